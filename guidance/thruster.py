@@ -1,0 +1,47 @@
+"""What the engine can do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Thruster:
+    """An engine that gives impulses along z of bounded size from a bounded budget.
+
+    Parameters
+    ----------
+    budget_m_s : float
+        Sum mu of the moduli of all impulses, m/s.
+    least_impulse_m_s, greatest_impulse_m_s : float
+        Bounds mu1 and mu2 of the modulus of one impulse that is not zero, m/s.
+
+    References
+    ----------
+    Kumkov and Patsko (1997), equation (3).
+    """
+
+    budget_m_s: float
+    least_impulse_m_s: float
+    greatest_impulse_m_s: float
+
+    def give(self, wanted_m_s: NDArray[np.float64], budget_left_m_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Impulses that the engine gives when a strategy wants these.
+
+        Parameters
+        ----------
+        wanted_m_s, budget_left_m_s : ndarray, shape (B,)
+            Wanted impulses (signed) and what is left of the budget n, m/s.
+
+        Returns
+        -------
+        ndarray, shape (B,)
+            Zero if |wanted| < mu1 or n < mu1, else `wanted` limited in modulus to min(mu2, n), m/s.
+        """
+        size = np.abs(wanted_m_s)
+        limited = np.copysign(np.minimum(size, np.minimum(self.greatest_impulse_m_s, budget_left_m_s)), wanted_m_s)
+        idle = (size < self.least_impulse_m_s) | (budget_left_m_s < self.least_impulse_m_s)
+        return np.where(idle, 0.0, limited)

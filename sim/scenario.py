@@ -1,0 +1,86 @@
+"""A scenario: every number of an engagement, in SI units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from guidance.thruster import Thruster
+from infoset.model import SetModel, StateBox
+from infoset.sensors import RangeSensor
+
+
+class NoiseKind(Enum):
+    """How nature chooses the measurement errors within their bounds."""
+
+    RANDOM = "random"
+    GAME = "game"
+
+
+class TieRule(Enum):
+    """Which extreme the game noise keeps when both are equally bad."""
+
+    UPPER = "upper"
+    LOWER = "lower"
+    ALTERNATE = "alternate"
+    RANDOM = "random"
+
+
+@dataclass(frozen=True)
+class Sun:
+    """The attracting body both craft move about.
+
+    Parameters
+    ----------
+    gravitational_parameter_m3_s2 : float
+        K, m^3/s^2.
+    distance_m : float
+        Distance from the spacecraft at t = 0, m.
+    direction_rad : float
+        Direction of the Sun seen from the spacecraft at t = 0, from the x axis toward z, rad.
+    """
+
+    gravitational_parameter_m3_s2: float
+    distance_m: float
+    direction_rad: float
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """An interception: truth, sensors, engine, guidance and noise.
+
+    Parameters
+    ----------
+    name, description : str
+        What a person calls it, and a line about it.
+    sun : Sun or None
+        None is free space.
+    nominal_range_m : float
+        Nominal range at t = 0, m.
+    dispersion : StateBox
+        Where the truth starts (B0 x D0), uniform; unknown on board. A fixed value has equal ends.
+    set_model : SetModel
+        What is known and assumed on board; it holds the closing speed, the step and the angle sensor.
+    range_sensor : RangeSensor or None
+        The range meter, if there is one.
+    thruster : Thruster
+        Limits of the engine.
+    strategy : str
+        Name of the guidance strategy.
+    noise : NoiseKind
+        How measurement errors are chosen.
+    tie : TieRule
+        The game noise's choice between equally bad extremes.
+    """
+
+    name: str
+    description: str
+    sun: Sun | None
+    nominal_range_m: float
+    dispersion: StateBox
+    set_model: SetModel
+    range_sensor: RangeSensor | None
+    thruster: Thruster
+    strategy: str = "symmetric-miss"
+    noise: NoiseKind = NoiseKind.RANDOM
+    tie: TieRule = TieRule.UPPER
