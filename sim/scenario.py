@@ -3,27 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
 
+from guidance.noise import NoiseKind, TieRule
 from guidance.thruster import Thruster
 from infoset.model import SetModel, StateBox
 from infoset.sensors import RangeSensor
-
-
-class NoiseKind(Enum):
-    """How nature chooses the measurement errors within their bounds."""
-
-    RANDOM = "random"
-    GAME = "game"
-
-
-class TieRule(Enum):
-    """Which extreme the game noise keeps when both are equally bad."""
-
-    UPPER = "upper"
-    LOWER = "lower"
-    ALTERNATE = "alternate"
-    RANDOM = "random"
 
 
 @dataclass(frozen=True)
