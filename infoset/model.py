@@ -1,4 +1,4 @@
-"""What the information set assumes: the motion, the start, the sensor and how much uncertainty a step adds."""
+"""What the set assumes: the motion, the start, the sensor and how much uncertainty a step adds."""
 
 from __future__ import annotations
 
