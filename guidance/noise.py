@@ -1,8 +1,17 @@
-"""The kinds of measurement noise."""
+"""The contract of measurement noise, and its kinds."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import Enum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infoset import AngleSensor, InformationSetView
+
+Floats = NDArray[np.float64]
 
 
 class NoiseKind(Enum):
@@ -19,3 +28,49 @@ class TieRule(Enum):
     LOWER = "lower"
     ALTERNATE = "alternate"
     RANDOM = "random"
+
+
+@dataclass(frozen=True)
+class LineOfSight:
+    """What the sensors look at in one step: the truth, and what they can tell of it.
+
+    Parameters
+    ----------
+    step : int
+        Number of the step.
+    alpha_rad, range_m : ndarray, shape (B,)
+        True line-of-sight angle and range.
+    angle_sensor : AngleSensor
+        Error law of the angle.
+    range_error : float or None
+        Relative error bound b of the range meter; None where it does not measure in this step.
+    """
+
+    step: int
+    alpha_rad: Floats
+    range_m: Floats
+    angle_sensor: AngleSensor
+    range_error: float | None
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What the sensors give.
+
+    Parameters
+    ----------
+    alpha_rad : ndarray, shape (B,)
+        Measured line-of-sight angle, rad.
+    range_m : ndarray, shape (B,), or None
+        Measured range, m; None where it was not measured.
+    """
+
+    alpha_rad: Floats
+    range_m: Floats | None
+
+
+class MeasurementNoise(Protocol):
+    """A rule that chooses the errors within their bounds."""
+
+    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
+        """Choose the measurements of a step, knowing the truth and the set before the measurement."""

@@ -1,1 +1,30 @@
-"""The set engine."""
+"""Set-membership estimation with polygon information sets: the set engine, usable on its own.
+
+Start with `InformationSet` (a batch of sets carried through measurements, impulses and time) or
+`ConvexPolygons` (operations on batches of convex polygons).
+"""
+
+from infoset.convex_polygons import ConvexPolygons
+from infoset.information_set import InformationSet, InformationSetView, Section, SetStatus, to_omega_alpha
+from infoset.model import InitialSet, Model, SetModel, StateBox
+from infoset.predicted_miss import ExtremePoints, PredictedMiss
+from infoset.sensors import AngleSensor, RangeSensor
+from infoset.shapes import to_shapely
+
+__all__ = [
+    "AngleSensor",
+    "ConvexPolygons",
+    "ExtremePoints",
+    "InformationSet",
+    "InformationSetView",
+    "InitialSet",
+    "Model",
+    "PredictedMiss",
+    "RangeSensor",
+    "Section",
+    "SetModel",
+    "SetStatus",
+    "StateBox",
+    "to_omega_alpha",
+    "to_shapely",
+]

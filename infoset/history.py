@@ -1,0 +1,61 @@
+"""The history of a batch of engagements: what was measured and done, in order."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infoset.section_kernels import PREDICTION
+
+ROOM_AT_START = 64
+
+
+class History:
+    """A tape of events shared by a batch: the kinds are common, the values one an engagement.
+
+    Parameters
+    ----------
+    batch : int
+        Number of engagements B.
+
+    Attributes
+    ----------
+    kinds : ndarray of int, shape (>= events,)
+        Kind of each event: an angle, an impulse or a prediction.
+    values : ndarray, shape (B, >= events)
+        Measured angle (rad) or impulse (m/s).
+    applies : ndarray of bool, shape (B, >= events)
+        Whether the event concerned the engagement.
+    events : int
+        Number of events.
+    elapsed : int
+        Number of predictions among them.
+    """
+
+    def __init__(self, batch: int) -> None:
+        self.kinds = np.zeros(ROOM_AT_START, dtype=np.int64)
+        self.values = np.zeros((batch, ROOM_AT_START))
+        self.applies = np.zeros((batch, ROOM_AT_START), dtype=bool)
+        self.events = 0
+        self.elapsed = 0
+
+    def record(self, kind: int, values: NDArray[np.float64], applies: NDArray[np.bool_]) -> int:
+        """Add an event; return its number."""
+        event = self.events
+        if event == self.kinds.size:
+            self.kinds = np.concatenate((self.kinds, np.zeros_like(self.kinds)))
+            self.values = np.concatenate((self.values, np.zeros_like(self.values)), axis=1)
+            self.applies = np.concatenate((self.applies, np.zeros_like(self.applies)), axis=1)
+        self.kinds[event] = kind
+        self.values[:, event] = values
+        self.applies[:, event] = applies
+        self.events += 1
+        self.elapsed += kind == PREDICTION
+        return event
+
+    def copy(self) -> History:
+        """A history of its own that starts from this one."""
+        twin = History.__new__(History)
+        twin.kinds, twin.values, twin.applies = self.kinds.copy(), self.values.copy(), self.applies.copy()
+        twin.events, twin.elapsed = self.events, self.elapsed
+        return twin

@@ -1,0 +1,559 @@
+"""The information set that a person handles: all states that agree with everything measured and done."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from infoset import section_kernels as kernels
+from infoset.convex_polygons import ConvexPolygons
+from infoset.history import History
+from infoset.location import refine_all
+from infoset.model import InitialSet, SetModel
+from infoset.predicted_miss import ExtremePoints, PredictedMiss
+from infoset.section_stack import SectionStack
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+class SetStatus(Enum):
+    """What has become of an information set."""
+
+    TRACKING = 0
+    """Some state agrees with everything, above the range threshold."""
+    EMPTY = 1
+    """No state agrees, and none had left below the threshold: the data or the model are inconsistent."""
+    FINISHED = 2
+    """Every hypothesis has left below the threshold."""
+    REFUTED = 3
+    """The hypotheses above the threshold are refuted, so the truth is among those that have left."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """One x-section of an information set.
+
+    Parameters
+    ----------
+    label_m : float
+        Range at t = 0 under this hypothesis, m.
+    range_m : float
+        Range now, m.
+    closing_speed_m_s : float
+        The nominal closing speed e, m/s.
+    polygon : ConvexPolygons
+        All (V, z) that agree with the history, m/s and m.
+    """
+
+    label_m: float
+    range_m: float
+    closing_speed_m_s: float
+    polygon: ConvexPolygons
+
+    @property
+    def omega_alpha(self) -> ConvexPolygons:
+        """The section as people look at it: (omega, alpha), rad/s and rad."""
+        return to_omega_alpha(self.polygon, self.range_m, self.closing_speed_m_s)
+
+
+def to_omega_alpha(polygon: ConvexPolygons, range_m: float, closing_speed_m_s: float) -> ConvexPolygons:
+    """Image of a polygon of (V, z) in the (omega, alpha) plane at a range.
+
+    Parameters
+    ----------
+    polygon : ConvexPolygons
+        Polygons of (V, z), m/s and m.
+    range_m, closing_speed_m_s : float
+        Range x and closing speed e.
+
+    Returns
+    -------
+    ConvexPolygons
+        omega = (V + e z/x)/x in rad/s, alpha = z/x in rad.
+    """
+    x, e = range_m, closing_speed_m_s
+    return polygon.linear_map(np.array([[1.0 / x, e / x**2], [0.0, 1.0 / x]]))
+
+
+class InformationSetView:
+    """What may be asked of an information set; nothing here changes it. Leading axis: B engagements.
+
+    Parameters
+    ----------
+    model : SetModel
+    stack : SectionStack
+        The stored sections.
+    history : History
+        What was measured and done.
+    label_limits : tuple of ndarray, shape (B,)
+        Least and greatest label that may live.
+    status : ndarray of int, shape (B,)
+        Values of `SetStatus`.
+    """
+
+    def __init__(
+        self,
+        model: SetModel,
+        stack: SectionStack,
+        history: History,
+        label_limits: tuple[Floats, Floats],
+        status: NDArray[np.int64],
+    ) -> None:
+        self.model = model
+        self._stack = stack
+        self._history = history
+        self._lower_label, self._upper_label = label_limits
+        self._status = status
+        self._some_left = np.zeros(stack.batch, dtype=bool)
+
+    @property
+    def batch(self) -> int:
+        """Number of engagements B."""
+        return self._stack.batch
+
+    @property
+    def time_s(self) -> float:
+        """Time now, s."""
+        return self._history.elapsed * self.model.step_s
+
+    @property
+    def status(self) -> list[SetStatus]:
+        """What has become of each set."""
+        return [SetStatus(value) for value in self._status]
+
+    @property
+    def tracking(self) -> Flags:
+        """Whether each set has states left above the threshold, shape (B,)."""
+        return self._status == SetStatus.TRACKING.value
+
+    @property
+    def living(self) -> Flags:
+        """Which stored sections live, shape (B, S)."""
+        return self._stack.living
+
+    @property
+    def labels_m(self) -> Floats:
+        """Labels of the stored sections, living or not, m, shape (B, S)."""
+        return self._stack.labels.copy()
+
+    @property
+    def ranges_m(self) -> Floats:
+        """Ranges of the stored sections now, m, shape (B, S)."""
+        return self._stack.ranges(self._history.elapsed)
+
+    @property
+    def section_counts(self) -> NDArray[np.int64]:
+        """Number of living sections, shape (B,)."""
+        return np.count_nonzero(self.living, axis=1)
+
+    def stored_range_interval_m(self) -> tuple[Floats, Floats]:
+        """Least and greatest range of the living stored sections, m; zeros where there is none."""
+        ranges, living = self.ranges_m, self.living
+        tracked = living.any(axis=1)
+        least = np.where(living, ranges, np.inf).min(axis=1)
+        greatest = np.where(living, ranges, -np.inf).max(axis=1)
+        return np.where(tracked, least, 0.0), np.where(tracked, greatest, 0.0)
+
+    def least_and_greatest_alpha(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Least and greatest line-of-sight angle of the stored sections, with the ranges where they are reached.
+
+        Returns
+        -------
+        alpha_least, alpha_greatest, range_of_least, range_of_greatest : ndarray, shape (B,)
+            rad and m; zeros where no section lives.
+        """
+        living, ranges = self.living, self.ranges_m
+        rows = np.arange(self.batch)
+        # Dead or unused slots may stand at any range: divide only where a section lives.
+        alphas_least = np.divide(
+            self._stack.summaries[:, :, kernels.Z_LEAST], ranges, out=np.full(ranges.shape, np.inf), where=living
+        )
+        alphas_greatest = np.divide(
+            self._stack.summaries[:, :, kernels.Z_GREATEST], ranges, out=np.full(ranges.shape, -np.inf), where=living
+        )
+        least_at, greatest_at = alphas_least.argmin(axis=1), alphas_greatest.argmax(axis=1)
+        tracked = living.any(axis=1)
+        return (
+            np.where(tracked, alphas_least[rows, least_at], 0.0),
+            np.where(tracked, alphas_greatest[rows, greatest_at], 0.0),
+            np.where(tracked, ranges[rows, least_at], 0.0),
+            np.where(tracked, ranges[rows, greatest_at], 0.0),
+        )
+
+    def predicted_miss(self) -> PredictedMiss:
+        """Predicted-miss interval over the stored sections, with the points that reach its ends.
+
+        Returns
+        -------
+        PredictedMiss
+            One interval an engagement.
+
+        References
+        ----------
+        Kumkov and Patsko (1997), equations (13) and (14).
+        """
+        living = self.living
+        exists = living.any(axis=1)
+        summaries = self._stack.summaries
+        upper_at = np.where(living, summaries[:, :, kernels.UPPER_MISS], -np.inf).argmax(axis=1)
+        lower_at = np.where(living, summaries[:, :, kernels.LOWER_MISS], np.inf).argmin(axis=1)
+        rows = np.arange(self.batch)
+        upper = np.where(exists[:, None], summaries[rows, upper_at], 0.0)
+        lower = np.where(exists[:, None], summaries[rows, lower_at], 0.0)
+        return PredictedMiss(
+            exists=exists,
+            lower_m=lower[:, kernels.LOWER_MISS],
+            upper_m=upper[:, kernels.UPPER_MISS],
+            lower_point=self._point(lower_at, lower[:, kernels.LOWER_V], lower[:, kernels.LOWER_Z], exists),
+            upper_point=self._point(upper_at, upper[:, kernels.UPPER_V], upper[:, kernels.UPPER_Z], exists),
+        )
+
+    def worst_predicted_miss_m(self) -> Floats:
+        """Greatest modulus of the predicted miss in each stored section, m, shape (B, S); zero where none lives."""
+        summaries = self._stack.summaries
+        worst = np.maximum(summaries[:, :, kernels.UPPER_MISS], -summaries[:, :, kernels.LOWER_MISS])
+        return np.where(self.living, worst, 0.0)
+
+    def _point(self, at: NDArray[np.int64], v: Floats, z: Floats, exists: Flags) -> ExtremePoints:
+        labels = self._stack.labels[np.arange(self.batch), at]
+        x = np.where(exists, labels - self.model.closing_speed_m_s * self.time_s, 1.0)
+        alpha = z / x
+        omega = (v + self.model.closing_speed_m_s * alpha) / x
+        return ExtremePoints(alpha, omega, np.where(exists, x, 0.0))
+
+    def sections(self, engagement: int = 0) -> list[Section]:
+        """Living sections of one engagement, in rising order of range."""
+        ranges = self.ranges_m[engagement]
+        return [
+            Section(
+                float(self._stack.labels[engagement, s]),
+                float(ranges[s]),
+                self.model.closing_speed_m_s,
+                ConvexPolygons(
+                    self._stack.vertices[engagement, s, : self._stack.counts[engagement, s]].copy(),
+                    self._stack.counts[engagement, s].copy(),
+                ),
+            )
+            for s in np.flatnonzero(self.living[engagement])
+        ]
+
+    def section_at(self, label_m: float, engagement: int = 0) -> Section:
+        """The section at any label, had by replaying the history.
+
+        Parameters
+        ----------
+        label_m : float
+            Range at t = 0 of the hypothesis, m.
+        engagement : int
+            Which of the batch.
+
+        Returns
+        -------
+        Section
+            Its polygon is empty if the label is refuted.
+
+        Notes
+        -----
+        About 0.1 us an event of the history.
+        """
+        points = np.empty((kernels.VERTEX_CAPACITY, 2))
+        scratch = np.empty((kernels.VERTEX_CAPACITY, 2))
+        tape = self._history
+        count, _ = kernels.replay(
+            float(label_m),
+            tape.kinds,
+            tape.values[engagement],
+            tape.applies[engagement],
+            tape.events,
+            self._stack.law,
+            points,
+            scratch,
+            np.empty(tape.events),
+        )
+        x = kernels.range_of(float(label_m), tape.elapsed, self._stack.law)
+        polygon = ConvexPolygons(points[:count].copy(), np.asarray(count))
+        return Section(float(label_m), x, self.model.closing_speed_m_s, polygon)
+
+    def margin(self, label_m: float, alpha_rad: float, omega_rad_s: float, engagement: int = 0) -> float:
+        """Signed margin of a state in the section at its label: positive inside, negative outside.
+
+        Parameters
+        ----------
+        label_m : float
+            Range at t = 0 of the state, m.
+        alpha_rad, omega_rad_s : float
+            Line-of-sight angle and its rate now.
+        engagement : int
+            Which of the batch.
+
+        Returns
+        -------
+        float
+            Distance to the boundary, m, with V counted as V x/e, the miss that it is worth; -inf if refuted.
+        """
+        section = self.section_at(label_m, engagement)
+        x, e = section.range_m, section.closing_speed_m_s
+        scaled = section.polygon.linear_map(np.array([[x / e, 0.0], [0.0, 1.0]]))
+        z, v = alpha_rad * x, omega_rad_s * x - e * alpha_rad
+        return float(scaled.margin(np.array([v * x / e, z])))
+
+    def living_range_interval_m(self) -> tuple[Floats, Floats]:
+        """Exact ends of the ranges that agree with the history, found by replay between the stored sections.
+
+        Returns
+        -------
+        least, greatest : ndarray, shape (B,)
+            m; zeros where no range agrees.
+
+        Notes
+        -----
+        About ten replays an end.
+        """
+        copy = self._detached()
+        copy._regrid(self.tracking, 2)
+        return copy.stored_range_interval_m()
+
+    def copy(self) -> InformationSet:
+        """An information set of its own that starts from this one."""
+        return self._detached()
+
+    def _detached(self) -> InformationSet:
+        twin = InformationSet.__new__(InformationSet)
+        InformationSetView.__init__(
+            twin,
+            self.model,
+            self._stack.copy(),
+            self._history.copy(),
+            (self._lower_label.copy(), self._upper_label.copy()),
+            self._status.copy(),
+        )
+        twin._some_left = self._some_left.copy()
+        return twin
+
+    def to_shapely(self, engagement: int = 0) -> list[BaseGeometry]:
+        """Living sections of one engagement as shapely geometries in the (omega, alpha) plane, rad/s and rad."""
+        from infoset.shapes import to_shapely
+
+        return [to_shapely(section.omega_alpha) for section in self.sections(engagement)]
+
+    def __repr__(self) -> str:
+        head = f"{type(self).__name__} at t = {self.time_s:g} s"
+        if self.batch > 1:
+            counts = np.bincount(self._status, minlength=len(SetStatus))
+            states = ", ".join(f"{counts[s.value]} {s.name.lower()}" for s in SetStatus if counts[s.value])
+            return f"<{head}: {self.batch} engagements, {states}>"
+        if not self.tracking[0]:
+            return f"<{head}: {self.status[0].name.lower()}>"
+        least, greatest = self.stored_range_interval_m()
+        miss = self.predicted_miss()
+        return (
+            f"<{head}: {self.section_counts[0]} sections, range {least[0] / 1e3:.6g} to {greatest[0] / 1e3:.6g} km, "
+            f"predicted miss {miss.lower_m[0]:.4g} to {miss.upper_m[0]:.4g} m>"
+        )
+
+
+class InformationSet(InformationSetView):
+    """All states (alpha, omega, x) that agree with everything measured and done, for a batch of engagements.
+
+    Parameters
+    ----------
+    model : SetModel
+        What is known and assumed.
+    batch : int
+        Number of engagements B; one by default.
+
+    Examples
+    --------
+    >>> from infoset import AngleSensor, InformationSet, SetModel, StateBox
+    >>> known = StateBox(z_m=(-10e3, 10e3), x_m=(5.3e6, 6.3e6), vz_m_s=(-100.0, 100.0), vx_m_s=(-59e3, -57e3))
+    >>> sensor = AngleSensor(0.5, 0.00015, 0.00023, nominal_range_m=5.8e6)
+    >>> information = InformationSet(SetModel(58e3, 0.5, known, sensor, disturbance_m_s2=0.005, sections=3))
+    >>> information
+    <InformationSet at t = 0 s: 3 sections, range 5300 to 6300 km, predicted miss -2.105e+04 to 2.105e+04 m>
+    >>> information.measure_angle(0.0004)
+    >>> information.shift(2.0)
+    >>> information.predict()
+    >>> information.sections()[0].polygon
+    <hexagon, area 8.33e+05>
+
+    Notes
+    -----
+    The order inside one step: `measure_range`, `measure_angle`, `shift`, `drop_below_threshold`, `predict`.
+    """
+
+    def __init__(self, model: SetModel, batch: int = 1) -> None:
+        least, greatest = model.bounds.x_m
+        slots = max(model.sections, 2 * model.fewest_sections + 1)
+        labels = np.full((batch, slots), greatest)
+        labels[:, : model.sections] = (
+            np.linspace(least, greatest, model.sections) if model.sections > 1 else 0.5 * (least + greatest)
+        )
+        super().__init__(
+            model,
+            SectionStack(section_law(model), labels, np.full(batch, model.sections)),
+            History(batch),
+            (np.full(batch, least), np.full(batch, greatest)),
+            np.full(batch, SetStatus.TRACKING.value, dtype=np.int64),
+        )
+
+    def view(self) -> InformationSetView:
+        """A read-only view of this set: it follows the set and cannot change it."""
+        limits = self._lower_label, self._upper_label
+        return InformationSetView(self.model, self._stack, self._history, limits, self._status)
+
+    def measure_range(self, range_m: ArrayLike, relative_error: float, where: ArrayLike = True) -> None:
+        """Keep the ranges that a range measurement allows: x_m/(1 + b) <= x <= x_m/(1 - b).
+
+        Parameters
+        ----------
+        range_m : array_like, shape () or (B,)
+            Measured range x_m, m.
+        relative_error : float
+            Bound b.
+        where : array_like of bool, shape () or (B,)
+            Which engagements have measured.
+
+        Notes
+        -----
+        A range measurement cuts no polygon: it narrows the interval of labels.
+        """
+        measured = self._spread(range_m, "range_m")
+        active = self._active(where)
+        travelled = self.model.closing_speed_m_s * self.time_s
+        slack = kernels.CUT_SLACK * (measured + travelled)
+        lower = measured / (1.0 + relative_error) + travelled - slack
+        upper = measured / (1.0 - relative_error) + travelled + slack
+        self._lower_label[active] = np.maximum(self._lower_label, lower)[active]
+        self._upper_label[active] = np.minimum(self._upper_label, upper)[active]
+        self._stack.keep_labels(self._lower_label, self._upper_label, active)
+        self._keep_enough(active, emptied=SetStatus.EMPTY)
+
+    def measure_angle(self, alpha_rad: ArrayLike, where: ArrayLike = True) -> None:
+        """Cut every section by a line-of-sight angle measurement: |alpha - alpha_m| <= a + h(x).
+
+        Parameters
+        ----------
+        alpha_rad : array_like, shape () or (B,)
+            Measured angle alpha_m, rad.
+        where : array_like of bool, shape () or (B,)
+            Which engagements have measured.
+        """
+        measured = self._spread(alpha_rad, "alpha_rad")
+        active = self._active(where)
+        event = self._history.record(kernels.ANGLE, measured, active)
+        self._stack.measure_angle(active, measured, self._history.elapsed, event)
+        self._keep_enough(active, emptied=SetStatus.EMPTY)
+
+    def shift(self, impulse_m_s: ArrayLike, where: ArrayLike = True) -> None:
+        """Shift every section by an impulse: V becomes V - k, that is omega becomes omega - k/x.
+
+        Parameters
+        ----------
+        impulse_m_s : array_like, shape () or (B,)
+            Impulse k along z, m/s.
+        where : array_like of bool, shape () or (B,)
+            Which engagements have fired.
+        """
+        impulse = self._spread(impulse_m_s, "impulse_m_s")
+        active = self._active(where) & (impulse != 0.0)
+        self._history.record(kernels.IMPULSE, impulse, active)
+        self._stack.shift(active, impulse, self._history.elapsed)
+
+    def drop_below_threshold(self, where: ArrayLike = True) -> Flags:
+        """Let the sections leave whose range will be below the threshold after the next step.
+
+        Returns
+        -------
+        ndarray of bool, shape (B, S)
+            Which stored sections left.
+        """
+        active = self._active(where)
+        elapsed = self.model.step_s * (self._history.elapsed + 1)
+        least_label = self.model.range_threshold_m + self.model.closing_speed_m_s * elapsed
+        self._lower_label[active] = np.maximum(self._lower_label, least_label)[active]
+        left = self._stack.keep_labels(self._lower_label, self._upper_label, active)
+        self._some_left |= left.any(axis=1)
+        self._keep_enough(active, emptied=SetStatus.FINISHED)
+        return left
+
+    def predict(self, where: ArrayLike = True) -> None:
+        """Move the set one step on, under every disturbance within its bound.
+
+        Notes
+        -----
+        The exact disturbance is a thin lens in (V, z); as in the paper it is the segment between its ends.
+        """
+        active = self._active(where)
+        self._history.record(kernels.PREDICTION, np.zeros(self.batch), np.ones(self.batch, dtype=bool))
+        self._stack.predict(active, self._history.elapsed)
+
+    def _spread(self, value: ArrayLike, name: str) -> Floats:
+        values = np.broadcast_to(np.asarray(value, dtype=np.float64), (self.batch,))
+        if not np.isfinite(values).all():
+            raise ValueError(f"{name} must be finite: found {values[~np.isfinite(values)][0]}")
+        return np.ascontiguousarray(values)
+
+    def _active(self, where: ArrayLike) -> Flags:
+        return self.tracking & np.broadcast_to(np.asarray(where, dtype=bool), (self.batch,))
+
+    def _keep_enough(self, active: Flags, emptied: SetStatus) -> None:
+        """Re-grid where fewer than the fewest sections are left, and note where nothing lives."""
+        few = active & (self.section_counts < self.model.fewest_sections)
+        if not few.any():
+            return
+        self._regrid(few, 2 * self.model.fewest_sections + 1)
+        empty = few & (self.section_counts == 0)
+        self._status[empty] = emptied.value
+        if emptied is SetStatus.EMPTY:
+            self._status[empty & self._some_left] = SetStatus.REFUTED.value
+
+    def _regrid(self, wanted: Flags, sections: int) -> None:
+        tape, stack = self._history, self._stack
+        refine_all(
+            wanted,
+            sections,
+            tape.elapsed,
+            self._lower_label,
+            self._upper_label,
+            tape.kinds,
+            tape.values,
+            tape.applies,
+            tape.events,
+            stack.labels,
+            stack.used,
+            stack.law,
+            stack.vertices,
+            stack.counts,
+            stack.died,
+            stack.overlaps,
+            stack.summaries,
+        )
+
+
+def section_law(model: SetModel) -> kernels.SectionLaw:
+    """The numbers of a model as the kernels take them."""
+    box, sensor = model.bounds, model.angle_sensor
+    return kernels.SectionLaw(
+        closing_speed=float(model.closing_speed_m_s),
+        step=float(model.step_s),
+        disturbance=float(model.disturbance_m_s2),
+        half_v=float(model.disturbance_m_s2 * model.step_s),
+        half_z=float(0.5 * model.disturbance_m_s2 * model.step_s**2),
+        error_at_zero_range=float(sensor.error_at_zero_range_rad),
+        error_slope=float(sensor.error_slope_rad_per_m),
+        z_least=float(box.z_m[0]),
+        z_greatest=float(box.z_m[1]),
+        vz_least=float(box.vz_m_s[0]),
+        vz_greatest=float(box.vz_m_s[1]),
+        vx_least=float(box.vx_m_s[0]),
+        vx_greatest=float(box.vx_m_s[1]),
+        rectangle=model.initial_set is InitialSet.RECTANGLE,
+    )

@@ -1,0 +1,285 @@
+"""Where the living labels are: they form an interval, found exactly by replaying the history at chosen labels."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from infoset._compile import compiled
+from infoset.section_kernels import (
+    ALIVE,
+    VERTEX_CAPACITY,
+    Flags,
+    Floats,
+    Integers,
+    SectionLaw,
+    range_of,
+    replay,
+    summarise_section,
+)
+
+LABEL_RESOLUTION = 1e-12
+MOST_PROBES = 200
+
+
+class Tape(NamedTuple):
+    """The history of one engagement, as `section_kernels.replay` takes it."""
+
+    kinds: Integers
+    values: Floats
+    applies: Flags
+    events: int
+
+
+class Workspace(NamedTuple):
+    """Room for replays."""
+
+    points: Floats
+    scratch: Floats
+    overlaps: Floats
+    living_overlaps: Floats
+
+
+class Living(NamedTuple):
+    """The interval of living labels [lower, upper], each end bracketed by a label known to be dead.
+
+    Where an end is the limit of the search itself, the bracket is that limit.
+    """
+
+    found: bool
+    below: float
+    lower: float
+    upper: float
+    above: float
+
+
+@compiled
+def run(label: float, tape: Tape, law: SectionLaw, room: Workspace) -> tuple[int, float]:
+    """Event at which a label died (or ALIVE) and its overlap there (0 if alive)."""
+    _, died = replay(
+        label, tape.kinds, tape.values, tape.applies, tape.events, law, room.points, room.scratch, room.overlaps
+    )
+    return died, room.overlaps[died] if died != ALIVE else 0.0
+
+
+@compiled
+def outlives(died: int, overlap: float, other_died: int, other_overlap: float) -> bool:
+    """Whether a dead label is nearer to living than another: it died later, or at less distance."""
+    return died > other_died or (died == other_died and overlap > other_overlap)
+
+
+@compiled
+def locate_end(
+    dead: float,
+    died: int,
+    overlap: float,
+    living: float,
+    resolution: float,
+    tape: Tape,
+    law: SectionLaw,
+    room: Workspace,
+) -> tuple[float, float]:
+    """Narrow the bracket between a dead and a living label; return the bracket (dead, living).
+
+    Notes
+    -----
+    The overlap at the measurement that kills is concave in the label, so the Illinois form of false position
+    converges fast; every fourth probe halves the bracket, against a change of the killing measurement.
+    """
+    run(living, tape, law, room)
+    room.living_overlaps[: tape.events] = room.overlaps[: tape.events]
+    weight_dead = overlap
+    weight_living = room.living_overlaps[died]
+    side = 0
+    for probes in range(MOST_PROBES):
+        if abs(living - dead) <= resolution:
+            break
+        fraction = 0.5
+        if probes % 4 != 3 and weight_living > weight_dead:
+            fraction = min(max(-weight_dead / (weight_living - weight_dead), 1e-3), 1.0 - 1e-3)
+        label = dead + fraction * (living - dead)
+        probe_died, probe_overlap = run(label, tape, law, room)
+        if probe_died == ALIVE:
+            living = label
+            room.living_overlaps[: tape.events] = room.overlaps[: tape.events]
+            weight_living = room.living_overlaps[died]
+            weight_dead = 0.5 * weight_dead if side == 1 else overlap
+            side = 1
+        else:
+            dead, died, overlap = label, probe_died, probe_overlap
+            weight_dead = overlap
+            weight_living = (0.5 if side == -1 else 1.0) * room.living_overlaps[died]
+            side = -1
+    return dead, living
+
+
+@compiled
+def search_living(
+    labels: Floats, died: Integers, overlaps: Floats, resolution: float, tape: Tape, law: SectionLaw, room: Workspace
+) -> int:
+    """Look for a living label between dead ones; the arrays hold three, of which the middle outlives the others.
+
+    Returns
+    -------
+    int
+        1 if the middle label now lives, 0 if the bracket closed without one.
+
+    Notes
+    -----
+    (time of death, overlap) is unimodal in the label: the larger half of the bracket is probed in its middle.
+    """
+    for _ in range(MOST_PROBES):
+        if labels[2] - labels[0] <= resolution:
+            return 0
+        lower_half = labels[1] - labels[0] > labels[2] - labels[1]
+        outer = 0 if lower_half else 2
+        label = 0.5 * (labels[1] + labels[outer])
+        probe_died, probe_overlap = run(label, tape, law, room)
+        if probe_died == ALIVE or outlives(probe_died, probe_overlap, died[1], overlaps[1]):
+            other = 2 - outer
+            labels[other], died[other], overlaps[other] = labels[1], died[1], overlaps[1]
+            labels[1], died[1], overlaps[1] = label, probe_died, probe_overlap
+            if probe_died == ALIVE:
+                return 1
+        else:
+            labels[outer], died[outer], overlaps[outer] = label, probe_died, probe_overlap
+    return 0
+
+
+@compiled
+def locate_living(
+    limit_below: float,
+    limit_above: float,
+    labels: Floats,
+    counts: Integers,
+    died: Integers,
+    overlaps: Floats,
+    tape: Tape,
+    law: SectionLaw,
+    room: Workspace,
+) -> Living:
+    """Find the living labels within limits, starting from what is known of the stored ones (in rising order)."""
+    nothing = Living(False, limit_below, limit_below, limit_above, limit_above)
+    if limit_below > limit_above:
+        return nothing
+    resolution = LABEL_RESOLUTION * max(abs(limit_below), abs(limit_above))
+    # The stored labels within the limits, between the limits themselves.
+    known = np.empty(labels.shape[0] + 2)
+    known_died = np.empty(labels.shape[0] + 2, np.int64)
+    known_overlap = np.empty(labels.shape[0] + 2)
+    known[0] = limit_below
+    known_died[0], known_overlap[0] = run(limit_below, tape, law, room)
+    size = 1
+    for s in range(labels.shape[0]):
+        if limit_below < labels[s] < limit_above:
+            known[size] = labels[s]
+            known_died[size] = ALIVE if counts[s] > 0 else died[s]
+            known_overlap[size] = overlaps[s]
+            size += 1
+    if limit_above > limit_below:
+        known[size] = limit_above
+        known_died[size], known_overlap[size] = run(limit_above, tape, law, room)
+        size += 1
+    best = 0
+    for i in range(1, size):
+        if outlives(known_died[i], known_overlap[i], known_died[best], known_overlap[best]):
+            best = i
+    first = last = best
+    if known_died[best] != ALIVE:
+        bracket = np.empty(3)
+        bracket_died = np.empty(3, np.int64)
+        bracket_overlap = np.empty(3)
+        for k in range(3):
+            i = min(max(best - 1 + k, 0), size - 1)
+            bracket[k], bracket_died[k], bracket_overlap[k] = known[i], known_died[i], known_overlap[i]
+        if search_living(bracket, bracket_died, bracket_overlap, resolution, tape, law, room) == 0:
+            return nothing
+        below, lower = locate_end(
+            bracket[0], bracket_died[0], bracket_overlap[0], bracket[1], resolution, tape, law, room
+        )
+        above, upper = locate_end(
+            bracket[2], bracket_died[2], bracket_overlap[2], bracket[1], resolution, tape, law, room
+        )
+        return Living(True, below, lower, upper, above)
+    for i in range(size):
+        if known_died[i] == ALIVE:
+            first = min(first, i)
+            last = max(last, i)
+    below = lower = known[first]
+    if first > 0:
+        below, lower = locate_end(
+            known[first - 1], known_died[first - 1], known_overlap[first - 1], lower, resolution, tape, law, room
+        )
+    above = upper = known[last]
+    if last < size - 1:
+        above, upper = locate_end(
+            known[last + 1], known_died[last + 1], known_overlap[last + 1], upper, resolution, tape, law, room
+        )
+    return Living(True, below, lower, upper, above)
+
+
+@compiled
+def refine_all(
+    wanted: Flags,
+    sections: int,
+    elapsed: int,
+    limit_below: Floats,
+    limit_above: Floats,
+    kinds: Integers,
+    values: Floats,
+    applies: Flags,
+    events: int,
+    labels: Floats,
+    used: Integers,
+    law: SectionLaw,
+    vertices: Floats,
+    counts: Integers,
+    died: Integers,
+    overlaps: Floats,
+    summaries: Floats,
+) -> None:
+    """Give each wanted engagement a new grid of sections over its living labels, ends included, by replay.
+
+    Notes
+    -----
+    `limit_below` and `limit_above` are narrowed to labels known to be dead. Where nothing lives, the engagement is
+    left with no living section.
+    """
+    scratch = np.empty((VERTEX_CAPACITY, 2))
+    room = Workspace(np.empty((VERTEX_CAPACITY, 2)), scratch, np.empty(events), np.empty(events))
+    for b in range(labels.shape[0]):
+        if not wanted[b]:
+            continue
+        tape = Tape(kinds, values[b], applies[b], events)
+        stored = used[b]
+        living = locate_living(
+            limit_below[b],
+            limit_above[b],
+            labels[b, :stored],
+            counts[b, :stored],
+            died[b, :stored],
+            overlaps[b, :stored],
+            tape,
+            law,
+            room,
+        )
+        counts[b, :stored] = 0
+        if not living.found:
+            continue
+        limit_below[b] = living.below
+        limit_above[b] = living.above
+        used[b] = sections
+        for s in range(sections):
+            share = s / (sections - 1) if sections > 1 else 0.5
+            labels[b, s] = living.lower + share * (living.upper - living.lower)
+            if s > 0 and s == sections - 1:
+                labels[b, s] = living.upper
+            counts[b, s], died[b, s] = replay(
+                labels[b, s], kinds, values[b], applies[b], events, law, vertices[b, s], scratch, room.overlaps
+            )
+            if counts[b, s] > 0:
+                x = range_of(labels[b, s], elapsed, law)
+                summarise_section(vertices[b, s], counts[b, s], x, law, summaries[b, s])
+            else:
+                overlaps[b, s] = room.overlaps[died[b, s]]

@@ -1,0 +1,81 @@
+"""Random numbers of a batch of runs: each run has its own streams, whatever batch it is flown in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infoset import StateBox
+from sim.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+START, ANGLE, RANGE, TIE = range(4)
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Everything random in a batch of B engagements.
+
+    Parameters
+    ----------
+    position_m, velocity_m_s : ndarray, shape (B, 2)
+        Relative (z, x) and (V_z, V_x) of the truth at t = 0.
+    angle, range, tie : ndarray, shape (B, steps)
+        Uniform in [-1, 1]: errors of the angle and of the range in units of their bounds, and choices between ties.
+    """
+
+    position_m: Floats
+    velocity_m_s: Floats
+    angle: Floats
+    range: Floats
+    tie: Floats
+
+
+def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
+    """Draw the random numbers of some runs of an experiment.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    runs : sequence of int
+        Numbers of the runs.
+    seed : int
+        The root seed. Run k has the same numbers in every experiment of the same seed.
+
+    Returns
+    -------
+    Draws
+    """
+    steps = greatest_number_of_steps(scenario)
+    box = scenario.dispersion
+    starts = np.stack([generator(seed, run, START).uniform(size=4) for run in runs])
+    noise = [
+        np.stack([generator(seed, run, stream).uniform(-1.0, 1.0, size=steps) for run in runs])
+        for stream in (ANGLE, RANGE, TIE)
+    ]
+    lower, upper = corners(box)
+    states = lower + (upper - lower) * starts
+    return Draws(states[:, :2], states[:, 2:], *noise)
+
+
+def corners(box: StateBox) -> tuple[Floats, Floats]:
+    """Least and greatest (z, x, V_z, V_x) of a box."""
+    intervals = np.array([box.z_m, box.x_m, box.vz_m_s, box.vx_m_s], dtype=np.float64)
+    return intervals[:, 0], intervals[:, 1]
+
+
+def generator(seed: int, run: int, stream: int) -> np.random.Generator:
+    """The generator of one stream of one run."""
+    return np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(run, stream)))
+
+
+def greatest_number_of_steps(scenario: Scenario) -> int:
+    """Steps after which every truth of the dispersion has passed its closest approach."""
+    box = scenario.dispersion
+    slowest = min(-box.vx_m_s[0], -box.vx_m_s[1])
+    return math.ceil(1.01 * box.x_m[1] / (slowest * scenario.set_model.step_s)) + 2

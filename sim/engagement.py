@@ -1,0 +1,262 @@
+"""The one closed loop: a batch of engagements flown step by step against the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance import (
+    GameNoise,
+    LineOfSight,
+    MeasurementNoise,
+    NoiseKind,
+    RandomNoise,
+    Situation,
+    Strategy,
+    make_strategy,
+)
+from infoset import InformationSet, InformationSetView, PredictedMiss, SetStatus
+from sim.draws import Draws
+from sim.kepler import KeplerMotion, Sight, TrueMotion
+from sim.results import Outcome, Results
+from sim.scenario import Scenario
+from sim.truth_section import TruthSection
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of a batch, as an observer sees it: after the decision, before the impulse.
+
+    Parameters
+    ----------
+    step : int
+    time_s : float
+    tracking : ndarray of bool, shape (B,)
+        Engagements that still measure and decide.
+    flying : ndarray of bool, shape (B,)
+        Engagements whose truth had not passed its closest approach.
+    sight : Sight
+        True geometry.
+    position_m, velocity_m_s : ndarray, shape (B, 2)
+        The label-independent truth: relative (z, x) and (V_z, V_x), where the motion has them.
+    measured_angle_rad, measured_range_m : ndarray, shape (B,), or None
+        None where nothing was measured in this step.
+    predicted_miss : PredictedMiss
+        After the measurement, before the impulse.
+    impulse_m_s : ndarray, shape (B,)
+        What the thruster gives.
+    truth_margin_m : ndarray, shape (B,)
+        Signed margin of the truth in its own section.
+    information : InformationSetView
+        The set after the measurement.
+    """
+
+    step: int
+    time_s: float
+    tracking: Flags
+    flying: Flags
+    sight: Sight
+    measured_angle_rad: Floats | None
+    measured_range_m: Floats | None
+    predicted_miss: PredictedMiss
+    impulse_m_s: Floats
+    truth_margin_m: Floats
+    information: InformationSetView
+
+
+class Engagements:
+    """A batch of engagements in flight.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    draws : Draws
+        The random numbers of the batch.
+    strategy : Strategy or None
+        None is the scenario's own.
+    truth : TrueMotion or None
+        None is Kepler motion under the scenario's Sun.
+
+    Notes
+    -----
+    One step: measure, intersect, decide, shift, drop what falls below the threshold, predict; meanwhile the truth
+    moves on, and is watched for its closest approach. Nothing flows from the truth to the strategy but measurements.
+    """
+
+    def __init__(
+        self, scenario: Scenario, draws: Draws, strategy: Strategy | None = None, truth: TrueMotion | None = None
+    ) -> None:
+        self.scenario = scenario
+        self.step = 0
+        self._draws = draws
+        self._batch = batch = len(draws.position_m)
+        self._truth = truth or KeplerMotion(draws.position_m, draws.velocity_m_s, scenario.sun)
+        self._noise = _make_noise(scenario, draws)
+        self._strategy = strategy or make_strategy(scenario.strategy)
+        self._state = self._strategy.start(batch)
+        self._information = InformationSet(scenario.set_model, batch)
+        self._truth_section = TruthSection(scenario.set_model, draws.position_m, draws.velocity_m_s)
+        self._angle_every = _steps_in(scenario.set_model.angle_sensor.period_s, scenario)
+        self._range_every = _steps_in(scenario.range_sensor.period_s, scenario) if scenario.range_sensor else 0
+        self._flying = np.ones(batch, dtype=bool)
+        self._tracking = np.ones(batch, dtype=bool)
+        self._miss = np.full(batch, np.inf)
+        self._budget = np.full(batch, float(scenario.thruster.budget_m_s))
+        self._impulse = np.zeros(batch)
+        self._spent = np.zeros(batch, dtype=bool)
+        self._guaranteed = np.zeros(batch)
+        self._finished_label = np.zeros(batch, dtype=bool)
+        self._measured_angle: Floats | None = None
+        self._measured_range: Floats | None = None
+
+    @property
+    def flying(self) -> bool:
+        """Whether any truth has yet to pass its closest approach."""
+        return bool(self._flying.any()) and self.step < self._draws.angle.shape[1]
+
+    def advance(self, observe: Callable[[Step], None] | None = None) -> None:
+        """Fly one step.
+
+        Parameters
+        ----------
+        observe : callable or None
+            Is shown each step after the decision, before the impulse.
+        """
+        model, thruster = self.scenario.set_model, self.scenario.thruster
+        sight = self._truth.sight()
+        self._tracking = self._flying & self._information.tracking
+        measured_angle, measured_range = self._measure(sight)
+        miss = self._information.predicted_miss()
+        tracking = self._tracking = self._tracking & self._information.tracking
+        wanted = np.where(tracking, self._decide(miss), 0.0)
+        self._spent |= (self._budget < thruster.least_impulse_m_s) & (np.abs(wanted) >= thruster.least_impulse_m_s)
+        self._impulse = thruster.give(wanted, self._budget)
+        if observe is not None:
+            observe(
+                Step(
+                    self.step,
+                    self.step * model.step_s,
+                    tracking,
+                    self._flying.copy(),
+                    sight,
+                    measured_angle,
+                    measured_range,
+                    miss,
+                    self._impulse,
+                    self._truth_section.margin_m.copy(),
+                    self._information.view(),
+                )
+            )
+        self._budget = np.maximum(self._budget - np.abs(self._impulse), 0.0)
+        self._truth.fire(self._impulse)
+        self._information.shift(self._impulse, tracking)
+        self._truth_section.shift(self._impulse)
+        self._finish_labels(tracking)
+        self._information.predict(tracking)
+        self._truth_section.predict()
+        passage = self._truth.advance(model.step_s)
+        self._miss = np.where(self._flying, np.minimum(self._miss, passage.least_distance_m), self._miss)
+        self._flying &= ~passage.passed
+        self.step += 1
+
+    def _measure(self, sight: Sight) -> tuple[Floats | None, Floats | None]:
+        if self.step % self._angle_every != 0 or not self._tracking.any():
+            return None, None
+        sensor = self.scenario.range_sensor
+        ranging = sensor is not None and self.step % self._range_every == 0
+        measurement = self._noise.measure(
+            LineOfSight(
+                self.step,
+                sight.alpha_rad,
+                sight.range_m,
+                self.scenario.set_model.angle_sensor,
+                sensor.relative_error if sensor is not None and ranging else None,
+            ),
+            self._information.view(),
+        )
+        if measurement.range_m is not None and sensor is not None:
+            self._information.measure_range(measurement.range_m, sensor.relative_error, self._tracking)
+            self._measured_range = measurement.range_m
+        self._information.measure_angle(measurement.alpha_rad, self._tracking)
+        self._truth_section.measure(measurement.alpha_rad, self._tracking, sight)
+        self._measured_angle = measurement.alpha_rad
+        return measurement.alpha_rad, measurement.range_m
+
+    def _decide(self, miss: PredictedMiss) -> Floats:
+        least, greatest = self._information.stored_range_interval_m()
+        situation = Situation(
+            time_s=self.step * self.scenario.set_model.step_s,
+            step=self.step,
+            step_s=self.scenario.set_model.step_s,
+            predicted_miss=miss,
+            budget_left_m_s=self._budget.copy(),
+            thruster=self.scenario.thruster,
+            closing_speed_m_s=self.scenario.set_model.closing_speed_m_s,
+            least_range_m=least,
+            greatest_range_m=greatest,
+            measured_angle_rad=self._measured_angle,
+            measured_range_m=self._measured_range,
+            last_impulse_m_s=self._impulse.copy(),
+            information=self._information.view(),
+        )
+        wanted = np.asarray(self._strategy.decide(situation, self._state), dtype=np.float64)
+        if wanted.shape != (self._batch,) or not np.isfinite(wanted[self._tracking]).all():
+            name = type(self._strategy).__name__
+            raise ValueError(
+                f"strategy {name} must return {self._batch} finite impulses (m/s), one an engagement: "
+                f"at step {self.step} it returned shape {wanted.shape}, {wanted}"
+            )
+        return wanted
+
+    def _finish_labels(self, tracking: Flags) -> None:
+        """Let labels leave below the threshold, and note the predicted miss of those that do."""
+        worst = self._information.worst_predicted_miss_m()
+        left = self._information.drop_below_threshold(tracking)
+        if left.any():
+            finished = left.any(axis=1)
+            payoff = np.where(left, worst, 0.0).max(axis=1)
+            self._guaranteed = np.where(finished, np.maximum(self._guaranteed, payoff), self._guaranteed)
+            self._finished_label |= finished
+
+    def results(self, runs: NDArray[np.int64]) -> Results:
+        """Results so far, under these run numbers."""
+        lost = np.array([status is SetStatus.EMPTY for status in self._information.status])
+        margin = self._truth_section.least_margin_m
+        return Results(
+            runs=runs,
+            miss_m=self._miss,
+            impulse_m_s=self.scenario.thruster.budget_m_s - self._budget,
+            guaranteed_miss_m=np.ma.MaskedArray(self._guaranteed, mask=~self._finished_label),
+            outcomes=tuple(
+                _outcome(*flags)
+                for flags in zip(self._miss > self.scenario.nominal_range_m, lost, self._spent, strict=True)
+            ),
+            truth_kept=margin >= 0.0,
+            truth_margin_m=margin,
+            position_m=self._draws.position_m,
+            velocity_m_s=self._draws.velocity_m_s,
+        )
+
+
+def _outcome(diverged: bool, lost: bool, spent: bool) -> Outcome:
+    if diverged:
+        return Outcome.DIVERGED
+    if lost:
+        return Outcome.SET_LOST
+    return Outcome.BUDGET_SPENT if spent else Outcome.INTERCEPTED
+
+
+def _make_noise(scenario: Scenario, draws: Draws) -> MeasurementNoise:
+    if scenario.noise is NoiseKind.GAME:
+        return GameNoise(scenario.tie, draws.tie)
+    return RandomNoise(draws.angle, draws.range)
+
+
+def _steps_in(period_s: float, scenario: Scenario) -> int:
+    return max(1, round(period_s / scenario.set_model.step_s))

@@ -1,0 +1,67 @@
+"""Fly many engagements of one scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from guidance import Strategy
+from sim.draws import draw
+from sim.engagement import Engagements
+from sim.results import Results, join
+from sim.scenario import Scenario
+
+ENGAGEMENTS_AT_ONCE = 64
+
+
+def simulate(
+    scenario: Scenario,
+    runs: int | Sequence[int] = 50,
+    *,
+    seed: int = 0,
+    strategy: Strategy | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Results:
+    """Fly engagements whose starts and measurement errors are drawn at random.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The numbers of the engagement, noise and range meter included.
+    runs : int or sequence of int
+        How many, or which: run k of a seed is the same engagement in whatever company it is flown.
+    seed : int
+        The root seed.
+    strategy : Strategy or None
+        A strategy of your own; None is the scenario's.
+    progress : callable or None
+        Is told the fraction done, from 0 to 1.
+
+    Returns
+    -------
+    Results
+        In the order of `runs`.
+
+    Raises
+    ------
+    ValueError
+        If there is no run to fly, or the strategy returns no proper impulses.
+    """
+    numbers = np.arange(runs) if isinstance(runs, int) else np.asarray(runs, dtype=np.int64)
+    if numbers.size == 0 or numbers.min() < 0 or seed < 0:
+        raise ValueError(f"need at least one run, and run numbers and seed not negative: got runs={runs}, seed={seed}")
+    parts = []
+    for first in range(0, numbers.size, ENGAGEMENTS_AT_ONCE):
+        chunk = numbers[first : first + ENGAGEMENTS_AT_ONCE]
+        draws = draw(scenario, chunk.tolist(), seed)
+        flight = Engagements(scenario, draws, strategy)
+        steps = draws.angle.shape[1]
+        while flight.flying:
+            flight.advance()
+            if progress is not None:
+                progress((first + chunk.size * min(1.0, flight.step / steps)) / numbers.size)
+        parts.append(flight.results(chunk))
+        if progress is not None:
+            progress((first + chunk.size) / numbers.size)
+    return join(parts)
