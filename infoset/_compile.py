@@ -18,4 +18,9 @@ def compiled(function: F) -> F:
     Numba keys its cache by the file that holds the function, not by the files of the functions that it
     calls: after editing a kernel, delete `__pycache__` (see CONTRIBUTING).
     """
-    return cast(F, njit(cache=True, nogil=True, error_model="numpy")(function))
+    return cast(F, njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz"})(function))
+
+
+def inlined(function: F) -> F:
+    """Compile a small helper of the kernels so that it is always inlined: a call costs about 20 ns."""
+    return cast(F, njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz"}, forceinline=True)(function))

@@ -13,18 +13,18 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset._compile import compiled
+from infoset._compile import compiled, inlined
 
 Points = NDArray[np.float64]
 
 
-@compiled
+@inlined
 def cross(ax: float, ay: float, bx: float, by: float) -> float:
     """Cross product of two vectors of the plane."""
     return ax * by - ay * bx
 
 
-@compiled
+@inlined
 def append(out: Points, count: int, x: float, y: float) -> int:
     """Add a vertex unless it repeats the last one; return the new count."""
     if count > 0 and out[count - 1, 0] == x and out[count - 1, 1] == y:
@@ -34,7 +34,7 @@ def append(out: Points, count: int, x: float, y: float) -> int:
     return count + 1
 
 
-@compiled
+@inlined
 def close(out: Points, count: int) -> int:
     """Drop trailing vertices that repeat the first; return the new count."""
     while count > 1 and out[count - 1, 0] == out[0, 0] and out[count - 1, 1] == out[0, 1]:
@@ -42,7 +42,7 @@ def close(out: Points, count: int) -> int:
     return count
 
 
-@compiled
+@inlined
 def append_crossing(
     out: Points,
     count: int,
@@ -103,23 +103,28 @@ def clip_to_band(
     height_last = normal_x * points[last, 0] + normal_y * points[last, 1]
     for i in range(count):
         height = normal_x * points[i, 0] + normal_y * points[i, 1]
-        edge = (last, i, height_last, height)
-        if height_last < lower < height:
-            made = append_crossing(out, made, points, edge, lower, normal_x, normal_y)
-        elif height < upper < height_last:
-            made = append_crossing(out, made, points, edge, upper, normal_x, normal_y)
-        if height_last < upper < height:
-            made = append_crossing(out, made, points, edge, upper, normal_x, normal_y)
-        elif height < lower < height_last:
-            made = append_crossing(out, made, points, edge, lower, normal_x, normal_y)
-        if lower <= height <= upper:
-            made = append(out, made, points[i, 0], points[i, 1])
+        inside = lower <= height <= upper
+        if inside and lower <= height_last <= upper:
+            put(out, made, points[i, 0], points[i, 1])
+            made += 1
+        else:
+            edge = (last, i, height_last, height)
+            if height_last < lower < height:
+                made = append_crossing(out, made, points, edge, lower, normal_x, normal_y)
+            elif height < upper < height_last:
+                made = append_crossing(out, made, points, edge, upper, normal_x, normal_y)
+            if height_last < upper < height:
+                made = append_crossing(out, made, points, edge, upper, normal_x, normal_y)
+            elif height < lower < height_last:
+                made = append_crossing(out, made, points, edge, lower, normal_x, normal_y)
+            if inside:
+                made = append(out, made, points[i, 0], points[i, 1])
         last = i
         height_last = height
     return close(out, made)
 
 
-@compiled
+@inlined
 def translate(points: Points, count: int, x: float, y: float) -> None:
     """Move by (x, y), in place. O(count)."""
     for i in range(count):
@@ -147,7 +152,7 @@ def map_linearly(points: Points, count: int, xx: float, xy: float, yx: float, yy
     return append(out, made, last_x, last_y)
 
 
-@compiled
+@inlined
 def support_index(points: Points, count: int, normal_x: float, normal_y: float) -> int:
     """Index of a vertex farthest along a direction: the first of equals. O(count)."""
     best = 0
@@ -184,41 +189,58 @@ def add_segment(points: Points, count: int, half_x: float, half_y: float, out: P
     """
     if count == 0:
         return 0
+    if half_x == 0.0 and half_y == 0.0:
+        for i in range(count):
+            put(out, i, points[i, 0], points[i, 1])
+        return count
     # Heights are measured across the segment; of equally high vertices the hindmost and foremost count.
     bottom = np.inf
     top = -np.inf
     bottom_first = bottom_last = top_first = top_last = 0
     for i in range(count):
         height = cross(half_x, half_y, points[i, 0], points[i, 1])
-        if height < bottom:
-            bottom = height
-            bottom_first = bottom_last = i
-        elif height == bottom:
-            bottom_first = hindmost(points, bottom_first, i, half_x, half_y)
-            bottom_last = hindmost(points, bottom_last, i, -half_x, -half_y)
-        if height > top:
-            top = height
-            top_first = top_last = i
-        elif height == top:
-            top_first = hindmost(points, top_first, i, -half_x, -half_y)
-            top_last = hindmost(points, top_last, i, half_x, half_y)
-    made = 0
-    i = bottom_last
-    while True:
-        made = append(out, made, points[i, 0] + half_x, points[i, 1] + half_y)
-        if i == top_first:
-            break
-        i = i + 1 if i + 1 < count else 0
-    i = top_last
-    while True:
-        made = append(out, made, points[i, 0] - half_x, points[i, 1] - half_y)
-        if i == bottom_first:
-            break
-        i = i + 1 if i + 1 < count else 0
-    return close(out, made)
+        if height <= bottom:
+            if height < bottom:
+                bottom = height
+                bottom_first = bottom_last = i
+            else:
+                bottom_first = hindmost(points, bottom_first, i, half_x, half_y)
+                bottom_last = hindmost(points, bottom_last, i, -half_x, -half_y)
+        if height >= top:
+            if height > top:
+                top = height
+                top_first = top_last = i
+            else:
+                top_first = hindmost(points, top_first, i, -half_x, -half_y)
+                top_last = hindmost(points, top_last, i, half_x, half_y)
+    made = put_stretch(points, count, bottom_last, top_first, half_x, half_y, out, 0)
+    return put_stretch(points, count, top_last, bottom_first, -half_x, -half_y, out, made)
 
 
-@compiled
+@inlined
+def put(out: Points, i: int, x: float, y: float) -> None:
+    """Write a vertex."""
+    out[i, 0] = x
+    out[i, 1] = y
+
+
+@inlined
+def put_stretch(
+    points: Points, count: int, first: int, last: int, x: float, y: float, out: Points, made: int
+) -> int:
+    """Write the vertices from first to last, counter-clockwise, moved by (x, y); return how many there are now."""
+    end = last + 1 if first <= last else count
+    for i in range(first, end):
+        put(out, made, points[i, 0] + x, points[i, 1] + y)
+        made += 1
+    if first > last:
+        for i in range(last + 1):
+            put(out, made, points[i, 0] + x, points[i, 1] + y)
+            made += 1
+    return made
+
+
+@inlined
 def hindmost(points: Points, i: int, j: int, x: float, y: float) -> int:
     """Whichever of two vertices lies less far along (x, y); the first of equals."""
     if x * (points[j, 0] - points[i, 0]) + y * (points[j, 1] - points[i, 1]) < 0.0:

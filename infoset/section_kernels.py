@@ -34,9 +34,8 @@ ANGLE, IMPULSE, PREDICTION = 0, 1, 2
 ALIVE = np.iinfo(np.int64).max
 
 # Columns of a section's summary.
-V_LEAST, V_GREATEST, Z_LEAST, Z_GREATEST = 0, 1, 2, 3
-UPPER_MISS, UPPER_V, UPPER_Z, LOWER_MISS, LOWER_V, LOWER_Z = 4, 5, 6, 7, 8, 9
-SUMMARY_COLUMNS = 10
+Z_LEAST, Z_GREATEST, UPPER_MISS, UPPER_V, UPPER_Z, LOWER_MISS, LOWER_V, LOWER_Z = range(8)
+SUMMARY_COLUMNS = 8
 
 
 class SectionLaw(NamedTuple):
@@ -157,7 +156,7 @@ def predict_section(points: Floats, count: int, law: SectionLaw, scratch: Floats
 
 @compiled
 def summarise_section(points: Floats, count: int, x: float, law: SectionLaw, summary: Floats) -> None:
-    """Write the bounding box and the extremes of the predicted miss (13), (14) with the points that reach them.
+    """Write the extent in z and the extremes of the predicted miss (13), (14) with the points that reach them.
 
     Notes
     -----
@@ -165,30 +164,25 @@ def summarise_section(points: Floats, count: int, x: float, law: SectionLaw, sum
     for the upper extreme and its highest for the lower one, so that a mirrored engagement is mirrored exactly.
     """
     time_to_go = x / law.closing_speed
-    v_least = z_least = lower = np.inf
-    v_greatest = z_greatest = upper = -np.inf
+    z_least = lower = np.inf
+    z_greatest = upper = -np.inf
+    upper_at = lower_at = 0
     for i in range(count):
-        v = points[i, 0]
         z = points[i, 1]
-        miss = z + v * time_to_go
-        v_least = min(v_least, v)
-        v_greatest = max(v_greatest, v)
+        miss = z + points[i, 0] * time_to_go
         z_least = min(z_least, z)
         z_greatest = max(z_greatest, z)
-        lower = min(lower, miss)
-        upper = max(upper, miss)
-    magnitude = max(abs(z_least), abs(z_greatest)) + max(abs(v_least), abs(v_greatest)) * time_to_go
-    tolerance = TIE_TOLERANCE * (upper - lower) + CUT_SLACK * magnitude
-    upper_at = lower_at = -1
-    for i in range(count):
-        miss = points[i, 1] + points[i, 0] * time_to_go
-        if miss >= upper - tolerance and (upper_at < 0 or points[i, 1] < points[upper_at, 1]):
+        if miss > upper:
+            upper = miss
             upper_at = i
-        if miss <= lower + tolerance and (lower_at < 0 or points[i, 1] > points[lower_at, 1]):
+        if miss < lower:
+            lower = miss
             lower_at = i
+    magnitude = abs(points[upper_at, 1]) + abs(points[lower_at, 1]) + (upper - lower)
+    tolerance = TIE_TOLERANCE * (upper - lower) + CUT_SLACK * magnitude
+    upper_at = extreme_along_edge(points, count, upper_at, time_to_go, upper - tolerance, 1.0)
+    lower_at = extreme_along_edge(points, count, lower_at, time_to_go, lower + tolerance, -1.0)
     drift = 0.5 * law.disturbance * time_to_go * time_to_go
-    summary[V_LEAST] = v_least
-    summary[V_GREATEST] = v_greatest
     summary[Z_LEAST] = z_least
     summary[Z_GREATEST] = z_greatest
     summary[UPPER_MISS] = upper + drift
@@ -197,6 +191,25 @@ def summarise_section(points: Floats, count: int, x: float, law: SectionLaw, sum
     summary[LOWER_MISS] = lower - drift
     summary[LOWER_V] = points[lower_at, 0]
     summary[LOWER_Z] = points[lower_at, 1]
+
+
+@compiled
+def extreme_along_edge(points: Floats, count: int, start: int, time_to_go: float, level: float, sign: float) -> int:
+    """Index of the lowest (sign 1) vertex with a miss at least `level`, or highest (sign -1) with one at most."""
+    best = start
+    for direction in (1, -1):
+        i = start
+        for _ in range(count - 1):
+            i += direction
+            if i == count:
+                i = 0
+            elif i < 0:
+                i = count - 1
+            if sign * (points[i, 1] + points[i, 0] * time_to_go - level) < 0.0:
+                break
+            if sign * (points[i, 1] - points[best, 1]) < 0.0:
+                best = i
+    return best
 
 
 @compiled
@@ -261,8 +274,6 @@ def shift_all(
                 continue
             polygon.translate(vertices[b, s], counts[b, s], -impulse[b], 0.0)
             summary = summaries[b, s]
-            summary[V_LEAST] -= impulse[b]
-            summary[V_GREATEST] -= impulse[b]
             summary[UPPER_V] -= impulse[b]
             summary[LOWER_V] -= impulse[b]
             miss = impulse[b] * range_of(labels[b, s], elapsed, law) / law.closing_speed

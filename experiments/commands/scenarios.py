@@ -1,0 +1,127 @@
+"""infoset scenarios: list, show, check and begin scenario files."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(
+    name="scenarios",
+    help="List, show and check scenarios, and begin one of your own.",
+    epilog="Example: infoset scenarios new mine.toml",
+)
+
+Json = Annotated[bool, typer.Option("--json", help="Print JSON alone on stdout.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no more than is asked for.")]
+
+
+@app.callback(invoke_without_command=True)
+def scenarios(context: typer.Context, json_: Json = False, quiet: Quiet = False) -> None:
+    """List, show and check scenarios, and begin one of your own. Alone, it lists the built-in ones."""
+    if context.invoked_subcommand is None:
+        list_scenarios(json_=json_, quiet=quiet)
+    elif json_ or quiet:
+        raise typer.BadParameter(f"put --json and --quiet after {context.invoked_subcommand!r}")
+
+
+@app.command("list", epilog="Example: infoset scenarios list --json")
+def list_scenarios(json_: Json = False, quiet: Quiet = False) -> None:
+    """List the built-in scenarios. With --quiet: their names alone."""
+    from experiments.scenario_file import load_scenario, scenario_names
+
+    built_in = [load_scenario(name) for name in scenario_names()]
+    if json_:
+        typer.echo(json.dumps([{"name": each.name, "description": each.description} for each in built_in], indent=2))
+        return
+    if quiet:
+        typer.echo("\n".join(each.name for each in built_in))
+        return
+
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table("name", "description", box=None, pad_edge=False)
+    for each in built_in:
+        table.add_row(Text(each.name, no_wrap=True), Text(each.description))
+    Console().print(table)
+
+
+@app.command("show", epilog="Example: infoset scenarios show asteroid-1997 > mine.toml")
+def show(name: Annotated[str, typer.Argument(help="Name of a built-in scenario.")]) -> None:
+    """Print the file of a built-in scenario, comments and all."""
+    from experiments.scenario_file import scenario_text
+
+    typer.echo(scenario_text(name), nl=False)
+
+
+@app.command("check", epilog="Example: infoset scenarios check mine.toml")
+def check(
+    file: Annotated[str, typer.Argument(help="A scenario file, or the name of a built-in scenario.")],
+    json_: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Check a scenario file: exit code 0 if it is sound, 2 with every problem named if it is not."""
+    from experiments.scenario_file import load_scenario, scenario_hash, scenario_warnings
+
+    scenario = load_scenario(file)
+    fingerprint, warnings = scenario_hash(scenario), scenario_warnings(scenario)
+    if json_:
+        from importlib.metadata import version
+
+        found = {
+            "version": version("infoset"),
+            "name": scenario.name,
+            "scenario_hash": fingerprint,
+            "warnings": warnings,
+        }
+        typer.echo(json.dumps(found, indent=2))
+    elif not quiet:
+        from rich.console import Console
+        from rich.text import Text
+
+        console = Console(soft_wrap=True)
+        console.print(Text.assemble(("ok", "bold green"), f"  {scenario.name}  {fingerprint}"))
+        for warning in warnings:
+            console.print(Text.assemble(("warning: ", "yellow"), warning))
+
+
+@app.command("new", epilog="Example: infoset scenarios new mine.toml")
+def new(
+    file: Annotated[Path, typer.Argument(help="The file to write.")],
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file if it exists.")] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a commented scenario file to start one's own from."""
+    from experiments.scenario_file import scenario_template
+
+    _write_new(file, scenario_template(), overwrite)
+    if not quiet:
+        typer.echo(f"wrote {file}; edit it, then: infoset scenarios check {file}")
+
+
+def _write_new(file: Path, text: str, overwrite: bool) -> None:
+    """Write a file whole or not at all, and replace one only when told to."""
+    from experiments.errors import InputError
+
+    temporary = file.with_name(f".{file.name}.{os.getpid()}.tmp") if file.name else file
+    try:
+        if file.is_dir():
+            raise InputError(f"{file}: is a folder; name a file in it, for example {file / 'mine.toml'}")
+        if os.path.lexists(file) and not overwrite:
+            raise InputError(f"{file}: exists already; choose another name, or give --overwrite to replace it")
+        if not file.parent.is_dir():
+            raise InputError(f"{file}: there is no folder {file.parent}; make it first")
+        with temporary.open("x", encoding="utf-8", newline="\n") as stream:
+            stream.write(text)
+        temporary.replace(file)
+    except (OSError, ValueError) as error:
+        with contextlib.suppress(OSError, ValueError):
+            temporary.unlink(missing_ok=True)
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise InputError(f"{file}: cannot be written: {reason}; choose a folder you may write in") from None
