@@ -225,9 +225,7 @@ def put(out: Points, i: int, x: float, y: float) -> None:
 
 
 @inlined
-def put_stretch(
-    points: Points, count: int, first: int, last: int, x: float, y: float, out: Points, made: int
-) -> int:
+def put_stretch(points: Points, count: int, first: int, last: int, x: float, y: float, out: Points, made: int) -> int:
     """Write the vertices from first to last, counter-clockwise, moved by (x, y); return how many there are now."""
     end = last + 1 if first <= last else count
     for i in range(first, end):

@@ -1,1 +1,22 @@
-"""The simulator."""
+"""The simulator: scenarios, the truth, the closed loop, records and statistics."""
+
+from sim.record import Record, StepRecord, fly_one
+from sim.results import Outcome, Results
+from sim.scenario import Scenario, Sun
+from sim.simulate import simulate
+from sim.statistics import Distribution, band_half_width, empirical_distribution, quantiles
+
+__all__ = [
+    "Distribution",
+    "Outcome",
+    "Record",
+    "Results",
+    "Scenario",
+    "StepRecord",
+    "Sun",
+    "band_half_width",
+    "empirical_distribution",
+    "fly_one",
+    "quantiles",
+    "simulate",
+]

@@ -1,0 +1,140 @@
+"""The record of one engagement: everything needed to draw it again without flying it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance import Strategy
+from infoset import Section
+from sim.draws import draw
+from sim.engagement import Engagements, Step
+from sim.results import Results
+from sim.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StepRecord:
+    """One step of one engagement.
+
+    Parameters
+    ----------
+    time_s : float
+    measured_angle_rad, measured_range_m : float or None
+        None where nothing was measured.
+    true_angle_rad, true_rate_rad_s, true_range_m : float
+        Line of sight of the truth.
+    impulse_m_s : float
+        Impulse k given in this step.
+    predicted_miss_m : tuple of float, or None
+        (pi_*, pi^*) after the measurement and before the impulse; None where no set is left.
+    truth_margin_m : float
+        Signed margin of the truth in its own section, as of the last measurement.
+    sections : tuple of Section
+        The living sections after the measurement, in rising order of range.
+    """
+
+    time_s: float
+    measured_angle_rad: float | None
+    measured_range_m: float | None
+    true_angle_rad: float
+    true_rate_rad_s: float
+    true_range_m: float
+    impulse_m_s: float
+    predicted_miss_m: tuple[float, float] | None
+    truth_margin_m: float
+    sections: tuple[Section, ...]
+
+
+@dataclass(frozen=True)
+class Record:
+    """One engagement, whole.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        As flown: noise, tie rule and range meter are those of this engagement.
+    seed, run : int
+        What draws the same engagement again.
+    strategy : str
+        Name of the strategy.
+    result : Results
+        A batch of one.
+    steps : tuple of StepRecord
+    """
+
+    scenario: Scenario
+    seed: int
+    run: int
+    strategy: str
+    result: Results
+    steps: tuple[StepRecord, ...]
+
+
+@dataclass
+class _Recorder:
+    steps: list[StepRecord] = field(default_factory=list)
+
+    def __call__(self, step: Step) -> None:
+        measured = bool(step.tracking[0]) or bool(step.measured_angle_rad is not None)
+        miss = step.predicted_miss
+        self.steps.append(
+            StepRecord(
+                time_s=step.time_s,
+                measured_angle_rad=_first(step.measured_angle_rad) if measured else None,
+                measured_range_m=_first(step.measured_range_m) if measured else None,
+                true_angle_rad=float(step.sight.alpha_rad[0]),
+                true_rate_rad_s=float(step.sight.omega_rad_s[0]),
+                true_range_m=float(step.sight.range_m[0]),
+                impulse_m_s=float(step.impulse_m_s[0]),
+                predicted_miss_m=(float(miss.lower_m[0]), float(miss.upper_m[0])) if miss.exists[0] else None,
+                truth_margin_m=float(step.truth_margin_m[0]),
+                sections=tuple(step.information.sections()),
+            )
+        )
+
+
+def _first(values: Floats | None) -> float | None:
+    return None if values is None else float(values[0])
+
+
+def fly_one(
+    scenario: Scenario,
+    run: int = 0,
+    *,
+    seed: int = 0,
+    strategy: Strategy | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Record:
+    """Fly one engagement and keep everything.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    run, seed : int
+        Run `run` of `simulate(..., seed=seed)` is the same engagement, number for number.
+    strategy : Strategy or None
+        A strategy of your own; None is the scenario's.
+    progress : callable or None
+        Is told the fraction done, from 0 to 1.
+
+    Returns
+    -------
+    Record
+    """
+    if run < 0 or seed < 0:
+        raise ValueError(f"run and seed must not be negative: got run={run}, seed={seed}")
+    draws = draw(scenario, [run], seed)
+    flight = Engagements(scenario, draws, strategy)
+    recorder = _Recorder()
+    while flight.flying:
+        flight.advance(recorder)
+        if progress is not None:
+            progress(min(1.0, flight.step / draws.angle.shape[1]))
+    name = scenario.strategy if strategy is None else type(strategy).__name__
+    return Record(scenario, seed, run, name, flight.results(np.array([run])), tuple(recorder.steps))
