@@ -1,0 +1,336 @@
+"""Batches of convex polygons, and what can be done with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from infoset import polygon as kernels
+from infoset._compile import compiled
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+_NAMES = ("empty set", "point", "segment", "triangle", "quadrangle", "pentagon", "hexagon")
+
+
+class ConvexPolygons:
+    """A batch of convex polygons of any shape; a single polygon is a batch of shape ().
+
+    Parameters
+    ----------
+    vertices : array_like, shape (..., V, 2)
+        The first `counts` rows are the vertices, counter-clockwise. One is a point, two a segment, none the empty set.
+    counts : array_like of int, shape (...)
+        Number of vertices.
+
+    Raises
+    ------
+    ValueError
+        If shapes disagree or a vertex is not finite.
+
+    Notes
+    -----
+    Operations return new objects and cost O(vertices); their arguments are broadcast over the batch.
+    Cuts and sums are exact up to rounding of the coordinates; no tolerance is absolute.
+    """
+
+    def __init__(self, vertices: ArrayLike, counts: ArrayLike) -> None:
+        self.counts: Integers = np.asarray(counts, dtype=np.int64)
+        self.vertices: Floats = np.asarray(vertices, dtype=np.float64)
+        if self.vertices.ndim < 2 or self.vertices.shape[-1] != 2 or self.vertices.shape[:-2] != self.counts.shape:
+            raise ValueError(
+                f"vertices of shape (..., V, 2) and counts of shape (...) are needed: "
+                f"got {self.vertices.shape} and {self.counts.shape}"
+            )
+        if (self.counts < 0).any() or (self.counts > self.vertices.shape[-2]).any():
+            raise ValueError(f"counts must lie between 0 and {self.vertices.shape[-2]}, the room for vertices")
+        used = np.arange(self.vertices.shape[-2]) < self.counts[..., None]
+        if not np.isfinite(self.vertices[used]).all():
+            raise ValueError("vertices must be finite")
+
+    @classmethod
+    def from_points(cls, points: ArrayLike) -> ConvexPolygons:
+        """Convex hull of points.
+
+        Parameters
+        ----------
+        points : array_like, shape (n, 2)
+            In any order; none gives the empty set.
+
+        Returns
+        -------
+        ConvexPolygons
+            A batch of shape ().
+        """
+        given = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+        if not np.isfinite(given).all():
+            raise ValueError("points must be finite")
+        if len(given) == 0:
+            return cls.empty()
+        from shapely import MultiPoint
+
+        from infoset.shapes import from_shapely
+
+        return from_shapely(MultiPoint(given).convex_hull)
+
+    @classmethod
+    def box(cls, x: tuple[float, float], y: tuple[float, float]) -> ConvexPolygons:
+        """Axis-parallel box from two intervals; equal ends give a segment or a point."""
+        if x[0] > x[1] or y[0] > y[1]:
+            raise ValueError(f"an interval is reversed: x = {x}, y = {y}")
+        corners = [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])]
+        distinct = list(dict.fromkeys(corners))
+        return cls(np.array(distinct), len(distinct))
+
+    @classmethod
+    def empty(cls, shape: tuple[int, ...] = ()) -> ConvexPolygons:
+        """Empty sets."""
+        return cls(np.zeros((*shape, 0, 2)), np.zeros(shape, dtype=np.int64))
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the batch."""
+        return self.counts.shape
+
+    @property
+    def is_empty(self) -> NDArray[np.bool_]:
+        """Which are empty, shape (...)."""
+        return np.asarray(self.counts == 0)
+
+    def __len__(self) -> int:
+        if not self.shape:
+            raise TypeError("a single polygon has no length; its number of vertices is .counts")
+        return self.shape[0]
+
+    def __getitem__(self, index: object) -> ConvexPolygons:
+        return ConvexPolygons(self.vertices[index], self.counts[index])  # type: ignore[index]
+
+    def __iter__(self) -> Iterator[ConvexPolygons]:
+        return (self[i] for i in range(len(self)))
+
+    def __repr__(self) -> str:
+        if self.shape:
+            return f"<convex polygons, batch of shape {self.shape}, {self.counts.min(initial=0)} to " + (
+                f"{self.counts.max(initial=0)} vertices>"
+            )
+        count = int(self.counts)
+        name = _NAMES[count] if count < len(_NAMES) else f"polygon of {count} vertices"
+        if count == 0:
+            return "<empty set>"
+        if count == 1:
+            return f"<point ({self.vertices[0, 0]:.6g}, {self.vertices[0, 1]:.6g})>"
+        if count == 2:
+            return f"<segment, length {np.hypot(*(self.vertices[1] - self.vertices[0])):.3g}>"
+        return f"<{name}, area {self.area():.3g}>"
+
+    def polygon(self) -> Floats:
+        """Vertices of a single polygon, shape (count, 2)."""
+        if self.shape:
+            raise ValueError(f"this is a batch of shape {self.shape}: choose one with an index first")
+        return self.vertices[: int(self.counts)].copy()
+
+    def clip(self, normal: ArrayLike, lower: ArrayLike = -np.inf, upper: ArrayLike = np.inf) -> ConvexPolygons:
+        """Intersection with the band lower <= normal . p <= upper.
+
+        Parameters
+        ----------
+        normal : array_like, shape (2,) or (..., 2)
+            Not zero; of any length.
+        lower, upper : array_like, shape () or (...)
+            Bounds; infinite ones give half-planes, a reversed pair the empty set.
+        """
+        normals = self._vectors(normal, "normal")
+        if (np.abs(normals).max(axis=-1, initial=0.0) == 0.0).any():
+            raise ValueError("the normal of a band must not be zero")
+        return self._make(2, _clip_each, normals, self._scalars(lower, "lower"), self._scalars(upper, "upper"))
+
+    def linear_map(self, matrix: ArrayLike) -> ConvexPolygons:
+        """Image under a matrix, shape (2, 2) or (..., 2, 2); a singular one gives segments or points."""
+        matrices = np.broadcast_to(np.asarray(matrix, dtype=np.float64), (*self.shape, 2, 2)).reshape(-1, 2, 2)
+        if not np.isfinite(matrices).all():
+            raise ValueError("matrix must be finite")
+        return self._make(0, _map_each, np.ascontiguousarray(matrices))
+
+    def translate(self, offset: ArrayLike) -> ConvexPolygons:
+        """Move by an offset, shape (2,) or (..., 2)."""
+        moved = self.vertices + np.reshape(self._vectors(offset, "offset"), (*self.shape, 1, 2))
+        return ConvexPolygons(moved, self.counts)
+
+    def add_segment(self, half: ArrayLike) -> ConvexPolygons:
+        """Minkowski sum with the segment from -half to +half, shape (2,) or (..., 2)."""
+        return self._make(2, _add_segment_each, self._vectors(half, "half"))
+
+    def minkowski_sum(self, other: ConvexPolygons) -> ConvexPolygons:
+        """Minkowski sum with polygons of the same batch shape, or with a single one."""
+        shape = self.shape if not other.shape else np.broadcast_shapes(self.shape, other.shape)
+        first, second = self._broadcast(shape), other._broadcast(shape)
+        return first._make(second.vertices.shape[-2], _add_polygon_each, *second._flat())
+
+    def support(self, direction: ArrayLike) -> Floats:
+        """Support function: greatest direction . p, shape (...); -inf for the empty set."""
+        return self._measure(_support_each, self._vectors(direction, "direction"))[:, 0].reshape(self.shape)
+
+    def support_vector(self, direction: ArrayLike) -> Floats:
+        """A vertex farthest along a direction, shape (..., 2).
+
+        Raises
+        ------
+        ValueError
+            If a set is empty.
+        """
+        self._need_points("support vector")
+        return self._measure(_support_each, self._vectors(direction, "direction"))[:, 1:].reshape(*self.shape, 2)
+
+    def margin(self, point: ArrayLike) -> Floats:
+        """Signed distance of points, shape (2,) or (..., 2), to the boundary: positive inside, -inf if empty."""
+        return self._measure(_margin_each, self._vectors(point, "point"))[:, 0].reshape(self.shape)
+
+    def contains(self, point: ArrayLike) -> NDArray[np.bool_]:
+        """Whether points lie inside or on the boundary."""
+        return np.asarray(self.margin(point) >= 0.0)
+
+    def area(self) -> Floats:
+        """Area, shape (...)."""
+        return self._measure(_area_each, np.zeros((self.counts.size, 2)))[:, 0].reshape(self.shape)
+
+    def centroid(self) -> Floats:
+        """Centroid, shape (..., 2).
+
+        Raises
+        ------
+        ValueError
+            If a set is empty.
+        """
+        self._need_points("centroid")
+        return self._measure(_centroid_each, np.zeros((self.counts.size, 2)))[:, :2].reshape(*self.shape, 2)
+
+    def bounding_box(self) -> tuple[Floats, Floats]:
+        """Least and greatest coordinates, two arrays of shape (..., 2).
+
+        Raises
+        ------
+        ValueError
+            If a set is empty.
+        """
+        self._need_points("bounding box")
+        ends = [self.support((sign * (1 - axis), sign * axis)) for sign in (-1.0, 1.0) for axis in (0, 1)]
+        return np.stack((-ends[0], -ends[1]), axis=-1), np.stack(ends[2:], axis=-1)
+
+    def reduce_outward(self, cap: int) -> ConvexPolygons:
+        """Polygons of at most `cap` (>= 4) vertices that contain these, by dropping edges of least added area."""
+        if cap < 4:
+            raise ValueError(f"cap must be at least 4: got {cap}")
+        return self._make(0, _reduce_each, np.full(self.counts.size, cap))
+
+    def _need_points(self, what: str) -> None:
+        if self.is_empty.any():
+            raise ValueError(f"the empty set has no {what}")
+
+    def _vectors(self, value: ArrayLike, name: str) -> Floats:
+        vectors = np.asarray(value, dtype=np.float64)
+        if vectors.shape[-1:] != (2,) or not np.isfinite(vectors).all():
+            raise ValueError(f"{name} must be finite, of shape (2,) or (..., 2): got {value!r}")
+        return np.ascontiguousarray(np.broadcast_to(vectors, (*self.shape, 2)).reshape(-1, 2))
+
+    def _scalars(self, value: ArrayLike, name: str) -> Floats:
+        scalars = np.asarray(value, dtype=np.float64)
+        if np.isnan(scalars).any():
+            raise ValueError(f"{name} must be a number: got {value!r}")
+        return np.ascontiguousarray(np.broadcast_to(scalars, self.shape).reshape(-1))
+
+    def _broadcast(self, shape: tuple[int, ...]) -> ConvexPolygons:
+        return ConvexPolygons(
+            np.broadcast_to(self.vertices, (*shape, *self.vertices.shape[-2:])), np.broadcast_to(self.counts, shape)
+        )
+
+    def _flat(self) -> tuple[Floats, Integers]:
+        room = self.vertices.shape[-2]
+        vertices = np.require(self.vertices.reshape(-1, room, 2), requirements=["C", "W"])
+        return vertices, np.require(self.counts.reshape(-1), requirements=["C", "W"])
+
+    def _make(self, more: int, each: object, *arguments: object) -> ConvexPolygons:
+        """Apply an operation that makes polygons of at most `more` vertices more than these have."""
+        vertices, counts = self._flat()
+        out = np.zeros((counts.size, vertices.shape[1] + more, 2))
+        made = np.zeros(counts.size, dtype=np.int64)
+        each(vertices, counts, out, made, *arguments)  # type: ignore[operator]
+        room = int(made.max(initial=0))
+        return ConvexPolygons(out[:, :room].reshape(*self.shape, room, 2), made.reshape(self.shape))
+
+    def _measure(self, each: object, vectors: Floats) -> Floats:
+        """Apply an operation that gives up to three numbers a polygon."""
+        vertices, counts = self._flat()
+        out = np.zeros((counts.size, 3))
+        each(vertices, counts, vectors, out)  # type: ignore[operator]
+        return out
+
+
+@compiled
+def _clip_each(
+    vertices: Floats, counts: Integers, out: Floats, made: Integers, normal: Floats, lower: Floats, upper: Floats
+) -> None:
+    for i in range(counts.size):
+        made[i] = kernels.clip_to_band(vertices[i], counts[i], normal[i, 0], normal[i, 1], lower[i], upper[i], out[i])
+
+
+@compiled
+def _map_each(vertices: Floats, counts: Integers, out: Floats, made: Integers, matrix: Floats) -> None:
+    for i in range(counts.size):
+        m = matrix[i]
+        made[i] = kernels.map_linearly(vertices[i], counts[i], m[0, 0], m[0, 1], m[1, 0], m[1, 1], out[i])
+
+
+@compiled
+def _add_segment_each(vertices: Floats, counts: Integers, out: Floats, made: Integers, half: Floats) -> None:
+    for i in range(counts.size):
+        made[i] = kernels.add_segment(vertices[i], counts[i], half[i, 0], half[i, 1], out[i])
+
+
+@compiled
+def _add_polygon_each(
+    vertices: Floats, counts: Integers, out: Floats, made: Integers, other: Floats, other_counts: Integers
+) -> None:
+    for i in range(counts.size):
+        made[i] = kernels.add_polygon(vertices[i], counts[i], other[i], other_counts[i], out[i])
+
+
+@compiled
+def _reduce_each(vertices: Floats, counts: Integers, out: Floats, made: Integers, cap: Integers) -> None:
+    for i in range(counts.size):
+        for j in range(counts[i]):
+            out[i, j] = vertices[i, j]
+        made[i] = kernels.reduce_outward(out[i], counts[i], cap[i])
+
+
+@compiled
+def _support_each(vertices: Floats, counts: Integers, direction: Floats, out: Floats) -> None:
+    for i in range(counts.size):
+        if counts[i] == 0:
+            out[i, 0] = -np.inf
+            continue
+        x, y = direction[i]
+        at = kernels.support_index(vertices[i], counts[i], x, y)
+        out[i, 1] = vertices[i, at, 0]
+        out[i, 2] = vertices[i, at, 1]
+        out[i, 0] = x * out[i, 1] + y * out[i, 2]
+
+
+@compiled
+def _margin_each(vertices: Floats, counts: Integers, point: Floats, out: Floats) -> None:
+    for i in range(counts.size):
+        out[i, 0] = kernels.margin(vertices[i], counts[i], point[i, 0], point[i, 1])
+
+
+@compiled
+def _area_each(vertices: Floats, counts: Integers, unused: Floats, out: Floats) -> None:
+    for i in range(counts.size):
+        out[i, 0] = kernels.area(vertices[i], counts[i])
+
+
+@compiled
+def _centroid_each(vertices: Floats, counts: Integers, unused: Floats, out: Floats) -> None:
+    for i in range(counts.size):
+        out[i, 0], out[i, 1] = kernels.centroid(vertices[i], counts[i])
