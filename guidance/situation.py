@@ -33,8 +33,6 @@ class Situation:
         Limits of the engine; whatever a strategy wants is limited by them.
     closing_speed_m_s : float
         The nominal closing speed e, m/s.
-    least_range_m, greatest_range_m : ndarray, shape (B,)
-        Interval of the possible ranges, over the stored sections, m.
     measured_angle_rad : ndarray, shape (B,), or None
         Last measured line-of-sight angle; None before the first.
     measured_range_m : ndarray, shape (B,), or None
@@ -52,9 +50,12 @@ class Situation:
     budget_left_m_s: Floats
     thruster: Thruster
     closing_speed_m_s: float
-    least_range_m: Floats
-    greatest_range_m: Floats
     measured_angle_rad: Floats | None
     measured_range_m: Floats | None
     last_impulse_m_s: Floats
     information: InformationSetView
+
+    @property
+    def possible_ranges_m(self) -> tuple[Floats, Floats]:
+        """Least and greatest range that may be, over the stored sections, m, each of shape (B,)."""
+        return self.information.stored_range_interval_m()

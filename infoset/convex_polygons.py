@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -105,8 +105,10 @@ class ConvexPolygons:
             raise TypeError("a single polygon has no length; its number of vertices is .counts")
         return self.shape[0]
 
-    def __getitem__(self, index: object) -> ConvexPolygons:
-        return ConvexPolygons(self.vertices[index], self.counts[index])  # type: ignore[index]
+    def __getitem__(self, index: int | slice | tuple[int | slice, ...] | NDArray[np.bool_]) -> ConvexPolygons:
+        if not self.shape:
+            raise TypeError("a single polygon cannot be indexed; its vertices are .polygon()")
+        return ConvexPolygons(self.vertices[index], self.counts[index])
 
     def __iter__(self) -> Iterator[ConvexPolygons]:
         return (self[i] for i in range(len(self)))
@@ -251,21 +253,28 @@ class ConvexPolygons:
         vertices = np.require(self.vertices.reshape(-1, room, 2), requirements=["C", "W"])
         return vertices, np.require(self.counts.reshape(-1), requirements=["C", "W"])
 
-    def _make(self, more: int, each: object, *arguments: object) -> ConvexPolygons:
+    def _make(self, more: int, each: Callable[..., None], *arguments: object) -> ConvexPolygons:
         """Apply an operation that makes polygons of at most `more` vertices more than these have."""
         vertices, counts = self._flat()
         out = np.zeros((counts.size, vertices.shape[1] + more, 2))
         made = np.zeros(counts.size, dtype=np.int64)
-        each(vertices, counts, out, made, *arguments)  # type: ignore[operator]
+        each(vertices, counts, out, made, *arguments)
         room = int(made.max(initial=0))
         return ConvexPolygons(out[:, :room].reshape(*self.shape, room, 2), made.reshape(self.shape))
 
-    def _measure(self, each: object, vectors: Floats) -> Floats:
+    def _measure(self, each: Callable[..., None], vectors: Floats) -> Floats:
         """Apply an operation that gives up to three numbers a polygon."""
         vertices, counts = self._flat()
         out = np.zeros((counts.size, 3))
-        each(vertices, counts, vectors, out)  # type: ignore[operator]
+        each(vertices, counts, vectors, out)
         return out
+
+
+@compiled
+def _copy(vertices: Floats, count: int, out: Floats) -> None:
+    for i in range(count):
+        out[i, 0] = vertices[i, 0]
+        out[i, 1] = vertices[i, 1]
 
 
 @compiled
@@ -273,7 +282,8 @@ def _clip_each(
     vertices: Floats, counts: Integers, out: Floats, made: Integers, normal: Floats, lower: Floats, upper: Floats
 ) -> None:
     for i in range(counts.size):
-        made[i] = kernels.clip_to_band(vertices[i], counts[i], normal[i, 0], normal[i, 1], lower[i], upper[i], out[i])
+        _copy(vertices[i], counts[i], out[i])
+        made[i], _ = kernels.clip_to_band(out[i], counts[i], normal[i, 0], normal[i, 1], lower[i], upper[i])
 
 
 @compiled
@@ -286,7 +296,8 @@ def _map_each(vertices: Floats, counts: Integers, out: Floats, made: Integers, m
 @compiled
 def _add_segment_each(vertices: Floats, counts: Integers, out: Floats, made: Integers, half: Floats) -> None:
     for i in range(counts.size):
-        made[i] = kernels.add_segment(vertices[i], counts[i], half[i, 0], half[i, 1], out[i])
+        _copy(vertices[i], counts[i], out[i])
+        made[i] = kernels.shear_and_add_segment(out[i], counts[i], 0.0, half[i, 0], half[i, 1], 1.0, 0.0)
 
 
 @compiled
@@ -300,8 +311,7 @@ def _add_polygon_each(
 @compiled
 def _reduce_each(vertices: Floats, counts: Integers, out: Floats, made: Integers, cap: Integers) -> None:
     for i in range(counts.size):
-        for j in range(counts[i]):
-            out[i, j] = vertices[i, j]
+        _copy(vertices[i], counts[i], out[i])
         made[i] = kernels.reduce_outward(out[i], counts[i], cap[i])
 
 

@@ -35,6 +35,8 @@ class SetStatus(Enum):
     """Every hypothesis has left below the threshold."""
     REFUTED = 3
     """The hypotheses above the threshold are refuted, so the truth is among those that have left."""
+    STOPPED = 4
+    """No longer followed, at its owner's word."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,7 @@ class InformationSetView:
     @property
     def batch(self) -> int:
         """Number of engagements B."""
-        return self._stack.batch
+        return int(self._stack.batch)
 
     @property
     def time_s(self) -> float:
@@ -132,7 +134,7 @@ class InformationSetView:
     @property
     def tracking(self) -> Flags:
         """Whether each set has states left above the threshold, shape (B,)."""
-        return self._status == SetStatus.TRACKING.value
+        return np.asarray(self._status == SetStatus.TRACKING.value)
 
     @property
     def living(self) -> Flags:
@@ -152,7 +154,7 @@ class InformationSetView:
     @property
     def section_counts(self) -> NDArray[np.int64]:
         """Number of living sections, shape (B,)."""
-        return np.count_nonzero(self.living, axis=1)
+        return np.asarray(np.count_nonzero(self.living, axis=1))
 
     def stored_range_interval_m(self) -> tuple[Floats, Floats]:
         """Least and greatest range of the living stored sections, m; zeros where there is none."""
@@ -201,7 +203,7 @@ class InformationSetView:
         Kumkov and Patsko (1997), equations (13) and (14).
         """
         living = self.living
-        exists = living.any(axis=1)
+        exists = np.asarray(living.any(axis=1))
         summaries = self._stack.summaries
         upper_at = np.where(living, summaries[:, :, kernels.UPPER_MISS], -np.inf).argmax(axis=1)
         lower_at = np.where(living, summaries[:, :, kernels.LOWER_MISS], np.inf).argmin(axis=1)
@@ -265,7 +267,6 @@ class InformationSetView:
         About 0.1 us an event of the history.
         """
         points = np.empty((kernels.VERTEX_CAPACITY, 2))
-        scratch = np.empty((kernels.VERTEX_CAPACITY, 2))
         tape = self._history
         count, _ = kernels.replay(
             float(label_m),
@@ -275,7 +276,6 @@ class InformationSetView:
             tape.events,
             self._stack.law,
             points,
-            scratch,
             np.empty(tape.events),
         )
         x = kernels.range_of(float(label_m), tape.elapsed, self._stack.law)
@@ -467,7 +467,7 @@ class InformationSet(InformationSetView):
         self._history.record(kernels.IMPULSE, impulse, active)
         self._stack.shift(active, impulse, self._history.elapsed)
 
-    def drop_below_threshold(self, where: ArrayLike = True) -> Flags:
+    def drop_below_threshold(self) -> Flags:
         """Let the sections leave whose range will be below the threshold after the next step.
 
         Returns
@@ -475,7 +475,7 @@ class InformationSet(InformationSetView):
         ndarray of bool, shape (B, S)
             Which stored sections left.
         """
-        active = self._active(where)
+        active = self.tracking
         elapsed = self.model.step_s * (self._history.elapsed + 1)
         least_label = self.model.range_threshold_m + self.model.closing_speed_m_s * elapsed
         self._lower_label[active] = np.maximum(self._lower_label, least_label)[active]
@@ -484,25 +484,29 @@ class InformationSet(InformationSetView):
         self._keep_enough(active, emptied=SetStatus.FINISHED)
         return left
 
-    def predict(self, where: ArrayLike = True) -> None:
+    def predict(self) -> None:
         """Move the set one step on, under every disturbance within its bound.
 
         Notes
         -----
         The exact disturbance is a thin lens in (V, z); as in the paper it is the segment between its ends.
         """
-        active = self._active(where)
+        active = self.tracking
         self._history.record(kernels.PREDICTION, np.zeros(self.batch), np.ones(self.batch, dtype=bool))
         self._stack.predict(active, self._history.elapsed)
 
+    def stop(self, where: ArrayLike) -> None:
+        """Follow these engagements no longer: nothing is computed for them from now on."""
+        self._status[self._active(where)] = SetStatus.STOPPED.value
+
     def _spread(self, value: ArrayLike, name: str) -> Floats:
-        values = np.broadcast_to(np.asarray(value, dtype=np.float64), (self.batch,))
+        values = np.asarray(value, dtype=np.float64)
         if not np.isfinite(values).all():
-            raise ValueError(f"{name} must be finite: found {values[~np.isfinite(values)][0]}")
-        return np.ascontiguousarray(values)
+            raise ValueError(f"{name} must be finite: got {value!r}")
+        return values if values.shape == (self.batch,) else np.ascontiguousarray(np.broadcast_to(values, self.batch))
 
     def _active(self, where: ArrayLike) -> Flags:
-        return self.tracking & np.broadcast_to(np.asarray(where, dtype=bool), (self.batch,))
+        return np.asarray(self.tracking & np.asarray(where, dtype=bool))
 
     def _keep_enough(self, active: Flags, emptied: SetStatus) -> None:
         """Re-grid where fewer than the fewest sections are left, and note where nothing lives."""
@@ -534,7 +538,7 @@ class InformationSet(InformationSetView):
             stack.counts,
             stack.died,
             stack.overlaps,
-            stack.summaries,
+            stack.written_summaries(wanted),
         )
 
 
@@ -546,7 +550,7 @@ def section_law(model: SetModel) -> kernels.SectionLaw:
         step=float(model.step_s),
         disturbance=float(model.disturbance_m_s2),
         half_v=float(model.disturbance_m_s2 * model.step_s),
-        half_z=float(0.5 * model.disturbance_m_s2 * model.step_s**2),
+        disturbance_slope=0.5 * float(model.step_s),
         error_at_zero_range=float(sensor.error_at_zero_range_rad),
         error_slope=float(sensor.error_slope_rad_per_m),
         z_least=float(box.z_m[0]),

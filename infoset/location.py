@@ -19,7 +19,7 @@ from infoset.section_kernels import (
     summarise_section,
 )
 
-LABEL_RESOLUTION = 1e-12
+LABEL_RESOLUTION = 1e-10
 MOST_PROBES = 200
 
 
@@ -36,7 +36,6 @@ class Workspace(NamedTuple):
     """Room for replays."""
 
     points: Floats
-    scratch: Floats
     overlaps: Floats
     living_overlaps: Floats
 
@@ -57,9 +56,7 @@ class Living(NamedTuple):
 @compiled
 def run(label: float, tape: Tape, law: SectionLaw, room: Workspace) -> tuple[int, float]:
     """Event at which a label died (or ALIVE) and its overlap there (0 if alive)."""
-    _, died = replay(
-        label, tape.kinds, tape.values, tape.applies, tape.events, law, room.points, room.scratch, room.overlaps
-    )
+    _, died = replay(label, tape.kinds, tape.values, tape.applies, tape.events, law, room.points, room.overlaps)
     return died, room.overlaps[died] if died != ALIVE else 0.0
 
 
@@ -246,8 +243,7 @@ def refine_all(
     `limit_below` and `limit_above` are narrowed to labels known to be dead. Where nothing lives, the engagement is
     left with no living section.
     """
-    scratch = np.empty((VERTEX_CAPACITY, 2))
-    room = Workspace(np.empty((VERTEX_CAPACITY, 2)), scratch, np.empty(events), np.empty(events))
+    room = Workspace(np.empty((VERTEX_CAPACITY, 2)), np.empty(events), np.empty(events))
     for b in range(labels.shape[0]):
         if not wanted[b]:
             continue
@@ -276,7 +272,7 @@ def refine_all(
             if s > 0 and s == sections - 1:
                 labels[b, s] = living.upper
             counts[b, s], died[b, s] = replay(
-                labels[b, s], kinds, values[b], applies[b], events, law, vertices[b, s], scratch, room.overlaps
+                labels[b, s], kinds, values[b], applies[b], events, law, vertices[b, s], room.overlaps
             )
             if counts[b, s] > 0:
                 x = range_of(labels[b, s], elapsed, law)

@@ -43,19 +43,19 @@ def close(out: Points, count: int) -> int:
 
 
 @inlined
-def append_crossing(
-    out: Points,
-    count: int,
-    points: Points,
-    edge: tuple[int, int, float, float],
-    level: float,
-    normal_x: float,
-    normal_y: float,
-) -> int:
-    """Add the point of an edge (i, j, height of i, height of j) at a level, counted from its nearer end."""
-    near, far, height_near, height_far = edge
-    if abs(level - height_near) > abs(height_far - level):
-        far, near, height_far, height_near = edge
+def height(points: Points, i: int, normal_x: float, normal_y: float) -> float:
+    """How far a vertex lies along a direction: normal . p."""
+    return float(normal_x * points[i, 0] + normal_y * points[i, 1])
+
+
+@inlined
+def crossing(points: Points, i: int, j: int, normal_x: float, normal_y: float, level: float) -> tuple[float, float]:
+    """Point of the edge i-j at a level of `normal . p`, counted from its nearer end: least rounding."""
+    height_i = height(points, i, normal_x, normal_y)
+    height_j = height(points, j, normal_x, normal_y)
+    near, far, height_near, height_far = i, j, height_i, height_j
+    if abs(level - height_i) > abs(height_j - level):
+        near, far, height_near, height_far = j, i, height_j, height_i
     fraction = (level - height_near) / (height_far - height_near)
     x = points[near, 0] + fraction * (points[far, 0] - points[near, 0])
     y = points[near, 1] + fraction * (points[far, 1] - points[near, 1])
@@ -63,65 +63,129 @@ def append_crossing(
         y = level / normal_y
     elif normal_y == 0.0:
         x = level / normal_x
-    return append(out, count, x, y)
+    return x, y
 
 
 @compiled
-def clip_to_band(
-    points: Points,
-    count: int,
-    normal_x: float,
-    normal_y: float,
-    lower: float,
-    upper: float,
-    out: Points,
-) -> int:
-    """Intersection with the band lower <= normal . p <= upper, in one pass over the edges.
+def cut_cap(points: Points, count: int, top: int, normal_x: float, normal_y: float, level: float) -> int:
+    """Cut off, in place, what is higher than a level; vertex `top` is higher, another is not.
 
     Parameters
     ----------
     points, count : polygon
-    normal_x, normal_y : float
-        Normal of the band, of any length but zero.
-    lower, upper : float
-        Bounds; infinite ones give a half-plane.
-    out : ndarray, shape (>= count + 2, 2)
+        With room for one vertex more.
+    top : int
+        The highest vertex.
+    normal_x, normal_y, level : float
+        Kept is normal . p <= level.
 
     Returns
     -------
     int
-        Vertices of the intersection; 0 if it is empty.
+        New number of vertices, at most count + 1.
 
     Notes
     -----
-    O(count). A vertex on the border is inside. An axis-parallel cut leaves vertices exactly on its line.
+    O(count). The run of high vertices about the top is replaced by the two points where the boundary crosses the
+    level: only that run, so rounding elsewhere cannot tear the polygon.
     """
-    made = 0
+    first = last = top
+    before = first - 1 if first > 0 else count - 1
+    while height(points, before, normal_x, normal_y) > level:
+        first = before
+        before = first - 1 if first > 0 else count - 1
+    after = last + 1 if last + 1 < count else 0
+    while height(points, after, normal_x, normal_y) > level:
+        last = after
+        after = last + 1 if last + 1 < count else 0
+    x, y = crossing(points, before, first, normal_x, normal_y, level)
+    other_x, other_y = crossing(points, last, after, normal_x, normal_y, level)
+    # A border through a vertex, or both crossings in one place, adds no vertex.
+    entering = height(points, before, normal_x, normal_y) < level and (x != other_x or y != other_y)
+    leaving = height(points, after, normal_x, normal_y) < level
+    added = int(entering) + int(leaving)
+    if first <= last:
+        kept = count - last - 1
+        place = first
+        step = first + added - (last + 1)
+        if step > 0:
+            for i in range(count - 1, last, -1):
+                put(points, i + step, points[i, 0], points[i, 1])
+        elif step < 0:
+            for i in range(last + 1, count):
+                put(points, i + step, points[i, 0], points[i, 1])
+        count = first + added + kept
+    else:
+        place = first - last - 1
+        for i in range(place):
+            put(points, i, points[i + last + 1, 0], points[i + last + 1, 1])
+        count = place + added
+    if entering:
+        put(points, place, x, y)
+        place += 1
+    if leaving:
+        put(points, place, other_x, other_y)
+    return count
+
+
+@compiled
+def clip_to_band(
+    points: Points, count: int, normal_x: float, normal_y: float, lower: float, upper: float
+) -> tuple[int, float]:
+    """Intersection, in place, with the band lower <= normal . p <= upper.
+
+    Parameters
+    ----------
+    points, count : polygon
+        With room for two vertices more.
+    normal_x, normal_y : float
+        Normal of the band, of any length but zero.
+    lower, upper : float
+        Bounds; infinite ones give a half-plane.
+
+    Returns
+    -------
+    count : int
+        Vertices of the intersection; 0 if it is empty.
+    overlap : float
+        Least overlap of the polygon and the band across either border; negative is the distance between them.
+
+    Notes
+    -----
+    O(count). A vertex on the border is inside. An axis-parallel cut leaves its vertices exactly on its line.
+    """
     if count == 0 or lower > upper:
-        return 0
-    last = count - 1
-    height_last = normal_x * points[last, 0] + normal_y * points[last, 1]
+        return 0, -np.inf
+    bottom, top = extremes(points, count, normal_x, normal_y)
+    least = height(points, bottom, normal_x, normal_y)
+    greatest = height(points, top, normal_x, normal_y)
+    overlap = min(greatest - lower, upper - least)
+    if overlap < 0.0:
+        return 0, overlap
+    if greatest > upper:
+        count = cut_cap(points, count, top, normal_x, normal_y, upper)
+        if least < lower:
+            bottom, _ = extremes(points, count, normal_x, normal_y)
+    if least < lower:
+        count = cut_cap(points, count, bottom, -normal_x, -normal_y, -lower)
+    return count, overlap
+
+
+@inlined
+def extremes(points: Points, count: int, normal_x: float, normal_y: float) -> tuple[int, int]:
+    """Indices of a lowest and a highest vertex along a direction: the first of equals."""
+    least = np.inf
+    greatest = -np.inf
+    bottom = top = 0
     for i in range(count):
-        height = normal_x * points[i, 0] + normal_y * points[i, 1]
-        inside = lower <= height <= upper
-        if inside and lower <= height_last <= upper:
-            put(out, made, points[i, 0], points[i, 1])
-            made += 1
-        else:
-            edge = (last, i, height_last, height)
-            if height_last < lower < height:
-                made = append_crossing(out, made, points, edge, lower, normal_x, normal_y)
-            elif height < upper < height_last:
-                made = append_crossing(out, made, points, edge, upper, normal_x, normal_y)
-            if height_last < upper < height:
-                made = append_crossing(out, made, points, edge, upper, normal_x, normal_y)
-            elif height < lower < height_last:
-                made = append_crossing(out, made, points, edge, lower, normal_x, normal_y)
-            if inside:
-                made = append(out, made, points[i, 0], points[i, 1])
-        last = i
-        height_last = height
-    return close(out, made)
+        here = height(points, i, normal_x, normal_y)
+        if here < least:
+            least = here
+            bottom = i
+        if here > greatest:
+            greatest = here
+            top = i
+    return bottom, top
 
 
 @inlined
@@ -166,15 +230,21 @@ def support_index(points: Points, count: int, normal_x: float, normal_y: float) 
 
 
 @compiled
-def add_segment(points: Points, count: int, half_x: float, half_y: float, out: Points) -> int:
-    """Minkowski sum with the segment from -half to +half.
+def shear_and_add_segment(
+    points: Points, count: int, shear: float, direction_x: float, direction_y: float, length: float, slack: float
+) -> int:
+    """Shear, then Minkowski sum with a centred segment, in place and in two passes.
 
     Parameters
     ----------
     points, count : polygon
-    half_x, half_y : float
-        Half of the segment, as a vector.
-    out : ndarray, shape (>= count + 2, 2)
+        With room for two vertices more.
+    shear : float
+        y becomes y + shear x first.
+    direction_x, direction_y : float
+        Direction of the segment, of any length but zero.
+    length, slack : float
+        The segment reaches from -half to +half, half = direction (length + slack max |x|).
 
     Returns
     -------
@@ -184,37 +254,71 @@ def add_segment(points: Points, count: int, half_x: float, half_y: float, out: P
     Notes
     -----
     O(count). The boundary is cut where it is extreme across the segment; the part to the right of the segment's
-    direction moves by +half, the rest by -half. Cutting at extremes, not at sign changes of edges, keeps the result
+    direction moves by +half, the rest by -half. Cutting at extremes, not where edges change sign, keeps the result
     sound when rounding makes tiny edges turn the wrong way.
     """
     if count == 0:
         return 0
-    if half_x == 0.0 and half_y == 0.0:
-        for i in range(count):
-            put(out, i, points[i, 0], points[i, 1])
-        return count
-    # Heights are measured across the segment; of equally high vertices the hindmost and foremost count.
-    bottom = np.inf
-    top = -np.inf
-    bottom_first = bottom_last = top_first = top_last = 0
+    least = np.inf
+    greatest = -np.inf
+    bottom_first = top_first = 0
+    reach = 0.0
     for i in range(count):
-        height = cross(half_x, half_y, points[i, 0], points[i, 1])
-        if height <= bottom:
-            if height < bottom:
-                bottom = height
-                bottom_first = bottom_last = i
-            else:
-                bottom_first = hindmost(points, bottom_first, i, half_x, half_y)
-                bottom_last = hindmost(points, bottom_last, i, -half_x, -half_y)
-        if height >= top:
-            if height > top:
-                top = height
-                top_first = top_last = i
-            else:
-                top_first = hindmost(points, top_first, i, -half_x, -half_y)
-                top_last = hindmost(points, top_last, i, half_x, half_y)
-    made = put_stretch(points, count, bottom_last, top_first, half_x, half_y, out, 0)
-    return put_stretch(points, count, top_last, bottom_first, -half_x, -half_y, out, made)
+        x = points[i, 0]
+        points[i, 1] += shear * x
+        reach = max(reach, abs(x))
+        across = cross(direction_x, direction_y, x, points[i, 1])
+        if across < least:
+            least = across
+            bottom_first = i
+        if across > greatest:
+            greatest = across
+            top_first = i
+    half_x = direction_x * (length + slack * reach)
+    half_y = direction_y * (length + slack * reach)
+    if half_x == 0.0 and half_y == 0.0:
+        return count
+    if least == greatest:
+        back, front = extremes(points, count, direction_x, direction_y)
+        back_x, back_y = points[back, 0] - half_x, points[back, 1] - half_y
+        put(points, 1, points[front, 0] + half_x, points[front, 1] + half_y)
+        put(points, 0, back_x, back_y)
+        return 2
+    # An edge along the segment is extreme as a whole: it grows longer, and no vertex is added.
+    bottom_first, bottom_last = level_run(points, count, bottom_first, direction_x, direction_y, least)
+    top_first, top_last = level_run(points, count, top_first, direction_x, direction_y, greatest)
+    made = place = count + int(bottom_first == bottom_last) + int(top_first == top_last)
+    if bottom_last < top_last:
+        half_x, half_y = -half_x, -half_y
+    for i in range(count - 1, -1, -1):
+        place -= 1
+        x, y = points[i, 0], points[i, 1]
+        put(points, place, x + half_x, y + half_y)
+        if i in (bottom_last, top_last):
+            half_x, half_y = -half_x, -half_y
+            if bottom_first == bottom_last if i == bottom_last else top_first == top_last:
+                place -= 1
+                put(points, place, x + half_x, y + half_y)
+    return made
+
+
+@inlined
+def level_run(
+    points: Points, count: int, start: int, direction_x: float, direction_y: float, level: float
+) -> tuple[int, int]:
+    """First and last of the consecutive vertices about `start` that lie exactly at its level across a direction."""
+    first = last = start
+    while True:
+        before = first - 1 if first > 0 else count - 1
+        if cross(direction_x, direction_y, points[before, 0], points[before, 1]) != level:
+            break
+        first = before
+    while True:
+        after = last + 1 if last + 1 < count else 0
+        if cross(direction_x, direction_y, points[after, 0], points[after, 1]) != level:
+            break
+        last = after
+    return first, last
 
 
 @inlined
@@ -222,28 +326,6 @@ def put(out: Points, i: int, x: float, y: float) -> None:
     """Write a vertex."""
     out[i, 0] = x
     out[i, 1] = y
-
-
-@inlined
-def put_stretch(points: Points, count: int, first: int, last: int, x: float, y: float, out: Points, made: int) -> int:
-    """Write the vertices from first to last, counter-clockwise, moved by (x, y); return how many there are now."""
-    end = last + 1 if first <= last else count
-    for i in range(first, end):
-        put(out, made, points[i, 0] + x, points[i, 1] + y)
-        made += 1
-    if first > last:
-        for i in range(last + 1):
-            put(out, made, points[i, 0] + x, points[i, 1] + y)
-            made += 1
-    return made
-
-
-@inlined
-def hindmost(points: Points, i: int, j: int, x: float, y: float) -> int:
-    """Whichever of two vertices lies less far along (x, y); the first of equals."""
-    if x * (points[j, 0] - points[i, 0]) + y * (points[j, 1] - points[i, 1]) < 0.0:
-        return j
-    return i
 
 
 @compiled

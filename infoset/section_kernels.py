@@ -45,7 +45,7 @@ class SectionLaw(NamedTuple):
     step: float
     disturbance: float
     half_v: float
-    half_z: float
+    disturbance_slope: float
     error_at_zero_range: float
     error_slope: float
     z_least: float
@@ -94,17 +94,7 @@ def initial_section(label: float, law: SectionLaw, points: Floats) -> int:
 
 
 @compiled
-def copy_back(source: Floats, count: int, target: Floats) -> None:
-    """Copy the vertices of a polygon."""
-    for i in range(count):
-        target[i, 0] = source[i, 0]
-        target[i, 1] = source[i, 1]
-
-
-@compiled
-def measure_section(
-    points: Floats, count: int, x: float, alpha: float, law: SectionLaw, scratch: Floats
-) -> tuple[int, float]:
+def measure_section(points: Floats, count: int, x: float, alpha: float, law: SectionLaw) -> tuple[int, float]:
     """Cut a section, in place, by an angle measurement.
 
     Returns
@@ -122,35 +112,15 @@ def measure_section(
     lower = x * (alpha - bound)
     upper = x * (alpha + bound)
     slack = CUT_SLACK * max(abs(lower), abs(upper))
-    lower -= slack
-    upper += slack
-    least = np.inf
-    greatest = -np.inf
-    for i in range(count):
-        least = min(least, points[i, 1])
-        greatest = max(greatest, points[i, 1])
-    overlap = min(greatest - lower, upper - least)
-    if overlap < 0.0:
-        return 0, overlap
-    if least >= lower and greatest <= upper:
-        return count, overlap
-    count = polygon.clip_to_band(points, count, 0.0, 1.0, lower, upper, scratch)
-    copy_back(scratch, count, points)
-    return count, overlap
+    return polygon.clip_to_band(points, count, 0.0, 1.0, lower - slack, upper + slack)
 
 
 @compiled
-def predict_section(points: Floats, count: int, law: SectionLaw, scratch: Floats) -> int:
+def predict_section(points: Floats, count: int, law: SectionLaw) -> int:
     """Move a section one step on, in place: shear, then add the disturbance's segment, 8 ulp longer outward."""
-    speed = 0.0
-    for i in range(count):
-        points[i, 1] += law.step * points[i, 0]
-        speed = max(speed, abs(points[i, 0]))
-    half_v = law.half_v + SUM_SLACK * speed
-    half_z = law.half_z * (half_v / law.half_v) if law.half_v > 0.0 else 0.0
-    count = polygon.add_segment(points, count, half_v, half_z, scratch)
-    count = polygon.reduce_outward(scratch, count, VERTEX_CAP)
-    copy_back(scratch, count, points)
+    count = polygon.shear_and_add_segment(points, count, law.step, 1.0, law.disturbance_slope, law.half_v, SUM_SLACK)
+    if count > VERTEX_CAP:
+        count = polygon.reduce_outward(points, count, VERTEX_CAP)
     return count
 
 
@@ -236,7 +206,6 @@ def measure_all(
     summaries: Floats,
 ) -> None:
     """Cut every living section of the active engagements by their angle measurements, and summarise it."""
-    scratch = np.empty((VERTEX_CAPACITY, 2))
     for b in range(labels.shape[0]):
         if not active[b]:
             continue
@@ -245,7 +214,7 @@ def measure_all(
                 continue
             x = range_of(labels[b, s], elapsed, law)
             points = vertices[b, s]
-            counts[b, s], overlap = measure_section(points, counts[b, s], x, alpha[b], law, scratch)
+            counts[b, s], overlap = measure_section(points, counts[b, s], x, alpha[b], law)
             if counts[b, s] == 0:
                 died[b, s] = event
                 overlaps[b, s] = overlap
@@ -282,26 +251,14 @@ def shift_all(
 
 
 @compiled
-def predict_all(
-    active: Flags,
-    elapsed: int,
-    labels: Floats,
-    used: Integers,
-    law: SectionLaw,
-    vertices: Floats,
-    counts: Integers,
-    summaries: Floats,
-) -> None:
-    """Move every living section of the active engagements to step `elapsed`, and summarise it."""
-    scratch = np.empty((VERTEX_CAPACITY, 2))
-    for b in range(labels.shape[0]):
+def predict_all(active: Flags, used: Integers, law: SectionLaw, vertices: Floats, counts: Integers) -> None:
+    """Move every living section of the active engagements one step on; the summaries stay those of before."""
+    for b in range(counts.shape[0]):
         if not active[b]:
             continue
         for s in range(used[b]):
-            if counts[b, s] == 0:
-                continue
-            counts[b, s] = predict_section(vertices[b, s], counts[b, s], law, scratch)
-            summarise_section(vertices[b, s], counts[b, s], range_of(labels[b, s], elapsed, law), law, summaries[b, s])
+            if counts[b, s] > 0:
+                counts[b, s] = predict_section(vertices[b, s], counts[b, s], law)
 
 
 @compiled
@@ -355,7 +312,6 @@ def replay(
     events: int,
     law: SectionLaw,
     points: Floats,
-    scratch: Floats,
     overlaps: Floats,
 ) -> tuple[int, int]:
     """Carry the section at any label through a whole history.
@@ -385,12 +341,12 @@ def replay(
     for event in range(events):
         if kinds[event] == PREDICTION:
             elapsed += 1
-            count = predict_section(points, count, law, scratch)
+            count = predict_section(points, count, law)
         elif not applies[event]:
             continue
         elif kinds[event] == ANGLE:
             x = range_of(label, elapsed, law)
-            count, overlaps[event] = measure_section(points, count, x, values[event], law, scratch)
+            count, overlaps[event] = measure_section(points, count, x, values[event], law)
             if count == 0:
                 return 0, event
         else:

@@ -33,9 +33,10 @@ class SectionStack:
         self.counts = np.zeros((self.batch, slots), dtype=np.int64)
         self.died = np.full((self.batch, slots), kernels.ALIVE, dtype=np.int64)
         self.overlaps = np.zeros((self.batch, slots))
-        self.summaries = np.zeros((self.batch, slots, kernels.SUMMARY_COLUMNS))
+        self._summaries = np.zeros((self.batch, slots, kernels.SUMMARY_COLUMNS))
+        self._stale = np.ones(self.batch, dtype=bool)
+        self._elapsed = 0
         kernels.start_all(self.labels, self.used, law, self.vertices, self.counts)
-        self.summarise(np.ones(self.batch, dtype=bool), 0)
 
     @property
     def living(self) -> Flags:
@@ -45,6 +46,28 @@ class SectionStack:
     def ranges(self, elapsed: int) -> Floats:
         """Range of every slot after a number of steps, m, shape (B, S)."""
         return self.labels - self.law.closing_speed * (self.law.step * elapsed)
+
+    @property
+    def summaries(self) -> Floats:
+        """Summary of each living section, shape (B, S, columns), brought up to date where it is stale."""
+        if self._stale.any():
+            kernels.summarise_all(
+                self._stale,
+                self._elapsed,
+                self.labels,
+                self.used,
+                self.law,
+                self.vertices,
+                self.counts,
+                self._summaries,
+            )
+            self._stale[:] = False
+        return self._summaries
+
+    def written_summaries(self, where: Flags) -> Floats:
+        """The summaries, for a caller that writes those of some engagements itself."""
+        self._stale &= ~where
+        return self._summaries
 
     def measure_angle(self, active: Flags, alpha: Floats, elapsed: int, event: int) -> None:
         """Cut the living sections by angle measurements (rad)."""
@@ -60,26 +83,20 @@ class SectionStack:
             self.counts,
             self.died,
             self.overlaps,
-            self.summaries,
+            self.written_summaries(active),
         )
 
     def shift(self, active: Flags, impulse: Floats, elapsed: int) -> None:
         """Shift the living sections, and their summaries, by impulses (m/s)."""
         kernels.shift_all(
-            active, impulse, elapsed, self.labels, self.used, self.law, self.vertices, self.counts, self.summaries
+            active, impulse, elapsed, self.labels, self.used, self.law, self.vertices, self.counts, self._summaries
         )
 
     def predict(self, active: Flags, elapsed: int) -> None:
         """Move the living sections to step `elapsed`."""
-        kernels.predict_all(
-            active, elapsed, self.labels, self.used, self.law, self.vertices, self.counts, self.summaries
-        )
-
-    def summarise(self, active: Flags, elapsed: int) -> None:
-        """Bring the summaries up to date."""
-        kernels.summarise_all(
-            active, elapsed, self.labels, self.used, self.law, self.vertices, self.counts, self.summaries
-        )
+        kernels.predict_all(active, self.used, self.law, self.vertices, self.counts)
+        self._stale |= active
+        self._elapsed = elapsed
 
     def keep_labels(self, least: Floats, greatest: Floats, active: Flags) -> Flags:
         """Remove the living sections whose labels are outside [least, greatest]; return which."""
@@ -98,5 +115,5 @@ class SectionStack:
         twin.law, twin.batch = self.law, self.batch
         twin.labels, twin.used, twin.vertices = self.labels.copy(), self.used.copy(), self.vertices.copy()
         twin.counts, twin.died, twin.overlaps = self.counts.copy(), self.died.copy(), self.overlaps.copy()
-        twin.summaries = self.summaries.copy()
+        twin._summaries, twin._stale, twin._elapsed = self._summaries.copy(), self._stale.copy(), self._elapsed
         return twin

@@ -157,12 +157,13 @@ class Engagements:
         self._truth.fire(self._impulse)
         self._information.shift(self._impulse, tracking)
         self._truth_section.shift(self._impulse)
-        self._finish_labels(tracking)
-        self._information.predict(tracking)
+        self._finish_labels()
+        self._information.predict()
         self._truth_section.predict()
         passage = self._truth.advance(model.step_s)
         self._miss = np.where(self._flying, np.minimum(self._miss, passage.least_distance_m), self._miss)
         self._flying &= ~passage.passed
+        self._information.stop(passage.passed)
         self.step += 1
 
     def _measure(self, sight: Sight) -> tuple[Floats | None, Floats | None]:
@@ -189,7 +190,6 @@ class Engagements:
         return measurement.alpha_rad, measurement.range_m
 
     def _decide(self, miss: PredictedMiss) -> Floats:
-        least, greatest = self._information.stored_range_interval_m()
         situation = Situation(
             time_s=self.step * self.scenario.set_model.step_s,
             step=self.step,
@@ -198,8 +198,6 @@ class Engagements:
             budget_left_m_s=self._budget.copy(),
             thruster=self.scenario.thruster,
             closing_speed_m_s=self.scenario.set_model.closing_speed_m_s,
-            least_range_m=least,
-            greatest_range_m=greatest,
             measured_angle_rad=self._measured_angle,
             measured_range_m=self._measured_range,
             last_impulse_m_s=self._impulse.copy(),
@@ -214,10 +212,10 @@ class Engagements:
             )
         return wanted
 
-    def _finish_labels(self, tracking: Flags) -> None:
+    def _finish_labels(self) -> None:
         """Let labels leave below the threshold, and note the predicted miss of those that do."""
         worst = self._information.worst_predicted_miss_m()
-        left = self._information.drop_below_threshold(tracking)
+        left = self._information.drop_below_threshold()
         if left.any():
             finished = left.any(axis=1)
             payoff = np.where(left, worst, 0.0).max(axis=1)

@@ -120,7 +120,7 @@ class KeplerMotion:
         for _ in range(substeps):
             position, velocity, acceleration = self.position_m.copy(), self.velocity_m_s.copy(), self._acceleration
             self._leap(step_s / substeps)
-            receding = np.einsum("ij,ij->i", self.position_m, self.velocity_m_s) >= 0.0
+            receding = _dot(self.position_m, self.velocity_m_s) >= 0.0
             least = np.where(passed, least, np.minimum(least, np.hypot(*self.position_m.T)))
             new = receding & ~passed
             if new.any():
@@ -151,7 +151,7 @@ class KeplerMotion:
 
 def attraction(position_m: Floats, gravitational_parameter_m3_s2: float) -> Floats:
     """Acceleration -K r / |r|^3 at positions from the Sun, shape (B, 2), m/s^2."""
-    squared = np.einsum("ij,ij->i", position_m, position_m)
+    squared = _dot(position_m, position_m)
     return (-gravitational_parameter_m3_s2 / (squared * np.sqrt(squared)))[:, None] * position_m
 
 
@@ -179,4 +179,4 @@ def closest_distance(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2
 
 
 def _dot(first: Floats, second: Floats) -> Floats:
-    return np.asarray(np.einsum("ij,ij->i", first, second))
+    return first[:, Z] * second[:, Z] + first[:, X] * second[:, X]

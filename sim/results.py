@@ -73,7 +73,10 @@ def join(parts: Sequence[Results]) -> Results:
         np.concatenate([part.runs for part in parts]),
         np.concatenate([part.miss_m for part in parts]),
         np.concatenate([part.impulse_m_s for part in parts]),
-        np.ma.concatenate([part.guaranteed_miss_m for part in parts]),
+        np.ma.MaskedArray(
+            np.concatenate([part.guaranteed_miss_m.data for part in parts]),
+            mask=np.concatenate([part.guaranteed_miss_m.mask for part in parts]),
+        ),
         tuple(outcome for part in parts for outcome in part.outcomes),
         np.concatenate([part.truth_kept for part in parts]),
         np.concatenate([part.truth_margin_m for part in parts]),
