@@ -144,7 +144,9 @@ class InformationSetView:
     @property
     def labels_m(self) -> Floats:
         """Labels of the stored sections, living or not, m, shape (B, S)."""
-        return self._stack.labels.copy()
+        labels = self._stack.labels.view()
+        labels.flags.writeable = False
+        return labels
 
     @property
     def ranges_m(self) -> Floats:

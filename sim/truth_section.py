@@ -31,7 +31,7 @@ class TruthSection:
 
     def __init__(self, model: SetModel, position_m: Floats, velocity_m_s: Floats) -> None:
         law = section_law(model)
-        labels = model.closing_speed_m_s * position_m[:, X] / -velocity_m_s[:, X]
+        labels = position_m[:, X] * (model.closing_speed_m_s / -velocity_m_s[:, X])
         self._threshold_m = model.range_threshold_m
         self._stack = SectionStack(law, labels[:, None], np.ones(len(labels), dtype=np.int64))
         self._elapsed = 0

@@ -1,0 +1,254 @@
+"""The information set: cuts, shifts, predictions, replay at any label, ends of the range."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from infoset import AngleSensor, ConvexPolygons, InformationSet, InitialSet, SetModel, SetStatus, StateBox
+
+E, STEP = 58e3, 0.5
+SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)
+KNOWN = StateBox((-10e3, 10e3), (5301.3e3, 6301.3e3), (-100.0, 100.0), (-59e3, -57e3))
+MODEL = SetModel(E, STEP, KNOWN, SENSOR, disturbance_m_s2=0.005, range_threshold_m=5e3)
+
+
+def flown(model: SetModel, steps: int, seed: int = 0, batch: int = 1) -> InformationSet:
+    """A set after some steps of a model motion with random noise and impulses, before the next measurement."""
+    random = np.random.default_rng(seed)
+    z, v, x = random.uniform(-1e3, 1e3, batch), random.uniform(-50.0, 50.0, batch), np.full(batch, 5801.3e3)
+    information = InformationSet(model, batch)
+    for _ in range(steps):
+        information.measure_angle(z / x + random.uniform(-1.0, 1.0, batch) * SENSOR.error_bound(x))
+        impulse = random.uniform(-3.0, 3.0, batch)
+        information.shift(impulse)
+        v = v - impulse
+        information.drop_below_threshold()
+        information.predict()
+        z, x = z + STEP * v, x - E * STEP
+    return information
+
+
+def test_a_section_replayed_equals_the_one_carried_from_the_start() -> None:
+    information = flown(replace(MODEL, sections=9, fewest_sections=1), 150)
+    carried = information.sections()
+    assert len(carried) >= 2
+    for section in carried:
+        replayed = information.section_at(section.label_m)
+        np.testing.assert_allclose(replayed.polygon.polygon(), section.polygon.polygon(), rtol=1e-12, atol=0.0)
+        assert replayed.range_m == section.range_m
+
+
+def test_regridding_gives_twice_the_fewest_and_one_over_the_living_range_ends_included() -> None:
+    model = replace(MODEL, sections=5, fewest_sections=5)
+    information = InformationSet(model)
+    information.measure_range(5801.3e3, 0.05)
+    ranges = np.array([section.range_m for section in information.sections()])
+    assert len(ranges) == 11
+    np.testing.assert_allclose(ranges, np.linspace(5801.3e3 / 1.05, 5801.3e3 / 0.95, 11), rtol=1e-12)
+
+
+def test_a_range_measurement_keeps_exactly_the_ranges_it_allows() -> None:
+    information = InformationSet(replace(MODEL, sections=101))
+    information.measure_range(5801.3e3, 0.05)
+    least, greatest = information.living_range_interval_m()
+    assert least[0] == pytest.approx(5801.3e3 / 1.05, rel=1e-13)
+    assert greatest[0] == pytest.approx(5801.3e3 / 0.95, rel=1e-13)
+    ranges = [section.range_m for section in information.sections()]
+    assert least[0] <= min(ranges)
+    assert max(ranges) <= greatest[0]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_ends_of_the_range_are_alive_and_just_beyond_them_is_dead(seed: int) -> None:
+    # A sharp sensor and a large offset make angles tell range, so that the ends are found between stored labels.
+    sharp = AngleSensor(0.5, 2e-6, 2e-6, 5801.3e3)
+    model = replace(MODEL, angle_sensor=sharp, disturbance_m_s2=0.0, sections=15, fewest_sections=2)
+    random = np.random.default_rng(seed)
+    information = InformationSet(model)
+    z, v, x = 9e3, -80.0, 5801.3e3
+    for _ in range(90):
+        information.measure_angle(z / x + random.uniform(-1.0, 1.0) * 2e-6)
+        impulse = float(random.uniform(-7.0, 7.0))
+        information.shift(impulse)
+        v -= impulse
+        information.drop_below_threshold()
+        information.predict()
+        z, x = z + STEP * v, x - E * STEP
+    assert information.tracking[0]
+    travelled = E * information.time_s
+    least, greatest = information.living_range_interval_m()
+    assert greatest[0] - least[0] < 0.9 * 1000e3
+    for end, outward in ((least[0], -1.0), (greatest[0], 1.0)):
+        assert not information.section_at(end + travelled).polygon.is_empty
+        assert information.section_at(end + travelled + outward * 2e-9 * (end + travelled)).polygon.is_empty
+
+
+def test_one_section_sits_in_the_middle() -> None:
+    (section,) = InformationSet(replace(MODEL, sections=1, fewest_sections=1)).sections()
+    assert section.label_m == pytest.approx(5801.3e3)
+
+
+def test_the_initial_rectangle_is_the_papers() -> None:
+    section = InformationSet(replace(MODEL, sections=1, fewest_sections=1)).sections()[0]
+    x = section.label_m
+    lower, upper = section.omega_alpha.bounding_box()
+    assert lower[1] == pytest.approx(math.atan(-10e3 / x), rel=1e-12)
+    assert upper[1] == pytest.approx(math.atan(10e3 / x), rel=1e-12)
+    assert lower[0] == pytest.approx((-100.0 * x - -59e3 * -10e3) / x**2, rel=1e-9)
+    assert upper[0] == pytest.approx((100.0 * x - -59e3 * 10e3) / x**2, rel=1e-9)
+
+
+def test_the_initial_box_is_the_bounds() -> None:
+    information = InformationSet(replace(MODEL, initial_set=InitialSet.BOX))
+    lower, upper = information.sections()[0].polygon.bounding_box()
+    np.testing.assert_array_equal(lower, (-100.0, -10e3))
+    np.testing.assert_array_equal(upper, (100.0, 10e3))
+
+
+def test_one_step_by_hand() -> None:
+    """Band, shift, shear and disturbance of a box, from the formulas of the theory."""
+    model = replace(MODEL, initial_set=InitialSet.BOX, sections=1, fewest_sections=1, disturbance_m_s2=0.02)
+    information = InformationSet(model)
+    x = information.sections()[0].range_m
+    bound = SENSOR.error_bound(x)
+    information.measure_angle(0.001)
+    lower, upper = information.sections()[0].polygon.bounding_box()
+    np.testing.assert_allclose((lower[1], upper[1]), (x * (0.001 - bound), x * (0.001 + bound)), rtol=1e-13)
+    information.shift(4.0)
+    information.predict()
+    section = information.sections()[0]
+    assert section.range_m == pytest.approx(x - E * STEP, rel=1e-15)
+    nu = 0.02
+    for direction in ((1.0, 0.0), (0.0, 1.0), (0.3, 1.0), (-1.0, 0.2), (-0.3, -1.0)):
+        corners = [(v - 4.0, z + STEP * (v - 4.0)) for v in (-100.0, 100.0) for z in (lower[1], upper[1])]
+        push = abs(direction[0] * nu * STEP + direction[1] * 0.5 * nu * STEP**2)
+        expected = max(direction[0] * v + direction[1] * z for v, z in corners) + push
+        assert section.polygon.support(direction) == pytest.approx(expected, rel=1e-13)
+
+
+def test_predicted_miss_by_hand() -> None:
+    model = replace(MODEL, initial_set=InitialSet.BOX, sections=2, fewest_sections=1)
+    miss = InformationSet(model).predicted_miss()
+    time_to_go = 6301.3e3 / E
+    expected = 10e3 + 100.0 * time_to_go + 0.5 * 0.005 * time_to_go**2
+    assert miss.upper_m[0] == pytest.approx(expected, rel=1e-13)
+    assert miss.lower_m[0] == pytest.approx(-expected, rel=1e-13)
+    assert miss.upper_point.range_m[0] == 6301.3e3
+    assert miss.upper_point.omega_rad_s[0] * 6301.3e3**2 / E == pytest.approx(10e3 + 100.0 * time_to_go, rel=1e-13)
+
+
+def test_the_point_of_an_extreme_edge_is_its_lowest_above_and_its_highest_below() -> None:
+    """The paper's rectangle has whole edges of extreme omega: the vertex rule of the theory."""
+    information = InformationSet(replace(MODEL, sections=1, fewest_sections=1))
+    for _ in range(3):
+        information.predict()
+    miss = information.predicted_miss()
+    lower, upper = information.sections()[0].omega_alpha.bounding_box()
+    points = information.sections()[0].omega_alpha.polygon()
+    tolerance = 1e-9 * (upper[0] - lower[0])
+    assert miss.upper_point.alpha_rad[0] == pytest.approx(points[points[:, 0] > upper[0] - tolerance, 1].min())
+    assert miss.lower_point.alpha_rad[0] == pytest.approx(points[points[:, 0] < lower[0] + tolerance, 1].max())
+    assert miss.upper_point.alpha_rad[0] < miss.lower_point.alpha_rad[0]
+
+
+def test_inconsistent_measurements_empty_the_set_and_say_so() -> None:
+    information = InformationSet(MODEL, batch=2)
+    information.measure_angle(0.001)
+    information.measure_angle([0.0012, -0.0012])
+    assert information.status == [SetStatus.TRACKING, SetStatus.EMPTY]
+    assert not information.predicted_miss().exists[1]
+    information.predict()
+    information.shift(1.0)
+    assert information.status[1] is SetStatus.EMPTY
+    assert "1 tracking, 1 empty" in repr(information)
+
+
+def test_a_set_whose_labels_have_all_left_is_finished() -> None:
+    information = InformationSet(replace(MODEL, sections=2, fewest_sections=1))
+    for _ in range(230):
+        information.drop_below_threshold()
+        information.predict()
+    assert information.status == [SetStatus.FINISHED]
+    assert "finished" in repr(information)
+
+
+def test_measuring_some_of_a_batch_leaves_the_others_alone() -> None:
+    information = InformationSet(MODEL, batch=2)
+    before = information.sections(1)[3].polygon.polygon()
+    information.measure_angle(0.0003, where=[True, False])
+    np.testing.assert_array_equal(information.sections(1)[3].polygon.polygon(), before)
+    assert information.sections(0)[3].polygon.area() < information.sections(1)[3].polygon.area()
+
+
+def test_a_batch_gives_what_its_members_give_alone() -> None:
+    together, random = InformationSet(MODEL, batch=3), np.random.default_rng(2)
+    alone = [InformationSet(MODEL) for _ in range(3)]
+    for _ in range(40):
+        alpha = random.uniform(-2e-5, 2e-5, 3)
+        together.measure_angle(alpha)
+        together.predict()
+        for information, value in zip(alone, alpha, strict=True):
+            information.measure_angle(value)
+            information.predict()
+    for b, information in enumerate(alone):
+        for one, other in zip(together.sections(b), information.sections(), strict=True):
+            np.testing.assert_array_equal(one.polygon.polygon(), other.polygon.polygon())
+
+
+def test_a_view_follows_the_set_and_a_copy_does_not() -> None:
+    information = InformationSet(MODEL)
+    view, copy = information.view(), information.copy()
+    information.measure_angle(0.0004)
+    information.predict()
+    assert view.time_s == 0.5
+    assert copy.time_s == 0.0
+    assert not hasattr(view, "measure_angle")
+    with pytest.raises(ValueError, match="read-only"):
+        view.labels_m[0, 0] = 1.0
+
+
+def test_shapely_and_margin_agree_on_what_is_inside() -> None:
+    from shapely import Point
+
+    information = flown(MODEL, 30)
+    section = information.sections()[4]
+    shape = information.to_shapely()[4]
+    omega, alpha = section.omega_alpha.centroid()
+    assert shape.contains(Point(omega, alpha))
+    assert information.margin(section.label_m, alpha, omega) > 0.0
+    assert information.margin(section.label_m, alpha + 1e-3, omega) < 0.0
+
+
+def test_exact_knowledge_gives_segments_and_points() -> None:
+    line = replace(MODEL, bounds=replace(KNOWN, z_m=(100.0, 100.0)), initial_set=InitialSet.BOX)
+    assert repr(InformationSet(line).sections()[0].polygon).startswith("<segment")
+    point = replace(line, bounds=replace(line.bounds, vz_m_s=(3.0, 3.0)))
+    assert repr(InformationSet(point).sections()[0].polygon) == "<point (3, 100)>"
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_what_is_not_finite_is_refused(value: float) -> None:
+    with pytest.raises(ValueError, match="alpha_rad must be finite"):
+        InformationSet(MODEL).measure_angle(value)
+
+
+def test_the_vertex_cap_is_kept_and_outward() -> None:
+    """Without cuts every step adds two vertices; the reduced section contains the exact one."""
+    information = InformationSet(replace(MODEL, sections=1, fewest_sections=1, initial_set=InitialSet.BOX))
+    exact = information.sections()[0].polygon
+    nu = MODEL.disturbance_m_s2
+    for _ in range(150):
+        information.predict()
+        exact = exact.linear_map([[1.0, 0.0], [STEP, 1.0]]).add_segment([nu * STEP, 0.5 * nu * STEP**2])
+    kept = information.sections()[0].polygon
+    assert int(kept.counts) <= 256
+    assert int(exact.counts) > 256
+    normals = np.column_stack((np.cos(np.linspace(0, 6.28, 60)), np.sin(np.linspace(0, 6.28, 60)))) * (50.0, 1.0)
+    for normal in normals:
+        assert kept.support(normal) >= exact.support(normal) * (1.0 - 1e-13)
+    assert kept.area() <= exact.area() * 1.001
+    assert isinstance(exact, ConvexPolygons)

@@ -1,0 +1,204 @@
+"""The closed loop: symmetry, the truth in its set, outcomes, reproducibility."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from guidance import NoiseKind, Situation, TieRule
+from infoset import StateBox
+from sim import Outcome, Results, Scenario, simulate
+from sim.draws import Draws, draw
+from sim.engagement import Engagements
+from sim.kepler import Passage, Sight
+
+Floats = NDArray[np.float64]
+
+
+def fly(scenario: Scenario, draws: Draws, truth: object = None) -> Results:
+    flight = Engagements(scenario, draws, truth=truth)  # type: ignore[arg-type]
+    while flight.flying:
+        flight.advance()
+    return flight.results(np.arange(len(draws.position_m)))
+
+
+def mirrored_interval(interval: tuple[float, float]) -> tuple[float, float]:
+    return -interval[1], -interval[0]
+
+
+def mirror(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
+    box = scenario.set_model.bounds
+    bounds = replace(box, z_m=mirrored_interval(box.z_m), vz_m_s=mirrored_interval(box.vz_m_s))
+    assert scenario.sun is not None
+    swapped = {TieRule.UPPER: TieRule.LOWER, TieRule.LOWER: TieRule.UPPER}
+    mirrored = replace(
+        scenario,
+        sun=replace(scenario.sun, direction_rad=-scenario.sun.direction_rad),
+        set_model=replace(scenario.set_model, bounds=bounds),
+        tie=swapped.get(scenario.tie, scenario.tie),
+    )
+    flip = np.array([-1.0, 1.0])
+    return mirrored, Draws(draws.position_m * flip, draws.velocity_m_s * flip, -draws.angle, draws.range, -draws.tie)
+
+
+@pytest.mark.parametrize("name", ["asteroid", "ranging", "comet"])
+@pytest.mark.parametrize(
+    ("noise", "tie"),
+    [
+        (NoiseKind.RANDOM, TieRule.UPPER),
+        (NoiseKind.GAME, TieRule.UPPER),
+        (NoiseKind.GAME, TieRule.LOWER),
+        (NoiseKind.GAME, TieRule.RANDOM),
+    ],
+)
+def test_a_mirrored_engagement_is_mirrored(
+    name: str, noise: NoiseKind, tie: TieRule, request: pytest.FixtureRequest
+) -> None:
+    scenario = replace(request.getfixturevalue(name), noise=noise, tie=tie)
+    draws = draw(scenario, range(20), 3)
+    there, back = fly(scenario, draws), fly(*mirror(scenario, draws))
+    np.testing.assert_allclose(back.miss_m, there.miss_m, rtol=1e-9)
+    np.testing.assert_allclose(back.impulse_m_s, there.impulse_m_s, rtol=1e-9)
+    np.testing.assert_allclose(back.guaranteed_miss_m, there.guaranteed_miss_m, rtol=1e-9)
+    assert back.outcomes == there.outcomes
+
+
+class ModelMotion:
+    """The model's own dynamics: V_x = -e, disturbances within their bound, constant over a step."""
+
+    def __init__(self, scenario: Scenario, draws: Draws, seed: int) -> None:
+        self._e = scenario.set_model.closing_speed_m_s
+        self._nu = scenario.set_model.disturbance_m_s2
+        self._z, self._v = draws.position_m[:, 0].copy(), draws.velocity_m_s[:, 0].copy()
+        self._start, self._steps = draws.position_m[:, 1].copy(), 0
+        self._x = self._start.copy()
+        self._random = np.random.default_rng(seed)
+
+    def sight(self) -> Sight:
+        alpha = self._z / self._x
+        return Sight(alpha, (self._v + self._e * alpha) / self._x, self._x)
+
+    def fire(self, impulse_m_s: Floats) -> None:
+        self._v = self._v - impulse_m_s
+
+    def advance(self, step_s: float) -> Passage:
+        # Half of the disturbances at their bounds: the extremes are what a set must withstand.
+        push = np.clip(self._random.uniform(-2.0, 2.0, self._z.size), -1.0, 1.0) * self._nu
+        self._z = self._z + self._v * step_s + 0.5 * push * step_s**2
+        self._v = self._v + push * step_s
+        self._steps += 1
+        self._x = self._start - self._e * step_s * self._steps
+        return Passage(self._x <= 0.0, np.abs(self._z))
+
+
+def fly_in_the_model(scenario: Scenario, engagements: int, seed: int) -> Results:
+    e = scenario.set_model.closing_speed_m_s
+    scenario = replace(scenario, sun=None, dispersion=replace(scenario.dispersion, vx_m_s=(-e, -e)))
+    draws = draw(scenario, range(engagements), seed)
+    return fly(scenario, draws, ModelMotion(scenario, draws, seed))
+
+
+@pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
+def test_the_truth_stays_in_its_section_in_the_models_own_dynamics(asteroid: Scenario, noise: NoiseKind) -> None:
+    results = fly_in_the_model(replace(asteroid, noise=noise), 300, 5)
+    assert results.truth_margin_m.min() >= 0.0
+    assert Outcome.SET_LOST not in results.outcomes
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
+def test_the_truth_stays_in_its_section_in_ten_thousand_engagements(asteroid: Scenario, noise: NoiseKind) -> None:
+    rules = list(TieRule)
+    for part in range(50):
+        scenario = replace(asteroid, noise=noise, tie=rules[part % len(rules)])
+        results = fly_in_the_model(scenario, 200, 100 + part)
+        assert results.truth_margin_m.min() >= 0.0
+        assert Outcome.SET_LOST not in results.outcomes
+
+
+def test_a_run_is_the_same_in_whatever_company(ranging: Scenario) -> None:
+    scenario = replace(ranging, noise=NoiseKind.GAME, tie=TieRule.RANDOM)
+    together = simulate(scenario, 9, seed=4)
+    alone = simulate(scenario, [7], seed=4)
+    assert alone.miss_m[0] == together.miss_m[7]
+    assert alone.impulse_m_s[0] == together.impulse_m_s[7]
+    assert alone.guaranteed_miss_m.tolist()[0] == together.guaranteed_miss_m.tolist()[7]
+    assert alone.truth_margin_m[0] == together.truth_margin_m[7]
+
+
+def test_the_applied_starts_are_those_of_the_dispersion(asteroid: Scenario) -> None:
+    results = simulate(asteroid, 40)
+    starts = np.hstack((results.position_m, results.velocity_m_s))
+    box = asteroid.dispersion
+    for column, (least, greatest) in zip(starts.T, (box.z_m, box.x_m, box.vz_m_s, box.vx_m_s), strict=True):
+        assert least <= column.min()
+        assert column.max() <= greatest
+        assert np.ptp(column) > 0.7 * (greatest - least)
+
+
+class Silent:
+    def start(self, batch: int) -> None: ...
+
+    def decide(self, situation: Situation, state: None) -> Floats:
+        return np.zeros_like(situation.budget_left_m_s)
+
+
+class Greedy:
+    def start(self, batch: int) -> dict[str, int]:
+        return {"calls": 0}
+
+    def decide(self, situation: Situation, state: dict[str, int]) -> Floats:
+        state["calls"] += 1
+        return np.full_like(situation.budget_left_m_s, 1e6)
+
+
+def test_without_control_the_miss_is_that_of_the_free_motion(asteroid: Scenario) -> None:
+    results = simulate(replace(asteroid, sun=None), 10, strategy=Silent())
+    z, x = results.position_m.T
+    vz, vx = results.velocity_m_s.T
+    np.testing.assert_allclose(results.miss_m, np.abs(z * vx - x * vz) / np.hypot(vz, vx), rtol=1e-9)
+    assert not results.impulse_m_s.any()
+
+
+def test_a_greedy_strategy_spends_its_budget_and_no_more(asteroid: Scenario) -> None:
+    # Little enough that the angles stay small: far off the course the paper's model loses the set.
+    head_on = StateBox((0.0, 0.0), (5801.3e3, 5801.3e3), (0.0, 0.0), (-58e3, -58e3))
+    scenario = replace(asteroid, dispersion=head_on, thruster=replace(asteroid.thruster, budget_m_s=3.0))
+    results = simulate(scenario, 5, strategy=Greedy())
+    np.testing.assert_allclose(results.impulse_m_s, 3.0)
+    assert set(results.outcomes) == {Outcome.BUDGET_SPENT}
+
+
+class Broken:
+    def start(self, batch: int) -> None: ...
+
+    def decide(self, situation: Situation, state: None) -> Floats:
+        return np.full(3, np.nan)
+
+
+def test_a_strategy_that_returns_nonsense_is_named(asteroid: Scenario) -> None:
+    with pytest.raises(ValueError, match="Broken must return 2 finite impulses"):
+        simulate(asteroid, 2, strategy=Broken())
+
+
+def test_a_wrong_model_of_the_start_loses_the_set(asteroid: Scenario) -> None:
+    far = StateBox((60e3, 60e3), (5801.3e3, 5801.3e3), (0.0, 0.0), (-58e3, -58e3))
+    results = simulate(replace(asteroid, dispersion=far), 3)
+    assert set(results.outcomes) == {Outcome.SET_LOST}
+    assert not results.truth_kept.any()
+    assert np.isfinite(results.miss_m).all()
+
+
+def test_a_miss_beyond_the_nominal_range_is_divergence(asteroid: Scenario) -> None:
+    away = StateBox((0.0, 0.0), (5801.3e3, 5801.3e3), (90e3, 90e3), (-58e3, -58e3))
+    scenario = replace(asteroid, dispersion=away, nominal_range_m=1e6)
+    assert simulate(scenario, 1).outcomes == (Outcome.DIVERGED,)
+
+
+@pytest.mark.parametrize("runs", [0, [], [-1]])
+def test_no_run_to_fly_is_an_error(asteroid: Scenario, runs: int | list[int]) -> None:
+    with pytest.raises(ValueError, match="at least one run"):
+        simulate(asteroid, runs)
