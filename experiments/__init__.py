@@ -1,1 +1,19 @@
 """What people run: the command line, scenarios, figures and files."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from experiments.scenario_file import load_scenario
+
+__all__ = ["load_scenario"]
+
+
+def __getattr__(name: str) -> object:
+    """Load what is exported when it is first asked for: the command line must start without it."""
+    if name == "load_scenario":
+        from experiments.scenario_file import load_scenario
+
+        return load_scenario
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

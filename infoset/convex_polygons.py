@@ -169,7 +169,7 @@ class ConvexPolygons:
         """Minkowski sum with polygons of the same batch shape, or with a single one."""
         shape = self.shape if not other.shape else np.broadcast_shapes(self.shape, other.shape)
         first, second = self._broadcast(shape), other._broadcast(shape)
-        return first._make(second.vertices.shape[-2], _add_polygon_each, *second._flat())
+        return first._make(second.vertices.shape[-2] + 1, _add_polygon_each, *second._flat())
 
     def support(self, direction: ArrayLike) -> Floats:
         """Support function: greatest direction . p, shape (...); -inf for the empty set."""

@@ -164,8 +164,10 @@ def clip_to_band(
         return 0, overlap
     if greatest > upper:
         count = cut_cap(points, count, top, normal_x, normal_y, upper)
-        if least < lower:
-            bottom, _ = extremes(points, count, normal_x, normal_y)
+        bottom, top = extremes(points, count, normal_x, normal_y)
+        # Across a band as thin as rounding the cut itself may lie an ulp below the lower border: keep the cut.
+        lower = min(lower, height(points, top, normal_x, normal_y))
+        least = height(points, bottom, normal_x, normal_y)
     if least < lower:
         count = cut_cap(points, count, bottom, -normal_x, -normal_y, -lower)
     return count, overlap
@@ -346,7 +348,8 @@ def add_polygon(points: Points, count: int, other: Points, other_count: int, out
     ----------
     points, count : polygon
     other, other_count : polygon
-    out : ndarray, shape (>= count + other_count, 2)
+    out : ndarray, shape (>= count + other_count + 1, 2)
+        The walk around the boundary ends by writing its first vertex again.
 
     Returns
     -------

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -98,30 +96,9 @@ def new(
     quiet: Quiet = False,
 ) -> None:
     """Write a commented scenario file to start one's own from."""
+    from experiments.output import write_file
     from experiments.scenario_file import scenario_template
 
-    _write_new(file, scenario_template(), overwrite)
+    write_file(file, scenario_template(), overwrite=overwrite)
     if not quiet:
         typer.echo(f"wrote {file}; edit it, then: infoset scenarios check {file}")
-
-
-def _write_new(file: Path, text: str, overwrite: bool) -> None:
-    """Write a file whole or not at all, and replace one only when told to."""
-    from experiments.errors import InputError
-
-    temporary = file.with_name(f".{file.name}.{os.getpid()}.tmp") if file.name else file
-    try:
-        if file.is_dir():
-            raise InputError(f"{file}: is a folder; name a file in it, for example {file / 'mine.toml'}")
-        if os.path.lexists(file) and not overwrite:
-            raise InputError(f"{file}: exists already; choose another name, or give --overwrite to replace it")
-        if not file.parent.is_dir():
-            raise InputError(f"{file}: there is no folder {file.parent}; make it first")
-        with temporary.open("x", encoding="utf-8", newline="\n") as stream:
-            stream.write(text)
-        temporary.replace(file)
-    except (OSError, ValueError) as error:
-        with contextlib.suppress(OSError, ValueError):
-            temporary.unlink(missing_ok=True)
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise InputError(f"{file}: cannot be written: {reason}; choose a folder you may write in") from None

@@ -1,0 +1,93 @@
+"""The command `infoset`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from experiments.commands.engage import engage
+from experiments.commands.experiment import experiment
+from experiments.commands.replay import replay
+from experiments.commands.scenarios import app as scenarios
+from experiments.errors import InputError
+
+INPUT_ERROR = 2
+INTERRUPTED = 130
+
+
+class _Root(TyperGroup):
+    """Says what went wrong in one message, without a traceback."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except InputError as error:
+            _complain(f"error: {error}")
+            raise typer.Exit(INPUT_ERROR) from None
+        except KeyboardInterrupt:
+            _complain("interrupted")
+            raise typer.Exit(INTERRUPTED) from None
+
+
+app = typer.Typer(
+    name="infoset",
+    cls=_Root,
+    help="Fly interceptions guided by information sets: all states that agree with everything measured and done.",
+    epilog="Example: infoset experiment --runs 50 --out results",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.command("experiment", epilog="Example: infoset experiment asteroid-1997 --runs 50 --out results")(experiment)
+app.command("engage", epilog="Example: infoset engage asteroid-1997-single --noise both --out figures")(engage)
+app.command("replay", epilog="Example: infoset replay flight-random.npz flight-game.npz --out figures")(replay)
+app.add_typer(scenarios, name="scenarios")
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"infoset {version('infoset')}")
+        raise typer.Exit
+
+
+@app.callback()
+def infoset(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and leave.")
+    ] = False,
+) -> None:
+    """Fly interceptions guided by information sets: all states that agree with everything measured and done."""
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command `infoset`, and leave with its exit code.
+
+    Parameters
+    ----------
+    arguments : sequence of str or None
+        What follows the name of the command; None takes them from the process.
+
+    Raises
+    ------
+    SystemExit
+        Always: 0 done, 2 something given is wrong, 130 interrupted.
+    """
+    try:
+        app(args=None if arguments is None else list(arguments), prog_name="infoset")
+    except KeyboardInterrupt:  # before a command had begun
+        _complain("interrupted")
+        sys.exit(INTERRUPTED)
+
+
+def _complain(message: str) -> None:
+    typer.echo(message, err=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,83 @@
+"""What `engage` and `replay` show of single engagements: a table, and figures 2 and 3."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.table import Table
+from rich.text import Text
+
+from experiments.commands._screen import PAPER_SINGLE_RUN, number, payoff_name, payoffs, table_console
+from sim import Record
+
+FIGURE_2 = "figure-2-process"
+FIGURE_3 = "figure-3-sets"
+PAPER_SCENARIO = "asteroid-1997-single"
+
+
+def show_engagements(records: Sequence[Record], stdout_taken: bool) -> None:
+    """Print the results of engagements side by side, beside the paper's where it has them.
+
+    Parameters
+    ----------
+    records : sequence of Record
+    stdout_taken : bool
+        Whether to print on stderr.
+    """
+    table = Table("", box=None, pad_edge=False)
+    columns: list[list[str]] = []
+    for record in records:
+        scenario, result = record.scenario, record.result
+        meter = " + range meter" if scenario.range_sensor is not None else ""
+        table.add_column(Text(f"{scenario.noise.value}{meter}"), justify="right")
+        columns.append(
+            [
+                number(float(result.miss_m[0])),
+                number(float(result.impulse_m_s[0])),
+                number(payoffs(result)[0]),
+                result.outcomes[0].value,
+                "yes" if result.truth_kept[0] else "no",
+                str(len(record.steps)),
+                f"{record.seed}, {record.run}",
+                record.strategy,
+            ]
+        )
+        paper = PAPER_SINGLE_RUN.get(scenario.noise.value)
+        if scenario.name == PAPER_SCENARIO and scenario.range_sensor is None and paper is not None:
+            table.add_column("paper", justify="right")
+            columns.append([number(paper[0]), number(paper[1]), *[""] * 6])
+    names = {payoff_name(record.scenario.set_model.kind.value) for record in records}
+    titles = [
+        "miss, m",
+        "impulse, m/s",
+        f"{' / '.join(sorted(names))}, m",
+        "outcome",
+        "truth kept in its section",
+        "steps",
+        "seed, run",
+        "strategy",
+    ]
+    for title, *values in zip(titles, *columns, strict=True):
+        table.add_row(title, *(Text(value) for value in values))
+    console = table_console(stdout_taken)
+    console.print(Text(" | ".join(dict.fromkeys(record.scenario.name for record in records))), soft_wrap=True)
+    console.print(table)
+
+
+def draw_engagements(records: Sequence[Record], folder: Path) -> None:
+    """Draw figures 2 and 3 of one or two engagements into a folder.
+
+    Parameters
+    ----------
+    records : sequence of Record
+    folder : Path
+    """
+    from experiments.figures.process import draw_process
+    from experiments.figures.sets import draw_sets
+    from experiments.figures.style import save_figure
+    from experiments.output import reporting_failures
+
+    for name, figure in ((FIGURE_2, draw_process(records)), (FIGURE_3, draw_sets(records))):
+        with reporting_failures(folder):
+            save_figure(figure, folder, name)

@@ -1,0 +1,147 @@
+"""What the commands that fly show of their work: progress, the notice of the first compilation, numbers in tables."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sim import Results
+
+PUBLISHED_PHI = "published Phi, no guarantee"
+PAPER_SCENARIOS = ("asteroid-1997", "asteroid-1997-single")
+PAPER_SINGLE_RUN = {"random": (4.3, 244.7), "game": (9.5, 521.7)}
+"""Miss (m) and impulse (m/s) of the paper's two engagements from z = -8 km, without a range meter."""
+
+
+def figure_files(*names: str) -> list[str]:
+    """Return the names of the files that figures become."""
+    return [f"{name}.{kind}" for name in names for kind in ("pdf", "png")]
+
+
+def say(message: str, quiet: bool) -> None:
+    """Print a line beside the results, on stderr."""
+    if not quiet:
+        typer.echo(message, err=True)
+
+
+def table_console(stdout_taken: bool) -> Console:
+    """Return where tables go: stdout, or stderr where a file is printed on stdout."""
+    from rich.console import Console
+
+    return Console(stderr=stdout_taken, highlight=False, markup=False)
+
+
+def tell_of_compiling(quiet: bool) -> None:
+    """Say that the kernels are about to be compiled, if no compiled ones of this source are stored."""
+    if not quiet and not _compiled_before():
+        typer.echo("compiling the kernels, once (about half a minute) ...", err=True)
+
+
+def _compiled_before() -> bool:
+    from infoset import location, section_kernels
+
+    return all(
+        _stored(kernel, Path(module.__file__ or ""))
+        for module, kernel in ((section_kernels, section_kernels.measure_all), (location, location.refine_all))
+    )
+
+
+def _stored(kernel: object, source: Path) -> bool:
+    """Whether Numba has an index of a kernel that is no older than its source."""
+    name = getattr(kernel, "__name__", "")
+    folder = getattr(getattr(kernel, "stats", None), "cache_path", None)
+    if folder is None:  # not compiled at all: switched off by NUMBA_DISABLE_JIT
+        return True
+    try:
+        made = [each.stat().st_mtime for each in Path(folder).glob(f"{source.stem}.{name}-*.nbi")]
+        return bool(made) and max(made) >= source.stat().st_mtime
+    except OSError:
+        return False
+
+
+@contextlib.contextmanager
+def progress_bar(quiet: bool) -> Iterator[Callable[[str], Callable[[float], None]]]:
+    """Show progress on stderr, where that is a terminal.
+
+    Parameters
+    ----------
+    quiet : bool
+        Whether to show nothing.
+
+    Yields
+    ------
+    callable
+        Begins a bar of a name; returns what is to be told the fraction done.
+    """
+    if quiet or not sys.stderr.isatty():
+        yield lambda _name: lambda _done: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+
+        def begin(name: str) -> Callable[[float], None]:
+            task = progress.add_task(name, total=1.0)
+            return lambda done: progress.update(task, completed=done)
+
+        yield begin
+
+
+def number(value: float | None) -> str:
+    """Return a number as a table shows it: three digits, more where they stand before the point."""
+    if value is None:
+        return "-"
+    return f"{value:.1f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+def need_finite(results: Results) -> None:
+    """Refuse results that overflowed, which no file and no figure can show.
+
+    Parameters
+    ----------
+    results : Results
+
+    Raises
+    ------
+    InputError
+        If a miss or an impulse is no finite number.
+    """
+    import numpy as np
+
+    values = np.concatenate([results.miss_m, results.impulse_m_s, results.guaranteed_miss_m.filled(0.0)])
+    if not np.isfinite(values).all():
+        from experiments.errors import InputError
+
+        raise InputError(
+            "the numbers of the scenario are so large or so small that the results are not finite; "
+            "check its units with: infoset scenarios check FILE"
+        )
+
+
+def payoff_name(model: str) -> str:
+    """Return what to call `guaranteed_miss_m` of a model: the paper's model guarantees nothing."""
+    return PUBLISHED_PHI if model == "paper" else "guaranteed miss"
+
+
+def payoffs(results: Results) -> list[float | None]:
+    """Return the guaranteed misses, m; None where no label finished."""
+    values, masked = results.guaranteed_miss_m.filled(0.0), results.guaranteed_miss_m.mask
+    return [
+        None if missing else float(value) for value, missing in zip(values, _spread(masked, len(results)), strict=True)
+    ]
+
+
+def _spread(mask: object, size: int) -> Sequence[bool]:
+    import numpy as np
+
+    return [bool(each) for each in np.broadcast_to(np.asarray(mask), (size,))]

@@ -1,0 +1,187 @@
+"""Distribution functions of the miss and of the impulse spent: the paper's figure 4."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from experiments.curves import Curve
+from experiments.figures.style import CURVE_LOOKS, new_figure, place_axes, style, width_mm
+from sim import band_half_width, empirical_distribution
+
+Floats = NDArray[np.float64]
+
+_HEIGHT_MM, _NUMBER_MM = 59.0, 5.0
+"""Height of the axes, and diameter of a number on a curve."""
+
+_LEVELS = np.linspace(0.15, 0.85, 29)
+
+
+def draw_distributions(curves: Sequence[Curve], confidence: float = 0.95) -> Figure:
+    """Draw the distribution functions of (a) the miss and (b) the impulse spent, with their confidence bands.
+
+    Parameters
+    ----------
+    curves : sequence of Curve
+        At least one; numbered as in the paper.
+    confidence : float
+        Of the Dvoretzky-Kiefer-Wolfowitz bands, in (0, 1).
+
+    Returns
+    -------
+    Figure
+        Two axes. Where a few values are far beyond the others, the axis ends before them and says how many.
+    """
+    if not curves:
+        raise ValueError("at least one curve is needed")
+    with style():
+        figure = new_figure(height_mm=36.0 + _HEIGHT_MM)
+        (row,) = place_axes(figure, 1, 2, margins_mm=(14.0, 4.0, 29.0, 7.0), gaps_mm=(7.0, 0.0))
+        notes = (
+            _draw_panel(row[0], curves, lambda curve: curve.results.miss_m, confidence, from_zero=True),
+            _draw_panel(row[1], curves, lambda curve: curve.results.impulse_m_s, confidence, from_zero=False),
+        )
+        labels = ("miss, m", "impulse spent, m/s")
+        for axes, title, label, note in zip(row, ("(a) miss", "(b) impulse spent"), labels, notes, strict=True):
+            axes.set_title(title)
+            axes.set_xlabel(f"{label}\n{note}" if note else label)
+            axes.set_ylabel("distribution function (share of runs)")
+        row[1].yaxis.label.set_visible(False)
+        row[1].tick_params(labelleft=False)
+        figure.legend(handles=_handles(curves, confidence), loc="lower center", ncols=2, columnspacing=2.5)
+    return figure
+
+
+def axis_limit(samples: Sequence[Floats]) -> float:
+    """Where an axis ends: past everything, unless a few values lie far beyond the others.
+
+    Parameters
+    ----------
+    samples : sequence of ndarray
+        One a curve.
+
+    Returns
+    -------
+    float
+        The greatest value if it is at most twice the farthest upper fence (upper quartile and three times the
+        distance between the quartiles) of the samples, else the greatest value within half as much again as that fence.
+    """
+    quartiles = [np.quantile(sample, (0.25, 0.75)) for sample in samples]
+    fence = max(float(upper + 3.0 * (upper - lower)) for lower, upper in quartiles)
+    greatest = max(float(sample.max()) for sample in samples)
+    if greatest <= 2.0 * fence:
+        return greatest
+    return max(float(sample[sample <= 1.5 * fence].max(initial=0.0)) for sample in samples)
+
+
+def _draw_panel(
+    axes: Axes, curves: Sequence[Curve], value: Callable[[Curve], Floats], confidence: float, *, from_zero: bool
+) -> str:
+    """Draw one distribution, and return what is to be said of the values that do not fit."""
+    samples = [np.asarray(value(curve), dtype=np.float64) for curve in curves]
+    least, limit = min(float(sample.min()) for sample in samples), axis_limit(samples)
+    left = 0.0 if from_zero else max(0.0, least - 0.08 * (limit - least))
+    right = limit + (0.04 * (limit - left) or 0.5)
+    for curve, sample in zip(curves, samples, strict=True):
+        _draw_curve(axes, curve, sample, confidence, (left, right))
+    axes.set_xlim(left, right)
+    axes.set_ylim(-0.02, 1.02)
+    _number(axes, curves, samples)
+    beyond = [
+        (curve.number, int((sample > right).sum()), len(sample)) for curve, sample in zip(curves, samples, strict=True)
+    ]
+    lost = [f"{count} of {runs} of curve {number}" for number, count, runs in beyond if count]
+    return "runs beyond the axis: " + ", ".join(lost) if lost else ""
+
+
+def _draw_curve(axes: Axes, curve: Curve, sample: Floats, confidence: float, ends: tuple[float, float]) -> None:
+    distribution = empirical_distribution(sample, confidence)
+    half = band_half_width(len(sample), confidence)
+    right = max(ends[1], float(distribution.values[-1]))
+    values = np.concatenate([[ends[0]], distribution.values, [right]])
+    probability = np.concatenate([[0.0], distribution.probability, [1.0]])
+    lower = np.concatenate([[0.0], distribution.lower, distribution.lower[-1:]])
+    upper = np.concatenate([[min(half, 1.0)], distribution.upper, [1.0]])
+    look = CURVE_LOOKS[curve.number]
+    axes.fill_between(
+        values,
+        lower,
+        upper,
+        step="post",
+        facecolor=look["color"],
+        alpha=0.13,
+        linewidth=0.0,
+        zorder=1.0 + 0.1 * curve.number,
+        label=f"band {curve.number}",
+    )
+    axes.plot(values, probability, drawstyle="steps-post", zorder=3.0, label=f"curve {curve.number}", **look)
+
+
+def _number(axes: Axes, curves: Sequence[Curve], samples: Sequence[Floats]) -> None:
+    """Put its number on each curve, where the other curves and numbers are farthest."""
+    low, high = axes.get_xlim()
+    size = np.array([width_mm(axes), _HEIGHT_MM])
+    grid = np.linspace(low, high, 200)
+    tracks, paths = [], []
+    for sample in samples:
+        track = np.column_stack([(np.quantile(sample, _LEVELS) - low) / (high - low), _LEVELS])
+        share = np.searchsorted(np.sort(sample), grid, side="right") / len(sample)
+        tracks.append(track[(track[:, 0] > 0.05) & (track[:, 0] < 0.95)])
+        paths.append(np.concatenate([track, np.column_stack([np.linspace(0.0, 1.0, len(grid)), share])]) * size)
+    placed: list[Floats] = []
+    for index, (curve, track) in enumerate(zip(curves, tracks, strict=True)):
+        if not len(track):
+            continue
+        room = np.zeros(len(track))
+        for other in paths[:index] + paths[index + 1 :]:
+            room += np.minimum(_gaps(track * size, other), 2.0 * _NUMBER_MM)
+        for spot in placed:
+            gaps = _gaps(track * size, spot[None, :] * size)
+            room += np.where(gaps < 1.6 * _NUMBER_MM, -100.0, 0.1 * gaps)
+        room -= 1e-3 * np.abs(track[:, 1] - 0.5)
+        spot = track[room.argmax()]
+        placed.append(spot)
+        axes.text(
+            low + float(spot[0]) * (high - low),
+            float(spot[1]),
+            str(curve.number),
+            ha="center",
+            va="center",
+            fontsize=8.0,
+            fontweight="bold",
+            color=CURVE_LOOKS[curve.number]["color"],
+            bbox={
+                "boxstyle": "circle,pad=0.18",
+                "facecolor": "white",
+                "edgecolor": CURVE_LOOKS[curve.number]["color"],
+                "linewidth": 0.8,
+            },
+            zorder=5,
+        )
+
+
+def _gaps(points: Floats, others: Floats) -> Floats:
+    """Return the distance of each point to the nearest of the others."""
+    return np.asarray(np.hypot(*(points[:, None, :] - others[None, :, :]).transpose(2, 0, 1)).min(axis=1))
+
+
+def _handles(curves: Sequence[Curve], confidence: float) -> list[Line2D | Patch]:
+    handles: list[Line2D | Patch] = [
+        Line2D(
+            [],
+            [],
+            label=f"{curve.number}  {curve.noise.value} noise, "
+            f"{'with' if curve.range_meter else 'no'} range meter, {len(curve.results)} runs",
+            **CURVE_LOOKS[curve.number],
+        )
+        for curve in curves
+    ]
+    band = f"{100.0 * confidence:g} % confidence band (Dvoretzky-Kiefer-Wolfowitz)"
+    handles.insert((len(handles) + 1) // 2, Patch(facecolor="#707070", alpha=0.25, label=band))
+    return handles

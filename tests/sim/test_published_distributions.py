@@ -1,0 +1,69 @@
+"""Distributions of the 1997 experiment: bands set from an independent implementation, not from this one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from guidance import NoiseKind
+from sim import Scenario, simulate
+
+pytestmark = pytest.mark.slow
+
+
+def test_random_noise(asteroid: Scenario) -> None:
+    results = simulate(asteroid, 1000)
+    assert 1.0 <= np.quantile(results.miss_m, 0.5) <= 1.4
+    assert 3.2 <= np.quantile(results.miss_m, 0.9) <= 4.2
+    assert 160.0 <= np.quantile(results.impulse_m_s, 0.5) <= 172.0
+
+
+def test_game_noise(asteroid: Scenario) -> None:
+    results = simulate(replace(asteroid, noise=NoiseKind.GAME), 1000)
+    assert 11.5 <= np.quantile(results.miss_m, 0.5) <= 14.0
+    assert 12.8 <= np.quantile(results.miss_m, 0.9) <= 17.0
+    assert 303.0 <= np.quantile(results.impulse_m_s, 0.5) <= 321.0
+
+
+@pytest.mark.parametrize(
+    ("noise", "median", "nine_in_ten", "impulse"),
+    [(NoiseKind.RANDOM, 1.4, 3.6, 158.0), (NoiseKind.GAME, 11.0, 14.0, 308.0)],
+)
+def test_with_the_range_meter(
+    ranging: Scenario, noise: NoiseKind, median: float, nine_in_ten: float, impulse: float
+) -> None:
+    results = simulate(replace(ranging, noise=noise), 1000)
+    assert np.quantile(results.miss_m, 0.5) == pytest.approx(median, rel=0.2)
+    assert np.quantile(results.miss_m, 0.9) == pytest.approx(nine_in_ten, rel=0.2)
+    assert np.quantile(results.impulse_m_s, 0.5) == pytest.approx(impulse, rel=0.2)
+
+
+@pytest.mark.parametrize("noise", list(NoiseKind))
+def test_the_number_of_sections_does_not_matter(asteroid: Scenario, noise: NoiseKind) -> None:
+    def figures(sections: int) -> np.ndarray:
+        model = replace(asteroid.set_model, sections=sections)
+        results = simulate(replace(asteroid, noise=noise, set_model=model), 1000)
+        return np.array(
+            [
+                np.quantile(results.miss_m, 0.5),
+                np.quantile(results.miss_m, 0.9),
+                np.quantile(results.impulse_m_s, 0.5),
+            ]
+        )
+
+    few, usual, many = figures(9), figures(29), figures(101)
+    np.testing.assert_allclose(few, usual, rtol=0.08)
+    np.testing.assert_allclose(many, usual, rtol=0.08)
+
+
+@pytest.mark.parametrize("noise", list(NoiseKind))
+def test_another_scenario_is_flown_as_well(comet: Scenario, noise: NoiseKind) -> None:
+    """At 20 km/s, with another step and other bounds: the guided miss is a small part of the unguided one."""
+    results = simulate(replace(comet, noise=noise), 300)
+    z, x = results.position_m.T
+    vz, vx = results.velocity_m_s.T
+    unguided = np.abs(z * vx - x * vz) / np.hypot(vz, vx)
+    assert np.median(results.miss_m) < 0.05 * np.median(unguided)
+    assert np.quantile(results.miss_m, 0.9) < 60.0
