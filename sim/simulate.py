@@ -13,6 +13,7 @@ from sim.results import Results, join
 from sim.scenario import Scenario
 
 ENGAGEMENTS_AT_ONCE = 64
+SECTIONS_AT_ONCE = 4096
 
 
 def simulate(
@@ -52,8 +53,10 @@ def simulate(
     if numbers.size == 0 or numbers.min() < 0 or seed < 0:
         raise ValueError(f"need at least one run, and run numbers and seed not negative: got runs={runs}, seed={seed}")
     parts = []
-    for first in range(0, numbers.size, ENGAGEMENTS_AT_ONCE):
-        chunk = numbers[first : first + ENGAGEMENTS_AT_ONCE]
+    # Few enough at once to stay in the processor's cache, and in memory when sections are very many.
+    at_once = max(1, min(ENGAGEMENTS_AT_ONCE, SECTIONS_AT_ONCE // scenario.set_model.sections))
+    for first in range(0, numbers.size, at_once):
+        chunk = numbers[first : first + at_once]
         draws = draw(scenario, chunk.tolist(), seed)
         flight = Engagements(scenario, draws, strategy)
         steps = draws.angle.shape[1]

@@ -1,0 +1,506 @@
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.cli import main
+from experiments.commands import _screen
+from experiments.errors import InputError
+from experiments.output import checked_destinations, to_csv, to_json, write_file
+from experiments.scenario_file import load_scenario, scenario_hash, scenario_text
+from sim import Scenario, simulate
+
+CURVE_KEYS = [
+    "number",
+    "noise",
+    "range_meter",
+    "miss_m",
+    "impulse_m_s",
+    "guaranteed_miss_m",
+    "outcome",
+    "truth_kept",
+]
+OUTCOMES = {"intercepted", "set-lost", "budget-spent", "diverged"}
+
+
+@pytest.fixture(autouse=True)
+def _plain_screen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.chdir(tmp_path)
+
+
+class Command:
+    def __init__(self, capsys: pytest.CaptureFixture[str]) -> None:
+        self._capsys = capsys
+
+    def __call__(self, *arguments: object) -> tuple[int, str, str]:
+        """Exit code, stdout and stderr."""
+        with pytest.raises(SystemExit) as left:
+            main([str(each) for each in arguments])
+        captured = self._capsys.readouterr()
+        assert "Traceback" not in captured.err
+        return int(left.value.code or 0), captured.out, captured.err
+
+    def refused(self, *arguments: object) -> str:
+        """The one message of a command that must be refused."""
+        code, out, err = self(*arguments)
+        assert (code, out) == (2, "")
+        assert err.startswith("error: ")
+        assert err.count("error: ") == 1
+        return err
+
+    def json(self, *arguments: object) -> Any:
+        code, out, _ = self(*arguments, "--json", "-")
+        assert code == 0
+        return json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+
+
+@pytest.fixture
+def infoset(capsys: pytest.CaptureFixture[str]) -> Command:
+    return Command(capsys)
+
+
+def names_in(folder: Path) -> list[str]:
+    return sorted(each.name for each in folder.iterdir())
+
+
+def test_version(infoset: Command) -> None:
+    assert infoset("--version") == (0, f"infoset {version('infoset')}\n", "")
+
+
+@pytest.mark.parametrize("command", [[], ["experiment"], ["engage"], ["replay"], ["scenarios"]])
+def test_help_has_an_example(command: list[str], infoset: Command) -> None:
+    code, out, _ = infoset(*command, "--help")
+    assert code == 0
+    assert "Example: infoset" in out
+
+
+@pytest.mark.parametrize(
+    "arguments", [["explode"], ["experiment", "--explode"], ["experiment", "--runs", "many"], ["replay"]]
+)
+def test_what_the_command_does_not_know(arguments: list[str], infoset: Command) -> None:
+    code, out, err = infoset(*arguments)
+    assert (code, out) == (2, "")
+    assert err
+
+
+def test_help_imports_nothing_heavy() -> None:
+    heavy = ["numpy", "numba", "pydantic", "matplotlib", "scipy", "shapely", "infoset", "sim"]
+    code = f"import experiments.cli, sys; print([each for each in {heavy} if each in sys.modules])"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"
+
+
+def test_experiment_as_json(infoset: Command, tmp_path: Path) -> None:
+    found = infoset.json("experiment", "--runs", 3, "--seed", 5)
+    assert list(found) == ["version", "scenario", "scenario_hash", "seed", "runs", "elapsed_s", "curves"]
+    scenario = load_scenario("asteroid-1997")
+    assert found["version"] == version("infoset")
+    assert found["scenario"] == "asteroid-1997"
+    assert found["scenario_hash"] == scenario_hash(scenario)
+    assert (found["seed"], found["runs"]) == (5, 3)
+    assert found["elapsed_s"] > 0.0
+    curves = found["curves"]
+    assert [list(curve) for curve in curves] == [CURVE_KEYS] * 4
+    assert [(curve["number"], curve["noise"], curve["range_meter"]) for curve in curves] == [
+        (1, "random", False),
+        (2, "random", True),
+        (3, "game", False),
+        (4, "game", True),
+    ]
+    for curve in curves:
+        assert all(len(curve[key]) == 3 for key in CURVE_KEYS[3:])
+        assert all(isinstance(each, float) and math.isfinite(each) for each in curve["miss_m"] + curve["impulse_m_s"])
+        assert all(each is None or each >= 0.0 for each in curve["guaranteed_miss_m"])
+        assert set(curve["outcome"]) <= OUTCOMES
+        assert all(isinstance(each, bool) for each in curve["truth_kept"])
+    assert curves[1]["miss_m"] == simulate(scenario, 3, seed=5).miss_m.tolist()
+    assert names_in(tmp_path) == []
+
+
+def test_experiment_prints_json_alone_and_the_table_beside_it(infoset: Command) -> None:
+    code, out, err = infoset("experiment", "--runs", 1, "--json", "-")
+    assert code == 0
+    json.loads(out)
+    assert "miss, m" in err
+    assert infoset("experiment", "--runs", 1, "--json", "-", "--quiet")[2] == ""
+
+
+def test_table_of_the_experiment(infoset: Command, tmp_path: Path) -> None:
+    code, out, _ = infoset("experiment", "--runs", 2)
+    assert code == 0
+    for part in ("10%", "50%", "90%", "99%", "impulse, m/s", "published Phi, no guarantee, m", "  + range meter"):
+        assert part in out
+    assert out.count("truth kept in its section") == 4
+    assert "paper, one run from z = -8 km, no range meter: random 4.3 m for 244.7 m/s, game 9.5 m for 521.7 m/s" in out
+    assert names_in(tmp_path) == []
+    assert "paper" not in infoset("experiment", "comet-fast", "--runs", 1)[1]
+
+
+def test_quiet_experiment_prints_nothing(infoset: Command) -> None:
+    assert infoset("experiment", "--runs", 1, "-q") == (0, "", "")
+
+
+def test_without_a_range_sensor_there_are_two_curves_and_it_is_said(infoset: Command) -> None:
+    code, out, err = infoset("experiment", "asteroid-1997-single", "--runs", 1, "--json", "-")
+    assert code == 0
+    assert [curve["number"] for curve in json.loads(out)["curves"]] == [1, 3]
+    assert "no [range_sensor]: there are curves 1 and 3 only" in err
+
+
+def test_warnings_are_said_and_written(infoset: Command, tmp_path: Path) -> None:
+    file = tmp_path / "wide.toml"
+    file.write_text(scenario_text("asteroid-1997-single").replace("z_km = -8.0", "z_km = -10.5"))
+    code, out, err = infoset("engage", file, "--json", "-")
+    assert code == 0
+    assert "warning: dispersion.z_km reaches 0.5 km below" in err
+    assert json.loads(out)["warnings"][0].startswith("dispersion.z_km reaches 0.5 km below")
+    assert infoset.json("experiment", file, "--runs", 1)["warnings"] == json.loads(out)["warnings"]
+
+
+def test_experiment_into_a_folder(infoset: Command, tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "results"
+    beside = tmp_path / "beside.csv"
+    code, _, _ = infoset("experiment", "--runs", 2, "--out", folder, "--csv", beside, "--tie", "lower", "--sections", 9)
+    assert code == 0
+    assert names_in(folder) == [
+        "figure-4-distributions.pdf",
+        "figure-4-distributions.png",
+        "results.csv",
+        "results.json",
+        "scenario.toml",
+    ]
+    found = json.loads((folder / "results.json").read_text())
+    flown = load_scenario(folder / "scenario.toml")
+    assert (flown.tie.value, flown.set_model.sections) == ("lower", 9)
+    assert scenario_hash(flown) == found["scenario_hash"]
+    text = (folder / "results.csv").read_text()
+    assert text == beside.read_text()
+    rows = list(csv.DictReader(io.StringIO(text)))
+    assert len(rows) == 8
+    assert [(row["curve"], row["run"]) for row in rows[:3]] == [("1", "0"), ("1", "1"), ("2", "0")]
+    assert [float(row["miss_m"]) for row in rows[4:6]] == found["curves"][2]["miss_m"]
+    assert {row["range_meter"] for row in rows} == {"true", "false"}
+    assert {row["start_x_m"] for row in rows[0::2]} == {rows[0]["start_x_m"]}
+
+
+@pytest.mark.parametrize(
+    ("noise", "meter", "curve"),
+    [("random", False, 1), ("random", True, 2), ("game", False, 3), ("game", True, 4)],
+)
+def test_a_run_of_the_experiment_is_the_same_engagement(noise: str, meter: bool, curve: int, infoset: Command) -> None:
+    curves = infoset.json("experiment", "--runs", 3, "--seed", 7, "--tie", "random")["curves"]
+    switch = "--range-meter" if meter else "--no-range-meter"
+    one = infoset.json("engage", "--noise", noise, switch, "--seed", 7, "--run", 2, "--tie", "random")
+    assert {key: one[key] for key in CURVE_KEYS} == {
+        key: value[2] if isinstance(value, list) else value for key, value in curves[curve - 1].items()
+    }
+
+
+def test_engage_as_json(infoset: Command, tmp_path: Path) -> None:
+    found = infoset.json("engage")
+    assert [key for key in found if key not in {"run", "runs"}] == [
+        *("version", "scenario", "scenario_hash", "seed", "elapsed_s"),
+        *CURVE_KEYS,
+        "steps",
+    ]
+    assert found["scenario_hash"] == scenario_hash(load_scenario("asteroid-1997"))
+    assert (found["run"], found["seed"], found["noise"], found["range_meter"]) == (0, 0, "random", True)
+    assert found["outcome"] in OUTCOMES
+    steps = found["steps"]
+    assert all(
+        list(step)
+        == [
+            *("t_s", "measured_angle_rad", "true_angle_rad", "true_rate_rad_s"),
+            *("impulse_m_s", "predicted_miss_m", "sections"),
+        ]
+        for step in steps
+    )
+    assert [step["t_s"] for step in steps[:3]] == [0.0, 0.5, 1.0]
+    first, last = steps[0], steps[-1]
+    lower, upper = first["predicted_miss_m"]
+    assert lower < upper
+    assert isinstance(first["measured_angle_rad"], float)
+    assert isinstance(first["sections"], int)
+    assert last["t_s"] == 0.5 * (len(steps) - 1)
+    assert all((step["predicted_miss_m"] is None) == (step["sections"] == 0) for step in steps)
+    assert math.isclose(sum(abs(step["impulse_m_s"]) for step in steps), found["impulse_m_s"])
+    assert names_in(tmp_path) == []
+
+
+def test_angle_is_null_where_nothing_is_measured(infoset: Command, tmp_path: Path) -> None:
+    file = tmp_path / "slow.toml"
+    file.write_text(scenario_text("asteroid-1997-single").replace("period_s = 0.5", "period_s = 1.0"))
+    steps = infoset.json("engage", file)["steps"]
+    assert [step["measured_angle_rad"] is None for step in steps[:4]] == [False, True, False, True]
+
+
+def test_engage_under_both_noises(infoset: Command, tmp_path: Path) -> None:
+    folder = tmp_path / "figures"
+    record = tmp_path / "flight.npz"
+    steps = tmp_path / "steps.csv"
+    arguments = ["engage", "asteroid-1997-single", "--noise", "both"]
+    code, out, _ = infoset(*arguments, "--out", folder, "--record", record, "--csv", steps)
+    assert code == 0
+    assert names_in(folder) == [
+        "figure-2-process.pdf",
+        "figure-2-process.png",
+        "figure-3-sets.pdf",
+        "figure-3-sets.png",
+        "record-game.npz",
+        "record-random.npz",
+        "results.json",
+        "scenario.toml",
+        "steps.csv",
+    ]
+    for part in ("4.3", "244.7", "9.5", "521.7", "paper", "intercepted", "published Phi, no guarantee, m"):
+        assert part in out
+    found = json.loads((folder / "results.json").read_text())
+    assert [key for key in found if key in {"random", "game"}] == ["random", "game"]
+    assert found["version"] == version("infoset")
+    assert found["game"]["steps"]
+    alone = infoset.json(*arguments[:2], "--noise", "game")
+    same = [key for key in alone if key != "elapsed_s"]
+    assert {key: found["game"][key] for key in same} == {key: alone[key] for key in same}
+    rows = list(csv.DictReader(io.StringIO(steps.read_text())))
+    assert {row["noise"] for row in rows} == {"random", "game"}
+    assert len(rows) == len(found["random"]["steps"]) + len(found["game"]["steps"])
+    assert rows[0]["measured_range_m"] == ""
+    assert (tmp_path / "flight-random.npz").read_bytes() == (folder / "record-random.npz").read_bytes()
+
+    again = tmp_path / "again"
+    code, _, _ = infoset("replay", tmp_path / "flight-random.npz", tmp_path / "flight-game.npz", "--out", again, "-q")
+    assert code == 0
+    assert names_in(again) == names_in(folder)[:4]
+    assert (again / "figure-3-sets.png").read_bytes() == (folder / "figure-3-sets.png").read_bytes()
+
+
+def test_replay_of_one_record(infoset: Command, tmp_path: Path) -> None:
+    assert infoset("engage", "--record", "a.npz", "-q") == (0, "", "")
+    assert names_in(tmp_path) == ["a.npz"]
+    code, out, err = infoset("replay", "a.npz")
+    assert code == 0
+    assert "asteroid-1997" in out
+    assert "give --out DIR for the figures" in err
+    assert names_in(tmp_path) == ["a.npz"]
+    assert "one record or two" in infoset.refused("replay", "a.npz", "a.npz", "a.npz")
+    assert "there is no such file" in infoset.refused("replay", "b.npz", "--out", "out")
+    assert names_in(tmp_path) == ["a.npz"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["experiment", "--runs", "0"], ["--runs", "from 1 to 10000000", "found 0", "--runs 50"]),
+        (["experiment", "--runs", "-3"], ["--runs", "found -3"]),
+        (["experiment", "--runs", "10000001"], ["--runs", "found 10000001"]),
+        (["experiment", "--runs", "9" * 100], ["--runs", "more than 20 digits"]),
+        (["experiment", "--seed", "-1"], ["--seed", "at least 0"]),
+        (["engage", "--seed", "-1"], ["--seed", "at least 0"]),
+        (["engage", "--run", "-1"], ["--run", "from 0"]),
+        (["engage", "--run", "9" * 30], ["--run", "more than 20 digits"]),
+        (["experiment", "--strategy", "symetric-miss"], ["--strategy", "did you mean symmetric-miss?"]),
+        (["experiment", "--strategy", "[red]"], ["--strategy", "[red]", "choose one of"]),
+        (["engage", "--model", "papr"], ["--model", "did you mean paper?"]),
+        (["engage", "--tie", "uper"], ["--tie", "did you mean upper?", "lower, alternate, random"]),
+        (["engage", "--noise", "gmae"], ["--noise", "did you mean game?", "both"]),
+        (["experiment", "--sections", "4"], ["--sections", "from 5", "fewest_sections", "found 4"]),
+        (["experiment", "--sections", "100001"], ["--sections", "found 100001"]),
+        (["engage", "asteroid-1997-single", "--range-meter"], ["--range-meter", "[range_sensor]", "relative_error"]),
+        (["engage", "asteroid-1996"], ["asteroid-1996", "did you mean"]),
+        (["experiment", "no/such.toml"], ["no/such.toml"]),
+        (["experiment", "."], ["."]),
+        (["engage", "--record", "flight"], ["--record", "must end in .npz"]),
+        (["engage", "--json", "-", "--csv", "-"], ["--json and --csv", "stdout"]),
+        (["engage", "--json", "x", "--csv", "x"], ["--csv", "also the file of --json"]),
+        (["engage", "--json", "out/results.json", "--out", "out"], ["--json", "also a file of --out"]),
+        (["engage", "--json", "missing/x.json"], ["there is no folder missing"]),
+        (["engage", "--json", ""], ["is a folder"]),
+        (["engage", "--json", "n" * 300], ["cannot be written"]),
+        (["engage", "--csv", "/dev/null", "--overwrite"], ["no ordinary file"]),
+        (["engage", "--out", "/dev/null"], ["is a file"]),
+        (["engage", "--out", "/dev/null/x"], ["cannot be written"]),
+        (["engage", "--out", "n" * 300], ["cannot be written"]),
+    ],
+)
+def test_what_is_wrong_is_said_before_the_work(
+    arguments: list[str], parts: list[str], infoset: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sim.simulate", lambda *_: pytest.fail("began to work"))
+    monkeypatch.setattr("sim.fly_one", lambda *_: pytest.fail("began to work"))
+    message = infoset.refused(*arguments)
+    for part in parts:
+        assert part in message
+    assert names_in(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("option", "name"), [("--json", "x.json"), ("--csv", "x.csv"), ("--record", "x.npz"), ("--out", "x")]
+)
+def test_nothing_is_replaced_unless_told(option: str, name: str, infoset: Command, tmp_path: Path) -> None:
+    target = tmp_path / name
+    precious = target
+    if option == "--out":
+        target.mkdir()
+        precious = target / "results.json"
+    precious.write_text("precious")
+    message = infoset.refused("engage", option, target)
+    assert "--overwrite" in message
+    assert precious.read_text() == "precious"
+    assert infoset("engage", option, target, "--overwrite", "-q")[0] == 0
+    assert precious.read_bytes() != b"precious"
+    assert names_in(tmp_path) == [name]
+
+
+def test_a_record_of_either_noise_is_not_replaced(infoset: Command, tmp_path: Path) -> None:
+    (tmp_path / "x-game.npz").write_text("precious")
+    message = infoset.refused("engage", "--noise", "both", "--record", tmp_path / "x.npz")
+    assert "x-game.npz" in message
+    assert names_in(tmp_path) == ["x-game.npz"]
+
+
+def test_a_folder_that_may_not_be_written_is_found_before_the_work(
+    infoset: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> None:  # chmod does not stop root
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("sim.simulate", lambda *_: pytest.fail("began to work"))
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "mkdir", refuse)
+        message = infoset.refused("experiment", "--out", "out")
+    assert message.startswith("error: out: cannot be written: Permission denied")
+    assert names_in(tmp_path) == []
+
+
+def test_a_folder_made_for_work_that_failed_is_taken_away(tmp_path: Path) -> None:
+    def work() -> None:
+        with checked_destinations(folder=tmp_path / "a" / "b"):
+            assert (tmp_path / "a" / "b").is_dir()
+            raise RuntimeError("no")
+
+    with pytest.raises(RuntimeError, match="no"):
+        work()
+    assert names_in(tmp_path) == []
+
+
+def test_a_link_is_followed_when_replaced(tmp_path: Path) -> None:
+    target, link = tmp_path / "target", tmp_path / "link"
+    target.write_text("old")
+    link.symlink_to(target)
+    write_file(link, "new", overwrite=True)
+    assert link.is_symlink()
+    assert target.read_text() == "new"
+    assert names_in(tmp_path) == ["link", "target"]
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    file = tmp_path / "x"
+    file.write_text("old")
+    monkeypatch.setattr(Path, "replace", fail)
+    with pytest.raises(InputError, match="No space left on device"):
+        write_file(file, "new", overwrite=True)
+    assert file.read_text() == "old"
+    assert names_in(tmp_path) == ["x"]
+
+
+def test_json_and_csv_of_odd_values() -> None:
+    assert to_csv(["a", "b_m"], [[None, 0.1], [True, -1e-300], ['x,"', 3]]) == ('a,b_m\n,0.1\ntrue,-1e-300\n"x,""",3\n')
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        to_json({"a": math.nan})
+
+
+def test_results_that_are_not_finite_are_refused(infoset: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    def overflowing(scenario: Scenario, runs: int, **_: object) -> object:
+        results = simulate(scenario, runs)
+        results.miss_m[:] = math.inf
+        return results
+
+    monkeypatch.setattr("sim.simulate", overflowing)
+    assert "not finite" in infoset.refused("experiment", "--runs", 1)
+
+
+def test_interrupted(infoset: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sim.simulate", interrupt)
+    assert infoset("experiment", "--out", "out") == (130, "", "interrupted\n")
+    assert names_in(tmp_path) == []
+
+
+def test_compiling_is_said_when_nothing_is_compiled(
+    infoset: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Kernel:
+        __name__ = "measure_all"
+
+        class stats:  # noqa: N801
+            cache_path = str(tmp_path)
+
+    source = tmp_path / "section_kernels.py"
+    source.write_text("")
+    index = tmp_path / "section_kernels.measure_all-7.py311.nbi"
+    assert not _screen._stored(Kernel(), source)
+    index.write_text("")
+    os.utime(source, (1, 1))
+    assert _screen._stored(Kernel(), source)
+    os.utime(source, (time.time() + 9, time.time() + 9))
+    assert not _screen._stored(Kernel(), source)
+
+    monkeypatch.setattr(_screen, "_compiled_before", lambda: False)
+    _, out, err = infoset("experiment", "--runs", 1, "--json", "-")
+    json.loads(out)
+    assert err.startswith("compiling the kernels, once")
+    assert infoset("experiment", "--runs", 1, "-q") == (0, "", "")
+
+
+def test_a_reader_that_leaves_is_no_error() -> None:
+    # Ample output, and a reader that closes at once.
+    process = subprocess.Popen(
+        [sys.executable, "-m", "experiments.cli", "engage", "--json", "-", "--quiet"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    assert process.stdout is not None
+    assert process.stderr is not None
+    process.stdout.close()
+    err = process.stderr.read()
+    process.stderr.close()
+    process.wait(60)
+    assert err == b""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+def test_interrupt_of_a_process(tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "experiments.cli", "experiment", "--runs", "100000", "--out", "out"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    deadline = time.monotonic() + 60
+    while not (tmp_path / "out").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, b"")
+    assert err.decode().splitlines()[-1] == "interrupted"
+    assert b"Traceback" not in err
+    assert names_in(tmp_path) == []
