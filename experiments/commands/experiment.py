@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
@@ -111,6 +112,8 @@ def _warn(scenario: Scenario, quiet: bool) -> list[str]:
 
 
 def _fly(scenario: Scenario, runs: int, seed: int, quiet: bool) -> tuple[list[Curve], float]:
+    from concurrent.futures import ThreadPoolExecutor
+    from threading import Event
     from time import perf_counter
 
     from experiments.commands._screen import need_finite, progress_bar
@@ -118,14 +121,30 @@ def _fly(scenario: Scenario, runs: int, seed: int, quiet: bool) -> tuple[list[Cu
     from sim import simulate
 
     began_s = perf_counter()
-    curves = []
+    stopped = Event()
     with progress_bar(quiet) as begin:
-        for number, flown in curve_scenarios(scenario):
-            progress = begin(f"curve {number}: {flown.noise.value}{' + range meter' if flown.range_sensor else ''}")
+
+        def fly(number: int, flown: Scenario) -> Curve:
+            report = begin(f"curve {number}: {flown.noise.value}{' + range meter' if flown.range_sensor else ''}")
+
+            def progress(share: float) -> None:
+                if stopped.is_set():
+                    raise InterruptedError
+                report(share)
+
             results = simulate(flown, runs, seed=seed, progress=progress)
             need_finite(results)
-            curves.append(Curve(number, flown.noise, flown.range_sensor is not None, results))
-    return curves, perf_counter() - began_s
+            return Curve(number, flown.noise, flown.range_sensor is not None, results)
+
+        # Curves are independent and the kernels release the interpreter: a thread a core. The slowest goes first.
+        flights = sorted(curve_scenarios(scenario), key=lambda flight: -flight[0])
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            try:
+                curves = list(pool.map(fly, *zip(*flights, strict=True)))
+            except BaseException:
+                stopped.set()
+                raise
+    return sorted(curves, key=lambda curve: curve.number), perf_counter() - began_s
 
 
 def _summary(

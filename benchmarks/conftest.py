@@ -1,0 +1,61 @@
+"""What all benchmarks share: targets, told at the end of the run, and scenarios."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from experiments import load_scenario
+from guidance import NoiseKind
+from sim import Scenario
+
+Check = Callable[[str, float, float, str], None]
+
+LINES = pytest.StashKey[list[str]]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--strict-targets", action="store_true", help="a target that is missed is a failure")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.stash[LINES] = []
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    lines = config.stash[LINES]
+    if lines:
+        terminalreporter.section("targets")
+        for line in lines:
+            terminalreporter.write_line(line)
+
+
+def _checker(config: pytest.Config, at_least: bool) -> Check:
+    def check(what: str, measured: float, target: float, unit: str) -> None:
+        met = measured >= target if at_least else measured < target
+        bound = ">=" if at_least else "<"
+        line = f"{'met   ' if met else 'MISSED'} {what}: {measured:.4g} {unit} (target {bound} {target:g} {unit})"
+        config.stash[LINES].append(line)
+        assert met or not config.getoption("--strict-targets"), line
+
+    return check
+
+
+@pytest.fixture(scope="session")
+def under(pytestconfig: pytest.Config) -> Check:
+    """Note a measured value that should be under its target."""
+    return _checker(pytestconfig, at_least=False)
+
+
+@pytest.fixture(scope="session")
+def at_least(pytestconfig: pytest.Config) -> Check:
+    """Note a measured value that should be at least its target."""
+    return _checker(pytestconfig, at_least=True)
+
+
+@pytest.fixture(params=list(NoiseKind), ids=lambda kind: kind.value, scope="module")
+def curve(request: pytest.FixtureRequest) -> Scenario:
+    """The paper's scenario without a range meter: curves 1 and 3 of its experiment."""
+    return replace(load_scenario("asteroid-1997"), noise=request.param, range_sensor=None)

@@ -1,0 +1,82 @@
+"""The experiment as a person waits for it: one curve in the process, and whole processes with their peak memory."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from pytest_benchmark.fixture import BenchmarkFixture
+
+from guidance import NoiseKind
+from sim import Scenario, simulate
+
+Check = Callable[[str, float, float, str], None]
+
+CURVE_TARGET_S = {NoiseKind.RANDOM: 0.2, NoiseKind.GAME: 0.5}
+ROUNDS = 5
+
+
+@dataclass(frozen=True)
+class Process:
+    """A finished process."""
+
+    elapsed_s: float
+    peak_mb: float
+    errors: str
+
+
+def infoset(*arguments: str, cache: Path | None = None) -> Process:
+    """Run the command `infoset` in a process of its own, with a compile cache of its own if one is given."""
+    environment = dict(os.environ) if cache is None else {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    command = [sys.executable, "-m", "experiments.cli", *arguments]
+    began = time.perf_counter()
+    with subprocess.Popen(
+        command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        errors = process.stderr.read()
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    elapsed_s = time.perf_counter() - began
+    assert process.returncode == 0, errors
+    unit = 1.0 if sys.platform == "darwin" else 1024.0  # ru_maxrss is in bytes there, in KiB elsewhere
+    return Process(elapsed_s, usage.ru_maxrss * unit / 1e6, errors)
+
+
+@pytest.mark.benchmark(group="50 engagements of one curve")
+def test_curve(benchmark: BenchmarkFixture, curve: Scenario, under: Check) -> None:
+    benchmark.pedantic(simulate, args=(curve, 50), rounds=ROUNDS, warmup_rounds=1)
+    assert benchmark.stats is not None
+    elapsed_s = float(benchmark.stats.stats.median)
+    under(f"50 engagements, {curve.noise.value}", elapsed_s, CURVE_TARGET_S[curve.noise], "s")
+
+
+def test_first_run(tmp_path: Path, under: Check) -> None:
+    first = infoset("experiment", cache=tmp_path / "cache")
+    assert "compil" in first.errors
+    under("infoset experiment, empty compile cache", first.elapsed_s, 40.0, "s")
+    under("peak memory, empty compile cache", first.peak_mb, 400.0, "MB")
+
+
+def test_without_figures(under: Check) -> None:
+    infoset("experiment", "--runs", "1")
+    runs = [infoset("experiment") for _ in range(ROUNDS)]
+    under("infoset experiment without figures", min(run.elapsed_s for run in runs), 4.0, "s")
+    under("peak memory without figures", max(run.peak_mb for run in runs), 400.0, "MB")
+
+
+def test_with_figures(tmp_path: Path, under: Check) -> None:
+    infoset("experiment", "--runs", "1", "--out", str(tmp_path / "warm"))
+    runs = [infoset("experiment", "--out", str(tmp_path / f"results{number}")) for number in range(ROUNDS)]
+    under("infoset experiment with figures", min(run.elapsed_s for run in runs), 8.0, "s")
+    under("peak memory with figures", max(run.peak_mb for run in runs), 400.0, "MB")
+
+
+def test_help(under: Check) -> None:
+    under("infoset --help", min(infoset("--help").elapsed_s for _ in range(ROUNDS)), 0.7, "s")

@@ -1,0 +1,374 @@
+"""Batches: shapes, broadcasting, indexing, errors, what a person sees; polygons from points and from shapely."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import shapely
+
+from infoset import ConvexPolygons, to_shapely
+from infoset.shapes import from_shapely
+
+SHAPES = [(), (3,), (2, 3), (0,)]
+
+
+def boxes(shape: tuple[int, ...]) -> ConvexPolygons:
+    """A batch of boxes [0, k + 1] x [0, 1], k counting the batch."""
+    widths = np.arange(1.0, math.prod(shape) + 1.0).reshape(shape)
+    zeros, ones = np.zeros(shape), np.ones(shape)
+    corners = [(zeros, zeros), (widths, zeros), (widths, ones), (zeros, ones)]
+    return ConvexPolygons(np.stack([np.stack(c, axis=-1) for c in corners], axis=-2), np.full(shape, 4))
+
+
+def square() -> ConvexPolygons:
+    return ConvexPolygons.box((0.0, 1.0), (0.0, 1.0))
+
+
+POINT = ConvexPolygons.box((1.0, 1.0), (2.0, 2.0))
+SEGMENT = ConvexPolygons([(0.0, 0.0), (3.0, 4.0)], 2)
+
+
+# Batches --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_every_operation_keeps_the_shape_of_the_batch(shape: tuple[int, ...]) -> None:
+    batch = boxes(shape)
+    sets = [
+        batch.clip((1.0, 0.0), 0.25, 0.75),
+        batch.linear_map([[0.0, 1.0], [1.0, 0.0]]),
+        batch.translate((1.0, 2.0)),
+        batch.add_segment((1.0, 1.0)),
+        batch.minkowski_sum(square()),
+        batch.minkowski_sum(batch),
+        batch.reduce_outward(4),
+    ]
+    assert [s.shape for s in sets] == [shape] * len(sets)
+    values = [
+        batch.support((1.0, 0.0)),
+        batch.margin((0.5, 0.5)),
+        batch.area(),
+        batch.contains((0.5, 0.5)),
+        batch.is_empty,
+    ]
+    assert [v.shape for v in values] == [shape] * len(values)
+    vectors = [batch.support_vector((1.0, 0.0)), batch.centroid(), *batch.bounding_box()]
+    assert [v.shape for v in vectors] == [(*shape, 2)] * len(vectors)
+
+
+@pytest.mark.parametrize("shape", [(3,), (2, 3)])
+def test_a_batch_gives_what_its_members_give(shape: tuple[int, ...]) -> None:
+    batch = boxes(shape)
+    random = np.random.default_rng(1)
+    vectors = random.normal(size=(*shape, 2))
+    lower, upper = random.uniform(-0.5, 0.2, shape), random.uniform(0.3, 2.0, shape)
+    matrices = random.normal(size=(*shape, 2, 2))
+    whole = [
+        batch.clip(vectors, lower, upper),
+        batch.linear_map(matrices),
+        batch.translate(vectors),
+        batch.add_segment(vectors),
+        batch.minkowski_sum(batch.linear_map(matrices)),
+    ]
+    measures = [batch.support(vectors), batch.support_vector(vectors), batch.margin(vectors), batch.centroid()]
+    for index in np.ndindex(shape):
+        one = batch[index]
+        single = [
+            one.clip(vectors[index], lower[index], upper[index]),
+            one.linear_map(matrices[index]),
+            one.translate(vectors[index]),
+            one.add_segment(vectors[index]),
+            one.minkowski_sum(one.linear_map(matrices[index])),
+        ]
+        for many, alone in zip(whole, single, strict=True):
+            assert many[index].polygon().tolist() == alone.polygon().tolist()
+        v = vectors[index]
+        for got, wanted in zip(
+            measures, [one.support(v), one.support_vector(v), one.margin(v), one.centroid()], strict=True
+        ):
+            np.testing.assert_array_equal(got[index], wanted)
+
+
+def test_arguments_are_broadcast_over_the_batch() -> None:
+    batch = boxes((2, 3))
+    cut = batch.clip((1.0, 0.0), upper=[0.25, 0.5, 1.0])
+    np.testing.assert_allclose(cut.area(), [[0.25, 0.5, 1.0]] * 2)
+    moved = batch.translate([[0.0, 0.0], [10.0, 0.0], [20.0, 0.0]])
+    np.testing.assert_allclose(moved.bounding_box()[0][..., 0], [[0.0, 10.0, 20.0]] * 2)
+    turned = batch.linear_map([np.eye(2), 2.0 * np.eye(2), np.zeros((2, 2))])
+    np.testing.assert_allclose(turned.area(), batch.area() * [1.0, 4.0, 0.0])
+    np.testing.assert_array_equal(turned.counts[:, 2], 1)
+
+
+def test_a_single_polygon_meets_a_batch_in_a_sum_either_way_round() -> None:
+    batch = boxes((2, 3))
+    one_way, other_way = batch.minkowski_sum(square()), square().minkowski_sum(batch)
+    assert one_way.shape == other_way.shape == (2, 3)
+    np.testing.assert_allclose(one_way.area(), 2.0 * (1.0 + batch.area()))
+    np.testing.assert_allclose(other_way.area(), one_way.area())
+
+
+def test_members_of_a_batch_may_have_few_vertices_or_none() -> None:
+    vertices = np.zeros((4, 4, 2))
+    vertices[1, 0] = (1.0, 2.0)
+    vertices[2, :2] = SEGMENT.polygon()
+    vertices[3] = square().polygon()
+    vertices[0] = np.nan  # not used: never looked at
+    mixed = ConvexPolygons(vertices, [0, 1, 2, 4])
+    assert mixed.is_empty.tolist() == [True, False, False, False]
+    np.testing.assert_array_equal(mixed.area(), [0.0, 0.0, 0.0, 1.0])
+    np.testing.assert_array_equal(mixed.support((1.0, 0.0)), [-np.inf, 1.0, 3.0, 1.0])
+    assert mixed.contains((1.0, 2.0)).tolist() == [False, True, False, False]
+    assert mixed.margin((1.0, 1.0))[0] == -np.inf
+    assert mixed.clip((1.0, 0.0), 0.5, 2.0).counts.tolist() == [0, 1, 2, 4]
+    assert mixed.linear_map(np.eye(2)).counts.tolist() == [0, 1, 2, 4]
+    assert mixed.add_segment((0.0, 1.0)).counts.tolist() == [0, 2, 4, 4]
+    assert mixed.minkowski_sum(square()).counts.tolist() == [0, 4, 6, 4]
+
+
+def test_indexing_slicing_masking_and_iteration() -> None:
+    batch = boxes((2, 3))
+    assert len(batch) == 2
+    assert batch[1].shape == (3,)
+    assert batch[1, 2].area() == 6.0
+    assert batch[:, 1:].shape == (2, 2)
+    assert batch[batch.area() > 3.0].shape == (3,)
+    assert [row.shape for row in batch] == [(3,), (3,)]
+    assert [float(one.area()) for one in batch[0]] == [1.0, 2.0, 3.0]
+    with pytest.raises(IndexError):
+        batch[2]
+
+
+def test_operations_leave_their_arguments_alone() -> None:
+    vertices = square().polygon()
+    before = vertices.copy()
+    polygon = ConvexPolygons(vertices, 4)
+    polygon.clip((1.0, 1.0), 0.3, 0.9)
+    polygon.translate((5.0, 5.0))
+    polygon.linear_map([[2.0, 1.0], [0.0, 1.0]])
+    polygon.add_segment((1.0, 0.5))
+    polygon.minkowski_sum(polygon)
+    polygon.reduce_outward(4)
+    polygon.polygon()[:] = 7.0
+    np.testing.assert_array_equal(polygon.vertices, before)
+
+
+# Empty sets -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("empty", [ConvexPolygons.empty(), square().clip((1.0, 0.0), 5.0, 6.0)], ids=["made", "cut"])
+def test_operations_on_the_empty_set_are_empty(empty: ConvexPolygons) -> None:
+    results = [
+        empty.clip((1.0, 0.0), 0.0, 1.0),
+        empty.linear_map(np.eye(2)),
+        empty.translate((1.0, 1.0)),
+        empty.add_segment((1.0, 0.0)),
+        empty.minkowski_sum(square()),
+        square().minkowski_sum(empty),
+        empty.reduce_outward(4),
+    ]
+    assert all(result.is_empty for result in results)
+    assert empty.area() == 0.0
+    assert empty.support((1.0, 0.0)) == -np.inf
+    assert empty.margin((0.0, 0.0)) == -np.inf
+    assert not empty.contains((0.0, 0.0))
+    assert empty.polygon().shape == (0, 2)
+
+
+def test_a_batch_of_empty_sets() -> None:
+    empty = ConvexPolygons.empty((2, 3))
+    assert empty.shape == (2, 3)
+    assert empty.is_empty.all()
+    assert empty.clip((1.0, 0.0), 0.0, 1.0).shape == (2, 3)
+    np.testing.assert_array_equal(empty.area(), np.zeros((2, 3)))
+
+
+@pytest.mark.parametrize(
+    "measure",
+    [ConvexPolygons.centroid, ConvexPolygons.bounding_box, lambda p: p.support_vector((1.0, 0.0))],
+    ids=["centroid", "bounding_box", "support_vector"],
+)
+def test_the_empty_set_has_no_points_to_give(measure: Callable[[ConvexPolygons], object]) -> None:
+    with pytest.raises(ValueError, match="the empty set has no"):
+        measure(ConvexPolygons.empty())
+    with pytest.raises(ValueError, match="the empty set has no"):
+        measure(boxes((3,)).clip((1.0, 0.0), [1.5, 0.0, 0.0], 9.0))
+
+
+# Errors ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("vertices", "counts", "message"),
+    [
+        ([0.0, 1.0], 1, "shape"),
+        (np.zeros((4, 3)), 4, "shape"),
+        (np.zeros((2, 4, 2)), 4, "shape"),
+        (np.zeros((2, 4, 2)), [4, 4, 4], "shape"),
+        (np.zeros((4, 2)), 5, "counts must lie between 0 and 4"),
+        (np.zeros((4, 2)), -1, "counts must lie between 0 and 4"),
+        ([[0.0, np.nan]], 1, "finite"),
+        ([[0.0, 1.0], [np.inf, 0.0]], 2, "finite"),
+    ],
+)
+def test_bad_vertices_are_refused(vertices: object, counts: object, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        ConvexPolygons(vertices, counts)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("bad", [(np.nan, 0.0), (np.inf, 1.0), (1.0,), (1.0, 2.0, 3.0), 1.0])
+def test_vectors_that_are_not_finite_pairs_are_refused(bad: object) -> None:
+    polygon = square()
+    for operation, name in [
+        (polygon.clip, "normal"),
+        (polygon.translate, "offset"),
+        (polygon.add_segment, "half"),
+        (polygon.support, "direction"),
+        (polygon.support_vector, "direction"),
+        (polygon.margin, "point"),
+        (polygon.contains, "point"),
+    ]:
+        with pytest.raises(ValueError, match=name):
+            operation(bad)  # type: ignore[operator]
+
+
+def test_other_bad_arguments_are_refused() -> None:
+    polygon = square()
+    with pytest.raises(ValueError, match="lower must be a number"):
+        polygon.clip((1.0, 0.0), np.nan, 1.0)
+    with pytest.raises(ValueError, match="upper must be a number"):
+        polygon.clip((1.0, 0.0), 0.0, np.nan)
+    with pytest.raises(ValueError, match="must not be zero"):
+        polygon.clip((0.0, 0.0), 0.0, 1.0)
+    with pytest.raises(ValueError, match="must not be zero"):
+        boxes((2,)).clip([(1.0, 0.0), (0.0, 0.0)], 0.0, 1.0)
+    with pytest.raises(ValueError, match="finite"):
+        polygon.linear_map([[np.nan, 0.0], [0.0, 1.0]])
+    with pytest.raises(ValueError, match="broadcast"):
+        polygon.linear_map(np.zeros((3, 3)))
+    with pytest.raises(ValueError, match="broadcast"):
+        boxes((3,)).clip((1.0, 0.0), [0.0, 0.0])
+    with pytest.raises(ValueError, match=r"broadcast|mismatch"):
+        boxes((3,)).minkowski_sum(boxes((2,)))
+    with pytest.raises(ValueError, match="cap must be at least 4"):
+        polygon.reduce_outward(3)
+    with pytest.raises(ValueError, match="reversed"):
+        ConvexPolygons.box((1.0, 0.0), (0.0, 1.0))
+    with pytest.raises(ValueError, match="reversed"):
+        ConvexPolygons.box((0.0, 1.0), (1.0, 0.0))
+    with pytest.raises(ValueError, match="choose one with an index"):
+        boxes((3,)).polygon()
+    with pytest.raises(TypeError, match=r"\.counts"):
+        len(polygon)
+    with pytest.raises(ValueError, match="finite"):
+        ConvexPolygons.from_points([(0.0, np.nan)])
+
+
+def test_a_reversed_band_is_empty() -> None:
+    assert square().clip((1.0, 0.0), 0.6, 0.4).is_empty
+    assert boxes((2,)).clip((1.0, 0.0), [0.0, 0.6], [0.5, 0.4]).is_empty.tolist() == [False, True]
+
+
+# What a person sees ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("polygon", "text"),
+    [
+        (ConvexPolygons.empty(), "<empty set>"),
+        (POINT, "<point (1, 2)>"),
+        (SEGMENT, "<segment, length 5>"),
+        (ConvexPolygons([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], 3), "<triangle, area 0.5>"),
+        (square(), "<quadrangle, area 1>"),
+        (square().clip((1.0, 1.0), upper=1.5), "<pentagon, area 0.875>"),
+        (square().minkowski_sum(square().linear_map([[1.0, -1.0], [1.0, 1.0]])), "<polygon of 8 vertices, area 7>"),
+        (boxes((2, 3)), "<convex polygons, batch of shape (2, 3), 4 to 4 vertices>"),
+        (boxes((2,)).clip((1.0, 0.0), 1.5), "<convex polygons, batch of shape (2,), 0 to 4 vertices>"),
+        (ConvexPolygons.empty((0,)), "<convex polygons, batch of shape (0,), 0 to 0 vertices>"),
+    ],
+)
+def test_printing_one_says_what_it_is(polygon: ConvexPolygons, text: str) -> None:
+    assert repr(polygon) == text
+
+
+def test_boxes_may_be_segments_and_points() -> None:
+    assert ConvexPolygons.box((0.0, 2.0), (0.0, 3.0)).area() == 6.0
+    assert ConvexPolygons.box((0.0, 2.0), (1.0, 1.0)).polygon().tolist() == [[0.0, 1.0], [2.0, 1.0]]
+    assert ConvexPolygons.box((1.0, 1.0), (0.0, 2.0)).polygon().tolist() == [[1.0, 0.0], [1.0, 2.0]]
+    assert POINT.polygon().tolist() == [[1.0, 2.0]]
+    assert POINT.contains((1.0, 2.0))
+
+
+# From points, to shapely and back ---------------------------------------------------------------------------------
+
+
+def around(vertices: np.ndarray) -> list[tuple[float, float]]:
+    """Vertices from the least one on, to compare cycles."""
+    corners = [(float(x), float(y)) for x, y in vertices]
+    start = corners.index(min(corners))
+    return corners[start:] + corners[:start]
+
+
+def test_from_points_takes_any_order_with_repeats_and_inner_points() -> None:
+    corners = [(0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (2.0, 5.0), (0.0, 3.0)]
+    random = np.random.default_rng(2)
+    for _ in range(20):
+        points = random.permutation(corners * 2 + [(2.0, 2.0), (1.0, 1.0), (2.0, 0.0)])
+        hull = ConvexPolygons.from_points(points)
+        assert around(hull.polygon()) == corners
+    assert hull.area() == 17.5
+
+
+@pytest.mark.parametrize(
+    ("points", "wanted"),
+    [
+        ([], []),
+        ([(1.0, 2.0)], [(1.0, 2.0)]),
+        ([(1.0, 2.0)] * 3, [(1.0, 2.0)]),
+        ([(1.0, 1.0), (0.0, 0.0)], [(0.0, 0.0), (1.0, 1.0)]),
+        ([(2.0, 2.0), (0.0, 0.0), (1.0, 1.0), (0.0, 0.0)], [(0.0, 0.0), (2.0, 2.0)]),
+        ([(0.0, 3.0), (0.0, 1.0), (0.0, 2.0)], [(0.0, 1.0), (0.0, 3.0)]),
+    ],
+)
+def test_from_points_of_a_degenerate_set(points: list[tuple[float, float]], wanted: list[tuple[float, float]]) -> None:
+    hull = ConvexPolygons.from_points(points)
+    assert hull.shape == ()
+    assert sorted(map(tuple, hull.polygon().tolist())) == wanted
+
+
+@pytest.mark.parametrize(
+    ("polygon", "kind"),
+    [
+        (ConvexPolygons.empty(), "Polygon"),
+        (POINT, "Point"),
+        (SEGMENT, "LineString"),
+        (square(), "Polygon"),
+        (ConvexPolygons.box((1e9, 1e9 + 1.0), (0.0, 1e-9)), "Polygon"),
+    ],
+)
+def test_shapely_round_trip(polygon: ConvexPolygons, kind: str) -> None:
+    geometry = to_shapely(polygon)
+    assert geometry.geom_type == kind
+    assert geometry.is_empty == polygon.is_empty
+    back = from_shapely(geometry)
+    assert back.shape == ()
+    assert back.counts == polygon.counts
+    if polygon.counts:
+        assert around(back.polygon()) == around(polygon.polygon())
+    assert polygon.area() == pytest.approx(geometry.area)
+
+
+def test_from_shapely_orients_and_refuses() -> None:
+    clockwise = shapely.Polygon([(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)])
+    assert from_shapely(clockwise).area() == 1.0
+    with pytest.raises(ValueError, match="not convex"):
+        from_shapely(shapely.Polygon([(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (3.0, 1.0)]))
+    with pytest.raises(ValueError, match="single segment"):
+        from_shapely(shapely.LineString([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]))
+    with pytest.raises(ValueError, match="is needed: got MultiPoint"):
+        from_shapely(shapely.MultiPoint([(0.0, 0.0), (1.0, 0.0)]))
+    with pytest.raises(ValueError, match="choose one with an index"):
+        to_shapely(boxes((3,)))

@@ -1,0 +1,104 @@
+"""What the README says is true."""
+
+from __future__ import annotations
+
+import doctest
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PROSE = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/README.md")
+
+
+def blocks(language: str) -> list[str]:
+    """Code blocks of the README in a language."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", README, flags=re.DOTALL | re.MULTILINE)
+
+
+def command(name: str) -> str:
+    """One of the marked commands."""
+    found = re.search(rf"<!-- command: {name} -->\n```sh\n(.+)\n```", README)
+    assert found is not None
+    return found[1]
+
+
+@pytest.mark.parametrize("block", blocks("python"))
+def test_python_blocks_run(block: str, tmp_path: Path) -> None:
+    script = tmp_path / "quickstart.py"
+    script.write_text(block.replace("runs=50", "runs=3"), encoding="utf-8")
+    done = subprocess.run([sys.executable, script], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    published, own = done.stdout.splitlines()
+    assert published.startswith("<3 engagements: median miss")
+    assert own.startswith("<3 engagements: median miss")
+    assert own != published
+
+
+def test_there_is_a_python_block_and_a_session() -> None:
+    assert len(blocks("python")) == 1
+    assert len(blocks("pycon")) == 1
+
+
+@pytest.mark.parametrize("session", blocks("pycon"))
+def test_sessions_print_what_they_say(session: str) -> None:
+    test = doctest.DocTestParser().get_doctest(session, {}, "README.md", "README.md", 0)
+    result = doctest.DocTestRunner().run(test)
+    assert result.attempted > 0
+    assert result.failed == 0
+
+
+def test_two_commands_do_all_the_set_up() -> None:
+    assert blocks("sh") == [f"{command('experiment')}\n", f"{command('tests')}\n"]
+
+
+def test_ci_runs_the_test_command_word_for_word() -> None:
+    lines = (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()
+    assert command("tests") in [line.strip() for line in lines]
+
+
+def test_the_extra_and_the_command_of_the_readme_exist() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert "test" in project["optional-dependencies"]
+    assert "infoset" in project["scripts"]
+    cited = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"version: {project['version']}\n" in cited
+
+
+def test_constraints_hold_names_and_versions_only() -> None:
+    pins = [line for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines() if line[:1] != "#"]
+    assert all(re.fullmatch(r"[A-Za-z0-9._-]+==[A-Za-z0-9.+!]+", pin) for pin in pins)
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    needed = [*project["dependencies"], *project["optional-dependencies"]["test"]]
+    pinned = {normal(pin.split("==")[0]) for pin in pins}
+    assert {normal(re.split(r"[^A-Za-z0-9._-]", name)[0]) for name in needed} <= pinned
+
+
+def normal(name: str) -> str:
+    """A distribution's name as indexes compare it."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+@pytest.mark.parametrize("name", PROSE)
+def test_files_named_in_the_prose_exist(name: str) -> None:
+    text = (ROOT / name).read_text(encoding="utf-8")
+    paths = re.findall(r"`((?:[\w.-]+/)+[\w.-]*|[\w-]+\.(?:md|toml|cff|txt)|LICENSE)`", text)
+    assert [path for path in paths if not (ROOT / path).exists() and path != "infoset/__pycache__"] == []
+
+
+def test_exports_of_experiments_are_loaded_late() -> None:
+    code = "import sys, experiments; print('pydantic' in sys.modules); experiments.load_scenario; print('pydantic' in sys.modules)"  # noqa: E501
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "True"]
+
+
+def test_experiments_has_no_other_exports() -> None:
+    import experiments
+
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = experiments.nothing
