@@ -70,11 +70,9 @@ class ConvexPolygons:
             raise ValueError("points must be finite")
         if len(given) == 0:
             return cls.empty()
-        from shapely import MultiPoint
-
-        from infoset.shapes import from_shapely
-
-        return from_shapely(MultiPoint(given).convex_hull)
+        vertices = np.zeros((2 * len(given) + 1, 2))
+        count = kernels.hull(given, len(given), vertices)
+        return cls(vertices[:count], count)
 
     @classmethod
     def box(cls, x: tuple[float, float], y: tuple[float, float]) -> ConvexPolygons:
@@ -115,8 +113,8 @@ class ConvexPolygons:
 
     def __repr__(self) -> str:
         if self.shape:
-            return f"<convex polygons, batch of shape {self.shape}, {self.counts.min(initial=0)} to " + (
-                f"{self.counts.max(initial=0)} vertices>"
+            return f"<convex polygons, batch of shape {self.shape}, " + (
+                f"{min(self.counts.flat, default=0)} to {max(self.counts.flat, default=0)} vertices>"
             )
         count = int(self.counts)
         name = _NAMES[count] if count < len(_NAMES) else f"polygon of {count} vertices"
@@ -250,7 +248,7 @@ class ConvexPolygons:
 
     def _flat(self) -> tuple[Floats, Integers]:
         room = self.vertices.shape[-2]
-        vertices = np.require(self.vertices.reshape(-1, room, 2), requirements=["C", "W"])
+        vertices = np.require(self.vertices.reshape(self.counts.size, room, 2), requirements=["C", "W"])
         return vertices, np.require(self.counts.reshape(-1), requirements=["C", "W"])
 
     def _make(self, more: int, each: Callable[..., None], *arguments: object) -> ConvexPolygons:

@@ -17,6 +17,9 @@ from infoset._compile import compiled, inlined
 
 Points = NDArray[np.float64]
 
+# Thickness, in units of the coordinates' magnitude, below which the orientation of a polygon is rounding.
+NEEDLE = 4.0 * float(np.finfo(np.float64).eps)
+
 
 @inlined
 def cross(ax: float, ay: float, bx: float, by: float) -> float:
@@ -280,15 +283,27 @@ def shear_and_add_segment(
     half_y = direction_y * (length + slack * reach)
     if half_x == 0.0 and half_y == 0.0:
         return count
-    if least == greatest:
+    # An edge along the segment is extreme as a whole: it grows longer, and no vertex is added.
+    bottom_last = bottom_first
+    top_last = top_first
+    if greatest > least:
+        bottom_first, bottom_last = level_run(points, count, bottom_first, direction_x, direction_y, least)
+        top_first, top_last = level_run(points, count, top_first, direction_x, direction_y, greatest)
+    tall = max(abs(points[bottom_first, 1]), abs(points[top_first, 1]))
+    forward = height(points, bottom_last, direction_x, direction_y) - height(
+        points, bottom_first, direction_x, direction_y
+    )
+    backward = height(points, top_last, direction_x, direction_y) - height(points, top_first, direction_x, direction_y)
+    scale = abs(direction_x) * tall + abs(direction_y) * reach
+    if forward < 0.0 or backward > 0.0:
+        scale = (abs(direction_x) + abs(direction_y)) * max(tall, reach)
+    if greatest - least <= NEEDLE * scale:
+        # A needle along the segment, as thin as rounding: which side is which cannot be told, only how far it goes.
         back, front = extremes(points, count, direction_x, direction_y)
         back_x, back_y = points[back, 0] - half_x, points[back, 1] - half_y
         put(points, 1, points[front, 0] + half_x, points[front, 1] + half_y)
         put(points, 0, back_x, back_y)
         return 2
-    # An edge along the segment is extreme as a whole: it grows longer, and no vertex is added.
-    bottom_first, bottom_last = level_run(points, count, bottom_first, direction_x, direction_y, least)
-    top_first, top_last = level_run(points, count, top_first, direction_x, direction_y, greatest)
     made = place = count + int(bottom_first == bottom_last) + int(top_first == top_last)
     if bottom_last < top_last:
         half_x, half_y = -half_x, -half_y
@@ -341,6 +356,45 @@ def lowest_index(points: Points, count: int) -> int:
 
 
 @compiled
+def hull(points: Points, count: int, out: Points) -> int:
+    """Convex hull of points in any order, counter-clockwise, no vertex repeated; return its number of vertices.
+
+    Parameters
+    ----------
+    points, count : points, in any order
+    out : ndarray, shape (>= 2 count + 1, 2)
+
+    Notes
+    -----
+    Sorting by insertion and Andrew's two chains: at most O(count^2), a handful of vertices.
+    """
+    ordered = points[:count].copy()
+    for i in range(1, count):
+        x, y = ordered[i, 0], ordered[i, 1]
+        j = i
+        while j > 0 and (ordered[j - 1, 0] > x or (ordered[j - 1, 0] == x and ordered[j - 1, 1] > y)):
+            put(ordered, j, ordered[j - 1, 0], ordered[j - 1, 1])
+            j -= 1
+        put(ordered, j, x, y)
+    made = 0
+    for chain in range(2):
+        kept = 1 if chain == 0 else made
+        for k in range(count):
+            i = k if chain == 0 else count - 1 - k
+            if made > 0 and ordered[i, 0] == out[made - 1, 0] and ordered[i, 1] == out[made - 1, 1]:
+                continue
+            while made > max(kept, 1):
+                edge_x = out[made - 1, 0] - out[made - 2, 0]
+                edge_y = out[made - 1, 1] - out[made - 2, 1]
+                if cross(edge_x, edge_y, ordered[i, 0] - out[made - 1, 0], ordered[i, 1] - out[made - 1, 1]) > 0.0:
+                    break
+                made -= 1
+            put(out, made, ordered[i, 0], ordered[i, 1])
+            made += 1
+    return close(out, made)
+
+
+@compiled
 def add_polygon(points: Points, count: int, other: Points, other_count: int, out: Points) -> int:
     """Minkowski sum with another convex polygon, by merging their edges in order of direction.
 
@@ -358,10 +412,16 @@ def add_polygon(points: Points, count: int, other: Points, other_count: int, out
 
     Notes
     -----
-    O(count + other_count). Each vertex of the sum is one addition of two vertices: nothing accumulates.
+    O(count + other_count), after a hull of either. A vertex of the sum is one addition of two: nothing accumulates.
     """
     if count == 0 or other_count == 0:
         return 0
+    # A repeated vertex or an edge that rounding has turned would spoil the merge: hulls have none.
+    first = np.empty((2 * count + 1, 2))
+    second = np.empty((2 * other_count + 1, 2))
+    count = hull(points, count, first)
+    other_count = hull(other, other_count, second)
+    points, other = first, second
     i = first_i = lowest_index(points, count)
     j = first_j = lowest_index(other, other_count)
     steps_i = count if count > 1 else 0

@@ -322,6 +322,10 @@ def replay(
         Range at t = 0 of the hypothesis, m.
     kinds, values, applies : ndarray, shape (>= events,)
         The history of one engagement: what happened, its value, and whether it concerned this engagement.
+    events : int
+        Number of events.
+    law : SectionLaw
+        The numbers of the model.
     points : ndarray
         Where the section goes.
     overlaps : ndarray, shape (>= events,)
