@@ -545,7 +545,7 @@ def _degrees(radians: float) -> str:
     """Write an angle as the shortest decimal of degrees that reads back as the same radians."""
     exact = _EXACT.divide(Decimal(_number(radians)), _RADIANS_PER_DEGREE)
     shorter = (Context(prec=digits).plus(exact) for digits in range(1, 20))
-    return _toml_float(next((value for value in shorter if _radians(value) == radians), exact))
+    return _toml_float(next((value for value in shorter if repr(_radians(value)) == repr(radians)), exact))
 
 
 def _pair(interval: Interval) -> str:

@@ -70,7 +70,7 @@ class ConvexPolygons:
             raise ValueError("points must be finite")
         if len(given) == 0:
             return cls.empty()
-        vertices = np.zeros((2 * len(given) + 1, 2))
+        vertices = np.zeros((len(given), 2))
         count = kernels.hull(given, len(given), vertices)
         return cls(vertices[:count], count)
 
@@ -167,7 +167,7 @@ class ConvexPolygons:
         """Minkowski sum with polygons of the same batch shape, or with a single one."""
         shape = self.shape if not other.shape else np.broadcast_shapes(self.shape, other.shape)
         first, second = self._broadcast(shape), other._broadcast(shape)
-        return first._make(second.vertices.shape[-2] + 1, _add_polygon_each, *second._flat())
+        return first._make(second.vertices.shape[-2], _add_polygon_each, *second._flat())
 
     def support(self, direction: ArrayLike) -> Floats:
         """Support function: greatest direction . p, shape (...); -inf for the empty set."""

@@ -19,7 +19,7 @@ from infoset.section_kernels import (
     summarise_section,
 )
 
-LABEL_RESOLUTION = 1e-10
+LABEL_RESOLUTION = 1e-13
 MOST_PROBES = 200
 
 

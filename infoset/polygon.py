@@ -4,6 +4,9 @@ A polygon is an array `points` of shape (capacity, 2) whose first `count` rows a
 One vertex is a point and two are a segment: they are polygons like any other; none is the empty set.
 Operations that may change the number of vertices write to `out`, which must not overlap `points`, and return the
 new count. No tolerance is absolute: a cut or a sum is exact up to rounding of the coordinates, a few ulp.
+
+Rounding leaves a polygon convex only up to a few ulp: a tiny edge may point anywhere, vertices may coincide, those of
+a set as thin as rounding may come in any order. Every operation stands that.
 """
 
 from __future__ import annotations
@@ -17,8 +20,8 @@ from infoset._compile import compiled, inlined
 
 Points = NDArray[np.float64]
 
-# Thickness, in units of the coordinates' magnitude, below which the orientation of a polygon is rounding.
-NEEDLE = 4.0 * float(np.finfo(np.float64).eps)
+# A difference of heights below this, relative to the products it is made of, may be rounding.
+ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
 
 
 @inlined
@@ -53,11 +56,17 @@ def height(points: Points, i: int, normal_x: float, normal_y: float) -> float:
 
 @inlined
 def crossing(points: Points, i: int, j: int, normal_x: float, normal_y: float, level: float) -> tuple[float, float]:
-    """Point of the edge i-j at a level of `normal . p`, counted from its nearer end: least rounding."""
+    """Point of the edge i-j at a level of `normal . p`, counted from its nearer end: least rounding.
+
+    Notes
+    -----
+    The same point, bit for bit, whichever way the edge is run: a cut segment stays a segment.
+    """
     height_i = height(points, i, normal_x, normal_y)
     height_j = height(points, j, normal_x, normal_y)
     near, far, height_near, height_far = i, j, height_i, height_j
-    if abs(level - height_i) > abs(height_j - level):
+    farther = abs(level - height_i) - abs(level - height_j)
+    if farther > 0.0 or (farther == 0.0 and height_i > height_j):
         near, far, height_near, height_far = j, i, height_j, height_i
     fraction = (level - height_near) / (height_far - height_near)
     x = points[near, 0] + fraction * (points[far, 0] - points[near, 0])
@@ -204,21 +213,32 @@ def translate(points: Points, count: int, x: float, y: float) -> None:
 @compiled
 def map_linearly(points: Points, count: int, xx: float, xy: float, yx: float, yy: float, out: Points) -> int:
     """Image under the matrix [[xx, xy], [yx, yy]]; a singular one gives a segment or a point. O(count)."""
-    determinant = xx * yy - xy * yx
+    determinant = scaled_determinant(xx, xy, yx, yy)
+    made = 0
     for i in range(count):
         source = i if determinant >= 0.0 else count - 1 - i
         x = points[source, 0]
         y = points[source, 1]
-        out[i, 0] = xx * x + xy * y
-        out[i, 1] = yx * x + yy * y
-    if determinant != 0.0 or count <= 1:
-        return count
-    along_x, along_y = (xx, yx) if xx != 0.0 or yx != 0.0 else (xy, yy)
-    first = support_index(out, count, -along_x, -along_y)
-    last = support_index(out, count, along_x, along_y)
+        made = append(out, made, xx * x + xy * y, yx * x + yy * y)
+    made = close(out, made)
+    if determinant != 0.0 or made <= 1:
+        return made
+    along_x, along_y = (xx, yx) if max(abs(xx), abs(yx)) > max(abs(xy), abs(yy)) else (xy, yy)
+    scale = max(abs(along_x), abs(along_y))
+    first = support_index(out, made, -along_x / scale, -along_y / scale)
+    last = support_index(out, made, along_x / scale, along_y / scale)
     first_x, first_y, last_x, last_y = out[first, 0], out[first, 1], out[last, 0], out[last, 1]
     made = append(out, 0, first_x, first_y)
     return append(out, made, last_x, last_y)
+
+
+@compiled
+def scaled_determinant(xx: float, xy: float, yx: float, yy: float) -> float:
+    """Determinant of a matrix divided by a power of two near its largest entry, lest it underflow or overflow."""
+    exponent = math.frexp(max(abs(xx), abs(xy), abs(yx), abs(yy)))[1]
+    return cross(
+        math.ldexp(xx, -exponent), math.ldexp(yx, -exponent), math.ldexp(xy, -exponent), math.ldexp(yy, -exponent)
+    )
 
 
 @inlined
@@ -260,13 +280,14 @@ def shear_and_add_segment(
     -----
     O(count). The boundary is cut where it is extreme across the segment; the part to the right of the segment's
     direction moves by +half, the rest by -half. Cutting at extremes, not where edges change sign, keeps the result
-    sound when rounding makes tiny edges turn the wrong way.
+    sound when rounding makes tiny edges turn the wrong way. Where rounding could mistake an extreme - an edge along
+    the segment, a set thin across it, a point - `add_segment_carefully` does the work.
     """
     if count == 0:
         return 0
     least = np.inf
     greatest = -np.inf
-    bottom_first = top_first = 0
+    bottom = top = 0
     reach = 0.0
     for i in range(count):
         x = points[i, 0]
@@ -275,67 +296,135 @@ def shear_and_add_segment(
         across = cross(direction_x, direction_y, x, points[i, 1])
         if across < least:
             least = across
-            bottom_first = i
+            bottom = i
         if across > greatest:
             greatest = across
-            top_first = i
+            top = i
     half_x = direction_x * (length + slack * reach)
     half_y = direction_y * (length + slack * reach)
     if half_x == 0.0 and half_y == 0.0:
         return count
-    # An edge along the segment is extreme as a whole: it grows longer, and no vertex is added.
-    bottom_last = bottom_first
-    top_last = top_first
-    if greatest > least:
-        bottom_first, bottom_last = level_run(points, count, bottom_first, direction_x, direction_y, least)
-        top_first, top_last = level_run(points, count, top_first, direction_x, direction_y, greatest)
-    tall = max(abs(points[bottom_first, 1]), abs(points[top_first, 1]))
-    forward = height(points, bottom_last, direction_x, direction_y) - height(
-        points, bottom_first, direction_x, direction_y
-    )
-    backward = height(points, top_last, direction_x, direction_y) - height(points, top_first, direction_x, direction_y)
-    scale = abs(direction_x) * tall + abs(direction_y) * reach
-    if forward < 0.0 or backward > 0.0:
-        scale = (abs(direction_x) + abs(direction_y)) * max(tall, reach)
-    if greatest - least <= NEEDLE * scale:
-        # A needle along the segment, as thin as rounding: which side is which cannot be told, only how far it goes.
-        back, front = extremes(points, count, direction_x, direction_y)
-        back_x, back_y = points[back, 0] - half_x, points[back, 1] - half_y
-        put(points, 1, points[front, 0] + half_x, points[front, 1] + half_y)
-        put(points, 0, back_x, back_y)
-        return 2
-    made = place = count + int(bottom_first == bottom_last) + int(top_first == top_last)
-    if bottom_last < top_last:
+    if not (
+        is_lowest(points, count, bottom, direction_x, direction_y)
+        and is_lowest(points, count, top, -direction_x, -direction_y)
+    ):
+        return add_segment_carefully(points, count, half_x, half_y)
+    if bottom < top:
         half_x, half_y = -half_x, -half_y
+    place = count + 2
     for i in range(count - 1, -1, -1):
         place -= 1
         x, y = points[i, 0], points[i, 1]
         put(points, place, x + half_x, y + half_y)
-        if i in (bottom_last, top_last):
+        if i in (bottom, top):
             half_x, half_y = -half_x, -half_y
-            if bottom_first == bottom_last if i == bottom_last else top_first == top_last:
-                place -= 1
-                put(points, place, x + half_x, y + half_y)
-    return made
+            place -= 1
+            put(points, place, x + half_x, y + half_y)
+    return count + 2
 
 
 @inlined
-def level_run(
-    points: Points, count: int, start: int, direction_x: float, direction_y: float, level: float
-) -> tuple[int, int]:
-    """First and last of the consecutive vertices about `start` that lie exactly at its level across a direction."""
-    first = last = start
-    while True:
+def is_lowest(points: Points, count: int, i: int, x: float, y: float) -> bool:
+    """Whether a vertex is lower across (x, y) than its neighbours by more than rounding."""
+    before = i - 1 if i > 0 else count - 1
+    after = i + 1 if i + 1 < count else 0
+    height = cross(x, y, points[i, 0], points[i, 1])
+    rise = min(cross(x, y, points[before, 0], points[before, 1]), cross(x, y, points[after, 0], points[after, 1]))
+    reach_x = max(abs(points[i, 0]), abs(points[before, 0]), abs(points[after, 0]))
+    reach_y = max(abs(points[i, 1]), abs(points[before, 1]), abs(points[after, 1]))
+    return bool(rise - height > ROUNDING * (abs(x) * reach_y + abs(y) * reach_x))
+
+
+@compiled
+def add_segment_carefully(points: Points, count: int, half_x: float, half_y: float) -> int:
+    """Minkowski sum, in place, of a segment and any set: with an edge along it, as thin as rounding, a point.
+
+    Notes
+    -----
+    O(count). Heights are counted from a vertex, so that their rounding is relative to the set's own size. In a set
+    longer along the segment than across it the hindmost and foremost vertices are certain, and the lowest is sought
+    only from the one to the other, the highest only on the way back: taken on the wrong side, it would leave the
+    foremost behind. In a set longer across the segment it is the lowest and highest that are certain.
+    """
+    source = points[:count].copy()
+    scale = max(abs(half_x), abs(half_y))
+    x = half_x / scale
+    y = half_y / scale
+    origin_x = points[0, 0]
+    origin_y = points[0, 1]
+    bottom = top = hind = fore = 0
+    lowest = highest = least = greatest = 0.0
+    for i in range(1, count):
+        from_x = points[i, 0] - origin_x
+        from_y = points[i, 1] - origin_y
+        height = cross(x, y, from_x, from_y)
+        along = x * from_x + y * from_y
+        if height < lowest:
+            lowest = height
+            bottom = i
+        if height > highest:
+            highest = height
+            top = i
+        if along < least:
+            least = along
+            hind = i
+        if along > greatest:
+            greatest = along
+            fore = i
+    if greatest - least > highest - lowest:
+        bottom_first, bottom_last = lowest_between(points, count, hind, fore, x, y)
+        top_first, top_last = lowest_between(points, count, fore, hind, -x, -y)
+    else:
+        bottom_first, bottom_last = level_stretch(points, count, bottom, x, y)
+        top_first, top_last = level_stretch(points, count, top, x, y)
+    made = append_moved(source, count, bottom_last, top_first, half_x, half_y, points, 0)
+    made = append_moved(source, count, top_last, bottom_first, -half_x, -half_y, points, made)
+    return close(points, made)
+
+
+@compiled
+def lowest_between(points: Points, count: int, first: int, last: int, x: float, y: float) -> tuple[int, int]:
+    """First and last of the vertices lowest across (x, y) from vertex first to vertex last, counter-clockwise."""
+    lowest = 0.0
+    lowest_first = lowest_last = first
+    i = first
+    while i != last:
+        i = i + 1 if i + 1 < count else 0
+        height = cross(x, y, points[i, 0] - points[first, 0], points[i, 1] - points[first, 1])
+        if height < lowest:
+            lowest = height
+            lowest_first = lowest_last = i
+        elif height == lowest:
+            lowest_last = i
+    return lowest_first, lowest_last
+
+
+@compiled
+def level_stretch(points: Points, count: int, i: int, x: float, y: float) -> tuple[int, int]:
+    """First and last of the vertices around vertex i that are exactly as high as it across (x, y)."""
+    first = last = i
+    for _ in range(count - 1):
         before = first - 1 if first > 0 else count - 1
-        if cross(direction_x, direction_y, points[before, 0], points[before, 1]) != level:
+        if cross(x, y, points[before, 0] - points[i, 0], points[before, 1] - points[i, 1]) != 0.0:
             break
         first = before
-    while True:
+    for _ in range(count - 1):
         after = last + 1 if last + 1 < count else 0
-        if cross(direction_x, direction_y, points[after, 0], points[after, 1]) != level:
+        if cross(x, y, points[after, 0] - points[i, 0], points[after, 1] - points[i, 1]) != 0.0:
             break
         last = after
     return first, last
+
+
+@compiled
+def append_moved(points: Points, count: int, first: int, last: int, x: float, y: float, out: Points, made: int) -> int:
+    """Add the vertices from first to last, counter-clockwise, moved by (x, y); return the new count."""
+    i = first
+    while True:
+        made = append(out, made, points[i, 0] + x, points[i, 1] + y)
+        if i == last:
+            return made
+        i = i + 1 if i + 1 < count else 0
 
 
 @inlined
@@ -357,41 +446,84 @@ def lowest_index(points: Points, count: int) -> int:
 
 @compiled
 def hull(points: Points, count: int, out: Points) -> int:
-    """Convex hull of points in any order, counter-clockwise, no vertex repeated; return its number of vertices.
+    """Convex hull of any points: counter-clockwise, without repeated vertices or vertices along an edge.
 
     Parameters
     ----------
     points, count : points, in any order
-    out : ndarray, shape (>= 2 count + 1, 2)
+    out : ndarray, shape (>= count, 2)
+
+    Returns
+    -------
+    int
+        Vertices of the hull: 2 if the points lie on a line, 1 if they coincide, 0 if there are none.
 
     Notes
     -----
-    Sorting by insertion and Andrew's two chains: at most O(count^2), a handful of vertices.
+    Andrew's monotone chain: O(count) once the points are in order; putting them so takes O(count^2) at worst. A
+    point is dropped where it sticks out by less than rounding. The directions of the edges increase strictly,
+    rounding or not.
+
+    References
+    ----------
+    A. M. Andrew, Another efficient algorithm for convex hulls in two dimensions, Inf. Process. Lett. 9 (1979).
     """
-    ordered = points[:count].copy()
-    for i in range(1, count):
-        x, y = ordered[i, 0], ordered[i, 1]
-        j = i
-        while j > 0 and (ordered[j - 1, 0] > x or (ordered[j - 1, 0] == x and ordered[j - 1, 1] > y)):
-            put(ordered, j, ordered[j - 1, 0], ordered[j - 1, 1])
-            j -= 1
-        put(ordered, j, x, y)
+    points = points[:count].copy()
+    sort_points(points, count)
+    count = drop_repeats(points, count)
     made = 0
-    for chain in range(2):
-        kept = 1 if chain == 0 else made
-        for k in range(count):
-            i = k if chain == 0 else count - 1 - k
-            if made > 0 and ordered[i, 0] == out[made - 1, 0] and ordered[i, 1] == out[made - 1, 1]:
-                continue
-            while made > max(kept, 1):
-                edge_x = out[made - 1, 0] - out[made - 2, 0]
-                edge_y = out[made - 1, 1] - out[made - 2, 1]
-                if cross(edge_x, edge_y, ordered[i, 0] - out[made - 1, 0], ordered[i, 1] - out[made - 1, 1]) > 0.0:
-                    break
-                made -= 1
-            put(out, made, ordered[i, 0], ordered[i, 1])
-            made += 1
-    return close(out, made)
+    for i in range(count):
+        made = drop_turned(out, made, 1, points[i, 0], points[i, 1])
+        made = append(out, made, points[i, 0], points[i, 1])
+    lower = made
+    known = lower - 2
+    for i in range(count - 2, 0, -1):
+        x = points[i, 0]
+        y = points[i, 1]
+        if known > 0 and out[known, 0] == x and out[known, 1] == y:
+            known -= 1
+            continue
+        made = drop_turned(out, made, lower, x, y)
+        made = append(out, made, x, y)
+    if count > 0:
+        made = drop_turned(out, made, lower, points[0, 0], points[0, 1])
+    return made
+
+
+@compiled
+def sort_points(points: Points, count: int) -> None:
+    """Order points by x, then by y, in place, by insertion: O(count) if they are nearly in order."""
+    for i in range(1, count):
+        x = points[i, 0]
+        y = points[i, 1]
+        j = i
+        while j > 0 and (points[j - 1, 0] > x or (points[j - 1, 0] == x and points[j - 1, 1] > y)):
+            points[j, 0] = points[j - 1, 0]
+            points[j, 1] = points[j - 1, 1]
+            j -= 1
+        points[j, 0] = x
+        points[j, 1] = y
+
+
+@compiled
+def drop_turned(out: Points, made: int, fewest: int, x: float, y: float) -> int:
+    """Drop last vertices, down to `fewest`, at which the way to (x, y) does not turn left; return the new count."""
+    while made > fewest:
+        along_x = out[made - 1, 0] - out[made - 2, 0]
+        along_y = out[made - 1, 1] - out[made - 2, 1]
+        if cross(along_x, along_y, x - out[made - 1, 0], y - out[made - 1, 1]) > 0.0:
+            break
+        made -= 1
+    return made
+
+
+@compiled
+def drop_repeats(points: Points, count: int) -> int:
+    """Drop vertices that repeat the one before, in place; return the new count. O(count)."""
+    made = 0
+    for i in range(count):
+        made = append(points, made, points[i, 0], points[i, 1])
+    return close(points, made)
 
 
 @compiled
@@ -402,8 +534,7 @@ def add_polygon(points: Points, count: int, other: Points, other_count: int, out
     ----------
     points, count : polygon
     other, other_count : polygon
-    out : ndarray, shape (>= count + other_count + 1, 2)
-        The walk around the boundary ends by writing its first vertex again.
+    out : ndarray, shape (>= count + other_count, 2)
 
     Returns
     -------
@@ -412,40 +543,68 @@ def add_polygon(points: Points, count: int, other: Points, other_count: int, out
 
     Notes
     -----
-    O(count + other_count), after a hull of either. A vertex of the sum is one addition of two: nothing accumulates.
+    O(count + other_count); more if rounding has turned an edge of either the wrong way, for then its hull is taken
+    first: one tiny edge out of order would spoil the whole merge. Each vertex of the sum is one addition of two
+    vertices: nothing accumulates.
     """
     if count == 0 or other_count == 0:
         return 0
-    # A repeated vertex or an edge that rounding has turned would spoil the merge: hulls have none.
-    first = np.empty((2 * count + 1, 2))
-    second = np.empty((2 * other_count + 1, 2))
-    count = hull(points, count, first)
-    other_count = hull(other, other_count, second)
-    points, other = first, second
-    i = first_i = lowest_index(points, count)
-    j = first_j = lowest_index(other, other_count)
-    steps_i = count if count > 1 else 0
-    steps_j = other_count if other_count > 1 else 0
-    made = append(out, 0, points[first_i, 0] + other[first_j, 0], points[first_i, 1] + other[first_j, 1])
-    while steps_i > 0 or steps_j > 0:
-        next_i = i + 1 if i + 1 < count else 0
-        next_j = j + 1 if j + 1 < other_count else 0
-        edge_x = points[next_i, 0] - points[i, 0]
-        edge_y = points[next_i, 1] - points[i, 1]
-        other_x = other[next_j, 0] - other[j, 0]
-        other_y = other[next_j, 1] - other[j, 1]
-        turn = direction_order(edge_x, edge_y, other_x, other_y)
-        if steps_j == 0 or (steps_i > 0 and turn >= 0):
+    first, first_count = with_edges_in_order(points, count)
+    second, second_count = with_edges_in_order(other, other_count)
+    i = lowest_index(first, first_count)
+    j = lowest_index(second, second_count)
+    steps_i = first_count if first_count > 1 else 0
+    steps_j = second_count if second_count > 1 else 0
+    made = 0
+    while True:
+        made = append(out, made, first[i, 0] + second[j, 0], first[i, 1] + second[j, 1])
+        next_i = i + 1 if i + 1 < first_count else 0
+        next_j = j + 1 if j + 1 < second_count else 0
+        order = direction_order(
+            first[next_i, 0] - first[i, 0],
+            first[next_i, 1] - first[i, 1],
+            second[next_j, 0] - second[j, 0],
+            second[next_j, 1] - second[j, 1],
+        )
+        advances_i = steps_i > 0 and (steps_j == 0 or order >= 0)
+        advances_j = steps_j > 0 and (steps_i == 0 or order <= 0)
+        if advances_i:
             i = next_i
             steps_i -= 1
-            if turn == 0 and steps_j > 0:
-                j = next_j
-                steps_j -= 1
-        else:
+        if advances_j:
             j = next_j
             steps_j -= 1
-        made = append(out, made, points[i, 0] + other[j, 0], points[i, 1] + other[j, 1])
-    return close(out, made)
+        if steps_i == 0 and steps_j == 0:
+            return close(out, made)
+
+
+@compiled
+def with_edges_in_order(points: Points, count: int) -> tuple[Points, int]:
+    """The polygon itself, or its hull where rounding has turned an edge the wrong way."""
+    if edges_in_order(points, count):
+        return points, count
+    ordered = np.empty((count, 2))
+    return ordered, hull(points, count, ordered)
+
+
+@compiled
+def edges_in_order(points: Points, count: int) -> bool:
+    """Whether the edges' directions, from the lowest vertex on, go round once without turning back. O(count)."""
+    if count == 1:
+        return True
+    i = lowest_index(points, count)
+    from_x = 1.0
+    from_y = 0.0
+    for _ in range(count):
+        after = i + 1 if i + 1 < count else 0
+        edge_x = points[after, 0] - points[i, 0]
+        edge_y = points[after, 1] - points[i, 1]
+        if (edge_x == 0.0 and edge_y == 0.0) or direction_order(from_x, from_y, edge_x, edge_y) < 0:
+            return False
+        from_x = edge_x
+        from_y = edge_y
+        i = after
+    return True
 
 
 @compiled
@@ -576,39 +735,90 @@ def reduce_outward(points: Points, count: int, cap: int) -> int:
 
     Notes
     -----
-    The edge whose neighbours, extended until they meet, add least area goes first. O(count) an edge.
+    The edge whose neighbours, extended until they meet, add least area goes first. O(count) an edge. Where rounding
+    has turned an edge the wrong way the hull is taken first; a hull too thin for that becomes a rectangle.
     """
+    is_hull = False
     while count > cap:
-        least = np.inf
-        chosen = -1
-        chosen_x = chosen_y = 0.0
-        for i in range(count):
-            j = i + 1 if i + 1 < count else 0
-            before = i - 1 if i > 0 else count - 1
-            after = j + 1 if j + 1 < count else 0
-            from_x = points[i, 0] - points[before, 0]
-            from_y = points[i, 1] - points[before, 1]
-            to_x = points[after, 0] - points[j, 0]
-            to_y = points[after, 1] - points[j, 1]
-            turn = cross(from_x, from_y, to_x, to_y)
-            if turn <= 0.0:
-                continue
-            edge_x = points[j, 0] - points[i, 0]
-            edge_y = points[j, 1] - points[i, 1]
-            reach = max(0.0, cross(edge_x, edge_y, to_x, to_y) / turn)
-            added = abs(cross(edge_x, edge_y, reach * from_x, reach * from_y))
-            if added < least:
-                least = added
-                chosen = i
-                chosen_x = points[i, 0] + reach * from_x
-                chosen_y = points[i, 1] + reach * from_y
-        if chosen < 0:
-            return count
-        points[chosen, 0] = chosen_x
-        points[chosen, 1] = chosen_y
-        gone = chosen + 1 if chosen + 1 < count else 0
-        for i in range(gone, count - 1):
-            points[i, 0] = points[i + 1, 0]
-            points[i, 1] = points[i + 1, 1]
-        count -= 1
+        chosen, x, y = cheapest_edge(points, count)
+        if chosen >= 0:
+            points[chosen, 0] = x
+            points[chosen, 1] = y
+            gone = chosen + 1 if chosen + 1 < count else 0
+            for i in range(gone, count - 1):
+                points[i, 0] = points[i + 1, 0]
+                points[i, 1] = points[i + 1, 1]
+            count -= 1
+            is_hull = False
+        elif is_hull:
+            count = make_rectangle(points, count)
+        else:
+            count = hull(points, count, points)
+            is_hull = True
     return count
+
+
+@compiled
+def cheapest_edge(points: Points, count: int) -> tuple[int, float, float]:
+    """First vertex of the edge that costs least area to drop, and where its neighbours meet; -1 if not convex."""
+    least = np.inf
+    chosen = -1
+    chosen_x = chosen_y = 0.0
+    before = count - 1
+    for i in range(count):
+        j = i + 1 if i + 1 < count else 0
+        after = j + 1 if j + 1 < count else 0
+        from_x = points[i, 0] - points[before, 0]
+        from_y = points[i, 1] - points[before, 1]
+        edge_x = points[j, 0] - points[i, 0]
+        edge_y = points[j, 1] - points[i, 1]
+        to_x = points[after, 0] - points[j, 0]
+        to_y = points[after, 1] - points[j, 1]
+        before = i
+        bend = cross(from_x, from_y, edge_x, edge_y)
+        if bend <= 0.0:
+            return -1, 0.0, 0.0
+        turn = cross(from_x, from_y, to_x, to_y)
+        if turn <= ROUNDING * (abs(from_x * to_y) + abs(from_y * to_x)):
+            continue
+        reach = cross(edge_x, edge_y, to_x, to_y) / turn
+        added = reach * bend
+        x = points[i, 0] + reach * from_x
+        y = points[i, 1] + reach * from_y
+        # The new vertex must not fall short of the far end of the edge: at a sharp tip that would cut the tip off.
+        if added < least and (points[j, 0] - x) * to_x + (points[j, 1] - y) * to_y >= 0.0:
+            least = added
+            chosen = i
+            chosen_x = x
+            chosen_y = y
+    return chosen, chosen_x, chosen_y
+
+
+@compiled
+def make_rectangle(points: Points, count: int) -> int:
+    """Replace a polygon by the rectangle around it along its longest direction from vertex 0, in place. O(count)."""
+    origin_x = points[0, 0]
+    origin_y = points[0, 1]
+    length = 0.0
+    x = 1.0
+    y = 0.0
+    for i in range(1, count):
+        distance = math.hypot(points[i, 0] - origin_x, points[i, 1] - origin_y)
+        if distance > length:
+            length = distance
+            x = (points[i, 0] - origin_x) / distance
+            y = (points[i, 1] - origin_y) / distance
+    least = greatest = lowest = highest = 0.0
+    for i in range(1, count):
+        from_x = points[i, 0] - origin_x
+        from_y = points[i, 1] - origin_y
+        along = x * from_x + y * from_y
+        height = cross(x, y, from_x, from_y)
+        least = min(least, along)
+        greatest = max(greatest, along)
+        lowest = min(lowest, height)
+        highest = max(highest, height)
+    made = 0
+    for along, height in ((least, lowest), (greatest, lowest), (greatest, highest), (least, highest)):
+        made = append(points, made, origin_x + along * x - height * y, origin_y + along * y + height * x)
+    return close(points, made)
