@@ -12,6 +12,7 @@ a set as thin as rounding may come in any order. Every operation stands that.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,20 @@ ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
 def cross(ax: float, ay: float, bx: float, by: float) -> float:
     """Cross product of two vectors of the plane."""
     return ax * by - ay * bx
+
+
+@inlined
+def unsigned(i: int) -> Any:
+    """Return an index that cannot be negative as an unsigned integer."""
+    return np.uint64(i)
+
+
+@inlined
+def move(points: Points, source: int, target: int) -> None:
+    """Copy a vertex to another place."""
+    i, j = unsigned(source), unsigned(target)
+    points[j, 0] = points[i, 0]
+    points[j, 1] = points[i, 1]
 
 
 @inlined
@@ -122,15 +137,15 @@ def cut_cap(points: Points, count: int, top: int, normal_x: float, normal_y: flo
         step = first + added - (last + 1)
         if step > 0:
             for i in range(count - 1, last, -1):
-                put(points, i + step, points[i, 0], points[i, 1])
+                move(points, i, i + step)
         elif step < 0:
             for i in range(last + 1, count):
-                put(points, i + step, points[i, 0], points[i, 1])
+                move(points, i, i + step)
         count = first + added + kept
     else:
         place = first - last - 1
         for i in range(place):
-            put(points, i, points[i + last + 1, 0], points[i + last + 1, 1])
+            move(points, i + last + 1, i)
         count = place + added
     if entering:
         put(points, place, x, y)
@@ -311,14 +326,17 @@ def shear_and_add_segment(
         return add_segment_carefully(points, count, half_x, half_y)
     if bottom < top:
         half_x, half_y = -half_x, -half_y
-    place = count + 2
-    for i in range(count - 1, -1, -1):
-        place -= 1
+    # Unsigned indices spare the check for negative ones, which costs as much as the rest of this loop.
+    turns = unsigned(bottom), unsigned(top)
+    place = unsigned(count + 2)
+    for k in range(count):
+        i = unsigned(count - 1 - k)
         x, y = points[i, 0], points[i, 1]
+        place -= unsigned(1)
         put(points, place, x + half_x, y + half_y)
-        if i in (bottom, top):
+        if i in turns:
             half_x, half_y = -half_x, -half_y
-            place -= 1
+            place -= unsigned(1)
             put(points, place, x + half_x, y + half_y)
     return count + 2
 
