@@ -523,6 +523,8 @@ class InformationSet(InformationSetView):
 
     def _regrid(self, wanted: Flags, sections: int) -> None:
         tape, stack = self._history, self._stack
+        # A replayed section may have any number of vertices.
+        stack.make_room(kernels.VERTEX_CAPACITY)
         refine_all(
             wanted,
             sections,

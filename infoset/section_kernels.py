@@ -112,7 +112,10 @@ def measure_section(points: Floats, count: int, x: float, alpha: float, law: Sec
     lower = x * (alpha - bound)
     upper = x * (alpha + bound)
     slack = CUT_SLACK * max(abs(lower), abs(upper))
-    return polygon.clip_to_band(points, count, 0.0, 1.0, lower - slack, upper + slack)
+    count, overlap = polygon.clip_to_band(points, count, 0.0, 1.0, lower - slack, upper + slack)
+    if count > VERTEX_CAP:
+        count = polygon.reduce_outward(points, count, VERTEX_CAP)
+    return count, overlap
 
 
 @compiled

@@ -11,6 +11,9 @@ from infoset.section_kernels import SectionLaw
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+ROOM_AT_START = 64
+MOST_ADDED_A_STEP = 4
+
 
 class SectionStack:
     """B engagements x S slots of one polygon of (V, z) each, carried in place.
@@ -29,7 +32,7 @@ class SectionStack:
         self.labels = labels
         self.used = used.astype(np.int64)
         self.batch, slots = labels.shape
-        self.vertices = np.empty((self.batch, slots, kernels.VERTEX_CAPACITY, 2))
+        self.vertices = np.empty((self.batch, slots, ROOM_AT_START, 2))
         self.counts = np.zeros((self.batch, slots), dtype=np.int64)
         self.died = np.full((self.batch, slots), kernels.ALIVE, dtype=np.int64)
         self.overlaps = np.zeros((self.batch, slots))
@@ -69,8 +72,20 @@ class SectionStack:
         self._stale &= ~where
         return self._summaries
 
+    def make_room(self, vertices: int) -> None:
+        """See that every slot has room for so many vertices; small slots lie closer together in the cache."""
+        room = self.vertices.shape[2]
+        if room < vertices:
+            wider = np.empty((*self.counts.shape, min(max(vertices, 2 * room), kernels.VERTEX_CAPACITY), 2))
+            wider[:, :, :room] = self.vertices
+            self.vertices = wider
+
+    def _make_room_for_a_step(self) -> None:
+        self.make_room(min(int(self.counts.max()) + MOST_ADDED_A_STEP, kernels.VERTEX_CAPACITY))
+
     def measure_angle(self, active: Flags, alpha: Floats, elapsed: int, event: int) -> None:
         """Cut the living sections by angle measurements (rad)."""
+        self._make_room_for_a_step()
         kernels.measure_all(
             active,
             alpha,
@@ -94,6 +109,7 @@ class SectionStack:
 
     def predict(self, active: Flags, elapsed: int) -> None:
         """Move the living sections to step `elapsed`."""
+        self._make_room_for_a_step()
         kernels.predict_all(active, self.used, self.law, self.vertices, self.counts)
         self._stale |= active
         self._elapsed = elapsed

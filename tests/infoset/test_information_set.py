@@ -236,6 +236,21 @@ def test_what_is_not_finite_is_refused(value: float) -> None:
         InformationSet(MODEL).measure_angle(value)
 
 
+def test_many_cuts_in_one_step_keep_the_vertex_cap() -> None:
+    """Each cut may add two vertices: at the cap they are taken off again, and no section outgrows its room."""
+    information = InformationSet(replace(MODEL, sections=3, fewest_sections=1, initial_set=InitialSet.BOX))
+    for _ in range(140):
+        information.predict()
+    section = information.sections()[1]
+    bound = float(SENSOR.error_bound(section.range_m))
+    least, greatest = (float(corner[1]) / section.range_m for corner in section.polygon.bounding_box())
+    assert greatest - least > 2.0 * bound
+    for share in np.linspace(0.0, 0.9, 12):
+        information.measure_angle(least + (1.0 + share) * bound)
+        assert all(int(section.polygon.counts) <= 256 for section in information.sections())
+    assert information.tracking[0]
+
+
 def test_the_vertex_cap_is_kept_and_outward() -> None:
     """Without cuts every step adds two vertices; the reduced section contains the exact one."""
     information = InformationSet(replace(MODEL, sections=1, fewest_sections=1, initial_set=InitialSet.BOX))
