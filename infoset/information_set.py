@@ -266,7 +266,7 @@ class InformationSetView:
 
         Notes
         -----
-        About 0.1 us an event of the history.
+        About 0.1 to 0.3 us an event of the history.
         """
         points = np.empty((kernels.VERTEX_CAPACITY, 2))
         tape = self._history
@@ -317,7 +317,7 @@ class InformationSetView:
 
         Notes
         -----
-        About ten replays an end.
+        About ten replays an end, fewer where it is a limit known already.
         """
         copy = self._detached()
         copy._regrid(self.tracking, 2)

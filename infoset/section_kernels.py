@@ -341,7 +341,7 @@ def replay(
 
     Notes
     -----
-    About 0.1 us an event.
+    About 0.1 to 0.3 us an event.
     """
     count = initial_section(label, law, points)
     elapsed = 0

@@ -43,8 +43,6 @@ class Step:
         Engagements whose truth had not passed its closest approach.
     sight : Sight
         True geometry.
-    position_m, velocity_m_s : ndarray, shape (B, 2)
-        The label-independent truth: relative (z, x) and (V_z, V_x), where the motion has them.
     measured_angle_rad, measured_range_m : ndarray, shape (B,), or None
         None where nothing was measured in this step.
     predicted_miss : PredictedMiss

@@ -166,7 +166,7 @@ def closest_distance(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2
     Returns
     -------
     ndarray, shape (B,)
-        m. Newton's method from the straight line's answer; exact to rounding after two steps here.
+        m. Four Newton steps from the straight line's answer.
     """
     moment = np.clip(-_dot(position_m, velocity_m_s) / _dot(velocity_m_s, velocity_m_s), 0.0, duration_s)
     for _ in range(4):

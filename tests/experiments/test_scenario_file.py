@@ -3,6 +3,8 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -599,8 +601,15 @@ def test_hash_is_of_the_values_not_of_the_writing() -> None:
     assert scenario_hash(zero) == scenario_hash(positive)
 
 
-def test_hash_is_pinned() -> None:
-    assert scenario_hash(load_scenario("asteroid-1997")) == "8976b56d53f40fb0"
+@pytest.mark.parametrize("hash_seed", ["0", "1"])
+def test_hash_is_the_same_in_another_process(hash_seed: str) -> None:
+    code = (
+        "from experiments.scenario_file import load_scenario, scenario_hash;"
+        "print(scenario_hash(load_scenario('asteroid-1997')))"
+    )
+    environment = {**os.environ, "PYTHONHASHSEED": hash_seed}
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+    assert shown.stdout.strip() == scenario_hash(load_scenario("asteroid-1997"))
 
 
 @pytest.mark.parametrize(("table", "key"), NUMBERS)
