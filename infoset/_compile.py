@@ -24,5 +24,5 @@ def compiled(function: F) -> F:
 def inlined(function: F) -> F:
     """Compile a small helper of the kernels so that it is always inlined: a call costs about 20 ns."""
     return cast(
-        F, njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz"}, forceinline=True)(function)
+        F, njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz"}, forceinline=True, _nrt=False)(function)
     )

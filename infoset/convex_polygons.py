@@ -295,7 +295,7 @@ def _map_each(vertices: Floats, counts: Integers, out: Floats, made: Integers, m
 def _add_segment_each(vertices: Floats, counts: Integers, out: Floats, made: Integers, half: Floats) -> None:
     for i in range(counts.size):
         _copy(vertices[i], counts[i], out[i])
-        made[i] = kernels.shear_and_add_segment(out[i], counts[i], 0.0, half[i, 0], half[i, 1], 1.0, 0.0)
+        made[i] = kernels.add_segment(out[i], counts[i], half[i, 0], half[i, 1])
 
 
 @compiled

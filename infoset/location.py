@@ -7,14 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from infoset._compile import compiled
+from infoset.chains import empty_sections
 from infoset.section_kernels import (
     ALIVE,
-    VERTEX_CAPACITY,
     Flags,
     Floats,
     Integers,
     SectionLaw,
-    range_of,
+    Sections,
     replay,
     summarise_section,
 )
@@ -35,7 +35,8 @@ class Tape(NamedTuple):
 class Workspace(NamedTuple):
     """Room for replays."""
 
-    points: Floats
+    store: Floats
+    marks: Integers
     overlaps: Floats
     living_overlaps: Floats
 
@@ -53,10 +54,17 @@ class Living(NamedTuple):
     above: float
 
 
+def workspace(events: int) -> Workspace:
+    """Room for replays of histories of so many events."""
+    return Workspace(*empty_sections(1), np.empty(events), np.empty(events))
+
+
 @compiled
 def run(label: float, tape: Tape, law: SectionLaw, room: Workspace) -> tuple[int, float]:
     """Event at which a label died (or ALIVE) and its overlap there (0 if alive)."""
-    _, died = replay(label, tape.kinds, tape.values, tape.applies, tape.events, law, room.points, room.overlaps)
+    died = replay(
+        label, tape.kinds, tape.values, tape.applies, tape.events, law, room.store, room.marks, 0, room.overlaps
+    )
     return died, room.overlaps[died] if died != ALIVE else 0.0
 
 
@@ -149,7 +157,7 @@ def locate_living(
     limit_below: float,
     limit_above: float,
     labels: Floats,
-    counts: Integers,
+    alive: Flags,
     died: Integers,
     overlaps: Floats,
     tape: Tape,
@@ -171,7 +179,7 @@ def locate_living(
     for s in range(labels.shape[0]):
         if limit_below < labels[s] < limit_above:
             known[size] = labels[s]
-            known_died[size] = ALIVE if counts[s] > 0 else died[s]
+            known_died[size] = ALIVE if alive[s] else died[s]
             known_overlap[size] = overlaps[s]
             size += 1
     if limit_above > limit_below:
@@ -219,7 +227,7 @@ def locate_living(
 @compiled
 def refine_all(
     wanted: Flags,
-    sections: int,
+    number: int,
     elapsed: int,
     limit_below: Floats,
     limit_above: Floats,
@@ -227,14 +235,9 @@ def refine_all(
     values: Floats,
     applies: Flags,
     events: int,
-    labels: Floats,
-    used: Integers,
+    sections: Sections,
     law: SectionLaw,
-    vertices: Floats,
-    counts: Integers,
-    died: Integers,
-    overlaps: Floats,
-    summaries: Floats,
+    room: Workspace,
 ) -> None:
     """Give each wanted engagement a new grid of sections over its living labels, ends included, by replay.
 
@@ -243,7 +246,7 @@ def refine_all(
     `limit_below` and `limit_above` are narrowed to labels known to be dead. Where nothing lives, the engagement is
     left with no living section.
     """
-    room = Workspace(np.empty((VERTEX_CAPACITY, 2)), np.empty(events), np.empty(events))
+    labels, used, alive, died, overlaps, store, marks, summaries = sections
     for b in range(labels.shape[0]):
         if not wanted[b]:
             continue
@@ -253,29 +256,29 @@ def refine_all(
             limit_below[b],
             limit_above[b],
             labels[b, :stored],
-            counts[b, :stored],
+            alive[b, :stored],
             died[b, :stored],
             overlaps[b, :stored],
             tape,
             law,
             room,
         )
-        counts[b, :stored] = 0
+        alive[b, :stored] = False
         if not living.found:
             continue
         limit_below[b] = living.below
         limit_above[b] = living.above
-        used[b] = sections
-        for s in range(sections):
-            share = s / (sections - 1) if sections > 1 else 0.5
-            labels[b, s] = living.lower + share * (living.upper - living.lower)
-            if s > 0 and s == sections - 1:
-                labels[b, s] = living.upper
-            counts[b, s], died[b, s] = replay(
-                labels[b, s], kinds, values[b], applies[b], events, law, vertices[b, s], room.overlaps
-            )
-            if counts[b, s] > 0:
-                x = range_of(labels[b, s], elapsed, law)
-                summarise_section(vertices[b, s], counts[b, s], x, law, summaries[b, s])
+        used[b] = number
+        for s in range(number):
+            share = s / (number - 1) if number > 1 else 0.5
+            label = living.lower + share * (living.upper - living.lower)
+            if s > 0 and s == number - 1:
+                label = living.upper
+            labels[b, s] = label
+            n = b * labels.shape[1] + s
+            died[b, s] = replay(label, kinds, values[b], applies[b], events, law, store, marks, n, room.overlaps)
+            alive[b, s] = died[b, s] == ALIVE
+            if alive[b, s]:
+                summarise_section(store, marks, n, label, elapsed, law, summaries, b, s)
             else:
                 overlaps[b, s] = room.overlaps[died[b, s]]

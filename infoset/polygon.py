@@ -270,21 +270,15 @@ def support_index(points: Points, count: int, normal_x: float, normal_y: float) 
 
 
 @compiled
-def shear_and_add_segment(
-    points: Points, count: int, shear: float, direction_x: float, direction_y: float, length: float, slack: float
-) -> int:
-    """Shear, then Minkowski sum with a centred segment, in place and in two passes.
+def add_segment(points: Points, count: int, half_x: float, half_y: float) -> int:
+    """Minkowski sum with the segment from -half to +half, in place and in two passes.
 
     Parameters
     ----------
     points, count : polygon
         With room for two vertices more.
-    shear : float
-        y becomes y + shear x first.
-    direction_x, direction_y : float
-        Direction of the segment, of any length but zero.
-    length, slack : float
-        The segment reaches from -half to +half, half = direction (length + slack max |x|).
+    half_x, half_y : float
+        Half of the segment.
 
     Returns
     -------
@@ -298,30 +292,11 @@ def shear_and_add_segment(
     sound when rounding makes tiny edges turn the wrong way. Where rounding could mistake an extreme - an edge along
     the segment, a set thin across it, a point - `add_segment_carefully` does the work.
     """
-    if count == 0:
-        return 0
-    least = np.inf
-    greatest = -np.inf
-    bottom = top = 0
-    reach = 0.0
-    for i in range(count):
-        x = points[i, 0]
-        points[i, 1] += shear * x
-        reach = max(reach, abs(x))
-        across = cross(direction_x, direction_y, x, points[i, 1])
-        if across < least:
-            least = across
-            bottom = i
-        if across > greatest:
-            greatest = across
-            top = i
-    half_x = direction_x * (length + slack * reach)
-    half_y = direction_y * (length + slack * reach)
-    if half_x == 0.0 and half_y == 0.0:
+    if count == 0 or (half_x == 0.0 and half_y == 0.0):
         return count
+    bottom, top = extremes(points, count, -half_y, half_x)
     if not (
-        is_lowest(points, count, bottom, direction_x, direction_y)
-        and is_lowest(points, count, top, -direction_x, -direction_y)
+        is_lowest(points, count, bottom, half_x, half_y) and is_lowest(points, count, top, -half_x, -half_y)
     ):
         return add_segment_carefully(points, count, half_x, half_y)
     if bottom < top:
@@ -689,24 +664,20 @@ def centroid(points: Points, count: int) -> tuple[float, float]:
     return 0.5 * (points[far, 0] + points[other, 0]), 0.5 * (points[far, 1] + points[other, 1])
 
 
-@compiled
-def distance_to_edge(points: Points, i: int, j: int, x: float, y: float) -> float:
-    """Distance from (x, y) to the edge between vertices i and j."""
+@inlined
+def squared_distance_to_edge(points: Points, i: int, j: int, x: float, y: float) -> float:
+    """Square of the distance from (x, y) to the edge between vertices i and j."""
     edge_x = points[j, 0] - points[i, 0]
     edge_y = points[j, 1] - points[i, 1]
     from_x = x - points[i, 0]
     from_y = y - points[i, 1]
-    length = math.hypot(edge_x, edge_y)
-    if length == 0.0:
-        return math.hypot(from_x, from_y)
-    edge_x /= length
-    edge_y /= length
+    squared_length = edge_x * edge_x + edge_y * edge_y
     along = from_x * edge_x + from_y * edge_y
     if along <= 0.0:
-        return math.hypot(from_x, from_y)
-    if along >= length:
-        return math.hypot(x - points[j, 0], y - points[j, 1])
-    return abs(cross(edge_x, edge_y, from_x, from_y))
+        return float(from_x * from_x + from_y * from_y)
+    if along >= squared_length:
+        return float((x - points[j, 0]) ** 2 + (y - points[j, 1]) ** 2)
+    return float(cross(edge_x, edge_y, from_x, from_y) ** 2 / squared_length)
 
 
 @compiled
@@ -722,7 +693,7 @@ def margin(points: Points, count: int, x: float, y: float) -> float:
     inside = False
     last = count - 1
     for i in range(count):
-        nearest = min(nearest, distance_to_edge(points, last, i, x, y))
+        nearest = min(nearest, squared_distance_to_edge(points, last, i, x, y))
         if (points[i, 1] > y) != (points[last, 1] > y):
             turn = cross(
                 points[i, 0] - points[last, 0],
@@ -733,7 +704,8 @@ def margin(points: Points, count: int, x: float, y: float) -> float:
             if (turn > 0.0) == (points[i, 1] > points[last, 1]):
                 inside = not inside
         last = i
-    return nearest if inside else -nearest
+    distance = math.sqrt(nearest)
+    return distance if inside else -distance
 
 
 @compiled
@@ -758,7 +730,7 @@ def reduce_outward(points: Points, count: int, cap: int) -> int:
     """
     is_hull = False
     while count > cap:
-        chosen, x, y = cheapest_edge(points, count)
+        chosen, x, y = cheapest_edge(points, count, 0, count - 1)
         if chosen >= 0:
             points[chosen, 0] = x
             points[chosen, 1] = y
@@ -777,13 +749,18 @@ def reduce_outward(points: Points, count: int, cap: int) -> int:
 
 
 @compiled
-def cheapest_edge(points: Points, count: int) -> tuple[int, float, float]:
-    """First vertex of the edge that costs least area to drop, and where its neighbours meet; -1 if not convex."""
+def cheapest_edge(points: Points, count: int, first: int, last: int) -> tuple[int, float, float]:
+    """First vertex of the edge that costs least area to drop, and where its neighbours meet; -1 if not convex.
+
+    Notes
+    -----
+    Only the edges whose first vertex is one of first .. last can go: all of them, or those inside a chain.
+    """
     least = np.inf
     chosen = -1
     chosen_x = chosen_y = 0.0
-    before = count - 1
-    for i in range(count):
+    before = first - 1 if first > 0 else count - 1
+    for i in range(first, last + 1):
         j = i + 1 if i + 1 < count else 0
         after = j + 1 if j + 1 < count else 0
         from_x = points[i, 0] - points[before, 0]

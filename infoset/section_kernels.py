@@ -2,9 +2,9 @@
 
 A section is the polygon of all (V, z) that agree with the history, under the hypothesis that the range is
 `x = label - e t`. With z = alpha x and V = omega x - e alpha the motion (9) of the paper is z' = V, V' = v_z:
-prediction is a shear, an impulse a shift of V, an angle measurement a horizontal band of z. Each section is a filter
-of its own, a function of its label and the history alone, so a section at a new label is had exactly by replaying
-the history: `replay` calls the very functions that carry the stored sections.
+an angle measurement is a band of z, an impulse a shift of V; `chains` has the polygon for that. Each section is a
+filter of its own, a function of its label and the history alone, so a section at a new label is had exactly by
+replaying the history: `replay` calls the very functions that carry the stored sections.
 """
 
 from __future__ import annotations
@@ -15,20 +15,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset import polygon
-from infoset._compile import compiled
+from infoset import chains, polygon
+from infoset._compile import compiled, inlined
+from infoset.chains import LEFT, REACH, RIGHT
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-EPSILON = float(np.finfo(np.float64).eps)
-CUT_SLACK = 16.0 * EPSILON
-SUM_SLACK = 8.0 * EPSILON
+CUT_SLACK = 16.0 * chains.EPSILON
+SUM_SLACK = 8.0 * chains.EPSILON
 TIE_TOLERANCE = 1e-9
-
-VERTEX_CAP = 256
-VERTEX_CAPACITY = VERTEX_CAP + 4
 
 ANGLE, IMPULSE, PREDICTION = 0, 1, 2
 ALIVE = np.iinfo(np.int64).max
@@ -45,7 +42,7 @@ class SectionLaw(NamedTuple):
     step: float
     disturbance: float
     half_v: float
-    disturbance_slope: float
+    disturbance_lead: float
     error_at_zero_range: float
     error_slope: float
     z_least: float
@@ -57,78 +54,130 @@ class SectionLaw(NamedTuple):
     rectangle: bool
 
 
-@compiled
+class Sections(NamedTuple):
+    """B engagements x S slots of one section each.
+
+    Parameters
+    ----------
+    labels : ndarray, shape (B, S)
+        Range at t = 0 of each slot's hypothesis, m; the slots in use come first, in rising order.
+    used : ndarray of int, shape (B,)
+        Number of slots in use.
+    living : ndarray of bool, shape (B, S)
+    died : ndarray of int, shape (B, S)
+        Event that emptied the section, or ALIVE.
+    overlaps : ndarray, shape (B, S)
+        Overlap of a dead section with the band that emptied it, m: negative.
+    store, marks : ndarray, shapes (B S, ...)
+        The sections themselves, as `chains` has them: slot s of engagement b is row b S + s.
+    summaries : ndarray, shape (B, S, columns)
+    """
+
+    labels: Floats
+    used: Integers
+    living: Flags
+    died: Integers
+    overlaps: Floats
+    store: Floats
+    marks: Integers
+    summaries: Floats
+
+
+def room_for_sections(labels: Floats, used: Integers) -> Sections:
+    """Arrays for a batch of sections, none of them written yet."""
+    shape = labels.shape
+    store, marks = chains.empty_sections(labels.size)
+    return Sections(
+        labels=labels,
+        used=used,
+        living=np.zeros(shape, dtype=bool),
+        died=np.full(shape, ALIVE, dtype=np.int64),
+        overlaps=np.zeros(shape),
+        store=store,
+        marks=marks,
+        summaries=np.zeros((*shape, SUMMARY_COLUMNS)),
+    )
+
+
+@inlined
 def range_of(label: float, elapsed: int, law: SectionLaw) -> float:
     """Range of a label after a number of steps."""
     return label - law.closing_speed * (law.step * elapsed)
 
 
+@inlined
+def time_to_go(label: float, elapsed: int, law: SectionLaw) -> float:
+    """Time until the range of a label is zero, after a number of steps."""
+    return range_of(label, elapsed, law) / law.closing_speed
+
+
 @compiled
-def initial_section(label: float, law: SectionLaw, points: Floats) -> int:
-    """Write the section at t = 0; return its number of vertices.
+def start_section(store: Floats, marks: Integers, n: int, label: float, law: SectionLaw) -> None:
+    """Write the section at t = 0.
 
     Notes
     -----
     The rectangle is the paper's (section 4), with V_x taken at whichever end of D makes it larger: the printed
     formula has the lower end always, which is the same whenever z may have either sign.
     """
-    if not law.rectangle:
-        made = polygon.append(points, 0, law.vz_least, law.z_least)
-        made = polygon.append(points, made, law.vz_greatest, law.z_least)
-        made = polygon.append(points, made, law.vz_greatest, law.z_greatest)
-        made = polygon.append(points, made, law.vz_least, law.z_greatest)
-        return polygon.close(points, made)
     x = label
     e = law.closing_speed
-    lowest = min(law.vz_least * x - law.vx_least * law.z_least, law.vz_least * x - law.vx_greatest * law.z_least)
-    highest = max(
-        law.vz_greatest * x - law.vx_least * law.z_greatest, law.vz_greatest * x - law.vx_greatest * law.z_greatest
-    )
-    alpha_least = math.atan(law.z_least / x)
-    alpha_greatest = math.atan(law.z_greatest / x)
-    made = polygon.append(points, 0, lowest / x - e * alpha_least, alpha_least * x)
-    made = polygon.append(points, made, highest / x - e * alpha_least, alpha_least * x)
-    made = polygon.append(points, made, highest / x - e * alpha_greatest, alpha_greatest * x)
-    made = polygon.append(points, made, lowest / x - e * alpha_greatest, alpha_greatest * x)
-    return polygon.close(points, made)
+    z_least, z_greatest = law.z_least, law.z_greatest
+    shift_at_least = shift_at_greatest = 0.0
+    lowest, highest = law.vz_least, law.vz_greatest
+    if law.rectangle:
+        lowest -= max(law.vx_least * z_least, law.vx_greatest * z_least) / x
+        highest -= min(law.vx_least * z_greatest, law.vx_greatest * z_greatest) / x
+        shift_at_least, shift_at_greatest = -e * math.atan(z_least / x), -e * math.atan(z_greatest / x)
+        z_least, z_greatest = math.atan(z_least / x) * x, math.atan(z_greatest / x) * x
+    corners = np.empty((4, 2))
+    corners[0] = highest + shift_at_least, z_least
+    corners[1] = highest + shift_at_greatest, z_greatest
+    corners[2] = lowest + shift_at_greatest, z_greatest
+    corners[3] = lowest + shift_at_least, z_least
+    chains.start(store, marks, n, time_to_go(label, 0, law), corners)
 
 
-@compiled
-def measure_section(points: Floats, count: int, x: float, alpha: float, law: SectionLaw) -> tuple[int, float]:
-    """Cut a section, in place, by an angle measurement.
+@inlined
+def measure_section(
+    store: Floats, marks: Integers, n: int, label: float, elapsed: int, alpha: float, law: SectionLaw
+) -> tuple[bool, float]:
+    """Cut a section by an angle measurement.
 
     Returns
     -------
-    count : int
-        Vertices left; 0 if the section died.
+    living : bool
     overlap : float
         Least overlap of the section and the band across either border, m: negative is the distance of a dead one.
 
     Notes
     -----
     The band is widened by 16 ulp: against extremal noise the truth sits on the border, and rounding must not lose it.
+    The ulp is that of what is subtracted to find a height, so it does not shrink with the range.
     """
+    x = range_of(label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x
-    lower = x * (alpha - bound)
-    upper = x * (alpha + bound)
-    slack = CUT_SLACK * max(abs(lower), abs(upper))
-    count, overlap = polygon.clip_to_band(points, count, 0.0, 1.0, lower - slack, upper + slack)
-    if count > VERTEX_CAP:
-        count = polygon.reduce_outward(points, count, VERTEX_CAP)
-    return count, overlap
+    slack = CUT_SLACK * (label * (abs(alpha) + bound) + store[n, REACH] * (label / law.closing_speed))
+    return chains.cut(store, marks, n, x / law.closing_speed, x * (alpha - bound) - slack, x * (alpha + bound) + slack)
 
 
-@compiled
-def predict_section(points: Floats, count: int, law: SectionLaw) -> int:
-    """Move a section one step on, in place: shear, then add the disturbance's segment, 8 ulp longer outward."""
-    count = polygon.shear_and_add_segment(points, count, law.step, 1.0, law.disturbance_slope, law.half_v, SUM_SLACK)
-    if count > VERTEX_CAP:
-        count = polygon.reduce_outward(points, count, VERTEX_CAP)
-    return count
+@inlined
+def shift_section(store: Floats, n: int, label: float, elapsed: int, impulse: float, law: SectionLaw) -> None:
+    """Shift a section by an impulse: V becomes V - k."""
+    chains.shift(store, n, time_to_go(label, elapsed, law), -impulse)
 
 
-@compiled
-def summarise_section(points: Floats, count: int, x: float, law: SectionLaw, summary: Floats) -> None:
+@inlined
+def predict_section(store: Floats, marks: Integers, n: int, label: float, elapsed: int, law: SectionLaw) -> None:
+    """Move a section on to step `elapsed`: time to go falls, and the disturbance adds its segment, 8 ulp longer."""
+    tau = time_to_go(label, elapsed, law)
+    chains.turn(store, marks, n, tau + law.disturbance_lead)
+    chains.spread(store, n, tau + law.disturbance_lead, law.half_v + SUM_SLACK * store[n, REACH])
+    chains.turn(store, marks, n, tau)
+
+
+@inlined
+def summarise_section(store: Floats, marks: Integers, n: int, label: float, elapsed: int, law: SectionLaw, summaries: Floats, b: int, s: int) -> None:
     """Write the extent in z and the extremes of the predicted miss (13), (14) with the points that reach them.
 
     Notes
@@ -136,174 +185,143 @@ def summarise_section(points: Floats, count: int, x: float, law: SectionLaw, sum
     The predicted miss is z + V x/e -+ nu/2 (x/e)^2. An extreme is usually a whole edge; the point is its lowest
     for the upper extreme and its highest for the lower one, so that a mirrored engagement is mirrored exactly.
     """
-    time_to_go = x / law.closing_speed
-    z_least = lower = np.inf
-    z_greatest = upper = -np.inf
-    upper_at = lower_at = 0
-    for i in range(count):
-        z = points[i, 1]
-        miss = z + points[i, 0] * time_to_go
-        z_least = min(z_least, z)
-        z_greatest = max(z_greatest, z)
-        if miss > upper:
-            upper = miss
-            upper_at = i
-        if miss < lower:
-            lower = miss
-            lower_at = i
-    magnitude = abs(points[upper_at, 1]) + abs(points[lower_at, 1]) + (upper - lower)
+    tau = time_to_go(label, elapsed, law)
+    summaries[b, s, Z_LEAST], summaries[b, s, Z_GREATEST] = chains.heights(store, marks, n, tau)
+    upper_at = chains.find_peak(store, marks, n, RIGHT)
+    lower_at = chains.find_peak(store, marks, n, LEFT)
+    upper_v, upper = chains.vertex(store, n, RIGHT, upper_at)
+    lower_v, lower = chains.vertex(store, n, LEFT, lower_at)
+    magnitude = tau * (abs(upper_v) + abs(lower_v)) + abs(upper) + abs(lower)
     tolerance = TIE_TOLERANCE * (upper - lower) + CUT_SLACK * magnitude
-    upper_at = extreme_along_edge(points, count, upper_at, time_to_go, upper - tolerance, 1.0)
-    lower_at = extreme_along_edge(points, count, lower_at, time_to_go, lower + tolerance, -1.0)
-    drift = 0.5 * law.disturbance * time_to_go * time_to_go
-    summary[Z_LEAST] = z_least
-    summary[Z_GREATEST] = z_greatest
-    summary[UPPER_MISS] = upper + drift
-    summary[UPPER_V] = points[upper_at, 0]
-    summary[UPPER_Z] = points[upper_at, 1]
-    summary[LOWER_MISS] = lower - drift
-    summary[LOWER_V] = points[lower_at, 0]
-    summary[LOWER_Z] = points[lower_at, 1]
+    upper_v, upper_m = chains.vertex(store, n, RIGHT, chains.first_near_peak(store, marks, n, RIGHT, upper_at, tolerance))
+    lower_v, lower_m = chains.vertex(store, n, LEFT, chains.first_near_peak(store, marks, n, LEFT, lower_at, tolerance))
+    drift = 0.5 * law.disturbance * tau * tau
+    summaries[b, s, UPPER_MISS] = upper + drift
+    summaries[b, s, UPPER_V] = upper_v
+    summaries[b, s, UPPER_Z] = upper_m - tau * upper_v
+    summaries[b, s, LOWER_MISS] = lower - drift
+    summaries[b, s, LOWER_V] = lower_v
+    summaries[b, s, LOWER_Z] = lower_m - tau * lower_v
 
 
 @compiled
-def extreme_along_edge(points: Floats, count: int, start: int, time_to_go: float, level: float, sign: float) -> int:
-    """Index of the lowest (sign 1) vertex with a miss at least `level`, or highest (sign -1) with one at most."""
-    best = start
-    for direction in (1, -1):
-        i = start
-        for _ in range(count - 1):
-            i += direction
-            if i == count:
-                i = 0
-            elif i < 0:
-                i = count - 1
-            if sign * (points[i, 1] + points[i, 0] * time_to_go - level) < 0.0:
-                break
-            if sign * (points[i, 1] - points[best, 1]) < 0.0:
-                best = i
-    return best
-
-
-@compiled
-def start_all(labels: Floats, used: Integers, law: SectionLaw, vertices: Floats, counts: Integers) -> None:
-    """Write the initial sections of a batch."""
+def start_all(sections: Sections, law: SectionLaw) -> None:
+    """Write the initial sections of a batch, and summarise them."""
+    labels, used, living, _, _, store, marks, summaries = sections
     for b in range(labels.shape[0]):
         for s in range(used[b]):
-            counts[b, s] = initial_section(labels[b, s], law, vertices[b, s])
+            n = b * labels.shape[1] + s
+            start_section(store, marks, n, labels[b, s], law)
+            summarise_section(store, marks, n, labels[b, s], 0, law, summaries, b, s)
+            living[b, s] = True
 
 
 @compiled
-def measure_all(
-    active: Flags,
-    alpha: Floats,
-    elapsed: int,
-    event: int,
-    labels: Floats,
-    used: Integers,
-    law: SectionLaw,
-    vertices: Floats,
-    counts: Integers,
-    died: Integers,
-    overlaps: Floats,
-    summaries: Floats,
-) -> None:
+def measure_all(active: Flags, alpha: Floats, elapsed: int, event: int, sections: Sections, law: SectionLaw) -> None:
     """Cut every living section of the active engagements by their angle measurements, and summarise it."""
+    labels, used, living, died, overlaps, store, marks, summaries = sections
     for b in range(labels.shape[0]):
         if not active[b]:
             continue
         for s in range(used[b]):
-            if counts[b, s] == 0:
+            if not living[b, s]:
                 continue
-            x = range_of(labels[b, s], elapsed, law)
-            points = vertices[b, s]
-            counts[b, s], overlap = measure_section(points, counts[b, s], x, alpha[b], law)
-            if counts[b, s] == 0:
+            n = b * labels.shape[1] + s
+            living[b, s], overlap = measure_section(store, marks, n, labels[b, s], elapsed, alpha[b], law)
+            if living[b, s]:
+                summarise_section(store, marks, n, labels[b, s], elapsed, law, summaries, b, s)
+            else:
                 died[b, s] = event
                 overlaps[b, s] = overlap
-            else:
-                summarise_section(points, counts[b, s], x, law, summaries[b, s])
 
 
 @compiled
-def shift_all(
-    active: Flags,
-    impulse: Floats,
-    elapsed: int,
-    labels: Floats,
-    used: Integers,
-    law: SectionLaw,
-    vertices: Floats,
-    counts: Integers,
-    summaries: Floats,
-) -> None:
-    """Shift every living section, and its summary, by its engagement's impulse: V becomes V - k."""
-    for b in range(counts.shape[0]):
+def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, law: SectionLaw) -> None:
+    """Shift every living section, and its summary, by its engagement's impulse."""
+    labels, used, living, _, _, store, _, summaries = sections
+    for b in range(labels.shape[0]):
         if not active[b] or impulse[b] == 0.0:
             continue
         for s in range(used[b]):
-            if counts[b, s] == 0:
+            if not living[b, s]:
                 continue
-            polygon.translate(vertices[b, s], counts[b, s], -impulse[b], 0.0)
-            summary = summaries[b, s]
-            summary[UPPER_V] -= impulse[b]
-            summary[LOWER_V] -= impulse[b]
-            miss = impulse[b] * range_of(labels[b, s], elapsed, law) / law.closing_speed
-            summary[UPPER_MISS] -= miss
-            summary[LOWER_MISS] -= miss
+            shift_section(store, b * labels.shape[1] + s, labels[b, s], elapsed, impulse[b], law)
+            summaries[b, s, UPPER_V] -= impulse[b]
+            summaries[b, s, LOWER_V] -= impulse[b]
+            miss = impulse[b] * time_to_go(labels[b, s], elapsed, law)
+            summaries[b, s, UPPER_MISS] -= miss
+            summaries[b, s, LOWER_MISS] -= miss
 
 
 @compiled
-def predict_all(active: Flags, used: Integers, law: SectionLaw, vertices: Floats, counts: Integers) -> None:
-    """Move every living section of the active engagements one step on; the summaries stay those of before."""
-    for b in range(counts.shape[0]):
-        if not active[b]:
-            continue
-        for s in range(used[b]):
-            if counts[b, s] > 0:
-                counts[b, s] = predict_section(vertices[b, s], counts[b, s], law)
-
-
-@compiled
-def summarise_all(
-    active: Flags,
-    elapsed: int,
-    labels: Floats,
-    used: Integers,
-    law: SectionLaw,
-    vertices: Floats,
-    counts: Integers,
-    summaries: Floats,
-) -> None:
-    """Summarise every living section of the active engagements."""
+def predict_all(active: Flags, elapsed: int, sections: Sections, law: SectionLaw) -> None:
+    """Move every living section of the active engagements on to step `elapsed`, and summarise it."""
+    labels, used, living, _, _, store, marks, summaries = sections
     for b in range(labels.shape[0]):
         if not active[b]:
             continue
         for s in range(used[b]):
-            if counts[b, s] > 0:
-                x = range_of(labels[b, s], elapsed, law)
-                summarise_section(vertices[b, s], counts[b, s], x, law, summaries[b, s])
+            if living[b, s]:
+                n = b * labels.shape[1] + s
+                if chains.is_crowded(marks, n):
+                    chains.reduce_outward(store, marks, n, time_to_go(labels[b, s], elapsed - 1, law))
+                predict_section(store, marks, n, labels[b, s], elapsed, law)
+                summarise_section(store, marks, n, labels[b, s], elapsed, law, summaries, b, s)
 
 
 @compiled
-def margins_all(
-    v: Floats, z: Floats, elapsed: int, labels: Floats, law: SectionLaw, vertices: Floats, counts: Integers
-) -> Floats:
-    """Signed margin of a state (V, z) in the first section of each engagement, m.
+def widest_all(elapsed: int, sections: Sections, law: SectionLaw) -> tuple[Flags, Floats]:
+    """Predicted-miss interval of each engagement, over its living sections.
 
-    Notes
-    -----
-    Distances are taken with V counted as V x/e, the metres of miss that it is worth.
+    Returns
+    -------
+    exists : ndarray of bool, shape (B,)
+        Whether any section lives.
+    ends : ndarray, shape (B, 2, 4)
+        For the lower and the upper end: predicted miss, and alpha, omega and range where it is reached; zeros where
+        no section lives.
     """
+    labels, used, living, _, _, _, _, summaries = sections
+    exists = np.zeros(labels.shape[0], np.bool_)
+    ends = np.zeros((labels.shape[0], 2, 4))
+    for b in range(labels.shape[0]):
+        for s in range(used[b]):
+            if not living[b, s]:
+                continue
+            x = range_of(labels[b, s], elapsed, law)
+            for end, column, sign in ((0, LOWER_MISS, -1.0), (1, UPPER_MISS, 1.0)):
+                if not exists[b] or sign * (summaries[b, s, column] - ends[b, end, 0]) > 0.0:
+                    v, z = summaries[b, s, column + 1], summaries[b, s, column + 2]
+                    alpha = z / x
+                    ends[b, end, 0] = summaries[b, s, column]
+                    ends[b, end, 1] = alpha
+                    ends[b, end, 2] = (v + law.closing_speed * alpha) / x
+                    ends[b, end, 3] = x
+            exists[b] = True
+    return exists, ends
+
+
+@compiled
+def margins_all(v: Floats, z: Floats, elapsed: int, sections: Sections, law: SectionLaw) -> Floats:
+    """Signed margin of a state (V, z) in the first section of each engagement, m; -inf where it is dead."""
+    labels, _, living, _, _, store, marks, _ = sections
     result = np.empty(v.shape[0])
-    scaled = np.empty((VERTEX_CAPACITY, 2))
+    points = np.empty((chains.CAPACITY, 2))
     for b in range(v.shape[0]):
-        time_to_go = range_of(labels[b, 0], elapsed, law) / law.closing_speed
-        for i in range(counts[b, 0]):
-            scaled[i, 0] = vertices[b, 0, i, 0] * time_to_go
-            scaled[i, 1] = vertices[b, 0, i, 1]
-        result[b] = polygon.margin(scaled, counts[b, 0], v[b] * time_to_go, z[b])
+        result[b] = -np.inf
+        if living[b, 0]:
+            tau = time_to_go(labels[b, 0], elapsed, law)
+            result[b] = margin_in(store, marks, b * labels.shape[1], tau, v[b], z[b], points)
     return result
+
+
+@compiled
+def margin_in(store: Floats, marks: Integers, n: int, tau: float, v: float, z: float, points: Floats) -> float:
+    """Signed margin of a state (V, z), m: distances are taken with V counted as V x/e, the miss that it is worth."""
+    count = chains.outline(store, marks, n, tau, points)
+    for i in range(count):
+        points[i, 0] *= tau
+    return polygon.margin(points, count, v * tau, z)
 
 
 @compiled
@@ -314,9 +332,11 @@ def replay(
     applies: Flags,
     events: int,
     law: SectionLaw,
-    points: Floats,
+    store: Floats,
+    marks: Integers,
+    n: int,
     overlaps: Floats,
-) -> tuple[int, int]:
+) -> int:
     """Carry the section at any label through a whole history.
 
     Parameters
@@ -329,33 +349,34 @@ def replay(
         Number of events.
     law : SectionLaw
         The numbers of the model.
-    points : ndarray
-        Where the section goes.
+    store, marks, n : section
+        Where it goes.
     overlaps : ndarray, shape (>= events,)
         Receives the overlap with the band of each angle measurement that the section lived to see.
 
     Returns
     -------
-    count, died : int
-        Vertices (0 if dead) and the event that killed it, or ALIVE.
+    int
+        The event that killed it, or ALIVE.
 
     Notes
     -----
-    About 0.1 to 0.3 us an event.
+    Some 30 ns an event.
     """
-    count = initial_section(label, law, points)
+    start_section(store, marks, n, label, law)
     elapsed = 0
     for event in range(events):
         if kinds[event] == PREDICTION:
+            if chains.is_crowded(marks, n):
+                chains.reduce_outward(store, marks, n, time_to_go(label, elapsed, law))
             elapsed += 1
-            count = predict_section(points, count, law)
+            predict_section(store, marks, n, label, elapsed, law)
         elif not applies[event]:
             continue
         elif kinds[event] == ANGLE:
-            x = range_of(label, elapsed, law)
-            count, overlaps[event] = measure_section(points, count, x, values[event], law)
-            if count == 0:
-                return 0, event
+            living, overlaps[event] = measure_section(store, marks, n, label, elapsed, values[event], law)
+            if not living:
+                return event
         else:
-            polygon.translate(points, count, -values[event], 0.0)
-    return count, ALIVE
+            shift_section(store, n, label, elapsed, values[event], law)
+    return ALIVE

@@ -47,8 +47,7 @@ class TruthSection:
         z = sight.alpha_rad * ranges
         v = sight.omega_rad_s * ranges - self._stack.law.closing_speed * sight.alpha_rad
         margin = self._stack.margins(v, z, self._elapsed)
-        refuted = self._stack.counts[:, 0] == 0
-        margin = np.where(refuted, self._stack.overlaps[:, 0], margin)
+        margin = np.where(self._stack.living[:, 0], margin, self._stack.sections.overlaps[:, 0])
         self.margin_m = np.where(where, margin, self.margin_m)
         self.least_margin_m = np.minimum(self.least_margin_m, self.margin_m)
 

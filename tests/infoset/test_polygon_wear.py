@@ -241,7 +241,7 @@ def clip(corners: Floats, normal: Floats, lower: float, upper: float) -> Floats:
 def add_segment(corners: Floats, half: Floats) -> Floats:
     def kernel(out: Floats) -> int:
         out[: len(corners)] = corners
-        return kernels.shear_and_add_segment(out, len(corners), 0.0, half[0], half[1], 1.0, 0.0)
+        return kernels.add_segment(out, len(corners), half[0], half[1])
 
     return written(corners, 2, kernel)
 
