@@ -157,7 +157,7 @@ class InformationSetView:
     @property
     def section_counts(self) -> NDArray[np.int64]:
         """Number of living sections, shape (B,)."""
-        return np.asarray(np.count_nonzero(self.living, axis=1))
+        return np.asarray(self.living.sum(axis=1))
 
     def stored_range_interval_m(self) -> tuple[Floats, Floats]:
         """Least and greatest range of the living stored sections, m; zeros where there is none."""

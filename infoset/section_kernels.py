@@ -206,13 +206,12 @@ def summarise_section(store: Floats, marks: Integers, n: int, label: float, elap
 
 @compiled
 def start_all(sections: Sections, law: SectionLaw) -> None:
-    """Write the initial sections of a batch, and summarise them."""
-    labels, used, living, _, _, store, marks, summaries = sections
+    """Write the initial sections of a batch; they are not summarised yet."""
+    labels, used, living, _, _, store, marks, _ = sections
     for b in range(labels.shape[0]):
         for s in range(used[b]):
             n = b * labels.shape[1] + s
             start_section(store, marks, n, labels[b, s], law)
-            summarise_section(store, marks, n, labels[b, s], 0, law, summaries, b, s)
             living[b, s] = True
 
 
@@ -255,8 +254,8 @@ def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, 
 
 @compiled
 def predict_all(active: Flags, elapsed: int, sections: Sections, law: SectionLaw) -> None:
-    """Move every living section of the active engagements on to step `elapsed`, and summarise it."""
-    labels, used, living, _, _, store, marks, summaries = sections
+    """Move every living section of the active engagements on to step `elapsed`; the summaries stay behind."""
+    labels, used, living, _, _, store, marks, _ = sections
     for b in range(labels.shape[0]):
         if not active[b]:
             continue
@@ -266,6 +265,18 @@ def predict_all(active: Flags, elapsed: int, sections: Sections, law: SectionLaw
                 if chains.is_crowded(marks, n):
                     chains.reduce_outward(store, marks, n, time_to_go(labels[b, s], elapsed - 1, law))
                 predict_section(store, marks, n, labels[b, s], elapsed, law)
+
+
+@compiled
+def summarise_all(active: Flags, elapsed: int, sections: Sections, law: SectionLaw) -> None:
+    """Summarise every living section of the active engagements."""
+    labels, used, living, _, _, store, marks, summaries = sections
+    for b in range(labels.shape[0]):
+        if not active[b]:
+            continue
+        for s in range(used[b]):
+            if living[b, s]:
+                n = b * labels.shape[1] + s
                 summarise_section(store, marks, n, labels[b, s], elapsed, law, summaries, b, s)
 
 

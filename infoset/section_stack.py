@@ -28,6 +28,8 @@ class SectionStack:
     def __init__(self, law: SectionLaw, labels: Floats, used: NDArray[np.int64]) -> None:
         self.law = law
         self.sections = kernels.room_for_sections(labels, used.astype(np.int64))
+        self._stale = np.ones(self.batch, dtype=bool)
+        self._elapsed = 0
         kernels.start_all(self.sections, law)
 
     @property
@@ -47,8 +49,14 @@ class SectionStack:
 
     @property
     def summaries(self) -> Floats:
-        """Summary of each living section, shape (B, S, columns)."""
+        """Summary of each living section, shape (B, S, columns), brought up to date where it is stale."""
+        self._refresh()
         return self.sections.summaries
+
+    def _refresh(self) -> None:
+        if self._stale.any():
+            kernels.summarise_all(self._stale, self._elapsed, self.sections, self.law)
+            self._stale[:] = False
 
     def ranges(self, elapsed: int) -> Floats:
         """Range of every slot after a number of steps, m, shape (B, S)."""
@@ -57,6 +65,7 @@ class SectionStack:
     def measure_angle(self, active: Flags, alpha: Floats, elapsed: int, event: int) -> None:
         """Cut the living sections by angle measurements (rad)."""
         kernels.measure_all(active, alpha, elapsed, event, self.sections, self.law)
+        self._stale &= ~active
 
     def shift(self, active: Flags, impulse: Floats, elapsed: int) -> None:
         """Shift the living sections, and their summaries, by impulses (m/s)."""
@@ -65,6 +74,8 @@ class SectionStack:
     def predict(self, active: Flags, elapsed: int) -> None:
         """Move the living sections to step `elapsed`."""
         kernels.predict_all(active, elapsed, self.sections, self.law)
+        self._stale |= active
+        self._elapsed = elapsed
 
     def keep_labels(self, least: Floats, greatest: Floats, active: Flags) -> Flags:
         """Remove the living sections whose labels are outside [least, greatest]; return which."""
@@ -79,6 +90,7 @@ class SectionStack:
 
     def widest(self, elapsed: int) -> tuple[Flags, Floats]:
         """Predicted-miss interval of each engagement: `section_kernels.widest_all`."""
+        self._refresh()
         return kernels.widest_all(elapsed, self.sections, self.law)
 
     def polygon(self, engagement: int, slot: int, elapsed: int) -> Floats:
@@ -92,6 +104,7 @@ class SectionStack:
         twin = SectionStack.__new__(SectionStack)
         twin.law = self.law
         twin.sections = Sections(*(array.copy() for array in self.sections))
+        twin._stale, twin._elapsed = self._stale.copy(), self._elapsed
         return twin
 
 
