@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import polygon
-from infoset._compile import compiled, inlined
+from infoset._compile import allocation_free, entry, inlined, substituted
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -38,98 +38,114 @@ EPSILON = float(np.finfo(np.float64).eps)
 RIGHT, LEFT = 0, 1
 
 CAPACITY = 256
-"""Vertices a section may have, and each chain has room for: a power of two."""
+"""Vertices a section may have: a power of two."""
+ROOM_AT_START = 32
+"""Vertices each chain has room for at first, a power of two: sections that lie close together are quicker to reach."""
 MOST_ADDED = 4
-"""Vertices that one step can add: two sums' ends and a cut's four corners, less what goes."""
+"""Vertices that one step can add, two at each of its two turns."""
 REDUCED = 160
-"""Vertices left in a section that has run out of room."""
+"""Vertices left in a section that has grown to CAPACITY."""
 
 # The marks, for each chain: the number of its first vertex, one past the last, and that of the peak. Numbers only
 # grow or fall: the ring holds a vertex at its number modulo the room.
-BEGIN, END, PEAK = 0, 1, 2
+BEGIN, END, PEAK = range(3)
 MARKS = 3
 
-# The store: the origins of both chains, a bound on |V|, then the vertices, each (V, m) from its chain's origin.
-# An origin moves at every step and must not wear, so it is a sum of two floats. The bound is over all that the section
-# ever was: rounding is relative to it.
-V_ORIGIN, V_REST, M_ORIGIN, M_REST = range(4)
-ORIGIN = 4
-REACH = 2 * ORIGIN
-VERTICES = REACH + 1
+# The store, for each chain: its origin, a bound on |V| (the right chain has it), then the vertices, each (V, m) from
+# the origin. An origin moves at every step and must not wear, so it is a sum of two floats. The bound is over all that
+# the section ever was: rounding is relative to it.
+V_ORIGIN, V_REST, M_ORIGIN, M_REST, REACH = range(5)
+VERTICES = 6
 
 
-def empty_sections(number: int) -> tuple[Floats, Integers]:
+def empty_sections(number: int, room: int = CAPACITY) -> tuple[Floats, Integers]:
     """Room for a number of sections: their store and marks."""
-    return np.zeros((number, VERTICES + 4 * CAPACITY)), np.zeros((number, 2 * MARKS), dtype=np.int64)
+    return np.zeros((number, 2, VERTICES + 2 * room)), np.zeros((number, 2, MARKS), dtype=np.int64)
 
 
-@inlined
-def place(side: int, i: int) -> int:
+def working_room() -> Floats:
+    """Room that some operations need to work in."""
+    return np.empty((CAPACITY, 2))
+
+
+@substituted
+def place(store: Floats, i: int) -> int:
     """Where the store has a vertex of a chain."""
-    return VERTICES + 2 * (side * CAPACITY + (i & (CAPACITY - 1)))
+    return VERTICES + 2 * (i & (((store.shape[2] - VERTICES) >> 1) - 1))
 
 
-@inlined
+@entry
+def move_to_wider_rings(store: Floats, marks: Integers, wider: Floats) -> None:
+    """Copy all sections to a store with more room."""
+    for n in range(store.shape[0]):
+        for side in (RIGHT, LEFT):
+            for i in range(VERTICES):
+                wider[n, side, i] = store[n, side, i]
+            for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
+                at = place(store, i)
+                put(wider, n, side, i, store[n, side, at], store[n, side, at + 1])
+
+
+@substituted
 def sign_of(side: int) -> float:
     """The side from which a chain is seen to rise: 1 for the right one, -1 for the left one."""
     return 1.0 - 2.0 * side
 
 
-@inlined
+@substituted
 def begin_of(marks: Integers, n: int, side: int) -> int:
     """Number of the first vertex of a chain."""
-    return int(marks[n, MARKS * side + BEGIN])
+    return int(marks[n, side, BEGIN])
 
 
-@inlined
+@substituted
 def end_of(marks: Integers, n: int, side: int) -> int:
     """One past the number of the last vertex of a chain."""
-    return int(marks[n, MARKS * side + END])
+    return int(marks[n, side, END])
 
 
 @inlined
 def rise(store: Floats, n: int, side: int, i: int, tau: float) -> float:
     """Height of a vertex over the origin of its chain, seen from the chain's own side: it rises along the chain."""
-    at = place(side, i)
-    return float(sign_of(side) * (store[n, at + 1] - tau * store[n, at]))
+    at = place(store, i)
+    return float(sign_of(side) * (store[n, side, at + 1] - tau * store[n, side, at]))
 
 
 @inlined
 def origin_height(store: Floats, n: int, side: int, tau: float) -> float:
     """Height of the origin of a chain."""
-    at = ORIGIN * side
-    whole = store[n, at + M_ORIGIN] - tau * store[n, at + V_ORIGIN]
-    return float(whole + (store[n, at + M_REST] - tau * store[n, at + V_REST]))
+    whole = store[n, side, M_ORIGIN] - tau * store[n, side, V_ORIGIN]
+    return float(whole + (store[n, side, M_REST] - tau * store[n, side, V_REST]))
 
 
 @inlined
 def vertex(store: Floats, n: int, side: int, i: int) -> tuple[float, float]:
     """A vertex: V and m."""
-    at, origin = place(side, i), ORIGIN * side
-    v = (store[n, at] + store[n, origin + V_REST]) + store[n, origin + V_ORIGIN]
-    m = (store[n, at + 1] + store[n, origin + M_REST]) + store[n, origin + M_ORIGIN]
+    at = place(store, i)
+    v = (store[n, side, at] + store[n, side, V_REST]) + store[n, side, V_ORIGIN]
+    m = (store[n, side, at + 1] + store[n, side, M_REST]) + store[n, side, M_ORIGIN]
     return v, m
 
 
-@inlined
+@substituted
 def put(store: Floats, n: int, side: int, i: int, v: float, m: float) -> None:
     """Write a vertex, from the origin of its chain."""
-    at = place(side, i)
-    store[n, at] = v
-    store[n, at + 1] = m
+    at = place(store, i)
+    store[n, side, at] = v
+    store[n, side, at + 1] = m
 
 
 @inlined
-def move_part(store: Floats, n: int, at: int, value: float) -> None:
+def move_part(store: Floats, n: int, side: int, part: int, value: float) -> None:
     """Add to a coordinate of an origin; its rest keeps what rounding takes away."""
-    before = store[n, at]
+    before = store[n, side, part]
     after = before + value
     added = after - before
-    store[n, at] = after
-    store[n, at + 1] += (before - (after - added)) + (value - added)
+    store[n, side, part] = after
+    store[n, side, part + 1] += (before - (after - added)) + (value - added)
 
 
-@inlined
+@substituted
 def product_error(a: float, b: float, product: float) -> float:
     """What rounding took from a product of two floats: a b - product (Dekker)."""
     split = 134217729.0
@@ -140,27 +156,38 @@ def product_error(a: float, b: float, product: float) -> float:
     return a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
 
 
-@compiled
-def start(store: Floats, marks: Integers, n: int, tau: float, corners: Floats) -> None:
-    """Begin with a quadrilateral.
+@allocation_free
+def start(
+    store: Floats,
+    marks: Integers,
+    n: int,
+    tau: float,
+    bottom: tuple[float, float, float],
+    top: tuple[float, float, float],
+) -> None:
+    """Begin with a trapezium between two levels.
 
     Parameters
     ----------
     store, marks, n : section
     tau : float
         Time to go.
-    corners : ndarray, shape (4, 2)
-        (V, z) of the right side's lower and upper corner and of the left side's upper and lower one.
+    bottom, top : tuple of float
+        Least V, greatest V, and z, of either level.
     """
-    store[n, :VERTICES] = 0.0
-    for corner in range(4):
-        v, z = corners[corner]
-        put(store, n, corner // 2, corner % 2, v, z + tau * v)
-        store[n, REACH] = max(store[n, REACH], abs(v))
+    reach = 0.0
     for side in (RIGHT, LEFT):
-        marks[n, MARKS * side + BEGIN] = 0
-        marks[n, MARKS * side + END] = 2
-        marks[n, MARKS * side + PEAK] = 0
+        for i in range(VERTICES):
+            store[n, side, i] = 0.0
+        for i in range(2):
+            at_top = (i == 1) == (side == RIGHT)
+            v = top[1 - side] if at_top else bottom[1 - side]
+            put(store, n, side, i, v, (top[2] if at_top else bottom[2]) + tau * v)
+            reach = max(reach, abs(v))
+        marks[n, side, BEGIN] = 0
+        marks[n, side, END] = 2
+        marks[n, side, PEAK] = 0
+    store[n, RIGHT, REACH] = reach
 
 
 @inlined
@@ -176,7 +203,7 @@ def hand_over(store: Floats, marks: Integers, n: int, giver: int, tau: float) ->
             front -= 1
             adopt(store, n, giver, back, taker, front)
             front_rise = -rise(store, n, taker, front, tau)
-            marks[n, MARKS * taker + BEGIN] = front
+            marks[n, taker, BEGIN] = front
         if back == first:
             break
         before_rise = rise(store, n, giver, back - 1, tau)
@@ -184,51 +211,51 @@ def hand_over(store: Floats, marks: Integers, n: int, giver: int, tau: float) ->
             break
         back -= 1
         back_rise = before_rise
-    marks[n, MARKS * giver + END] = back + 1
+    marks[n, giver, END] = back + 1
 
 
-@inlined
+@substituted
 def adopt(store: Floats, n: int, giver: int, i: int, taker: int, j: int) -> None:
     """Write vertex i of one chain as vertex j of the other, from the other's origin."""
-    at, source, target = place(giver, i), ORIGIN * giver, ORIGIN * taker
-    v_rest = store[n, source + V_REST] - store[n, target + V_REST]
-    m_rest = store[n, source + M_REST] - store[n, target + M_REST]
-    v = store[n, at] + ((store[n, source + V_ORIGIN] - store[n, target + V_ORIGIN]) + v_rest)
-    m = store[n, at + 1] + ((store[n, source + M_ORIGIN] - store[n, target + M_ORIGIN]) + m_rest)
+    at = place(store, i)
+    v_rest = store[n, giver, V_REST] - store[n, taker, V_REST]
+    m_rest = store[n, giver, M_REST] - store[n, taker, M_REST]
+    v = store[n, giver, at] + ((store[n, giver, V_ORIGIN] - store[n, taker, V_ORIGIN]) + v_rest)
+    m = store[n, giver, at + 1] + ((store[n, giver, M_ORIGIN] - store[n, taker, M_ORIGIN]) + m_rest)
     put(store, n, taker, j, v, m)
 
 
-@inlined
+@substituted
 def turn(store: Floats, marks: Integers, n: int, tau: float) -> None:
     """Let the time to go fall to `tau`: the level turns, and each chain ends where it is highest or lowest now."""
     hand_over(store, marks, n, RIGHT, tau)
     hand_over(store, marks, n, LEFT, tau)
 
 
-@inlined
+@substituted
 def spread(store: Floats, n: int, tau: float, half_v: float) -> None:
     """Minkowski sum with the segment of V from -half_v to half_v that lies along the level of `tau`."""
     half_m = half_v * tau
-    move_part(store, n, ORIGIN * RIGHT + V_ORIGIN, half_v)
-    move_part(store, n, ORIGIN * RIGHT + M_ORIGIN, half_m)
-    move_part(store, n, ORIGIN * LEFT + V_ORIGIN, -half_v)
-    move_part(store, n, ORIGIN * LEFT + M_ORIGIN, -half_m)
-    store[n, REACH] += half_v
+    move_part(store, n, RIGHT, V_ORIGIN, half_v)
+    move_part(store, n, RIGHT, M_ORIGIN, half_m)
+    move_part(store, n, LEFT, V_ORIGIN, -half_v)
+    move_part(store, n, LEFT, M_ORIGIN, -half_m)
+    store[n, RIGHT, REACH] += half_v
 
 
-@inlined
+@substituted
 def shift(store: Floats, n: int, tau: float, v: float) -> None:
     """Move by V along the level of `tau`: z stays, the predicted miss changes by V tau."""
     m = v * tau
     rest = product_error(v, tau, m)
     for side in (RIGHT, LEFT):
-        move_part(store, n, ORIGIN * side + V_ORIGIN, v)
-        move_part(store, n, ORIGIN * side + M_ORIGIN, m)
-        store[n, ORIGIN * side + M_REST] += rest
-    store[n, REACH] += abs(v)
+        move_part(store, n, side, V_ORIGIN, v)
+        move_part(store, n, side, M_ORIGIN, m)
+        store[n, side, M_REST] += rest
+    store[n, RIGHT, REACH] += abs(v)
 
 
-@inlined
+@substituted
 def heights(store: Floats, marks: Integers, n: int, tau: float) -> tuple[float, float]:
     """Least and greatest z of a section that is turned to `tau`."""
     right, left = origin_height(store, n, RIGHT, tau), origin_height(store, n, LEFT, tau)
@@ -246,15 +273,15 @@ def heights(store: Floats, marks: Integers, n: int, tau: float) -> tuple[float, 
 @inlined
 def put_on_edge(store: Floats, n: int, side: int, near: int, far: int, at: int, tau: float, level: float) -> None:
     """Put, as vertex `at`, the point at a rise of `level` on the edge from `near` to `far`; a lone vertex goes there."""
-    v = store[n, place(side, near)]
+    v = store[n, side, place(store, near)]
     if near != far:
         near_rise = rise(store, n, side, near, tau)
         far_rise = rise(store, n, side, far, tau)
         # From the nearer end: least rounding.
         if abs(level - near_rise) <= abs(far_rise - level):
-            v += (level - near_rise) / (far_rise - near_rise) * (store[n, place(side, far)] - v)
+            v += (level - near_rise) / (far_rise - near_rise) * (store[n, side, place(store, far)] - v)
         else:
-            far_v = store[n, place(side, far)]
+            far_v = store[n, side, place(store, far)]
             v = far_v + (level - far_rise) / (near_rise - far_rise) * (v - far_v)
     put(store, n, side, at, v, sign_of(side) * level + tau * v)
 
@@ -268,7 +295,7 @@ def cut_back(store: Floats, marks: Integers, n: int, side: int, tau: float, leve
     while last > first and rise(store, n, side, last - 1, tau) > level:
         last -= 1
     put_on_edge(store, n, side, max(last - 1, first), last, last, tau, level)
-    marks[n, MARKS * side + END] = last + 1
+    marks[n, side, END] = last + 1
 
 
 @inlined
@@ -280,7 +307,7 @@ def cut_front(store: Floats, marks: Integers, n: int, side: int, tau: float, lev
     while first < last and rise(store, n, side, first + 1, tau) < level:
         first += 1
     put_on_edge(store, n, side, min(first + 1, last), first, first, tau, level)
-    marks[n, MARKS * side + BEGIN] = first
+    marks[n, side, BEGIN] = first
 
 
 @inlined
@@ -308,17 +335,17 @@ def cut(store: Floats, marks: Integers, n: int, tau: float, lower: float, upper:
     return True, overlap
 
 
-@inlined
+@substituted
 def miss_of(store: Floats, n: int, side: int, i: int) -> float:
     """Predicted miss of a vertex over that of its chain's origin, counted outward."""
-    return float(sign_of(side) * store[n, place(side, i) + 1])
+    return float(sign_of(side) * store[n, side, place(store, i) + 1])
 
 
 @inlined
 def find_peak(store: Floats, marks: Integers, n: int, side: int) -> int:
     """Number of the vertex of a chain whose predicted miss is the greatest (right) or the least (left)."""
     first, last = begin_of(marks, n, side), end_of(marks, n, side) - 1
-    peak = int(min(max(marks[n, MARKS * side + PEAK], first), last))
+    peak = int(min(max(marks[n, side, PEAK], first), last))
     miss = miss_of(store, n, side, peak)
     while peak < last and miss_of(store, n, side, peak + 1) > miss:
         peak += 1
@@ -326,11 +353,11 @@ def find_peak(store: Floats, marks: Integers, n: int, side: int) -> int:
     while peak > first and miss_of(store, n, side, peak - 1) > miss:
         peak -= 1
         miss = miss_of(store, n, side, peak)
-    marks[n, MARKS * side + PEAK] = peak
+    marks[n, side, PEAK] = peak
     return peak
 
 
-@inlined
+@substituted
 def first_near_peak(store: Floats, marks: Integers, n: int, side: int, peak: int, tolerance: float) -> int:
     """First vertex of the edge through the peak along which the predicted miss is the same to within a tolerance."""
     first = begin_of(marks, n, side)
@@ -340,16 +367,30 @@ def first_near_peak(store: Floats, marks: Integers, n: int, side: int, peak: int
     return peak
 
 
-@inlined
+@substituted
+def count_of(marks: Integers, n: int) -> int:
+    """Number of vertices of both chains."""
+    right, left = marks[n, RIGHT, END] - marks[n, RIGHT, BEGIN], marks[n, LEFT, END] - marks[n, LEFT, BEGIN]
+    return int(right + left)
+
+
+@substituted
 def is_crowded(marks: Integers, n: int) -> bool:
     """Whether a section may have more vertices than there is room for before the next step is over."""
-    counts = marks[n, END] - marks[n, BEGIN] + marks[n, MARKS + END] - marks[n, MARKS + BEGIN]
-    return bool(counts > CAPACITY - MOST_ADDED)
+    return bool(count_of(marks, n) > CAPACITY - MOST_ADDED)
 
 
-@compiled
-def reduce_outward(store: Floats, marks: Integers, n: int, tau: float) -> None:
+@allocation_free
+def reduce_outward(store: Floats, marks: Integers, n: int, tau: float, points: Floats) -> None:
     """Drop edges of the longer chain, outward, until the section has `REDUCED` vertices.
+
+    Parameters
+    ----------
+    store, marks, n : section
+    tau : float
+        Time to go.
+    points : ndarray, shape (CAPACITY, 2)
+        Room to work in.
 
     Notes
     -----
@@ -357,15 +398,15 @@ def reduce_outward(store: Floats, marks: Integers, n: int, tau: float) -> None:
     rounding has put inside the others goes before; where no edge can be dropped, the chain becomes three sides
     of a box around it.
     """
-    lengths = marks[n, END] - marks[n, BEGIN], marks[n, MARKS + END] - marks[n, MARKS + BEGIN]
-    side = RIGHT if lengths[RIGHT] >= lengths[LEFT] else LEFT
-    points = np.empty((CAPACITY, 2))
+    right = marks[n, RIGHT, END] - marks[n, RIGHT, BEGIN]
+    other = min(right, count_of(marks, n) - right)
+    side = RIGHT if right > other else LEFT
     count = 0
     for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
-        at = place(side, i)
-        v, m = store[n, at], store[n, at + 1]
+        at = place(store, i)
+        v, m = store[n, side, at], store[n, side, at + 1]
         count = polygon.append(points, polygon.drop_turned(points, count, 1, v, m), v, m)
-    while count > REDUCED - lengths[1 - side]:
+    while count > REDUCED - other:
         chosen, v, m = polygon.cheapest_edge(points, count, 1, count - 3)
         if chosen < 0:
             count = box_around(points, count, sign_of(side), tau)
@@ -378,12 +419,12 @@ def reduce_outward(store: Floats, marks: Integers, n: int, tau: float) -> None:
         count -= 1
     for i in range(count):
         put(store, n, side, i, points[i, 0], points[i, 1])
-    marks[n, MARKS * side + BEGIN] = 0
-    marks[n, MARKS * side + END] = count
-    marks[n, MARKS * side + PEAK] = 0
+    marks[n, side, BEGIN] = 0
+    marks[n, side, END] = count
+    marks[n, side, PEAK] = 0
 
 
-@compiled
+@allocation_free
 def box_around(points: Floats, count: int, sign: float, tau: float) -> int:
     """Replace a chain by its ends and their images moved out along the level as far as its outermost vertex."""
     out = 0.0
@@ -401,7 +442,7 @@ def box_around(points: Floats, count: int, sign: float, tau: float) -> int:
     return 4
 
 
-@compiled
+@entry
 def outline(store: Floats, marks: Integers, n: int, tau: float, out: Floats) -> int:
     """Write the vertices (V, z), counter-clockwise; return how many: at most CAPACITY.
 
@@ -415,14 +456,14 @@ def outline(store: Floats, marks: Integers, n: int, tau: float, out: Floats) -> 
         for i in range(first, end_of(marks, n, side)):
             v, m = vertex(store, n, side, i)
             z = m - tau * v
-            if i > first or made == 0 or not meets(out, made - 1, v, z, store[n, REACH], tau):
+            if i > first or made == 0 or not meets(out, made - 1, v, z, store[n, RIGHT, REACH], tau):
                 made = polygon.append(out, made, v, z)
-    while made > 1 and meets(out, made - 1, out[0, 0], out[0, 1], store[n, REACH], tau):
+    while made > 1 and meets(out, made - 1, out[0, 0], out[0, 1], store[n, RIGHT, REACH], tau):
         made -= 1
     return made
 
 
-@compiled
+@allocation_free
 def meets(points: Floats, i: int, v: float, z: float, reach: float, tau: float) -> bool:
     """Whether a vertex is (V, z) up to the rounding of a change of chains."""
     close_v = abs(points[i, 0] - v) <= 4.0 * EPSILON * reach

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from infoset import section_kernels as kernels
-from infoset.chains import empty_sections
+from infoset.chains import CAPACITY, empty_sections, working_room
 from infoset.convex_polygons import ConvexPolygons
 from infoset.history import History
 from infoset.location import refine_all, workspace
@@ -260,6 +260,7 @@ class InformationSetView:
             marks,
             0,
             np.empty(tape.events),
+            working_room(),
         )
         vertices = outline(store, marks, 0, label, tape.elapsed, law) if died == kernels.ALIVE else np.empty((0, 2))
         x = label - law.closing_speed * (law.step * tape.elapsed)
@@ -504,6 +505,8 @@ class InformationSet(InformationSetView):
 
     def _regrid(self, wanted: Flags, sections: int) -> None:
         tape, stack = self._history, self._stack
+        # A replayed section may have any number of vertices.
+        stack.make_room(CAPACITY)
         refine_all(
             wanted,
             sections,
@@ -516,7 +519,7 @@ class InformationSet(InformationSetView):
             tape.events,
             stack.sections,
             stack.law,
-            workspace(tape.events),
+            workspace(tape.events, stack.labels.shape[1]),
         )
 
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset._compile import compiled
-from infoset.chains import empty_sections
+from infoset._compile import allocation_free, entry
+from infoset.chains import empty_sections, working_room
 from infoset.section_kernels import (
     ALIVE,
     Flags,
@@ -39,6 +39,10 @@ class Workspace(NamedTuple):
     marks: Integers
     overlaps: Floats
     living_overlaps: Floats
+    points: Floats
+    labels: Floats
+    died: Integers
+    label_overlaps: Floats
 
 
 class Living(NamedTuple):
@@ -54,27 +58,53 @@ class Living(NamedTuple):
     above: float
 
 
-def workspace(events: int) -> Workspace:
-    """Room for replays of histories of so many events."""
-    return Workspace(*empty_sections(1), np.empty(events), np.empty(events))
+def workspace(events: int, slots: int) -> Workspace:
+    """Room for replays of histories of so many events, and for a search among so many stored labels."""
+    known = slots + 2
+    return Workspace(
+        *empty_sections(1),
+        overlaps=np.empty(events),
+        living_overlaps=np.empty(events),
+        points=working_room(),
+        labels=np.empty(known),
+        died=np.empty(known, dtype=np.int64),
+        label_overlaps=np.empty(known),
+    )
 
 
-@compiled
+@allocation_free
 def run(label: float, tape: Tape, law: SectionLaw, room: Workspace) -> tuple[int, float]:
     """Event at which a label died (or ALIVE) and its overlap there (0 if alive)."""
     died = replay(
-        label, tape.kinds, tape.values, tape.applies, tape.events, law, room.store, room.marks, 0, room.overlaps
+        label,
+        tape.kinds,
+        tape.values,
+        tape.applies,
+        tape.events,
+        law,
+        room.store,
+        room.marks,
+        0,
+        room.overlaps,
+        room.points,
     )
     return died, room.overlaps[died] if died != ALIVE else 0.0
 
 
-@compiled
+@allocation_free
+def keep_overlaps(room: Workspace, events: int) -> None:
+    """Keep the overlaps of the last replay as those of the living label."""
+    for event in range(events):
+        room.living_overlaps[event] = room.overlaps[event]
+
+
+@allocation_free
 def outlives(died: int, overlap: float, other_died: int, other_overlap: float) -> bool:
     """Whether a dead label is nearer to living than another: it died later, or at less distance."""
     return died > other_died or (died == other_died and overlap > other_overlap)
 
 
-@compiled
+@allocation_free
 def locate_end(
     dead: float,
     died: int,
@@ -93,7 +123,7 @@ def locate_end(
     converges fast; every fourth probe halves the bracket, against a change of the killing measurement.
     """
     run(living, tape, law, room)
-    room.living_overlaps[: tape.events] = room.overlaps[: tape.events]
+    keep_overlaps(room, tape.events)
     weight_dead = overlap
     weight_living = room.living_overlaps[died]
     side = 0
@@ -107,7 +137,7 @@ def locate_end(
         probe_died, probe_overlap = run(label, tape, law, room)
         if probe_died == ALIVE:
             living = label
-            room.living_overlaps[: tape.events] = room.overlaps[: tape.events]
+            keep_overlaps(room, tape.events)
             weight_living = room.living_overlaps[died]
             weight_dead = 0.5 * weight_dead if side == 1 else overlap
             side = 1
@@ -119,7 +149,7 @@ def locate_end(
     return dead, living
 
 
-@compiled
+@allocation_free
 def search_living(
     labels: Floats, died: Integers, overlaps: Floats, resolution: float, tape: Tape, law: SectionLaw, room: Workspace
 ) -> int:
@@ -152,7 +182,7 @@ def search_living(
     return 0
 
 
-@compiled
+@allocation_free
 def locate_living(
     limit_below: float,
     limit_above: float,
@@ -170,9 +200,7 @@ def locate_living(
         return nothing
     resolution = LABEL_RESOLUTION * max(abs(limit_below), abs(limit_above))
     # The stored labels within the limits, between the limits themselves.
-    known = np.empty(labels.shape[0] + 2)
-    known_died = np.empty(labels.shape[0] + 2, np.int64)
-    known_overlap = np.empty(labels.shape[0] + 2)
+    known, known_died, known_overlap = room.labels, room.died, room.label_overlaps
     known[0] = limit_below
     known_died[0], known_overlap[0] = run(limit_below, tape, law, room)
     size = 1
@@ -192,19 +220,19 @@ def locate_living(
             best = i
     first = last = best
     if known_died[best] != ALIVE:
-        bracket = np.empty(3)
-        bracket_died = np.empty(3, np.int64)
-        bracket_overlap = np.empty(3)
-        for k in range(3):
-            i = min(max(best - 1 + k, 0), size - 1)
-            bracket[k], bracket_died[k], bracket_overlap[k] = known[i], known_died[i], known_overlap[i]
-        if search_living(bracket, bracket_died, bracket_overlap, resolution, tape, law, room) == 0:
+        # The best of the dead and its neighbours, at the front of the same room.
+        first, last = max(best - 1, 0), min(best + 1, size - 1)
+        known[0], known_died[0], known_overlap[0] = known[first], known_died[first], known_overlap[first]
+        middle, middle_died, middle_overlap = known[best], known_died[best], known_overlap[best]
+        known[2], known_died[2], known_overlap[2] = known[last], known_died[last], known_overlap[last]
+        known[1], known_died[1], known_overlap[1] = middle, middle_died, middle_overlap
+        if search_living(known, known_died, known_overlap, resolution, tape, law, room) == 0:
             return nothing
         below, lower = locate_end(
-            bracket[0], bracket_died[0], bracket_overlap[0], bracket[1], resolution, tape, law, room
+            known[0], known_died[0], known_overlap[0], known[1], resolution, tape, law, room
         )
         above, upper = locate_end(
-            bracket[2], bracket_died[2], bracket_overlap[2], bracket[1], resolution, tape, law, room
+            known[2], known_died[2], known_overlap[2], known[1], resolution, tape, law, room
         )
         return Living(True, below, lower, upper, above)
     for i in range(size):
@@ -224,7 +252,7 @@ def locate_living(
     return Living(True, below, lower, upper, above)
 
 
-@compiled
+@entry
 def refine_all(
     wanted: Flags,
     number: int,
@@ -276,7 +304,7 @@ def refine_all(
                 label = living.upper
             labels[b, s] = label
             n = b * labels.shape[1] + s
-            died[b, s] = replay(label, kinds, values[b], applies[b], events, law, store, marks, n, room.overlaps)
+            died[b, s] = replay(label, kinds, values[b], applies[b], events, law, store, marks, n, room.overlaps, room.points)
             alive[b, s] = died[b, s] == ALIVE
             if alive[b, s]:
                 summarise_section(store, marks, n, label, elapsed, law, summaries, b, s)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import chains, polygon
-from infoset._compile import compiled, inlined
+from infoset._compile import allocation_free, entry, inlined, substituted
 from infoset.chains import LEFT, REACH, RIGHT
 
 Floats = NDArray[np.float64]
@@ -86,7 +86,7 @@ class Sections(NamedTuple):
 def room_for_sections(labels: Floats, used: Integers) -> Sections:
     """Arrays for a batch of sections, none of them written yet."""
     shape = labels.shape
-    store, marks = chains.empty_sections(labels.size)
+    store, marks = chains.empty_sections(labels.size, chains.ROOM_AT_START)
     return Sections(
         labels=labels,
         used=used,
@@ -99,19 +99,19 @@ def room_for_sections(labels: Floats, used: Integers) -> Sections:
     )
 
 
-@inlined
+@substituted
 def range_of(label: float, elapsed: int, law: SectionLaw) -> float:
     """Range of a label after a number of steps."""
     return label - law.closing_speed * (law.step * elapsed)
 
 
-@inlined
+@substituted
 def time_to_go(label: float, elapsed: int, law: SectionLaw) -> float:
     """Time until the range of a label is zero, after a number of steps."""
     return range_of(label, elapsed, law) / law.closing_speed
 
 
-@compiled
+@entry
 def start_section(store: Floats, marks: Integers, n: int, label: float, law: SectionLaw) -> None:
     """Write the section at t = 0.
 
@@ -130,12 +130,15 @@ def start_section(store: Floats, marks: Integers, n: int, label: float, law: Sec
         highest -= min(law.vx_least * z_greatest, law.vx_greatest * z_greatest) / x
         shift_at_least, shift_at_greatest = -e * math.atan(z_least / x), -e * math.atan(z_greatest / x)
         z_least, z_greatest = math.atan(z_least / x) * x, math.atan(z_greatest / x) * x
-    corners = np.empty((4, 2))
-    corners[0] = highest + shift_at_least, z_least
-    corners[1] = highest + shift_at_greatest, z_greatest
-    corners[2] = lowest + shift_at_greatest, z_greatest
-    corners[3] = lowest + shift_at_least, z_least
-    chains.start(store, marks, n, time_to_go(label, 0, law), corners)
+    tau = time_to_go(label, 0, law)
+    chains.start(
+        store,
+        marks,
+        n,
+        tau,
+        (lowest + shift_at_least, highest + shift_at_least, z_least),
+        (lowest + shift_at_greatest, highest + shift_at_greatest, z_greatest),
+    )
 
 
 @inlined
@@ -157,11 +160,11 @@ def measure_section(
     """
     x = range_of(label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x
-    slack = CUT_SLACK * (label * (abs(alpha) + bound) + store[n, REACH] * (label / law.closing_speed))
+    slack = CUT_SLACK * (label * (abs(alpha) + bound) + store[n, RIGHT, REACH] * (label / law.closing_speed))
     return chains.cut(store, marks, n, x / law.closing_speed, x * (alpha - bound) - slack, x * (alpha + bound) + slack)
 
 
-@inlined
+@substituted
 def shift_section(store: Floats, n: int, label: float, elapsed: int, impulse: float, law: SectionLaw) -> None:
     """Shift a section by an impulse: V becomes V - k."""
     chains.shift(store, n, time_to_go(label, elapsed, law), -impulse)
@@ -172,7 +175,7 @@ def predict_section(store: Floats, marks: Integers, n: int, label: float, elapse
     """Move a section on to step `elapsed`: time to go falls, and the disturbance adds its segment, 8 ulp longer."""
     tau = time_to_go(label, elapsed, law)
     chains.turn(store, marks, n, tau + law.disturbance_lead)
-    chains.spread(store, n, tau + law.disturbance_lead, law.half_v + SUM_SLACK * store[n, REACH])
+    chains.spread(store, n, tau + law.disturbance_lead, law.half_v + SUM_SLACK * store[n, RIGHT, REACH])
     chains.turn(store, marks, n, tau)
 
 
@@ -204,7 +207,7 @@ def summarise_section(store: Floats, marks: Integers, n: int, label: float, elap
     summaries[b, s, LOWER_Z] = lower_m - tau * lower_v
 
 
-@compiled
+@entry
 def start_all(sections: Sections, law: SectionLaw) -> None:
     """Write the initial sections of a batch; they are not summarised yet."""
     labels, used, living, _, _, store, marks, _ = sections
@@ -215,7 +218,7 @@ def start_all(sections: Sections, law: SectionLaw) -> None:
             living[b, s] = True
 
 
-@compiled
+@entry
 def measure_all(active: Flags, alpha: Floats, elapsed: int, event: int, sections: Sections, law: SectionLaw) -> None:
     """Cut every living section of the active engagements by their angle measurements, and summarise it."""
     labels, used, living, died, overlaps, store, marks, summaries = sections
@@ -234,7 +237,7 @@ def measure_all(active: Flags, alpha: Floats, elapsed: int, event: int, sections
                 overlaps[b, s] = overlap
 
 
-@compiled
+@entry
 def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, law: SectionLaw) -> None:
     """Shift every living section, and its summary, by its engagement's impulse."""
     labels, used, living, _, _, store, _, summaries = sections
@@ -252,9 +255,13 @@ def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, 
             summaries[b, s, LOWER_MISS] -= miss
 
 
-@compiled
-def predict_all(active: Flags, elapsed: int, sections: Sections, law: SectionLaw) -> None:
-    """Move every living section of the active engagements on to step `elapsed`; the summaries stay behind."""
+@entry
+def predict_all(active: Flags, elapsed: int, sections: Sections, law: SectionLaw, points: Floats) -> int:
+    """Move every living section of the active engagements on to step `elapsed`; return the most vertices of any.
+
+    The summaries stay behind.
+    """
+    fullest = 0
     labels, used, living, _, _, store, marks, _ = sections
     for b in range(labels.shape[0]):
         if not active[b]:
@@ -263,11 +270,13 @@ def predict_all(active: Flags, elapsed: int, sections: Sections, law: SectionLaw
             if living[b, s]:
                 n = b * labels.shape[1] + s
                 if chains.is_crowded(marks, n):
-                    chains.reduce_outward(store, marks, n, time_to_go(labels[b, s], elapsed - 1, law))
+                    chains.reduce_outward(store, marks, n, time_to_go(labels[b, s], elapsed - 1, law), points)
                 predict_section(store, marks, n, labels[b, s], elapsed, law)
+                fullest = max(fullest, chains.count_of(marks, n))
+    return fullest
 
 
-@compiled
+@entry
 def summarise_all(active: Flags, elapsed: int, sections: Sections, law: SectionLaw) -> None:
     """Summarise every living section of the active engagements."""
     labels, used, living, _, _, store, marks, summaries = sections
@@ -280,21 +289,23 @@ def summarise_all(active: Flags, elapsed: int, sections: Sections, law: SectionL
                 summarise_section(store, marks, n, labels[b, s], elapsed, law, summaries, b, s)
 
 
-@compiled
-def widest_all(elapsed: int, sections: Sections, law: SectionLaw) -> tuple[Flags, Floats]:
-    """Predicted-miss interval of each engagement, over its living sections.
+@entry
+def widest_all(elapsed: int, sections: Sections, law: SectionLaw, exists: Flags, ends: Floats) -> None:
+    """Write the predicted-miss interval of each engagement, over its living sections.
 
-    Returns
-    -------
+    Parameters
+    ----------
+    elapsed : int
+        Steps so far.
+    sections : Sections
+    law : SectionLaw
     exists : ndarray of bool, shape (B,)
         Whether any section lives.
     ends : ndarray, shape (B, 2, 4)
-        For the lower and the upper end: predicted miss, and alpha, omega and range where it is reached; zeros where
-        no section lives.
+        For the lower and the upper end: predicted miss, and alpha, omega and range where it is reached; left as they
+        are where no section lives.
     """
     labels, used, living, _, _, _, _, summaries = sections
-    exists = np.zeros(labels.shape[0], np.bool_)
-    ends = np.zeros((labels.shape[0], 2, 4))
     for b in range(labels.shape[0]):
         for s in range(used[b]):
             if not living[b, s]:
@@ -309,24 +320,22 @@ def widest_all(elapsed: int, sections: Sections, law: SectionLaw) -> tuple[Flags
                     ends[b, end, 2] = (v + law.closing_speed * alpha) / x
                     ends[b, end, 3] = x
             exists[b] = True
-    return exists, ends
 
 
-@compiled
-def margins_all(v: Floats, z: Floats, elapsed: int, sections: Sections, law: SectionLaw) -> Floats:
-    """Signed margin of a state (V, z) in the first section of each engagement, m; -inf where it is dead."""
+@entry
+def margins_all(
+    v: Floats, z: Floats, elapsed: int, sections: Sections, law: SectionLaw, points: Floats, margins: Floats
+) -> None:
+    """Write the signed margin of a state (V, z) in the first section of each engagement, m; -inf where it is dead."""
     labels, _, living, _, _, store, marks, _ = sections
-    result = np.empty(v.shape[0])
-    points = np.empty((chains.CAPACITY, 2))
     for b in range(v.shape[0]):
-        result[b] = -np.inf
+        margins[b] = -np.inf
         if living[b, 0]:
             tau = time_to_go(labels[b, 0], elapsed, law)
-            result[b] = margin_in(store, marks, b * labels.shape[1], tau, v[b], z[b], points)
-    return result
+            margins[b] = margin_in(store, marks, b * labels.shape[1], tau, v[b], z[b], points)
 
 
-@compiled
+@entry
 def margin_in(store: Floats, marks: Integers, n: int, tau: float, v: float, z: float, points: Floats) -> float:
     """Signed margin of a state (V, z), m: distances are taken with V counted as V x/e, the miss that it is worth."""
     count = chains.outline(store, marks, n, tau, points)
@@ -335,7 +344,7 @@ def margin_in(store: Floats, marks: Integers, n: int, tau: float, v: float, z: f
     return polygon.margin(points, count, v * tau, z)
 
 
-@compiled
+@entry
 def replay(
     label: float,
     kinds: Integers,
@@ -347,6 +356,7 @@ def replay(
     marks: Integers,
     n: int,
     overlaps: Floats,
+    points: Floats,
 ) -> int:
     """Carry the section at any label through a whole history.
 
@@ -364,6 +374,8 @@ def replay(
         Where it goes.
     overlaps : ndarray, shape (>= events,)
         Receives the overlap with the band of each angle measurement that the section lived to see.
+    points : ndarray, shape (CAPACITY, 2)
+        Room to work in.
 
     Returns
     -------
@@ -379,7 +391,7 @@ def replay(
     for event in range(events):
         if kinds[event] == PREDICTION:
             if chains.is_crowded(marks, n):
-                chains.reduce_outward(store, marks, n, time_to_go(label, elapsed, law))
+                chains.reduce_outward(store, marks, n, time_to_go(label, elapsed, law), points)
             elapsed += 1
             predict_section(store, marks, n, label, elapsed, law)
         elif not applies[event]:

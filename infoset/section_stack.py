@@ -30,6 +30,7 @@ class SectionStack:
         self.sections = kernels.room_for_sections(labels, used.astype(np.int64))
         self._stale = np.ones(self.batch, dtype=bool)
         self._elapsed = 0
+        self._fullest = 4
         kernels.start_all(self.sections, law)
 
     @property
@@ -62,6 +63,17 @@ class SectionStack:
         """Range of every slot after a number of steps, m, shape (B, S)."""
         return self.labels - self.law.closing_speed * (self.law.step * elapsed)
 
+    def make_room(self, vertices: int) -> None:
+        """See that each chain of every slot has room for so many vertices."""
+        store, marks = self.sections.store, self.sections.marks
+        room = (store.shape[2] - chains.VERTICES) // 2
+        if room < vertices and room < chains.CAPACITY:
+            while room < min(vertices, chains.CAPACITY):
+                room *= 2
+            wider, _ = chains.empty_sections(len(store), room)
+            chains.move_to_wider_rings(store, marks, wider)
+            self.sections = self.sections._replace(store=wider)
+
     def measure_angle(self, active: Flags, alpha: Floats, elapsed: int, event: int) -> None:
         """Cut the living sections by angle measurements (rad)."""
         kernels.measure_all(active, alpha, elapsed, event, self.sections, self.law)
@@ -73,7 +85,8 @@ class SectionStack:
 
     def predict(self, active: Flags, elapsed: int) -> None:
         """Move the living sections to step `elapsed`."""
-        kernels.predict_all(active, elapsed, self.sections, self.law)
+        self.make_room(self._fullest + chains.MOST_ADDED)
+        self._fullest = kernels.predict_all(active, elapsed, self.sections, self.law, chains.working_room())
         self._stale |= active
         self._elapsed = elapsed
 
@@ -86,12 +99,16 @@ class SectionStack:
 
     def margins(self, v: Floats, z: Floats, elapsed: int) -> Floats:
         """Signed margin of states (V, z) in the first slot of each engagement, m."""
-        return kernels.margins_all(v, z, elapsed, self.sections, self.law)
+        margins = np.empty(self.batch)
+        kernels.margins_all(v, z, elapsed, self.sections, self.law, chains.working_room(), margins)
+        return margins
 
     def widest(self, elapsed: int) -> tuple[Flags, Floats]:
-        """Predicted-miss interval of each engagement: `section_kernels.widest_all`."""
+        """Predicted-miss interval of each engagement, as `section_kernels.widest_all` writes it."""
         self._refresh()
-        return kernels.widest_all(elapsed, self.sections, self.law)
+        exists, ends = np.zeros(self.batch, dtype=bool), np.zeros((self.batch, 2, 4))
+        kernels.widest_all(elapsed, self.sections, self.law, exists, ends)
+        return exists, ends
 
     def polygon(self, engagement: int, slot: int, elapsed: int) -> Floats:
         """Vertices (V, z) of a living section, counter-clockwise, shape (n, 2)."""
@@ -104,7 +121,7 @@ class SectionStack:
         twin = SectionStack.__new__(SectionStack)
         twin.law = self.law
         twin.sections = Sections(*(array.copy() for array in self.sections))
-        twin._stale, twin._elapsed = self._stale.copy(), self._elapsed
+        twin._stale, twin._elapsed, twin._fullest = self._stale.copy(), self._elapsed, self._fullest
         return twin
 
 
@@ -112,6 +129,6 @@ def outline(
     store: Floats, marks: NDArray[np.int64], row: int, label: float, elapsed: int, law: SectionLaw
 ) -> Floats:
     """Vertices (V, z) of a section, counter-clockwise, shape (n, 2)."""
-    points = np.empty((chains.CAPACITY, 2))
+    points = chains.working_room()
     time_to_go = (label - law.closing_speed * (law.step * elapsed)) / law.closing_speed
     return points[: chains.outline(store, marks, row, time_to_go, points)].copy()

@@ -120,13 +120,12 @@ class KeplerMotion:
         for _ in range(substeps):
             position, velocity, acceleration = self.position_m.copy(), self.velocity_m_s.copy(), self._acceleration
             self._leap(step_s / substeps)
-            receding = _dot(self.position_m, self.velocity_m_s) >= 0.0
-            least = np.where(passed, least, np.minimum(least, np.hypot(*self.position_m.T)))
-            new = receding & ~passed
+            least = np.where(passed, least, np.minimum(least, np.sqrt(_dot(self.position_m, self.position_m))))
+            new = (_dot(self.position_m, self.velocity_m_s) >= 0.0) & ~passed
             if new.any():
                 turn = closest_distance(position[new], velocity[new], acceleration[new], step_s / substeps)
                 least[new] = np.minimum(least[new], turn)
-            passed |= receding
+                passed |= new
         return Passage(passed, least)
 
     def _leap(self, duration_s: float) -> None:
