@@ -159,7 +159,7 @@ class Engagements:
         self._information.predict()
         self._truth_section.predict()
         passage = self._truth.advance(model.step_s)
-        self._miss = np.where(self._flying, np.minimum(self._miss, passage.least_distance_m), self._miss)
+        np.minimum(self._miss, passage.least_distance_m, out=self._miss, where=self._flying)
         self._flying &= ~passage.passed
         self._information.stop(passage.passed)
         self.step += 1
@@ -224,14 +224,16 @@ class Engagements:
         """Results so far, under these run numbers."""
         lost = np.array([status is SetStatus.EMPTY for status in self._information.status])
         margin = self._truth_section.least_margin_m
+        # Out of steps without having passed: the object is where it is.
+        miss = np.where(np.isfinite(self._miss), self._miss, self._truth.sight().range_m)
         return Results(
             runs=runs,
-            miss_m=self._miss,
+            miss_m=miss,
             impulse_m_s=self.scenario.thruster.budget_m_s - self._budget,
             guaranteed_miss_m=np.ma.MaskedArray(self._guaranteed, mask=~self._finished_label),
             outcomes=tuple(
                 _outcome(*flags)
-                for flags in zip(self._miss > self.scenario.nominal_range_m, lost, self._spent, strict=True)
+                for flags in zip(miss > self.scenario.nominal_range_m, lost, self._spent, strict=True)
             ),
             truth_kept=margin >= 0.0,
             truth_margin_m=margin,

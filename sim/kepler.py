@@ -42,7 +42,7 @@ class Passage:
     passed : ndarray of bool, shape (B,)
         Whether the closest approach lies within the step.
     least_distance_m : ndarray, shape (B,)
-        Least distance over the step.
+        The least distance of those that have passed; infinite for the others, which are still coming nearer.
     """
 
     passed: NDArray[np.bool_]
@@ -83,19 +83,28 @@ class KeplerMotion:
     """
 
     def __init__(self, position_m: Floats, velocity_m_s: Floats, sun: Sun | None) -> None:
-        self.position_m = position_m.astype(np.float64)
-        self.velocity_m_s = velocity_m_s.astype(np.float64)
+        # The relative motion and, below it, the spacecraft's own: shape (2, B, 2).
+        self._position = np.stack([position_m.astype(np.float64), np.zeros(position_m.shape)])
+        self._velocity = np.stack([velocity_m_s.astype(np.float64), np.zeros(position_m.shape)])
         self._sun = sun
-        self._craft_position = np.zeros_like(self.position_m)
-        self._craft_velocity = np.zeros_like(self.position_m)
         if sun is not None:
             toward_sun = np.array([np.sin(sun.direction_rad), np.cos(sun.direction_rad)])
             along_orbit = np.array([toward_sun[X], -toward_sun[Z]])
             if along_orbit[X] < 0.0:
                 along_orbit = -along_orbit
-            self._craft_position[:] = -sun.distance_m * toward_sun
-            self._craft_velocity[:] = np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m) * along_orbit
-        self._acceleration, self._craft_acceleration = self._gravity()
+            self._position[1] = -sun.distance_m * toward_sun
+            self._velocity[1] = np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m) * along_orbit
+        self._acceleration = self._gravity()
+
+    @property
+    def position_m(self) -> Floats:
+        """Relative (z, x), shape (B, 2)."""
+        return self._position[0]
+
+    @property
+    def velocity_m_s(self) -> Floats:
+        """Relative (V_z, V_x), shape (B, 2)."""
+        return self._velocity[0]
 
     def sight(self) -> Sight:
         """Geometry now."""
@@ -109,8 +118,8 @@ class KeplerMotion:
 
     def fire(self, impulse_m_s: Floats) -> None:
         """Change the spacecraft's velocity along z: V_z becomes V_z - k."""
-        self.velocity_m_s[:, Z] -= impulse_m_s
-        self._craft_velocity[:, Z] += impulse_m_s
+        self._velocity[0, :, Z] -= impulse_m_s
+        self._velocity[1, :, Z] += impulse_m_s
 
     def advance(self, step_s: float) -> Passage:
         """Move one step on."""
@@ -118,40 +127,37 @@ class KeplerMotion:
         passed = np.zeros(len(self.position_m), dtype=bool)
         least = np.full(len(self.position_m), np.inf)
         for _ in range(substeps):
-            position, velocity, acceleration = self.position_m.copy(), self.velocity_m_s.copy(), self._acceleration
+            before = self.position_m.copy(), self.velocity_m_s.copy(), self._acceleration[0]
             self._leap(step_s / substeps)
-            least = np.where(passed, least, np.minimum(least, np.sqrt(_dot(self.position_m, self.position_m))))
             new = (_dot(self.position_m, self.velocity_m_s) >= 0.0) & ~passed
             if new.any():
-                turn = closest_distance(position[new], velocity[new], acceleration[new], step_s / substeps)
-                least[new] = np.minimum(least[new], turn)
+                position, velocity, acceleration = (value[new] for value in before)
+                least[new] = closest_distance(position, velocity, acceleration, step_s / substeps)
                 passed |= new
         return Passage(passed, least)
 
     def _leap(self, duration_s: float) -> None:
         half = 0.5 * duration_s
-        self.velocity_m_s += half * self._acceleration
-        self.position_m += duration_s * self.velocity_m_s
-        if self._sun is not None:
-            self._craft_velocity += half * self._craft_acceleration
-            self._craft_position += duration_s * self._craft_velocity
-            self._acceleration, self._craft_acceleration = self._gravity()
-            self._craft_velocity += half * self._craft_acceleration
-        self.velocity_m_s += half * self._acceleration
+        self._velocity += half * self._acceleration
+        self._position += duration_s * self._velocity
+        self._acceleration = self._gravity()
+        self._velocity += half * self._acceleration
 
-    def _gravity(self) -> tuple[Floats, Floats]:
-        """Relative acceleration, and that of the spacecraft, m/s^2."""
+    def _gravity(self) -> Floats:
+        """Relative acceleration, and that of the spacecraft, m/s^2, shape (2, B, 2)."""
         if self._sun is None:
-            return np.zeros_like(self.position_m), np.zeros_like(self.position_m)
-        parameter = self._sun.gravitational_parameter_m3_s2
-        craft = attraction(self._craft_position, parameter)
-        return attraction(self._craft_position + self.position_m, parameter) - craft, craft
+            return np.zeros_like(self._position)
+        from_sun = self._position.copy()
+        from_sun[0] += from_sun[1]
+        acceleration = attraction(from_sun, self._sun.gravitational_parameter_m3_s2)
+        acceleration[0] -= acceleration[1]
+        return acceleration
 
 
 def attraction(position_m: Floats, gravitational_parameter_m3_s2: float) -> Floats:
-    """Acceleration -K r / |r|^3 at positions from the Sun, shape (B, 2), m/s^2."""
+    """Acceleration -K r / |r|^3 at positions from the Sun, shape (..., 2), m/s^2."""
     squared = _dot(position_m, position_m)
-    return (-gravitational_parameter_m3_s2 / (squared * np.sqrt(squared)))[:, None] * position_m
+    return (-gravitational_parameter_m3_s2 / (squared * np.sqrt(squared)))[..., None] * position_m
 
 
 def closest_distance(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2: Floats, duration_s: float) -> Floats:
@@ -178,4 +184,4 @@ def closest_distance(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2
 
 
 def _dot(first: Floats, second: Floats) -> Floats:
-    return first[:, Z] * second[:, Z] + first[:, X] * second[:, X]
+    return first[..., Z] * second[..., Z] + first[..., X] * second[..., X]
