@@ -9,7 +9,11 @@ from numba import njit
 
 F = TypeVar("F", bound=Callable[..., object])
 
-_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"nnan", "nsz"}}
+
+def _compile(function: F, **options: bool | str) -> F:
+    # nrt, Numba's reference counting, has no public name.
+    jit: Any = njit
+    return cast(F, jit(nogil=True, error_model="numpy", fastmath={"nnan", "nsz"}, **options)(function))
 
 
 def compiled(function: F) -> F:
@@ -20,7 +24,7 @@ def compiled(function: F) -> F:
     Numba keys its cache by the file that holds the function, not by the files of the functions that it
     calls: after editing a kernel, delete `__pycache__` (see CONTRIBUTING).
     """
-    return cast(F, njit(**_OPTIONS, cache=True)(function))
+    return _compile(function, cache=True)
 
 
 def entry(function: F) -> F:
@@ -31,19 +35,19 @@ def entry(function: F) -> F:
     Numba counts the references to arrays, atomically, wherever one is handed on: that may cost more than the work.
     Kernels that make no array can do without.
     """
-    return cast(F, njit(**_OPTIONS, cache=True, _nrt=False)(function))
+    return _compile(function, cache=True, _nrt=False)
 
 
 def allocation_free(function: F) -> F:
     """Compile a kernel that makes no array, called by other kernels and stored with them."""
-    return cast(F, njit(**_OPTIONS, _nrt=False)(function))
+    return _compile(function, _nrt=False)
 
 
 def inlined(function: F) -> F:
     """Compile a small helper that makes no array, so that it is always inlined."""
-    return cast(F, njit(**_OPTIONS, forceinline=True, _nrt=False)(function))
+    return _compile(function, forceinline=True, _nrt=False)
 
 
 def substituted(function: F) -> F:
     """Compile an expression of a line or two by writing it out where it is used: quicker to compile, and leaner."""
-    return cast(F, njit(**_OPTIONS, inline="always", _nrt=False)(function))
+    return _compile(function, inline="always", _nrt=False)

@@ -71,7 +71,7 @@ def working_room() -> Floats:
 @substituted
 def place(store: Floats, i: int) -> int:
     """Where the store has a vertex of a chain."""
-    return VERTICES + 2 * (i & (((store.shape[2] - VERTICES) >> 1) - 1))
+    return int(VERTICES + 2 * (i & (((store.shape[2] - VERTICES) >> 1) - 1)))
 
 
 @entry
@@ -272,7 +272,7 @@ def heights(store: Floats, marks: Integers, n: int, tau: float) -> tuple[float, 
 
 @inlined
 def put_on_edge(store: Floats, n: int, side: int, near: int, far: int, at: int, tau: float, level: float) -> None:
-    """Put, as vertex `at`, the point at a rise of `level` on the edge from `near` to `far`; a lone vertex goes there."""
+    """Put, as vertex `at`, the point at a rise of `level` on the edge near-far; a lone vertex goes there."""
     v = store[n, side, place(store, near)]
     if near != far:
         near_rise = rise(store, n, side, near, tau)

@@ -223,7 +223,7 @@ class InformationSetView:
                 float(self._stack.labels[engagement, s]),
                 float(ranges[s]),
                 self.model.closing_speed_m_s,
-                _as_polygon(self._stack.polygon(engagement, s, self._history.elapsed)),
+                _as_polygon(self._stack.polygon(engagement, int(s), self._history.elapsed)),
             )
             for s in np.flatnonzero(self.living[engagement])
         ]

@@ -228,12 +228,8 @@ def locate_living(
         known[1], known_died[1], known_overlap[1] = middle, middle_died, middle_overlap
         if search_living(known, known_died, known_overlap, resolution, tape, law, room) == 0:
             return nothing
-        below, lower = locate_end(
-            known[0], known_died[0], known_overlap[0], known[1], resolution, tape, law, room
-        )
-        above, upper = locate_end(
-            known[2], known_died[2], known_overlap[2], known[1], resolution, tape, law, room
-        )
+        below, lower = locate_end(known[0], known_died[0], known_overlap[0], known[1], resolution, tape, law, room)
+        above, upper = locate_end(known[2], known_died[2], known_overlap[2], known[1], resolution, tape, law, room)
         return Living(True, below, lower, upper, above)
     for i in range(size):
         if known_died[i] == ALIVE:
@@ -304,7 +300,9 @@ def refine_all(
                 label = living.upper
             labels[b, s] = label
             n = b * labels.shape[1] + s
-            died[b, s] = replay(label, kinds, values[b], applies[b], events, law, store, marks, n, room.overlaps, room.points)
+            died[b, s] = replay(
+                label, kinds, values[b], applies[b], events, law, store, marks, n, room.overlaps, room.points
+            )
             alive[b, s] = died[b, s] == ALIVE
             if alive[b, s]:
                 summarise_section(store, marks, n, label, elapsed, law, summaries, b, s)

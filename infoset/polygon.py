@@ -295,9 +295,7 @@ def add_segment(points: Points, count: int, half_x: float, half_y: float) -> int
     if count == 0 or (half_x == 0.0 and half_y == 0.0):
         return count
     bottom, top = extremes(points, count, -half_y, half_x)
-    if not (
-        is_lowest(points, count, bottom, half_x, half_y) and is_lowest(points, count, top, -half_x, -half_y)
-    ):
+    if not (is_lowest(points, count, bottom, half_x, half_y) and is_lowest(points, count, top, -half_x, -half_y)):
         return add_segment_carefully(points, count, half_x, half_y)
     if bottom < top:
         half_x, half_y = -half_x, -half_y

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import chains, polygon
-from infoset._compile import allocation_free, entry, inlined, substituted
+from infoset._compile import entry, inlined, substituted
 from infoset.chains import LEFT, REACH, RIGHT
 
 Floats = NDArray[np.float64]
@@ -180,7 +180,17 @@ def predict_section(store: Floats, marks: Integers, n: int, label: float, elapse
 
 
 @inlined
-def summarise_section(store: Floats, marks: Integers, n: int, label: float, elapsed: int, law: SectionLaw, summaries: Floats, b: int, s: int) -> None:
+def summarise_section(
+    store: Floats,
+    marks: Integers,
+    n: int,
+    label: float,
+    elapsed: int,
+    law: SectionLaw,
+    summaries: Floats,
+    b: int,
+    s: int,
+) -> None:
     """Write the extent in z and the extremes of the predicted miss (13), (14) with the points that reach them.
 
     Notes
@@ -196,7 +206,9 @@ def summarise_section(store: Floats, marks: Integers, n: int, label: float, elap
     lower_v, lower = chains.vertex(store, n, LEFT, lower_at)
     magnitude = tau * (abs(upper_v) + abs(lower_v)) + abs(upper) + abs(lower)
     tolerance = TIE_TOLERANCE * (upper - lower) + CUT_SLACK * magnitude
-    upper_v, upper_m = chains.vertex(store, n, RIGHT, chains.first_near_peak(store, marks, n, RIGHT, upper_at, tolerance))
+    upper_v, upper_m = chains.vertex(
+        store, n, RIGHT, chains.first_near_peak(store, marks, n, RIGHT, upper_at, tolerance)
+    )
     lower_v, lower_m = chains.vertex(store, n, LEFT, chains.first_near_peak(store, marks, n, LEFT, lower_at, tolerance))
     drift = 0.5 * law.disturbance * tau * tau
     summaries[b, s, UPPER_MISS] = upper + drift

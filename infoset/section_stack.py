@@ -120,14 +120,12 @@ class SectionStack:
         """A stack of its own with the same sections."""
         twin = SectionStack.__new__(SectionStack)
         twin.law = self.law
-        twin.sections = Sections(*(array.copy() for array in self.sections))
+        twin.sections = Sections(**{name: array.copy() for name, array in self.sections._asdict().items()})
         twin._stale, twin._elapsed, twin._fullest = self._stale.copy(), self._elapsed, self._fullest
         return twin
 
 
-def outline(
-    store: Floats, marks: NDArray[np.int64], row: int, label: float, elapsed: int, law: SectionLaw
-) -> Floats:
+def outline(store: Floats, marks: NDArray[np.int64], row: int, label: float, elapsed: int, law: SectionLaw) -> Floats:
     """Vertices (V, z) of a section, counter-clockwise, shape (n, 2)."""
     points = chains.working_room()
     time_to_go = (label - law.closing_speed * (law.step * elapsed)) / law.closing_speed

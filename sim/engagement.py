@@ -80,6 +80,8 @@ class Engagements:
         None is the scenario's own.
     truth : TrueMotion or None
         None is Kepler motion under the scenario's Sun.
+    noise : MeasurementNoise or None
+        None is the scenario's own.
 
     Notes
     -----
@@ -88,14 +90,19 @@ class Engagements:
     """
 
     def __init__(
-        self, scenario: Scenario, draws: Draws, strategy: Strategy | None = None, truth: TrueMotion | None = None
+        self,
+        scenario: Scenario,
+        draws: Draws,
+        strategy: Strategy | None = None,
+        truth: TrueMotion | None = None,
+        noise: MeasurementNoise | None = None,
     ) -> None:
         self.scenario = scenario
         self.step = 0
         self._draws = draws
         self._batch = batch = len(draws.position_m)
         self._truth = truth or KeplerMotion(draws.position_m, draws.velocity_m_s, scenario.sun)
-        self._noise = _make_noise(scenario, draws)
+        self._noise = noise or _make_noise(scenario, draws)
         self._strategy = strategy or make_strategy(scenario.strategy)
         self._state = self._strategy.start(batch)
         self._information = InformationSet(scenario.set_model, batch)
@@ -232,8 +239,7 @@ class Engagements:
             impulse_m_s=self.scenario.thruster.budget_m_s - self._budget,
             guaranteed_miss_m=np.ma.MaskedArray(self._guaranteed, mask=~self._finished_label),
             outcomes=tuple(
-                _outcome(*flags)
-                for flags in zip(miss > self.scenario.nominal_range_m, lost, self._spent, strict=True)
+                _outcome(*flags) for flags in zip(miss > self.scenario.nominal_range_m, lost, self._spent, strict=True)
             ),
             truth_kept=margin >= 0.0,
             truth_margin_m=margin,

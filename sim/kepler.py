@@ -99,12 +99,12 @@ class KeplerMotion:
     @property
     def position_m(self) -> Floats:
         """Relative (z, x), shape (B, 2)."""
-        return self._position[0]
+        return np.asarray(self._position[0])
 
     @property
     def velocity_m_s(self) -> Floats:
         """Relative (V_z, V_x), shape (B, 2)."""
-        return self._velocity[0]
+        return np.asarray(self._velocity[0])
 
     def sight(self) -> Sight:
         """Geometry now."""
