@@ -2,6 +2,7 @@
 
 from guidance.game_noise import GameNoise
 from guidance.noise import LineOfSight, Measurement, MeasurementNoise, NoiseKind, TieRule
+from guidance.patient import Patient
 from guidance.predicted_miss import symmetric_impulse, zero_effort_miss
 from guidance.random_noise import RandomNoise
 from guidance.registry import make_strategy, strategy_names
@@ -16,6 +17,7 @@ __all__ = [
     "Measurement",
     "MeasurementNoise",
     "NoiseKind",
+    "Patient",
     "RandomNoise",
     "Situation",
     "Strategy",

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
+from guidance.patient import Patient
 from guidance.strategy import Strategy
 from guidance.symmetric_miss import SymmetricMiss
 
-_STRATEGIES: Mapping[str, Callable[[], Strategy]] = MappingProxyType({SymmetricMiss.name: SymmetricMiss})
+_STRATEGIES: Mapping[str, Callable[[], Strategy]] = MappingProxyType(
+    {each.name: each for each in (SymmetricMiss, Patient)}
+)
 
 
 def strategy_names() -> list[str]:
