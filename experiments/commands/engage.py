@@ -85,7 +85,7 @@ def engage(
 
     whole_number("--seed", seed, 0, None, 0)
     whole_number("--run", run, 0, MOST_RUNS - 1, 0)
-    given = _with_range_meter(scenario_with(scenario, strategy=strategy, model=model, tie=tie), range_meter)
+    given = with_range_meter(scenario_with(scenario, strategy=strategy, model=model, tie=tie), range_meter)
     flown = _with_noise(given, noise)
     records_at = [] if record is None else _record_paths(record, [each.noise.value for each in flown])
     files = {"--json": json_, "--csv": csv} | {f"--record ({each.name})": each for each in records_at}
@@ -120,7 +120,23 @@ def engage(
         show_engagements(records, STDOUT in (str(json_), str(csv)))
 
 
-def _with_range_meter(scenario: Scenario, range_meter: bool | None) -> Scenario:
+def with_range_meter(scenario: Scenario, range_meter: bool | None) -> Scenario:
+    """Return a scenario with its range meter, or without; as it is where nothing is said.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    range_meter : bool or None
+
+    Returns
+    -------
+    Scenario
+
+    Raises
+    ------
+    InputError
+        If it has none.
+    """
     from dataclasses import replace
 
     from experiments.errors import InputError

@@ -1,0 +1,95 @@
+"""Strategies side by side: each under random noise, and under game noise with every tie rule."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance import NoiseKind, TieRule
+from sim import Results, Scenario, quantiles
+
+Floats = NDArray[np.float64]
+
+QUANTILES: Mapping[str, float] = {"p10": 0.1, "p50": 0.5, "p90": 0.9, "p99": 0.99, "max": 1.0}
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One strategy under one kind of noise, the same runs as every other.
+
+    Parameters
+    ----------
+    strategy : str
+    noise : NoiseKind
+    results : mapping of TieRule or None to Results
+        By tie rule of the game noise; the one key of random noise is None.
+    """
+
+    strategy: str
+    noise: NoiseKind
+    results: Mapping[TieRule | None, Results]
+
+    @property
+    def miss_m(self) -> Floats:
+        """Greatest miss of each run over the tie rules, m, shape (N,)."""
+        return np.asarray(np.max([each.miss_m for each in self.results.values()], axis=0), dtype=np.float64)
+
+    @property
+    def impulse_m_s(self) -> Floats:
+        """Greatest impulse spent of each run over the tie rules, m/s, shape (N,)."""
+        return np.asarray(np.max([each.impulse_m_s for each in self.results.values()], axis=0), dtype=np.float64)
+
+    @property
+    def truth_kept(self) -> NDArray[np.bool_]:
+        """Whether the truth stayed in its own section, in each run under every tie rule, shape (N,)."""
+        return np.asarray(np.all([each.truth_kept for each in self.results.values()], axis=0), dtype=np.bool_)
+
+    @property
+    def phi_held(self) -> NDArray[np.bool_] | None:
+        """Whether no miss was above its guaranteed one, in each run under every tie rule; None if nothing tells."""
+        held = [getattr(each, "phi_held", None) for each in self.results.values()]
+        if any(each is None for each in held):
+            return None
+        return np.asarray(np.ma.filled(np.ma.asarray(held), True).all(axis=0), dtype=np.bool_)
+
+
+def flights(scenario: Scenario, strategies: Sequence[str]) -> list[tuple[str, TieRule | None, Scenario]]:
+    """What a comparison flies: strategy, tie rule (None is random noise) and scenario."""
+    return [
+        (
+            name,
+            tie,
+            replace(scenario, strategy=name, noise=NoiseKind.RANDOM)
+            if tie is None
+            else replace(scenario, strategy=name, noise=NoiseKind.GAME, tie=tie),
+        )
+        for name in strategies
+        for tie in (None, *TieRule)
+    ]
+
+
+def gather(flown: Sequence[tuple[str, TieRule | None, Results]]) -> list[Comparison]:
+    """Results of flights by strategy and noise, in the order of the strategies, random noise first."""
+    names = list(dict.fromkeys(name for name, _, _ in flown))
+    return [
+        Comparison(
+            name,
+            noise,
+            {
+                tie: results
+                for each, tie, results in flown
+                if each == name and (tie is None) == (noise is NoiseKind.RANDOM)
+            },
+        )
+        for name in names
+        for noise in (NoiseKind.RANDOM, NoiseKind.GAME)
+    ]
+
+
+def summary(sample: Floats) -> dict[str, float]:
+    """Quantiles of a sample by name: p10, p50, p90, p99 and max."""
+    values = quantiles(sample, list(QUANTILES.values()))
+    return {name: float(value) for name, value in zip(QUANTILES, values, strict=True)}
