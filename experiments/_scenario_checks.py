@@ -90,7 +90,7 @@ def _impulses(known: Known) -> Iterator[Problem]:
 
 def _periods(known: Known) -> Iterator[Problem]:
     step = known.number("guidance", "step_s")
-    for sensor in ("angle_sensor", "range_sensor"):
+    for sensor in ("angle_sensor", "range_sensor", "rate_sensor"):
         period = known.number(sensor, "period_s")
         if step is None or period is None:
             continue

@@ -17,6 +17,7 @@ from pydantic_core import PydanticCustomError
 import guidance
 from guidance.noise import NoiseKind, TieRule
 from infoset.model import InitialSet, Model
+from sim.scenario import Manoeuvre
 
 SCHEMA = 1
 LARGEST = Decimal("1e15")
@@ -259,12 +260,34 @@ class RangeSensorTable(_Table):
     relative_error: Fraction = _key("greatest error as a part of the range", "0.05")
 
 
+class RateSensorTable(_Table):
+    """[rate_sensor]."""
+
+    period_s: Positive = _key("time between measurements, a multiple of guidance.step_s", "1.0")
+    error_rad_s: Positive = _key("greatest error of the line of sight's angular rate", "1e-6")
+
+
+class TargetTable(_Table):
+    """[target]."""
+
+    manoeuvre: Annotated[Manoeuvre, PlainValidator(_OneOf(Manoeuvre))] = _key(
+        '"none", "constant", "bang-bang", "random-telegraph" or "worst-case"', '"bang-bang"'
+    )
+    acceleration_m_s2: NotNegative = _key("its acceleration across", "0.005")
+    switching_period_s: Positive = _key(
+        "time between changes of side; its mean where they are random", "10.0", default=Decimal(10)
+    )
+
+
 class ThrusterTable(_Table):
     """[thruster]."""
 
     budget_m_s: NotNegative = _key("sum of the sizes of all impulses", "1000.0")
     least_impulse_m_s: NotNegative = _key("smaller impulses cannot be given", "0.25")
     greatest_impulse_m_s: Positive = _key("nor greater ones", "7.5")
+    execution_error_relative: Annotated[Decimal, PlainValidator(_Number(least=_ZERO, below=_ONE))] = _key(
+        "an impulse may come out greater or less by this part", "0.0", default=_ZERO
+    )
 
 
 class GuidanceTable(_Table):
@@ -278,7 +301,9 @@ class GuidanceTable(_Table):
 class InformationSetTable(_Table):
     """[information_set]."""
 
-    model: Annotated[Model, PlainValidator(_OneOf(Model))] = _key("how much uncertainty each step adds", '"paper"')
+    model: Annotated[Model, PlainValidator(_OneOf(Model))] = _key(
+        '"paper", as published, or "guaranteed", which never loses the truth', '"paper"'
+    )
     initial_set: Annotated[InitialSet | None, PlainValidator(_OneOf(InitialSet))] = _key(
         'a section at t0: "rectangle" in (omega, alpha) or "box" in (z, V)', '"rectangle"', default=None
     )
@@ -288,7 +313,7 @@ class InformationSetTable(_Table):
     fewest_sections: Annotated[int | None, PlainValidator(_Whole(MOST_SECTIONS))] = _key(
         "fewer left: the grid is made anew with 2 fewest_sections + 1", "5", default=None
     )
-    disturbance_m_s2: NotNegative = _key("bound of the unknown acceleration across", "0.005")
+    disturbance_m_s2: NotNegative = _key("bound of the unknown acceleration across, or of the target's", "0.005")
 
 
 class NoiseTable(_Table):
@@ -322,6 +347,10 @@ class ScenarioTables(_Table):
     dispersion: DispersionTable = _key("where the truth starts, unknown on board", "")
     angle_sensor: AngleSensorTable = _key("the line-of-sight sensor", "")
     range_sensor: RangeSensorTable | None = _key("the range meter; without the table: none", "", default=None)
+    rate_sensor: RateSensorTable | None = _key(
+        "the sensor of the line of sight's rate; without the table: none", "", default=None
+    )
+    target: TargetTable | None = _key("how the object accelerates; without the table: not at all", "", default=None)
     thruster: ThrusterTable = _key("the engine", "")
     guidance: GuidanceTable = _key("how impulses are chosen", "")
     information_set: InformationSetTable = _key("how hypotheses are kept", "")
@@ -335,6 +364,8 @@ TABLES: dict[str, type[BaseModel]] = {
     "dispersion": DispersionTable,
     "angle_sensor": AngleSensorTable,
     "range_sensor": RangeSensorTable,
+    "rate_sensor": RateSensorTable,
+    "target": TargetTable,
     "thruster": ThrusterTable,
     "guidance": GuidanceTable,
     "information_set": InformationSetTable,

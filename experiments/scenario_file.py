@@ -35,8 +35,8 @@ from experiments._scenario_tables import (
 from experiments.errors import InputError
 from guidance.thruster import Thruster
 from infoset.model import InitialSet, Interval, Model, SetModel, StateBox
-from infoset.sensors import AngleSensor, RangeSensor
-from sim.scenario import Scenario, Sun
+from infoset.sensors import AngleSensor, RangeSensor, RateSensor
+from sim.scenario import Scenario, Sun, Target
 
 LARGEST_FILE_BYTES = 1_000_000
 LONGEST_LINE = 1000
@@ -48,6 +48,9 @@ _KILO = 3
 _RADIANS_PER_DEGREE = _EXACT.divide(
     Decimal("3.14159265358979323846264338327950288419716939937510582097494459"), Decimal(180)
 )
+
+UNUSUAL_TABLES = ("rate_sensor", "target")
+"""Tables that the template shows but leaves out."""
 
 
 def scenario_names() -> tuple[str, ...]:
@@ -202,6 +205,12 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
             "the on-board model believes in a speed known to be wrong"
         )
     thruster = scenario.thruster
+    target, model = scenario.target, scenario.set_model
+    if target is not None and model.is_guaranteed and target.acceleration_m_s2 > model.disturbance_m_s2:
+        lines.append(
+            f"target.acceleration_m_s2, {target.acceleration_m_s2:g}, exceeds information_set.disturbance_m_s2, "
+            f"{model.disturbance_m_s2:g}: the guaranteed model does not allow for it and may lose the truth"
+        )
     if thruster.budget_m_s < thruster.least_impulse_m_s:
         lines.append(
             f"thruster.budget_m_s, {thruster.budget_m_s:g}, is less than thruster.least_impulse_m_s, "
@@ -229,9 +238,11 @@ def scenario_template() -> str:
     for table in TABLES:
         field = keys_of(None)[table]
         optional = "" if field.is_required() else " (an optional table)"
-        lines += ["", f"# {field.description}{optional}", f"[{table}]"]
-        for name, key in keys_of(table).items():
-            lines += _template_key(name, key)
+        keys = [line for name, key in keys_of(table).items() for line in _template_key(name, key)]
+        if table in UNUSUAL_TABLES:
+            keys = [f"# {line.removeprefix('# ')}" for line in keys]
+        lines += ["", f"# {field.description}{optional}", f"# [{table}]" if table in UNUSUAL_TABLES else f"[{table}]"]
+        lines += keys
     return "\n".join(lines) + "\n"
 
 
@@ -289,10 +300,22 @@ def scenario_to_toml(scenario: Scenario) -> str:
             "period_s": _number(scenario.range_sensor.period_s),
             "relative_error": _number(scenario.range_sensor.relative_error),
         }
+    if scenario.rate_sensor is not None:
+        tables["rate_sensor"] = {
+            "period_s": _number(scenario.rate_sensor.period_s),
+            "error_rad_s": _number(scenario.rate_sensor.error_rad_s),
+        }
+    if scenario.target is not None:
+        tables["target"] = {
+            "manoeuvre": _quoted(scenario.target.manoeuvre.value),
+            "acceleration_m_s2": _number(scenario.target.acceleration_m_s2),
+            "switching_period_s": _number(scenario.target.switching_period_s),
+        }
     tables["thruster"] = {
         "budget_m_s": _number(scenario.thruster.budget_m_s),
         "least_impulse_m_s": _number(scenario.thruster.least_impulse_m_s),
         "greatest_impulse_m_s": _number(scenario.thruster.greatest_impulse_m_s),
+        "execution_error_relative": _number(scenario.thruster.execution_error_relative),
     }
     tables["guidance"] = {
         "step_s": _number(model.step_s),
@@ -466,6 +489,7 @@ def _state_box(table: UncertaintyTable | DispersionTable) -> StateBox:
 def _to_scenario(tables: ScenarioTables) -> Scenario:
     """Change units and compose the dataclasses of the core."""
     information_set, sun, range_sensor = tables.information_set, tables.sun, tables.range_sensor
+    rate_sensor, target = tables.rate_sensor, tables.target
     nominal_range_m = _si(tables.nominal.range_km, _KILO)
     fewest = information_set.fewest_sections
     return Scenario(
@@ -504,10 +528,21 @@ def _to_scenario(tables: ScenarioTables) -> Scenario:
             budget_m_s=_si(tables.thruster.budget_m_s),
             least_impulse_m_s=_si(tables.thruster.least_impulse_m_s),
             greatest_impulse_m_s=_si(tables.thruster.greatest_impulse_m_s),
+            execution_error_relative=_si(tables.thruster.execution_error_relative),
         ),
         strategy=tables.guidance.strategy,
         noise=tables.noise.kind,
         tie=tables.noise.tie,
+        rate_sensor=None
+        if rate_sensor is None
+        else RateSensor(period_s=_si(rate_sensor.period_s), error_rad_s=_si(rate_sensor.error_rad_s)),
+        target=None
+        if target is None
+        else Target(
+            manoeuvre=target.manoeuvre,
+            acceleration_m_s2=_si(target.acceleration_m_s2),
+            switching_period_s=_si(target.switching_period_s),
+        ),
     )
 
 

@@ -40,9 +40,15 @@ class GameNoise:
         miss = predicted.predicted_miss()
         upper_is_worse = self._upper_is_worse(miss, sight.step)
         alpha = self._angle(sight, predicted, miss, upper_is_worse)
-        if sight.range_error is None:
-            return Measurement(alpha, None)
-        return Measurement(alpha, self._range(sight, predicted, miss, upper_is_worse, sight.range_error))
+        distance = omega = None
+        if sight.range_error is not None:
+            distance = self._range(sight, predicted, miss, upper_is_worse, sight.range_error)
+        if sight.rate_error_rad_s is not None and sight.omega_rad_s is not None:
+            worst = np.where(upper_is_worse, miss.upper_point.omega_rad_s, miss.lower_point.omega_rad_s)
+            bound = sight.rate_error_rad_s
+            nearest = np.clip(worst, sight.omega_rad_s - bound, sight.omega_rad_s + bound)
+            omega = np.where(miss.exists, nearest, sight.omega_rad_s)
+        return Measurement(alpha, distance, omega)
 
     def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
         upper, lower = np.abs(miss.upper_m), np.abs(miss.lower_m)

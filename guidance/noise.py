@@ -44,6 +44,10 @@ class LineOfSight:
         Error law of the angle.
     range_error : float or None
         Relative error bound b of the range meter; None where it does not measure in this step.
+    omega_rad_s : ndarray, shape (B,), or None
+        True rate of the line of sight.
+    rate_error_rad_s : float or None
+        Error bound of the rate sensor; None where it does not measure in this step.
     """
 
     step: int
@@ -51,6 +55,8 @@ class LineOfSight:
     range_m: Floats
     angle_sensor: AngleSensor
     range_error: float | None
+    omega_rad_s: Floats | None = None
+    rate_error_rad_s: float | None = None
 
 
 @dataclass(frozen=True)
@@ -63,10 +69,13 @@ class Measurement:
         Measured line-of-sight angle, rad.
     range_m : ndarray, shape (B,), or None
         Measured range, m; None where it was not measured.
+    omega_rad_s : ndarray, shape (B,), or None
+        Measured rate, rad/s; None where it was not measured.
     """
 
     alpha_rad: Floats
     range_m: Floats | None
+    omega_rad_s: Floats | None = None
 
 
 class MeasurementNoise(Protocol):

@@ -21,6 +21,8 @@ class RandomNoise:
     ----------
     angle_draws, range_draws : ndarray, shape (B, steps)
         Uniform in [-1, 1]; the error is the draw times the bound.
+    rate_draws : ndarray, shape (B, steps), or None
+        The same for the angular rate; None where there is no such sensor.
 
     References
     ----------
@@ -29,11 +31,15 @@ class RandomNoise:
 
     angle_draws: Floats
     range_draws: Floats
+    rate_draws: Floats | None = None
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
         """Draw the measurements of a step; the set is not looked at."""
         bound = sight.angle_sensor.error_bound(sight.range_m)
         alpha = sight.alpha_rad + bound * self.angle_draws[:, sight.step]
-        if sight.range_error is None:
-            return Measurement(alpha, None)
-        return Measurement(alpha, sight.range_m * (1.0 + sight.range_error * self.range_draws[:, sight.step]))
+        distance = omega = None
+        if sight.range_error is not None:
+            distance = sight.range_m * (1.0 + sight.range_error * self.range_draws[:, sight.step])
+        if sight.rate_error_rad_s is not None and sight.omega_rad_s is not None and self.rate_draws is not None:
+            omega = sight.omega_rad_s + sight.rate_error_rad_s * self.rate_draws[:, sight.step]
+        return Measurement(alpha, distance, omega)

@@ -37,6 +37,8 @@ class Situation:
         Last measured line-of-sight angle; None before the first.
     measured_range_m : ndarray, shape (B,), or None
         Last measured range; None before the first or without a range meter.
+    measured_rate_rad_s : ndarray, shape (B,), or None
+        Last measured line-of-sight rate; None before the first or without such a sensor.
     last_impulse_m_s : ndarray, shape (B,)
         Impulses of the step before, m/s.
     information : InformationSetView
@@ -54,6 +56,7 @@ class Situation:
     measured_range_m: Floats | None
     last_impulse_m_s: Floats
     information: InformationSetView
+    measured_rate_rad_s: Floats | None = None
 
     @property
     def possible_ranges_m(self) -> tuple[Floats, Floats]:

@@ -18,6 +18,8 @@ class Thruster:
         Sum mu of the moduli of all impulses, m/s.
     least_impulse_m_s, greatest_impulse_m_s : float
         Bounds mu1 and mu2 of the modulus of one impulse that is not zero, m/s.
+    execution_error_relative : float
+        Bound delta of |given / commanded - 1|: an impulse k comes out as k (1 + error).
 
     References
     ----------
@@ -27,6 +29,7 @@ class Thruster:
     budget_m_s: float
     least_impulse_m_s: float
     greatest_impulse_m_s: float
+    execution_error_relative: float = 0.0
 
     def give(self, wanted_m_s: NDArray[np.float64], budget_left_m_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """Impulses that the engine gives when a strategy wants these.

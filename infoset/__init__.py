@@ -8,7 +8,7 @@ from infoset.convex_polygons import ConvexPolygons
 from infoset.information_set import InformationSet, InformationSetView, Section, SetStatus, to_omega_alpha
 from infoset.model import InitialSet, Model, SetModel, StateBox
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
-from infoset.sensors import AngleSensor, RangeSensor
+from infoset.sensors import AngleSensor, RangeSensor, RateSensor
 from infoset.shapes import to_shapely
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "Model",
     "PredictedMiss",
     "RangeSensor",
+    "RateSensor",
     "Section",
     "SetModel",
     "SetStatus",

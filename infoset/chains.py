@@ -65,7 +65,7 @@ def empty_sections(number: int, room: int = CAPACITY) -> tuple[Floats, Integers]
 
 def working_room() -> Floats:
     """Room that some operations need to work in."""
-    return np.empty((CAPACITY, 2))
+    return np.empty((CAPACITY + 2, 2))
 
 
 @substituted
@@ -468,3 +468,38 @@ def meets(points: Floats, i: int, v: float, z: float, reach: float, tau: float) 
     """Whether a vertex is (V, z) up to the rounding of a change of chains."""
     close_v = abs(points[i, 0] - v) <= 4.0 * EPSILON * reach
     return bool(close_v and abs(points[i, 1] - z) <= 4.0 * EPSILON * (abs(z) + 2.0 * tau * reach))
+
+
+@entry
+def cut_misses(
+    store: Floats, marks: Integers, n: int, tau: float, lower: float, upper: float, points: Floats
+) -> tuple[bool, float]:
+    """Keep the band lower <= m <= upper of predicted miss; the rest is as in `cut`.
+
+    Notes
+    -----
+    This band is not along the line of sight, so it may cut anywhere: the chains are taken apart and made anew.
+    O(vertices). `points` has room for CAPACITY + 2.
+    """
+    count = 0
+    for side in (RIGHT, LEFT):
+        for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
+            v, m = vertex(store, n, side, i)
+            count = polygon.append(points, count, v, m)
+    count, overlap = polygon.clip_to_band(points, count, 0.0, 1.0, lower, upper)
+    if count == 0:
+        return False, overlap
+    for side in (RIGHT, LEFT):
+        for part in range(REACH):
+            store[n, side, part] = 0.0
+    bottom, top = polygon.extremes(points, count, -tau, 1.0)
+    for side in (RIGHT, LEFT):
+        first, last = (bottom, top) if side == RIGHT else (top, bottom)
+        length = (last - first) % count + 1
+        for i in range(length):
+            at = (first + i) % count
+            put(store, n, side, i, points[at, 0], points[at, 1])
+        marks[n, side, BEGIN] = 0
+        marks[n, side, END] = length
+        marks[n, side, PEAK] = 0
+    return True, overlap

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset.section_kernels import PREDICTION
+from infoset.section_kernels import IMPULSE, PREDICTION
 
 ROOM_AT_START = 64
 
@@ -21,9 +21,11 @@ class History:
     Attributes
     ----------
     kinds : ndarray of int, shape (>= events,)
-        Kind of each event: an angle, an impulse or a prediction.
+        Kind of each event: an angle, an impulse, a prediction or a rate.
+    errors : ndarray, shape (>= events,)
+        Error bound of each measured rate, rad/s; zero for the other kinds.
     values : ndarray, shape (B, >= events)
-        Measured angle (rad) or impulse (m/s).
+        Measured angle (rad), impulse (m/s) or measured rate (rad/s).
     applies : ndarray of bool, shape (B, >= events)
         Whether the event concerned the engagement.
     events : int
@@ -34,28 +36,37 @@ class History:
 
     def __init__(self, batch: int) -> None:
         self.kinds = np.zeros(ROOM_AT_START, dtype=np.int64)
+        self.errors = np.zeros(ROOM_AT_START)
         self.values = np.zeros((batch, ROOM_AT_START))
         self.applies = np.zeros((batch, ROOM_AT_START), dtype=bool)
         self.events = 0
         self.elapsed = 0
 
-    def record(self, kind: int, values: NDArray[np.float64], applies: NDArray[np.bool_]) -> int:
+    def record(self, kind: int, values: NDArray[np.float64], applies: NDArray[np.bool_], error: float = 0.0) -> int:
         """Add an event; return its number."""
         event = self.events
         if event == self.kinds.size:
             self.kinds = np.concatenate((self.kinds, np.zeros_like(self.kinds)))
+            self.errors = np.concatenate((self.errors, np.zeros_like(self.errors)))
             self.values = np.concatenate((self.values, np.zeros_like(self.values)), axis=1)
             self.applies = np.concatenate((self.applies, np.zeros_like(self.applies)), axis=1)
         self.kinds[event] = kind
+        self.errors[event] = error
         self.values[:, event] = values
         self.applies[:, event] = applies
         self.events += 1
         self.elapsed += kind == PREDICTION
         return event
 
+    def total_impulse(self) -> NDArray[np.float64]:
+        """Sum of the moduli of all impulses of each engagement, m/s, shape (B,)."""
+        fired = self.applies[:, : self.events] & (self.kinds[: self.events] == IMPULSE)
+        return np.asarray(np.where(fired, np.abs(self.values[:, : self.events]), 0.0).sum(axis=1))
+
     def copy(self) -> History:
         """A history of its own that starts from this one."""
         twin = History.__new__(History)
-        twin.kinds, twin.values, twin.applies = self.kinds.copy(), self.values.copy(), self.applies.copy()
+        twin.kinds, twin.errors = self.kinds.copy(), self.errors.copy()
+        twin.values, twin.applies = self.values.copy(), self.applies.copy()
         twin.events, twin.elapsed = self.events, self.elapsed
         return twin

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING
@@ -14,7 +15,7 @@ from infoset.chains import CAPACITY, empty_sections, working_room
 from infoset.convex_polygons import ConvexPolygons
 from infoset.history import History
 from infoset.location import refine_all, workspace
-from infoset.model import InitialSet, SetModel
+from infoset.model import InitialSet, Interval, SetModel
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.section_stack import SectionStack, outline
 
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+
+BOUND_SLACK = 1e-9
+"""Relative, of bounds that the guaranteed model computes: what rounding may take from them is far less."""
 
 
 class SetStatus(Enum):
@@ -252,6 +256,7 @@ class InformationSetView:
         died = kernels.replay(
             label,
             tape.kinds,
+            tape.errors,
             tape.values[engagement],
             tape.applies[engagement],
             tape.events,
@@ -374,7 +379,7 @@ class InformationSet(InformationSetView):
     """
 
     def __init__(self, model: SetModel, batch: int = 1) -> None:
-        least, greatest = model.bounds.x_m
+        least, greatest = model.label_limits_m
         slots = max(model.sections, 2 * model.fewest_sections + 1)
         labels = np.full((batch, slots), greatest)
         labels[:, : model.sections] = (
@@ -393,7 +398,14 @@ class InformationSet(InformationSetView):
         limits = self._lower_label, self._upper_label
         return InformationSetView(self.model, self._stack, self._history, limits, self._status)
 
-    def measure_range(self, range_m: ArrayLike, relative_error: float, where: ArrayLike = True) -> None:
+    def measure_range(
+        self,
+        range_m: ArrayLike,
+        relative_error: float,
+        where: ArrayLike = True,
+        *,
+        alpha_rad: ArrayLike | None = None,
+    ) -> None:
         """Keep the ranges that a range measurement allows: x_m/(1 + b) <= x <= x_m/(1 - b).
 
         Parameters
@@ -404,6 +416,9 @@ class InformationSet(InformationSetView):
             Bound b.
         where : array_like of bool, shape () or (B,)
             Which engagements have measured.
+        alpha_rad : array_like, shape () or (B,), or None
+            Angle measured at the same moment: in the guaranteed model the distance measured is x / cos(alpha). Without
+            it alpha is bounded by how far the object can have gone.
 
         Notes
         -----
@@ -413,12 +428,28 @@ class InformationSet(InformationSetView):
         active = self._active(where)
         travelled = self.model.closing_speed_m_s * self.time_s
         slack = kernels.CUT_SLACK * (measured + travelled)
-        lower = measured / (1.0 + relative_error) + travelled - slack
-        upper = measured / (1.0 - relative_error) + travelled + slack
+        eta = self.model.speed_error
+        nearer = np.cos(self._greatest_alpha(alpha_rad)) if self.model.is_guaranteed else 1.0
+        lower = measured * nearer / ((1.0 + relative_error) * (1.0 + eta)) + travelled - slack
+        upper = measured / ((1.0 - relative_error) * (1.0 - eta)) + travelled + slack
         self._lower_label[active] = np.maximum(self._lower_label, lower)[active]
         self._upper_label[active] = np.minimum(self._upper_label, upper)[active]
         self._stack.keep_labels(self._lower_label, self._upper_label, active)
         self._keep_enough(active, emptied=SetStatus.EMPTY)
+
+    def _greatest_alpha(self, measured_rad: ArrayLike | None) -> Floats:
+        """Bound of |alpha| now, rad, shape (B,): from a measured one, or from the fastest the object can go."""
+        travelled = self.model.closing_speed_m_s * self.time_s
+        if measured_rad is not None:
+            sensor, farthest = self.model.angle_sensor, self.model.bounds.x_m[1]
+            bound = max(sensor.error_bound(0.0), sensor.error_bound(farthest)) * (1.0 + BOUND_SLACK)
+            return np.minimum(np.abs(self._spread(measured_rad, "alpha_rad")) + bound, 0.5 * np.pi)
+        box, law = self.model.bounds, self._stack.law
+        impulses = self._history.total_impulse() * (1.0 + self.model.execution_error_relative)
+        fastest = impulses + max(abs(v) for v in box.vz_m_s) + law.disturbance * self.time_s
+        offset = max(abs(z) for z in box.z_m) + fastest * self.time_s
+        nearest = np.maximum((self._lower_label - travelled) * (1.0 - self.model.speed_error), 0.0)
+        return np.asarray(np.arctan2(offset, nearest))
 
     def measure_angle(self, alpha_rad: ArrayLike, where: ArrayLike = True) -> None:
         """Cut every section by a line-of-sight angle measurement: |alpha - alpha_m| <= a + h(x).
@@ -434,6 +465,29 @@ class InformationSet(InformationSetView):
         active = self._active(where)
         event = self._history.record(kernels.ANGLE, measured, active)
         self._stack.measure_angle(active, measured, self._history.elapsed, event)
+        self._keep_enough(active, emptied=SetStatus.EMPTY)
+
+    def measure_rate(self, omega_rad_s: ArrayLike, error_rad_s: float, where: ArrayLike = True) -> None:
+        """Cut every section by a measurement of the line of sight's rate: |omega - omega_m| <= error.
+
+        Parameters
+        ----------
+        omega_rad_s : array_like, shape () or (B,)
+            Measured rate, rad/s.
+        error_rad_s : float
+            Its error bound, rad/s.
+        where : array_like of bool, shape () or (B,)
+            Which engagements have measured.
+
+        References
+        ----------
+        Kumkov and Patsko (2001).
+        """
+        measured = self._spread(omega_rad_s, "omega_rad_s")
+        active = self._active(where)
+        error = error_rad_s * (1.0 + BOUND_SLACK)
+        event = self._history.record(kernels.RATE, measured, active, error)
+        self._stack.measure_rate(active, measured, error, self._history.elapsed, event)
         self._keep_enough(active, emptied=SetStatus.EMPTY)
 
     def shift(self, impulse_m_s: ArrayLike, where: ArrayLike = True) -> None:
@@ -514,6 +568,7 @@ class InformationSet(InformationSetView):
             self._lower_label,
             self._upper_label,
             tape.kinds,
+            tape.errors,
             tape.values,
             tape.applies,
             tape.events,
@@ -528,21 +583,54 @@ def _as_polygon(vertices: Floats) -> ConvexPolygons:
 
 
 def section_law(model: SetModel) -> kernels.SectionLaw:
-    """The numbers of a model as the kernels take them."""
-    box, sensor = model.bounds, model.angle_sensor
+    """The numbers of a model as the kernels take them.
+
+    Notes
+    -----
+    Angles do not tell scale: a truth with closing speed e (1 + eta) looks like a motion of the model whose lengths,
+    velocities and impulses are those of the truth divided by 1 + eta. So in the guaranteed model bounds of lengths and
+    velocities grow outward by eta, an angle bound is the greatest over the ranges that a label can mean, and an
+    impulse is known to within eta and the engine's error. See docs/guarantee.md.
+    """
+    box, sensor, eta = model.bounds, model.angle_sensor, model.speed_error
+    slope, error = sensor.error_slope_rad_per_m, sensor.error_at_zero_range_rad
+    half_v = model.acceleration_m_s2 * model.step_s
+    guaranteed = model.is_guaranteed
+    if guaranteed:
+        slope *= (1.0 + math.copysign(eta, slope)) * (1.0 + BOUND_SLACK)
+        error *= 1.0 + BOUND_SLACK
+    z_least, z_greatest = _scaled_outward(box.z_m, eta)
+    vz_least, vz_greatest = _scaled_outward(box.vz_m_s, eta)
     return kernels.SectionLaw(
         closing_speed=float(model.closing_speed_m_s),
         step=float(model.step_s),
-        disturbance=float(model.disturbance_m_s2),
-        half_v=float(model.disturbance_m_s2 * model.step_s),
-        disturbance_lead=0.5 * float(model.step_s),
-        error_at_zero_range=float(sensor.error_at_zero_range_rad),
-        error_slope=float(sensor.error_slope_rad_per_m),
-        z_least=float(box.z_m[0]),
-        z_greatest=float(box.z_m[1]),
-        vz_least=float(box.vz_m_s[0]),
-        vz_greatest=float(box.vz_m_s[1]),
+        disturbance=float(model.acceleration_m_s2),
+        half_v=float(half_v),
+        # The exact disturbance is a thin lens. The paper takes the segment between its ends; a sound set takes half of
+        # the change of V at the start of the step and half at its end, which together contain the lens.
+        half_v_at_start=0.5 * float(half_v) if guaranteed else 0.0,
+        disturbance_lead=0.0 if guaranteed else 0.5 * float(model.step_s),
+        impulse_error=(1.0 + model.execution_error_relative) / (1.0 - eta) - 1.0 if guaranteed else 0.0,
+        error_at_zero_range=float(error),
+        error_slope=float(slope),
+        exact_angles=guaranteed,
+        z_least=z_least,
+        z_greatest=z_greatest,
+        vz_least=vz_least,
+        vz_greatest=vz_greatest,
         vx_least=float(box.vx_m_s[0]),
         vx_greatest=float(box.vx_m_s[1]),
         rectangle=model.initial_set is InitialSet.RECTANGLE,
+    )
+
+
+def _scaled_outward(interval: Interval, eta: float) -> Interval:
+    """Interval of all a / (1 + h) with a of the interval and |h| <= eta, an ulp or two wider if eta is not zero."""
+    least, greatest = interval
+    if eta == 0.0:
+        return float(least), float(greatest)
+    slack = 1.0 + BOUND_SLACK
+    return (
+        slack * least / (1.0 - eta) if least < 0.0 else least / (1.0 + eta) / slack,
+        slack * greatest / (1.0 - eta) if greatest > 0.0 else greatest / (1.0 + eta) / slack,
     )

@@ -27,6 +27,7 @@ class Tape(NamedTuple):
     """The history of one engagement, as `section_kernels.replay` takes it."""
 
     kinds: Integers
+    errors: Floats
     values: Floats
     applies: Flags
     events: int
@@ -78,6 +79,7 @@ def run(label: float, tape: Tape, law: SectionLaw, room: Workspace) -> tuple[int
     died = replay(
         label,
         tape.kinds,
+        tape.errors,
         tape.values,
         tape.applies,
         tape.events,
@@ -256,6 +258,7 @@ def refine_all(
     limit_below: Floats,
     limit_above: Floats,
     kinds: Integers,
+    errors: Floats,
     values: Floats,
     applies: Flags,
     events: int,
@@ -274,7 +277,7 @@ def refine_all(
     for b in range(labels.shape[0]):
         if not wanted[b]:
             continue
-        tape = Tape(kinds, values[b], applies[b], events)
+        tape = Tape(kinds, errors, values[b], applies[b], events)
         stored = used[b]
         living = locate_living(
             limit_below[b],
@@ -301,7 +304,7 @@ def refine_all(
             labels[b, s] = label
             n = b * labels.shape[1] + s
             died[b, s] = replay(
-                label, kinds, values[b], applies[b], events, law, store, marks, n, room.overlaps, room.points
+                label, kinds, errors, values[b], applies[b], events, law, store, marks, n, room.overlaps, room.points
             )
             alive[b, s] = died[b, s] == ALIVE
             if alive[b, s]:

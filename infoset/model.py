@@ -11,9 +11,14 @@ Interval = tuple[float, float]
 
 
 class Model(Enum):
-    """How much uncertainty each step adds."""
+    """What the set allows for.
+
+    PAPER is the published procedure: it may lose the truth. GUARANTEED allows for everything the truth can do - its
+    closing speed, gravity, manoeuvres, the engine's errors, rounding - and does not.
+    """
 
     PAPER = "paper"
+    GUARANTEED = "guaranteed"
 
 
 class InitialSet(Enum):
@@ -59,7 +64,8 @@ class SetModel:
     angle_sensor : AngleSensor
         Error law of the line-of-sight angle.
     disturbance_m_s2 : float
-        Bound nu of the fictitious acceleration along z, m/s^2.
+        In the paper's model, bound nu of the fictitious acceleration along z; in the guaranteed one, of the target's
+        own manoeuvres along z, m/s^2.
     range_threshold_m : float
         Hypotheses about to fall below this range eps leave the set, m.
     sections : int
@@ -69,7 +75,13 @@ class SetModel:
     initial_set : InitialSet
         Shape of a section at the start.
     kind : Model
-        How much uncertainty each step adds.
+        What the set allows for.
+    gravity_m_s2 : float
+        Bound of the difference of gravity along z; only the guaranteed model counts it.
+    gravity_speed_change : float
+        Bound of the relative change of the closing speed by gravity; only the guaranteed model counts it.
+    execution_error_relative : float
+        Bound of |given / commanded - 1| of an impulse; only the guaranteed model counts it.
 
     References
     ----------
@@ -86,3 +98,31 @@ class SetModel:
     fewest_sections: int = 5
     initial_set: InitialSet = InitialSet.RECTANGLE
     kind: Model = Model.PAPER
+    gravity_m_s2: float = 0.0
+    gravity_speed_change: float = 0.0
+    execution_error_relative: float = 0.0
+
+    @property
+    def is_guaranteed(self) -> bool:
+        """Whether the set is meant to keep the truth, whatever it does within its bounds."""
+        return self.kind is Model.GUARANTEED
+
+    @property
+    def speed_error(self) -> float:
+        """Greatest |eta|, with e (1 + eta) the closing speed of a truth; zero in the paper's model."""
+        if not self.is_guaranteed:
+            return 0.0
+        e = self.closing_speed_m_s
+        return max(abs(speed + e) for speed in self.bounds.vx_m_s) / e + self.gravity_speed_change
+
+    @property
+    def acceleration_m_s2(self) -> float:
+        """Bound nu of the acceleration along z that the set allows for, m/s^2."""
+        return self.disturbance_m_s2 + (self.gravity_m_s2 if self.is_guaranteed else 0.0)
+
+    @property
+    def label_limits_m(self) -> Interval:
+        """Least and greatest label of a truth, m: its range at t = 0 divided by 1 + eta."""
+        least, greatest = self.bounds.x_m
+        eta = self.speed_error
+        return least / (1.0 + eta), greatest / (1.0 - eta)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import chains, polygon
-from infoset._compile import entry, inlined, substituted
+from infoset._compile import allocation_free, entry, inlined, substituted
 from infoset.chains import LEFT, REACH, RIGHT
 
 Floats = NDArray[np.float64]
@@ -26,8 +26,9 @@ Flags = NDArray[np.bool_]
 CUT_SLACK = 16.0 * chains.EPSILON
 SUM_SLACK = 8.0 * chains.EPSILON
 TIE_TOLERANCE = 1e-9
+RIGHT_ANGLE = 0.5 * math.pi
 
-ANGLE, IMPULSE, PREDICTION = 0, 1, 2
+ANGLE, IMPULSE, PREDICTION, RATE = range(4)
 ALIVE = np.iinfo(np.int64).max
 
 # Columns of a section's summary.
@@ -42,9 +43,12 @@ class SectionLaw(NamedTuple):
     step: float
     disturbance: float
     half_v: float
+    half_v_at_start: float
     disturbance_lead: float
+    impulse_error: float
     error_at_zero_range: float
     error_slope: float
+    exact_angles: bool
     z_least: float
     z_greatest: float
     vz_least: float
@@ -139,6 +143,8 @@ def start_section(store: Floats, marks: Integers, n: int, label: float, law: Sec
         (lowest + shift_at_least, highest + shift_at_least, z_least),
         (lowest + shift_at_greatest, highest + shift_at_greatest, z_greatest),
     )
+    if law.half_v_at_start > 0.0:
+        chains.spread(store, n, tau, law.half_v_at_start)
 
 
 @inlined
@@ -160,14 +166,53 @@ def measure_section(
     """
     x = range_of(label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x
+    lower, upper = alpha - bound, alpha + bound
+    if law.exact_angles:
+        lower = math.tan(lower) if lower > -RIGHT_ANGLE else -np.inf
+        upper = math.tan(upper) if upper < RIGHT_ANGLE else np.inf
     slack = CUT_SLACK * (label * (abs(alpha) + bound) + store[n, RIGHT, REACH] * (label / law.closing_speed))
-    return chains.cut(store, marks, n, x / law.closing_speed, x * (alpha - bound) - slack, x * (alpha + bound) + slack)
+    return chains.cut(store, marks, n, x / law.closing_speed, x * lower - slack, x * upper + slack)
+
+
+@allocation_free
+def measure_rate_section(
+    store: Floats,
+    marks: Integers,
+    n: int,
+    label: float,
+    elapsed: int,
+    omega: float,
+    error: float,
+    law: SectionLaw,
+    points: Floats,
+) -> tuple[bool, float]:
+    """Cut a section by a measurement of the line of sight's rate: a band of the predicted miss, omega x^2 / e.
+
+    Notes
+    -----
+    What is measured is (V_z x - V_x z)/(x^2 + z^2), less than the model's V/x + e z/x^2 by the square of cos(alpha).
+    """
+    if chains.is_crowded(marks, n):
+        chains.reduce_outward(store, marks, n, time_to_go(label, elapsed, law), points)
+    x = range_of(label, elapsed, law)
+    tau = x / law.closing_speed
+    lower, upper = omega - error, omega + error
+    if law.exact_angles:
+        least, greatest = chains.heights(store, marks, n, tau)
+        widest = 1.0 + (max(abs(least), abs(greatest)) / x) ** 2
+        lower *= widest if lower < 0.0 else 1.0
+        upper *= widest if upper > 0.0 else 1.0
+    slack = CUT_SLACK * (label * (abs(omega) + error) + store[n, RIGHT, REACH]) * (label / law.closing_speed)
+    return chains.cut_misses(store, marks, n, tau, tau * x * lower - slack, tau * x * upper + slack, points)
 
 
 @substituted
 def shift_section(store: Floats, n: int, label: float, elapsed: int, impulse: float, law: SectionLaw) -> None:
-    """Shift a section by an impulse: V becomes V - k."""
-    chains.shift(store, n, time_to_go(label, elapsed, law), -impulse)
+    """Shift a section by an impulse: V becomes V - k, for every k that the commanded one may have been."""
+    tau = time_to_go(label, elapsed, law)
+    chains.shift(store, n, tau, -impulse)
+    if law.impulse_error > 0.0:
+        chains.spread(store, n, tau, abs(impulse) * law.impulse_error)
 
 
 @inlined
@@ -250,6 +295,36 @@ def measure_all(active: Flags, alpha: Floats, elapsed: int, event: int, sections
 
 
 @entry
+def measure_rate_all(
+    active: Flags,
+    omega: Floats,
+    error: float,
+    elapsed: int,
+    event: int,
+    sections: Sections,
+    law: SectionLaw,
+    points: Floats,
+) -> None:
+    """Cut every living section of the active engagements by measured rates, and summarise it."""
+    labels, used, living, died, overlaps, store, marks, summaries = sections
+    for b in range(labels.shape[0]):
+        if not active[b]:
+            continue
+        for s in range(used[b]):
+            if not living[b, s]:
+                continue
+            n = b * labels.shape[1] + s
+            living[b, s], overlap = measure_rate_section(
+                store, marks, n, labels[b, s], elapsed, omega[b], error, law, points
+            )
+            if living[b, s]:
+                summarise_section(store, marks, n, labels[b, s], elapsed, law, summaries, b, s)
+            else:
+                died[b, s] = event
+                overlaps[b, s] = overlap
+
+
+@entry
 def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, law: SectionLaw) -> None:
     """Shift every living section, and its summary, by its engagement's impulse."""
     labels, used, living, _, _, store, _, summaries = sections
@@ -260,11 +335,11 @@ def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, 
             if not living[b, s]:
                 continue
             shift_section(store, b * labels.shape[1] + s, labels[b, s], elapsed, impulse[b], law)
-            summaries[b, s, UPPER_V] -= impulse[b]
-            summaries[b, s, LOWER_V] -= impulse[b]
-            miss = impulse[b] * time_to_go(labels[b, s], elapsed, law)
-            summaries[b, s, UPPER_MISS] -= miss
-            summaries[b, s, LOWER_MISS] -= miss
+            tau, error = time_to_go(labels[b, s], elapsed, law), abs(impulse[b]) * law.impulse_error
+            summaries[b, s, UPPER_V] += error - impulse[b]
+            summaries[b, s, LOWER_V] -= error + impulse[b]
+            summaries[b, s, UPPER_MISS] += (error - impulse[b]) * tau
+            summaries[b, s, LOWER_MISS] -= (error + impulse[b]) * tau
 
 
 @entry
@@ -360,6 +435,7 @@ def margin_in(store: Floats, marks: Integers, n: int, tau: float, v: float, z: f
 def replay(
     label: float,
     kinds: Integers,
+    errors: Floats,
     values: Floats,
     applies: Flags,
     events: int,
@@ -376,8 +452,9 @@ def replay(
     ----------
     label : float
         Range at t = 0 of the hypothesis, m.
-    kinds, values, applies : ndarray, shape (>= events,)
-        The history of one engagement: what happened, its value, and whether it concerned this engagement.
+    kinds, errors, values, applies : ndarray, shape (>= events,)
+        The history of one engagement: what happened, the error bound of a rate, the value, and whether it concerned
+        this engagement.
     events : int
         Number of events.
     law : SectionLaw
@@ -410,6 +487,12 @@ def replay(
             continue
         elif kinds[event] == ANGLE:
             living, overlaps[event] = measure_section(store, marks, n, label, elapsed, values[event], law)
+            if not living:
+                return event
+        elif kinds[event] == RATE:
+            living, overlaps[event] = measure_rate_section(
+                store, marks, n, label, elapsed, values[event], errors[event], law, points
+            )
             if not living:
                 return event
         else:

@@ -79,6 +79,13 @@ class SectionStack:
         kernels.measure_all(active, alpha, elapsed, event, self.sections, self.law)
         self._stale &= ~active
 
+    def measure_rate(self, active: Flags, omega: Floats, error: float, elapsed: int, event: int) -> None:
+        """Cut the living sections by measured rates of the line of sight (rad/s)."""
+        self.make_room(self._fullest + 2 * chains.MOST_ADDED)
+        kernels.measure_rate_all(active, omega, error, elapsed, event, self.sections, self.law, chains.working_room())
+        self._stale &= ~active
+        self._fullest += chains.MOST_ADDED
+
     def shift(self, active: Flags, impulse: Floats, elapsed: int) -> None:
         """Shift the living sections, and their summaries, by impulses (m/s)."""
         kernels.shift_all(active, impulse, elapsed, self.sections, self.law)

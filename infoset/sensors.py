@@ -62,3 +62,23 @@ class RangeSensor:
 
     period_s: float
     relative_error: float
+
+
+@dataclass(frozen=True)
+class RateSensor:
+    """A sensor of the line of sight's angular rate with a bounded error.
+
+    Parameters
+    ----------
+    period_s : float
+        Time between measurements, s; the first is at t = 0.
+    error_rad_s : float
+        Greatest |omega_m - omega|, rad/s.
+
+    References
+    ----------
+    Kumkov and Patsko (2001).
+    """
+
+    period_s: float
+    error_rad_s: float

@@ -14,7 +14,7 @@ from sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-START, ANGLE, RANGE, TIE = range(4)
+START, ANGLE, RANGE, TIE, RATE, EXECUTION, TARGET = range(7)
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,8 @@ class Draws:
         Relative (z, x) and (V_z, V_x) of the truth at t = 0.
     angle, range, tie : ndarray, shape (B, steps)
         Uniform in [-1, 1]: errors of the angle and of the range in units of their bounds, and choices between ties.
+    rate, execution, target : ndarray, shape (B, steps), or None
+        The same for the angular rate, the size of impulses, and the target's changes of side; None is zero.
     """
 
     position_m: Floats
@@ -34,6 +36,9 @@ class Draws:
     angle: Floats
     range: Floats
     tie: Floats
+    rate: Floats | None = None
+    execution: Floats | None = None
+    target: Floats | None = None
 
 
 def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
@@ -54,13 +59,22 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
     steps = greatest_number_of_steps(scenario)
     box = scenario.dispersion
     starts = np.stack([generator(seed, run, START).uniform(size=4) for run in runs])
-    noise = [
-        np.stack([generator(seed, run, stream).uniform(-1.0, 1.0, size=steps) for run in runs])
-        for stream in (ANGLE, RANGE, TIE)
-    ]
+
+    def uniform(stream: int) -> Floats:
+        return np.stack([generator(seed, run, stream).uniform(-1.0, 1.0, size=steps) for run in runs])
+
     lower, upper = corners(box)
     states = lower + (upper - lower) * starts
-    return Draws(states[:, :2], states[:, 2:], *noise)
+    return Draws(
+        states[:, :2],
+        states[:, 2:],
+        angle=uniform(ANGLE),
+        range=uniform(RANGE),
+        tie=uniform(TIE),
+        rate=uniform(RATE) if scenario.rate_sensor is not None else None,
+        execution=uniform(EXECUTION) if scenario.thruster.execution_error_relative > 0.0 else None,
+        target=uniform(TARGET) if scenario.target is not None else None,
+    )
 
 
 def corners(box: StateBox) -> tuple[Floats, Floats]:

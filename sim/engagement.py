@@ -20,9 +20,11 @@ from guidance import (
 )
 from infoset import InformationSet, InformationSetView, PredictedMiss, SetStatus
 from sim.draws import Draws
+from sim.gravity import on_board_model
 from sim.kepler import KeplerMotion, Sight, TrueMotion
 from sim.results import Outcome, Results
 from sim.scenario import Scenario
+from sim.target import acceleration_m_s2
 from sim.truth_section import TruthSection
 
 Floats = NDArray[np.float64]
@@ -105,10 +107,14 @@ class Engagements:
         self._noise = noise or _make_noise(scenario, draws)
         self._strategy = strategy or make_strategy(scenario.strategy)
         self._state = self._strategy.start(batch)
-        self._information = InformationSet(scenario.set_model, batch)
-        self._truth_section = TruthSection(scenario.set_model, draws.position_m, draws.velocity_m_s)
+        model = on_board_model(scenario)
+        arrival_s = self._truth.arrival_s()
+        self._information = InformationSet(model, batch)
+        self._truth_section = TruthSection(model, arrival_s)
+        self._arrival_s = arrival_s
         self._angle_every = _steps_in(scenario.set_model.angle_sensor.period_s, scenario)
         self._range_every = _steps_in(scenario.range_sensor.period_s, scenario) if scenario.range_sensor else 0
+        self._rate_every = _steps_in(scenario.rate_sensor.period_s, scenario) if scenario.rate_sensor else 0
         self._flying = np.ones(batch, dtype=bool)
         self._tracking = np.ones(batch, dtype=bool)
         self._miss = np.full(batch, np.inf)
@@ -119,6 +125,7 @@ class Engagements:
         self._finished_label = np.zeros(batch, dtype=bool)
         self._measured_angle: Floats | None = None
         self._measured_range: Floats | None = None
+        self._measured_rate: Floats | None = None
 
     @property
     def flying(self) -> bool:
@@ -159,23 +166,27 @@ class Engagements:
                 )
             )
         self._budget = np.maximum(self._budget - np.abs(self._impulse), 0.0)
-        self._truth.fire(self._impulse)
+        self._truth.fire(self._executed(self._impulse))
         self._information.shift(self._impulse, tracking)
         self._truth_section.shift(self._impulse)
         self._finish_labels()
         self._information.predict()
         self._truth_section.predict()
-        passage = self._truth.advance(model.step_s)
+        passage = self._truth.advance(model.step_s, self._manoeuvre(sight))
         np.minimum(self._miss, passage.least_distance_m, out=self._miss, where=self._flying)
         self._flying &= ~passage.passed
         self._information.stop(passage.passed)
         self.step += 1
 
     def _measure(self, sight: Sight) -> tuple[Floats | None, Floats | None]:
-        if self.step % self._angle_every != 0 or not self._tracking.any():
+        if not self._tracking.any():
             return None, None
-        sensor = self.scenario.range_sensor
+        sensor, rate_sensor = self.scenario.range_sensor, self.scenario.rate_sensor
+        looking = self.step % self._angle_every == 0
         ranging = sensor is not None and self.step % self._range_every == 0
+        rating = rate_sensor is not None and self.step % self._rate_every == 0
+        if not (looking or ranging or rating):
+            return None, None
         measurement = self._noise.measure(
             LineOfSight(
                 self.step,
@@ -183,16 +194,48 @@ class Engagements:
                 sight.range_m,
                 self.scenario.set_model.angle_sensor,
                 sensor.relative_error if sensor is not None and ranging else None,
+                sight.omega_rad_s,
+                rate_sensor.error_rad_s if rate_sensor is not None and rating else None,
             ),
             self._information.view(),
         )
         if measurement.range_m is not None and sensor is not None:
-            self._information.measure_range(measurement.range_m, sensor.relative_error, self._tracking)
+            self._information.measure_range(
+                measurement.range_m,
+                sensor.relative_error,
+                self._tracking,
+                alpha_rad=measurement.alpha_rad if looking else None,
+            )
             self._measured_range = measurement.range_m
-        self._information.measure_angle(measurement.alpha_rad, self._tracking)
-        self._truth_section.measure(measurement.alpha_rad, self._tracking, sight)
-        self._measured_angle = measurement.alpha_rad
-        return measurement.alpha_rad, measurement.range_m
+        if looking:
+            self._information.measure_angle(measurement.alpha_rad, self._tracking)
+            self._measured_angle = measurement.alpha_rad
+        if measurement.omega_rad_s is not None and rate_sensor is not None:
+            self._information.measure_rate(measurement.omega_rad_s, rate_sensor.error_rad_s, self._tracking)
+            self._measured_rate = measurement.omega_rad_s
+        self._truth_section.measure(
+            measurement.alpha_rad if looking else None,
+            measurement.omega_rad_s,
+            rate_sensor.error_rad_s if rate_sensor is not None else 0.0,
+            self._tracking,
+            sight,
+        )
+        return measurement.alpha_rad if looking else None, measurement.range_m
+
+    def _executed(self, impulse: Floats) -> Floats:
+        """What becomes of commanded impulses."""
+        errors, bound = self._draws.execution, self.scenario.thruster.execution_error_relative
+        return impulse if errors is None else impulse * (1.0 + bound * errors[:, self.step])
+
+    def _manoeuvre(self, sight: Sight) -> Floats | None:
+        """Acceleration of the targets over this step; None where none manoeuvres."""
+        target = self.scenario.target
+        if target is None or self._draws.target is None:
+            return None
+        step_s = self.scenario.set_model.step_s
+        left = np.maximum(self._arrival_s - self.step * step_s, 0.0)
+        predicted = (sight.omega_rad_s * sight.range_m - self._impulse) * left
+        return acceleration_m_s2(target, self._draws.target, self.step, step_s, predicted)
 
     def _decide(self, miss: PredictedMiss) -> Floats:
         situation = Situation(
@@ -205,6 +248,7 @@ class Engagements:
             closing_speed_m_s=self.scenario.set_model.closing_speed_m_s,
             measured_angle_rad=self._measured_angle,
             measured_range_m=self._measured_range,
+            measured_rate_rad_s=self._measured_rate,
             last_impulse_m_s=self._impulse.copy(),
             information=self._information.view(),
         )
@@ -259,7 +303,7 @@ def _outcome(diverged: bool, lost: bool, spent: bool) -> Outcome:
 def _make_noise(scenario: Scenario, draws: Draws) -> MeasurementNoise:
     if scenario.noise is NoiseKind.GAME:
         return GameNoise(scenario.tie, draws.tie)
-    return RandomNoise(draws.angle, draws.range)
+    return RandomNoise(draws.angle, draws.range, draws.rate)
 
 
 def _steps_in(period_s: float, scenario: Scenario) -> int:

@@ -13,6 +13,7 @@ from sim.scenario import Sun
 Floats = NDArray[np.float64]
 
 LONGEST_SUBSTEP_S = 0.5
+ARRIVAL_LEAPS = 64
 Z, X = 0, 1
 
 
@@ -58,8 +59,11 @@ class TrueMotion(Protocol):
     def fire(self, impulse_m_s: Floats) -> None:
         """Change the spacecraft's velocity along z: V_z becomes V_z - k."""
 
-    def advance(self, step_s: float) -> Passage:
-        """Move one step on."""
+    def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
+        """Move one step on, the object accelerating along z, shape (B,), if it manoeuvres."""
+
+    def arrival_s(self) -> Floats:
+        """Times from now until x = 0, shape (B,)."""
 
 
 class KeplerMotion:
@@ -87,6 +91,7 @@ class KeplerMotion:
         self._position = np.stack([position_m.astype(np.float64), np.zeros(position_m.shape)])
         self._velocity = np.stack([velocity_m_s.astype(np.float64), np.zeros(position_m.shape)])
         self._sun = sun
+        self._manoeuvre: Floats | None = None
         if sun is not None:
             toward_sun = np.array([np.sin(sun.direction_rad), np.cos(sun.direction_rad)])
             along_orbit = np.array([toward_sun[X], -toward_sun[Z]])
@@ -121,8 +126,27 @@ class KeplerMotion:
         self._velocity[0, :, Z] -= impulse_m_s
         self._velocity[1, :, Z] += impulse_m_s
 
-    def advance(self, step_s: float) -> Passage:
-        """Move one step on."""
+    def arrival_s(self) -> Floats:
+        """Times from now until x = 0, shape (B,), s.
+
+        Notes
+        -----
+        The motion without impulses, in 64 leaps and a last straight stretch: impulses are along z, and shift this
+        time by far less than a nanosecond.
+        """
+        free = KeplerMotion.__new__(KeplerMotion)
+        free._sun, free._position, free._velocity = self._sun, self._position.copy(), self._velocity.copy()
+        free._manoeuvre, free._acceleration = None, self._acceleration
+        duration = self.position_m[:, X] / -self.velocity_m_s[:, X]
+        for _ in range(ARRIVAL_LEAPS):
+            free._leap((duration / ARRIVAL_LEAPS)[:, None])
+        return duration - free.position_m[:, X] / free.velocity_m_s[:, X]
+
+    def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
+        """Move one step on, the object accelerating along z, shape (B,), if it manoeuvres."""
+        if manoeuvre_m_s2 is not None:
+            self._manoeuvre = manoeuvre_m_s2
+            self._acceleration = self._gravity()
         substeps = max(1, int(np.ceil(step_s / LONGEST_SUBSTEP_S * (1.0 - 1e-12))))
         passed = np.zeros(len(self.position_m), dtype=bool)
         least = np.full(len(self.position_m), np.inf)
@@ -136,7 +160,7 @@ class KeplerMotion:
                 passed |= new
         return Passage(passed, least)
 
-    def _leap(self, duration_s: float) -> None:
+    def _leap(self, duration_s: float | Floats) -> None:
         half = 0.5 * duration_s
         self._velocity += half * self._acceleration
         self._position += duration_s * self._velocity
@@ -144,13 +168,16 @@ class KeplerMotion:
         self._velocity += half * self._acceleration
 
     def _gravity(self) -> Floats:
-        """Relative acceleration, and that of the spacecraft, m/s^2, shape (2, B, 2)."""
+        """Relative acceleration, manoeuvre included, and that of the spacecraft, m/s^2, shape (2, B, 2)."""
         if self._sun is None:
-            return np.zeros_like(self._position)
-        from_sun = self._position.copy()
-        from_sun[0] += from_sun[1]
-        acceleration = attraction(from_sun, self._sun.gravitational_parameter_m3_s2)
-        acceleration[0] -= acceleration[1]
+            acceleration = np.zeros_like(self._position)
+        else:
+            from_sun = self._position.copy()
+            from_sun[0] += from_sun[1]
+            acceleration = attraction(from_sun, self._sun.gravitational_parameter_m3_s2)
+            acceleration[0] -= acceleration[1]
+        if self._manoeuvre is not None:
+            acceleration[0, :, Z] += self._manoeuvre
         return acceleration
 
 

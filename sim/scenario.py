@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 
 from guidance.noise import NoiseKind, TieRule
 from guidance.thruster import Thruster
 from infoset.model import SetModel, StateBox
-from infoset.sensors import RangeSensor
+from infoset.sensors import RangeSensor, RateSensor
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,38 @@ class Sun:
     gravitational_parameter_m3_s2: float
     distance_m: float
     direction_rad: float
+
+
+class Manoeuvre(Enum):
+    """How the target accelerates along z, within its bound.
+
+    NONE is not at all; CONSTANT always the same way; BANG_BANG changes sides at even times; RANDOM_TELEGRAPH at random
+    times; WORST_CASE pushes the truth's predicted miss further out, the way it is already.
+    """
+
+    NONE = "none"
+    CONSTANT = "constant"
+    BANG_BANG = "bang-bang"
+    RANDOM_TELEGRAPH = "random-telegraph"
+    WORST_CASE = "worst-case"
+
+
+@dataclass(frozen=True)
+class Target:
+    """A target that manoeuvres.
+
+    Parameters
+    ----------
+    manoeuvre : Manoeuvre
+    acceleration_m_s2 : float
+        Its acceleration along z, m/s^2.
+    switching_period_s : float
+        Time between changes of side (bang-bang), or its mean (random telegraph), s.
+    """
+
+    manoeuvre: Manoeuvre
+    acceleration_m_s2: float
+    switching_period_s: float = 10.0
 
 
 @dataclass(frozen=True)
@@ -55,6 +88,10 @@ class Scenario:
         How measurement errors are chosen.
     tie : TieRule
         The game noise's choice between equally bad extremes.
+    rate_sensor : RateSensor or None
+        The sensor of the line of sight's rate, if there is one.
+    target : Target or None
+        None does not manoeuvre.
     """
 
     name: str
@@ -68,3 +105,5 @@ class Scenario:
     strategy: str = "symmetric-miss"
     noise: NoiseKind = NoiseKind.RANDOM
     tie: TieRule = TieRule.UPPER
+    rate_sensor: RateSensor | None = None
+    target: Target | None = None

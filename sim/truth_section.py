@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from infoset import SetModel
 from infoset.information_set import section_law
 from infoset.section_stack import SectionStack
-from sim.kepler import Sight, X
+from sim.kepler import Sight
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -20,8 +20,8 @@ class TruthSection:
     Parameters
     ----------
     model : SetModel
-    position_m, velocity_m_s : ndarray, shape (B, 2)
-        The truth at t = 0: (z, x) and (V_z, V_x).
+    arrival_s : ndarray, shape (B,)
+        Time T when the truth's x is zero.
 
     Notes
     -----
@@ -29,9 +29,10 @@ class TruthSection:
     x / (1 + eta), so its label is e T with T the time when x = 0.
     """
 
-    def __init__(self, model: SetModel, position_m: Floats, velocity_m_s: Floats) -> None:
+    def __init__(self, model: SetModel, arrival_s: Floats) -> None:
         law = section_law(model)
-        labels = position_m[:, X] * (model.closing_speed_m_s / -velocity_m_s[:, X])
+        labels = model.closing_speed_m_s * arrival_s
+        self._exact_angles = model.is_guaranteed
         self._threshold_m = model.range_threshold_m
         self._stack = SectionStack(law, labels[:, None], np.ones(len(labels), dtype=np.int64))
         self._elapsed = 0
@@ -39,13 +40,22 @@ class TruthSection:
         self.margin_m = np.full(len(labels), np.inf)
         self.least_margin_m = np.full(len(labels), np.inf)
 
-    def measure(self, alpha_rad: Floats, where: Flags, sight: Sight) -> None:
-        """Cut by a measured angle, and see how deep inside the truth is then."""
+    def measure(
+        self, alpha_rad: Floats | None, omega_rad_s: Floats | None, rate_error_rad_s: float, where: Flags, sight: Sight
+    ) -> None:
+        """Cut by what was measured, and see how deep inside the truth is then."""
         ranges = self._stack.ranges(self._elapsed)[:, 0]
         where = where & (ranges >= self._threshold_m)
-        self._stack.measure_angle(where, alpha_rad, self._elapsed, self._elapsed)
-        z = sight.alpha_rad * ranges
-        v = sight.omega_rad_s * ranges - self._stack.law.closing_speed * sight.alpha_rad
+        if alpha_rad is not None:
+            self._stack.measure_angle(where, alpha_rad, self._elapsed, self._elapsed)
+        if omega_rad_s is not None:
+            self._stack.measure_rate(where, omega_rad_s, rate_error_rad_s, self._elapsed, self._elapsed)
+        slope, rate = sight.alpha_rad, sight.omega_rad_s
+        if self._exact_angles:
+            slope = np.tan(slope)
+            rate = rate * (1.0 + slope * slope)
+        z = slope * ranges
+        v = rate * ranges - self._stack.law.closing_speed * slope
         margin = self._stack.margins(v, z, self._elapsed)
         margin = np.where(self._stack.living[:, 0], margin, self._stack.sections.overlaps[:, 0])
         self.margin_m = np.where(where, margin, self.margin_m)

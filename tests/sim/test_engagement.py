@@ -84,7 +84,10 @@ class ModelMotion:
     def fire(self, impulse_m_s: Floats) -> None:
         self._v = self._v - impulse_m_s
 
-    def advance(self, step_s: float) -> Passage:
+    def arrival_s(self) -> Floats:
+        return self._start / self._e
+
+    def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
         # Half of the disturbances at their bounds: the extremes are what a set must withstand.
         push = np.clip(self._random.uniform(-2.0, 2.0, self._z.size), -1.0, 1.0) * self._nu
         self._z = self._z + self._v * step_s + 0.5 * push * step_s**2

@@ -1,0 +1,56 @@
+"""What gravity can do to the relative motion: the bounds that the guaranteed model needs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from infoset import SetModel
+from sim.scenario import Scenario, Sun
+
+MARGIN = 1.05
+LEAST_SPEED_CHANGE = 1e-8
+
+
+def on_board_model(scenario: Scenario) -> SetModel:
+    """The set model of a scenario with the bounds that its other tables imply: gravity and the engine's errors."""
+    model = replace(scenario.set_model, execution_error_relative=scenario.thruster.execution_error_relative)
+    return with_gravity(model, scenario.sun)
+
+
+def with_gravity(model: SetModel, sun: Sun | None) -> SetModel:
+    """The same model with the bounds of gravity's doings under a Sun.
+
+    Parameters
+    ----------
+    model : SetModel
+    sun : Sun or None
+        None is free space.
+
+    Returns
+    -------
+    SetModel
+        With `gravity_m_s2` and `gravity_speed_change`.
+
+    Notes
+    -----
+    To first order the difference of the Sun's attraction at two points r apart is (K/R^3)(3 (n . r) n - r), n the
+    direction of the Sun. Across the line r it is at most 1.5 K/R^3 |r|, where n is 45 degrees off the line; along it at
+    most 2 K/R^3 |r|. The Sun comes nearer by no more than the range and the way flown, and a margin of 5 % stands for
+    what is left out: the second order, the offset across, the change of n. docs/guarantee.md has the derivation.
+    """
+    if sun is None:
+        return replace(model, gravity_m_s2=0.0, gravity_speed_change=LEAST_SPEED_CHANGE)
+    box = model.bounds
+    greatest_range = float(np.hypot(box.x_m[1], max(abs(z) for z in box.z_m)))
+    slowest = -box.vx_m_s[1]
+    flight_s = box.x_m[1] / slowest
+    orbital_speed = np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m)
+    nearest = sun.distance_m - greatest_range - 0.5 * (orbital_speed * flight_s) ** 2 / sun.distance_m
+    gradient = MARGIN * sun.gravitational_parameter_m3_s2 / max(nearest, 0.1 * sun.distance_m) ** 3
+    return replace(
+        model,
+        gravity_m_s2=float(1.5 * gradient * greatest_range),
+        gravity_speed_change=float(max(LEAST_SPEED_CHANGE, 2.0 * gradient * greatest_range * flight_s / slowest)),
+    )

@@ -1,0 +1,44 @@
+"""How a manoeuvring target accelerates."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.scenario import Manoeuvre, Target
+
+Floats = NDArray[np.float64]
+
+
+def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, predicted_miss_m: Floats) -> Floats:
+    """Acceleration of the targets of a batch along z over one step, m/s^2, shape (B,).
+
+    Parameters
+    ----------
+    target : Target
+    draws : ndarray, shape (B, steps)
+        Uniform in [-1, 1].
+    step : int
+        Number of the step.
+    step_s : float
+        Its length, s.
+    predicted_miss_m : ndarray, shape (B,)
+        The truth's own predicted miss z + V_z (time to go), signed.
+    """
+    first = np.where(draws[:, 0] >= 0.0, 1.0, -1.0)
+    if target.manoeuvre is Manoeuvre.NONE:
+        side = np.zeros(len(draws))
+    elif target.manoeuvre is Manoeuvre.CONSTANT:
+        side = first
+    elif target.manoeuvre is Manoeuvre.BANG_BANG:
+        side = first * (-1.0) ** math.floor(step * step_s / target.switching_period_s)
+    elif target.manoeuvre is Manoeuvre.RANDOM_TELEGRAPH:
+        # Switches are a Poisson process: so likely is an odd number of them within a step.
+        odd = 0.5 * (1.0 - math.exp(-2.0 * step_s / target.switching_period_s))
+        switches = 0.5 * (1.0 + draws[:, 1 : step + 1]) < odd
+        side = first * (-1.0) ** switches.sum(axis=1)
+    else:
+        side = np.where(predicted_miss_m >= 0.0, 1.0, -1.0)
+    return np.asarray(target.acceleration_m_s2 * side)
