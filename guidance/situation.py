@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.thruster import Thruster
-from infoset import InformationSetView, PredictedMiss
+from infoset import InformationSetView, PredictedMiss, RangeSensor
 
 Floats = NDArray[np.float64]
 
@@ -43,6 +43,10 @@ class Situation:
         Impulses of the step before, m/s.
     information : InformationSetView
         The information set itself, read-only.
+    angle_is_new, range_is_new : bool
+        Whether the angle, or the range, was measured in this step.
+    range_sensor : RangeSensor or None
+        Error law of the range meter; None without one.
     """
 
     time_s: float
@@ -57,6 +61,9 @@ class Situation:
     last_impulse_m_s: Floats
     information: InformationSetView
     measured_rate_rad_s: Floats | None = None
+    angle_is_new: bool = True
+    range_is_new: bool = False
+    range_sensor: RangeSensor | None = None
 
     @property
     def possible_ranges_m(self) -> tuple[Floats, Floats]:

@@ -251,6 +251,9 @@ class Engagements:
             measured_rate_rad_s=self._measured_rate,
             last_impulse_m_s=self._impulse.copy(),
             information=self._information.view(),
+            angle_is_new=self.step % self._angle_every == 0,
+            range_is_new=self._range_every > 0 and self.step % self._range_every == 0,
+            range_sensor=self.scenario.range_sensor,
         )
         wanted = np.asarray(self._strategy.decide(situation, self._state), dtype=np.float64)
         if wanted.shape != (self._batch,) or not np.isfinite(wanted[self._tracking]).all():
