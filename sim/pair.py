@@ -1,0 +1,117 @@
+"""Fly the two truths of a lower bound side by side, against any strategy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance import Strategy
+from guidance.pair_noise import PairNoise
+from sim.bound import TruthPair
+from sim.draws import Draws
+from sim.engagement import Engagements
+from sim.kepler import KeplerMotion, Passage
+from sim.results import Results
+from sim.scenario import Scenario, Sun
+
+Floats = NDArray[np.float64]
+
+STEPS_BEYOND = 2
+"""Steps flown at most after the one in which x = 0."""
+
+
+class ScheduledMotion(KeplerMotion):
+    """Kepler motion, the object accelerating along z as laid down before.
+
+    Parameters
+    ----------
+    position_m, velocity_m_s : ndarray, shape (B, 2)
+        Relative (z, x) and (V_z, V_x) at t = 0.
+    sun : Sun or None
+        None is free space.
+    acceleration_m_s2 : ndarray, shape (B, steps)
+        Acceleration along z over each step; none after the last.
+    """
+
+    def __init__(self, position_m: Floats, velocity_m_s: Floats, sun: Sun | None, acceleration_m_s2: Floats) -> None:
+        super().__init__(position_m, velocity_m_s, sun)
+        self._schedule = acceleration_m_s2
+        self._step = 0
+
+    def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
+        """Move one step on, under the acceleration of this step and no other."""
+        over = self._step >= self._schedule.shape[1]
+        scheduled = np.zeros(len(self._schedule)) if over else self._schedule[:, self._step]
+        self._step += 1
+        return super().advance(step_s, scheduled)
+
+
+@dataclass(frozen=True)
+class PairFlight:
+    """What came of flying a pair.
+
+    Parameters
+    ----------
+    results : Results
+        Of the two truths.
+    impulse_m_s : ndarray, shape (steps, 2)
+        Impulses at each step.
+    greatest_error_share : float
+        Greatest error of a common measurement, in units of its bound.
+    """
+
+    results: Results
+    impulse_m_s: Floats
+    greatest_error_share: float
+
+    @property
+    def worst_miss_m(self) -> float:
+        """The worse of the two misses, m."""
+        return float(self.results.miss_m.max())
+
+
+def fly_pair(
+    scenario: Scenario,
+    pair: TruthPair,
+    strategy: Strategy | None = None,
+    *,
+    progress: Callable[[float], None] | None = None,
+) -> PairFlight:
+    """Fly two truths that cannot be told apart until it is late.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Its noise is replaced by the pair's, its target's manoeuvre by the pair's accelerations.
+    pair : TruthPair
+    strategy : Strategy or None
+        None is the scenario's own.
+    progress : callable or None
+        Is told the fraction done, from 0 to 1.
+
+    Returns
+    -------
+    PairFlight
+        The worse of the two misses is at least `pair.bound_m` for every strategy that is the same function of the
+        same measurements, but for what is said in the notes.
+
+    Notes
+    -----
+    The bound is reckoned in a straight frame; here the miss is the least distance between the two and gravity curves
+    the way. The miss is measured across the relative velocity, and so is smaller than |z| at x = 0 by (V_z/V_x)^2 / 2.
+    """
+    steps = pair.acceleration_m_s2.shape[1] + STEPS_BEYOND
+    nothing = np.zeros((2, steps))
+    draws = Draws(pair.position_m, pair.velocity_m_s, nothing, nothing, nothing)
+    noise = PairNoise(pair.last_common_step)
+    truth = ScheduledMotion(pair.position_m, pair.velocity_m_s, scenario.sun, pair.acceleration_m_s2)
+    flight = Engagements(scenario, draws, strategy, truth, noise)
+    impulses: list[Floats] = []
+    while flight.flying:
+        flight.advance(lambda step: impulses.append(np.where(step.tracking, step.impulse_m_s, 0.0)))
+        if progress is not None:
+            progress(min(1.0, flight.step / steps))
+    return PairFlight(flight.results(np.arange(2)), np.array(impulses), noise.greatest_share)
