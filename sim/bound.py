@@ -67,6 +67,15 @@ class TruthPair:
         """Time when x = 0, s."""
         return -self.label_m / self.vx_m_s
 
+    def distance_m(self, step_s: float) -> tuple[Floats, Floats]:
+        """Times of all steps and of the arrival, s, and the distance of the two along z then, m."""
+        steps = self.acceleration_m_s2.shape[1]
+        times_s = np.append(np.arange(steps) * step_s, self.arrival_s)
+        offset, velocity, acceleration = (
+            values[0] - values[1] for values in (self.position_m[:, 0], self.velocity_m_s[:, 0], self.acceleration_m_s2)
+        )
+        return times_s, _motion(float(offset), float(velocity), acceleration, times_s)[0]
+
 
 @dataclass(frozen=True)
 class LabelBound:

@@ -134,6 +134,36 @@ def choice(option: str, name: str, valid: Sequence[str]) -> str:
     raise InputError(f"{option}: there is no {shown(name)}; {hint}choose one of: {', '.join(valid)}")
 
 
+def chosen_strategies(names: str | None) -> list[str]:
+    """Return the strategies of a list of names.
+
+    Parameters
+    ----------
+    names : str or None
+        Names separated by commas; None is all there are.
+
+    Returns
+    -------
+    list of str
+
+    Raises
+    ------
+    InputError
+        If there is no such strategy, or one is named twice.
+    """
+    from experiments.errors import InputError
+    from guidance import strategy_names
+
+    valid = strategy_names()
+    if names is None:
+        return valid
+    chosen = [choice("--strategies", each.strip(), valid) for each in names.split(",")]
+    if len(set(chosen)) < len(chosen):
+        (twice, *_) = [each for each in chosen if chosen.count(each) > 1]
+        raise InputError(f"--strategies: {twice} is named twice; name each strategy once")
+    return chosen
+
+
 def whole_number(option: str, value: int, least: int, greatest: int | None, example: int) -> int:
     """Return a whole number if it lies where it must.
 

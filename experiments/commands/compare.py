@@ -18,7 +18,7 @@ from experiments.commands._options import (
     Quiet,
     ScenarioName,
     Seed,
-    choice,
+    chosen_strategies,
     scenario_with,
     whole_number,
 )
@@ -72,7 +72,7 @@ def compare(
 
     whole_number("--runs", runs, 1, MOST_RUNS, 50)
     whole_number("--seed", seed, 0, None, 0)
-    names = _chosen(strategies)
+    names = chosen_strategies(strategies)
     given = with_range_meter(scenario_with(scenario, model=model), range_meter)
     files = ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE))
     with checked_destinations(folder=out, names=files, files={"--json": json_, "--csv": csv}, overwrite=overwrite):
@@ -92,20 +92,6 @@ def compare(
             _fill(out, given, compared, json_text, csv_text, overwrite)
     if not quiet:
         _show(given, compared, STDOUT in (str(json_), str(csv)))
-
-
-def _chosen(strategies: str | None) -> list[str]:
-    from experiments.errors import InputError
-    from guidance import strategy_names
-
-    valid = strategy_names()
-    if strategies is None:
-        return valid
-    names = [choice("--strategies", each.strip(), valid) for each in strategies.split(",")]
-    if len(set(names)) < len(names):
-        (twice, *_) = [each for each in names if names.count(each) > 1]
-        raise InputError(f"--strategies: {twice} is named twice; name each strategy once")
-    return names
 
 
 def _fly(scenario: Scenario, names: Sequence[str], runs: int, seed: int, quiet: bool) -> tuple[list[Comparison], float]:
