@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from experiments.commands.bound import bound
 from experiments.commands.compare import compare
 from experiments.commands.engage import engage
 from experiments.commands.experiment import experiment
@@ -46,6 +47,7 @@ app = typer.Typer(
 app.command("experiment", epilog="Example: infoset experiment asteroid-1997 --runs 50 --out results")(experiment)
 app.command("engage", epilog="Example: infoset engage asteroid-1997-single --noise both --out figures")(engage)
 app.command("compare", epilog="Example: infoset compare --strategies patient,symmetric-miss --out results")(compare)
+app.command("bound", epilog="Example: infoset bound asteroid-1997 --strategies patient --out results")(bound)
 app.command("replay", epilog="Example: infoset replay flight-random.npz flight-game.npz --out figures")(replay)
 app.add_typer(scenarios, name="scenarios")
 

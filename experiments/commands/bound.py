@@ -1,0 +1,242 @@
+"""infoset bound: what no strategy can guarantee, and how near strategies come to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from experiments.commands._options import (
+    Json,
+    ModelName,
+    Out,
+    Overwrite,
+    Quiet,
+    ScenarioName,
+    chosen_strategies,
+    scenario_with,
+)
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from sim import Scenario
+    from sim.bound import LowerBound, TruthPair
+    from sim.pair import PairFlight
+
+FIGURE = "figure-bound"
+M_PER_KM = 1e3
+
+
+@dataclass(frozen=True)
+class Found:
+    """What was found for one strategy: its flights of the pairs, each with the pair."""
+
+    name: str
+    flights: tuple[tuple[TruthPair, PairFlight], ...]
+
+    @property
+    def worst(self) -> PairFlight:
+        """The flight with the greatest miss."""
+        return max((flight for _, flight in self.flights), key=lambda flight: flight.worst_miss_m)
+
+    @property
+    def worst_outcome(self) -> str:
+        """How the engagement of the greatest miss ended."""
+        results = self.worst.results
+        return results.outcomes[int(results.miss_m.argmax())].value
+
+    def guaranteed_m(self, scenario: Scenario) -> float | None:
+        """Return the greatest guaranteed miss of all flights, m; None where the model guarantees nothing."""
+        from experiments.commands._screen import payoffs
+
+        if not scenario.set_model.is_guaranteed:
+            return None
+        known = [payoff for _, flight in self.flights for payoff in payoffs(flight.results)]
+        return None if None in known else max(payoff for payoff in known if payoff is not None)
+
+
+def bound(
+    scenario: ScenarioName = "asteroid-1997",
+    strategies: Annotated[
+        str | None,
+        typer.Option("--strategies", metavar="A,B,C", help="Which, separated by commas; all there are by default."),
+    ] = None,
+    model: ModelName = None,
+    out: Out = None,
+    json_: Json = None,
+    overwrite: Overwrite = False,
+    quiet: Quiet = False,
+) -> None:
+    """Find the miss that no strategy can guarantee to stay below, and fly what shows it.
+
+    Two truths whose measurements can be the same until it is late get the same impulses until then; one of them must
+    miss. The bound is the most that this shows; each strategy is flown against such pairs. Without --out or --json
+    nothing is written.
+    """
+    from experiments.commands._screen import figure_files, say, tell_of_compiling
+    from experiments.output import STDOUT, checked_destinations, to_json, write_file
+    from experiments.scenario_file import scenario_warnings
+
+    names = chosen_strategies(strategies)
+    given = scenario_with(scenario, model=model)
+    files = ("scenario.toml", "results.json", *figure_files(FIGURE))
+    with checked_destinations(folder=out, names=files, files={"--json": json_}, overwrite=overwrite):
+        warnings = scenario_warnings(given)
+        for warning in warnings:
+            say(f"warning: {warning}", quiet)
+        tell_of_compiling(quiet)
+        lower, found, elapsed_s = _find(given, names, quiet)
+        json_text = to_json(_summary(given, lower, found, elapsed_s, warnings))
+        if json_ is not None and str(json_) == STDOUT:
+            typer.echo(json_text, nl=False)
+        elif json_ is not None:
+            write_file(json_, json_text, overwrite=overwrite)
+        if out is not None:
+            _fill(out, given, lower, json_text, overwrite)
+    if not quiet:
+        _show(given, lower, found, str(json_) == STDOUT)
+
+
+def _find(scenario: Scenario, names: Sequence[str], quiet: bool) -> tuple[LowerBound, list[Found], float]:
+    from time import perf_counter
+
+    from experiments.commands._screen import need_finite, progress_bar
+    from experiments.errors import InputError
+    from guidance import make_strategy
+    from sim.bound import BoundError, lower_bound
+    from sim.pair import fly_pair
+
+    began_s = perf_counter()
+    with progress_bar(quiet) as begin:
+        try:
+            lower = lower_bound(scenario, progress=begin("lower bound"))
+        except BoundError as error:
+            raise InputError(
+                f"{scenario.name}: a linear program of the bound has no solution ({error}); check the units of the "
+                "scenario with: infoset scenarios check FILE"
+            ) from None
+        found = []
+        for name in names:
+            report, flights = begin(name), []
+            for index, pair in enumerate(lower.pairs):
+                flight = fly_pair(scenario, pair, make_strategy(name))
+                need_finite(flight.results)
+                flights.append((pair, flight))
+                report((index + 1) / len(lower.pairs))
+            found.append(Found(name, tuple(flights)))
+    return lower, found, perf_counter() - began_s
+
+
+def _summary(
+    scenario: Scenario, lower: LowerBound, found: Sequence[Found], elapsed_s: float, warnings: Sequence[str]
+) -> dict[str, object]:
+    from experiments.output import library_version
+    from experiments.scenario_file import scenario_hash
+
+    return {
+        "version": library_version(),
+        "scenario": scenario.name,
+        "scenario_hash": scenario_hash(scenario),
+        **({"warnings": list(warnings)} if warnings else {}),
+        "model": scenario.set_model.kind.value,
+        "elapsed_s": elapsed_s,
+        "disturbance_m_s2": lower.disturbance_m_s2,
+        "lower_bound_m": lower.bound_m,
+        "reached_at": _where(lower.pair, scenario),
+        "by_label": [
+            {
+                "label_km": each.label_m / M_PER_KM,
+                "closing_speed_km_s": -each.vx_m_s / M_PER_KM,
+                "last_common_step": each.last_common_step,
+                "bound_m": each.bound_m,
+            }
+            for each in lower.by_label
+        ],
+        "strategies": [
+            {
+                "name": each.name,
+                "worst_found_m": each.worst.worst_miss_m,
+                "guaranteed_m": each.guaranteed_m(scenario),
+                "gap": _gap(each, lower),
+                "outcome": each.worst_outcome,
+                "flights": [
+                    {
+                        **_where(pair, scenario),
+                        "bound_m": pair.bound_m,
+                        "miss_m": flight.results.miss_m.tolist(),
+                        "spent_m_s": flight.results.impulse_m_s.tolist(),
+                        "outcomes": [outcome.value for outcome in flight.results.outcomes],
+                        "truth_kept": flight.results.truth_kept.tolist(),
+                    }
+                    for pair, flight in each.flights
+                ],
+            }
+            for each in found
+        ],
+    }
+
+
+def _gap(found: Found, lower: LowerBound) -> float | None:
+    """How many times the bound the worst is; None where the bound is zero."""
+    return found.worst.worst_miss_m / lower.bound_m if lower.bound_m > 0.0 else None
+
+
+def _where(pair: TruthPair, scenario: Scenario) -> dict[str, object]:
+    return {
+        "label_km": pair.label_m / M_PER_KM,
+        "closing_speed_km_s": -pair.vx_m_s / M_PER_KM,
+        "last_common_step": pair.last_common_step,
+        "alike_until_before_arrival_s": pair.arrival_s - pair.last_common_step * scenario.set_model.step_s,
+    }
+
+
+def _fill(folder: Path, scenario: Scenario, lower: LowerBound, json_text: str, overwrite: bool) -> None:
+    from experiments.figures.bound import draw_bound
+    from experiments.figures.style import save_figure
+    from experiments.output import reporting_failures, write_file
+    from experiments.scenario_file import scenario_to_toml
+
+    write_file(folder / "scenario.toml", scenario_to_toml(scenario), overwrite=overwrite)
+    write_file(folder / "results.json", json_text, overwrite=overwrite)
+    figure = draw_bound(scenario, lower)
+    with reporting_failures(folder):
+        save_figure(figure, folder, FIGURE)
+
+
+def _show(scenario: Scenario, lower: LowerBound, found: Sequence[Found], stdout_taken: bool) -> None:
+    """Print the bound with where it is reached, and the strategies against it."""
+    from rich.table import Table
+    from rich.text import Text
+
+    from experiments.commands._screen import number, table_console
+
+    reached = Table(box=None, pad_edge=False)
+    for title in ("closing speed\nkm/s", "bound\nm", "at label\nkm", "alike until, s\nbefore arrival"):
+        reached.add_column(title, justify="right")
+    for pair in lower.pairs:
+        alike_s = pair.arrival_s - pair.last_common_step * scenario.set_model.step_s
+        row = (-pair.vx_m_s / M_PER_KM, pair.bound_m, pair.label_m / M_PER_KM, alike_s)
+        reached.add_row(f"{row[0]:g}", number(row[1]), f"{row[2]:.1f}", f"{row[3]:.2f}")
+    table = Table("strategy", box=None, pad_edge=False)
+    for title in ("worst found\nm", "worst\n/ bound", "guaranteed\nmiss, m"):
+        table.add_column(title, justify="right")
+    table.add_column("outcome")
+    for each in found:
+        table.add_row(
+            each.name,
+            number(each.worst.worst_miss_m),
+            number(_gap(each, lower)),
+            number(each.guaranteed_m(scenario)),
+            each.worst_outcome,
+        )
+    console = table_console(stdout_taken)
+    said = f"no strategy can guarantee a miss below {number(lower.bound_m)} m"
+    console.print(Text(f"{scenario.name}, model {scenario.set_model.kind.value}: {said}"), soft_wrap=True)
+    console.print(Text(f"errors of the angle; acceleration along z up to {lower.disturbance_m_s2:.3g} m/s^2"))
+    console.print(reached)
+    console.print()
+    console.print(table)
+    console.print(Text("worst found: the worse of the two truths of each pair above, flown"), soft_wrap=True)
