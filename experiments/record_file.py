@@ -97,6 +97,7 @@ def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: boo
         "seed": record.seed,
         "run": record.run,
         "strategy": record.strategy,
+        **({} if record.noise is None else {"noise": record.noise}),
         "result": _result_to_json(record.result),
         "scenario": toml,
     }
@@ -333,13 +334,16 @@ def _read_header(header: NDArray[Any]) -> dict[str, Any]:
 
 def _to_record(header: Mapping[str, Any], arrays: Arrays, source: str) -> Record:
     keys = {"format", "schema", "version", "seed", "run", "strategy", "result", "scenario", "sha256"}
-    if set(header) != keys:
+    if set(header) - {"noise"} != keys:
         raise _UnsoundError(f"its header has the keys {', '.join(sorted(map(str, header)))}")
     seed, run, strategy, toml = (header[key] for key in ("seed", "run", "strategy", "scenario"))
     if not (_is_whole(seed) and _is_whole(run) and run < 2**63 and isinstance(strategy, str) and isinstance(toml, str)):
         raise _UnsoundError("its header has a wrong seed, run, strategy or scenario")
     if not strategy.isprintable() or len(strategy) > LONGEST_NAME:
         raise _UnsoundError("its header has a strategy whose name cannot be printed")
+    noise = header.get("noise", "")
+    if not isinstance(noise, str) or not noise.isprintable() or len(noise) > LONGEST_NAME:
+        raise _UnsoundError("its header has a noise whose name cannot be printed")
     try:
         scenario = read_scenario(toml, f"{source}: the scenario in it")
     except InputError as error:
@@ -352,6 +356,7 @@ def _to_record(header: Mapping[str, Any], arrays: Arrays, source: str) -> Record
         strategy=strategy,
         result=_result_from_json(header["result"], run),
         steps=_to_steps(arrays, scenario),
+        noise=header.get("noise"),
     )
 
 

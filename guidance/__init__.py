@@ -6,6 +6,7 @@ from guidance.patient import Patient
 from guidance.predicted_miss import symmetric_impulse, zero_effort_miss
 from guidance.random_noise import RandomNoise
 from guidance.registry import make_strategy, strategy_names
+from guidance.scripted_noise import ScriptedNoise
 from guidance.situation import Situation
 from guidance.strategy import Strategy
 from guidance.symmetric_miss import SymmetricMiss
@@ -19,6 +20,7 @@ __all__ = [
     "NoiseKind",
     "Patient",
     "RandomNoise",
+    "ScriptedNoise",
     "Situation",
     "Strategy",
     "SymmetricMiss",

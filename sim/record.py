@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance import Strategy
+from guidance import MeasurementNoise, Strategy
 from infoset import Section
 from sim.draws import draw
 from sim.engagement import Engagements, Step
@@ -66,6 +66,8 @@ class Record:
     result : Results
         A batch of one.
     steps : tuple of StepRecord
+    noise : str or None
+        Name of a noise that is not the scenario's own; None where it is.
     """
 
     scenario: Scenario
@@ -74,6 +76,12 @@ class Record:
     strategy: str
     result: Results
     steps: tuple[StepRecord, ...]
+    noise: str | None = None
+
+    @property
+    def noise_name(self) -> str:
+        """What the noise is called that was flown."""
+        return self.scenario.noise.value if self.noise is None else self.noise
 
 
 @dataclass
@@ -109,6 +117,7 @@ def fly_one(
     *,
     seed: int = 0,
     strategy: Strategy | None = None,
+    noise: MeasurementNoise | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Record:
     """Fly one engagement and keep everything.
@@ -120,6 +129,8 @@ def fly_one(
         Run `run` of `simulate(..., seed=seed)` is the same engagement, number for number.
     strategy : Strategy or None
         A strategy of your own; None is the scenario's.
+    noise : MeasurementNoise or None
+        A noise of your own, for a batch of one; None is the scenario's.
     progress : callable or None
         Is told the fraction done, from 0 to 1.
 
@@ -130,11 +141,12 @@ def fly_one(
     if run < 0 or seed < 0:
         raise ValueError(f"run and seed must not be negative: got run={run}, seed={seed}")
     draws = draw(scenario, [run], seed)
-    flight = Engagements(scenario, draws, strategy)
+    flight = Engagements(scenario, draws, strategy, noise=noise)
     recorder = _Recorder()
     while flight.flying:
         flight.advance(recorder)
         if progress is not None:
             progress(min(1.0, flight.step / draws.angle.shape[1]))
     name = scenario.strategy if strategy is None else type(strategy).__name__
-    return Record(scenario, seed, run, name, flight.results(np.array([run])), tuple(recorder.steps))
+    own = None if noise is None else getattr(noise, "name", type(noise).__name__)
+    return Record(scenario, seed, run, name, flight.results(np.array([run])), tuple(recorder.steps), own)

@@ -30,7 +30,7 @@ def show_engagements(records: Sequence[Record], stdout_taken: bool) -> None:
     for record in records:
         scenario, result = record.scenario, record.result
         meter = " + range meter" if scenario.range_sensor is not None else ""
-        table.add_column(Text(f"{scenario.noise.value}{meter}"), justify="right")
+        table.add_column(Text(f"{record.noise_name}{meter}"), justify="right")
         columns.append(
             [
                 number(float(result.miss_m[0])),
@@ -43,7 +43,7 @@ def show_engagements(records: Sequence[Record], stdout_taken: bool) -> None:
                 record.strategy,
             ]
         )
-        paper = PAPER_SINGLE_RUN.get(scenario.noise.value)
+        paper = PAPER_SINGLE_RUN.get(record.noise_name)
         if scenario.name == PAPER_SCENARIO and scenario.range_sensor is None and paper is not None:
             table.add_column("paper", justify="right")
             columns.append([number(paper[0]), number(paper[1]), *[""] * 6])

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from sim import Outcome, Record, Scenario
+from sim import Outcome, Record
 
 WIDTH_MM = 180.0
 PNG_DPI = 200
@@ -137,9 +137,9 @@ def width_mm(axes: Axes) -> float:
     return float(axes.get_position().width * figure.get_figwidth() * _MM_PER_INCH)
 
 
-def noise_title(scenario: Scenario) -> str:
+def noise_title(record: Record) -> str:
     """Return what a reader calls the noise of an engagement: `random noise`, or `game noise, range meter`."""
-    return f"{scenario.noise.value} noise" + (", range meter" if scenario.range_sensor is not None else "")
+    return f"{record.noise_name} noise" + (", range meter" if record.scenario.range_sensor is not None else "")
 
 
 def record_titles(records: Sequence[Record]) -> list[str]:
@@ -153,7 +153,7 @@ def record_titles(records: Sequence[Record]) -> list[str]:
     -------
     list of str
     """
-    titles = [noise_title(record.scenario) for record in records]
+    titles = [noise_title(record) for record in records]
     candidates = (
         [f"run {record.run}" for record in records],
         [f"seed {record.seed}" for record in records],

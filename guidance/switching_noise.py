@@ -1,0 +1,29 @@
+"""Measurement noise that keeps, step by step, the extreme it is told to keep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance.game_noise import GameNoise
+from infoset import PredictedMiss
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class SwitchingNoise(GameNoise):
+    """The game noise with the extreme to keep given for every step, not only where both are equally bad.
+
+    Parameters
+    ----------
+    tie : TieRule
+        Not looked at.
+    tie_draws : ndarray, shape (B, steps)
+        The upper extreme is kept where it is not negative, the lower one elsewhere.
+    """
+
+    def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
+        return np.asarray(self.tie_draws[:, step] >= 0.0)

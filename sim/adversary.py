@@ -1,0 +1,515 @@
+"""Search for the engagement that a strategy stands worst: the start and the measurement errors of the greatest miss.
+
+What is found bounds from below what the strategy can guarantee. It is no proof that there is nothing worse.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance import GameNoise, LineOfSight, Measurement, Strategy, TieRule, make_strategy
+from guidance.scripted_noise import ScriptedNoise, errors_made, measure_with_errors
+from guidance.switching_noise import SwitchingNoise
+from infoset import InformationSetView, StateBox
+from sim.draws import corners, draw
+from sim.engagement import Engagements
+from sim.record import Record, fly_one
+from sim.results import Outcome
+from sim.scenario import Scenario
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Counts = NDArray[np.int64]
+
+CHUNK = 50
+"""Engagements flown together."""
+GENERATION = 100
+"""Engagements flown before the next choice."""
+ELITE = 24
+"""The worst plans so far that are changed further."""
+LINEAGE_SHARE = 6
+"""Most of the elite that may come from one first plan, while the search is young."""
+YOUNG_SHARE = 0.5
+"""Share of the budget that the search is young for."""
+FIRST_SHARE = 0.25
+"""Share of the budget for first plans."""
+MOST_CHANGES = 3
+"""Changes from a plan to the next, at most."""
+LATE_STEPS = 12.0
+"""Mean distance from the end, in steps, of those changes that prefer the end."""
+
+UPPER, LOWER = 1.0, -1.0
+ANGLE, RANGE, RATE = range(3)
+
+
+@dataclass(frozen=True)
+class WorstEngagement:
+    """The engagement of greatest miss that a search has found.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What was searched; its dispersion is the one start that was found.
+    seed : int
+        The seed of the search.
+    strategy : str
+        Name of the strategy.
+    miss_m : float
+        True miss, m.
+    outcome : Outcome
+    truth_kept : bool
+        Whether the truth was inside its own section after every measurement.
+    position_m, velocity_m_s : ndarray, shape (2,)
+        Start: (z, x) and (V_z, V_x).
+    angle_errors : ndarray, shape (steps,)
+        Errors of the angle in units of the bound, for `ScriptedNoise`: they fly this engagement again bit by bit.
+    range_errors, rate_errors : ndarray, shape (steps,)
+        The same of the range and of the angular rate; zeros where they were not measured.
+    construction : str
+        The first plan that the search made it from.
+    changes : int
+        How many plans lie between the two.
+    evaluations : int
+        Engagements flown.
+    history : tuple of (int, float)
+        Evaluations and greatest miss so far, m, whenever it had risen.
+    """
+
+    scenario: Scenario
+    seed: int
+    strategy: str
+    miss_m: float
+    outcome: Outcome
+    truth_kept: bool
+    position_m: Floats
+    velocity_m_s: Floats
+    angle_errors: Floats
+    range_errors: Floats
+    rate_errors: Floats
+    construction: str
+    changes: int
+    evaluations: int
+    history: tuple[tuple[int, float], ...]
+
+    def noise(self) -> ScriptedNoise:
+        """The errors as the noise of a batch of one."""
+        return ScriptedNoise(self.angle_errors[None], self.range_errors[None], self.rate_errors[None])
+
+    def record(self, strategy: Strategy | None = None) -> Record:
+        """Fly it once more and keep everything.
+
+        Parameters
+        ----------
+        strategy : Strategy or None
+            None is the scenario's own. Another one than that of the search has another miss.
+        """
+        return fly_one(self.scenario, seed=self.seed, strategy=strategy, noise=self.noise())
+
+
+@dataclass(frozen=True)
+class _Plans:
+    """What nature intends in each of n engagements.
+
+    In a step that is `given`, the errors of angle, range and rate are the elements of the sequence, in units of the
+    bounds. Elsewhere the upper extreme of the predicted miss is kept where the element of the angle is not negative,
+    the lower one where it is.
+    """
+
+    start: Floats  # (n, 4): z, x, V_z, V_x
+    sequence: Floats  # (n, 3, steps)
+    given: Flags  # (n, steps)
+    lineage: Counts  # (n,)
+    changes: Counts  # (n,)
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def take(self, which: Counts | slice) -> _Plans:
+        """Copies of some of them."""
+        return _Plans(*(getattr(self, each.name)[which].copy() for each in fields(self)))
+
+    def join(self, other: _Plans) -> _Plans:
+        """These and others."""
+        return _Plans(*(np.concatenate([getattr(each, of.name) for each in (self, other)]) for of in fields(self)))
+
+
+@dataclass
+class _PlannedNoise:
+    """Measures as planned, and notes the errors made: what is measured is what the noted error gives."""
+
+    plans: _Plans
+    tie: TieRule | None
+    errors: Floats = field(init=False)  # (n, 3, steps)
+
+    def __post_init__(self) -> None:
+        sequence = self.plans.sequence
+        self.errors = np.zeros_like(sequence)
+        tie = TieRule.RANDOM if self.tie is None else self.tie
+        self._keeping = (SwitchingNoise if self.tie is None else GameNoise)(tie, sequence[:, ANGLE])
+
+    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
+        step = sight.step
+        kept = np.stack(errors_made(sight, self._keeping.measure(sight, predicted)), axis=1)
+        errors = np.where(self.plans.given[:, None, step], self.plans.sequence[:, :, step], kept)
+        self.errors[:, :, step] = errors
+        return measure_with_errors(sight, errors[:, ANGLE], errors[:, RANGE], errors[:, RATE])
+
+
+@dataclass(frozen=True)
+class _Flown:
+    """Plans with what came of them."""
+
+    plans: _Plans
+    value: Floats  # (n,): the miss, or -inf where the engagement does not count
+    errors: Floats  # (n, 3, steps)
+    outcomes: NDArray[np.object_]
+    truth_kept: Flags
+
+    def take(self, which: Counts | slice) -> _Flown:
+        """Some of them."""
+        return _Flown(self.plans.take(which), *(getattr(self, each.name)[which] for each in fields(self)[1:]))
+
+    def join(self, other: _Flown) -> _Flown:
+        """These and others."""
+        both = (np.concatenate([getattr(each, of.name) for each in (self, other)]) for of in fields(self)[1:])
+        return _Flown(self.plans.join(other.plans), *both)
+
+
+def find_worst(
+    scenario: Scenario,
+    *,
+    strategy: Strategy | None = None,
+    budget: int = 5000,
+    seed: int = 0,
+    keep_set: bool = False,
+    threads: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> WorstEngagement:
+    """Search the starts that are possible, and the errors within their bounds, for the greatest true miss.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Starts are sought in all of `set_model.bounds` (B x D), not in its dispersion.
+    strategy : Strategy or None
+        None is the scenario's own.
+    budget : int
+        Engagements to fly.
+    seed : int
+        Root seed. The same seed and budget find the same engagement, whatever the number of threads.
+    keep_set : bool
+        Whether only engagements count whose set was never lost. In the model `paper` a set can be lost at once, and
+        then nothing is corrected: that is the greatest miss there is, and says nothing of the strategy.
+    threads : int
+        Threads that fly.
+    progress : callable or None
+        Is told the fraction done, from 0 to 1.
+
+    Returns
+    -------
+    WorstEngagement
+
+    Raises
+    ------
+    ValueError
+        If the budget or the number of threads is not positive, the seed is negative, or no engagement counts.
+
+    Notes
+    -----
+    A quarter of the budget goes to first plans: the game noise under its four tie rules, noise that keeps the upper or
+    the lower extreme in a random or a blockwise order, constant and extremal errors, and errors that follow the middle
+    between the truth and another that cannot be told from it. The worst are then changed, a few steps, blocks,
+    switching times or coordinates of the start at a time, and compete with what they become. While the search is
+    young no first plan may fill the elite with its offspring.
+
+    References
+    ----------
+    Kumkov and Patsko (1997), section 7: the rule of the game noise, here one plan of many.
+    """
+    if budget < 1 or threads < 1 or seed < 0:
+        raise ValueError(
+            f"need a positive budget and number of threads, and a seed not negative: got budget={budget}, "
+            f"threads={threads}, seed={seed}"
+        )
+    search = _Search(scenario, strategy, seed, keep_set)
+    with ThreadPoolExecutor(threads) as pool:
+        search.run(budget, pool, progress)
+    return search.worst()
+
+
+class _Search:
+    """A search in progress."""
+
+    def __init__(self, scenario: Scenario, strategy: Strategy | None, seed: int, keep_set: bool) -> None:
+        self.scenario = replace(scenario, dispersion=scenario.set_model.bounds)
+        self.evaluations = 0
+        self.history: list[tuple[int, float]] = []
+        self._seed, self._keep_set = seed, keep_set
+        self._strategy = strategy or make_strategy(scenario.strategy)
+        self._name = scenario.strategy if strategy is None else type(strategy).__name__
+        self._lower, self._upper = corners(scenario.set_model.bounds)
+        self._random = np.random.default_rng(seed)
+        # What else is random is that of run 0 in every engagement, so that the worst can be flown again alone.
+        self._draws = draw(self.scenario, [0], seed)
+        self._steps: int = self._draws.angle.shape[1]
+        self._constructions: list[str] = []
+        self._elite: _Flown | None = None
+
+    def run(self, budget: int, pool: ThreadPoolExecutor, progress: Callable[[float], None] | None) -> None:
+        first = max(1, round(FIRST_SHARE * budget))
+        for plans, tie in self._first_plans(first):
+            for chunk in self._fly_all([(plans.take(part), tie) for part in _parts(len(plans), CHUNK)], pool):
+                self._select(chunk, young=True)
+            if progress is not None:
+                progress(self.evaluations / budget)
+        while self.evaluations < budget:
+            size = min(GENERATION, budget - self.evaluations)
+            plans = self._children(size)
+            for chunk in self._fly_all([(plans.take(part), None) for part in _parts(size, CHUNK)], pool):
+                self._select(chunk, young=self.evaluations < YOUNG_SHARE * budget)
+            if progress is not None:
+                progress(self.evaluations / budget)
+
+    def worst(self) -> WorstEngagement:
+        elite = self._elite
+        if elite is None or not np.isfinite(elite.value[0]):
+            raise ValueError("in every engagement flown the set was lost or the miss was not finite: none counts")
+        start = elite.plans.start[0]
+        z, x, vz, vx = ((float(each), float(each)) for each in start)
+        return WorstEngagement(
+            scenario=replace(self.scenario, dispersion=StateBox(z, x, vz, vx)),
+            seed=self._seed,
+            strategy=self._name,
+            miss_m=float(elite.value[0]),
+            outcome=elite.outcomes[0],
+            truth_kept=bool(elite.truth_kept[0]),
+            position_m=start[:2],
+            velocity_m_s=start[2:],
+            angle_errors=elite.errors[0, ANGLE],
+            range_errors=elite.errors[0, RANGE],
+            rate_errors=elite.errors[0, RATE],
+            construction=self._constructions[int(elite.plans.lineage[0])],
+            changes=int(elite.plans.changes[0]),
+            evaluations=self.evaluations,
+            history=tuple(self.history),
+        )
+
+    def _fly_all(self, flights: list[tuple[_Plans, TieRule | None]], pool: ThreadPoolExecutor) -> list[_Flown]:
+        return list(pool.map(lambda flight: self._fly(*flight), flights))
+
+    def _fly(self, plans: _Plans, tie: TieRule | None) -> _Flown:
+        size = len(plans)
+        alike = {
+            each.name: np.repeat(value, size, axis=0)
+            for each in fields(self._draws)
+            if (value := getattr(self._draws, each.name)) is not None
+        }
+        alike |= {"position_m": plans.start[:, :2].copy(), "velocity_m_s": plans.start[:, 2:].copy()}
+        draws = replace(self._draws, **alike)
+        noise = _PlannedNoise(plans, tie)
+        flight = Engagements(self.scenario, draws, self._strategy, noise=noise)
+        while flight.flying:
+            flight.advance()
+        results = flight.results(np.arange(size))
+        outcomes = np.array(results.outcomes, dtype=object)
+        counts = np.isfinite(results.miss_m)
+        if self._keep_set:
+            counts &= outcomes != Outcome.SET_LOST
+        if tie is not None:  # what the game did, as a plan
+            plans.sequence[:], plans.given[:] = noise.errors, True
+        value = np.where(counts, results.miss_m, -np.inf)
+        return _Flown(plans, value, noise.errors, outcomes, results.truth_kept)
+
+    def _select(self, flown: _Flown, young: bool) -> None:
+        """Note what has been flown, and keep the worst."""
+        self.evaluations += len(flown.value)
+        rivals = flown if self._elite is None else self._elite.join(flown)
+        order = np.argsort(-rivals.value, kind="stable")
+        kept: list[int] = []
+        of_lineage: dict[int, int] = {}
+        for each in order.tolist():
+            lineage = int(rivals.plans.lineage[each])
+            same = bool(kept) and rivals.value[each] == rivals.value[kept[-1]]
+            full = young and of_lineage.get(lineage, 0) >= LINEAGE_SHARE
+            if not same and not full:
+                kept.append(each)
+                of_lineage[lineage] = of_lineage.get(lineage, 0) + 1
+            if len(kept) == ELITE:
+                break
+        self._elite = rivals.take(np.array(kept))
+        greatest = float(self._elite.value[0])
+        if np.isfinite(greatest) and (not self.history or greatest > self.history[-1][1]):
+            self.history.append((self.evaluations, greatest))
+
+    def _first_plans(self, count: int) -> list[tuple[_Plans, TieRule | None]]:
+        """First plans, `count` in all, of every construction as many."""
+        makers: list[tuple[str, TieRule | None, Callable[[int, Floats], tuple[Floats, bool]]]] = [
+            *((f"game noise, tie {tie.value}", tie, self._coins) for tie in TieRule),
+            ("extremes kept in random order", None, self._coins),
+            ("extremes kept in blocks", None, self._blocks),
+            ("extremal errors in blocks", None, self._extremal),
+            ("constant bias", None, self._constant),
+            ("middle of a pair", None, self._pair),
+        ]
+        shares = [len(part) for part in np.array_split(np.arange(count), len(makers))]
+        plans = []
+        for (name, tie, maker), share in zip(makers, shares, strict=True):
+            if share == 0:
+                continue
+            start = self._starts(share)
+            angle, given = maker(share, start)
+            others = np.repeat(self._random.choice([-1.0, 0.0, 1.0], (share, 2, 1)), self._steps, axis=2)
+            sequence = np.concatenate([angle[:, None], others], axis=1)
+            lineage = len(self._constructions) + np.arange(share)
+            self._constructions += [name] * share
+            none = np.zeros(share, dtype=np.int64)
+            plans.append((_Plans(start, sequence, np.full(angle.shape, given), lineage, none), tie))
+        return plans
+
+    def _starts(self, count: int) -> Floats:
+        """Starts in B x D: half of them anywhere, the others with some coordinates at an end."""
+        share = self._random.random((count, 4))
+        at_end = (self._random.random((count, 4)) < 0.5) & (self._random.random((count, 1)) < 0.5)
+        return self._lower + (self._upper - self._lower) * np.where(at_end, np.round(share), share)
+
+    def _coins(self, count: int, start: Floats) -> tuple[Floats, bool]:
+        return self._random.choice([LOWER, UPPER], (count, self._steps)), False
+
+    def _blocks(self, count: int, start: Floats) -> tuple[Floats, bool]:
+        switches = self._random.random((count, self._steps)) < 10.0 ** self._random.uniform(-2.5, -0.5, (count, 1))
+        return self._random.choice([LOWER, UPPER], (count, 1)) * (-1.0) ** np.cumsum(switches, axis=1), False
+
+    def _extremal(self, count: int, start: Floats) -> tuple[Floats, bool]:
+        return self._blocks(count, start)[0], True
+
+    def _constant(self, count: int, start: Floats) -> tuple[Floats, bool]:
+        return np.repeat(self._random.uniform(-1.0, 1.0, (count, 1)), self._steps, axis=1), True
+
+    def _pair(self, count: int, start: Floats) -> tuple[Floats, bool]:
+        """Half the lateral distance to another straight motion, within the bounds until shortly before the end.
+
+        The other motion is `at_first` bounds away at t = 0 and one bound away, on either side, when the two can be
+        told apart; from then on the measurements are exact.
+        """
+        step_s, sensor = self.scenario.set_model.step_s, self.scenario.set_model.angle_sensor
+        closing = -start[:, 3:]
+        ranges = np.maximum(start[:, 1:2] - closing * step_s * np.arange(self._steps), 0.0)
+        bound = ranges * sensor.error_bound(ranges)
+        time_left = self._random.uniform(1.0, 12.0, (count, 1)) * step_s
+        apart_at = np.clip(np.round((start[:, 1:2] / closing - time_left) / step_s), 1, self._steps - 1).astype(int)
+        begin = self._random.uniform(-1.0, 1.0, (count, 1)) * bound[:, :1]
+        end = self._random.choice([-1.0, 1.0], (count, 1)) * np.take_along_axis(bound, apart_at, axis=1)
+        half = begin + (end - begin) * np.arange(self._steps) / apart_at
+        errors = np.divide(half, bound, out=np.zeros_like(half), where=bound > 0.0)
+        return np.where(np.arange(self._steps) <= apart_at, np.clip(errors, -1.0, 1.0), 0.0), True
+
+    def _children(self, count: int) -> _Plans:
+        """Plans changed from the elite; the worse a plan, the more often."""
+        elite = self._elite
+        if elite is None:
+            raise RuntimeError("there is nothing to change before something has flown")
+        ranks = np.floor(len(elite.value) * self._random.random(count) ** 2).astype(np.int64)
+        plans = elite.plans.take(ranks)
+        for i in range(count):
+            for _ in range(int(self._random.integers(1, MOST_CHANGES + 1))):
+                change = self._CHANGES[int(self._random.integers(len(self._CHANGES)))]
+                change(self, plans, i)
+        plans.changes[:] += 1
+        return plans
+
+    def _last_step(self, plans: _Plans, i: int) -> int:
+        """The last step before the closest approach of a start, with a step to spare."""
+        x, vx = float(plans.start[i, 1]), float(plans.start[i, 3])
+        return min(self._steps - 1, int(x / (-vx * self.scenario.set_model.step_s)) + 1)
+
+    def _step(self, plans: _Plans, i: int) -> int:
+        """A step at random: anywhere or, as often, late."""
+        last = self._last_step(plans, i)
+        if self._random.random() < 0.5:
+            return int(self._random.integers(last + 1))
+        return max(0, last - int(self._random.exponential(LATE_STEPS)))
+
+    def _span(self, plans: _Plans, i: int) -> slice:
+        """A block of steps at random, short more often than long."""
+        begin = self._step(plans, i)
+        return slice(begin, begin + 1 + int(10.0 ** self._random.uniform(0.0, 2.0)))
+
+    def _flip_step(self, plans: _Plans, i: int) -> None:
+        plans.sequence[i, ANGLE, self._step(plans, i)] *= -1.0
+
+    def _flip_block(self, plans: _Plans, i: int) -> None:
+        plans.sequence[i, ANGLE, self._span(plans, i)] *= -1.0
+
+    def _move_switch(self, plans: _Plans, i: int) -> None:
+        """Move one switching time by a few steps."""
+        signs = np.sign(plans.sequence[i, ANGLE, : self._last_step(plans, i) + 1])
+        switches = np.flatnonzero(np.diff(signs))
+        if switches.size:
+            at, by = int(self._random.choice(switches)), int(self._random.integers(1, 5))
+            if self._random.random() < 0.5:
+                plans.sequence[i, ANGLE, at + 1 : at + 1 + by] *= -1.0
+            else:
+                plans.sequence[i, ANGLE, max(0, at + 1 - by) : at + 1] *= -1.0
+
+    def _roll(self, plans: _Plans, i: int) -> None:
+        """Move the whole plan by a few steps."""
+        by = int(self._random.choice([-3, -2, -1, 1, 2, 3]))
+        plans.sequence[i] = np.roll(plans.sequence[i], by, axis=-1)
+        plans.given[i] = np.roll(plans.given[i], by)
+
+    def _give_block(self, plans: _Plans, i: int) -> None:
+        """Give the errors of a block, or leave it to the extremes."""
+        span = self._span(plans, i)
+        if plans.given[i, span].all():
+            plans.given[i, span] = False
+        else:
+            plans.given[i, span] = True
+            anything = self._random.uniform(-1.0, 1.0)
+            plans.sequence[i, :, span] = self._random.choice([-1.0, 0.0, 1.0, anything], (3, 1))
+
+    def _move_error(self, plans: _Plans, i: int) -> None:
+        """Change the size of the given errors of a block."""
+        span = self._span(plans, i)
+        moved = plans.sequence[i, :, span] + 10.0 ** self._random.uniform(-2.0, 0.0) * self._random.normal(size=(3, 1))
+        given = plans.given[i, span]
+        plans.sequence[i, :, span] = np.where(given, np.clip(moved, -1.0, 1.0), plans.sequence[i, :, span])
+
+    def _cross(self, plans: _Plans, i: int) -> None:
+        """Take the end of the plan from another of the elite."""
+        elite = self._elite
+        if elite is not None:
+            other, begin = int(self._random.integers(len(elite.value))), self._step(plans, i)
+            plans.sequence[i, :, begin:] = elite.plans.sequence[other, :, begin:]
+            plans.given[i, begin:] = elite.plans.given[other, begin:]
+
+    def _move_start(self, plans: _Plans, i: int) -> None:
+        """Move the start by little or much, in one coordinate or in all, or one coordinate to an end."""
+        which = self._random.random(4) < self._random.choice([0.25, 1.0])
+        width = self._upper - self._lower
+        moved = plans.start[i] + width * 10.0 ** self._random.uniform(-5.0, -0.5) * self._random.normal(size=4)
+        if self._random.random() < 0.1:
+            moved = np.where(self._random.random(4) < 0.5, self._lower, self._upper)
+        plans.start[i] = np.clip(np.where(which, moved, plans.start[i]), self._lower, self._upper)
+
+    _CHANGES = (
+        _flip_step,
+        _flip_block,
+        _move_switch,
+        _roll,
+        _give_block,
+        _move_error,
+        _cross,
+        _move_start,
+        _move_start,
+        _move_start,
+    )
+
+
+def _parts(size: int, greatest: int) -> list[slice]:
+    """Slices of at most so many that make up the whole."""
+    return [slice(begin, min(begin + greatest, size)) for begin in range(0, size, greatest)]
