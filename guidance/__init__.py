@@ -1,6 +1,8 @@
 """Guidance: what to do with an information set, and what nature does against it."""
 
 from guidance.game_noise import GameNoise
+from guidance.kalman import Kalman
+from guidance.least_squares import LeastSquares
 from guidance.noise import LineOfSight, Measurement, MeasurementNoise, NoiseKind, TieRule
 from guidance.patient import Patient
 from guidance.predicted_miss import symmetric_impulse, zero_effort_miss
@@ -11,9 +13,12 @@ from guidance.situation import Situation
 from guidance.strategy import Strategy
 from guidance.symmetric_miss import SymmetricMiss
 from guidance.thruster import Thruster
+from guidance.zero_effort import ZeroEffortMiss
 
 __all__ = [
     "GameNoise",
+    "Kalman",
+    "LeastSquares",
     "LineOfSight",
     "Measurement",
     "MeasurementNoise",
@@ -26,6 +31,7 @@ __all__ = [
     "SymmetricMiss",
     "Thruster",
     "TieRule",
+    "ZeroEffortMiss",
     "make_strategy",
     "strategy_names",
     "symmetric_impulse",

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
+from guidance.kalman import Kalman
+from guidance.least_squares import LeastSquares
 from guidance.patient import Patient
 from guidance.strategy import Strategy
 from guidance.symmetric_miss import SymmetricMiss
+from guidance.zero_effort import ZeroEffortMiss
 
 _STRATEGIES: Mapping[str, Callable[[], Strategy]] = MappingProxyType(
-    {each.name: each for each in (SymmetricMiss, Patient)}
+    {each.name: each for each in (SymmetricMiss, Patient, ZeroEffortMiss, Kalman, LeastSquares)}
 )
 
 

@@ -219,6 +219,12 @@ class InformationSetView:
         worst = np.maximum(summaries[:, :, kernels.UPPER_MISS], -summaries[:, :, kernels.LOWER_MISS])
         return np.where(self.living, worst, 0.0)
 
+    def predicted_miss_by_section_m(self) -> tuple[Floats, Floats]:
+        """Least and greatest predicted miss of each stored section, m, each (B, S); zeros where none lives."""
+        summaries, living = self._stack.summaries, self.living
+        lower, upper = summaries[:, :, kernels.LOWER_MISS], summaries[:, :, kernels.UPPER_MISS]
+        return np.where(living, lower, 0.0), np.where(living, upper, 0.0)
+
     def sections(self, engagement: int = 0) -> list[Section]:
         """Living sections of one engagement, in rising order of range."""
         ranges = self.ranges_m[engagement]
