@@ -18,6 +18,8 @@ class PairNoise:
     ----------
     last_common_step : int
         The last step at which both truths of a pair are measured at the middle between them.
+    angle_every : int
+        Steps between measurements of the angle: at the others nobody looks at what is given.
 
     Attributes
     ----------
@@ -30,8 +32,9 @@ class PairNoise:
     nothing else does the same in both; the set is not looked at.
     """
 
-    def __init__(self, last_common_step: int) -> None:
+    def __init__(self, last_common_step: int, angle_every: int = 1) -> None:
         self.last_common_step = last_common_step
+        self.angle_every = angle_every
         self.greatest_share = 0.0
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
@@ -42,7 +45,8 @@ class PairNoise:
                 sight.alpha_rad, sight.range_m if ranging else None, sight.omega_rad_s if rating else None
             )
         alpha, measured_range, measured_rate = middle(sight.alpha_rad), None, None
-        self._note(np.abs(alpha - sight.alpha_rad), sight.angle_sensor.error_bound(sight.range_m))
+        if sight.step % self.angle_every == 0:
+            self._note(np.abs(alpha - sight.alpha_rad), sight.angle_sensor.error_bound(sight.range_m))
         if sight.range_error is not None:
             measured_range = middle(sight.range_m)
             self._note(np.abs(measured_range - sight.range_m), sight.range_error * sight.range_m)

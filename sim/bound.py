@@ -18,6 +18,9 @@ Integers = NDArray[np.int64]
 LABELS_A_PERIOD, PERIODS_LOOKED_AT = 8, 7
 """The bound ripples with the label, once in the way flown between two steps; beneath that it changes slowly."""
 REFINEMENTS = 5
+MARGIN = 1e-6
+"""Share of each limit that is kept back: angles are no ratios, and the truths are to look alike in rounded numbers."""
+
 STEPS_A_BLOCK = 8
 """Acceleration is constant over blocks whose length is an eighth of the time to the last common measurement."""
 
@@ -136,18 +139,16 @@ class LowerBound:
 
 
 def possible_acceleration_m_s2(scenario: Scenario) -> float:
-    """Acceleration along z that a truth of a scenario may have relative to the spacecraft, m/s^2.
+    """Acceleration along z that tells a truth of a scenario from another, m/s^2: the target's manoeuvre.
 
     Notes
     -----
-    The target's manoeuvre, and the difference of the Sun's gravity over the range: at most 1.5 K/R^3 times the range
-    across the line of sight, wherever the Sun is.
+    Gravity is no choice of the truth's: at one label it acts on both truths of a pair alike but for about K/R^3 times
+    their distance, 1e-11 m/s^2 here. Were it as free as the set takes it to be (up to 1.5 K/R^3 times the range,
+    4e-7 m/s^2), the published scenario's bound would be higher by 4e-5 m, and the pair flown under gravity as it is
+    would not be admissible.
     """
-    gravity = 0.0
-    if scenario.sun is not None:
-        gradient = scenario.sun.gravitational_parameter_m3_s2 / scenario.sun.distance_m**3
-        gravity = 1.5 * gradient * scenario.set_model.bounds.x_m[1]
-    return scenario.set_model.disturbance_m_s2 + gravity
+    return scenario.set_model.disturbance_m_s2
 
 
 def lower_bound(
@@ -194,15 +195,16 @@ def lower_bound(
     slow, fast = max(model.bounds.vx_m_s), min(model.bounds.vx_m_s)
     speeds = sorted({fast, min(max(-model.closing_speed_m_s, fast), slow), slow})
     grids = [label_grid(scenario, speed) for speed in speeds]
-    total, done = sum(len(grid) + 2 * REFINEMENTS for grid in grids), 0
+    refinements = [2 * REFINEMENTS if len(grid) > 1 else 0 for grid in grids]
+    total, done = sum(len(grid) for grid in grids) + sum(refinements), 0
     found: list[LabelBound] = []
     pairs: list[TruthPair] = []
-    for speed, grid in zip(speeds, grids, strict=True):
+    for speed, grid, extra in zip(speeds, grids, refinements, strict=True):
         best: TruthPair | None = None
         before_s: float | None = None
-        width = float(np.diff(grid).min()) if len(grid) > 1 else 0.0
+        width = float(np.diff(grid).min(initial=np.inf))
         labels = grid.tolist()
-        for index in range(len(grid) + 2 * REFINEMENTS):
+        for index in range(len(grid) + extra):
             if index >= len(grid) and best is not None:
                 # About the best so far: half a width to either side, again and again.
                 width *= 0.5 if (index - len(grid)) % 2 == 0 else 1.0
@@ -331,11 +333,13 @@ class _Approach:
         self.ranges_m = np.maximum(label_m + vx_m_s * self.times_s[:-1], 0.0)
         self.limits_m = np.full(self.steps, np.inf)
         looked = np.arange(0, self.steps, _every(model.angle_sensor.period_s, scenario))
-        self.limits_m[looked] = 2.0 * model.angle_sensor.error_bound(self.ranges_m[looked]) * self.ranges_m[looked]
+        self.limits_m[looked] = (
+            2.0 * (1.0 - MARGIN) * model.angle_sensor.error_bound(self.ranges_m[looked]) * self.ranges_m[looked]
+        )
         self.rate_limits_m = np.full(self.steps, np.inf)
         if scenario.rate_sensor is not None:
             rated = np.arange(0, self.steps, _every(scenario.rate_sensor.period_s, scenario))
-            error_m_s = scenario.rate_sensor.error_rad_s * self.ranges_m[rated]
+            error_m_s = (1.0 - MARGIN) * scenario.rate_sensor.error_rad_s * self.ranges_m[rated]
             self.rate_limits_m[rated] = 2.0 * error_m_s * self.ranges_m[rated] / -vx_m_s
 
     @property

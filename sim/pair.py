@@ -106,7 +106,8 @@ def fly_pair(
     steps = pair.acceleration_m_s2.shape[1] + STEPS_BEYOND
     nothing = np.zeros((2, steps))
     draws = Draws(pair.position_m, pair.velocity_m_s, nothing, nothing, nothing)
-    noise = PairNoise(pair.last_common_step)
+    model = scenario.set_model
+    noise = PairNoise(pair.last_common_step, max(1, round(model.angle_sensor.period_s / model.step_s)))
     truth = ScheduledMotion(pair.position_m, pair.velocity_m_s, scenario.sun, pair.acceleration_m_s2)
     flight = Engagements(scenario, draws, strategy, truth, noise)
     impulses: list[Floats] = []

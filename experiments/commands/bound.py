@@ -212,6 +212,7 @@ def _show(scenario: Scenario, lower: LowerBound, found: Sequence[Found], stdout_
     from rich.text import Text
 
     from experiments.commands._screen import number, table_console
+    from sim import Outcome
 
     reached = Table(box=None, pad_edge=False)
     for title in ("closing speed\nkm/s", "bound\nm", "at label\nkm", "alike until, s\nbefore arrival"):
@@ -221,7 +222,7 @@ def _show(scenario: Scenario, lower: LowerBound, found: Sequence[Found], stdout_
         row = (-pair.vx_m_s / M_PER_KM, pair.bound_m, pair.label_m / M_PER_KM, alike_s)
         reached.add_row(f"{row[0]:g}", number(row[1]), f"{row[2]:.1f}", f"{row[3]:.2f}")
     table = Table("strategy", box=None, pad_edge=False)
-    for title in ("worst found\nm", "worst\n/ bound", "guaranteed\nmiss, m"):
+    for title in ("worst found\nm", "worst\n/ bound", "guaranteed\nthen, m"):
         table.add_column(title, justify="right")
     table.add_column("outcome")
     for each in found:
@@ -235,8 +236,14 @@ def _show(scenario: Scenario, lower: LowerBound, found: Sequence[Found], stdout_
     console = table_console(stdout_taken)
     said = f"no strategy can guarantee a miss below {number(lower.bound_m)} m"
     console.print(Text(f"{scenario.name}, model {scenario.set_model.kind.value}: {said}"), soft_wrap=True)
-    console.print(Text(f"errors of the angle; acceleration along z up to {lower.disturbance_m_s2:.3g} m/s^2"))
+    console.print(
+        Text(f"whatever it does; the truth may accelerate along z by {lower.disturbance_m_s2:.3g} m/s^2"),
+        soft_wrap=True,
+    )
     console.print(reached)
     console.print()
     console.print(table)
     console.print(Text("worst found: the worse of the two truths of each pair above, flown"), soft_wrap=True)
+    if any(each.worst_outcome == Outcome.SET_LOST.value for each in found):
+        said = "set-lost: the model lost a truth it should keep; try --model guaranteed"
+        console.print(Text(said), soft_wrap=True)
