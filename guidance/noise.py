@@ -65,15 +65,15 @@ class Measurement:
 
     Parameters
     ----------
-    alpha_rad : ndarray, shape (B,)
-        Measured line-of-sight angle, rad.
+    alpha_rad : ndarray, shape (B,), or None
+        Measured line-of-sight angle, rad; None where there was none: the sensor has dropped out.
     range_m : ndarray, shape (B,), or None
         Measured range, m; None where it was not measured.
     omega_rad_s : ndarray, shape (B,), or None
         Measured rate, rad/s; None where it was not measured.
     """
 
-    alpha_rad: Floats
+    alpha_rad: Floats | None
     range_m: Floats | None
     omega_rad_s: Floats | None = None
 

@@ -192,8 +192,15 @@ def start(
 
 @inlined
 def hand_over(store: Floats, marks: Integers, n: int, giver: int, tau: float) -> None:
-    """Give the last vertices of a chain, past its highest now, to the front of the other chain."""
+    """Give the last vertices of a chain, past its highest now, to the front of the other chain.
+
+    Notes
+    -----
+    A falling time to go lifts what is on the right: only a vertex with the one before it on its outer side is passed.
+    Where the level has not turned, heights along it are equal to within rounding, and must not pass the others.
+    """
     taker = 1 - giver
+    same = 4.0 * EPSILON * store[n, RIGHT, REACH]
     origin = sign_of(giver) * (origin_height(store, n, giver, tau) - origin_height(store, n, taker, tau))
     first, back, front = begin_of(marks, n, giver), end_of(marks, n, giver) - 1, begin_of(marks, n, taker)
     back_rise = rise(store, n, giver, back, tau)
@@ -207,7 +214,8 @@ def hand_over(store: Floats, marks: Integers, n: int, giver: int, tau: float) ->
         if back == first:
             break
         before_rise = rise(store, n, giver, back - 1, tau)
-        if before_rise < back_rise:
+        inward = store[n, giver, place(store, back)] - store[n, giver, place(store, back - 1)]
+        if before_rise < back_rise or sign_of(giver) * inward > same:
             break
         back -= 1
         back_rise = before_rise
@@ -503,3 +511,29 @@ def cut_misses(
         marks[n, side, END] = length
         marks[n, side, PEAK] = 0
     return True, overlap
+
+
+@allocation_free
+def raise_from(store: Floats, marks: Integers, n: int, side: int, half_m: float) -> None:
+    """Pull a chain apart at its outermost vertex in V: the part before it sinks by half_m, the rest rises."""
+    sign = sign_of(side)
+    first, last = begin_of(marks, n, side), end_of(marks, n, side) - 1
+    outermost = first
+    for i in range(first, last + 1):
+        if sign * (store[n, side, place(store, i)] - store[n, side, place(store, outermost)]) > 0.0:
+            outermost = i
+    for i in range(last, outermost - 1, -1):
+        at = place(store, i)
+        put(store, n, side, i + 1, store[n, side, at], store[n, side, at + 1] + sign * half_m)
+    for i in range(first, outermost + 1):
+        store[n, side, place(store, i) + 1] -= sign * half_m
+    marks[n, side, END] += 1
+    marks[n, side, PEAK] = outermost
+
+
+@inlined
+def widen(store: Floats, marks: Integers, n: int, tau: float, half_z: float, half_v: float) -> None:
+    """Minkowski sum with the box |z| <= half_z, |V| <= half_v of a section that is turned to `tau`. O(vertices)."""
+    spread(store, n, tau, half_v)
+    raise_from(store, marks, n, RIGHT, half_z)
+    raise_from(store, marks, n, LEFT, half_z)

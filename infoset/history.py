@@ -21,7 +21,7 @@ class History:
     Attributes
     ----------
     kinds : ndarray of int, shape (>= events,)
-        Kind of each event: an angle, an impulse, a prediction or a rate.
+        Kind of each event: an angle, an impulse, a prediction, a rate or a widening.
     errors : ndarray, shape (>= events,)
         Error bound of each measured rate, rad/s; zero for the other kinds.
     values : ndarray, shape (B, >= events)
@@ -57,6 +57,10 @@ class History:
         self.events += 1
         self.elapsed += kind == PREDICTION
         return event
+
+    def retract(self, event: int, where: NDArray[np.bool_]) -> None:
+        """Let an event not have concerned some engagements."""
+        self.applies[where, event] = False
 
     def total_impulse(self) -> NDArray[np.float64]:
         """Sum of the moduli of all impulses of each engagement, m/s, shape (B,)."""

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from infoset import section_kernels as kernels
 from infoset.chains import CAPACITY, empty_sections, working_room
 from infoset.convex_polygons import ConvexPolygons
+from infoset.guaranteed_miss import GuaranteedMiss
 from infoset.history import History
 from infoset.location import refine_all, workspace
 from infoset.model import InitialSet, Interval, SetModel
@@ -35,7 +36,7 @@ class SetStatus(Enum):
     TRACKING = 0
     """Some state agrees with everything, above the range threshold."""
     EMPTY = 1
-    """No state agrees, and none had left below the threshold: the data or the model are inconsistent."""
+    """No state agrees, none had left below the threshold, and no recovery was possible."""
     FINISHED = 2
     """Every hypothesis has left below the threshold."""
     REFUTED = 3
@@ -120,6 +121,9 @@ class InformationSetView:
         self._lower_label, self._upper_label = label_limits
         self._status = status
         self._some_left = np.zeros(stack.batch, dtype=bool)
+        self._phi: GuaranteedMiss | None = None
+        self._lost_step = np.full(stack.batch, -1, dtype=np.int64)
+        self._lost_label = np.zeros(stack.batch)
 
     @property
     def batch(self) -> int:
@@ -140,6 +144,16 @@ class InformationSetView:
     def tracking(self) -> Flags:
         """Whether each set has states left above the threshold, shape (B,)."""
         return np.asarray(self._status == SetStatus.TRACKING.value)
+
+    @property
+    def inconsistent(self) -> Flags:
+        """Whether the data of each set have contradicted the model: it emptied, and was made anew. Shape (B,)."""
+        return np.asarray(self._lost_step >= 0)
+
+    @property
+    def inconsistency(self) -> tuple[NDArray[np.int64], Floats]:
+        """Step at which each set emptied first (-1: never), and the label (m) that came nearest to living on."""
+        return self._lost_step.copy(), self._lost_label.copy()
 
     @property
     def living(self) -> Flags:
@@ -331,6 +345,8 @@ class InformationSetView:
             self._status.copy(),
         )
         twin._some_left = self._some_left.copy()
+        twin._lost_step, twin._lost_label = self._lost_step.copy(), self._lost_label.copy()
+        twin._phi = None if self._phi is None else self._phi.copy()
         return twin
 
     def to_shapely(self, engagement: int = 0) -> list[BaseGeometry]:
@@ -344,6 +360,8 @@ class InformationSetView:
         if self.batch > 1:
             counts = np.bincount(self._status, minlength=len(SetStatus))
             states = ", ".join(f"{counts[s.value]} {s.name.lower()}" for s in SetStatus if counts[s.value])
+            if self.inconsistent.any():
+                states += f", {np.count_nonzero(self.inconsistent)} of them inconsistent"
             return f"<{head}: {self.batch} engagements, {states}>"
         if not self.tracking[0]:
             return f"<{head}: {self.status[0].name.lower()}>"
@@ -364,6 +382,9 @@ class InformationSet(InformationSetView):
         What is known and assumed.
     batch : int
         Number of engagements B; one by default.
+    guarantee : bool
+        Whether to keep the guaranteed miss Phi: only the guaranteed model, started from a box, has one. It takes about
+        as long as the rest.
 
     Examples
     --------
@@ -384,7 +405,7 @@ class InformationSet(InformationSetView):
     The order inside one step: `measure_range`, `measure_angle`, `shift`, `drop_below_threshold`, `predict`.
     """
 
-    def __init__(self, model: SetModel, batch: int = 1) -> None:
+    def __init__(self, model: SetModel, batch: int = 1, *, guarantee: bool = True) -> None:
         least, greatest = model.label_limits_m
         slots = max(model.sections, 2 * model.fewest_sections + 1)
         labels = np.full((batch, slots), greatest)
@@ -398,11 +419,33 @@ class InformationSet(InformationSetView):
             (np.full(batch, least), np.full(batch, greatest)),
             np.full(batch, SetStatus.TRACKING.value, dtype=np.int64),
         )
+        if guarantee and model.is_guaranteed and model.initial_set is InitialSet.BOX:
+            self._phi = GuaranteedMiss(self._stack.law, batch, model.speed_error)
+
+    def guaranteed_miss(self) -> tuple[Floats, Flags]:
+        """The guaranteed miss Phi: whatever the truth is and did within its bounds, its miss is no more.
+
+        Returns
+        -------
+        phi_m : ndarray, shape (B,)
+            m; zero where no label has left yet.
+        exists : ndarray of bool, shape (B,)
+            Whether it holds: some label has left, the model guarantees, and no measurement broke its bounds.
+
+        Notes
+        -----
+        It is of the labels that have left below the threshold; the truth is among them by the time it arrives.
+        """
+        if self._phi is None:
+            return np.zeros(self.batch), np.zeros(self.batch, dtype=bool)
+        return self._phi.bound_m, self._phi.exists & ~self.inconsistent
 
     def view(self) -> InformationSetView:
         """A read-only view of this set: it follows the set and cannot change it."""
         limits = self._lower_label, self._upper_label
-        return InformationSetView(self.model, self._stack, self._history, limits, self._status)
+        view = InformationSetView(self.model, self._stack, self._history, limits, self._status)
+        view._lost_step, view._lost_label = self._lost_step, self._lost_label
+        return view
 
     def measure_range(
         self,
@@ -438,10 +481,12 @@ class InformationSet(InformationSetView):
         nearer = np.cos(self._greatest_alpha(alpha_rad)) if self.model.is_guaranteed else 1.0
         lower = measured * nearer / ((1.0 + relative_error) * (1.0 + eta)) + travelled - slack
         upper = measured / ((1.0 - relative_error) * (1.0 - eta)) + travelled + slack
+        before = self._lower_label.copy(), self._upper_label.copy()
         self._lower_label[active] = np.maximum(self._lower_label, lower)[active]
         self._upper_label[active] = np.minimum(self._upper_label, upper)[active]
         self._stack.keep_labels(self._lower_label, self._upper_label, active)
-        self._keep_enough(active, emptied=SetStatus.EMPTY)
+        emptied = self._keep_enough(active, emptied=SetStatus.EMPTY)
+        self._recover(emptied, None, *before)
 
     def _greatest_alpha(self, measured_rad: ArrayLike | None) -> Floats:
         """Bound of |alpha| now, rad, shape (B,): from a measured one, or from the fastest the object can go."""
@@ -470,8 +515,10 @@ class InformationSet(InformationSetView):
         measured = self._spread(alpha_rad, "alpha_rad")
         active = self._active(where)
         event = self._history.record(kernels.ANGLE, measured, active)
+        before = self._lower_label.copy(), self._upper_label.copy()
         self._stack.measure_angle(active, measured, self._history.elapsed, event)
-        self._keep_enough(active, emptied=SetStatus.EMPTY)
+        emptied = self._keep_enough(active, emptied=SetStatus.EMPTY)
+        self._recover(emptied, event, *before)
 
     def measure_rate(self, omega_rad_s: ArrayLike, error_rad_s: float, where: ArrayLike = True) -> None:
         """Cut every section by a measurement of the line of sight's rate: |omega - omega_m| <= error.
@@ -493,8 +540,10 @@ class InformationSet(InformationSetView):
         active = self._active(where)
         error = error_rad_s * (1.0 + BOUND_SLACK)
         event = self._history.record(kernels.RATE, measured, active, error)
+        before = self._lower_label.copy(), self._upper_label.copy()
         self._stack.measure_rate(active, measured, error, self._history.elapsed, event)
-        self._keep_enough(active, emptied=SetStatus.EMPTY)
+        emptied = self._keep_enough(active, emptied=SetStatus.EMPTY)
+        self._recover(emptied, event, *before)
 
     def shift(self, impulse_m_s: ArrayLike, where: ArrayLike = True) -> None:
         """Shift every section by an impulse: V becomes V - k, that is omega becomes omega - k/x.
@@ -508,6 +557,8 @@ class InformationSet(InformationSetView):
         """
         impulse = self._spread(impulse_m_s, "impulse_m_s")
         active = self._active(where) & (impulse != 0.0)
+        if self._phi is not None:
+            self._phi.fire(np.where(self._active(where), impulse, 0.0), self._history.elapsed)
         self._history.record(kernels.IMPULSE, impulse, active)
         self._stack.shift(active, impulse, self._history.elapsed)
 
@@ -522,9 +573,14 @@ class InformationSet(InformationSetView):
         active = self.tracking
         elapsed = self.model.step_s * (self._history.elapsed + 1)
         least_label = self.model.range_threshold_m + self.model.closing_speed_m_s * elapsed
+        if self._phi is not None:
+            leaving_below = np.minimum(self._upper_label, least_label)
+            self._phi.leave(active, self._lower_label, leaving_below, self._stack, self._history)
         self._lower_label[active] = np.maximum(self._lower_label, least_label)[active]
         left = self._stack.keep_labels(self._lower_label, self._upper_label, active)
         self._some_left |= left.any(axis=1)
+        if self._phi is not None:
+            self._some_left |= self._phi.exists
         self._keep_enough(active, emptied=SetStatus.FINISHED)
         return left
 
@@ -552,16 +608,52 @@ class InformationSet(InformationSetView):
     def _active(self, where: ArrayLike) -> Flags:
         return np.asarray(self.tracking & np.asarray(where, dtype=bool))
 
-    def _keep_enough(self, active: Flags, emptied: SetStatus) -> None:
-        """Re-grid where fewer than the fewest sections are left, and note where nothing lives."""
-        few = active & (self.section_counts < self.model.fewest_sections)
-        if not few.any():
-            return
-        self._regrid(few, 2 * self.model.fewest_sections + 1)
-        empty = few & (self.section_counts == 0)
+    def _keep_enough(self, active: Flags, emptied: SetStatus) -> Flags:
+        """Re-grid where fewer than the fewest sections are left; note, and return, where nothing lives any more."""
+        empty = active & (self.section_counts < self.model.fewest_sections)
+        if not empty.any():
+            return empty
+        self._regrid(empty, 2 * self.model.fewest_sections + 1)
+        empty &= self.section_counts == 0
         self._status[empty] = emptied.value
         if emptied is SetStatus.EMPTY:
             self._status[empty & self._some_left] = SetStatus.REFUTED.value
+            empty &= ~self._some_left
+        return empty
+
+    def _recover(self, empty: Flags, event: int | None, lower: Floats, upper: Floats) -> None:
+        """Go on without the measurement that emptied a set: the last consistent set, predicted to now and widened.
+
+        Parameters
+        ----------
+        empty : ndarray of bool, shape (B,)
+            Which sets.
+        event : int or None
+            The measurement; None for one of range, which is no event.
+        lower, upper : ndarray, shape (B,)
+            Limits of the labels before it.
+        """
+        if not empty.any():
+            return
+        history = self._history
+        for b in np.flatnonzero(empty & (self._lost_step < 0)):
+            # The label that came nearest to living through it.
+            died, overlaps = self._stack.sections.died[b], self._stack.sections.overlaps[b]
+            last = event is not None and (died == event).any()
+            nearest = np.where(died == event, overlaps, -np.inf).argmax() if last else len(died) // 2
+            self._lost_step[b], self._lost_label[b] = history.elapsed, self._stack.labels[b, nearest]
+        if event is not None:
+            history.retract(event, empty)
+        history.record(kernels.WIDENING, np.zeros(self.batch), empty)
+        # Those that this measurement killed live again; their polygons are made anew below.
+        sections = self._stack.sections
+        stored = np.arange(sections.labels.shape[1]) < sections.used[:, None]
+        killed = (sections.died == kernels.ALIVE) | (sections.died == (-1 if event is None else event))
+        sections.living[empty] = (stored & killed)[empty]
+        self._lower_label[empty], self._upper_label[empty] = lower[empty], upper[empty]
+        self._status[empty] = SetStatus.TRACKING.value
+        self._regrid(empty, 2 * self.model.fewest_sections + 1)
+        self._status[empty & (self.section_counts == 0)] = SetStatus.EMPTY.value
 
     def _regrid(self, wanted: Flags, sections: int) -> None:
         tape, stack = self._history, self._stack

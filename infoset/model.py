@@ -117,8 +117,13 @@ class SetModel:
 
     @property
     def acceleration_m_s2(self) -> float:
-        """Bound nu of the acceleration along z that the set allows for, m/s^2."""
-        return self.disturbance_m_s2 + (self.gravity_m_s2 if self.is_guaranteed else 0.0)
+        """Bound nu of the acceleration along z that the set allows for, m/s^2.
+
+        In the guaranteed model lengths, and so accelerations, are those of the truth divided by 1 + eta.
+        """
+        if not self.is_guaranteed:
+            return self.disturbance_m_s2
+        return (self.disturbance_m_s2 + self.gravity_m_s2) / (1.0 - self.speed_error)
 
     @property
     def label_limits_m(self) -> Interval:

@@ -28,7 +28,7 @@ SUM_SLACK = 8.0 * chains.EPSILON
 TIE_TOLERANCE = 1e-9
 RIGHT_ANGLE = 0.5 * math.pi
 
-ANGLE, IMPULSE, PREDICTION, RATE = range(4)
+ANGLE, IMPULSE, PREDICTION, RATE, WIDENING = range(5)
 ALIVE = np.iinfo(np.int64).max
 
 # Columns of a section's summary.
@@ -204,6 +204,19 @@ def measure_rate_section(
         upper *= widest if upper > 0.0 else 1.0
     slack = CUT_SLACK * (label * (abs(omega) + error) + store[n, RIGHT, REACH]) * (label / law.closing_speed)
     return chains.cut_misses(store, marks, n, tau, tau * x * lower - slack, tau * x * upper + slack, points)
+
+
+@allocation_free
+def widen_section(
+    store: Floats, marks: Integers, n: int, label: float, elapsed: int, law: SectionLaw, points: Floats
+) -> None:
+    """Widen a section by the error of one angle measurement, b: by x b in z and by e b in V, a miss of x b more."""
+    tau = time_to_go(label, elapsed, law)
+    if chains.is_crowded(marks, n):
+        chains.reduce_outward(store, marks, n, tau, points)
+    x = range_of(label, elapsed, law)
+    bound = law.error_at_zero_range + law.error_slope * x
+    chains.widen(store, marks, n, tau, x * bound, law.closing_speed * bound)
 
 
 @substituted
@@ -495,6 +508,8 @@ def replay(
             )
             if not living:
                 return event
+        elif kinds[event] == WIDENING:
+            widen_section(store, marks, n, label, elapsed, law, points)
         else:
             shift_section(store, n, label, elapsed, values[event], law)
     return ALIVE

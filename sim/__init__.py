@@ -2,18 +2,20 @@
 
 from sim.record import Record, StepRecord, fly_one
 from sim.results import Outcome, Results
-from sim.scenario import Scenario, Sun
+from sim.scenario import Manoeuvre, Scenario, Sun, Target
 from sim.simulate import simulate
 from sim.statistics import Distribution, band_half_width, empirical_distribution, quantiles
 
 __all__ = [
     "Distribution",
+    "Manoeuvre",
     "Outcome",
     "Record",
     "Results",
     "Scenario",
     "StepRecord",
     "Sun",
+    "Target",
     "band_half_width",
     "empirical_distribution",
     "fly_one",

@@ -18,7 +18,7 @@ from guidance import (
     Strategy,
     make_strategy,
 )
-from infoset import InformationSet, InformationSetView, PredictedMiss, SetStatus
+from infoset import InformationSet, InformationSetView, PredictedMiss
 from sim.draws import Draws
 from sim.gravity import on_board_model
 from sim.kepler import KeplerMotion, Sight, TrueMotion
@@ -107,7 +107,7 @@ class Engagements:
         self._noise = noise or _make_noise(scenario, draws)
         self._strategy = strategy or make_strategy(scenario.strategy)
         self._state = self._strategy.start(batch)
-        model = on_board_model(scenario)
+        self._model = model = on_board_model(scenario)
         arrival_s = self._truth.arrival_s()
         self._information = InformationSet(model, batch)
         self._truth_section = TruthSection(model, arrival_s)
@@ -207,7 +207,7 @@ class Engagements:
                 alpha_rad=measurement.alpha_rad if looking else None,
             )
             self._measured_range = measurement.range_m
-        if looking:
+        if looking and measurement.alpha_rad is not None:
             self._information.measure_angle(measurement.alpha_rad, self._tracking)
             self._measured_angle = measurement.alpha_rad
         if measurement.omega_rad_s is not None and rate_sensor is not None:
@@ -266,6 +266,9 @@ class Engagements:
 
     def _finish_labels(self) -> None:
         """Let labels leave below the threshold, and note the predicted miss of those that do."""
+        if self._model.is_guaranteed:
+            self._information.drop_below_threshold()
+            return
         worst = self._information.worst_predicted_miss_m()
         left = self._information.drop_below_threshold()
         if left.any():
@@ -276,15 +279,18 @@ class Engagements:
 
     def results(self, runs: NDArray[np.int64]) -> Results:
         """Results so far, under these run numbers."""
-        lost = np.array([status is SetStatus.EMPTY for status in self._information.status])
+        lost = self._information.inconsistent
         margin = self._truth_section.least_margin_m
+        payoff, known = self._guaranteed, self._finished_label
+        if self._model.is_guaranteed:
+            payoff, known = self._information.guaranteed_miss()
         # Out of steps without having passed: the object is where it is.
         miss = np.where(np.isfinite(self._miss), self._miss, self._truth.sight().range_m)
         return Results(
             runs=runs,
             miss_m=miss,
             impulse_m_s=self.scenario.thruster.budget_m_s - self._budget,
-            guaranteed_miss_m=np.ma.MaskedArray(self._guaranteed, mask=~self._finished_label),
+            guaranteed_miss_m=np.ma.MaskedArray(payoff, mask=~known),
             outcomes=tuple(
                 _outcome(*flags) for flags in zip(miss > self.scenario.nominal_range_m, lost, self._spent, strict=True)
             ),

@@ -155,16 +155,27 @@ def test_the_point_of_an_extreme_edge_is_its_lowest_above_and_its_highest_below(
     assert miss.upper_point.alpha_rad[0] < miss.lower_point.alpha_rad[0]
 
 
-def test_inconsistent_measurements_empty_the_set_and_say_so() -> None:
+def test_inconsistent_measurements_are_told_and_the_set_goes_on_from_the_last_consistent_one() -> None:
     information = InformationSet(MODEL, batch=2)
     information.measure_angle(0.001)
+    before = information.copy()
     information.measure_angle([0.0012, -0.0012])
-    assert information.status == [SetStatus.TRACKING, SetStatus.EMPTY]
-    assert not information.predicted_miss().exists[1]
+    assert information.inconsistent.tolist() == [False, True]
+    step, label = information.inconsistency
+    assert step.tolist() == [-1, 0]
+    assert MODEL.bounds.x_m[0] <= label[1] <= MODEL.bounds.x_m[1]
+    assert information.status == [SetStatus.TRACKING, SetStatus.TRACKING]
+    # As before the measurement, and wider by what one measurement may err: x b in z, and as much in the miss by V.
+    x, slack = 5801.3e3, 1e-9
+    bound = MODEL.angle_sensor.error_bound(x)
+    old, new = before.section_at(x, 1).polygon, information.section_at(x, 1).polygon
+    grown = old.minkowski_sum(ConvexPolygons.box((-E * bound, E * bound), (-x * bound, x * bound)))
+    for direction in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.01), (-1.0, 0.02)):
+        assert new.support(direction) == pytest.approx(float(grown.support(direction)), rel=slack)
     information.predict()
     information.shift(1.0)
-    assert information.status[1] is SetStatus.EMPTY
-    assert "1 tracking, 1 empty" in repr(information)
+    assert information.predicted_miss().exists.all()
+    assert "2 tracking, 1 of them inconsistent" in repr(information)
 
 
 def test_a_set_whose_labels_have_all_left_is_finished() -> None:

@@ -1,0 +1,159 @@
+"""Does the guaranteed model keep its word? Fly every kind of noise from everywhere in B x D, and count what breaks.
+
+    python benchmarks/soundness.py --engagements 200000
+    python benchmarks/soundness.py --engagements 200000 --hostile      # execution errors of 2 %, a manoeuvring target
+
+Counted are engagements whose truth left its own section (by any amount), whose set was lost, and whose true miss
+exceeded Phi. All must be zero. Engagements of one batch have noise of every kind, real Kepler truth, V_x anywhere in D.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.scenario_file import load_scenario
+from guidance import GameNoise, LineOfSight, Measurement, MeasurementNoise, RandomNoise, TieRule
+from infoset import InformationSetView, InitialSet, Model
+from sim import Manoeuvre, Outcome, Scenario, Target
+from sim.draws import Draws, draw
+from sim.engagement import Engagements
+
+Floats = NDArray[np.float64]
+BATCH = 80
+KINDS = ("random", "game, upper", "game, lower", "game, alternate", "game, random", "extremal", "constant", "pair")
+
+
+@dataclass(frozen=True)
+class PairNoise:
+    """Engagements 2 k and 2 k + 1 are shown the angle between their two, as far as both bounds allow."""
+
+    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
+        """Show each the middle."""
+        partner = np.arange(sight.alpha_rad.size) ^ 1
+        middle = 0.5 * (sight.alpha_rad + sight.alpha_rad[partner])
+        bound = sight.angle_sensor.error_bound(sight.range_m)
+        alpha = np.clip(middle, sight.alpha_rad - bound, sight.alpha_rad + bound)
+        return Measurement(alpha, None if sight.range_error is None else sight.range_m.copy())
+
+
+@dataclass(frozen=True)
+class MixedNoise:
+    """Engagement b has noise number b modulo how many there are, in pairs."""
+
+    parts: tuple[MeasurementNoise, ...]
+
+    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
+        """Ask all, and give to each engagement its own."""
+        kind = kind_of(sight.alpha_rad.size)
+        given = [part.measure(sight, predicted) for part in self.parts]
+        alpha = np.choose(kind, [each.alpha_rad for each in given])
+        ranges = None if sight.range_error is None else np.choose(kind, [each.range_m for each in given])
+        return Measurement(alpha, ranges)
+
+
+def kind_of(batch: int) -> NDArray[np.int64]:
+    """Number of the noise of each engagement."""
+    return np.arange(batch) // 2 % len(KINDS)
+
+
+def every_noise(draws: Draws) -> MixedNoise:
+    """One noise of each kind."""
+    signs = np.where(draws.tie >= 0.0, 1.0, -1.0)
+    # Half of them at the bound, half anywhere.
+    bias = np.where(np.arange(len(signs)) % 4 < 2, signs[:, 0], draws.tie[:, 0])
+    constant = np.broadcast_to(bias[:, None], signs.shape)
+    range_signs = np.where(draws.range >= 0.0, 1.0, -1.0)
+    return MixedNoise(
+        (
+            RandomNoise(draws.angle, draws.range),
+            *(GameNoise(tie, draws.tie) for tie in (TieRule.UPPER, TieRule.LOWER, TieRule.ALTERNATE, TieRule.RANDOM)),
+            RandomNoise(signs, range_signs),
+            RandomNoise(constant, range_signs[:, :1] + np.zeros_like(signs)),
+            PairNoise(),
+        )
+    )
+
+
+def guaranteed(scenario: Scenario, hostile: bool) -> Scenario:
+    """The scenario with the guaranteed model and starts anywhere in B x D."""
+    model = replace(scenario.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    scenario = replace(scenario, set_model=model, dispersion=model.bounds)
+    if not hostile:
+        return scenario
+    target = Target(Manoeuvre.WORST_CASE, model.disturbance_m_s2)
+    return replace(scenario, thruster=replace(scenario.thruster, execution_error_relative=0.02), target=target)
+
+
+@dataclass(frozen=True)
+class Count:
+    """What broke, of how many."""
+
+    engagements: int = 0
+    outside: int = 0
+    lost: int = 0
+    above: int = 0
+    unknown: int = 0
+
+    def __add__(self, other: Count) -> Count:
+        return Count(*(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True)))
+
+
+def fly(scenario: Scenario, first: int, batch: int, seed: int) -> Count:
+    """Fly some engagements, of every noise."""
+    draws = draw(scenario, range(first, first + batch), seed)
+    if draws.execution is not None and first // batch % 2:
+        draws = replace(draws, execution=np.where(draws.execution >= 0.0, 1.0, -1.0))
+    if scenario.target is not None:
+        manoeuvres = [each for each in Manoeuvre if each is not Manoeuvre.NONE]
+        target = replace(scenario.target, manoeuvre=manoeuvres[first // batch % len(manoeuvres)])
+        scenario = replace(scenario, target=target)
+    flight = Engagements(scenario, draws, noise=every_noise(draws))
+    while flight.flying:
+        flight.advance()
+    results = flight.results(np.arange(first, first + batch))
+    phi = results.guaranteed_miss_m
+    return Count(
+        batch,
+        int((results.truth_margin_m < 0.0).sum()),
+        results.outcomes.count(Outcome.SET_LOST),
+        int((results.miss_m > phi.filled(np.inf)).sum()),
+        int(np.ma.getmaskarray(phi).sum()),
+    )
+
+
+def scenarios(hostile: bool) -> list[Scenario]:
+    """The built-in scenarios, each without and with its range meter."""
+    given = [guaranteed(load_scenario(name), hostile) for name in ("asteroid-1997", "comet-fast")]
+    return [replace(each, range_sensor=sensor) for each in given for sensor in {None, each.range_sensor}]
+
+
+def main() -> None:
+    """Fly, count and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--engagements", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--hostile", action="store_true", help="execution errors of 2 %% and a manoeuvring target")
+    parser.add_argument("--workers", type=int, default=1)
+    given = parser.parse_args()
+    flown = scenarios(given.hostile)
+    began = time.perf_counter()
+    total = Count()
+    with ThreadPoolExecutor(given.workers) as pool:
+        jobs = [
+            pool.submit(fly, flown[number % len(flown)], number * BATCH, BATCH, given.seed)
+            for number in range(-(-given.engagements // BATCH))
+        ]
+        for number, job in enumerate(jobs):
+            total += job.result()
+            if number % 50 == 49 or number == len(jobs) - 1:
+                print(f"{total} {time.perf_counter() - began:.0f} s", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,344 @@
+"""The guaranteed miss Phi: a bound on the true miss that is known on board, over the continuum of labels.
+
+Labels leave the set step by step, as their range falls below the threshold. Whatever leaves is bounded here, between
+the replayed labels too, and then follows the impulses that are still fired before its range is zero. docs/guarantee.md
+has the theorem and its proof.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from infoset import chains
+from infoset._compile import allocation_free, entry
+from infoset.history import History
+from infoset.location import Tape, Workspace, locate_end, run, workspace
+from infoset.section_kernels import ALIVE, Flags, Floats, Integers, SectionLaw, Sections
+from infoset.section_stack import SectionStack
+
+LABELS = 4
+"""Labels replayed in what leaves at one step; with one more on either side for extrapolation."""
+MOST_LABELS = LABELS + 2
+PIECES = LABELS + 1
+LEAST, GREATEST, NEAREST, FARTHEST = range(4)
+"""Columns of a piece: bounds of its predicted miss, and its ends as labels, all in m."""
+RESOLUTION = 1e-10
+SLACK = 1e-9
+
+
+@allocation_free
+def extremes_along(points: Floats, count: int, tau: float) -> tuple[float, float]:
+    """Least and greatest z + V tau over the vertices (V, z)."""
+    least, greatest = np.inf, -np.inf
+    for i in range(count):
+        value = points[i, 1] + points[i, 0] * tau
+        least = min(least, value)
+        greatest = max(greatest, value)
+    return least, greatest
+
+
+@allocation_free
+def line_at(x: float, x0: float, y0: float, x1: float, y1: float) -> float:
+    """Value at x of the line through two points."""
+    return y0 + (y1 - y0) * ((x - x0) / (x1 - x0))
+
+
+@allocation_free
+def bound_between(
+    labels: Floats, values: Floats, number: int, first: int, p: float, q: float, slope: float, centre: float
+) -> float:
+    """Greatest value on [p, q] that a concave function with these values may have, plus slope (x - centre).
+
+    Parameters
+    ----------
+    labels, values : ndarray
+        Rising arguments, and the function there.
+    number : int
+        How many of them.
+    first : int
+        How many of the arguments are at most p; the others are at least q.
+    p, q : float
+        Ends of the stretch.
+    slope, centre : float
+        What is added.
+
+    Notes
+    -----
+    Beyond two of its points a concave function stays below the line through them. `number` is at least 3.
+    """
+    has_left, has_right = first >= 2, number - first >= 2
+    best = -np.inf
+    left_p = left_q = right_p = right_q = np.inf
+    if has_left:
+        a, b = first - 2, first - 1
+        left_p = line_at(p, labels[a], values[a], labels[b], values[b])
+        left_q = line_at(q, labels[a], values[a], labels[b], values[b])
+    if has_right:
+        a, b = first, first + 1
+        right_p = line_at(p, labels[a], values[a], labels[b], values[b])
+        right_q = line_at(q, labels[a], values[a], labels[b], values[b])
+    best = max(min(left_p, right_p) + slope * (p - centre), min(left_q, right_q) + slope * (q - centre))
+    if has_left and has_right and (left_p < right_p) != (left_q < right_q):
+        share = (right_p - left_p) / ((right_p - left_p) - (right_q - left_q))
+        x = p + share * (q - p)
+        best = max(best, left_p + share * (left_q - left_p) + slope * (x - centre))
+    return best
+
+
+@allocation_free
+def bound_piece(
+    labels: Floats,
+    outlines: Floats,
+    counts: Integers,
+    number: int,
+    first: int,
+    p: float,
+    q: float,
+    travelled: float,
+    law: SectionLaw,
+    values: Floats,
+) -> tuple[float, float]:
+    """Bounds of z + V x/e over all sections with labels from p to q.
+
+    Notes
+    -----
+    For a fixed direction the support of the sections is concave in the label; z + V x/e has a direction that
+    turns with the label. About the middle c of the piece, z + V x/e = (z + V x_c/e) + V (x - x_c)/e: the first is a
+    fixed direction, and V of the second is within its own extrapolated bounds V_c +- r.
+    """
+    e = law.closing_speed
+    centre = 0.5 * (p + q)
+    tau = (centre - travelled) / e
+    for k in range(number):
+        least, greatest = np.inf, -np.inf
+        for i in range(counts[k]):
+            least = min(least, outlines[k, i, 0])
+            greatest = max(greatest, outlines[k, i, 0])
+        values[0, k], values[1, k] = -least, greatest
+        least, greatest = extremes_along(outlines[k], counts[k], tau)
+        values[2, k], values[3, k] = -least, greatest
+    v_least = -bound_between(labels, values[0], number, first, p, q, 0.0, centre)
+    v_greatest = bound_between(labels, values[1], number, first, p, q, 0.0, centre)
+    v_middle = 0.5 * (v_least + v_greatest)
+    room = 0.5 * (v_greatest - v_least) * (q - p) / (2.0 * e)
+    least = -bound_between(labels, values[2], number, first, p, q, -v_middle / e, centre) - room
+    greatest = bound_between(labels, values[3], number, first, p, q, v_middle / e, centre) + room
+    drift = 0.5 * law.disturbance * ((q - travelled) / e) ** 2
+    return least - drift, greatest + drift
+
+
+@allocation_free
+def bound_leaving(
+    lower: float,
+    upper: float,
+    known: float,
+    elapsed: int,
+    tape: Tape,
+    law: SectionLaw,
+    room: Workspace,
+    labels: Floats,
+    outlines: Floats,
+    counts: Integers,
+    values: Floats,
+    pieces: Floats,
+) -> int:
+    """Bound the predicted miss of all labels that live between two limits; return the number of pieces written.
+
+    Parameters
+    ----------
+    lower, upper : float
+        The limits.
+    known : float
+        A label between them that is known to live; less than `lower` if none is.
+    """
+    lower_died, lower_overlap = run(lower, tape, law, room)
+    upper_died, upper_overlap = run(upper, tape, law, room)
+    living = known
+    if lower_died == ALIVE:
+        living = lower
+    elif upper_died == ALIVE:
+        living = upper
+    if living < lower:
+        # The living labels are an interval, and one beyond the limits lives: nothing does between dead limits.
+        return 0
+    resolution = RESOLUTION * upper
+    first_dead, last_dead = lower, upper
+    first, last = lower, upper
+    if lower_died != ALIVE:
+        first_dead, first = locate_end(lower, lower_died, lower_overlap, living, resolution, tape, law, room)
+    if upper_died != ALIVE:
+        last_dead, last = locate_end(upper, upper_died, upper_overlap, living, resolution, tape, law, room)
+    spacing = (last - first) / (LABELS - 1)
+    travelled = law.closing_speed * (law.step * elapsed)
+    number = 0
+    inner = 0
+    if spacing <= resolution:
+        spacing = 0.0
+    for k in range(-1, LABELS + 1):
+        outside = k < 0 or k == LABELS
+        if (spacing == 0.0 and k != 0) or (k < 0 and lower_died != ALIVE) or (k == LABELS and upper_died != ALIVE):
+            continue
+        label = last if k == LABELS - 1 and spacing > 0.0 else first + k * spacing
+        died, _ = run(label, tape, law, room)
+        if died != ALIVE:
+            continue
+        if outside and k < 0:
+            inner = 1
+        labels[number] = label
+        tau = (label - travelled) / law.closing_speed
+        counts[number] = chains.outline(room.store, room.marks, 0, tau, outlines[number])
+        number += 1
+    if spacing == 0.0 or number < 3:
+        # So few labels live that they are one to within what is located: a hair's breadth stands for the rest.
+        width = last_dead - first_dead
+        tau = (first - travelled) / law.closing_speed
+        least, greatest = extremes_along(outlines[0], counts[0], tau)
+        hair = SLACK * (abs(least) + abs(greatest)) + width * (abs(least) + abs(greatest)) / max(first - travelled, 1.0)
+        drift = 0.5 * law.disturbance * tau * tau
+        pieces[0, LEAST], pieces[0, GREATEST] = least - hair - drift, greatest + hair + drift
+        pieces[0, NEAREST], pieces[0, FARTHEST] = first_dead, last_dead
+        return 1
+    made = 0
+    for piece in range(LABELS + 1):
+        # Piece 0 ends at the first living label, the last begins at the last one.
+        at = inner + piece
+        p = first_dead if piece == 0 else labels[at - 1]
+        q = last_dead if piece == LABELS else labels[at]
+        if q <= p:
+            continue
+        before = at
+        least, greatest = bound_piece(labels, outlines, counts, number, before, p, q, travelled, law, values)
+        pieces[made, LEAST], pieces[made, GREATEST], pieces[made, NEAREST], pieces[made, FARTHEST] = (
+            least,
+            greatest,
+            p,
+            q,
+        )
+        made += 1
+    return made
+
+
+@entry
+def bound_leaving_all(
+    active: Flags,
+    lower: Floats,
+    upper: Floats,
+    elapsed: int,
+    kinds: Integers,
+    errors: Floats,
+    values: Floats,
+    applies: Flags,
+    events: int,
+    sections: Sections,
+    law: SectionLaw,
+    room: Workspace,
+    labels: Floats,
+    outlines: Floats,
+    counts: Integers,
+    supports: Floats,
+    pieces: Floats,
+    made: Integers,
+) -> None:
+    """Write the pieces of every active engagement, and how many there are."""
+    stored, used, living, _, _, _, _, _ = sections
+    for b in range(active.shape[0]):
+        made[b] = 0
+        if not active[b] or lower[b] >= upper[b]:
+            continue
+        known = lower[b] - 1.0
+        for s in range(used[b]):
+            if living[b, s] and lower[b] <= stored[b, s] <= upper[b]:
+                known = stored[b, s]
+        tape = Tape(kinds, errors, values[b], applies[b], events)
+        made[b] = bound_leaving(
+            lower[b], upper[b], known, elapsed, tape, law, room, labels, outlines, counts, supports, pieces[b]
+        )
+
+
+class GuaranteedMiss:
+    """Phi of a batch of engagements, as far as it is known: a bound on the true miss of whatever has left the set.
+
+    Parameters
+    ----------
+    law : SectionLaw
+    batch : int
+        Number of engagements B.
+    speed_error : float
+        Greatest |eta|.
+    """
+
+    def __init__(self, law: SectionLaw, batch: int, speed_error: float) -> None:
+        self._law, self._speed_error = law, speed_error
+        self._settled = np.zeros(batch)
+        self.exists: Flags = np.zeros(batch, dtype=bool)
+        # Pieces whose range is not yet zero: impulses still move them.
+        self._pending: list[tuple[Floats, Flags]] = []
+
+    @property
+    def bound_m(self) -> Floats:
+        """Phi so far, m, shape (B,); zero where nothing has left."""
+        return np.maximum(self._settled, self._worst(self._pending))
+
+    def copy(self) -> GuaranteedMiss:
+        """A Phi of its own that starts from this one."""
+        twin = GuaranteedMiss(self._law, len(self._settled), self._speed_error)
+        twin._settled, twin.exists = self._settled.copy(), self.exists.copy()
+        twin._pending = [(pieces.copy(), real.copy()) for pieces, real in self._pending]
+        return twin
+
+    def fire(self, impulse_m_s: Floats, elapsed: int) -> None:
+        """Let impulses move what has left but not yet arrived."""
+        e, error = self._law.closing_speed, self._law.impulse_error
+        travelled = e * (self._law.step * elapsed)
+        still = []
+        for pieces, real in self._pending:
+            near = np.maximum(pieces[:, :, NEAREST] - travelled, 0.0) / e
+            far = np.maximum(pieces[:, :, FARTHEST] - travelled, 0.0) / e
+            if not (real & (far > 0.0)).any():
+                self._settled = np.maximum(self._settled, self._worst([(pieces, real)]))
+                continue
+            for_least, for_greatest = (
+                impulse_m_s - error * np.abs(impulse_m_s),
+                impulse_m_s + error * np.abs(impulse_m_s),
+            )
+            moves = np.stack([k[:, None] * x for k in (for_least, for_greatest) for x in (near, far)])
+            pieces[:, :, LEAST] -= moves.max(axis=0)
+            pieces[:, :, GREATEST] -= moves.min(axis=0)
+            still.append((pieces, real))
+        self._pending = still
+
+    def leave(self, active: Flags, lower: Floats, upper: Floats, stack: SectionStack, history: History) -> None:
+        """Bound the labels that leave now: those that live from `lower` to `upper`."""
+        batch = len(active)
+        pieces, made = np.zeros((batch, PIECES, 4)), np.zeros(batch, dtype=np.int64)
+        bound_leaving_all(
+            active,
+            lower,
+            upper,
+            history.elapsed,
+            history.kinds,
+            history.errors,
+            history.values,
+            history.applies,
+            history.events,
+            stack.sections,
+            self._law,
+            workspace(history.events, 1),
+            np.empty(MOST_LABELS),
+            np.empty((MOST_LABELS, chains.CAPACITY, 2)),
+            np.empty(MOST_LABELS, dtype=np.int64),
+            np.empty((4, MOST_LABELS)),
+            pieces,
+            made,
+        )
+        real = np.arange(PIECES) < made[:, None]
+        if real.any():
+            self.exists |= real.any(axis=1)
+            self._pending.append((pieces, real))
+
+    def _worst(self, parts: list[tuple[Floats, Flags]]) -> Floats:
+        worst = np.zeros_like(self._settled)
+        for pieces, real in parts:
+            modulus = np.maximum(pieces[:, :, GREATEST], -pieces[:, :, LEAST])
+            worst = np.maximum(worst, np.where(real, modulus, 0.0).max(axis=1))
+        return worst * ((1.0 + self._speed_error) * (1.0 + SLACK))
