@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from experiments.commands.adversary import adversary
 from experiments.commands.bound import bound
 from experiments.commands.compare import compare
 from experiments.commands.engage import engage
@@ -48,6 +49,9 @@ app.command("experiment", epilog="Example: infoset experiment asteroid-1997 --ru
 app.command("engage", epilog="Example: infoset engage asteroid-1997-single --noise both --out figures")(engage)
 app.command("compare", epilog="Example: infoset compare --strategies patient,symmetric-miss --out results")(compare)
 app.command("bound", epilog="Example: infoset bound asteroid-1997 --strategies patient --out results")(bound)
+app.command(
+    "adversary", epilog="Example: infoset adversary --strategy symmetric-miss --budget 2000 --record worst.npz"
+)(adversary)
 app.command("replay", epilog="Example: infoset replay flight-random.npz flight-game.npz --out figures")(replay)
 app.add_typer(scenarios, name="scenarios")
 

@@ -47,6 +47,10 @@ UPPER, LOWER = 1.0, -1.0
 ANGLE, RANGE, RATE = range(3)
 
 
+class NothingCountsError(ValueError):
+    """No engagement of a search counts."""
+
+
 @dataclass(frozen=True)
 class WorstEngagement:
     """The engagement of greatest miss that a search has found.
@@ -217,7 +221,9 @@ def find_worst(
     Raises
     ------
     ValueError
-        If the budget or the number of threads is not positive, the seed is negative, or no engagement counts.
+        If the budget or the number of threads is not positive, or the seed is negative.
+    NothingCountsError
+        If in every engagement flown the set was lost, or the miss was not finite.
 
     Notes
     -----
@@ -238,7 +244,11 @@ def find_worst(
         )
     search = _Search(scenario, strategy, seed, keep_set)
     with ThreadPoolExecutor(threads) as pool:
-        search.run(budget, pool, progress)
+        try:
+            search.run(budget, pool, progress)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
     return search.worst()
 
 
@@ -261,24 +271,19 @@ class _Search:
         self._elite: _Flown | None = None
 
     def run(self, budget: int, pool: ThreadPoolExecutor, progress: Callable[[float], None] | None) -> None:
-        first = max(1, round(FIRST_SHARE * budget))
-        for plans, tie in self._first_plans(first):
-            for chunk in self._fly_all([(plans.take(part), tie) for part in _parts(len(plans), CHUNK)], pool):
-                self._select(chunk, young=True)
-            if progress is not None:
-                progress(self.evaluations / budget)
-        while self.evaluations < budget:
+        flights = self._first_plans(max(1, round(FIRST_SHARE * budget)))
+        while flights:
+            for flown in pool.map(lambda flight: self._fly(*flight), flights):
+                self._select(flown, young=self.evaluations < YOUNG_SHARE * budget)
+                if progress is not None:
+                    progress(self.evaluations / budget)
             size = min(GENERATION, budget - self.evaluations)
-            plans = self._children(size)
-            for chunk in self._fly_all([(plans.take(part), None) for part in _parts(size, CHUNK)], pool):
-                self._select(chunk, young=self.evaluations < YOUNG_SHARE * budget)
-            if progress is not None:
-                progress(self.evaluations / budget)
+            flights = _in_chunks(self._children(size), None) if size > 0 else []
 
     def worst(self) -> WorstEngagement:
         elite = self._elite
         if elite is None or not np.isfinite(elite.value[0]):
-            raise ValueError("in every engagement flown the set was lost or the miss was not finite: none counts")
+            raise NothingCountsError("in every engagement flown the set was lost, or the miss was not finite")
         start = elite.plans.start[0]
         z, x, vz, vx = ((float(each), float(each)) for each in start)
         return WorstEngagement(
@@ -298,9 +303,6 @@ class _Search:
             evaluations=self.evaluations,
             history=tuple(self.history),
         )
-
-    def _fly_all(self, flights: list[tuple[_Plans, TieRule | None]], pool: ThreadPoolExecutor) -> list[_Flown]:
-        return list(pool.map(lambda flight: self._fly(*flight), flights))
 
     def _fly(self, plans: _Plans, tie: TieRule | None) -> _Flown:
         size = len(plans)
@@ -357,7 +359,7 @@ class _Search:
             ("middle of a pair", None, self._pair),
         ]
         shares = [len(part) for part in np.array_split(np.arange(count), len(makers))]
-        plans = []
+        plans: list[tuple[_Plans, TieRule | None]] = []
         for (name, tie, maker), share in zip(makers, shares, strict=True):
             if share == 0:
                 continue
@@ -368,7 +370,7 @@ class _Search:
             lineage = len(self._constructions) + np.arange(share)
             self._constructions += [name] * share
             none = np.zeros(share, dtype=np.int64)
-            plans.append((_Plans(start, sequence, np.full(angle.shape, given), lineage, none), tie))
+            plans += _in_chunks(_Plans(start, sequence, np.full(angle.shape, given), lineage, none), tie)
         return plans
 
     def _starts(self, count: int) -> Floats:
@@ -510,6 +512,7 @@ class _Search:
     )
 
 
-def _parts(size: int, greatest: int) -> list[slice]:
-    """Slices of at most so many that make up the whole."""
-    return [slice(begin, min(begin + greatest, size)) for begin in range(0, size, greatest)]
+def _in_chunks(plans: _Plans, tie: TieRule | None) -> list[tuple[_Plans, TieRule | None]]:
+    """Plans in parts as even as can be, none larger than a chunk."""
+    parts = np.array_split(np.arange(len(plans)), -(-len(plans) // CHUNK))
+    return [(plans.take(part), tie) for part in parts]

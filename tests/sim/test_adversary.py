@@ -1,0 +1,183 @@
+"""The search for the worst engagement: what it finds is real, flies again bit by bit, and is far from the average."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from guidance import Situation
+from guidance.scripted_noise import ScriptedNoise
+from infoset import InitialSet, Model, RateSensor, StateBox
+from sim import Outcome, Scenario
+from sim.adversary import NothingCountsError, WorstEngagement, find_worst
+from sim.draws import corners, draw
+from sim.engagement import Engagements
+
+BUDGET = 40
+
+
+@pytest.fixture(scope="module")
+def coarse(asteroid: Scenario) -> Scenario:
+    """The paper's engagement with few sections: quick to fly."""
+    return replace(asteroid, set_model=replace(asteroid.set_model, sections=9))
+
+
+@pytest.fixture(scope="module")
+def worst(coarse: Scenario) -> WorstEngagement:
+    return find_worst(coarse, budget=BUDGET, seed=1)
+
+
+def guaranteed(scenario: Scenario) -> Scenario:
+    model = replace(scenario.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    return replace(scenario, set_model=model)
+
+
+def assert_flies_again(found: WorstEngagement) -> None:
+    """Alone with everything kept, and in other company, to the last bit."""
+    assert float(found.record().result.miss_m[0]) == found.miss_m
+    company = 3
+    noise = ScriptedNoise(
+        *(
+            np.repeat(each[None], company, axis=0)
+            for each in (found.angle_errors, found.range_errors, found.rate_errors)
+        )
+    )
+    flight = Engagements(found.scenario, draw(found.scenario, [0] * company, found.seed), noise=noise)
+    while flight.flying:
+        flight.advance()
+    assert flight.results(np.arange(company)).miss_m.tolist() == [found.miss_m] * company
+
+
+def assert_possible(found: WorstEngagement, scenario: Scenario) -> None:
+    """Its start lies in B x D, its errors within their bounds."""
+    lower, upper = corners(scenario.set_model.bounds)
+    start = np.concatenate([found.position_m, found.velocity_m_s])
+    assert (lower <= start).all()
+    assert (start <= upper).all()
+    assert corners(found.scenario.dispersion)[0].tolist() == corners(found.scenario.dispersion)[1].tolist()
+    assert corners(found.scenario.dispersion)[0].tolist() == start.tolist()
+    for errors in (found.angle_errors, found.range_errors, found.rate_errors):
+        assert np.abs(errors).max() <= 1.0
+
+
+def test_what_is_found_is_possible_and_flies_again(worst: WorstEngagement, coarse: Scenario) -> None:
+    assert_possible(worst, coarse)
+    assert_flies_again(worst)
+    assert np.abs(worst.angle_errors).max() == 1.0
+    assert not worst.range_errors.any()
+    assert worst.record().noise_name == "scripted"
+
+
+def test_measurements_of_the_worst_lie_within_the_bounds_of_the_truth(worst: WorstEngagement) -> None:
+    record, sensor = worst.record(), worst.scenario.set_model.angle_sensor
+    assert len(record.steps) > 150
+    for step in record.steps:
+        if step.measured_angle_rad is not None:
+            bound = sensor.error_bound(step.true_range_m)
+            assert abs(step.measured_angle_rad - step.true_angle_rad) <= bound * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("name", ["ranging", "comet"])
+def test_with_all_sensors_in_the_guaranteed_model(name: str, request: pytest.FixtureRequest) -> None:
+    given = guaranteed(request.getfixturevalue(name))
+    scenario = replace(
+        given, rate_sensor=RateSensor(1.2, 1e-5), set_model=replace(given.set_model, sections=9, fewest_sections=3)
+    )
+    found = find_worst(scenario, budget=24, seed=2)
+    assert_possible(found, scenario)
+    assert_flies_again(found)
+    assert found.range_errors.any()
+    assert found.rate_errors.any()
+    assert found.truth_kept
+
+
+def test_the_search_keeps_its_account(worst: WorstEngagement) -> None:
+    assert worst.evaluations == BUDGET
+    evaluations, misses = np.array(worst.history).T
+    assert (np.diff(evaluations) > 0).all()
+    assert (np.diff(misses) > 0.0).all()
+    assert evaluations[-1] <= BUDGET
+    assert misses[-1] == worst.miss_m
+    assert worst.strategy == "symmetric-miss"
+
+
+def test_the_same_seed_finds_the_same_whatever_the_threads(worst: WorstEngagement, coarse: Scenario) -> None:
+    again = find_worst(coarse, budget=BUDGET, seed=1, threads=2)
+    assert (again.miss_m, again.history) == (worst.miss_m, worst.history)
+    assert np.array_equal(again.angle_errors, worst.angle_errors)
+    assert np.array_equal(again.position_m, worst.position_m)
+    other = find_worst(coarse, budget=20, seed=2)
+    assert other.history[0] != worst.history[0]
+
+
+def test_engagements_that_lose_their_set_can_be_left_out(coarse: Scenario) -> None:
+    """A set that believes in 58 km/s, and truths that come at 110: it is always lost."""
+    fast = replace(coarse.set_model.bounds, vx_m_s=(-110.1e3, -110e3))
+    wrong = replace(coarse, set_model=replace(coarse.set_model, bounds=fast))
+    assert find_worst(wrong, budget=10).outcome is Outcome.SET_LOST
+    with pytest.raises(NothingCountsError, match="in every engagement flown the set was lost"):
+        find_worst(wrong, budget=10, keep_set=True)
+
+
+def test_a_strategy_of_ones_own(coarse: Scenario) -> None:
+    class Idle:
+        def start(self, batch: int) -> None:
+            return None
+
+        def decide(self, situation: Situation, state: None) -> np.ndarray:
+            return np.zeros(situation.information.batch)
+
+    found = find_worst(coarse, strategy=Idle(), budget=10)
+    assert found.strategy == "Idle"
+    assert found.miss_m > 5e3
+    record = found.record(Idle())
+    assert float(record.result.miss_m[0]) == found.miss_m
+    assert float(record.result.impulse_m_s[0]) == 0.0
+
+
+def test_progress_rises_to_one(coarse: Scenario) -> None:
+    told: list[float] = []
+    find_worst(coarse, budget=17, progress=told.append)
+    assert told == sorted(told)
+    assert told[0] > 0.0
+    assert told[-1] == 1.0
+
+
+@pytest.mark.parametrize("bad", [{"budget": 0}, {"threads": 0}, {"seed": -1}])
+def test_what_cannot_be_searched_is_refused(bad: dict[str, int], coarse: Scenario) -> None:
+    with pytest.raises(ValueError, match="need a positive budget and number of threads"):
+        find_worst(coarse, **bad)  # type: ignore[arg-type]
+
+
+def test_one_evaluation_is_enough(coarse: Scenario) -> None:
+    assert find_worst(coarse, budget=1).evaluations == 1
+
+
+def test_starts_do_not_come_from_the_dispersion(coarse: Scenario) -> None:
+    nowhere = replace(coarse, dispersion=StateBox((0.0, 0.0), (5801.3e3, 5801.3e3), (0.0, 0.0), (-58e3, -58e3)))
+    found = find_worst(nowhere, budget=10, seed=4)
+    assert found.position_m.tolist() != [0.0, 5801.3e3]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1])
+def test_symmetric_miss_in_the_papers_model_misses_by_85_m_with_its_set_kept(asteroid: Scenario, seed: int) -> None:
+    found = find_worst(asteroid, budget=4000, seed=seed, keep_set=True, threads=2)
+    assert found.outcome is Outcome.INTERCEPTED
+    assert found.miss_m >= 85.0
+    assert_possible(found, asteroid)
+    assert_flies_again(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1])
+def test_symmetric_miss_in_the_guaranteed_model_misses_by_50_m(asteroid: Scenario, seed: int) -> None:
+    scenario = guaranteed(asteroid)
+    found = find_worst(scenario, budget=2500, seed=seed, threads=2)
+    assert found.outcome is Outcome.INTERCEPTED
+    assert found.truth_kept
+    assert found.miss_m >= 50.0
+    assert_possible(found, scenario)
+    assert_flies_again(found)
