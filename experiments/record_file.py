@@ -354,7 +354,7 @@ def _to_record(header: Mapping[str, Any], arrays: Arrays, source: str) -> Record
         seed=seed,
         run=run,
         strategy=strategy,
-        result=_result_from_json(header["result"], run),
+        result=_result_from_json(header["result"], run, scenario.set_model.is_guaranteed),
         steps=_to_steps(arrays, scenario),
         noise=header.get("noise"),
     )
@@ -395,7 +395,7 @@ def _check(arrays: Arrays) -> None:
         raise _UnsoundError("section_range_m holds a range that is not positive")
 
 
-def _result_from_json(found: object, run: int) -> Results:
+def _result_from_json(found: object, run: int, guarantees: bool) -> Results:
     keys = ("miss_m", "impulse_m_s", "guaranteed_miss_m", "outcome", "truth_kept", "truth_margin_m")
     if not isinstance(found, dict) or set(found) != {*keys, "position_m", "velocity_m_s"}:
         raise _UnsoundError("its header has a wrong result")
@@ -418,6 +418,7 @@ def _result_from_json(found: object, run: int) -> Results:
         truth_margin_m=np.array([np.inf if margin is None else margin]),
         position_m=np.array([pairs[0]]),
         velocity_m_s=np.array([pairs[1]]),
+        guarantees=guarantees,
     )
 
 

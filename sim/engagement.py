@@ -84,6 +84,8 @@ class Engagements:
         None is Kepler motion under the scenario's Sun.
     noise : MeasurementNoise or None
         None is the scenario's own.
+    guarantee : bool
+        Whether the guaranteed model keeps its guaranteed miss, which takes about as long as all the rest.
 
     Notes
     -----
@@ -98,6 +100,8 @@ class Engagements:
         strategy: Strategy | None = None,
         truth: TrueMotion | None = None,
         noise: MeasurementNoise | None = None,
+        *,
+        guarantee: bool = True,
     ) -> None:
         self.scenario = scenario
         self.step = 0
@@ -109,7 +113,7 @@ class Engagements:
         self._state = self._strategy.start(batch)
         self._model = model = on_board_model(scenario)
         arrival_s = self._truth.arrival_s()
-        self._information = InformationSet(model, batch)
+        self._information = InformationSet(model, batch, guarantee=guarantee)
         self._truth_section = TruthSection(model, arrival_s)
         self._arrival_s = arrival_s
         self._angle_every = _steps_in(scenario.set_model.angle_sensor.period_s, scenario)
@@ -298,6 +302,7 @@ class Engagements:
             truth_margin_m=margin,
             position_m=self._draws.position_m,
             velocity_m_s=self._draws.velocity_m_s,
+            guarantees=self._model.is_guaranteed,
         )
 
 

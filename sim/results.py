@@ -38,8 +38,9 @@ class Results:
     impulse_m_s : ndarray, shape (B,)
         Sum of the moduli of the impulses, m/s.
     guaranteed_miss_m : masked array, shape (B,)
-        The published payoff Phi over the stored sections, m; masked where no label finished. In the model `paper` it
-        is no guarantee.
+        In the guaranteed model Phi, which the true miss cannot exceed, over all labels; masked where it is not known:
+        no label has left, the set did not start as a box, or the data broke their bounds. In the model `paper` the
+        published payoff over the stored sections, which is no guarantee; masked where no label finished. m.
     outcomes : tuple of Outcome
     truth_kept : ndarray of bool, shape (B,)
         Whether the truth was inside its own section after every measurement.
@@ -47,6 +48,8 @@ class Results:
         Least signed margin of the truth in its section, m.
     position_m, velocity_m_s : ndarray, shape (B, 2)
         Where the truth started: (z, x) and (V_z, V_x).
+    guarantees : bool
+        Whether `guaranteed_miss_m` is a guarantee.
     """
 
     runs: NDArray[np.int64]
@@ -58,6 +61,13 @@ class Results:
     truth_margin_m: Floats
     position_m: Floats
     velocity_m_s: Floats
+    guarantees: bool = False
+
+    @property
+    def phi_held(self) -> np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]:
+        """Whether the true miss stayed within the guaranteed one, shape (B,); masked where nothing was guaranteed."""
+        unknown = np.ma.getmaskarray(self.guaranteed_miss_m) | (not self.guarantees)
+        return np.ma.MaskedArray(self.miss_m <= self.guaranteed_miss_m.filled(np.inf), mask=unknown)
 
     def __len__(self) -> int:
         return len(self.runs)
@@ -82,4 +92,5 @@ def join(parts: Sequence[Results]) -> Results:
         np.concatenate([part.truth_margin_m for part in parts]),
         np.concatenate([part.position_m for part in parts]),
         np.concatenate([part.velocity_m_s for part in parts]),
+        all(part.guarantees for part in parts),
     )

@@ -22,6 +22,7 @@ def simulate(
     *,
     seed: int = 0,
     strategy: Strategy | None = None,
+    guarantee: bool = True,
     progress: Callable[[float], None] | None = None,
 ) -> Results:
     """Fly engagements whose starts and measurement errors are drawn at random.
@@ -36,6 +37,8 @@ def simulate(
         The root seed.
     strategy : Strategy or None
         A strategy of your own; None is the scenario's.
+    guarantee : bool
+        Whether the guaranteed model keeps its guaranteed miss, which takes about as long as all the rest.
     progress : callable or None
         Is told the fraction done, from 0 to 1.
 
@@ -58,7 +61,7 @@ def simulate(
     for first in range(0, numbers.size, at_once):
         chunk = numbers[first : first + at_once]
         draws = draw(scenario, chunk.tolist(), seed)
-        flight = Engagements(scenario, draws, strategy)
+        flight = Engagements(scenario, draws, strategy, guarantee=guarantee)
         steps = draws.angle.shape[1]
         while flight.flying:
             flight.advance()

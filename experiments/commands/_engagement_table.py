@@ -8,7 +8,15 @@ from pathlib import Path
 from rich.table import Table
 from rich.text import Text
 
-from experiments.commands._screen import PAPER_SINGLE_RUN, number, payoff_name, payoffs, table_console
+from experiments.commands._screen import (
+    PAPER_SINGLE_RUN,
+    allowance,
+    certificate,
+    number,
+    payoff_name,
+    payoffs,
+    table_console,
+)
 from sim import Record
 
 FIGURE_2 = "figure-2-process"
@@ -37,7 +45,8 @@ def show_engagements(records: Sequence[Record], stdout_taken: bool) -> None:
                 number(float(result.impulse_m_s[0])),
                 number(payoffs(result)[0]),
                 result.outcomes[0].value,
-                "yes" if result.truth_kept[0] else "no",
+                certificate(result),
+                number(float(result.truth_margin_m[0])),
                 str(len(record.steps)),
                 f"{record.seed}, {record.run}",
                 record.strategy,
@@ -46,14 +55,15 @@ def show_engagements(records: Sequence[Record], stdout_taken: bool) -> None:
         paper = PAPER_SINGLE_RUN.get(record.noise_name)
         if scenario.name == PAPER_SCENARIO and scenario.range_sensor is None and paper is not None:
             table.add_column("paper", justify="right")
-            columns.append([number(paper[0]), number(paper[1]), *[""] * 6])
+            columns.append([number(paper[0]), number(paper[1]), *[""] * 7])
     names = {payoff_name(record.scenario.set_model.kind.value) for record in records}
     titles = [
         "miss, m",
         "impulse, m/s",
         f"{' / '.join(sorted(names))}, m",
         "outcome",
-        "truth kept in its section",
+        "certificate",
+        "least margin of the truth in its section, m",
         "steps",
         "seed, run",
         "strategy",
@@ -63,6 +73,8 @@ def show_engagements(records: Sequence[Record], stdout_taken: bool) -> None:
     console = table_console(stdout_taken)
     console.print(Text(" | ".join(dict.fromkeys(record.scenario.name for record in records))), soft_wrap=True)
     console.print(table)
+    for line in dict.fromkeys(filter(None, (allowance(record.scenario) for record in records))):
+        console.print(Text(line), soft_wrap=True)
 
 
 def draw_engagements(records: Sequence[Record], folder: Path) -> None:

@@ -13,7 +13,7 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from sim import Results
+    from sim import Results, Scenario
 
 PUBLISHED_PHI = "published Phi, no guarantee"
 PAPER_SCENARIOS = ("asteroid-1997", "asteroid-1997-single")
@@ -131,6 +131,40 @@ def need_finite(results: Results) -> None:
 def payoff_name(model: str) -> str:
     """Return what to call `guaranteed_miss_m` of a model: the paper's model guarantees nothing."""
     return PUBLISHED_PHI if model == "paper" else "guaranteed miss"
+
+
+def allowance(scenario: Scenario) -> str | None:
+    """Return what the guaranteed model of a scenario allows for, as a line; None for the paper's model."""
+    from sim.gravity import on_board_model
+
+    model = on_board_model(scenario)
+    if not model.is_guaranteed:
+        return None
+    return (
+        f"the guaranteed model allows for {model.acceleration_m_s2:.5g} m/s^2 along z (manoeuvres "
+        f"{model.disturbance_m_s2:g}, gravity {model.gravity_m_s2:.2g}), a closing speed within "
+        f"{model.speed_error:.2%}, impulses within {model.execution_error_relative:.2%}"
+    )
+
+
+def held(results: Results) -> list[bool | None]:
+    """Return whether each miss stayed within its guaranteed one; None where nothing was guaranteed."""
+    import numpy as np
+
+    flags = results.phi_held
+    return [
+        None if unknown else bool(flag) for flag, unknown in zip(flags.data, np.ma.getmaskarray(flags), strict=True)
+    ]
+
+
+def certificate(results: Results) -> str:
+    """Return the certificate of a batch as a line: how often the truth was kept, and how often Phi held."""
+    kept = f"truth kept {int(results.truth_kept.sum())}/{len(results)}"
+    known = [each for each in held(results) if each is not None]
+    if not known:
+        return kept
+    missing = f" ({len(results) - len(known)} without Phi)" if len(known) < len(results) else ""
+    return f"{kept}, Phi held {sum(known)}/{len(known)}{missing}"
 
 
 def payoffs(results: Results) -> list[float | None]:

@@ -196,7 +196,7 @@ def _fly(flown: Sequence[Scenario], seed: int, run: int, quiet: bool) -> list[tu
 
 
 def _summary(record: Record, elapsed_s: float, warnings: Sequence[str]) -> dict[str, object]:
-    from experiments.commands._screen import payoffs
+    from experiments.commands._screen import held, payoffs
     from experiments.output import library_version
     from experiments.scenario_file import scenario_hash
     from guidance import NoiseKind
@@ -219,6 +219,8 @@ def _summary(record: Record, elapsed_s: float, warnings: Sequence[str]) -> dict[
         "guaranteed_miss_m": payoffs(result)[0],
         "outcome": result.outcomes[0].value,
         "truth_kept": bool(result.truth_kept[0]),
+        "truth_margin_m": _finite(float(result.truth_margin_m[0])),
+        "phi_held": held(result)[0],
         "steps": [
             {
                 "t_s": step.time_s,
@@ -228,10 +230,15 @@ def _summary(record: Record, elapsed_s: float, warnings: Sequence[str]) -> dict[
                 "impulse_m_s": step.impulse_m_s,
                 "predicted_miss_m": None if step.predicted_miss_m is None else list(step.predicted_miss_m),
                 "sections": len(step.sections),
+                "truth_margin_m": _finite(step.truth_margin_m),
             }
             for step in record.steps
         ],
     }
+
+
+def _finite(value: float) -> float | None:
+    return value if abs(value) < float("inf") else None
 
 
 def _rows(records: Sequence[Record]) -> list[list[Cell]]:
@@ -252,7 +259,7 @@ def _rows(records: Sequence[Record]) -> list[list[Cell]]:
                     step.impulse_m_s,
                     lower,
                     upper,
-                    step.truth_margin_m if abs(step.truth_margin_m) < float("inf") else None,
+                    _finite(step.truth_margin_m),
                     len(step.sections),
                 ]
             )

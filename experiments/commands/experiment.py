@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from experiments.curves import Curve
     from experiments.output import Cell
-    from sim import Scenario
+    from sim import Results, Scenario
 
 FIGURE = "figure-4-distributions"
 LEVELS = (0.1, 0.5, 0.9, 0.99)
@@ -45,6 +45,7 @@ COLUMNS = (
     "outcome",
     "truth_kept",
     "truth_margin_m",
+    "phi_held",
     "start_z_m",
     "start_x_m",
     "start_vz_m_s",
@@ -150,7 +151,7 @@ def _fly(scenario: Scenario, runs: int, seed: int, quiet: bool) -> tuple[list[Cu
 def _summary(
     scenario: Scenario, runs: int, seed: int, elapsed_s: float, curves: Sequence[Curve], warnings: Sequence[str]
 ) -> dict[str, object]:
-    from experiments.commands._screen import payoffs
+    from experiments.commands._screen import held, payoffs
     from experiments.output import library_version
     from experiments.scenario_file import scenario_hash
 
@@ -172,21 +173,25 @@ def _summary(
                 "guaranteed_miss_m": payoffs(curve.results),
                 "outcome": [outcome.value for outcome in curve.results.outcomes],
                 "truth_kept": curve.results.truth_kept.tolist(),
+                "truth_margin_m": _margins(curve.results),
+                "phi_held": held(curve.results),
             }
             for curve in curves
         ],
     }
 
 
+def _margins(results: Results) -> list[float | None]:
+    return [margin if abs(margin) < float("inf") else None for margin in results.truth_margin_m.tolist()]
+
+
 def _rows(curves: Sequence[Curve]) -> list[list[Cell]]:
-    from experiments.commands._screen import payoffs
+    from experiments.commands._screen import held, payoffs
 
     rows: list[list[Cell]] = []
     for curve in curves:
         results, guaranteed = curve.results, payoffs(curve.results)
-        margins: list[Cell] = [
-            margin if abs(margin) < float("inf") else None for margin in results.truth_margin_m.tolist()
-        ]
+        margins, phi_held = _margins(results), held(results)
         for i in range(len(results)):
             rows.append(
                 [
@@ -200,6 +205,7 @@ def _rows(curves: Sequence[Curve]) -> list[list[Cell]]:
                     results.outcomes[i].value,
                     bool(results.truth_kept[i]),
                     margins[i],
+                    phi_held[i],
                     *results.position_m[i].tolist(),
                     *results.velocity_m_s[i].tolist(),
                 ]
@@ -231,6 +237,8 @@ def _show(scenario: Scenario, curves: Sequence[Curve], stdout_taken: bool) -> No
     from experiments.commands._screen import (
         PAPER_SCENARIOS,
         PAPER_SINGLE_RUN,
+        allowance,
+        certificate,
         number,
         payoff_name,
         payoffs,
@@ -253,14 +261,14 @@ def _show(scenario: Scenario, curves: Sequence[Curve], stdout_taken: bool) -> No
         ):
             table.add_row(first, quantity, *(number(float(each)) for each in quantiles(values, LEVELS)))
         table.add_row("", f"{payoff_name(scenario.set_model.kind.value)}, m", "", median)
-        kept = f"{int(results.truth_kept.sum())} of {len(results)}"
         others = Counter(each.value for each in results.outcomes if each is not Outcome.INTERCEPTED)
         said = ", ".join(f"{count} {outcome}" for outcome, count in others.items()) or "none"
-        notes.append(f"curve {curve.number}: truth kept in its section {kept}; not intercepted: {said}")
+        notes.append(f"curve {curve.number}: {certificate(results)}; not intercepted: {said}")
     console = table_console(stdout_taken)
     console.print(Text(f"{scenario.name}, {len(curves[0].results)} runs a curve; quantiles"), soft_wrap=True)
     console.print(table)
-    for note in notes:
+    allowed = allowance(scenario)
+    for note in [*notes, *([allowed] if allowed else [])]:
         console.print(Text(note), soft_wrap=True)
     if scenario.name in PAPER_SCENARIOS:
         figures = ", ".join(f"{noise} {miss} m for {fuel} m/s" for noise, (miss, fuel) in PAPER_SINGLE_RUN.items())

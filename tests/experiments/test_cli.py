@@ -31,6 +31,8 @@ CURVE_KEYS = [
     "guaranteed_miss_m",
     "outcome",
     "truth_kept",
+    "truth_margin_m",
+    "phi_held",
 ]
 OUTCOMES = {"intercepted", "set-lost", "budget-spent", "diverged"}
 
@@ -144,7 +146,8 @@ def test_table_of_the_experiment(infoset: Command, tmp_path: Path) -> None:
     assert code == 0
     for part in ("10%", "50%", "90%", "99%", "impulse, m/s", "published Phi, no guarantee, m", "  + range meter"):
         assert part in out
-    assert out.count("truth kept in its section") == 4
+    assert out.count("truth kept ") == 4
+    assert "Phi held" not in out
     assert "paper, one run from z = -8 km, no range meter: random 4.3 m for 244.7 m/s, game 9.5 m for 521.7 m/s" in out
     assert names_in(tmp_path) == []
     assert "paper" not in infoset("experiment", "comet-fast", "--runs", 1)[1]
@@ -210,6 +213,17 @@ def test_a_run_of_the_experiment_is_the_same_engagement(noise: str, meter: bool,
     }
 
 
+def test_the_guaranteed_model_shows_its_certificate(infoset: Command) -> None:
+    code, out, _ = infoset("experiment", "--runs", 4, "--model", "guaranteed")
+    assert code == 0
+    assert out.count("truth kept 4/4, Phi held 4/4") == 4
+    assert "allows for 0.0050881" in out  # (0.005 + 3.9e-7) / (1 - 1 / 58)
+    one = infoset.json("engage", "--model", "guaranteed", "--run", 3)
+    assert one["phi_held"] is True
+    assert one["truth_margin_m"] == min(step["truth_margin_m"] for step in one["steps"]) >= 0.0
+    assert one["miss_m"] <= one["guaranteed_miss_m"]
+
+
 def test_engage_as_json(infoset: Command, tmp_path: Path) -> None:
     found = infoset.json("engage")
     assert [key for key in found if key not in {"run", "runs"}] == [
@@ -225,7 +239,7 @@ def test_engage_as_json(infoset: Command, tmp_path: Path) -> None:
         list(step)
         == [
             *("t_s", "measured_angle_rad", "true_angle_rad", "true_rate_rad_s"),
-            *("impulse_m_s", "predicted_miss_m", "sections"),
+            *("impulse_m_s", "predicted_miss_m", "sections", "truth_margin_m"),
         ]
         for step in steps
     )
