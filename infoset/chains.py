@@ -427,6 +427,9 @@ def reduce_outward(store: Floats, marks: Integers, n: int, tau: float, points: F
         count -= 1
     for i in range(count):
         put(store, n, side, i, points[i, 0], points[i, 1])
+        # New vertices may be farther out than any that the section ever had.
+        v, _ = vertex(store, n, side, i)
+        store[n, RIGHT, REACH] = max(store[n, RIGHT, REACH], abs(v))
     marks[n, side, BEGIN] = 0
     marks[n, side, END] = count
     marks[n, side, PEAK] = 0

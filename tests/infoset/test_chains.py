@@ -1,0 +1,755 @@
+"""Sections kept as two chains, against exact rational polygons in the coordinates (V, m).
+
+What rounding may do is bounded beforehand, in units `U` of the magnitudes that a section had over its life: `R` for V,
+`G` for m and z (the greatest m plus the first time to go times `R`). An operation that writes a vertex sums a few
+numbers, of up to `2 R` in V and `2 G` in m: it puts the vertex off by less than `8 U R` and `16 U G`. A height that is
+compared is off by less than `16 U G` as well. Moves of the origins are compensated and add nothing.
+
+An error of a level can move a vertex far along an edge that is nearly level, so a section cannot be near the exact
+one at all places; but it is the exact section of bands that differ by rounding. So two exact polygons are carried,
+one through bands too narrow by the rounding, one through bands too wide: after `k` operations a section lies in the
+wide one enlarged by the box of `8 k U R` by `16 k U G`, and contains the narrow one to within that box. A box is
+not enlarged by a cut, if the band is widened by its height. Where no band is nearly along an edge, the narrow
+and the wide one are the same to a few ulp, and without cuts they are equal.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from infoset import chains
+from infoset.chains import BEGIN, CAPACITY, END, LEFT, M_ORIGIN, REACH, RIGHT, V_ORIGIN, VERTICES
+
+Floats = NDArray[np.float64]
+Exact = tuple[Fraction, Fraction]
+Level = tuple[float, float, float]
+
+U = Fraction(1, 2**53)
+ROW = 1  # of three: what is done to one section must leave its neighbours alone
+checked = settings(max_examples=70, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+briefly = settings(checked, max_examples=35)
+
+
+# The oracle: convex polygons with rational vertices (V, m), counter-clockwise, no three of them on a line.
+
+
+def cross(a: Exact, b: Exact, c: Exact) -> Fraction:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def hull(points: Sequence[Exact]) -> list[Exact]:
+    ordered = sorted(set(points))
+    if len(ordered) < 3:
+        return ordered
+    made: list[list[Exact]] = []
+    for row in (ordered, ordered[::-1]):
+        chain: list[Exact] = []
+        for point in row:
+            while len(chain) > 1 and cross(chain[-2], chain[-1], point) <= 0:
+                chain.pop()
+            chain.append(point)
+        made.append(chain[:-1])
+    return made[0] + made[1]
+
+
+def along(normal: Exact, point: Exact) -> Fraction:
+    return normal[0] * point[0] + normal[1] * point[1]
+
+
+def upward(tau: float) -> Exact:
+    """The normal that tells heights: z = m - tau V."""
+    return -Fraction(tau), Fraction(1)
+
+
+MISS: Exact = (Fraction(0), Fraction(1))
+AXES: list[Exact] = [(Fraction(x), Fraction(y)) for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1))]
+
+
+def reaches(polygon: Sequence[Exact], normal: Exact) -> tuple[Fraction, Fraction]:
+    heights = [along(normal, point) for point in polygon]
+    return min(heights), max(heights)
+
+
+def clip(polygon: Sequence[Exact], normal: Exact, lower: Fraction, upper: Fraction) -> list[Exact]:
+    kept = list(polygon)
+    for sign, bound in ((1, lower), (-1, upper)):
+        heights = [sign * (along(normal, point) - bound) for point in kept]
+        new: list[Exact] = []
+        for i, here in enumerate(kept):
+            before = kept[i - 1]
+            if heights[i - 1] * heights[i] < 0:
+                part = heights[i - 1] / (heights[i - 1] - heights[i])
+                new.append((before[0] + part * (here[0] - before[0]), before[1] + part * (here[1] - before[1])))
+            if heights[i] >= 0:
+                new.append(here)
+        kept = hull(new)
+    return kept
+
+
+def moved(polygon: Sequence[Exact], by: Exact) -> list[Exact]:
+    return [(point[0] + by[0], point[1] + by[1]) for point in polygon]
+
+
+def with_segment(polygon: Sequence[Exact], half: Exact) -> list[Exact]:
+    return hull(moved(polygon, half) + moved(polygon, (-half[0], -half[1])))
+
+
+def outside_by(points: Sequence[Exact], polygon: Sequence[Exact], box: Exact) -> Exact | None:
+    """Return a point that is not in the polygon enlarged by [-box, box], if there is one.
+
+    The normals of that sum are those of the polygon and the axes: to test these is to test containment.
+    """
+    if not polygon:
+        return points[0] if points else None
+    sides = [(b[1] - a[1], a[0] - b[0]) for a, b in zip(polygon, [*polygon[1:], polygon[0]], strict=True) if a != b]
+    for normal in sides + AXES:
+        reach = max(along(normal, point) for point in polygon)
+        reach += abs(normal[0]) * box[0] + abs(normal[1]) * box[1]
+        for point in points:
+            if along(normal, point) > reach:
+                return point
+    return None
+
+
+def assert_contains(polygon: Sequence[Exact], points: Sequence[Exact], box: Exact) -> None:
+    lost = outside_by(points, polygon, box)
+    assert lost is None, f"{tuple(map(float, lost))} is not in {[tuple(map(float, point)) for point in polygon]}"
+
+
+# A section, and what its store holds, exactly.
+
+
+class Section:
+    """One row of a store, with the time to go that it was last turned to."""
+
+    def __init__(self, tau: float, bottom: Level, top: Level, room: int = CAPACITY) -> None:
+        self.store, self.marks = chains.empty_sections(3, room)
+        self.tau = tau
+        chains.start(self.store, self.marks, ROW, tau, bottom, top)
+
+    def turn(self, tau: float) -> None:
+        self.tau = tau
+        chains.turn(self.store, self.marks, ROW, tau)
+
+    def spread(self, half_v: float) -> None:
+        chains.spread(self.store, ROW, self.tau, half_v)
+
+    def shift(self, v: float) -> None:
+        chains.shift(self.store, ROW, self.tau, v)
+
+    def cut(self, lower: float, upper: float) -> tuple[bool, float]:
+        return chains.cut(self.store, self.marks, ROW, self.tau, lower, upper)
+
+    def cut_misses(self, lower: float, upper: float) -> tuple[bool, float]:
+        room = chains.working_room()
+        return chains.cut_misses(self.store, self.marks, ROW, self.tau, lower, upper, room)
+
+    def reduce(self) -> None:
+        chains.reduce_outward(self.store, self.marks, ROW, self.tau, chains.working_room())
+
+    @property
+    def reach(self) -> float:
+        return float(self.store[ROW, RIGHT, REACH])
+
+    @property
+    def count(self) -> int:
+        return chains.count_of(self.marks, ROW)
+
+    def heights(self) -> tuple[float, float]:
+        return chains.heights(self.store, self.marks, ROW, self.tau)
+
+    def outline(self) -> Floats:
+        out = chains.working_room()
+        return out[: chains.outline(self.store, self.marks, ROW, self.tau, out)].copy()
+
+    def corners(self) -> list[Exact]:
+        """The outline, as (V, m)."""
+        tau = Fraction(self.tau)
+        outline = [(Fraction(float(v)), Fraction(float(z))) for v, z in self.outline()]
+        return hull([(v, z + tau * v) for v, z in outline])
+
+    def numbers(self, side: int) -> range:
+        return range(int(self.marks[ROW, side, BEGIN]), int(self.marks[ROW, side, END]))
+
+    def local(self, side: int) -> list[tuple[float, float]]:
+        """Vertices from the origin of their chain."""
+        chain = self.store[ROW, side]
+        room = (len(chain) - VERTICES) // 2
+        places = [VERTICES + 2 * (i % room) for i in self.numbers(side)]
+        return [(float(chain[at]), float(chain[at + 1])) for at in places]
+
+    def chain(self, side: int) -> list[Exact]:
+        """Vertices as the store has them, without any rounding."""
+        parts = [Fraction(float(part)) for part in self.store[ROW, side, :REACH]]
+        v, m = parts[V_ORIGIN] + parts[V_ORIGIN + 1], parts[M_ORIGIN] + parts[M_ORIGIN + 1]
+        return [(Fraction(x) + v, Fraction(y) + m) for x, y in self.local(side)]
+
+    def peak(self, side: int) -> int:
+        return chains.find_peak(self.store, self.marks, ROW, side)
+
+    def is_alone(self) -> bool:
+        """Whether the rows before and after are as they were made."""
+        others = [row for row in range(3) if row != ROW]
+        return not self.store[others].any() and not self.marks[others].any()
+
+
+class Life:
+    """A section with its exact polygons, narrow and wide, and the bounds of the module's docstring."""
+
+    def __init__(self, tau: float, bottom: Level, top: Level, room: int = CAPACITY) -> None:
+        self.section = Section(tau, bottom, top, room)
+        self.first_tau = Fraction(tau)
+        corners = [(Fraction(v), Fraction(level[2])) for level in (bottom, top) for v in level[:2]]
+        self.narrow = self.wide = hull([(v, z + self.first_tau * v) for v, z in corners])
+        self.most_v = max(abs(v) for v, _ in corners)
+        self.most_m = max(abs(number) for points in (corners, self.wide) for _, number in points)
+        self.operations = 1
+        self.check()
+
+    @property
+    def greatest(self) -> Fraction:
+        return self.most_m + self.first_tau * self.most_v
+
+    @property
+    def box(self) -> Exact:
+        return 8 * self.operations * U * self.most_v, 16 * self.operations * U * self.greatest
+
+    @property
+    def tolerance(self) -> Fraction:
+        """What the box is worth in height."""
+        return self.box[1] + Fraction(self.section.tau) * self.box[0]
+
+    def turn(self, tau: float) -> None:
+        self.section.turn(tau)
+        self.operations += 1
+        self.check()
+
+    def spread(self, half_v: float) -> None:
+        self.section.spread(half_v)
+        half = (Fraction(half_v), Fraction(half_v) * Fraction(self.section.tau))
+        self.narrow, self.wide = with_segment(self.narrow, half), with_segment(self.wide, half)
+        self.grow(half)
+
+    def shift(self, v: float) -> None:
+        self.section.shift(v)
+        by = (Fraction(v), Fraction(v) * Fraction(self.section.tau))
+        self.narrow, self.wide = moved(self.narrow, by), moved(self.wide, by)
+        self.grow((abs(by[0]), abs(by[1])))
+
+    def grow(self, by: Exact) -> None:
+        self.most_v += by[0]
+        self.most_m += by[1]
+        self.check()
+
+    def cut(self, lower: float, upper: float, of_miss: bool = False) -> bool:
+        """Cut by a band of height or of predicted miss; whether the section is alive as it should be."""
+        normal = MISS if of_miss else upward(self.section.tau)
+        operation = self.section.cut_misses if of_miss else self.section.cut
+        alive, overlap = operation(lower, upper)
+        rounding = 16 * U * self.greatest + self.tolerance
+        # The overlap itself is a difference, of levels that need not be near the section.
+        doubt = rounding + 4 * U * (abs(Fraction(lower)) + abs(Fraction(upper)))
+        for polygon, sign in ((self.narrow, -1), (self.wide, 1)):
+            if polygon:
+                least, most = reaches(polygon, normal)
+                exact = min(most - Fraction(lower), Fraction(upper) - least)
+                assert sign * (Fraction(overlap) - exact) <= doubt
+                assert alive or sign > 0 or exact <= doubt
+                assert not alive or sign < 0 or exact >= -doubt
+        self.narrow = clip(self.narrow, normal, Fraction(lower) + rounding, Fraction(upper) - rounding)
+        self.wide = clip(self.wide, normal, Fraction(lower) - rounding, Fraction(upper) + rounding)
+        self.operations += 1
+        if alive:
+            assert self.wide
+            self.check()
+        else:
+            assert not self.narrow
+        return alive
+
+    def check(self) -> None:
+        """All that holds after any operation."""
+        section, normal = self.section, upward(self.section.tau)
+        right, left = section.chain(RIGHT), section.chain(LEFT)
+        assert right
+        assert left
+        assert section.count == len(right) + len(left) <= CAPACITY
+        assert section.is_alone()
+        assert Fraction(section.reach) * (1 + self.operations * U) >= max(abs(v) for v, _ in right + left)
+        if not self.narrow:
+            # Thinner than rounding: which vertex is the higher or the more to the right is anybody's guess.
+            return
+        for chain, sign in ((right, 1), (left, -1)):
+            rises = [sign * along(normal, point) for point in chain]
+            assert all(after >= before - self.tolerance for before, after in pairwise(rises))
+        self.check_extremes(right, left)
+
+    def check_extremes(self, right: list[Exact], left: list[Exact]) -> None:
+        """Heights and peaks lie between those of the narrow and the wide polygon, and are those of the vertices."""
+        section, normal = self.section, upward(self.section.tau)
+        least, greatest = map(Fraction, section.heights())
+        lowest, highest = reaches(right + left, normal)
+        assert abs(least - lowest) <= self.tolerance
+        assert abs(greatest - highest) <= self.tolerance
+        peak = right[section.peak(RIGHT) - section.numbers(RIGHT)[0]][1]
+        trough = left[section.peak(LEFT) - section.numbers(LEFT)[0]][1]
+        assert max(m for _, m in right) - peak <= self.box[1]
+        assert trough - min(m for _, m in left) <= self.box[1]
+        for low, high, direction, slack in (
+            (least, greatest, normal, self.tolerance),
+            (trough, peak, MISS, self.box[1]),
+        ):
+            inner, outer = reaches(self.narrow, direction), reaches(self.wide, direction)
+            assert outer[0] - slack <= low <= inner[0] + slack
+            assert inner[1] - slack <= high <= outer[1] + slack
+
+    def check_outline(self) -> None:
+        if self.narrow:
+            corners = self.section.corners()
+            assert_contains(self.wide, corners, self.box)
+            assert_contains(corners, self.narrow, self.box)
+
+
+# Life stories: plain numbers, put in proportion to the section when they are told.
+
+UNIT = st.one_of(st.integers(-(2**40), 2**40).map(lambda i: i / 2**40), st.sampled_from([-1.0, -0.5, 0.0, 0.5, 1.0]))
+SIZES = st.sampled_from([1e-9, 1e-3, 1.0, 1.0, 1.0, 1e3])
+FALLS = st.sampled_from([1.0, 1.0, 1.0 - 1e-12, 0.999, 0.9, 0.9, 0.7, 0.5, 0.01])
+ULPS = st.sampled_from([0, 0, 1, -1, 3, -3, 20, 1000])
+
+
+class Start(NamedTuple):
+    """A trapezium between two levels."""
+
+    tau: float
+    bottom: Level
+    top: Level
+
+
+class Band(NamedTuple):
+    """How a band lies to the section that it meets."""
+
+    kind: str
+    parts: tuple[float, float]
+    ulps: int
+    of_miss: bool
+
+
+class Step(NamedTuple):
+    """What happens to a section in one step."""
+
+    falls: tuple[float, float]
+    half_v: float
+    kick: float
+    band: Band | None
+
+
+@st.composite
+def starts(draw: st.DrawFn) -> Start:
+    """Trapezia, points, segments along the level, across it and aslant, near zero and far from it."""
+    tau = draw(st.sampled_from([1e-3, 0.7, 1.0, 130.0, 1e4]))
+    size_v, place = draw(SIZES), draw(st.sampled_from([0.0, 0.0, 1.0, 100.0]))
+    size_z = draw(st.one_of(SIZES, st.just(size_v * tau)))
+    vs = [size_v * (draw(UNIT) + place) for _ in range(4)]
+    zs = [size_z * draw(UNIT) for _ in range(2)]
+    kind = draw(st.sampled_from(["trapezium"] * 4 + ["rectangle", "point", "level", "upright", "aslant"]))
+    if kind in ("point", "level"):
+        zs[1] = zs[0]
+    if kind in ("point", "upright", "aslant"):
+        vs[1], vs[3] = vs[0], vs[2]
+    if kind in ("point", "upright", "rectangle", "level"):
+        vs[2:] = vs[:2]
+    bottom, top = sorted(vs[:2]), sorted(vs[2:])
+    return Start(tau, (bottom[0], bottom[1], min(zs)), (top[0], top[1], max(zs)))
+
+
+BANDS = st.builds(
+    Band,
+    st.sampled_from(["parts", "parts", "vertex", "vertex", "thin", "touching", "beyond", "around", "rest"]),
+    st.tuples(UNIT, UNIT),
+    ULPS,
+    st.sampled_from([False] * 5 + [True]),
+)
+HALVES = st.one_of(st.just(0.0), UNIT.map(abs), st.sampled_from([1e-16, 1e-6, 1.0]))
+
+
+def steps(bands: st.SearchStrategy[Band | None]) -> st.SearchStrategy[Step]:
+    return st.builds(Step, st.tuples(FALLS, FALLS), HALVES, st.one_of(st.just(0.0), UNIT), bands)
+
+
+def levels(section: Section, band: Band, ulp: float) -> tuple[float, float]:
+    """The borders of a band."""
+    outline = section.outline()
+    heights = outline[:, 1] + (section.tau * outline[:, 0] if band.of_miss else 0.0)
+    least, greatest = float(heights.min()), float(heights.max())
+    extent, error = greatest - least, band.ulps * ulp
+    first, second = band.parts
+    if band.kind == "parts":
+        borders = [0.5 * (least + greatest) + part * extent for part in band.parts]
+        return min(borders), max(borders)
+    if band.kind == "vertex":
+        level = float(heights[int(abs(first) * (len(heights) - 1))]) + error
+        return (level, greatest + ulp) if second < 0.0 else (least - ulp, level)
+    if band.kind == "thin":
+        level = least + abs(first) * extent
+        return level, level + abs(error)
+    if band.kind == "touching":
+        return (greatest + error, greatest + extent + 1.0) if first < 0.0 else (least - extent - 1.0, least + error)
+    if band.kind == "beyond":
+        return greatest + abs(first) * extent, greatest + 2.0 * extent
+    if band.kind == "around":
+        return least - 1.0, greatest + 1.0
+    return (least + 0.999 * extent, greatest + 1.0) if first < 0.0 else (least - 1.0, least + 0.001 * extent)
+
+
+def tell(life: Life, step: Step) -> bool:
+    """Let one step happen; whether the section survives it."""
+    scale = float(life.most_v) / life.operations
+    life.turn(life.section.tau * step.falls[0])
+    life.spread(scale * step.half_v)
+    life.turn(life.section.tau * step.falls[1])
+    life.shift(scale * step.kick)
+    if step.band is None:
+        return True
+    lower, upper = levels(life.section, step.band, float(U * life.greatest))
+    return lower > upper or life.cut(lower, upper, step.band.of_miss)
+
+
+# Lives.
+
+
+@checked
+@given(starts(), st.lists(steps(st.one_of(st.none(), BANDS)), min_size=1, max_size=10))
+def test_a_life_is_the_exact_one_up_to_rounding(start: Start, story: list[Step]) -> None:
+    life = Life(*start)
+    for step in story:
+        if not tell(life, step):
+            return
+        life.check_outline()
+
+
+@briefly
+@given(starts(), st.lists(steps(st.none()), min_size=1, max_size=8))
+def test_without_cuts_the_outline_is_the_exact_polygon(start: Start, story: list[Step]) -> None:
+    """Degenerate ones too: a point becomes a segment, a segment a parallelogram."""
+    life = Life(*start)
+    for step in story:
+        tell(life, step)
+    assert life.narrow == life.wide
+    life.check_outline()
+
+
+@pytest.mark.parametrize("start", [(3.0, 3.0, -50.4220476397299), (2.0, 5.0, 7.1)])
+@pytest.mark.parametrize("tau", [0.44999999999955004, 1.0, 7.3, 1e4])
+def test_a_level_segment_keeps_its_ends_where_the_level_does_not_turn(start: Level, tau: float) -> None:
+    """All its heights are equal to within rounding: which of its ends is the higher must not be taken from that."""
+    halves = (202.7652897567146, 0.0, 613.1018861295662, 1e-3)
+    for kick in np.random.default_rng(1).uniform(-300.0, 300.0, 20):
+        life = Life(tau, start, start)
+        life.shift(float(kick))
+        for half_v in halves:
+            for _ in range(3):
+                life.turn(tau)
+            life.spread(half_v)
+            life.check_outline()
+        life.turn(0.9 * tau)
+        life.check_outline()
+        lowest, highest = life.section.heights()
+        assert highest - lowest == pytest.approx((start[1] - start[0] + 2.0 * sum(halves)) * 0.1 * tau, rel=1e-9)
+
+
+def test_a_step_of_a_square_by_hand() -> None:
+    section = Section(2.0, (-1.0, 1.0, -1.0), (-1.0, 1.0, 1.0))
+    section.turn(1.0)
+    np.testing.assert_array_equal(section.outline(), [(-1.0, -2.0), (1.0, 0.0), (1.0, 2.0), (-1.0, 0.0)])
+    section.spread(0.5)
+    outline = section.outline()
+    np.testing.assert_array_equal(
+        outline, [(-0.5, -2.0), (1.5, 0.0), (1.5, 2.0), (0.5, 2.0), (-1.5, 0.0), (-1.5, -2.0)]
+    )
+    section.turn(1.0)
+    section.shift(0.25)
+    assert section.cut(-1.0, 1.0) == (True, 3.0)
+    wanted = [(0.75, -1.0), (1.75, 0.0), (1.75, 1.0), (-0.25, 1.0), (-1.25, 0.0), (-1.25, -1.0)]
+    assert sorted(section.outline().tolist()) == sorted(map(list, wanted))
+    assert section.heights() == (-1.0, 1.0)
+    assert section.cut(1.0 + 2.0**-40, 3.0) == (False, -(2.0**-40))
+    assert sorted(section.outline().tolist()) == sorted(map(list, wanted)), "a dead section is left as it was"
+    assert section.cut(1.0, 3.0) == (True, 0.0)
+    np.testing.assert_array_equal(np.sort(section.outline(), axis=0), [(-0.25, 1.0), (1.75, 1.0)])
+
+
+@checked
+@given(
+    st.integers(0, 3),
+    st.lists(st.tuples(steps(st.none()), st.booleans(), UNIT.map(abs)), min_size=4, max_size=16),
+)
+def test_extremal_bands_never_lose_the_truth(corner: int, story: list[tuple[Step, bool, float]]) -> None:
+    """The truth is a corner of the set, and each band ends at it, widened by the 16 ulp that a measurement has."""
+    bottom, top = (-0.2, 0.3, -17.0), (-0.1, 0.3, 23.0)
+    section = Section(300.0, bottom, top)
+    v, z = Fraction((*bottom[:2], *top[:2])[corner]), Fraction((bottom, top)[corner // 2][2])
+    truth = (v, z + 300 * v)
+    most_m = 400.0
+    for step, from_below, width in story:
+        section.turn(section.tau * step.falls[0])
+        section.spread(0.01 * step.half_v)
+        section.turn(section.tau * step.falls[1])
+        section.shift(0.1 * step.kick)
+        kick = Fraction(0.1 * step.kick)
+        truth = (truth[0] + kick, truth[1] + kick * Fraction(section.tau))
+        level = float(along(upward(section.tau), truth))
+        most_m += abs(0.1 * step.kick) * section.tau + 0.01 * step.half_v * section.tau
+        slack = 16.0 * chains.EPSILON * (most_m + 300.0 * section.reach)
+        band = (level - slack, level + width + slack) if from_below else (level - width - slack, level + slack)
+        alive, overlap = section.cut(*band)
+        assert alive
+        assert overlap > 0.0
+    # A truth once lost would be far outside by now, for the level has turned.
+    assert_contains(section.corners(), [truth], (8 * U * Fraction(section.reach), 16 * U * Fraction(most_m)))
+
+
+# Peaks.
+
+
+@briefly
+@given(starts(), st.lists(steps(st.one_of(st.none(), BANDS)), max_size=6), UNIT.map(abs))
+def test_the_first_vertex_near_a_peak(start: Start, story: list[Step], part: float) -> None:
+    life = Life(*start)
+    if not all(tell(life, step) for step in story):
+        return
+    section = life.section
+    for side, sign in ((RIGHT, 1.0), (LEFT, -1.0)):
+        misses = [sign * m for _, m in section.local(side)]
+        first, peak = section.numbers(side)[0], section.peak(side)
+        tolerance = part * (max(misses) - min(misses))
+        near = chains.first_near_peak(section.store, section.marks, ROW, side, peak, tolerance)
+        level = misses[peak - first] - tolerance
+        assert all(miss >= level for miss in misses[near - first : peak - first + 1])
+        assert near == first or misses[near - first - 1] < level
+
+
+def test_a_stale_peak_is_found_again() -> None:
+    """Asked for after every step or only at last, it is the same vertex."""
+    for band in ((-3.0, 3.0), (-3.0, 0.5), (0.5, 3.0)):
+        for ask in (True, False):
+            life = Life(4.0, (-1.0, 1.0, -1.0), (-1.0, 1.0, 1.0))
+            for k in range(12):
+                life.section.turn(life.section.tau * 0.9)
+                life.section.spread(0.1)
+                life.section.turn(life.section.tau * 0.9)
+                life.section.cut(*band) if k % 3 == 2 else None
+                if ask:
+                    life.section.peak(RIGHT)
+            for side, pick in ((RIGHT, max), (LEFT, min)):
+                number = life.section.peak(side)
+                misses = [m for _, m in life.section.chain(side)]
+                assert misses[number - life.section.numbers(side)[0]] == pick(misses)
+
+
+# Outward reduction and room.
+
+
+def crowded(tau: float, size_v: float, size_z: float, fall: float) -> Life:
+    """A section that has grown until it may have no room for another step; its exact polygon is taken from there."""
+    life = Life(tau, (-size_v, 1.3 * size_v, -size_z), (-size_v, size_v, 1.3 * size_z))
+    section = life.section
+    while not chains.is_crowded(section.marks, ROW):
+        before = section.count
+        section.turn(section.tau * fall)
+        section.spread(0.01 * size_v)
+        section.turn(section.tau * fall)
+        assert before < section.count <= before + chains.MOST_ADDED
+        life.operations += 2
+    life.narrow = life.wide = hull(section.chain(RIGHT) + section.chain(LEFT))
+    life.most_v = Fraction(section.reach)
+    life.most_m += life.first_tau * life.most_v
+    life.check()
+    return life
+
+
+@pytest.mark.parametrize("fall", [0.999, 0.97])
+@pytest.mark.parametrize(("tau", "size_v", "size_z"), [(1.0, 1.0, 1.0), (500.0, 1e-9, 30.0), (500.0, 2.0, 1e-6)])
+def test_reduction_is_outward_and_life_goes_on(tau: float, size_v: float, size_z: float, fall: float) -> None:
+    life = crowded(tau, size_v, size_z, fall)
+    section = life.section
+    section.reduce()
+    assert section.count <= chains.REDUCED
+    reduced = hull(section.chain(RIGHT) + section.chain(LEFT))
+    assert_contains(reduced, life.narrow, life.box)
+    # The edges that go are those that cost least: there is hardly more of the set in any direction.
+    for normal in AXES:
+        (least, greatest), (low, high) = reaches(life.narrow, normal), reaches(reduced, normal)
+        assert high - low <= (greatest - least) * Fraction(11, 10)
+    life.wide = reduced
+    life.operations += 1
+    life.check()
+    for k in range(6):
+        life.turn(section.tau * 0.9)
+        life.spread(0.02 * size_v)
+        life.turn(section.tau * 0.9)
+        bottom, top = section.heights()
+        margin = 0.2 * (top - bottom)
+        life.cut(bottom + margin * (k % 2), top - margin * ((k + 1) % 2))
+    life.check_outline()
+
+
+def test_reduction_of_a_round_chain_keeps_the_bound_on_v() -> None:
+    """Dropping edges all around, it goes farther out than any vertex was."""
+    section = Section(3.0, (-1.0, 1.0, 0.0), (-1.0, 1.0, 1.0))
+    turns = np.linspace(-0.8, 0.8, 248)
+    for i, turn in enumerate(turns):
+        v, z = math.cos(turn), math.sin(turn)
+        chains.put(section.store, ROW, RIGHT, i, v, z + 3.0 * v)
+    section.marks[ROW, RIGHT, END] = len(turns)
+    before = hull(section.chain(RIGHT) + section.chain(LEFT))
+    section.reduce()
+    assert section.count == chains.REDUCED
+    assert_contains(hull(section.chain(RIGHT) + section.chain(LEFT)), before, (8 * U, 32 * U))
+    outermost = max(abs(v) for side in (RIGHT, LEFT) for v, _ in section.chain(side))
+    assert 1 < outermost <= section.reach
+
+
+def test_reduction_of_a_chain_as_thin_as_rounding_contains_it() -> None:
+    """Where rounding has left edges no direction, three sides of a box around the chain are taken."""
+    rng = np.random.default_rng(5)
+    for thickness in (0.0, 1e-17, 1e-16, 1e-15, 1e-12):
+        section = Section(3.0, (-1.0, 1.0, 0.0), (-1.0, 1.0, 1.0))
+        rises = np.sort(rng.uniform(0.0, 1.0, 250))
+        for i, rise in enumerate(rises):
+            v = 1.0 + 0.3 * rise + thickness * rng.uniform(-1.0, 1.0) * 10.0
+            chains.put(section.store, ROW, RIGHT, i, float(v), float(rise + 3.0 * v))
+        section.marks[ROW, RIGHT, END] = len(rises)
+        section.store[ROW, RIGHT, REACH] = 2.0
+        before = section.chain(RIGHT) + section.chain(LEFT)
+        section.reduce()
+        assert section.count <= chains.REDUCED
+        assert_contains(section.corners(), before, (32 * U * 2, 64 * U * 6))
+        assert all(abs(v) <= section.reach for side in (RIGHT, LEFT) for v, _ in section.chain(side))
+        misses = [m for _, m in section.chain(RIGHT)]
+        assert misses[section.peak(RIGHT) - section.numbers(RIGHT)[0]] >= max(misses) - 64 * U
+
+
+@briefly
+@given(starts(), st.lists(steps(st.none()), min_size=1, max_size=6), st.lists(steps(BANDS), max_size=3))
+def test_moving_to_wider_rings_keeps_everything(start: Start, before: list[Step], after: list[Step]) -> None:
+    life, twin = Life(*start, room=chains.ROOM_AT_START), Life(*start)
+    for step in before:
+        assert tell(life, step) == tell(twin, step)
+    wider, _ = chains.empty_sections(3)
+    chains.move_to_wider_rings(life.section.store, life.section.marks, wider)
+    life.section.store = wider
+    for i in range(len(after) + 1):
+        for side in (RIGHT, LEFT):
+            assert life.section.local(side) == twin.section.local(side)
+        np.testing.assert_array_equal(life.section.store[ROW, :, :VERTICES], twin.section.store[ROW, :, :VERTICES])
+        np.testing.assert_array_equal(life.section.marks, twin.section.marks)
+        if i < len(after) and not (tell(life, after[i]) & tell(twin, after[i])):
+            break
+
+
+# Mirror.
+
+
+def assert_mirrored(section: Section, mirror: Section) -> None:
+    """Turned by 180 degrees the right chain is the left one, to the last bit."""
+    for side in (RIGHT, LEFT):
+        assert mirror.local(1 - side) == [(-v, -m) for v, m in section.local(side)]
+        np.testing.assert_array_equal(mirror.store[ROW, 1 - side, :REACH], -section.store[ROW, side, :REACH])
+        assert mirror.numbers(1 - side) == section.numbers(side)
+    assert mirror.heights() == tuple(-height for height in section.heights()[::-1])
+
+
+@checked
+@given(
+    starts(),
+    st.lists(st.tuples(steps(st.none()), st.booleans(), UNIT.map(abs)), min_size=1, max_size=10),
+)
+def test_a_mirrored_life_is_mirrored_to_the_last_bit(start: Start, story: list[tuple[Step, bool, float]]) -> None:
+    """With one border a cut: two borders on one edge are worked in another order, see the next test.
+
+    So it is with the two turns of a section that is as thin as rounding, which could share an edge: none is here.
+    """
+    tau, (low, high, z), (low_top, high_top, z_top) = start
+    magnitude = max(abs(z), abs(z_top)) + tau * max(map(abs, (low, high, low_top, high_top)))
+    assume(z_top - z > 1e-5 * magnitude)
+    section, mirror = Section(*start), Section(tau, (-high_top, -low_top, -z_top), (-high, -low, -z))
+    size = max(map(abs, (low, high, low_top, high_top)))
+    for step, from_below, part in story:
+        for one, sign in ((section, 1.0), (mirror, -1.0)):
+            one.turn(one.tau * step.falls[0])
+            one.spread(size * step.half_v)
+            one.turn(one.tau * step.falls[1])
+            one.shift(sign * size * step.kick)
+        assert_mirrored(section, mirror)
+        least, greatest = section.heights()
+        level = least + (0.1 + 0.8 * part) * (greatest - least)
+        band = (level, greatest + 1.0) if from_below else (least - 1.0, level)
+        assert section.cut(*band) == mirror.cut(-band[1], -band[0])
+        assert_mirrored(section, mirror)
+        for side in (RIGHT, LEFT):
+            assert section.peak(side) == mirror.peak(1 - side)
+
+
+def test_two_borders_on_one_edge_are_mirrored_up_to_rounding() -> None:
+    """The crossing of the second is found on an edge that the first has shortened, and which is first is not mirrored.
+
+    Heights are mirrored all the same: a crossing is put at the level of its border.
+    """
+    rng = np.random.default_rng(2)
+    for _ in range(200):
+        v, z = np.sort(rng.uniform(-1.0, 1.0, 2)), np.sort(rng.uniform(-1.0, 1.0, 2))
+        bottom, top = (float(v[0]), float(v[0]), float(z[0])), (float(v[1]), float(v[1]), float(z[1]))
+        section = Section(2.0, bottom, top)
+        mirror = Section(2.0, (-top[0], -top[0], -top[2]), (-bottom[0], -bottom[0], -bottom[2]))
+        lower, upper = z[0] + (z[1] - z[0]) * np.sort(rng.uniform(0.0, 1.0, 2))
+        assert section.cut(lower, upper) == mirror.cut(-upper, -lower)
+        outline, image = section.outline(), -mirror.outline()
+        ulps = 16.0 * chains.EPSILON / (z[1] - z[0])
+        np.testing.assert_allclose(np.sort(outline, axis=0), np.sort(image, axis=0), rtol=0.0, atol=ulps)
+
+
+# Wear.
+
+
+def test_ten_thousand_moves_do_not_wear_a_section() -> None:
+    """Origins a thousand times as far out as the section is wide, and back: it is exact to 4 ulp, not to 10 000."""
+    rng = np.random.default_rng(3)
+    life = Life(97.3, (-1.3, 0.7, -20.0), (-0.9, 1.1, 30.0))
+    section, exact = life.section, life.wide
+    added, place, most_v, most_m = (Fraction(0), Fraction(0)), (Fraction(0), Fraction(0)), Fraction(0), Fraction(0)
+    for _ in range(10_000):
+        half_v = float(rng.uniform(0.0, 1e-4))
+        kick = float(rng.uniform(-1.0, 1.0) * 1e3) if abs(place[0]) < 3000 else -float(place[0])
+        section.spread(half_v)
+        section.shift(kick)
+        by = (Fraction(kick), Fraction(kick) * Fraction(97.3))
+        place = (place[0] + by[0], place[1] + by[1])
+        added = (added[0] + Fraction(half_v), added[1] + Fraction(half_v) * Fraction(97.3))
+        most_v, most_m = max(most_v, abs(place[0])), max(most_m, abs(place[1]))
+    section.shift(-float(place[0]))
+    back = Fraction(-float(place[0]))
+    place = (place[0] + back, place[1] + back * Fraction(97.3))
+    wanted = moved(with_segment(exact, added), place)
+    got = hull(section.chain(RIGHT) + section.chain(LEFT))
+    # Not a unit of rounding of how far it has been, for each of two floats, is left behind:
+    far = (most_v * U * U * 20_000, most_m * U * U * 20_000)
+    # but the half of a spread along m is rounded, as is what it starts from.
+    box = (far[0] + 2 * U * 2, far[1] + U * added[1] + 4 * U * 150)
+    assert_contains(wanted, got, box)
+    assert_contains(got, wanted, box)
+    outline = section.corners()
+    reach = max(abs(v) for v, _ in wanted), max(abs(m) for _, m in wanted)
+    few = (8 * U * reach[0], 8 * U * (reach[1] + Fraction(97.3) * reach[0]))
+    assert_contains(wanted, outline, few)
+    assert_contains(outline, wanted, few)
+    assert math.isclose(section.reach, 5e6, rel_tol=0.2)
