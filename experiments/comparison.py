@@ -48,12 +48,13 @@ class Comparison:
         return np.asarray(np.all([each.truth_kept for each in self.results.values()], axis=0), dtype=np.bool_)
 
     @property
-    def phi_held(self) -> NDArray[np.bool_] | None:
-        """Whether no miss was above its guaranteed one, in each run under every tie rule; None if nothing tells."""
-        held = [getattr(each, "phi_held", None) for each in self.results.values()]
-        if any(each is None for each in held):
-            return None
-        return np.asarray(np.ma.filled(np.ma.asarray(held), True).all(axis=0), dtype=np.bool_)
+    def phi_held(self) -> np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]:
+        """Whether each run's miss was within the guaranteed one under every tie rule, shape (N,).
+
+        Masked where nothing was guaranteed, as in all of the model `paper`.
+        """
+        held = np.ma.stack([each.phi_held for each in self.results.values()])
+        return np.ma.MaskedArray(held.filled(True).all(axis=0), mask=np.ma.getmaskarray(held).all(axis=0))
 
 
 def flights(scenario: Scenario, strategies: Sequence[str]) -> list[tuple[str, TieRule | None, Scenario]]:

@@ -26,9 +26,6 @@ from experiments.commands._options import (
 if TYPE_CHECKING:
     from pathlib import Path
 
-    import numpy as np
-    from numpy.typing import NDArray
-
     from experiments.comparison import Comparison
     from experiments.output import Cell
     from guidance import TieRule
@@ -155,7 +152,7 @@ def _summary(
                 "miss_m": summary(each.miss_m),
                 "impulse_m_s": summary(each.impulse_m_s),
                 "truth_kept": int(each.truth_kept.sum()),
-                "phi_held": _count(each.phi_held),
+                "phi_held": None if each.phi_held.mask.all() else int(each.phi_held.filled(False).sum()),
                 "outcomes": _outcomes(each),
                 "ties": {
                     tie.value: {"miss_m": summary(results.miss_m), "impulse_m_s": summary(results.impulse_m_s)}
@@ -166,10 +163,6 @@ def _summary(
             for each in compared
         ],
     }
-
-
-def _count(held: NDArray[np.bool_] | None) -> int | None:
-    return None if held is None else int(held.sum())
 
 
 def _outcomes(compared: Comparison) -> dict[str, int]:

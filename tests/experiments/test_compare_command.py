@@ -68,10 +68,15 @@ def test_compare_as_json(infoset: Infoset, tmp_path: Path) -> None:
             assert list(each[quantity]) == LEVELS
             assert sorted(each[quantity].values()) == list(each[quantity].values())
         assert 0 <= each["truth_kept"] <= 4
-        assert each["phi_held"] is None or 0 <= each["phi_held"] <= 4
+        assert each["phi_held"] is None
         assert list(each["ties"]) == ([] if each["noise"] == "random" else ["upper", "lower", "alternate", "random"])
         assert sum(each["outcomes"].values()) == (4 if each["noise"] == "random" else 16)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_guaranteed_model_keeps_the_truth_and_its_word(infoset: Infoset) -> None:
+    for each in as_json(infoset, *TWO, "--runs", 3, "--model", "guaranteed")["strategies"]:
+        assert (each["truth_kept"], each["phi_held"]) == (3, 3)
 
 
 def test_the_figures_are_those_of_the_simulator_and_the_worst_tie_rule_counts(infoset: Infoset) -> None:
