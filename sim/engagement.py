@@ -136,6 +136,11 @@ class Engagements:
         """Whether any truth has yet to pass its closest approach."""
         return bool(self._flying.any()) and self.step < self._draws.angle.shape[1]
 
+    @property
+    def inconsistency(self) -> tuple[NDArray[np.int64], Floats]:
+        """Step at which each set emptied first (-1: never), and the label (m) that came nearest to living on."""
+        return self._information.inconsistency
+
     def advance(self, observe: Callable[[Step], None] | None = None) -> None:
         """Fly one step.
 
