@@ -314,7 +314,7 @@ class _Search:
         alike |= {"position_m": plans.start[:, :2].copy(), "velocity_m_s": plans.start[:, 2:].copy()}
         draws = replace(self._draws, **alike)
         noise = _PlannedNoise(plans, tie)
-        flight = Engagements(self.scenario, draws, self._strategy, noise=noise)
+        flight = Engagements(self.scenario, draws, self._strategy, noise=noise, guarantee=False)
         while flight.flying:
             flight.advance()
         results = flight.results(np.arange(size))

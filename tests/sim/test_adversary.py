@@ -179,5 +179,8 @@ def test_symmetric_miss_in_the_guaranteed_model_misses_by_50_m(asteroid: Scenari
     assert found.outcome is Outcome.INTERCEPTED
     assert found.truth_kept
     assert found.miss_m >= 50.0
+    guaranteed_miss = found.record().result.guaranteed_miss_m
+    assert not np.ma.getmaskarray(guaranteed_miss)[0]
+    assert found.miss_m <= guaranteed_miss.data[0]
     assert_possible(found, scenario)
     assert_flies_again(found)
