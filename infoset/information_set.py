@@ -712,6 +712,8 @@ def section_law(model: SetModel) -> kernels.SectionLaw:
         error_at_zero_range=float(error),
         error_slope=float(slope),
         exact_angles=guaranteed,
+        label_least=float(model.label_limits_m[0]),
+        label_greatest=float(model.label_limits_m[1]),
         z_least=z_least,
         z_greatest=z_greatest,
         vz_least=vz_least,

@@ -49,6 +49,8 @@ class SectionLaw(NamedTuple):
     error_at_zero_range: float
     error_slope: float
     exact_angles: bool
+    label_least: float
+    label_greatest: float
     z_least: float
     z_greatest: float
     vz_least: float
@@ -167,7 +169,15 @@ def measure_section(
     x = range_of(label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x
     lower, upper = alpha - bound, alpha + bound
-    if law.exact_angles:
+    if law.exact_angles and law.error_slope > 0.0:
+        # x h(x) is convex then. What is claimed over all labels needs it concave: a chord and a tangent lie above it.
+        travelled = label - x
+        near, far = max(law.label_least - travelled, 0.0), law.label_greatest - travelled
+        steepest = abs(alpha) + law.error_at_zero_range + law.error_slope * far
+        half = law.error_at_zero_range + law.error_slope * (near + far - near * far / x)
+        half = half / math.cos(steepest) ** 2 if steepest < RIGHT_ANGLE else np.inf
+        lower, upper = math.tan(alpha) - half, math.tan(alpha) + half
+    elif law.exact_angles:
         lower = math.tan(lower) if lower > -RIGHT_ANGLE else -np.inf
         upper = math.tan(upper) if upper < RIGHT_ANGLE else np.inf
     slack = CUT_SLACK * (label * (abs(alpha) + bound) + store[n, RIGHT, REACH] * (label / law.closing_speed))
