@@ -150,6 +150,17 @@ def bound_leaving(
         The limits.
     known : float
         A label between them that is known to live; less than `lower` if none is.
+    elapsed, tape, law : steps so far, history and numbers of the model
+    room : Workspace
+        Room for replays.
+    labels, outlines, counts, values : ndarray
+        Room for the replayed labels, their outlines, and supports.
+    pieces : ndarray, shape (PIECES, 4)
+        Receives the pieces.
+
+    Returns
+    -------
+    int
     """
     lower_died, lower_overlap = run(lower, tape, law, room)
     upper_died, upper_overlap = run(upper, tape, law, room)

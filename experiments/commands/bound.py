@@ -15,38 +15,52 @@ from experiments.commands._options import (
     Overwrite,
     Quiet,
     ScenarioName,
+    Seed,
     chosen_strategies,
     scenario_with,
+    whole_number,
 )
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from sim import Scenario
+    from sim import Record, Results, Scenario
     from sim.bound import LowerBound, TruthPair
     from sim.pair import PairFlight
 
 FIGURE = "figure-bound"
+MOST_EVALUATIONS = 10_000_000
 M_PER_KM = 1e3
 
 
 @dataclass(frozen=True)
 class Found:
-    """What was found for one strategy: its flights of the pairs, each with the pair."""
+    """What was found for one strategy: its flights of the pairs, each with the pair, and what a search found."""
 
     name: str
     flights: tuple[tuple[TruthPair, PairFlight], ...]
+    searched: Record | None = None
 
     @property
-    def worst(self) -> PairFlight:
+    def all_results(self) -> list[Results]:
+        """Results of all the flights."""
+        searched = [] if self.searched is None else [self.searched.result]
+        return [*(flight.results for _, flight in self.flights), *searched]
+
+    @property
+    def worst(self) -> Results:
         """The flight with the greatest miss."""
-        return max((flight for _, flight in self.flights), key=lambda flight: flight.worst_miss_m)
+        return max(self.all_results, key=lambda results: float(results.miss_m.max()))
+
+    @property
+    def worst_miss_m(self) -> float:
+        """The greatest miss found, m."""
+        return float(self.worst.miss_m.max())
 
     @property
     def worst_outcome(self) -> str:
         """How the engagement of the greatest miss ended."""
-        results = self.worst.results
-        return results.outcomes[int(results.miss_m.argmax())].value
+        return self.worst.outcomes[int(self.worst.miss_m.argmax())].value
 
     def guaranteed_m(self, scenario: Scenario) -> float | None:
         """Return the greatest guaranteed miss of all flights, m; None where the model guarantees nothing."""
@@ -54,7 +68,7 @@ class Found:
 
         if not scenario.set_model.is_guaranteed:
             return None
-        known = [payoff for _, flight in self.flights for payoff in payoffs(flight.results)]
+        known = [payoff for results in self.all_results for payoff in payoffs(results)]
         return None if None in known else max(payoff for payoff in known if payoff is not None)
 
 
@@ -65,6 +79,10 @@ def bound(
         typer.Option("--strategies", metavar="A,B,C", help="Which, separated by commas; all there are by default."),
     ] = None,
     model: ModelName = None,
+    budget: Annotated[
+        int, typer.Option("--budget", metavar="N", help="Engagements to search for the worst, a strategy; 0: none.")
+    ] = 500,
+    seed: Seed = 0,
     out: Out = None,
     json_: Json = None,
     overwrite: Overwrite = False,
@@ -80,6 +98,8 @@ def bound(
     from experiments.output import STDOUT, checked_destinations, to_json, write_file
     from experiments.scenario_file import scenario_warnings
 
+    whole_number("--budget", budget, 0, MOST_EVALUATIONS, 500)
+    whole_number("--seed", seed, 0, None, 0)
     names = chosen_strategies(strategies)
     given = scenario_with(scenario, model=model)
     files = ("scenario.toml", "results.json", *figure_files(FIGURE))
@@ -88,7 +108,7 @@ def bound(
         for warning in warnings:
             say(f"warning: {warning}", quiet)
         tell_of_compiling(quiet)
-        lower, found, elapsed_s = _find(given, names, quiet)
+        lower, found, elapsed_s = _find(given, names, budget, seed, quiet)
         json_text = to_json(_summary(given, lower, found, elapsed_s, warnings))
         if json_ is not None and str(json_) == STDOUT:
             typer.echo(json_text, nl=False)
@@ -100,12 +120,18 @@ def bound(
         _show(given, lower, found, str(json_) == STDOUT)
 
 
-def _find(scenario: Scenario, names: Sequence[str], quiet: bool) -> tuple[LowerBound, list[Found], float]:
+def _find(
+    scenario: Scenario, names: Sequence[str], budget: int, seed: int, quiet: bool
+) -> tuple[LowerBound, list[Found], float]:
+    import contextlib
+    import os
+    from dataclasses import replace
     from time import perf_counter
 
     from experiments.commands._screen import need_finite, progress_bar
     from experiments.errors import InputError
     from guidance import make_strategy
+    from sim.adversary import NothingCountsError, find_worst
     from sim.bound import BoundError, lower_bound
     from sim.pair import fly_pair
 
@@ -126,7 +152,18 @@ def _find(scenario: Scenario, names: Sequence[str], quiet: bool) -> tuple[LowerB
                 need_finite(flight.results)
                 flights.append((pair, flight))
                 report((index + 1) / len(lower.pairs))
-            found.append(Found(name, tuple(flights)))
+            searched = None
+            if budget > 0:
+                with contextlib.suppress(NothingCountsError):
+                    searched = find_worst(
+                        replace(scenario, strategy=name),
+                        budget=budget,
+                        seed=seed,
+                        keep_set=not scenario.set_model.is_guaranteed,
+                        threads=os.cpu_count() or 1,
+                        progress=begin(f"worst against {name}"),
+                    ).record()
+            found.append(Found(name, tuple(flights), searched))
     return lower, found, perf_counter() - began_s
 
 
@@ -158,10 +195,11 @@ def _summary(
         "strategies": [
             {
                 "name": each.name,
-                "worst_found_m": each.worst.worst_miss_m,
+                "worst_found_m": each.worst_miss_m,
                 "guaranteed_m": each.guaranteed_m(scenario),
                 "gap": _gap(each, lower),
                 "outcome": each.worst_outcome,
+                "worst_of_search_m": None if each.searched is None else float(each.searched.result.miss_m[0]),
                 "flights": [
                     {
                         **_where(pair, scenario),
@@ -181,7 +219,7 @@ def _summary(
 
 def _gap(found: Found, lower: LowerBound) -> float | None:
     """How many times the bound the worst is; None where the bound is zero."""
-    return found.worst.worst_miss_m / lower.bound_m if lower.bound_m > 0.0 else None
+    return found.worst_miss_m / lower.bound_m if lower.bound_m > 0.0 else None
 
 
 def _where(pair: TruthPair, scenario: Scenario) -> dict[str, object]:
@@ -228,7 +266,7 @@ def _show(scenario: Scenario, lower: LowerBound, found: Sequence[Found], stdout_
     for each in found:
         table.add_row(
             each.name,
-            number(each.worst.worst_miss_m),
+            number(each.worst_miss_m),
             number(_gap(each, lower)),
             number(each.guaranteed_m(scenario)),
             each.worst_outcome,
@@ -243,7 +281,9 @@ def _show(scenario: Scenario, lower: LowerBound, found: Sequence[Found], stdout_
     console.print(reached)
     console.print()
     console.print(table)
-    console.print(Text("worst found: the worse of the two truths of each pair above, flown"), soft_wrap=True)
+    console.print(
+        Text("worst found: by flying the pairs above, and by the search of: infoset adversary"), soft_wrap=True
+    )
     if any(each.worst_outcome == Outcome.SET_LOST.value for each in found):
         said = "set-lost: the model lost a truth it should keep; try --model guaranteed"
         console.print(Text(said), soft_wrap=True)

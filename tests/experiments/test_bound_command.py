@@ -64,7 +64,7 @@ def short_file(short: Scenario, tmp_path: Path, infoset: Infoset) -> Path:
 
 def test_bound_into_a_folder(infoset: Infoset, short: Scenario, short_file: Path, tmp_path: Path) -> None:
     folder = tmp_path / "results"
-    code, out, err = infoset(short_file, "--out", folder, "--model", "guaranteed")
+    code, out, err = infoset(short_file, "--out", folder, "--model", "guaranteed", "--budget", 40)
     assert (code, err) == (0, "")
     assert sorted(each.name for each in folder.iterdir()) == FILES
     found = json.loads((folder / "results.json").read_text())
@@ -86,7 +86,8 @@ def test_bound_into_a_folder(infoset: Infoset, short: Scenario, short_file: Path
         assert each["gap"] == pytest.approx(each["worst_found_m"] / found["lower_bound_m"])
         assert each["guaranteed_m"] is not None
         assert each["guaranteed_m"] >= each["worst_found_m"]
-        assert each["worst_found_m"] == max(miss for flight in each["flights"] for miss in flight["miss_m"])
+        pairs = max(miss for flight in each["flights"] for miss in flight["miss_m"])
+        assert each["worst_found_m"] == max(pairs, each["worst_of_search_m"])
         assert all(all(flight["truth_kept"]) for flight in each["flights"])
         assert each["name"] in out
     assert f"no strategy can guarantee a miss below {found['lower_bound_m']:.3g} m" in out
@@ -95,15 +96,16 @@ def test_bound_into_a_folder(infoset: Infoset, short: Scenario, short_file: Path
 
 
 def test_bound_as_json_alone(infoset: Infoset, short_file: Path, tmp_path: Path) -> None:
-    code, out, err = infoset(short_file, "--strategies", "symmetric-miss", "--json", "-")
+    code, out, err = infoset(short_file, "--strategies", "symmetric-miss", "--json", "-", "--budget", 0)
     assert code == 0
     found: Any = json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
     (only,) = found["strategies"]
     assert only["name"] == "symmetric-miss"
     assert only["guaranteed_m"] is None
+    assert only["worst_of_search_m"] is None
     assert "symmetric-miss" in err
     assert [each.name for each in tmp_path.iterdir()] == ["short.toml"]
-    assert infoset(short_file, "--strategies", "patient", "-q") == (0, "", "")
+    assert infoset(short_file, "--strategies", "patient", "-q", "--budget", 0) == (0, "", "")
 
 
 def test_help_has_an_example(infoset: Infoset) -> None:
@@ -118,6 +120,7 @@ def test_help_has_an_example(infoset: Infoset) -> None:
         (["asteroid-1996"], ["asteroid-1996", "did you mean"]),
         (["--strategies", "patent"], ["--strategies", "did you mean patient?"]),
         (["--strategies", "patient,patient"], ["named twice"]),
+        (["--budget", -1], ["--budget", "must be"]),
         (["--model", "papr"], ["--model", "did you mean paper?"]),
         (["--json", "missing/x.json"], ["there is no folder missing"]),
         (["--out", "/dev/null"], ["is a file"]),
