@@ -130,7 +130,16 @@ def fly(scenario: Scenario, first: int, batch: int, seed: int) -> Count:
 def scenarios(hostile: bool) -> list[Scenario]:
     """The built-in scenarios, each without and with its range meter."""
     given = [guaranteed(load_scenario(name), hostile) for name in ("asteroid-1997", "comet-fast")]
-    return [replace(each, range_sensor=sensor) for each in given for sensor in {None, each.range_sensor}]
+    return [replace(each, range_sensor=sensor) for each in given for sensor in (None, each.range_sensor)]
+
+
+def fly_batch(number: int, hostile: bool, seed: int) -> Count:
+    """Fly batch `number`: one in eight is of the comet, which takes three times the steps."""
+    flown = scenarios(hostile)
+    often = [each for each in flown if each.name == "asteroid-1997"]
+    rarely = [each for each in flown if each.name != "asteroid-1997"]
+    chosen = rarely[number // 8 % len(rarely)] if number % 8 == 7 else often[number % len(often)]
+    return fly(chosen, number * BATCH, BATCH, seed)
 
 
 def main() -> None:
@@ -141,12 +150,11 @@ def main() -> None:
     parser.add_argument("--hostile", action="store_true", help="execution errors of 2 %% and a manoeuvring target")
     parser.add_argument("--workers", type=int, default=1)
     given = parser.parse_args()
-    flown = scenarios(given.hostile)
     began = time.perf_counter()
     total = Count()
     with ThreadPoolExecutor(given.workers) as pool:
         jobs = [
-            pool.submit(fly, flown[number % len(flown)], number * BATCH, BATCH, given.seed)
+            pool.submit(fly_batch, number, given.hostile, given.seed)
             for number in range(-(-given.engagements // BATCH))
         ]
         for number, job in enumerate(jobs):

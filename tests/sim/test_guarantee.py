@@ -53,9 +53,8 @@ def sound(results: Results) -> bool:
 def test_nothing_breaks_the_guarantee(soundness: ModuleType, hostile: bool) -> None:
     """2 x 2560 engagements of every noise, from anywhere in B x D; benchmarks/soundness.py flies 200 000."""
     total = soundness.Count()
-    flown = soundness.scenarios(hostile)
     for number in range(2560 // soundness.BATCH):
-        total += soundness.fly(flown[number % len(flown)], number * soundness.BATCH, soundness.BATCH, 2)
+        total += soundness.fly_batch(number, hostile, seed=2)
     assert vars(total) == {"engagements": 2560, "outside": 0, "lost": 0, "above": 0, "unknown": 0}
 
 
