@@ -10,6 +10,7 @@ exceeded Phi. All must be zero. Engagements of one batch have noise of every kin
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -160,7 +161,8 @@ def main() -> None:
         for number, job in enumerate(jobs):
             total += job.result()
             if number % 50 == 49 or number == len(jobs) - 1:
-                print(f"{total} {time.perf_counter() - began:.0f} s", flush=True)
+                sys.stdout.write(f"{total} {time.perf_counter() - began:.0f} s\n")
+                sys.stdout.flush()
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from guidance import NoiseKind, Situation, TieRule
-from infoset import StateBox
+from infoset import InitialSet, Model, StateBox
 from sim import Outcome, Results, Scenario, simulate
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
@@ -54,10 +54,14 @@ def mirror(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
         (NoiseKind.GAME, TieRule.RANDOM),
     ],
 )
+@pytest.mark.parametrize("model", list(Model))
 def test_a_mirrored_engagement_is_mirrored(
-    name: str, noise: NoiseKind, tie: TieRule, request: pytest.FixtureRequest
+    name: str, noise: NoiseKind, tie: TieRule, model: Model, request: pytest.FixtureRequest
 ) -> None:
     scenario = replace(request.getfixturevalue(name), noise=noise, tie=tie)
+    if model is Model.GUARANTEED:
+        box = replace(scenario.set_model, kind=model, initial_set=InitialSet.BOX)
+        scenario = replace(scenario, set_model=box)
     draws = draw(scenario, range(20), 3)
     there, back = fly(scenario, draws), fly(*mirror(scenario, draws))
     np.testing.assert_allclose(back.miss_m, there.miss_m, rtol=1e-9)
