@@ -351,16 +351,27 @@ def miss_of(store: Floats, n: int, side: int, i: int) -> float:
 
 @inlined
 def find_peak(store: Floats, marks: Integers, n: int, side: int) -> int:
-    """Number of the vertex of a chain whose predicted miss is the greatest (right) or the least (left)."""
+    """Number of the vertex of a chain whose predicted miss is the greatest (right) or the least (left).
+
+    Notes
+    -----
+    The search starts where the peak was. It ends where the miss falls by more than rounding: vertices that repeat
+    one another, or nearly so, must not stop it.
+    """
     first, last = begin_of(marks, n, side), end_of(marks, n, side) - 1
     peak = int(min(max(marks[n, side, PEAK], first), last))
     miss = miss_of(store, n, side, peak)
-    while peak < last and miss_of(store, n, side, peak + 1) > miss:
-        peak += 1
-        miss = miss_of(store, n, side, peak)
-    while peak > first and miss_of(store, n, side, peak - 1) > miss:
-        peak -= 1
-        miss = miss_of(store, n, side, peak)
+    rounding = 16.0 * EPSILON * (abs(miss) + abs(store[n, side, M_ORIGIN]))
+    start_at = peak
+    for way in (1, -1):
+        i = start_at + way
+        while first <= i <= last:
+            here = miss_of(store, n, side, i)
+            if here > miss:
+                peak, miss = i, here
+            elif here < miss - rounding:
+                break
+            i += way
     marks[n, side, PEAK] = peak
     return peak
 
@@ -504,6 +515,10 @@ def cut_misses(
         for part in range(REACH):
             store[n, side, part] = 0.0
     bottom, top = polygon.extremes(points, count, -tau, 1.0)
+    thickness = polygon.height(points, top, -tau, 1.0) - polygon.height(points, bottom, -tau, 1.0)
+    if thickness <= 16.0 * EPSILON * (abs(points[top, 1]) + abs(points[bottom, 1]) + tau * store[n, RIGHT, REACH]):
+        # Level to within rounding: its ends are to the right and to the left, and each chain has both.
+        bottom, top = polygon.extremes(points, count, -1.0, 0.0)
     for side in (RIGHT, LEFT):
         first, last = (bottom, top) if side == RIGHT else (top, bottom)
         length = (last - first) % count + 1

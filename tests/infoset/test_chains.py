@@ -556,6 +556,33 @@ def test_a_stale_peak_is_found_again() -> None:
                 assert misses[number - life.section.numbers(side)[0]] == pick(misses)
 
 
+def test_vertices_that_repeat_one_another_do_not_stop_the_search_for_a_peak() -> None:
+    """Both have the same miss, so that to look for a greater one next to the first is to look no further."""
+    section = Section(3.0, (-1.0, 1.0, 0.0), (-1.0, 1.0, 1.0))
+    (v, m), (v_top, m_top) = section.local(RIGHT)
+    for i, vertex in enumerate([(v, m), (math.nextafter(v, 2.0), m), (v, m), (v_top, m_top)]):
+        chains.put(section.store, ROW, RIGHT, i, *vertex)
+    section.marks[ROW, RIGHT, END] = 4
+    assert section.peak(RIGHT) == 3
+
+
+@pytest.mark.parametrize("part", [0.25, 0.5, 0.9])
+def test_a_level_segment_cut_by_its_miss_stays_a_segment(part: float) -> None:
+    """Its heights are equal: neither its lowest vertex nor its highest says where it ends."""
+    life = Life(0.7, (100.0, 300.0, 29.5), (100.0, 300.0, 29.5))
+    middle = 29.5 + 0.7 * 200.0
+    assert life.cut(middle - part * 70.0, middle + 0.5 * part * 70.0, of_miss=True)
+    life.check_outline()
+    for _ in range(3):
+        life.turn(0.7)
+        life.spread(10.0)
+        life.check_outline()
+    life.turn(0.5)
+    life.check_outline()
+    least, greatest = life.section.heights()
+    assert greatest - least == pytest.approx((1.5 * part * 100.0 + 60.0) * 0.2)
+
+
 # Outward reduction and room.
 
 
