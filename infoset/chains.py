@@ -529,29 +529,3 @@ def cut_misses(
         marks[n, side, END] = length
         marks[n, side, PEAK] = 0
     return True, overlap
-
-
-@allocation_free
-def raise_from(store: Floats, marks: Integers, n: int, side: int, half_m: float) -> None:
-    """Pull a chain apart at its outermost vertex in V: the part before it sinks by half_m, the rest rises."""
-    sign = sign_of(side)
-    first, last = begin_of(marks, n, side), end_of(marks, n, side) - 1
-    outermost = first
-    for i in range(first, last + 1):
-        if sign * (store[n, side, place(store, i)] - store[n, side, place(store, outermost)]) > 0.0:
-            outermost = i
-    for i in range(last, outermost - 1, -1):
-        at = place(store, i)
-        put(store, n, side, i + 1, store[n, side, at], store[n, side, at + 1] + sign * half_m)
-    for i in range(first, outermost + 1):
-        store[n, side, place(store, i) + 1] -= sign * half_m
-    marks[n, side, END] += 1
-    marks[n, side, PEAK] = outermost
-
-
-@inlined
-def widen(store: Floats, marks: Integers, n: int, tau: float, half_z: float, half_v: float) -> None:
-    """Minkowski sum with the box |z| <= half_z, |V| <= half_v of a section that is turned to `tau`. O(vertices)."""
-    spread(store, n, tau, half_v)
-    raise_from(store, marks, n, RIGHT, half_z)
-    raise_from(store, marks, n, LEFT, half_z)

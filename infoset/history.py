@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset.section_kernels import IMPULSE, PREDICTION
+from infoset.section_kernels import IMPULSE, PREDICTION, RATE
 
 ROOM_AT_START = 64
 
@@ -41,6 +41,7 @@ class History:
         self.applies = np.zeros((batch, ROOM_AT_START), dtype=bool)
         self.events = 0
         self.elapsed = 0
+        self._has_rates = False
 
     def record(self, kind: int, values: NDArray[np.float64], applies: NDArray[np.bool_], error: float = 0.0) -> int:
         """Add an event; return its number."""
@@ -52,6 +53,7 @@ class History:
             self.applies = np.concatenate((self.applies, np.zeros_like(self.applies)), axis=1)
         self.kinds[event] = kind
         self.errors[event] = error
+        self._has_rates |= kind == RATE
         self.values[:, event] = values
         self.applies[:, event] = applies
         self.events += 1
@@ -67,10 +69,15 @@ class History:
         fired = self.applies[:, : self.events] & (self.kinds[: self.events] == IMPULSE)
         return np.asarray(np.where(fired, np.abs(self.values[:, : self.events]), 0.0).sum(axis=1))
 
+    @property
+    def errors_if_any(self) -> NDArray[np.float64] | None:
+        """The errors, or None if no rate was measured, as replays take them."""
+        return self.errors if self._has_rates else None
+
     def copy(self) -> History:
         """A history of its own that starts from this one."""
         twin = History.__new__(History)
         twin.kinds, twin.errors = self.kinds.copy(), self.errors.copy()
         twin.values, twin.applies = self.values.copy(), self.applies.copy()
-        twin.events, twin.elapsed = self.events, self.elapsed
+        twin.events, twin.elapsed, twin._has_rates = self.events, self.elapsed, self._has_rates
         return twin

@@ -276,7 +276,7 @@ class InformationSetView:
         died = kernels.replay(
             label,
             tape.kinds,
-            tape.errors,
+            tape.errors_if_any,
             tape.values[engagement],
             tape.applies[engagement],
             tape.events,
@@ -666,7 +666,7 @@ class InformationSet(InformationSetView):
             self._lower_label,
             self._upper_label,
             tape.kinds,
-            tape.errors,
+            tape.errors_if_any,
             tape.values,
             tape.applies,
             tape.events,

@@ -27,7 +27,7 @@ class Tape(NamedTuple):
     """The history of one engagement, as `section_kernels.replay` takes it."""
 
     kinds: Integers
-    errors: Floats
+    errors: Floats | None
     values: Floats
     applies: Flags
     events: int
@@ -258,7 +258,7 @@ def refine_all(
     limit_below: Floats,
     limit_above: Floats,
     kinds: Integers,
-    errors: Floats,
+    errors: Floats | None,
     values: Floats,
     applies: Flags,
     events: int,

@@ -216,17 +216,12 @@ def measure_rate_section(
     return chains.cut_misses(store, marks, n, tau, tau * x * lower - slack, tau * x * upper + slack, points)
 
 
-@allocation_free
-def widen_section(
-    store: Floats, marks: Integers, n: int, label: float, elapsed: int, law: SectionLaw, points: Floats
-) -> None:
-    """Widen a section by the error of one angle measurement, b: by x b in z and by e b in V, a miss of x b more."""
-    tau = time_to_go(label, elapsed, law)
-    if chains.is_crowded(marks, n):
-        chains.reduce_outward(store, marks, n, tau, points)
+@inlined
+def widen_section(store: Floats, n: int, label: float, elapsed: int, law: SectionLaw) -> None:
+    """Widen a section by what one angle measurement may err, b: by e b in V, which is x b in the predicted miss."""
     x = range_of(label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x
-    chains.widen(store, marks, n, tau, x * bound, law.closing_speed * bound)
+    chains.spread(store, n, x / law.closing_speed, law.closing_speed * bound)
 
 
 @substituted
@@ -458,7 +453,7 @@ def margin_in(store: Floats, marks: Integers, n: int, tau: float, v: float, z: f
 def replay(
     label: float,
     kinds: Integers,
-    errors: Floats,
+    errors: Floats | None,
     values: Floats,
     applies: Flags,
     events: int,
@@ -477,7 +472,7 @@ def replay(
         Range at t = 0 of the hypothesis, m.
     kinds, errors, values, applies : ndarray, shape (>= events,)
         The history of one engagement: what happened, the error bound of a rate, the value, and whether it concerned
-        this engagement.
+        this engagement. `errors` is None where there is no rate.
     events : int
         Number of events.
     law : SectionLaw
@@ -512,14 +507,15 @@ def replay(
             living, overlaps[event] = measure_section(store, marks, n, label, elapsed, values[event], law)
             if not living:
                 return event
-        elif kinds[event] == RATE:
+        elif kinds[event] == IMPULSE:
+            shift_section(store, n, label, elapsed, values[event], law)
+        elif kinds[event] == WIDENING:
+            widen_section(store, n, label, elapsed, law)
+        elif errors is not None:
+            # Compiled only for a history that has rates: this branch would be the greater part of the work.
             living, overlaps[event] = measure_rate_section(
                 store, marks, n, label, elapsed, values[event], errors[event], law, points
             )
             if not living:
                 return event
-        elif kinds[event] == WIDENING:
-            widen_section(store, marks, n, label, elapsed, law, points)
-        else:
-            shift_section(store, n, label, elapsed, values[event], law)
     return ALIVE
