@@ -32,6 +32,7 @@ from infoset._compile import allocation_free, entry, inlined, substituted
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 EPSILON = float(np.finfo(np.float64).eps)
 
@@ -75,9 +76,11 @@ def place(store: Floats, i: int) -> int:
 
 
 @entry
-def move_to_wider_rings(store: Floats, marks: Integers, wider: Floats) -> None:
-    """Copy all sections to a store with more room."""
+def move_to_wider_rings(store: Floats, marks: Integers, kept: Flags, wider: Floats) -> None:
+    """Copy the sections that are kept to a store with more room; the others stay unwritten, and take no memory."""
     for n in range(store.shape[0]):
+        if not kept[n]:
+            continue
         for side in (RIGHT, LEFT):
             for i in range(VERTICES):
                 wider[n, side, i] = store[n, side, i]

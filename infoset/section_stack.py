@@ -71,7 +71,7 @@ class SectionStack:
             while room < min(vertices, chains.CAPACITY):
                 room *= 2
             wider, _ = chains.empty_sections(len(store), room)
-            chains.move_to_wider_rings(store, marks, wider)
+            chains.move_to_wider_rings(store, marks, self.living.ravel(), wider)
             self.sections = self.sections._replace(store=wider)
 
     def measure_angle(self, active: Flags, alpha: Floats, elapsed: int, event: int) -> None:

@@ -673,7 +673,7 @@ def test_moving_to_wider_rings_keeps_everything(start: Start, before: list[Step]
     for step in before:
         assert tell(life, step) == tell(twin, step)
     wider, _ = chains.empty_sections(3)
-    chains.move_to_wider_rings(life.section.store, life.section.marks, wider)
+    chains.move_to_wider_rings(life.section.store, life.section.marks, np.ones(3, dtype=bool), wider)
     life.section.store = wider
     for i in range(len(after) + 1):
         for side in (RIGHT, LEFT):
