@@ -160,6 +160,11 @@ class _PlannedNoise:
         step = sight.step
         kept = np.stack(errors_made(sight, self._keeping.measure(sight, predicted)), axis=1)
         errors = np.where(self.plans.given[:, None, step], self.plans.sequence[:, :, step], kept)
+        # What is not measured in this step has no error, whatever was planned.
+        if sight.range_error is None:
+            errors[:, RANGE] = 0.0
+        if sight.rate_error_rad_s is None:
+            errors[:, RATE] = 0.0
         self.errors[:, :, step] = errors
         return measure_with_errors(sight, errors[:, ANGLE], errors[:, RANGE], errors[:, RATE])
 
