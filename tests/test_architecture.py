@@ -14,7 +14,7 @@ import pytest
 from importlinter import cli
 
 ROOT = Path(__file__).resolve().parents[1]
-LAYERS = ("infoset", "guidance", "sim")
+LAYERS = ("infoset", "guidance", "sim", "rendezvous")
 
 
 def modules() -> Iterator[ModuleType]:

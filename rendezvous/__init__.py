@@ -1,0 +1,1 @@
+"""Rendezvous of craft in orbit: minimum energy, reachable sets, pursuit."""
