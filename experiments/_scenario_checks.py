@@ -3,68 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from decimal import Decimal
 
-from experiments._scenario_tables import DecimalPair, shown
+from experiments.toml_file import Known, Problem
+from experiments.toml_values import DecimalPair, shown
 
 MOST_STEPS = 100_000
 WHOLE_STEPS_TOLERANCE = Decimal("1e-9")
-
-
-@dataclass(frozen=True)
-class Problem:
-    """One thing wrong with a file.
-
-    Parameters
-    ----------
-    path : tuple of str
-        Table and key.
-    text : str
-        What is wrong, and with which value.
-    remedy : str
-        What to do about it.
-    """
-
-    path: tuple[str, ...]
-    text: str
-    remedy: str
-
-
-@dataclass(frozen=True)
-class Known:
-    """The values of a file that are sound by themselves; the others are None.
-
-    Parameters
-    ----------
-    document : dict
-        The file as parsed.
-    bad : frozenset of tuple of str
-        Paths of the tables and keys already found wrong.
-    """
-
-    document: dict[str, object]
-    bad: frozenset[tuple[str, ...]]
-
-    def value(self, table: str, key: str) -> object:
-        """Return the value of a key as parsed, or None."""
-        values = self.document.get(table)
-        if (table,) in self.bad or (table, key) in self.bad or not isinstance(values, dict):
-            return None
-        return values.get(key)
-
-    def number(self, table: str, key: str) -> Decimal | None:
-        """Return a number, or None."""
-        value = self.value(table, key)
-        return Decimal(value) if isinstance(value, int | Decimal) else None
-
-    def pair(self, table: str, key: str) -> DecimalPair | None:
-        """Return an interval, or None; a fixed number has equal ends."""
-        value = self.value(table, key)
-        if isinstance(value, list):
-            return Decimal(value[0]), Decimal(value[1])
-        fixed = self.number(table, key)
-        return None if fixed is None else (fixed, fixed)
 
 
 def cross_problems(known: Known) -> Iterator[Problem]:

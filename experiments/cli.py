@@ -14,6 +14,7 @@ from experiments.commands.bound import bound
 from experiments.commands.compare import compare
 from experiments.commands.engage import engage
 from experiments.commands.experiment import experiment
+from experiments.commands.problems import app as problems
 from experiments.commands.replay import replay
 from experiments.commands.scenarios import app as scenarios
 from experiments.errors import InputError
@@ -54,6 +55,7 @@ app.command(
 )(adversary)
 app.command("replay", epilog="Example: infoset replay flight-random.npz flight-game.npz --out figures")(replay)
 app.add_typer(scenarios, name="scenarios")
+app.add_typer(problems, name="problems")
 
 
 def _print_version(wanted: bool) -> None:

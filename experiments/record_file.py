@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments._scenario_tables import shown
 from experiments.errors import InputError
 from experiments.output import library_version, write_file
 from experiments.scenario_file import read_scenario, scenario_to_toml
+from experiments.toml_values import shown
 from infoset import ConvexPolygons, Section
 from sim import Outcome, Record, Results, Scenario, StepRecord
 

@@ -10,43 +10,38 @@ import dataclasses
 import hashlib
 import json
 import os
-import tomllib
 from collections.abc import Iterator
-from decimal import Context, Decimal, InvalidOperation
 from enum import Enum
-from importlib import resources
-from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
-from experiments._scenario_checks import Known, Problem, cross_problems
-from experiments._scenario_tables import (
-    SCHEMA,
-    TABLES,
-    DecimalPair,
-    DispersionTable,
-    ScenarioTables,
-    UncertaintyTable,
-    keys_of,
-    nearest,
-    shown,
-)
+from experiments._scenario_checks import cross_problems
+from experiments._scenario_tables import SCHEMA, DispersionTable, ScenarioTables, UncertaintyTable
 from experiments.errors import InputError
+from experiments.toml_file import (
+    Form,
+    built_in_names,
+    built_in_text,
+    keys_of,
+    load_tables,
+    read_tables,
+    tables_of,
+)
+from experiments.toml_values import KILO, DecimalPair, degrees_text, number_text, quoted_text, radians, shown, si
 from guidance.thruster import Thruster
 from infoset.model import InitialSet, Interval, Model, SetModel, StateBox
 from infoset.sensors import AngleSensor, RangeSensor, RateSensor
 from sim.scenario import Scenario, Sun, Target
 
-LARGEST_FILE_BYTES = 1_000_000
-LONGEST_LINE = 1000
-MOST_PROBLEMS = 100
 DEFAULT_FEWEST_SECTIONS = 5
 
-_EXACT = Context(prec=60)
-_KILO = 3
-_RADIANS_PER_DEGREE = _EXACT.divide(
-    Decimal("3.14159265358979323846264338327950288419716939937510582097494459"), Decimal(180)
+FORM = Form(
+    noun="scenario",
+    folder="scenarios",
+    listed_by="infoset scenarios list",
+    begun_by="infoset scenarios new FILE",
+    tables=ScenarioTables,
+    checks=cross_problems,
+    schema=SCHEMA,
 )
 
 UNUSUAL_TABLES = ("rate_sensor", "target")
@@ -55,8 +50,7 @@ UNUSUAL_TABLES = ("rate_sensor", "target")
 
 def scenario_names() -> tuple[str, ...]:
     """Return the names of the built-in scenarios, in alphabetical order."""
-    files = resources.files("experiments").joinpath("scenarios").iterdir()
-    return tuple(sorted(file.name.removesuffix(".toml") for file in files if file.name.endswith(".toml")))
+    return built_in_names(FORM)
 
 
 def scenario_text(name: str) -> str:
@@ -77,9 +71,7 @@ def scenario_text(name: str) -> str:
     InputError
         If there is no such scenario.
     """
-    if name not in scenario_names():
-        raise _no_such_name(name, "no built-in scenario")
-    return resources.files("experiments").joinpath("scenarios", f"{name}.toml").read_text(encoding="utf-8")
+    return built_in_text(FORM, name)
 
 
 def load_scenario(name_or_path: str | os.PathLike[str]) -> Scenario:
@@ -94,21 +86,14 @@ def load_scenario(name_or_path: str | os.PathLike[str]) -> Scenario:
     Returns
     -------
     Scenario
-        In SI units.
+        In SI units, each number rounded once.
 
     Raises
     ------
     InputError
         If there is no such scenario or file, or the file is not a sound scenario; all its problems are named.
     """
-    given = os.fspath(name_or_path)
-    marks = [mark for mark in (os.sep, os.altsep) if mark]
-    is_name = isinstance(name_or_path, str) and not given.endswith(".toml") and not any(mark in given for mark in marks)
-    if is_name and given in scenario_names():
-        return read_scenario(scenario_text(given), f"{given} (built in)")
-    if is_name and not _exists(given):
-        raise _no_such_name(given, "no file and no built-in scenario")
-    return read_scenario(_text_of_file(given), given)
+    return _to_scenario(load_tables(FORM, name_or_path))
 
 
 def read_scenario(text: str, source: str) -> Scenario:
@@ -131,26 +116,7 @@ def read_scenario(text: str, source: str) -> Scenario:
     InputError
         With every problem of the text: where it is, the value found and the remedy.
     """
-    document = _parse(text, source)
-    schema = document.get("schema", SCHEMA)
-    if isinstance(schema, bool) or not isinstance(schema, int) or schema != SCHEMA:
-        raise InputError(
-            f"{source}: schema: must be {SCHEMA}, the only form of file this version reads, found {shown(schema)}; "
-            f"write schema = {SCHEMA} and the keys of `infoset scenarios new`, or update infoset"
-        )
-    tables = None
-    problems: list[Problem] = []
-    try:
-        tables = ScenarioTables.model_validate(document)
-    except ValidationError as error:
-        problems = [_problem(details) for details in error.errors(include_url=False)[: MOST_PROBLEMS + 1]]
-        known = Known(document, frozenset(tuple(str(part) for part in each["loc"]) for each in error.errors()))
-    else:
-        known = Known(document, frozenset())
-    problems += cross_problems(known)
-    if tables is None or problems:
-        raise InputError(_report(problems, source))
-    return _to_scenario(tables)
+    return _to_scenario(read_tables(FORM, text, source))
 
 
 def scenario_hash(scenario: Scenario) -> str:
@@ -232,13 +198,13 @@ def scenario_template() -> str:
         "# spacecraft is the origin. A line `# key = value` is optional: the default or an example.",
         "",
     ]
-    for name, field in keys_of(None).items():
-        if name not in TABLES:
+    for name, field in keys_of(ScenarioTables).items():
+        if name not in tables_of(ScenarioTables):
             lines += _template_key(name, field)
-    for table in TABLES:
-        field = keys_of(None)[table]
+    for table in tables_of(ScenarioTables):
+        field = keys_of(ScenarioTables)[table]
         optional = "" if field.is_required() else " (an optional table)"
-        keys = [line for name, key in keys_of(table).items() for line in _template_key(name, key)]
+        keys = [line for name, key in keys_of(ScenarioTables, (table,)).items() for line in _template_key(name, key)]
         if table in UNUSUAL_TABLES:
             keys = [f"# {line.removeprefix('# ')}" for line in keys]
         lines += ["", f"# {field.description}{optional}", f"# [{table}]" if table in UNUSUAL_TABLES else f"[{table}]"]
@@ -274,207 +240,67 @@ def scenario_to_toml(scenario: Scenario) -> str:
     tables: dict[str, dict[str, str]] = {
         "": {
             "schema": str(SCHEMA),
-            "name": _quoted(scenario.name),
-            "description": _quoted(scenario.description),
+            "name": quoted_text(scenario.name),
+            "description": quoted_text(scenario.description),
         }
     }
     if sun is not None:
         tables["sun"] = {
-            "gravitational_parameter_km3_s2": _number(sun.gravitational_parameter_m3_s2, 3 * _KILO),
-            "distance_km": _number(sun.distance_m, _KILO),
-            "direction_deg": _degrees(sun.direction_rad),
+            "gravitational_parameter_km3_s2": number_text(sun.gravitational_parameter_m3_s2, 3 * KILO),
+            "distance_km": number_text(sun.distance_m, KILO),
+            "direction_deg": degrees_text(sun.direction_rad),
         }
     tables["nominal"] = {
-        "range_km": _number(scenario.nominal_range_m, _KILO),
-        "closing_speed_km_s": _number(model.closing_speed_m_s, _KILO),
+        "range_km": number_text(scenario.nominal_range_m, KILO),
+        "closing_speed_km_s": number_text(model.closing_speed_m_s, KILO),
     }
     tables["uncertainty"] = _box(model.bounds, _pair)
     tables["dispersion"] = _box(scenario.dispersion, _pair_or_number)
     tables["angle_sensor"] = {
-        "period_s": _number(sensor.period_s),
-        "error_at_nominal_range_rad": _number(sensor.error_at_nominal_range_rad),
-        "error_at_zero_range_rad": _number(sensor.error_at_zero_range_rad),
+        "period_s": number_text(sensor.period_s),
+        "error_at_nominal_range_rad": number_text(sensor.error_at_nominal_range_rad),
+        "error_at_zero_range_rad": number_text(sensor.error_at_zero_range_rad),
     }
     if scenario.range_sensor is not None:
         tables["range_sensor"] = {
-            "period_s": _number(scenario.range_sensor.period_s),
-            "relative_error": _number(scenario.range_sensor.relative_error),
+            "period_s": number_text(scenario.range_sensor.period_s),
+            "relative_error": number_text(scenario.range_sensor.relative_error),
         }
     if scenario.rate_sensor is not None:
         tables["rate_sensor"] = {
-            "period_s": _number(scenario.rate_sensor.period_s),
-            "error_rad_s": _number(scenario.rate_sensor.error_rad_s),
+            "period_s": number_text(scenario.rate_sensor.period_s),
+            "error_rad_s": number_text(scenario.rate_sensor.error_rad_s),
         }
     if scenario.target is not None:
         tables["target"] = {
-            "manoeuvre": _quoted(scenario.target.manoeuvre.value),
-            "acceleration_m_s2": _number(scenario.target.acceleration_m_s2),
-            "switching_period_s": _number(scenario.target.switching_period_s),
+            "manoeuvre": quoted_text(scenario.target.manoeuvre.value),
+            "acceleration_m_s2": number_text(scenario.target.acceleration_m_s2),
+            "switching_period_s": number_text(scenario.target.switching_period_s),
         }
     tables["thruster"] = {
-        "budget_m_s": _number(scenario.thruster.budget_m_s),
-        "least_impulse_m_s": _number(scenario.thruster.least_impulse_m_s),
-        "greatest_impulse_m_s": _number(scenario.thruster.greatest_impulse_m_s),
-        "execution_error_relative": _number(scenario.thruster.execution_error_relative),
+        "budget_m_s": number_text(scenario.thruster.budget_m_s),
+        "least_impulse_m_s": number_text(scenario.thruster.least_impulse_m_s),
+        "greatest_impulse_m_s": number_text(scenario.thruster.greatest_impulse_m_s),
+        "execution_error_relative": number_text(scenario.thruster.execution_error_relative),
     }
     tables["guidance"] = {
-        "step_s": _number(model.step_s),
-        "strategy": _quoted(scenario.strategy),
-        "range_threshold_km": _number(model.range_threshold_m, _KILO),
+        "step_s": number_text(model.step_s),
+        "strategy": quoted_text(scenario.strategy),
+        "range_threshold_km": number_text(model.range_threshold_m, KILO),
     }
     tables["information_set"] = {
-        "model": _quoted(model.kind.value),
-        "initial_set": _quoted(model.initial_set.value),
+        "model": quoted_text(model.kind.value),
+        "initial_set": quoted_text(model.initial_set.value),
         "sections": str(int(model.sections)),
         "fewest_sections": str(int(model.fewest_sections)),
-        "disturbance_m_s2": _number(model.disturbance_m_s2),
+        "disturbance_m_s2": number_text(model.disturbance_m_s2),
     }
-    tables["noise"] = {"kind": _quoted(scenario.noise.value), "tie": _quoted(scenario.tie.value)}
+    tables["noise"] = {"kind": quoted_text(scenario.noise.value), "tie": quoted_text(scenario.tie.value)}
     return "\n".join(_table_lines(tables))
 
 
-def _no_such_name(name: str, what: str) -> InputError:
-    names = scenario_names()
-    guess = nearest(name, list(names))
-    hint = f'did you mean "{guess}"? ' if guess else ""
-    return InputError(f"{what} is called {shown(name)}; {hint}the built-in ones are {', '.join(names)}")
-
-
-def _exists(path: str) -> bool:
-    try:
-        return bool(path) and Path(path).exists()
-    except (OSError, ValueError):  # a name too long, or with a null in it
-        return False
-
-
-def _text_of_file(path: str) -> str:
-    """Read a file a person named."""
-    try:
-        with Path(path).open("rb") as file:
-            content = file.read(LARGEST_FILE_BYTES + 1)
-    except FileNotFoundError:
-        raise InputError(
-            f"{path}: there is no such file; check the path, or see `infoset scenarios list` for the built-in names"
-        ) from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder; name a scenario file in it") from None
-    except PermissionError:
-        raise InputError(f"{path}: cannot be read, permission denied; check who may read it") from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise InputError(f"{shown(path)}: cannot be read: {reason}; check the path") from None
-    if len(content) > LARGEST_FILE_BYTES:
-        raise InputError(
-            f"{path}: is over {LARGEST_FILE_BYTES // 1000} kB, far more than a scenario needs; name a scenario file"
-        )
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise InputError(f"{path}: is not UTF-8 text (line {line}); save it as UTF-8") from None
-
-
-def _decimal(literal: str) -> Decimal:
-    """Read a TOML float as written."""
-    try:
-        return Decimal(literal)
-    except InvalidOperation:  # an exponent beyond what a Decimal holds: zero or infinity, as for a float
-        return Decimal(repr(float(literal)))
-
-
-def _parse(text: str, source: str) -> dict[str, Any]:
-    """Parse TOML, refusing what would take the parser too long."""
-    if len(text) > LARGEST_FILE_BYTES:
-        raise InputError(f"{source}: is over {LARGEST_FILE_BYTES // 1000} kB, far more than a scenario needs")
-    lines = text.split("\n")
-    for number, line in enumerate(lines, start=1):
-        if len(line) > LONGEST_LINE:  # the parser's time grows as the square of a dotted key's length
-            raise InputError(f"{source}: line {number} is over {LONGEST_LINE} characters; no line of a scenario is")
-    try:
-        return tomllib.loads(text, parse_float=_decimal)
-    except tomllib.TOMLDecodeError as error:
-        column = len(lines[-1]) + 1
-        reason = str(error).replace("(at end of document)", f"(at line {len(lines)}, column {column}: the end)")
-        raise InputError(f"{source}: is not TOML: {reason}; correct that line") from None
-    except (RecursionError, ValueError) as error:
-        reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
-        raise InputError(f"{source}: is not a scenario: {reason}; start from `infoset scenarios new FILE`") from None
-
-
-def _report(problems: list[Problem], source: str) -> str:
-    """Put all problems of a file into one message, in the order of the tables."""
-    order = [*keys_of(None)]
-    problems = sorted(problems, key=lambda each: order.index(each.path[0]) if each.path[0] in order else len(order))
-    lines = [f"{source}: {_path(each.path)}: {each.text}; {each.remedy}" for each in problems[:MOST_PROBLEMS]]
-    if len(problems) > MOST_PROBLEMS:
-        lines.append(f"{source}: and more problems; correct these first")
-    if len(lines) == 1:
-        return lines[0]
-    return "\n  ".join([f"{source} has {len(lines)} problems:", *lines])
-
-
-def _path(path: tuple[str, ...]) -> str:
-    return ".".join(part if part.replace("_", "").replace("-", "").isalnum() else shown(part) for part in path)
-
-
-def _problem(details: Any) -> Problem:
-    """Say in our words what pydantic found."""
-    path = tuple(str(part) for part in details["loc"])
-    if details["type"] == "missing":
-        return Problem(path, "is missing", _remedy_of_missing(path))
-    if details["type"] == "extra_forbidden":
-        return Problem(path, *_unknown(path, details["input"]))
-    found = shown(details["input"])
-    if details["type"] == "scenario":
-        context = details["ctx"]
-        return Problem(path, f"{context['problem']}, found {found}", context["remedy"] or f"write {_example(path)}")
-    return Problem(
-        path, f"must be a table, found {found}", f"write [{path[0]}] on a line of its own, its keys below it"
-    )
-
-
-def _example(path: tuple[str, ...]) -> str:
-    field = keys_of(path[0] if len(path) > 1 else None)[path[-1]]
-    return f"for example {path[-1]} = {field.examples[0]}"
-
-
-def _remedy_of_missing(path: tuple[str, ...]) -> str:
-    if len(path) > 1:
-        return f"add it under [{path[0]}], {_example(path)}"
-    if path[0] in TABLES:
-        return f"add the table [{path[0]}] with its keys {', '.join(keys_of(path[0]))}"
-    return f"add it above the first table, {_example(path)}"
-
-
-def _unknown(path: tuple[str, ...], value: object) -> tuple[str, str]:
-    """Say what to do about a key or a table that a scenario does not have."""
-    name, table = path[-1], path[0] if len(path) > 1 else None
-    what = "is not a table of a scenario" if isinstance(value, dict) else "is not a key of a scenario"
-    homes = [f"[{other}]" for other in TABLES if name in keys_of(other)]
-    if table is not None and name in keys_of(None):
-        if name in TABLES:
-            return f"is not a key of [{table}]", f"write [{name}] as a table of its own"
-        return f"is not a key of [{table}]", f"move {name} above the first table"
-    if homes and not isinstance(value, dict):
-        return f"is not a key of {f'[{table}]' if table else 'the top'}", f"move {name} to {' or '.join(homes)}"
-    valid = [*keys_of(table)]
-    guess = nearest(name, valid)
-    if table is not None:
-        what = f"is not a key of [{table}]"
-    return what, f"did you mean {guess}?" if guess else f"remove it; valid here: {', '.join(valid)}"
-
-
-def _si(value: Decimal, power_of_ten: int = 0) -> float:
-    """Change the unit of a decimal and round it, once."""
-    return float(value.scaleb(power_of_ten, _EXACT))
-
-
 def _interval(pair: DecimalPair) -> Interval:
-    return _si(pair[0], _KILO), _si(pair[1], _KILO)
-
-
-def _radians(degrees: Decimal) -> float:
-    return float(_EXACT.multiply(degrees, _RADIANS_PER_DEGREE))
+    return si(pair[0], KILO), si(pair[1], KILO)
 
 
 def _state_box(table: UncertaintyTable | DispersionTable) -> StateBox:
@@ -490,7 +316,7 @@ def _to_scenario(tables: ScenarioTables) -> Scenario:
     """Change units and compose the dataclasses of the core."""
     information_set, sun, range_sensor = tables.information_set, tables.sun, tables.range_sensor
     rate_sensor, target = tables.rate_sensor, tables.target
-    nominal_range_m = _si(tables.nominal.range_km, _KILO)
+    nominal_range_m = si(tables.nominal.range_km, KILO)
     fewest = information_set.fewest_sections
     return Scenario(
         name=tables.name,
@@ -498,24 +324,24 @@ def _to_scenario(tables: ScenarioTables) -> Scenario:
         sun=None
         if sun is None
         else Sun(
-            gravitational_parameter_m3_s2=_si(sun.gravitational_parameter_km3_s2, 3 * _KILO),
-            distance_m=_si(sun.distance_km, _KILO),
-            direction_rad=_radians(sun.direction_deg),
+            gravitational_parameter_m3_s2=si(sun.gravitational_parameter_km3_s2, 3 * KILO),
+            distance_m=si(sun.distance_km, KILO),
+            direction_rad=radians(sun.direction_deg),
         ),
         nominal_range_m=nominal_range_m,
         dispersion=_state_box(tables.dispersion),
         set_model=SetModel(
-            closing_speed_m_s=_si(tables.nominal.closing_speed_km_s, _KILO),
-            step_s=_si(tables.guidance.step_s),
+            closing_speed_m_s=si(tables.nominal.closing_speed_km_s, KILO),
+            step_s=si(tables.guidance.step_s),
             bounds=_state_box(tables.uncertainty),
             angle_sensor=AngleSensor(
-                period_s=_si(tables.angle_sensor.period_s),
-                error_at_nominal_range_rad=_si(tables.angle_sensor.error_at_nominal_range_rad),
-                error_at_zero_range_rad=_si(tables.angle_sensor.error_at_zero_range_rad),
+                period_s=si(tables.angle_sensor.period_s),
+                error_at_nominal_range_rad=si(tables.angle_sensor.error_at_nominal_range_rad),
+                error_at_zero_range_rad=si(tables.angle_sensor.error_at_zero_range_rad),
                 nominal_range_m=nominal_range_m,
             ),
-            disturbance_m_s2=_si(information_set.disturbance_m_s2),
-            range_threshold_m=_si(tables.guidance.range_threshold_km, _KILO),
+            disturbance_m_s2=si(information_set.disturbance_m_s2),
+            range_threshold_m=si(tables.guidance.range_threshold_km, KILO),
             sections=information_set.sections,
             fewest_sections=min(DEFAULT_FEWEST_SECTIONS, information_set.sections) if fewest is None else fewest,
             initial_set=information_set.initial_set or default_initial_set(information_set.model),
@@ -523,25 +349,25 @@ def _to_scenario(tables: ScenarioTables) -> Scenario:
         ),
         range_sensor=None
         if range_sensor is None
-        else RangeSensor(period_s=_si(range_sensor.period_s), relative_error=_si(range_sensor.relative_error)),
+        else RangeSensor(period_s=si(range_sensor.period_s), relative_error=si(range_sensor.relative_error)),
         thruster=Thruster(
-            budget_m_s=_si(tables.thruster.budget_m_s),
-            least_impulse_m_s=_si(tables.thruster.least_impulse_m_s),
-            greatest_impulse_m_s=_si(tables.thruster.greatest_impulse_m_s),
-            execution_error_relative=_si(tables.thruster.execution_error_relative),
+            budget_m_s=si(tables.thruster.budget_m_s),
+            least_impulse_m_s=si(tables.thruster.least_impulse_m_s),
+            greatest_impulse_m_s=si(tables.thruster.greatest_impulse_m_s),
+            execution_error_relative=si(tables.thruster.execution_error_relative),
         ),
         strategy=tables.guidance.strategy,
         noise=tables.noise.kind,
         tie=tables.noise.tie,
         rate_sensor=None
         if rate_sensor is None
-        else RateSensor(period_s=_si(rate_sensor.period_s), error_rad_s=_si(rate_sensor.error_rad_s)),
+        else RateSensor(period_s=si(rate_sensor.period_s), error_rad_s=si(rate_sensor.error_rad_s)),
         target=None
         if target is None
         else Target(
             manoeuvre=target.manoeuvre,
-            acceleration_m_s2=_si(target.acceleration_m_s2),
-            switching_period_s=_si(target.switching_period_s),
+            acceleration_m_s2=si(target.acceleration_m_s2),
+            switching_period_s=si(target.switching_period_s),
         ),
     )
 
@@ -559,36 +385,12 @@ def _canonical(value: Any) -> Any:
     return (float(value) + 0.0).hex()  # adding zero takes the sign off a negative zero
 
 
-def _toml_float(value: Decimal) -> str:
-    """Write a decimal as a TOML float, without an exponent where that is short."""
-    value = value.normalize(_EXACT)
-    if value and not -6 <= value.adjusted() < 9:
-        return f"{value:e}"
-    text = f"{value:f}"
-    return text if "." in text else f"{text}.0"
-
-
-def _number(si: float, power_of_ten: int = 0) -> str:
-    """Write an SI value as the shortest decimal of a unit 10^power_of_ten times as great."""
-    value = Decimal(repr(float(si)))
-    if not value.is_finite():
-        raise InputError(f"a scenario file holds finite numbers only, not {si}; correct the scenario")
-    return _toml_float(value.scaleb(-power_of_ten, _EXACT))
-
-
-def _degrees(radians: float) -> str:
-    """Write an angle as the shortest decimal of degrees that reads back as the same radians."""
-    exact = _EXACT.divide(Decimal(_number(radians)), _RADIANS_PER_DEGREE)
-    shorter = (Context(prec=digits).plus(exact) for digits in range(1, 20))
-    return _toml_float(next((value for value in shorter if repr(_radians(value)) == repr(radians)), exact))
-
-
 def _pair(interval: Interval) -> str:
-    return f"[{_number(interval[0], _KILO)}, {_number(interval[1], _KILO)}]"
+    return f"[{number_text(interval[0], KILO)}, {number_text(interval[1], KILO)}]"
 
 
 def _pair_or_number(interval: Interval) -> str:
-    least, greatest = (_number(end, _KILO) for end in interval)
+    least, greatest = (number_text(end, KILO) for end in interval)
     return least if least == greatest else f"[{least}, {greatest}]"
 
 
@@ -599,12 +401,6 @@ def _box(box: StateBox, written: Any) -> dict[str, str]:
         "vz_km_s": written(box.vz_m_s),
         "vx_km_s": written(box.vx_m_s),
     }
-
-
-def _quoted(text: str) -> str:
-    """Write a TOML string on one line."""
-    escapes = {"\\": "\\\\", '"': '\\"'}
-    return '"' + "".join(escapes.get(c, c if c.isprintable() or c == " " else f"\\U{ord(c):08x}") for c in text) + '"'
 
 
 def _table_lines(tables: dict[str, dict[str, str]]) -> Iterator[str]:

@@ -126,8 +126,8 @@ def choice(option: str, name: str, valid: Sequence[str]) -> str:
     """
     if name in valid:
         return name
-    from experiments._scenario_tables import nearest, shown
     from experiments.errors import InputError
+    from experiments.toml_values import nearest, shown
 
     guess = nearest(name, list(valid))
     hint = f"did you mean {guess}? " if guess else ""
