@@ -1,0 +1,101 @@
+"""Motion with a constant A: transition, Gramian and held control from one block exponential."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import expm
+
+from rendezvous.relative_motion.frames import HILL, Frame
+from rendezvous.relative_motion.linear_motion import Segment, checked_durations, velocity_input
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ConstantMotion:
+    """x' = A x + (0, u)'.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (6, 6)
+        A, in the frame.
+    frame : Frame
+        Of states and controls; position before velocity.
+
+    Raises
+    ------
+    ValueError
+        If A has another shape or is not finite.
+
+    Notes
+    -----
+    Van Loan's block exponential, balanced: velocities are multiplied by the duration, so that all blocks are of one
+    size. 12 x 12 an interval.
+    """
+
+    matrix: Floats
+    frame: Frame = HILL
+
+    def __post_init__(self) -> None:
+        if np.shape(self.matrix) != (6, 6) or not np.isfinite(self.matrix).all():
+            raise ValueError("A must be a finite matrix of shape (6, 6)")
+
+    def dynamics(self, time_s: ArrayLike) -> Floats:
+        """A, the same at all times, shape (..., 6, 6)."""
+        return np.broadcast_to(self.matrix, (*np.shape(time_s), 6, 6))
+
+    def input_map(self, time_s: ArrayLike) -> Floats:
+        """B, shape (..., 6, 3)."""
+        return velocity_input(np.shape(time_s))
+
+    def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
+        """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
+        durations = np.asarray(end_s, dtype=np.float64) - np.asarray(start_s, dtype=np.float64)
+        scale = _scales(durations)
+        return np.asarray(expm(self._scaled(durations, scale)) * (scale[..., :, None] / scale[..., None, :]))
+
+    def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
+        """Gramian, int Phi(end, t) B B' Phi(end, t)' dt from start to end, shape (..., 6, 6); end >= start."""
+        durations = checked_durations(start_s, end_s)
+        scale = _scales(durations)
+        scaled = self._scaled(durations, scale)
+        block = np.zeros((*durations.shape, 12, 12))
+        block[..., :6, :6] = -scaled
+        block[..., 6:, 6:] = np.swapaxes(scaled, -1, -2)
+        block[..., (3, 4, 5), (9, 10, 11)] = 1.0
+        power = expm(block)
+        unit = np.swapaxes(power[..., 6:, 6:], -1, -2) @ power[..., :6, 6:]
+        unit = 0.5 * (unit + np.swapaxes(unit, -1, -2))
+        factor = durations[..., None, None] * scale[..., :, None] * scale[..., None, :]
+        return np.asarray(unit * factor)
+
+    def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> Segment:
+        """Transition, Gramian and drift at once; end >= start."""
+        return Segment(self.transition(start_s, end_s), self.gramian(start_s, end_s), self.drift(start_s, end_s))
+
+    def held_input(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
+        """Effect at the end of a unit control held from the start, int Phi(end, t) B dt, shape (..., 6, 3)."""
+        durations = checked_durations(start_s, end_s)
+        scale = _scales(durations)
+        block = np.zeros((*durations.shape, 9, 9))
+        block[..., :6, :6] = self._scaled(durations, scale)
+        block[..., (3, 4, 5), (6, 7, 8)] = 1.0
+        return np.asarray(expm(block)[..., :6, 6:] * scale[..., :, None] * durations[..., None, None])
+
+    def drift(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
+        """Zero, shape (..., 6)."""
+        return np.zeros((*np.broadcast_shapes(np.shape(start_s), np.shape(end_s)), 6))
+
+    def _scaled(self, durations: Floats, scale: Floats) -> Floats:
+        """A T in states divided by (T, T, T, 1, 1, 1)."""
+        return np.asarray(self.matrix * (scale[..., None, :] / scale[..., :, None]) * durations[..., None, None])
+
+
+def _scales(durations: Floats) -> Floats:
+    """(T, T, T, 1, 1, 1) an interval; an empty one is as good as a second long."""
+    scale = np.ones((*durations.shape, 6))
+    scale[..., :3] = np.where(durations == 0.0, 1.0, np.abs(durations))[..., None]
+    return scale

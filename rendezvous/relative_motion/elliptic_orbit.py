@@ -1,0 +1,196 @@
+"""The reference orbit of elliptic relative motion: where it is at a time, and A(t) about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rendezvous.relative_motion.constant import ConstantMotion
+from rendezvous.relative_motion.frames import HILL, Frame
+from rendezvous.relative_motion.linear_motion import checked_rate
+
+Floats = NDArray[np.float64]
+
+_MOST_STEPS = 60
+
+
+@dataclass(frozen=True)
+class EllipticOrbit:
+    """An elliptic reference orbit.
+
+    Parameters
+    ----------
+    mean_motion_rad_s : float
+    eccentricity : float
+        0 <= e < 1.
+    true_anomaly_rad : float
+        At t = 0.
+
+    Raises
+    ------
+    ValueError
+        If the mean motion is not positive, the eccentricity outside [0, 1), or the anomaly not finite.
+    """
+
+    mean_motion_rad_s: float
+    eccentricity: float = 0.0
+    true_anomaly_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        checked_rate(self.mean_motion_rad_s)
+        if not 0.0 <= self.eccentricity < 1.0:
+            raise ValueError(f"the eccentricity must be at least 0 and below 1, found {self.eccentricity!r}")
+        if not np.isfinite(self.true_anomaly_rad):
+            raise ValueError("the true anomaly is not finite")
+
+    @classmethod
+    def of_size(
+        cls,
+        semi_major_axis_m: float,
+        eccentricity: float,
+        gravitational_parameter_m3_s2: float,
+        true_anomaly_rad: float = 0.0,
+    ) -> EllipticOrbit:
+        """Return the orbit of a semi-major axis.
+
+        Parameters
+        ----------
+        semi_major_axis_m : float
+        eccentricity : float
+        gravitational_parameter_m3_s2 : float
+        true_anomaly_rad : float
+            At t = 0.
+
+        Returns
+        -------
+        EllipticOrbit
+        """
+        rate = float(np.sqrt(gravitational_parameter_m3_s2 / semi_major_axis_m**3))
+        return cls(rate, eccentricity, true_anomaly_rad)
+
+    @property
+    def areal_rate_rad_s(self) -> float:
+        """sqrt(mu / p^3) = h / p^2, which Yamanaka and Ankersen call k^2, rad/s."""
+        return float(self.mean_motion_rad_s / (1.0 - self.eccentricity**2) ** 1.5)
+
+    def eccentric_anomaly(self, time_s: ArrayLike) -> Floats:
+        """Return the eccentric anomaly, which grows without end, rad.
+
+        Parameters
+        ----------
+        time_s : array_like
+
+        Returns
+        -------
+        ndarray
+        """
+        start = self._eccentric_of_true(self.true_anomaly_rad)
+        mean = start - self.eccentricity * np.sin(start) + self.mean_motion_rad_s * np.asarray(time_s, dtype=np.float64)
+        return eccentric_of_mean(mean, self.eccentricity)
+
+    def time_of_eccentric(self, eccentric_rad: Floats) -> Floats:
+        """Return the times of eccentric anomalies, s: Kepler's equation, the inverse of `eccentric_anomaly`."""
+        start = self._eccentric_of_true(self.true_anomaly_rad)
+        e = self.eccentricity
+        return np.asarray(
+            (eccentric_rad - start - e * (np.sin(eccentric_rad) - np.sin(start))) / self.mean_motion_rad_s
+        )
+
+    def true_anomaly(self, time_s: ArrayLike) -> Floats:
+        """Return the true anomaly, which grows without end, rad.
+
+        Parameters
+        ----------
+        time_s : array_like
+
+        Returns
+        -------
+        ndarray
+        """
+        eccentric, e = self.eccentric_anomaly(time_s), self.eccentricity
+        fraction = e / (1.0 + np.sqrt(1.0 - e * e))
+        return np.asarray(
+            eccentric + 2.0 * np.arctan2(fraction * np.sin(eccentric), 1.0 - fraction * np.cos(eccentric))
+        )
+
+    def rate(self, time_s: ArrayLike) -> Floats:
+        """Return the angular rate w of the radius vector, rad/s: k^2 (1 + e cos nu)^2."""
+        return np.asarray(self.areal_rate_rad_s * (1.0 + self.eccentricity * np.cos(self.true_anomaly(time_s))) ** 2)
+
+    def dynamics(self, time_s: ArrayLike) -> Floats:
+        """Return A(t) in axes of Hill.
+
+        Parameters
+        ----------
+        time_s : array_like
+
+        Returns
+        -------
+        ndarray, shape (..., 6, 6)
+
+        Notes
+        -----
+        Equation (2) of Shorikov and Goranov (2021) in other axes; mu / r^3 = w^2 r / p.
+        """
+        anomaly, e, k2 = self.true_anomaly(time_s), self.eccentricity, self.areal_rate_rad_s
+        rho = 1.0 + e * np.cos(anomaly)
+        w, w_dot, gravity = k2 * rho**2, -2.0 * k2**2 * e * np.sin(anomaly) * rho**3, k2**2 * rho**3
+        matrix = np.zeros((*anomaly.shape, 6, 6))
+        matrix[..., 0, 3] = matrix[..., 1, 4] = matrix[..., 2, 5] = 1.0
+        matrix[..., 3, 0], matrix[..., 3, 1], matrix[..., 3, 4] = w**2 + 2.0 * gravity, w_dot, 2.0 * w
+        matrix[..., 4, 0], matrix[..., 4, 1], matrix[..., 4, 3] = -w_dot, w**2 - gravity, -2.0 * w
+        matrix[..., 5, 2] = -gravity
+        return matrix
+
+    def frozen(self, time_s: float, frame: Frame = HILL) -> ConstantMotion:
+        """Return the motion with A(t) as it is at one time, for ever.
+
+        Parameters
+        ----------
+        time_s : float
+        frame : Frame
+
+        Returns
+        -------
+        ConstantMotion
+        """
+        return ConstantMotion(HILL.matrices_to(frame, self.dynamics(time_s)), frame)
+
+    def _eccentric_of_true(self, true_rad: float) -> float:
+        e = self.eccentricity
+        fraction = e / (1.0 + np.sqrt(1.0 - e * e))
+        return float(true_rad - 2.0 * np.arctan2(fraction * np.sin(true_rad), 1.0 + fraction * np.cos(true_rad)))
+
+
+def eccentric_of_mean(mean_rad: ArrayLike, eccentricity: float) -> Floats:
+    """Solve Kepler's equation E - e sin E = M.
+
+    Parameters
+    ----------
+    mean_rad : array_like
+        M; E grows with it without end.
+    eccentricity : float
+        0 <= e < 1.
+
+    Returns
+    -------
+    ndarray
+        E, rad.
+
+    Notes
+    -----
+    Newton's method from above, where the function is convex: it falls to the root and cannot overshoot.
+    """
+    mean = np.asarray(mean_rad, dtype=np.float64)
+    turns = 2.0 * np.pi * np.round(mean / (2.0 * np.pi))
+    sign, rest = np.where(mean < turns, -1.0, 1.0), np.abs(mean - turns)
+    found = np.minimum(np.minimum(rest + eccentricity, rest / (1.0 - eccentricity)), np.pi)
+    for _ in range(_MOST_STEPS):
+        excess = found - eccentricity * np.sin(found) - rest
+        step = excess / (1.0 - eccentricity * np.cos(found))
+        found = np.maximum(found - step, 0.0)
+        if np.all(np.abs(step) <= 4e-16 * (1.0 + found)):
+            break
+    return np.asarray(turns + sign * found)

@@ -1,0 +1,212 @@
+"""Motion with any A(t), B(t) and drift w(t), by collocation of the adjoint variational equations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rendezvous.relative_motion.frames import HILL, Frame
+from rendezvous.relative_motion.linear_motion import Segment, checked_durations, velocity_input
+
+Floats = NDArray[np.float64]
+OfTime = Callable[[Floats], Floats]
+
+NODES = 8
+AGREEMENT = 2e-13
+ROUNDING = 1e-10
+MOST_PANELS = 4096
+
+
+@dataclass(frozen=True)
+class _Solution:
+    """What happens from each start to each end, one a row."""
+
+    transition: Floats
+    gramian: Floats
+    held: Floats
+    drift: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class TimeVaryingMotion:
+    """x' = A(t) x + B(t) u + w(t).
+
+    Parameters
+    ----------
+    matrix_at : callable
+        A of times of shape (k,), s: shape (k, 6, 6).
+    frame : Frame
+        Of states and controls; position before velocity.
+    input_at : callable or None
+        B, shape (k, 6, 3); None is an acceleration, (0, 1)'. An actuator with the cost u' R u has
+        B = (0, 1)' R^(-1/2), and controls R^(1/2) u.
+    drift_at : callable or None
+        w, shape (k, 6); None is zero.
+
+    Notes
+    -----
+    The adjoint Psi' = -A' Psi, Psi(end) = 1, is collocated backwards at 8 Gauss points a panel (order 16); Phi(end, t)
+    = Psi(t)' at the nodes gives the Gramian, the held control and the drift as sums of positive weights. Panels are
+    doubled until two answers agree to 2e-13, or until only rounding parts them. A panel is a 48 x 48 system.
+    """
+
+    matrix_at: OfTime
+    frame: Frame = HILL
+    input_at: OfTime | None = None
+    drift_at: OfTime | None = None
+
+    def dynamics(self, time_s: ArrayLike) -> Floats:
+        """A(t), shape (..., 6, 6)."""
+        return _at(self.matrix_at, time_s)
+
+    def input_map(self, time_s: ArrayLike) -> Floats:
+        """B(t), shape (..., 6, 3)."""
+        return velocity_input(np.shape(time_s)) if self.input_at is None else _at(self.input_at, time_s)
+
+    def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
+        """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
+        return self._solved(start_s, end_s).transition
+
+    def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
+        """Gramian, int Phi(end, t) B B' Phi(end, t)' dt from start to end, shape (..., 6, 6); end >= start."""
+        checked_durations(start_s, end_s)
+        return self._solved(start_s, end_s).gramian
+
+    def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> Segment:
+        """Transition, Gramian and drift at once; end >= start."""
+        checked_durations(start_s, end_s)
+        found = self._solved(start_s, end_s)
+        return Segment(found.transition, found.gramian, found.drift)
+
+    def held_input(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
+        """Effect at the end of a unit control held from the start, int Phi(end, t) B dt, shape (..., 6, 3)."""
+        checked_durations(start_s, end_s)
+        return self._solved(start_s, end_s).held
+
+    def drift(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
+        """Where the drift alone leads from the origin, int Phi(end, t) w dt, shape (..., 6)."""
+        return self._solved(start_s, end_s).drift
+
+    def _solved(self, start_s: ArrayLike, end_s: ArrayLike) -> _Solution:
+        starts, ends = np.broadcast_arrays(np.asarray(start_s, dtype=np.float64), np.asarray(end_s, dtype=np.float64))
+        if not (np.isfinite(starts).all() and np.isfinite(ends).all()):
+            raise ValueError("a time is not finite")
+        found, shape = _refined(self, starts.ravel(), ends.ravel()), starts.shape
+        return _Solution(
+            found.transition.reshape(*shape, 6, 6),
+            found.gramian.reshape(*shape, 6, 6),
+            found.held.reshape(*shape, 6, 3),
+            found.drift.reshape(*shape, 6),
+        )
+
+
+def _refined(motion: TimeVaryingMotion, starts: Floats, ends: Floats) -> _Solution:
+    """Double the panels until two answers agree, or differ by rounding alone."""
+    panels = _first_panels(motion, starts, ends)
+    coarse, apart = _collocated(motion, starts, ends, panels), np.inf
+    while 2 * panels <= MOST_PANELS:
+        panels *= 2
+        fine = _collocated(motion, starts, ends, panels)
+        before, apart = apart, _difference(coarse, fine, ends - starts)
+        if apart <= AGREEMENT or (apart <= ROUNDING and apart > 0.1 * before):
+            return fine
+        coarse = fine
+    raise ValueError(f"A(t) changes too fast: {MOST_PANELS} panels an interval do not agree to {AGREEMENT:g}")
+
+
+def _at(function: OfTime, time_s: ArrayLike) -> Floats:
+    times = np.asarray(time_s, dtype=np.float64)
+    found = np.asarray(function(times.ravel()), dtype=np.float64)
+    return found.reshape(*times.shape, *found.shape[1:])
+
+
+def _first_panels(motion: TimeVaryingMotion, starts: Floats, ends: Floats) -> int:
+    """A panel a radian of the fastest motion seen at the ends and the middle."""
+    if not len(starts):
+        return 1
+    matrices = motion.dynamics(np.stack([starts, 0.5 * (starts + ends), ends]))
+    if not np.isfinite(matrices).all():
+        raise ValueError("A(t) is not finite")
+    gravity = np.sqrt(np.abs(matrices[..., 3:, :3]).sum(axis=-1).max(axis=-1))
+    turning = np.abs(matrices[..., 3:, 3:]).sum(axis=-1).max(axis=-1)
+    radians = float((np.maximum(gravity, turning) * np.abs(ends - starts)).max())
+    return int(np.clip(np.ceil(radians), 1, MOST_PANELS // 4))
+
+
+@lru_cache(maxsize=1)
+def _gauss_collocation() -> tuple[Floats, Floats, Floats]:
+    """Nodes and weights on [0, 1], and the integrals of the Lagrange polynomials from 0 to each node."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    values = np.polynomial.legendre.legvander(nodes, NODES - 1)
+    integrals = np.stack(
+        [
+            np.polynomial.legendre.legval(nodes, np.polynomial.legendre.legint(np.eye(NODES)[k], lbnd=-1.0))
+            for k in range(NODES)
+        ],
+        axis=1,
+    )
+    return 0.5 * (nodes + 1.0), 0.5 * weights, 0.5 * integrals @ np.linalg.inv(values)
+
+
+def _collocated(motion: TimeVaryingMotion, starts: Floats, ends: Floats, panels: int) -> _Solution:
+    """Solve on equal panels; s = end - t runs backwards, and states are divided by (T, T, T, 1, 1, 1)."""
+    nodes, weights, integrals = _gauss_collocation()
+    durations = ends - starts
+    width = durations / panels
+    positions = (np.arange(panels)[:, None] + nodes) / panels
+    times = ends[:, None, None] - durations[:, None, None] * positions
+    scale = np.ones((len(durations), 6))
+    scale[:, :3] = np.where(durations == 0.0, 1.0, np.abs(durations))[:, None]
+    ratio = (scale[:, None, :] / scale[:, :, None])[:, None, None]
+    adjoint = np.swapaxes(motion.dynamics(times) * ratio, -1, -2) * width[:, None, None, None, None]
+    # (1 - h a_jk A_k') Psi_k = 1, for the 8 nodes of each panel at once.
+    system = -np.einsum("jk,npkab->npjakb", integrals, adjoint).reshape(len(durations), panels, 6 * NODES, 6 * NODES)
+    system[..., np.arange(6 * NODES), np.arange(6 * NODES)] += 1.0
+    right = np.broadcast_to(np.tile(np.eye(6), (NODES, 1)), (len(durations), panels, 6 * NODES, 6))
+    psi = np.linalg.solve(system, right).reshape(len(durations), panels, NODES, 6, 6)
+    last = np.eye(6) + np.einsum("k,npkab->npab", weights, adjoint @ psi)
+    inputs = motion.input_map(times) / scale[:, None, None, :, None]
+    effect = np.swapaxes(psi, -1, -2) @ inputs
+    drifts = np.zeros((len(durations), panels, 6))
+    if motion.drift_at is not None:
+        pushed = _at(motion.drift_at, times) / scale[:, None, None, :]
+        drifts = np.einsum("k,npkba,npkb->npa", weights, psi, pushed)
+    power = np.broadcast_to(np.eye(6), (len(durations), 6, 6))
+    gramian, held, drift = np.zeros((len(durations), 6, 6)), np.zeros((len(durations), 6, 3)), np.zeros_like(scale)
+    for panel in range(panels):
+        turned = power[:, None] @ effect[:, panel]
+        gramian = gramian + np.einsum("k,nkai,nkbi->nab", weights, turned, turned)
+        held = held + np.einsum("k,nkai->nai", weights, turned)
+        drift = drift + (power @ drifts[:, panel, :, None])[..., 0]
+        power = power @ np.swapaxes(last[:, panel], -1, -2)
+    outer = scale[:, :, None] * scale[:, None, :]
+    return _Solution(
+        power * (scale[:, :, None] / scale[:, None, :]),
+        gramian * outer * width[:, None, None],
+        held * scale[:, :, None] * width[:, None, None],
+        drift * scale * width[:, None],
+    )
+
+
+def _difference(first: _Solution, second: _Solution, durations: Floats) -> float:
+    """Greatest disagreement, each part relative to its own size in states divided by (T, T, T, 1, 1, 1)."""
+    if not len(durations):
+        return 0.0
+    scale = np.ones((len(durations), 6))
+    scale[:, :3] = np.where(durations == 0.0, 1.0, np.abs(durations))[:, None]
+    worst = 0.0
+    for one, other, weight in (
+        (first.transition, second.transition, scale[:, None, :] / scale[:, :, None]),
+        (first.gramian, second.gramian, 1.0 / (scale[:, :, None] * scale[:, None, :])),
+        (first.held, second.held, 1.0 / scale[:, :, None]),
+        (first.drift, second.drift, 1.0 / scale),
+    ):
+        axes = tuple(range(1, one.ndim))
+        size = np.abs(other * weight).max(axis=axes)
+        apart = np.abs((one - other) * weight).max(axis=axes)
+        worst = max(worst, float((apart / np.where(size > 0.0, size, 1.0)).max()))
+    return worst
