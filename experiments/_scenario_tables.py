@@ -32,7 +32,7 @@ from experiments.toml_values import (
     known_name,
 )
 from guidance.noise import NoiseKind, TieRule
-from infoset.model import InitialSet, Model
+from infoset.model import InitialSet, Model, Recovery
 from sim.scenario import Manoeuvre
 
 SCHEMA = 1
@@ -157,6 +157,11 @@ class InformationSetTable(Table):
     )
     fewest_sections: Annotated[int | None, PlainValidator(Whole(MOST_SECTIONS))] = key(
         "fewer left: the grid is made anew with 2 fewest_sections + 1", "5", default=None
+    )
+    recovery: Annotated[Recovery, PlainValidator(OneOf(Recovery))] = key(
+        'what a set that empties becomes: "widened", or "none"',
+        '"widened"',
+        default=Recovery.WIDENED,
     )
     disturbance_m_s2: NotNegative = key("bound of the unknown acceleration across, or of the target's", "0.005")
 

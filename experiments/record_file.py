@@ -6,6 +6,7 @@ flat vertices with offsets. What is not known in a step has a mask; no number st
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import io
 import json
@@ -27,10 +28,10 @@ from experiments.output import library_version, write_file
 from experiments.scenario_file import read_scenario, scenario_to_toml
 from experiments.toml_values import shown
 from infoset import ConvexPolygons, Section
-from sim import Outcome, Record, Results, Scenario, StepRecord
+from sim import Inconsistency, Outcome, Record, Results, Scenario, StepRecord
 
 FORMAT = "infoset-record"
-SCHEMA = 1
+SCHEMA = 2
 LARGEST_FILE_BYTES = 1 << 30
 LONGEST_NAME = 200
 REMEDY = "make a record with `infoset engage --record FILE.npz`"
@@ -48,6 +49,8 @@ _MEMBERS: Mapping[str, tuple[str, int]] = {
     "measured_angle_rad": (_FLOAT, _STEPS),
     "range_measured": (_FLAG, _STEPS),
     "measured_range_m": (_FLOAT, _STEPS),
+    "rate_measured": (_FLAG, _STEPS),
+    "measured_rate_rad_s": (_FLOAT, _STEPS),
     "true_angle_rad": (_FLOAT, _STEPS),
     "true_rate_rad_s": (_FLOAT, _STEPS),
     "true_range_m": (_FLOAT, _STEPS),
@@ -99,6 +102,7 @@ def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: boo
         "strategy": record.strategy,
         **({} if record.noise is None else {"noise": record.noise}),
         "result": _result_to_json(record.result),
+        "inconsistency": None if record.inconsistency is None else dataclasses.asdict(record.inconsistency),
         "scenario": toml,
     }
     header["sha256"] = _checksum(header, arrays)
@@ -191,6 +195,7 @@ def _to_arrays(record: Record) -> Arrays:
 
     angle_measured, measured_angle = optional([step.measured_angle_rad for step in steps])
     range_measured, measured_range = optional([step.measured_range_m for step in steps])
+    rate_measured, measured_rate = optional([step.measured_rate_rad_s for step in steps])
     miss_exists = np.array([step.predicted_miss_m is not None for step in steps], dtype=bool)
     margin = _floats(step.truth_margin_m for step in steps)
     margin_known = np.isfinite(margin)
@@ -200,6 +205,8 @@ def _to_arrays(record: Record) -> Arrays:
         "measured_angle_rad": measured_angle,
         "range_measured": range_measured,
         "measured_range_m": measured_range,
+        "rate_measured": rate_measured,
+        "measured_rate_rad_s": measured_rate,
         "true_angle_rad": _floats(step.true_angle_rad for step in steps),
         "true_rate_rad_s": _floats(step.true_rate_rad_s for step in steps),
         "true_range_m": _floats(step.true_range_m for step in steps),
@@ -333,7 +340,7 @@ def _read_header(header: NDArray[Any]) -> dict[str, Any]:
 
 
 def _to_record(header: Mapping[str, Any], arrays: Arrays, source: str) -> Record:
-    keys = {"format", "schema", "version", "seed", "run", "strategy", "result", "scenario", "sha256"}
+    keys = {"format", "schema", "version", "seed", "run", "strategy", "result", "inconsistency", "scenario", "sha256"}
     if set(header) - {"noise"} != keys:
         raise _UnsoundError(f"its header has the keys {', '.join(sorted(map(str, header)))}")
     seed, run, strategy, toml = (header[key] for key in ("seed", "run", "strategy", "scenario"))
@@ -357,7 +364,19 @@ def _to_record(header: Mapping[str, Any], arrays: Arrays, source: str) -> Record
         result=_result_from_json(header["result"], run, scenario.set_model.is_guaranteed),
         steps=_to_steps(arrays, scenario),
         noise=header.get("noise"),
+        inconsistency=_inconsistency_from_json(header["inconsistency"], len(arrays["time_s"])),
     )
+
+
+def _inconsistency_from_json(found: object, steps: int) -> Inconsistency | None:
+    if found is None:
+        return None
+    if not isinstance(found, dict) or set(found) != {"step", "label_m"}:
+        raise _UnsoundError("its header has a wrong inconsistency")
+    step, label = found["step"], found["label_m"]
+    if not (_is_whole(step) and step < steps and isinstance(label, float) and np.isfinite(label)):
+        raise _UnsoundError("its header has a wrong inconsistency")
+    return Inconsistency(step, label)
 
 
 def _is_whole(value: object) -> bool:
@@ -444,6 +463,7 @@ def _to_steps(arrays: Arrays, scenario: Scenario) -> tuple[StepRecord, ...]:
         arrays["time_s"].tolist(),
         optional("angle_measured", "measured_angle_rad"),
         optional("range_measured", "measured_range_m"),
+        optional("rate_measured", "measured_rate_rad_s"),
         arrays["true_angle_rad"].tolist(),
         arrays["true_rate_rad_s"].tolist(),
         arrays["true_range_m"].tolist(),

@@ -293,6 +293,7 @@ def scenario_to_toml(scenario: Scenario) -> str:
         "initial_set": quoted_text(model.initial_set.value),
         "sections": str(int(model.sections)),
         "fewest_sections": str(int(model.fewest_sections)),
+        "recovery": quoted_text(model.recovery.value),
         "disturbance_m_s2": number_text(model.disturbance_m_s2),
     }
     tables["noise"] = {"kind": quoted_text(scenario.noise.value), "tie": quoted_text(scenario.tie.value)}
@@ -346,6 +347,7 @@ def _to_scenario(tables: ScenarioTables) -> Scenario:
             fewest_sections=min(DEFAULT_FEWEST_SECTIONS, information_set.sections) if fewest is None else fewest,
             initial_set=information_set.initial_set or default_initial_set(information_set.model),
             kind=information_set.model,
+            recovery=information_set.recovery,
         ),
         range_sensor=None
         if range_sensor is None

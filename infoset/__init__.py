@@ -6,7 +6,7 @@ Start with `InformationSet` (a batch of sets carried through measurements, impul
 
 from infoset.convex_polygons import ConvexPolygons
 from infoset.information_set import InformationSet, InformationSetView, Section, SetStatus, to_omega_alpha
-from infoset.model import InitialSet, Model, SetModel, StateBox
+from infoset.model import InitialSet, Model, Recovery, SetModel, StateBox
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.sensors import AngleSensor, RangeSensor, RateSensor
 from infoset.shapes import to_shapely
@@ -22,6 +22,7 @@ __all__ = [
     "PredictedMiss",
     "RangeSensor",
     "RateSensor",
+    "Recovery",
     "Section",
     "SetModel",
     "SetStatus",

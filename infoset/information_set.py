@@ -16,7 +16,7 @@ from infoset.convex_polygons import ConvexPolygons
 from infoset.guaranteed_miss import GuaranteedMiss
 from infoset.history import History
 from infoset.location import refine_all, workspace
-from infoset.model import InitialSet, Interval, SetModel
+from infoset.model import InitialSet, Interval, Recovery, SetModel
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.section_stack import SectionStack, outline
 
@@ -642,6 +642,8 @@ class InformationSet(InformationSetView):
             last = event is not None and (died == event).any()
             nearest = np.where(died == event, overlaps, -np.inf).argmax() if last else len(died) // 2
             self._lost_step[b], self._lost_label[b] = history.elapsed, self._stack.labels[b, nearest]
+        if self.model.recovery is Recovery.NONE:
+            return
         if event is not None:
             history.retract(event, empty)
         history.record(kernels.WIDENING, np.zeros(self.batch), empty)

@@ -31,6 +31,17 @@ class InitialSet(Enum):
     BOX = "box"
 
 
+class Recovery(Enum):
+    """What becomes of a set that a measurement empties: the measurement contradicts the model.
+
+    WIDENED goes on without that measurement, from the last consistent set widened by a disturbance; NONE leaves the set
+    empty, and nothing more is done with it, as in the published procedure.
+    """
+
+    WIDENED = "widened"
+    NONE = "none"
+
+
 @dataclass(frozen=True)
 class StateBox:
     """Intervals of relative position and velocity: the paper's B x D.
@@ -76,6 +87,8 @@ class SetModel:
         Shape of a section at the start.
     kind : Model
         What the set allows for.
+    recovery : Recovery
+        What becomes of a set that a measurement empties.
     gravity_m_s2 : float
         Bound of the difference of gravity along z; only the guaranteed model counts it.
     gravity_speed_change : float
@@ -98,6 +111,7 @@ class SetModel:
     fewest_sections: int = 5
     initial_set: InitialSet = InitialSet.RECTANGLE
     kind: Model = Model.PAPER
+    recovery: Recovery = Recovery.WIDENED
     gravity_m_s2: float = 0.0
     gravity_speed_change: float = 0.0
     execution_error_relative: float = 0.0

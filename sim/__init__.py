@@ -1,6 +1,6 @@
 """The simulator: scenarios, the truth, the closed loop, records and statistics."""
 
-from sim.record import Record, StepRecord, fly_one
+from sim.record import Inconsistency, Record, StepRecord, fly_one
 from sim.results import Outcome, Results
 from sim.scenario import Manoeuvre, Scenario, Sun, Target
 from sim.simulate import simulate
@@ -8,6 +8,7 @@ from sim.statistics import Distribution, band_half_width, empirical_distribution
 
 __all__ = [
     "Distribution",
+    "Inconsistency",
     "Manoeuvre",
     "Outcome",
     "Record",

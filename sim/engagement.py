@@ -45,7 +45,7 @@ class Step:
         Engagements whose truth had not passed its closest approach.
     sight : Sight
         True geometry.
-    measured_angle_rad, measured_range_m : ndarray, shape (B,), or None
+    measured_angle_rad, measured_range_m, measured_rate_rad_s : ndarray, shape (B,), or None
         None where nothing was measured in this step.
     predicted_miss : PredictedMiss
         After the measurement, before the impulse.
@@ -64,6 +64,7 @@ class Step:
     sight: Sight
     measured_angle_rad: Floats | None
     measured_range_m: Floats | None
+    measured_rate_rad_s: Floats | None
     predicted_miss: PredictedMiss
     impulse_m_s: Floats
     truth_margin_m: Floats
@@ -152,7 +153,7 @@ class Engagements:
         model, thruster = self.scenario.set_model, self.scenario.thruster
         sight = self._truth.sight()
         self._tracking = self._flying & self._information.tracking
-        measured_angle, measured_range = self._measure(sight)
+        measured_angle, measured_range, measured_rate = self._measure(sight)
         miss = self._information.predicted_miss()
         tracking = self._tracking = self._tracking & self._information.tracking
         wanted = np.where(tracking, self._decide(miss), 0.0)
@@ -168,6 +169,7 @@ class Engagements:
                     sight,
                     measured_angle,
                     measured_range,
+                    measured_rate,
                     miss,
                     self._impulse,
                     self._truth_section.margin_m.copy(),
@@ -187,15 +189,16 @@ class Engagements:
         self._information.stop(passage.passed)
         self.step += 1
 
-    def _measure(self, sight: Sight) -> tuple[Floats | None, Floats | None]:
+    def _measure(self, sight: Sight) -> tuple[Floats | None, Floats | None, Floats | None]:
+        """Measure what is due, cut the sets by it, and return angle, range and rate."""
         if not self._tracking.any():
-            return None, None
+            return None, None, None
         sensor, rate_sensor = self.scenario.range_sensor, self.scenario.rate_sensor
         looking = self.step % self._angle_every == 0
         ranging = sensor is not None and self.step % self._range_every == 0
         rating = rate_sensor is not None and self.step % self._rate_every == 0
         if not (looking or ranging or rating):
-            return None, None
+            return None, None, None
         measurement = self._noise.measure(
             LineOfSight(
                 self.step,
@@ -229,7 +232,7 @@ class Engagements:
             self._tracking,
             sight,
         )
-        return measurement.alpha_rad if looking else None, measurement.range_m
+        return measurement.alpha_rad if looking else None, measurement.range_m, measurement.omega_rad_s
 
     def _executed(self, impulse: Floats) -> Floats:
         """What becomes of commanded impulses."""

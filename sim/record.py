@@ -25,7 +25,7 @@ class StepRecord:
     Parameters
     ----------
     time_s : float
-    measured_angle_rad, measured_range_m : float or None
+    measured_angle_rad, measured_range_m, measured_rate_rad_s : float or None
         None where nothing was measured.
     true_angle_rad, true_rate_rad_s, true_range_m : float
         Line of sight of the truth.
@@ -42,6 +42,7 @@ class StepRecord:
     time_s: float
     measured_angle_rad: float | None
     measured_range_m: float | None
+    measured_rate_rad_s: float | None
     true_angle_rad: float
     true_rate_rad_s: float
     true_range_m: float
@@ -49,6 +50,21 @@ class StepRecord:
     predicted_miss_m: tuple[float, float] | None
     truth_margin_m: float
     sections: tuple[Section, ...]
+
+
+@dataclass(frozen=True)
+class Inconsistency:
+    """Where the data of an engagement first contradicted the model: no state agreed with a measurement.
+
+    Parameters
+    ----------
+    step : int
+    label_m : float
+        The hypothesis that came nearest to living on: its range at t = 0.
+    """
+
+    step: int
+    label_m: float
 
 
 @dataclass(frozen=True)
@@ -68,6 +84,8 @@ class Record:
     steps : tuple of StepRecord
     noise : str or None
         Name of a noise that is not the scenario's own; None where it is.
+    inconsistency : Inconsistency or None
+        None where the data never contradicted the model.
     """
 
     scenario: Scenario
@@ -77,6 +95,7 @@ class Record:
     result: Results
     steps: tuple[StepRecord, ...]
     noise: str | None = None
+    inconsistency: Inconsistency | None = None
 
     @property
     def noise_name(self) -> str:
@@ -96,6 +115,7 @@ class _Recorder:
                 time_s=step.time_s,
                 measured_angle_rad=_first(step.measured_angle_rad) if measured else None,
                 measured_range_m=_first(step.measured_range_m) if measured else None,
+                measured_rate_rad_s=_first(step.measured_rate_rad_s) if measured else None,
                 true_angle_rad=float(step.sight.alpha_rad[0]),
                 true_rate_rad_s=float(step.sight.omega_rad_s[0]),
                 true_range_m=float(step.sight.range_m[0]),
@@ -149,4 +169,6 @@ def fly_one(
             progress(min(1.0, flight.step / draws.angle.shape[1]))
     name = scenario.strategy if strategy is None else type(strategy).__name__
     own = None if noise is None else getattr(noise, "name", type(noise).__name__)
-    return Record(scenario, seed, run, name, flight.results(np.array([run])), tuple(recorder.steps), own)
+    (step,), (label,) = flight.inconsistency
+    found = Inconsistency(int(step), float(label)) if step >= 0 else None
+    return Record(scenario, seed, run, name, flight.results(np.array([run])), tuple(recorder.steps), own, found)

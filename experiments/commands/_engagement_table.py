@@ -44,7 +44,7 @@ def show_engagements(records: Sequence[Record], stdout_taken: bool) -> None:
                 number(float(result.miss_m[0])),
                 number(float(result.impulse_m_s[0])),
                 number(payoffs(result)[0]),
-                result.outcomes[0].value,
+                _outcome(record),
                 certificate(result),
                 number(float(result.truth_margin_m[0])),
                 str(len(record.steps)),
@@ -75,6 +75,13 @@ def show_engagements(records: Sequence[Record], stdout_taken: bool) -> None:
     console.print(table)
     for line in dict.fromkeys(filter(None, (allowance(record.scenario) for record in records))):
         console.print(Text(line), soft_wrap=True)
+
+
+def _outcome(record: Record) -> str:
+    outcome, found = record.result.outcomes[0].value, record.inconsistency
+    if found is None:
+        return outcome
+    return f"{outcome} at {record.steps[found.step].time_s:g} s, label {found.label_m / 1e3:.0f} km"
 
 
 def draw_engagements(records: Sequence[Record], folder: Path) -> None:

@@ -27,7 +27,7 @@ from experiments.commands._options import (
 
 if TYPE_CHECKING:
     from experiments.output import Cell
-    from sim import Record, Scenario
+    from sim import Inconsistency, Record, Scenario
 
 BOTH = "both"
 COLUMNS = (
@@ -36,6 +36,7 @@ COLUMNS = (
     "t_s",
     "measured_angle_rad",
     "measured_range_m",
+    "measured_rate_rad_s",
     "true_angle_rad",
     "true_rate_rad_s",
     "true_range_m",
@@ -221,10 +222,13 @@ def _summary(record: Record, elapsed_s: float, warnings: Sequence[str]) -> dict[
         "truth_kept": bool(result.truth_kept[0]),
         "truth_margin_m": _finite(float(result.truth_margin_m[0])),
         "phi_held": held(result)[0],
+        "inconsistency": None if record.inconsistency is None else _where(record, record.inconsistency),
         "steps": [
             {
                 "t_s": step.time_s,
                 "measured_angle_rad": step.measured_angle_rad,
+                "measured_range_m": step.measured_range_m,
+                "measured_rate_rad_s": step.measured_rate_rad_s,
                 "true_angle_rad": step.true_angle_rad,
                 "true_rate_rad_s": step.true_rate_rad_s,
                 "impulse_m_s": step.impulse_m_s,
@@ -235,6 +239,11 @@ def _summary(record: Record, elapsed_s: float, warnings: Sequence[str]) -> dict[
             for step in record.steps
         ],
     }
+
+
+def _where(record: Record, found: Inconsistency) -> dict[str, object]:
+    """Say at which step, and at which hypothesis, the data contradicted the model."""
+    return {"step": found.step, "t_s": record.steps[found.step].time_s, "label_km": found.label_m / 1e3}
 
 
 def _finite(value: float) -> float | None:
@@ -253,6 +262,7 @@ def _rows(records: Sequence[Record]) -> list[list[Cell]]:
                     step.time_s,
                     step.measured_angle_rad,
                     step.measured_range_m,
+                    step.measured_rate_rad_s,
                     step.true_angle_rad,
                     step.true_rate_rad_s,
                     step.true_range_m,

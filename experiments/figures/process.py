@@ -88,6 +88,12 @@ def _draw_angle(axes: Axes, record: Record) -> None:
 
 def _draw_rate(axes: Axes, record: Record) -> None:
     axes.axhline(0.0, color=LIMIT, linewidth=0.6)
+    measured = [
+        (step.time_s, step.measured_rate_rad_s) for step in record.steps if step.measured_rate_rad_s is not None
+    ]
+    if measured:
+        times, rates = np.array(measured).T
+        axes.plot(times, rates * 1e6, ".", color=MEASURED, markersize=3.0, markeredgewidth=0.0)
     axes.plot(_times(record), _rates(record) * 1e6, color=TRUTH, marker=_marker(record), markersize=3.0)
 
 
@@ -179,9 +185,11 @@ def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], records: Sequence[Re
             axes.set_ylabel(label)
             axes.yaxis.label.set_visible(axes is row[0])
         row[0].yaxis.set_label_coords(-13.0 / width_mm(row[0]), 0.5)
+    rated = any(step.measured_rate_rad_s is not None for record in records for step in record.steps)
+    measured = "measured angle and rate" if rated else "measured angle"
     handles = [
         Line2D([], [], color=TRUTH, label="true angle and rate"),
-        Line2D([], [], color=MEASURED, marker=".", markersize=7, linestyle="none", label="measured angle"),
+        Line2D([], [], color=MEASURED, marker=".", markersize=7, linestyle="none", label=measured),
         Line2D([], [], color=IMPULSE, linewidth=1.2, label="impulse given"),
         Line2D([], [], color=LIMIT, linewidth=0.8, linestyle=(0, (4, 2)), label="limit of an impulse"),
         Patch(facecolor=SET_FILL, edgecolor=SET_EDGE, label="predicted-miss interval"),
@@ -224,8 +232,14 @@ def _angle_extent(record: Record) -> tuple[float, float]:
 
 
 def _rate_extent(record: Record) -> tuple[float, float]:
-    seen = _rates(record)[_far(record, RATE_RANGE_SHARE)]
-    return float(seen.min()), float(seen.max())
+    far = _far(record, RATE_RANGE_SHARE)
+    seen = _rates(record)[far].tolist()
+    seen += [
+        step.measured_rate_rad_s
+        for step, use in zip(record.steps, far, strict=True)
+        if use and step.measured_rate_rad_s is not None
+    ]
+    return min(seen), max(seen)
 
 
 def _marker(record: Record) -> str:

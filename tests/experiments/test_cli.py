@@ -229,6 +229,7 @@ def test_engage_as_json(infoset: Command, tmp_path: Path) -> None:
     assert [key for key in found if key not in {"run", "runs"}] == [
         *("version", "scenario", "scenario_hash", "seed", "elapsed_s"),
         *CURVE_KEYS,
+        "inconsistency",
         "steps",
     ]
     assert found["scenario_hash"] == scenario_hash(load_scenario("asteroid-1997"))
@@ -238,7 +239,14 @@ def test_engage_as_json(infoset: Command, tmp_path: Path) -> None:
     assert all(
         list(step)
         == [
-            *("t_s", "measured_angle_rad", "true_angle_rad", "true_rate_rad_s"),
+            *(
+                "t_s",
+                "measured_angle_rad",
+                "measured_range_m",
+                "measured_rate_rad_s",
+                "true_angle_rad",
+                "true_rate_rad_s",
+            ),
             *("impulse_m_s", "predicted_miss_m", "sections", "truth_margin_m"),
         ]
         for step in steps

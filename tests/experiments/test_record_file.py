@@ -18,7 +18,8 @@ from experiments import record_file
 from experiments.errors import InputError
 from experiments.record_file import read_record, write_record
 from experiments.scenario_file import load_scenario
-from guidance import NoiseKind, Situation
+from guidance import LineOfSight, Measurement, NoiseKind, Situation
+from infoset import InformationSetView, RateSensor
 from sim import Record, StepRecord, fly_one
 
 
@@ -30,6 +31,18 @@ class Idle:
 
     def decide(self, situation: Situation, state: object) -> Any:
         return np.zeros(situation.information.batch)
+
+
+OUTLIER_AT = 60
+
+
+class Outlier:
+    """Measures truly, but for one angle that is wrong by five times its bound."""
+
+    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
+        wrong = 5.0 * sight.angle_sensor.error_bound(sight.range_m) if sight.step == OUTLIER_AT else 0.0
+        rate = None if sight.rate_error_rad_s is None else sight.omega_rad_s
+        return Measurement(sight.alpha_rad + wrong, None, rate)
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +83,7 @@ def assert_same_step(one: StepRecord, other: StepRecord) -> None:
 
 def assert_same(one: Record, other: Record) -> None:
     assert (one.scenario, one.seed, one.run, one.strategy) == (other.scenario, other.seed, other.run, other.strategy)
+    assert (one.noise, one.inconsistency) == (other.noise, other.inconsistency)
     for field in dataclasses.fields(one.result):
         a, b = getattr(one.result, field.name), getattr(other.result, field.name)
         if field.name == "guaranteed_miss_m":
@@ -96,6 +110,16 @@ def test_a_record_of_ones_own_strategy(tmp_path: Path) -> None:
     found = read_record(tmp_path / "x.npz")
     assert (found.strategy, found.scenario.strategy) == ("Idle", "symmetric-miss")
     assert_same(found, flown)
+
+
+def test_measured_rates_and_where_data_contradict_the_model_come_back(tmp_path: Path) -> None:
+    scenario = dataclasses.replace(load_scenario("asteroid-1997-single"), rate_sensor=RateSensor(1.0, 1e-6))
+    flown = fly_one(scenario, noise=Outlier())
+    assert [step.measured_rate_rad_s is None for step in flown.steps[:4]] == [False, True, False, True]
+    assert flown.inconsistency is not None
+    assert flown.inconsistency.step == OUTLIER_AT
+    write_record(flown, tmp_path / "x.npz")
+    assert_same(read_record(tmp_path / "x.npz"), flown)
 
 
 def test_what_is_not_known_comes_back_as_not_known(record: Record, tmp_path: Path) -> None:
@@ -273,7 +297,7 @@ def shorter(name: str) -> Callable[[Arrays], None]:
     [
         (lambda arrays: arrays.update(extra=np.zeros(3)), "another program"),
         (lambda arrays: arrays.pop("time_s"), "has no time_s.npy"),
-        (header(schema=2), "has the schema 2"),
+        (header(schema=1), "has the schema 1"),
         (header(schema=True), "has the schema true"),
         (header(schema=[1]), "has the schema"),
         (header(format="other"), "does not say infoset-record"),

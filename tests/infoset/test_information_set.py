@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from infoset import AngleSensor, ConvexPolygons, InformationSet, InitialSet, SetModel, SetStatus, StateBox
+from infoset import AngleSensor, ConvexPolygons, InformationSet, InitialSet, Recovery, SetModel, SetStatus, StateBox
 
 E, STEP = 58e3, 0.5
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)
@@ -176,6 +176,20 @@ def test_inconsistent_measurements_are_told_and_the_set_goes_on_from_the_last_co
     information.shift(1.0)
     assert information.predicted_miss().exists.all()
     assert "2 tracking, 1 of them inconsistent" in repr(information)
+
+
+def test_without_recovery_an_inconsistent_set_stays_empty() -> None:
+    information = InformationSet(replace(MODEL, recovery=Recovery.NONE), batch=2)
+    information.measure_angle(0.001)
+    information.measure_angle([0.0012, -0.0012])
+    assert information.status == [SetStatus.TRACKING, SetStatus.EMPTY]
+    assert information.inconsistent.tolist() == [False, True]
+    assert information.inconsistency[0].tolist() == [-1, 0]
+    for _ in range(3):
+        information.predict()
+        information.measure_angle(0.001)
+        assert information.status == [SetStatus.TRACKING, SetStatus.EMPTY]
+        assert information.predicted_miss().exists.tolist() == [True, False]
 
 
 def test_a_set_whose_labels_have_all_left_is_finished() -> None:
