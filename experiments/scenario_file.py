@@ -6,12 +6,8 @@ can be written (its own shortest decimal with the point moved), and comes back a
 
 from __future__ import annotations
 
-import dataclasses
-import hashlib
-import json
 import os
 from collections.abc import Iterator
-from enum import Enum
 from typing import Any
 
 from experiments._scenario_checks import cross_problems
@@ -30,6 +26,7 @@ from experiments.toml_values import KILO, DecimalPair, degrees_text, number_text
 from guidance.thruster import Thruster
 from infoset.model import InitialSet, Interval, Model, SetModel, StateBox
 from infoset.sensors import AngleSensor, RangeSensor, RateSensor
+from sim.fingerprint import scenario_hash as scenario_hash  # noqa: PLC0414 (a scenario's hash is asked for here)
 from sim.scenario import Scenario, Sun, Target
 
 DEFAULT_FEWEST_SECTIONS = 5
@@ -117,23 +114,6 @@ def read_scenario(text: str, source: str) -> Scenario:
         With every problem of the text: where it is, the value found and the remedy.
     """
     return _to_scenario(read_tables(FORM, text, source))
-
-
-def scenario_hash(scenario: Scenario) -> str:
-    """Return a short fingerprint of every value that can change a result.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Its name and description do not count.
-
-    Returns
-    -------
-    str
-        16 hexadecimal digits, the same for equal values on every machine.
-    """
-    values = _canonical(dataclasses.replace(scenario, name="", description=""))
-    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def scenario_warnings(scenario: Scenario) -> list[str]:
@@ -372,19 +352,6 @@ def _to_scenario(tables: ScenarioTables) -> Scenario:
             switching_period_s=si(target.switching_period_s),
         ),
     )
-
-
-def _canonical(value: Any) -> Any:
-    """Return a value as JSON that is equal exactly when the values are."""
-    if dataclasses.is_dataclass(value):
-        return {field.name: _canonical(getattr(value, field.name)) for field in dataclasses.fields(value)}
-    if isinstance(value, Enum):
-        return value.value
-    if isinstance(value, tuple):
-        return [_canonical(each) for each in value]
-    if value is None or isinstance(value, str):
-        return value
-    return (float(value) + 0.0).hex()  # adding zero takes the sign off a negative zero
 
 
 def _pair(interval: Interval) -> str:

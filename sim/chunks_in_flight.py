@@ -1,0 +1,84 @@
+"""Chunks flown on any executor, a bounded number at a time."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Generator, Iterable
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from threading import Event
+
+from sim.chunk import Chunk, fly_chunk
+from sim.results import Results
+
+
+def fly_on(executor: Executor, chunks: Iterable[Chunk], at_once: int) -> Generator[tuple[Chunk, Results], None, None]:
+    """Fly chunks on an executor of somebody else's.
+
+    Parameters
+    ----------
+    executor : Executor
+        Of threads, of processes, or of another machine's.
+    chunks : iterable of Chunk
+    at_once : int
+        How many are handed to the executor before the first comes back: what bounds the memory.
+
+    Yields
+    ------
+    tuple of Chunk and Results
+        As they are done, in any order.
+
+    Notes
+    -----
+    Closed early, or broken by an error, it takes back what has not begun.
+    """
+    yield from _flying(executor, chunks, at_once, None)
+
+
+def fly_on_threads(workers: int, chunks: Iterable[Chunk]) -> Generator[tuple[Chunk, Results], None, None]:
+    """Fly chunks on threads of this process; the kernels release the interpreter.
+
+    Parameters
+    ----------
+    workers : int
+    chunks : iterable of Chunk
+
+    Yields
+    ------
+    tuple of Chunk and Results
+        As they are done, in any order.
+
+    Notes
+    -----
+    Closed early, or broken by an error or an interrupt, it breaks off the chunks under way.
+    """
+    stopped = Event()
+
+    def check() -> None:
+        if stopped.is_set():
+            raise InterruptedError
+
+    with ThreadPoolExecutor(workers) as pool:
+        try:
+            yield from _flying(pool, chunks, workers + 1, check)
+        finally:
+            stopped.set()
+
+
+def _flying(
+    executor: Executor, chunks: Iterable[Chunk], at_once: int, check: Callable[[], None] | None
+) -> Generator[tuple[Chunk, Results], None, None]:
+    extra = () if check is None else (check,)
+    waiting = iter(chunks)
+    under_way: dict[Future[Results], Chunk] = {}
+    try:
+        while True:
+            for chunk in itertools.islice(waiting, at_once - len(under_way)):
+                under_way[executor.submit(fly_chunk, chunk, *extra)] = chunk
+            if not under_way:
+                return
+            done, _ = wait(under_way, return_when=FIRST_COMPLETED)
+            for future in done:
+                yield under_way.pop(future), future.result()
+    finally:
+        for future in under_way:
+            future.cancel()

@@ -1,0 +1,26 @@
+"""Campaigns on disk: a manifest, shards of rows, one lock. The only place that knows Parquet."""
+
+from sim.storage.campaign_folder import CampaignFolder, Damage
+from sim.storage.errors import (
+    DamagedError,
+    DiskFullError,
+    ManifestError,
+    MissingLibraryError,
+    OccupiedError,
+    StorageError,
+)
+from sim.storage.manifest import Axis, Manifest, read_manifest
+
+__all__ = [
+    "Axis",
+    "CampaignFolder",
+    "Damage",
+    "DamagedError",
+    "DiskFullError",
+    "Manifest",
+    "ManifestError",
+    "MissingLibraryError",
+    "OccupiedError",
+    "StorageError",
+    "read_manifest",
+]

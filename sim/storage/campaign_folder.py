@@ -1,0 +1,374 @@
+"""The folder of a campaign: begun or resumed under a lock, filled shard by shard, read by anybody."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.chunk import Chunk
+from sim.results import Results
+from sim.storage.atomic_file import clear_leftovers, is_leftover, reporting, write_whole
+from sim.storage.errors import DamagedError, ManifestError, MissingLibraryError, OccupiedError
+from sim.storage.folder_lock import LOCK, FolderLock
+from sim.storage.manifest import MANIFEST, Manifest, need_same, read_manifest, write_manifest
+
+Numbers = np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]
+
+SHARDS = "shards"
+BEYOND = "beyond"
+"""Folder in the shards' for those past the point where a rule stopped: flown, but no part of the result."""
+
+_NAME = re.compile(r"chunk-(\d{7,12})-([0-9a-f]{8})\.parquet")
+
+
+@dataclass(frozen=True)
+class Damage:
+    """A shard that is no longer what was written, or never belonged here.
+
+    Parameters
+    ----------
+    file : Path
+    reason : str
+    """
+
+    file: Path
+    reason: str
+
+
+class CampaignFolder:
+    """A campaign on disk.
+
+    Parameters
+    ----------
+    path : Path
+    manifest : Manifest
+
+    Notes
+    -----
+    A shard is named after its chunk and the CRC-32 of its bytes, and is renamed into place once it is whole: its name
+    says both that it is finished and what must be in it. No list of shards has to be kept in step with them.
+    """
+
+    def __init__(self, path: Path, manifest: Manifest) -> None:
+        self.path = path
+        self.manifest = manifest
+        self.damaged: list[Damage] = []
+        self._files: dict[int, Path] = {}
+        self._tables = need_arrow()
+        self._scan()
+
+    @classmethod
+    @contextlib.contextmanager
+    def begin(
+        cls, path: Path, manifest: Manifest, *, resume: bool, beside: Mapping[str, str] | None = None
+    ) -> Iterator[CampaignFolder]:
+        """Begin a campaign in a folder, or go on with the one in it, alone in there until leaving.
+
+        Parameters
+        ----------
+        path : Path
+            Made if it is not there.
+        manifest : Manifest
+            What is asked for. More runs than a campaign had so far extend it.
+        resume : bool
+            Whether to go on with what is there.
+        beside : mapping of str to str
+            Text files to write beside the manifest.
+
+        Yields
+        ------
+        CampaignFolder
+
+        Raises
+        ------
+        OccupiedError
+            If the folder holds something and `resume` is not set, or another campaign is at work in it.
+        ManifestError
+            If it holds another campaign; the differences are shown.
+        StorageError
+            If it cannot be written.
+        """
+        need_arrow()
+        _need_free(path, resume)
+        with reporting(path):
+            path.mkdir(parents=True, exist_ok=True)
+        with FolderLock(path):
+            _need_free(path, resume)
+            clear_leftovers(path)
+            found = read_manifest(path) if (path / MANIFEST).is_file() else None
+            folder_manifest = manifest if found is None else _continued(found, manifest, path)
+            if found is not None and found.runs < folder_manifest.runs:
+                _drop_partial_shard(path, found)
+            if found != folder_manifest:
+                write_manifest(path, folder_manifest)
+            for name, text in (beside or {}).items():
+                write_whole(path / name, text.encode())
+            with reporting(path):
+                (path / SHARDS / BEYOND).mkdir(parents=True, exist_ok=True)
+                for kept in (path / SHARDS / BEYOND).iterdir():
+                    kept.replace(path / SHARDS / kept.name)
+            clear_leftovers(path / SHARDS)
+            yield cls(path, folder_manifest)
+
+    @classmethod
+    def read(cls, path: Path) -> CampaignFolder:
+        """Open a campaign to read what there is of it, finished or not.
+
+        Parameters
+        ----------
+        path : Path
+
+        Returns
+        -------
+        CampaignFolder
+
+        Raises
+        ------
+        ManifestError
+            If there is no campaign.
+        """
+        need_arrow()
+        return cls(path, read_manifest(path))
+
+    @property
+    def chunks_a_cell(self) -> int:
+        """Shards that the wanted runs of a cell make."""
+        return -(-self.manifest.wanted_runs // self.manifest.chunk)
+
+    @property
+    def stride(self) -> int:
+        """Numbers of chunks from one cell to the next."""
+        return -(-self.manifest.runs // self.manifest.chunk)
+
+    @property
+    def finished(self) -> frozenset[int]:
+        """Numbers of the chunks whose shards are here and sound."""
+        return frozenset(self._files)
+
+    @property
+    def finished_runs(self) -> int:
+        """Engagements of the result that are here."""
+        return sum(self._size(index) for index in self._wanted())
+
+    @property
+    def wanted_runs(self) -> int:
+        """Engagements of the result, over all cells."""
+        return self.manifest.wanted_runs * self.manifest.cells
+
+    @property
+    def complete(self) -> bool:
+        """Whether every engagement of the result is here."""
+        return self.finished_runs == self.wanted_runs
+
+    def write(self, chunk: Chunk, results: Results) -> None:
+        """Write the shard of a chunk: whole or not at all.
+
+        Parameters
+        ----------
+        chunk : Chunk
+        results : Results
+
+        Raises
+        ------
+        DiskFullError
+            If there is no room.
+        StorageError
+            If it cannot be written.
+        ValueError
+            If the results are not finite.
+        """
+        table = self._tables.rows(chunk, results, with_cell=bool(self.manifest.axes))
+        content = self._tables.to_bytes(table, {"campaign": self.manifest.identity, "chunk": str(chunk.index)})
+        file = self.path / SHARDS / f"chunk-{chunk.index:07d}-{zlib.crc32(content):08x}.parquet"
+        write_whole(file, content)
+        self._files[chunk.index] = file
+
+    def write_beside(self, name: str, content: bytes) -> None:
+        """Write another file into the folder, whole or not at all."""
+        write_whole(self.path / name, content)
+
+    def discard_damaged(self) -> list[Damage]:
+        """Take the damaged shards away, so that their chunks are flown again, and say which they were."""
+        for damage in self.damaged:
+            with reporting(damage.file):
+                damage.file.unlink(missing_ok=True)
+        gone, self.damaged = self.damaged, []
+        return gone
+
+    def stop_after(self, runs: int) -> None:
+        """Note after how many runs a rule has stopped the campaign, and put aside what was flown beyond.
+
+        Parameters
+        ----------
+        runs : int
+        """
+        if runs != self.manifest.stopped_after:
+            self.manifest = replace(self.manifest, stopped_after=runs)
+            write_manifest(self.path, self.manifest)
+        for index in [each for each in self._files if not self._is_wanted(each)]:
+            file = self._files.pop(index)
+            with reporting(file):
+                file.replace(file.parent / BEYOND / file.name)
+
+    def table(self, columns: Sequence[str] | None = None, cell: int | None = None) -> Any:
+        """Return rows as an Arrow table, in the order of cells and runs.
+
+        Parameters
+        ----------
+        columns : sequence of str or None
+            None is all of them.
+        cell : int or None
+            None is all of them.
+
+        Returns
+        -------
+        pyarrow.Table
+
+        Raises
+        ------
+        DamagedError
+            If a shard has changed since the folder was opened.
+        """
+        files = [self._files[index] for index in self._wanted(cell)]
+        try:
+            return self._tables.read(files, columns, with_cell=bool(self.manifest.axes))
+        except (OSError, ValueError) as error:
+            raise DamagedError(
+                f"{self.path}: a shard has changed or gone while it was read: {str(error)[:200]}; go on with resume"
+            ) from None
+
+    def chunk_samples(self, index: int, quantity: str, noises: Sequence[str]) -> list[NDArray[np.float64]]:
+        """Return what is known of a quantity in a finished chunk, a sample a noise."""
+        table = self._tables.read([self._files[index]], [quantity, "noise"], with_cell=bool(self.manifest.axes))
+        values, places = self._tables.numbers(table, quantity), self._tables.codes(table, "noise", noises)
+        known = ~np.ma.getmaskarray(values)
+        return [values.data[known & (places == place)] for place in range(len(noises))]
+
+    def numbers(self, name: str, cell: int | None = None) -> Numbers:
+        """Return a column of numbers, masked where it is null."""
+        found: Numbers = self._tables.numbers(self.table([name], cell), name)
+        return found
+
+    def codes(self, name: str, known: Sequence[str], cell: int | None = None) -> NDArray[np.int64]:
+        """Return a column of text as places in a list of what it can say; -1 where it says none of them."""
+        found: NDArray[np.int64] = self._tables.codes(self.table([name], cell), name, known)
+        return found
+
+    def _size(self, index: int) -> int:
+        first = index % self.stride * self.manifest.chunk
+        return min(self.manifest.chunk, self.manifest.runs - first)
+
+    def _is_wanted(self, index: int) -> bool:
+        return index % self.stride < self.chunks_a_cell and index < self.stride * self.manifest.cells
+
+    def _wanted(self, cell: int | None = None) -> list[int]:
+        found: Iterable[int] = sorted(self._files)
+        return [each for each in found if self._is_wanted(each) and (cell is None or each // self.stride == cell)]
+
+    def _scan(self) -> None:
+        """Find the sound shards, and those that are not."""
+        folder = self.path / SHARDS
+        if not folder.is_dir():
+            return
+        with reporting(folder):
+            names = sorted(folder.iterdir())
+        for file in names:
+            matched = _NAME.fullmatch(file.name)
+            if matched is None:
+                continue
+            index = int(matched[1])
+            reason = self._unsound(file, index, int(matched[2], 16))
+            if reason is None:
+                self._files[index] = file
+            elif reason is not None:
+                self.damaged.append(Damage(file, reason))
+
+    def _unsound(self, file: Path, index: int, checksum: int) -> str | None:
+        """What is wrong with a shard, or None."""
+        try:
+            content = file.read_bytes()
+        except OSError as error:
+            return f"cannot be read: {error.strerror}"
+        if zlib.crc32(content) != checksum:
+            return f"is cut short or changed: {len(content)} bytes whose checksum is not the one of its name"
+        found = self._tables.metadata(content)
+        if found is None:
+            return "is no Parquet file"
+        told, rows = found
+        if told.get("campaign") != self.manifest.identity or told.get("chunk") != str(index):
+            return "belongs to another campaign"
+        return None if rows == self._size(index) else f"has {rows} rows in place of {self._size(index)}"
+
+
+def need_arrow() -> ModuleType:
+    """Return the module that reads and writes tables, or say what to install.
+
+    Returns
+    -------
+    module
+
+    Raises
+    ------
+    MissingLibraryError
+        If pyarrow is not installed.
+    """
+    try:
+        from sim.storage import tables
+    except ImportError:
+        raise MissingLibraryError(
+            "campaigns are stored with pyarrow, which is not installed; install the extra: pip install "
+            "'infoset[campaign]'"
+        ) from None
+    return tables
+
+
+def _need_free(path: Path, resume: bool) -> None:
+    """Refuse a folder that holds something else, or a campaign that is not to be resumed."""
+    with reporting(path):
+        if not path.exists() and not path.is_symlink():
+            return
+        if not path.is_dir():
+            raise OccupiedError(f"{path}: is a file, not a folder; choose another name for the campaign's folder")
+        strange = [each.name for each in path.iterdir() if each.name != LOCK and not is_leftover(each)]
+    if MANIFEST in strange:
+        if not resume:
+            raise OccupiedError(f"{path}: holds a campaign already; go on with --resume, or choose another folder")
+    elif strange:
+        raise OccupiedError(f"{path}: is not empty, and holds no campaign; choose another folder")
+
+
+def _continued(found: Manifest, given: Manifest, path: Path) -> Manifest:
+    """The manifest of a campaign that goes on; it may have grown."""
+    need_same(found, given, path)
+    if given.runs == found.runs and given.until == found.until:
+        return found
+    if given.runs < found.runs:
+        raise ManifestError(
+            f"{path}: is another campaign than the one asked for: it has {found.runs} runs, now {given.runs} are asked "
+            "for; give as many or more"
+        )
+    if given.axes and given.runs != found.runs:
+        raise ManifestError(
+            f"{path}: is another sweep than the one asked for: it has {found.runs} runs a cell, now {given.runs}; give "
+            "as many, or choose another folder"
+        )
+    return replace(found, runs=given.runs, until=given.until, stopped_after=None)
+
+
+def _drop_partial_shard(path: Path, found: Manifest) -> None:
+    """Take the last shard of a campaign away if it is not full: with more runs it will be."""
+    last, rows = divmod(found.runs, found.chunk)
+    if not rows:
+        return
+    with reporting(path):
+        for file in (path / SHARDS).glob(f"chunk-{last:07d}-*.parquet"):
+            file.unlink()

@@ -1,0 +1,45 @@
+"""What the numbers of a result depend on besides its scenario and seed."""
+
+from __future__ import annotations
+
+import functools
+from importlib.metadata import PackageNotFoundError, version
+
+CALCULATING = ("infoset", "numpy", "numba", "llvmlite")
+
+
+class VersionError(Exception):
+    """Results were asked of another version than the one at hand; the message names both."""
+
+
+@functools.cache
+def calculating_versions() -> tuple[tuple[str, str], ...]:
+    """Return name and version of each package whose numbers a result is made of."""
+    return tuple((name, _version(name)) for name in CALCULATING)
+
+
+def differences(here: tuple[tuple[str, str], ...], there: tuple[tuple[str, str], ...]) -> list[str]:
+    """Say which versions differ, a piece of text each: `numpy 2.1 here, 2.0 there`.
+
+    Parameters
+    ----------
+    here, there : tuple of pairs of str
+        From `calculating_versions`.
+
+    Returns
+    -------
+    list of str
+    """
+    ours, theirs = dict(here), dict(there)
+    return [
+        f"{name} {ours.get(name, 'none')} here, {theirs.get(name, 'none')} there"
+        for name in dict.fromkeys((*ours, *theirs))
+        if ours.get(name) != theirs.get(name)
+    ]
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "none"
