@@ -171,13 +171,14 @@ def _closed_gramian(theta: Floats) -> Floats:
 
 
 def _quadrature_gramian(theta: Floats) -> Floats:
-    """Integrate as `_closed_gramian` does, by quadrature, but for the one entry that cancels."""
+    """Integrate as `_closed_gramian` does, by quadrature, but for the two entries that cancel."""
     half = 0.5 * theta
     effect = _unit_effect(half[..., None] * (1.0 + _NODES)) * np.sqrt(_WEIGHTS)[:, None, None]
     columns = np.swapaxes(effect, -3, -2).reshape(*theta.shape, 6, 3 * len(_NODES))
     matrix = np.asarray(columns @ np.swapaxes(columns, -1, -2) * half[..., None, None])
-    lag = angle_less_sine(theta)
+    lag, versine = angle_less_sine(theta), 2.0 * np.sin(half) ** 2
     matrix[..., 0, 1] = matrix[..., 1, 0] = -3.0 * lag * lag
+    matrix[..., 3, 4] = matrix[..., 4, 3] = -3.0 * versine * versine
     return matrix
 
 
