@@ -11,6 +11,7 @@ from typer.core import TyperGroup
 
 from experiments.commands.adversary import adversary
 from experiments.commands.bound import bound
+from experiments.commands.campaign import campaign
 from experiments.commands.compare import compare
 from experiments.commands.engage import engage
 from experiments.commands.experiment import experiment
@@ -53,6 +54,7 @@ app.command("bound", epilog="Example: infoset bound asteroid-1997 --strategies p
 app.command(
     "adversary", epilog="Example: infoset adversary --strategy symmetric-miss --budget 2000 --record worst.npz"
 )(adversary)
+app.command("campaign", epilog="Example: infoset campaign --noise mixed --runs 100000 --out runs")(campaign)
 app.command("replay", epilog="Example: infoset replay flight-random.npz flight-game.npz --out figures")(replay)
 app.add_typer(scenarios, name="scenarios")
 app.add_typer(problems, name="problems")

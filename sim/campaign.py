@@ -138,7 +138,9 @@ class Campaign:
             If the folder holds something else or cannot be written, or pyarrow is not installed. Whatever is stored
             by then stays, and the campaign can be resumed.
         ValueError
-            If the numbers make no campaign, or its results are not finite.
+            If the numbers make no campaign.
+        FloatingPointError
+            If its results are not finite.
         """
         plan = self.plan()
         with CampaignFolder.begin(Path(self.folder), self.manifest(), resume=resume, beside=beside) as folder:

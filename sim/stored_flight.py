@@ -70,7 +70,9 @@ def fly_into(
     VersionError
         If the executor flies with other versions.
     ValueError
-        If results are not finite, or there is not at least one worker.
+        If there is not at least one worker.
+    FloatingPointError
+        If results are not finite.
     """
     if workers is not None and workers < 1:
         raise ValueError(f"need at least one worker: got {workers}")

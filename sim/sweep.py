@@ -88,7 +88,9 @@ class Sweep:
         StorageError
             If the folder holds something else or cannot be written, or pyarrow is not installed.
         ValueError
-            If the numbers make no sweep, or its results are not finite.
+            If the numbers make no sweep.
+        FloatingPointError
+            If its results are not finite.
         """
         plan = self.plan()
         with CampaignFolder.begin(Path(self.folder), self.manifest(), resume=resume, beside=beside) as folder:

@@ -1,6 +1,6 @@
 """Campaigns on disk: a manifest, shards of rows, one lock. The only place that knows Parquet."""
 
-from sim.storage.campaign_folder import CampaignFolder, Damage
+from sim.storage.campaign_folder import CampaignFolder, Damage, need_arrow, need_free
 from sim.storage.errors import (
     DamagedError,
     DiskFullError,
@@ -22,5 +22,7 @@ __all__ = [
     "MissingLibraryError",
     "OccupiedError",
     "StorageError",
+    "need_arrow",
+    "need_free",
     "read_manifest",
 ]

@@ -79,9 +79,9 @@ def reporting(where: Path) -> Iterator[None]:
     except OSError as error:
         if error.errno in _NO_ROOM:
             raise DiskFullError(
-                f"{where}: the disk is full; what is in the folder is whole: make room and go on with resume"
+                f"{where}: the disk is full; what is in the folder is whole: make room and resume it"
             ) from None
-        raise StorageError(f"{where}: {error.strerror or error}; check the folder, then go on with resume") from None
+        raise StorageError(f"{where}: {error.strerror or error}; check the folder and the disk") from None
 
 
 def _flush_folder(folder: Path) -> None:

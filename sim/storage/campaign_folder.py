@@ -98,11 +98,11 @@ class CampaignFolder:
             If it cannot be written.
         """
         need_arrow()
-        _need_free(path, resume)
+        need_free(path, resume=resume)
         with reporting(path):
             path.mkdir(parents=True, exist_ok=True)
         with FolderLock(path):
-            _need_free(path, resume)
+            need_free(path, resume=resume)
             clear_leftovers(path)
             found = read_manifest(path) if (path / MANIFEST).is_file() else None
             folder_manifest = manifest if found is None else _continued(found, manifest, path)
@@ -183,7 +183,7 @@ class CampaignFolder:
             If there is no room.
         StorageError
             If it cannot be written.
-        ValueError
+        FloatingPointError
             If the results are not finite.
         """
         table = self._tables.rows(chunk, results, with_cell=bool(self.manifest.axes))
@@ -238,30 +238,64 @@ class CampaignFolder:
         DamagedError
             If a shard has changed since the folder was opened.
         """
-        files = [self._files[index] for index in self._wanted(cell)]
-        try:
-            return self._tables.read(files, columns, with_cell=bool(self.manifest.axes))
-        except (OSError, ValueError) as error:
-            raise DamagedError(
-                f"{self.path}: a shard has changed or gone while it was read: {str(error)[:200]}; go on with resume"
-            ) from None
+        with self._reading():
+            return self._read(self._files_of(cell), columns)
 
     def chunk_samples(self, index: int, quantity: str, noises: Sequence[str]) -> list[NDArray[np.float64]]:
         """Return what is known of a quantity in a finished chunk, a sample a noise."""
-        table = self._tables.read([self._files[index]], [quantity, "noise"], with_cell=bool(self.manifest.axes))
+        table = self._read([self._files[index]], [quantity, "noise"])
         values, places = self._tables.numbers(table, quantity), self._tables.codes(table, "noise", noises)
         known = ~np.ma.getmaskarray(values)
         return [values.data[known & (places == place)] for place in range(len(noises))]
 
     def numbers(self, name: str, cell: int | None = None) -> Numbers:
         """Return a column of numbers, masked where it is null."""
-        found: Numbers = self._tables.numbers(self.table([name], cell), name)
-        return found
+        with self._reading():
+            # Shard by shard: the column is in memory once.
+            files = self._files_of(cell)
+            sizes = [self._size(index) for index in self._wanted(cell)]
+            values, unknown = np.empty(sum(sizes)), np.empty(sum(sizes), dtype=bool)
+            first = 0
+            for file, size in zip(files, sizes, strict=True):
+                part = self._tables.numbers(self._read([file], [name]), name)
+                values[first : first + size] = part.data
+                unknown[first : first + size] = np.ma.getmaskarray(part)
+                first += size
+        return np.ma.MaskedArray(values, mask=unknown)
 
-    def codes(self, name: str, known: Sequence[str], cell: int | None = None) -> NDArray[np.int64]:
+    def codes(self, name: str, known: Sequence[str], cell: int | None = None) -> NDArray[np.int8]:
         """Return a column of text as places in a list of what it can say; -1 where it says none of them."""
-        found: NDArray[np.int64] = self._tables.codes(self.table([name], cell), name, known)
-        return found
+        with self._reading():
+            parts = [self._tables.codes(self._read([file], [name]), name, known) for file in self._files_of(cell)]
+        return np.concatenate(parts) if parts else np.zeros(0, dtype=np.int8)
+
+    def at(self, places: Sequence[int], cell: int | None = None) -> list[dict[str, Any]]:
+        """Return whole rows at some places of the columns, as mappings by column."""
+        files = self._files_of(cell)
+        sizes = [self._size(index) for index in self._wanted(cell)]
+        starts = np.concatenate([[0], np.cumsum(sizes)])
+        rows = []
+        with self._reading():
+            for place in places:
+                shard = int(np.searchsorted(starts, place, side="right")) - 1
+                table = self._read([files[shard]], None)
+                rows.append(table.slice(int(place - starts[shard]), 1).to_pylist()[0])
+        return rows
+
+    def _files_of(self, cell: int | None) -> list[Path]:
+        return [self._files[index] for index in self._wanted(cell)]
+
+    def _read(self, files: Sequence[Path], columns: Sequence[str] | None) -> Any:
+        return self._tables.read(files, columns, with_cell=bool(self.manifest.axes))
+
+    @contextlib.contextmanager
+    def _reading(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, ValueError) as error:
+            raise DamagedError(
+                f"{self.path}: a shard has changed or gone while it was read: {str(error)[:200]}; resume the campaign"
+            ) from None
 
     def _size(self, index: int) -> int:
         first = index % self.stride * self.manifest.chunk
@@ -331,8 +365,20 @@ def need_arrow() -> ModuleType:
     return tables
 
 
-def _need_free(path: Path, resume: bool) -> None:
-    """Refuse a folder that holds something else, or a campaign that is not to be resumed."""
+def need_free(path: Path, *, resume: bool) -> None:
+    """Refuse a folder that holds something else, or a campaign that is not to be resumed.
+
+    Parameters
+    ----------
+    path : Path
+    resume : bool
+        Whether to go on with a campaign that it holds.
+
+    Raises
+    ------
+    OccupiedError
+        If it does.
+    """
     with reporting(path):
         if not path.exists() and not path.is_symlink():
             return

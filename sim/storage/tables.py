@@ -67,12 +67,12 @@ def rows(chunk: Chunk, results: Results, *, with_cell: bool) -> Any:
 
     Raises
     ------
-    ValueError
+    FloatingPointError
         If a miss or an impulse is not a finite number.
     """
     guaranteed = results.guaranteed_miss_m
     if not np.isfinite([results.miss_m, results.impulse_m_s, guaranteed.filled(0.0)]).all():
-        raise ValueError(f"results of runs {results.runs[0]} to {results.runs[-1]} are not finite")
+        raise FloatingPointError(f"results of runs {results.runs[0]} to {results.runs[-1]} are not finite")
     noises = chunk.noises(results.runs)
     margin = results.truth_margin_m
     columns: dict[str, Any] = {
@@ -98,7 +98,9 @@ def rows(chunk: Chunk, results: Results, *, with_cell: bool) -> Any:
 def to_bytes(table: Any, extra: Mapping[str, str]) -> bytes:
     """Return a table as a Parquet file, with some more of its own in the metadata of the schema."""
     sink = pa.BufferOutputStream()
-    pq.write_table(table.replace_schema_metadata({**(table.schema.metadata or {}), **extra}), sink)
+    whole = table.replace_schema_metadata({**(table.schema.metadata or {}), **extra})
+    # Numbers drawn at random repeat nowhere: a dictionary of them only takes room.
+    pq.write_table(whole, sink, compression="zstd", use_dictionary=["noise", "tie", "outcome"])
     return bytes(sink.getvalue().to_pybytes())
 
 
@@ -141,10 +143,10 @@ def numbers(table: Any, name: str) -> np.ma.MaskedArray[tuple[int], np.dtype[np.
     return np.ma.MaskedArray(pc.fill_null(column, 0).to_numpy(), mask=pc.is_null(column).to_numpy())
 
 
-def codes(table: Any, name: str, known: Sequence[str]) -> NDArray[np.int64]:
+def codes(table: Any, name: str, known: Sequence[str]) -> NDArray[np.int8]:
     """Return a column of text as places in a list of what it can say; -1 where it says none of them."""
     found = pc.index_in(table.column(name), value_set=pa.array(list(known), type=pa.string()))
-    return np.asarray(pc.fill_null(found, -1).to_numpy(), dtype=np.int64)
+    return np.asarray(pc.fill_null(found, -1).to_numpy(), dtype=np.int8)
 
 
 def plain_table(columns: Mapping[str, Sequence[Any]], units: Mapping[str, str]) -> Any:
