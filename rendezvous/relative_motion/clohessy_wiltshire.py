@@ -60,6 +60,10 @@ class ClohessyWiltshire:
         """B, shape (..., 6, 3)."""
         return velocity_input(np.shape(time_s))
 
+    def forcing(self, time_s: ArrayLike) -> Floats:
+        """Zero, shape (..., 6)."""
+        return np.zeros((*np.shape(time_s), 6))
+
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
         n = self.rate_rad_s

@@ -51,6 +51,10 @@ class ConstantMotion:
         """B, shape (..., 6, 3)."""
         return velocity_input(np.shape(time_s))
 
+    def forcing(self, time_s: ArrayLike) -> Floats:
+        """Zero, shape (..., 6)."""
+        return np.zeros((*np.shape(time_s), 6))
+
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
         durations = np.asarray(end_s, dtype=np.float64) - np.asarray(start_s, dtype=np.float64)

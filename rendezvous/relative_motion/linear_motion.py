@@ -44,6 +44,9 @@ class LinearMotion(Protocol):
     def input_map(self, time_s: ArrayLike) -> Floats:
         """B(t), shape (..., 6, 3)."""
 
+    def forcing(self, time_s: ArrayLike) -> Floats:
+        """w(t), shape (..., 6)."""
+
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
 

@@ -67,6 +67,10 @@ class TimeVaryingMotion:
         """B(t), shape (..., 6, 3)."""
         return velocity_input(np.shape(time_s)) if self.input_at is None else _at(self.input_at, time_s)
 
+    def forcing(self, time_s: ArrayLike) -> Floats:
+        """w(t), shape (..., 6)."""
+        return np.zeros((*np.shape(time_s), 6)) if self.drift_at is None else _at(self.drift_at, time_s)
+
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
         return self._solved(start_s, end_s).transition

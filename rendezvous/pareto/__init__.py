@@ -1,0 +1,58 @@
+"""Minimum-energy encounter of several craft, and the choice among its Pareto-optimal meetings."""
+
+from rendezvous.pareto.coalitions import Coalition, Coalitions, Core, analyse_coalitions
+from rendezvous.pareto.encounter import Component, Craft, Encounter, Meeting
+from rendezvous.pareto.feasibility import (
+    BoundCheck,
+    Feasibility,
+    check_bound,
+    least_peak,
+    peak_control,
+    total_impulse,
+)
+from rendezvous.pareto.front import (
+    ParetoSet,
+    distances,
+    front_of_three,
+    front_of_two,
+    pareto_set,
+    simplex_weights,
+)
+from rendezvous.pareto.plan import Plan, PlanSamples
+from rendezvous.pareto.selections import least_greatest_excess, least_sum_of_costs, nearest_to
+from rendezvous.pareto.solution import CraftCost, EncounterSolution, solve_encounter, weighted_point
+from rendezvous.pareto.sweep import DurationSweep, sweep_meeting_time
+
+__all__ = [
+    "BoundCheck",
+    "Coalition",
+    "Coalitions",
+    "Component",
+    "Core",
+    "Craft",
+    "CraftCost",
+    "DurationSweep",
+    "Encounter",
+    "EncounterSolution",
+    "Feasibility",
+    "Meeting",
+    "ParetoSet",
+    "Plan",
+    "PlanSamples",
+    "analyse_coalitions",
+    "check_bound",
+    "distances",
+    "front_of_three",
+    "front_of_two",
+    "least_greatest_excess",
+    "least_peak",
+    "least_sum_of_costs",
+    "nearest_to",
+    "pareto_set",
+    "peak_control",
+    "simplex_weights",
+    "solve_encounter",
+    "sweep_meeting_time",
+    "total_impulse",
+    "weighted_point",
+]

@@ -1,0 +1,150 @@
+"""The problem: craft that meet at one time in one state, of which some components are free."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rendezvous.relative_motion import Frame, LinearMotion
+
+Floats = NDArray[np.float64]
+
+
+class Component(Enum):
+    """A component of the terminal state, in the order of a state."""
+
+    X = 0
+    Y = 1
+    Z = 2
+    VX = 3
+    VY = 4
+    VZ = 5
+
+
+class Meeting(Enum):
+    """What the craft have in common when they meet."""
+
+    RENDEZVOUS = "rendezvous"
+    """Position and velocity."""
+    INTERCEPT = "intercept"
+    """Position alone: each craft arrives with a velocity of its own."""
+
+
+@dataclass(frozen=True, eq=False)
+class Craft:
+    """A craft that takes part.
+
+    Parameters
+    ----------
+    name : str
+    state : ndarray, shape (6,)
+        (x, y, z, vx, vy, vz) at its start, in the frame of its motion, m and m/s.
+    motion : LinearMotion
+    weight : float
+        Of its excess in the group's loss; not negative.
+    start_s : float
+        When it starts; the meeting is later.
+    """
+
+    name: str
+    state: Floats
+    motion: LinearMotion
+    weight: float = 1.0
+    start_s: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Encounter:
+    """Craft that meet.
+
+    Parameters
+    ----------
+    craft : tuple of Craft
+        At least one, all in one frame.
+    meeting_s : float
+        When they meet.
+    free : tuple of Component
+        What of the terminal state is open; at least one, of an intercept only of the position.
+    fixed : ndarray, shape (6,)
+        Values of the others; those of free components do not count.
+    meeting : Meeting
+
+    Raises
+    ------
+    ValueError
+        If there is no craft or no free component, a weight is negative or all are zero, a craft starts at the meeting
+        or later, frames differ, names repeat, or a number is not finite.
+    """
+
+    craft: tuple[Craft, ...]
+    meeting_s: float
+    free: tuple[Component, ...]
+    fixed: Floats
+    meeting: Meeting = Meeting.RENDEZVOUS
+
+    def __post_init__(self) -> None:
+        if not self.craft:
+            raise ValueError("an encounter needs a craft")
+        names = [each.name for each in self.craft]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"two craft are called {name!r}; a name tells one craft")
+        if not self.free:
+            raise ValueError("no component of the terminal state is free; free one of x, y, z, vx, vy, vz")
+        if len(set(self.free)) < len(self.free):
+            raise ValueError("a free component is named twice")
+        if self.meeting is Meeting.INTERCEPT and any(each.value >= 3 for each in self.free):
+            raise ValueError("the velocities of an intercept are each craft's own; free only x, y and z")
+        if np.shape(self.fixed) != (6,) or not np.isfinite(self.fixed).all() or not np.isfinite(self.meeting_s):
+            raise ValueError("the terminal state must be six finite numbers at a finite time")
+        for each in self.craft:
+            _check(each, self.meeting_s)
+            if each.motion.frame != self.frame:
+                raise ValueError(
+                    f"craft {each.name!r} moves in frame {each.motion.frame.name}, others in {self.frame.name}"
+                )
+        if not any(each.weight > 0.0 for each in self.craft):
+            raise ValueError("all weights are zero; give one craft a positive weight")
+
+    @property
+    def frame(self) -> Frame:
+        """The frame of all states."""
+        return self.craft[0].motion.frame
+
+    @property
+    def weights(self) -> Floats:
+        """Weights of the craft, shape (n,)."""
+        return np.array([each.weight for each in self.craft])
+
+    @property
+    def common(self) -> int:
+        """How many components of the terminal state the craft have in common: 6, or the 3 of the position."""
+        return 6 if self.meeting is Meeting.RENDEZVOUS else 3
+
+    @property
+    def base(self) -> Floats:
+        """The terminal state with zeros for what is free, shape (6,)."""
+        state = np.array(self.fixed, dtype=np.float64)
+        state[[each.value for each in self.free]] = 0.0
+        return state
+
+    @property
+    def opening(self) -> Floats:
+        """E: the free values' place in the terminal state, shape (6, f)."""
+        matrix = np.zeros((6, len(self.free)))
+        matrix[[each.value for each in self.free], range(len(self.free))] = 1.0
+        return matrix
+
+
+def _check(craft: Craft, meeting_s: float) -> None:
+    if np.shape(craft.state) != (6,) or not np.isfinite(craft.state).all():
+        raise ValueError(f"craft {craft.name!r}: the state must be six finite numbers")
+    if not np.isfinite(craft.weight) or craft.weight < 0.0:
+        raise ValueError(f"craft {craft.name!r}: the weight must be finite and not negative, found {craft.weight!r}")
+    if not np.isfinite(craft.start_s) or not craft.start_s < meeting_s:
+        raise ValueError(
+            f"craft {craft.name!r}: it must start before the meeting at {meeting_s!r} s, found {craft.start_s!r} s"
+        )

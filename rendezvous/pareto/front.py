@@ -1,0 +1,160 @@
+"""The whole Pareto set: every meeting that no other one improves for all craft."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import qmc
+
+from rendezvous.pareto.solution import EncounterSolution
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ParetoSet:
+    """Pareto-optimal meetings.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (k, n)
+        Weights of the craft, of sum one, whose weighted sum of excesses each meeting minimises.
+    points : ndarray, shape (k, f)
+        Free terminal values.
+    excess : ndarray, shape (k, n)
+        J_i^2 - J_i*^2, m^2/s^3.
+    """
+
+    weights: Floats
+    points: Floats
+    excess: Floats
+
+
+def pareto_set(solution: EncounterSolution, weights: Floats) -> ParetoSet:
+    """Return the Pareto-optimal meetings of given weights.
+
+    Parameters
+    ----------
+    solution : EncounterSolution
+    weights : ndarray, shape (k, n)
+        Not negative, each row with a positive sum.
+
+    Returns
+    -------
+    ParetoSet
+
+    Notes
+    -----
+    (sum w_i M_i)^-1 sum w_i M_i p_i*: with one M the convex hull of the ideals, else curved. All weights together cover
+    the set, for the excesses are convex.
+    """
+    shares = weights / weights.sum(axis=1, keepdims=True)
+    ideals = solution.ideals
+    # About the mean of the ideals, scaled by the mean M: the systems are then of order one.
+    middle = ideals.mean(axis=0)
+    root = np.linalg.cholesky(np.mean([each.matrix for each in solution.costs], axis=0)).T
+    back = np.linalg.inv(root)
+    matrices = np.array([back.T @ each.matrix @ back for each in solution.costs])
+    scaled = (ideals - middle) @ root.T
+    left = np.einsum("kn,nab->kab", shares, matrices)
+    right = np.einsum("kn,nab,nb->ka", shares, matrices, scaled)
+    points = middle + np.linalg.solve(left, right[..., None])[..., 0] @ back.T
+    return ParetoSet(shares, points, solution.excess(points))
+
+
+def simplex_weights(craft: int, count: int) -> Floats:
+    """Return weights spread evenly over all shares of so many craft.
+
+    Parameters
+    ----------
+    craft : int
+    count : int
+        How many rows, about; those of single craft are among them.
+
+    Returns
+    -------
+    ndarray, shape (k, craft)
+        A lattice up to three craft, beyond that a low-discrepancy sequence; the same at every call.
+    """
+    if craft == 1:
+        return np.ones((1, 1))
+    if craft == 2:
+        share = np.linspace(0.0, 1.0, max(count, 2))
+        return np.stack([1.0 - share, share], axis=1)
+    if craft == 3:
+        divisions = max(1, int(np.sqrt(2.0 * count)) - 1)
+        pairs = [(i, j) for i in range(divisions + 1) for j in range(divisions + 1 - i)]
+        return np.array([(divisions - i - j, i, j) for i, j in pairs], dtype=np.float64) / divisions
+    uniform = qmc.Halton(craft, scramble=False).random(count + 1)[1:]
+    spread = -np.log(uniform)
+    return np.concatenate([np.eye(craft), spread / spread.sum(axis=1, keepdims=True)])
+
+
+def distances(solution: EncounterSolution) -> Floats:
+    """Return how far apart the ideals are in the norm of M.
+
+    Parameters
+    ----------
+    solution : EncounterSolution
+        With one M.
+
+    Returns
+    -------
+    ndarray, shape (n, n)
+        d_ij = |p_i* - p_j*|_M.
+
+    Raises
+    ------
+    ValueError
+        If the craft have different M.
+    """
+    if not solution.same_matrix:
+        raise ValueError("the craft have different cost matrices: there is no one distance between their ideals")
+    scaled = solution.ideals @ solution.costs[0].root.T
+    return np.asarray(np.linalg.norm(scaled[:, None] - scaled, axis=-1))
+
+
+def front_of_two(distance: float, excess: ArrayLike) -> Floats:
+    """Return the second craft's excess along the Pareto front of two.
+
+    Parameters
+    ----------
+    distance : float
+        d_12.
+    excess : array_like
+        Of the first, from 0 to d_12^2.
+
+    Returns
+    -------
+    ndarray
+        sqrt(e_1) + sqrt(e_2) = d_12.
+    """
+    return np.asarray((distance - np.sqrt(np.asarray(excess, dtype=np.float64))) ** 2)
+
+
+def front_of_three(between: Floats, first: ArrayLike, second: ArrayLike) -> Floats:
+    """Return the third craft's excess on the Pareto front of three.
+
+    Parameters
+    ----------
+    between : ndarray, shape (3, 3)
+        d_ij; the first two ideals differ.
+    first, second : array_like
+        Excesses e_1 and e_2 of a point of the triangle of the ideals.
+
+    Returns
+    -------
+    ndarray
+        e_3, from the triangle with sides d_ij laid in a plane: the distances from two corners give the third.
+    """
+    e1, e2 = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
+    base = between[0, 1]
+    if not base > 0.0:
+        raise ValueError("the first two ideals coincide: the front of these three is that of two")
+    along = (base**2 + e1 - e2) / (2.0 * base)
+    across = np.sqrt(np.maximum(e1 - along**2, 0.0))
+    corner = (base**2 + between[0, 2] ** 2 - between[1, 2] ** 2) / (2.0 * base)
+    height = np.sqrt(max(between[0, 2] ** 2 - corner**2, 0.0))
+    return np.asarray((along - corner) ** 2 + (across - height) ** 2)

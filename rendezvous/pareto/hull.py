@@ -1,0 +1,68 @@
+"""The nearest point of a convex hull, exactly: Wolfe's minimum-norm-point method."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+_RELATIVE = 1e-13
+_MOST_ROUNDS = 1000
+
+
+def nearest_in_hull(points: Floats, target: Floats) -> Floats:
+    """Return the weights of the point of a convex hull that is nearest to a target.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, f)
+        What the hull is of; Euclidean distances count.
+    target : ndarray, shape (f,)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Not negative, of sum one; `weights @ points` is the nearest point.
+
+    Notes
+    -----
+    Wolfe (1976): a corral of affinely independent points grows by the point farthest ahead and sheds those that the
+    nearest point of their affine hull leaves behind. Finite; a few small least-squares problems in practice.
+    """
+    offsets = points - target
+    size = float((offsets**2).sum(axis=1).max())
+    if size == 0.0:
+        return np.asarray(np.eye(len(points))[0])
+    corral = [int((offsets**2).sum(axis=1).argmin())]
+    weights = np.ones(1)
+    for _ in range(_MOST_ROUNDS):
+        nearest = weights @ offsets[corral]
+        ahead = int((offsets @ nearest).argmin())
+        if ahead in corral or nearest @ (nearest - offsets[ahead]) <= _RELATIVE * size:
+            break
+        corral.append(ahead)
+        weights = np.append(weights, 0.0)
+        while True:
+            affine = _affine_nearest(offsets[corral])
+            if (affine > 0.0).all():
+                weights = affine
+                break
+            behind = affine <= 0.0
+            # A weight that is and stays zero leaves at once.
+            step = float(np.min(weights[behind] / np.maximum(weights[behind] - affine[behind], np.finfo(float).tiny)))
+            weights = weights + min(step, 1.0) * (affine - weights)
+            leaving = int(np.where(behind, weights, np.inf).argmin())
+            del corral[leaving]
+            weights = np.delete(weights, leaving)
+            weights /= weights.sum()
+    found = np.zeros(len(points))
+    found[corral] = weights
+    return found
+
+
+def _affine_nearest(offsets: Floats) -> Floats:
+    """Weights of sum one of the point of least norm in an affine hull."""
+    edges = (offsets[1:] - offsets[0]).T
+    rest = np.linalg.lstsq(edges, -offsets[0], rcond=None)[0]
+    return np.concatenate([[1.0 - rest.sum()], rest])

@@ -1,0 +1,99 @@
+"""One craft's minimum-energy flight to a meeting: control and trajectory at any time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rendezvous.pareto.encounter import Craft
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlanSamples:
+    """A flight at given times.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (k,)
+    state : ndarray, shape (k, 6)
+        m and m/s.
+    control_m_s2 : ndarray, shape (k, 3)
+    """
+
+    time_s: Floats
+    state: Floats
+    control_m_s2: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The flight of one craft.
+
+    Parameters
+    ----------
+    craft : Craft
+    meeting_s : float
+    costate : ndarray, shape (6,)
+        At the meeting.
+    """
+
+    craft: Craft
+    meeting_s: float
+    costate: Floats
+
+    def control(self, time_s: ArrayLike) -> Floats:
+        """Return u(t) = B' Phi(T, t)' lambda, (2.1) of the paper.
+
+        Parameters
+        ----------
+        time_s : array_like
+            Times from the craft's start to the meeting.
+
+        Returns
+        -------
+        ndarray, shape (..., 3)
+            m/s^2.
+        """
+        times = np.asarray(time_s, dtype=np.float64)
+        costate = self._costate_at(times)
+        return np.asarray(np.einsum("...ai,...a->...i", self.craft.motion.input_map(times), costate))
+
+    def state(self, time_s: ArrayLike) -> Floats:
+        """Return x(t), (2.5) of the paper: Phi x0 + drift + G(t, t0) Phi(T, t)' lambda.
+
+        Parameters
+        ----------
+        time_s : array_like
+            Times from the craft's start to the meeting.
+
+        Returns
+        -------
+        ndarray, shape (..., 6)
+        """
+        times = np.asarray(time_s, dtype=np.float64)
+        segment = self.craft.motion.segment(np.full(times.shape, self.craft.start_s), times)
+        forced = np.einsum("...ab,...b->...a", segment.gramian, self._costate_at(times))
+        return np.asarray(segment.transition @ self.craft.state + segment.drift + forced)
+
+    def sample(self, count: int) -> PlanSamples:
+        """Return the flight at equally spaced times, both ends among them.
+
+        Parameters
+        ----------
+        count : int
+            At least 2.
+
+        Returns
+        -------
+        PlanSamples
+        """
+        times = np.linspace(self.craft.start_s, self.meeting_s, count)
+        return PlanSamples(times, self.state(times), self.control(times))
+
+    def _costate_at(self, times: Floats) -> Floats:
+        transition = self.craft.motion.transition(times, np.full(times.shape, self.meeting_s))
+        return np.asarray(np.einsum("...ba,b->...a", transition, self.costate))

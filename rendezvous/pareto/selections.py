@@ -1,0 +1,219 @@
+"""Ways to choose one meeting of the Pareto set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from rendezvous.pareto.front import pareto_set
+from rendezvous.pareto.hull import nearest_in_hull
+from rendezvous.pareto.solution import EncounterSolution
+
+Floats = NDArray[np.float64]
+
+_MOST_STEPS = 200
+
+
+def least_sum_of_costs(solution: EncounterSolution) -> Floats:
+    """Return the meeting that minimises sum w_i J_i: impulse-like costs, not their squares.
+
+    Parameters
+    ----------
+    solution : EncounterSolution
+
+    Returns
+    -------
+    ndarray, shape (f,)
+        Free values.
+
+    Notes
+    -----
+    A sum of norms of affine functions, convex: damped Newton steps. Where an ideal costs nothing its norm has a corner
+    there, which is the answer if the others' slopes do not outweigh it.
+    """
+    roots, centres, floors, weights = _parts(solution)
+    size = _size(roots, centres)
+    active = weights > 0.0
+
+    def parts(point: Floats) -> tuple[Floats, Floats]:
+        apart = np.einsum("nab,nb->na", roots, point - centres)
+        return apart, np.sqrt(floors + (apart**2).sum(axis=1))
+
+    def value(point: Floats) -> float:
+        return float(weights @ parts(point)[1])
+
+    for corner in np.flatnonzero(active & (floors <= (1e-12 * size) ** 2)):
+        point = centres[corner]
+        apart, costs = parts(point)
+        # Craft with the same ideal and no cost there have the same corner.
+        here = costs <= 1e-9 * size
+        slopes = np.einsum("n,nab,na->b", np.where(here, 0.0, weights / np.where(here, 1.0, costs)), roots, apart)
+        if np.linalg.norm(np.linalg.solve(roots[corner].T, slopes)) <= weights[here].sum():
+            return np.array(point)
+    point = solution.point
+    for _ in range(_MOST_STEPS):
+        apart, costs = parts(point)
+        shares = np.where(active, weights, 0.0) / np.maximum(costs, 1e-12 * size)
+        slopes = np.einsum("nab,na->nb", roots, apart)
+        slope = shares @ slopes
+        bend = np.einsum("n,nca,ncb->ab", shares, roots, roots)
+        curve = bend - np.einsum("n,na,nb->ab", shares / np.maximum(costs, 1e-12 * size) ** 2, slopes, slopes)
+        step, lost = -np.linalg.solve(curve + 1e-12 * bend, slope), value(point)
+        if abs(slope @ step) <= 1e-28 * lost or np.linalg.norm(roots[0] @ step) <= 1e-15 * size:
+            break
+        if slope @ step > 0.0 or not np.isfinite(step).all():
+            step = -np.linalg.solve(bend, slope)  # Weiszfeld's step, which always leads down
+        length = 1.0
+        while length > 1e-12 and value(point + length * step) > lost + 1e-4 * length * (slope @ step):
+            length *= 0.5
+        if length <= 1e-12:
+            break
+        point = point + length * step
+    return np.asarray(point)
+
+
+def least_greatest_excess(solution: EncounterSolution) -> Floats:
+    """Return the meeting that minimises the greatest weighted excess: with one M, the smallest enclosing ball's centre.
+
+    Parameters
+    ----------
+    solution : EncounterSolution
+
+    Returns
+    -------
+    ndarray, shape (f,)
+        Free values.
+
+    Notes
+    -----
+    Sequential quadratic programming on (p, t), least t with w_i e_i(p) <= t, then Newton's method on the conditions of
+    the craft that bind.
+    """
+    roots, centres, _, weights = _parts(solution)
+    matrices = np.einsum("n,nca,ncb->nab", weights, roots, roots)
+    scale = np.linalg.inv(np.linalg.cholesky(matrices.mean(axis=0)).T)
+    scaled = np.einsum("ca,ncd,db->nab", scale, matrices, scale)
+    middle = centres.mean(axis=0)
+    ideals = np.linalg.solve(scale, (centres - middle).T).T
+    size = float(np.abs(ideals).max())
+    if size == 0.0 or len(centres) == 1:
+        return np.array(centres[0])
+    ideals /= size
+
+    def excess(point: Floats) -> Floats:
+        apart = point - ideals
+        return np.asarray(np.einsum("na,nab,nb->n", apart, scaled, apart))
+
+    def slopes(point: Floats) -> Floats:
+        return np.asarray(2.0 * np.einsum("nab,nb->na", scaled, point - ideals))
+
+    begin = np.linalg.solve(scaled.sum(axis=0), np.einsum("nab,nb->a", scaled, ideals))
+    free = len(begin)
+    found = minimize(
+        lambda x: x[-1],
+        np.append(begin, excess(begin).max()),
+        jac=lambda _: np.append(np.zeros(free), 1.0),
+        constraints={
+            "type": "ineq",
+            "fun": lambda x: x[-1] - excess(x[:-1]),
+            "jac": lambda x: np.column_stack([-slopes(x[:-1]), np.ones(len(ideals))]),
+        },
+        method="SLSQP",
+        options={"ftol": 1e-15, "maxiter": 200},
+    )
+    best = _bound_craft(np.asarray(found.x[:-1]), excess, slopes, scaled)
+    return np.asarray(middle + size * scale @ best)
+
+
+def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
+    """Return the Pareto-optimal meeting nearest to a preferred one.
+
+    Parameters
+    ----------
+    solution : EncounterSolution
+    preferred : ndarray, shape (f,)
+        Free values.
+
+    Returns
+    -------
+    ndarray, shape (f,)
+        Nearest in the norm of M; of the weighted mean of the M where they differ.
+
+    Notes
+    -----
+    With one M a projection onto the convex hull of the ideals, exactly; else sequential quadratic programming over
+    the weights, from every craft and from the middle.
+    """
+    roots, _, _, weights = _parts(solution)
+    if solution.same_matrix:
+        root = roots[0]
+        return np.asarray(nearest_in_hull(solution.ideals @ root.T, root @ preferred) @ solution.ideals)
+    matrix = np.einsum("n,nca,ncb->ab", weights / weights.sum(), roots, roots)
+    root = np.linalg.cholesky(matrix).T
+    count = len(weights)
+    size = max(float(((solution.ideals - preferred) @ root.T).max(initial=0.0)), np.finfo(float).tiny)
+
+    def distance(shares: Floats) -> float:
+        shares = np.maximum(shares, 0.0)
+        point = pareto_set(solution, shares[None] / shares.sum()).points[0]
+        return float((((point - preferred) @ root.T / size) ** 2).sum())
+
+    best: Floats | None = None
+    for begin in (np.full(count, 1.0 / count), *(0.9 * np.eye(count) + 0.1 / count)):
+        found = minimize(
+            distance,
+            begin,
+            bounds=[(0.0, 1.0)] * count,
+            constraints={"type": "eq", "fun": lambda x: x.sum() - 1.0},
+            method="SLSQP",
+            options={"ftol": 1e-14, "maxiter": 200},
+        )
+        if best is None or distance(found.x) < distance(best):
+            best = np.asarray(found.x)
+    assert best is not None
+    return np.asarray(pareto_set(solution, np.maximum(best, 0.0)[None]).points[0])
+
+
+def _parts(solution: EncounterSolution) -> tuple[Floats, Floats, Floats, Floats]:
+    """Roots of M, ideals, J*^2 and weights of the craft."""
+    return (
+        np.array([each.root for each in solution.costs]),
+        solution.ideals,
+        np.array([each.ideal_cost_squared for each in solution.costs]),
+        solution.encounter.weights,
+    )
+
+
+def _size(roots: Floats, centres: Floats) -> float:
+    """How far apart the ideals are, in the norms of M."""
+    apart = np.einsum("nab,nmb->nma", roots, centres[None] - centres[:, None])
+    return float(np.sqrt((apart**2).sum(axis=-1).max()))
+
+
+def _bound_craft(
+    point: Floats, excess: Callable[[Floats], Floats], slopes: Callable[[Floats], Floats], matrices: Floats
+) -> Floats:
+    """Polish a minimax point: equal excesses of the craft that bind, slopes that cancel."""
+    values = excess(point)
+    bound = np.flatnonzero(values >= values.max() * (1.0 - 1e-5))
+    count, free = len(bound), len(point)
+    shares = np.linalg.lstsq(
+        np.vstack([slopes(point)[bound].T, np.ones(count)]), np.append(np.zeros(free), 1.0), rcond=None
+    )[0]
+    best = point
+    for _ in range(8):
+        values, tilts = excess(point)[bound], slopes(point)[bound]
+        top = float(values.mean())
+        residual = np.concatenate([shares @ tilts, values - top, [shares.sum() - 1.0]])
+        system = np.zeros((free + count + 1, free + count + 1))
+        system[:free, :free] = 2.0 * np.einsum("n,nab->ab", shares, matrices[bound])
+        system[:free, free : free + count] = tilts.T
+        system[free : free + count, :free] = tilts
+        system[free : free + count, -1] = -1.0
+        system[-1, free : free + count] = 1.0
+        step = np.linalg.lstsq(system, -residual, rcond=None)[0]
+        point, shares = point + step[:free], shares + step[free : free + count]
+    return np.asarray(point if excess(point).max() <= excess(best).max() * (1.0 + 1e-9) else best)

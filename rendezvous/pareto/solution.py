@@ -1,0 +1,255 @@
+"""The solution in closed form: every craft's cost as a quadratic form of the free terminal values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rendezvous.pareto.encounter import Craft, Encounter
+from rendezvous.pareto.plan import Plan
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class CraftCost:
+    """J^2(p) = J*^2 + (p - p*)' M (p - p*) of one craft.
+
+    Parameters
+    ----------
+    craft : Craft
+    ideal : ndarray, shape (f,)
+        p*: the free values that are cheapest for this craft alone.
+    ideal_cost_squared : float
+        J*^2, m^2/s^3.
+    root : ndarray, shape (f, f)
+        R, upper triangular, M = R' R.
+    effort_base, effort_slope : ndarray, shapes (c,) and (c, f)
+        The scaled effort y(p) = base + slope p, |y|^2 = J^2.
+    to_costate : ndarray, shape (6, c)
+        From y to the costate at the meeting.
+    """
+
+    craft: Craft
+    ideal: Floats
+    ideal_cost_squared: float
+    root: Floats
+    effort_base: Floats
+    effort_slope: Floats
+    to_costate: Floats
+
+    @property
+    def matrix(self) -> Floats:
+        """M, shape (f, f)."""
+        return np.asarray(self.root.T @ self.root)
+
+    def excess(self, point: Floats) -> Floats:
+        """J^2 - J*^2 at points of shape (..., f), shape (...)."""
+        return np.asarray((((point - self.ideal) @ self.root.T) ** 2).sum(axis=-1))
+
+
+@dataclass(frozen=True, eq=False)
+class EncounterSolution:
+    """An encounter solved: the meeting of least group loss, and what any other meeting costs.
+
+    Parameters
+    ----------
+    encounter : Encounter
+    costs : tuple of CraftCost
+        One a craft, in order.
+    point : ndarray, shape (f,)
+        The free values that minimise the weighted sum of excesses, the norm (1.7) of the paper.
+    """
+
+    encounter: Encounter
+    costs: tuple[CraftCost, ...]
+    point: Floats
+
+    @property
+    def ideals(self) -> Floats:
+        """p* of the craft, shape (n, f)."""
+        return np.array([each.ideal for each in self.costs])
+
+    @property
+    def same_matrix(self) -> bool:
+        """Whether all craft have one M: then the Pareto set is the convex hull of the ideals."""
+        first = self.costs[0].matrix
+        return all(np.allclose(each.matrix, first, rtol=1e-12, atol=0.0) for each in self.costs[1:])
+
+    def meeting_state(self, point: Floats | None = None) -> Floats:
+        """Return the terminal state of free values.
+
+        Parameters
+        ----------
+        point : ndarray, shape (f,), or None
+            None: the best for the group.
+
+        Returns
+        -------
+        ndarray, shape (6,)
+            Of an intercept only the position is common.
+        """
+        chosen = self.point if point is None else point
+        return np.asarray(self.encounter.base + self.encounter.opening @ chosen)
+
+    def excess(self, point: Floats | None = None) -> Floats:
+        """Return J_i^2 - J_i*^2 of all craft.
+
+        Parameters
+        ----------
+        point : ndarray, shape (..., f), or None
+            None: the best for the group.
+
+        Returns
+        -------
+        ndarray, shape (..., n)
+        """
+        chosen = self.point if point is None else point
+        return np.asarray(np.stack([each.excess(chosen) for each in self.costs], axis=-1))
+
+    def cost_squared(self, point: Floats | None = None) -> Floats:
+        """Return J_i^2 of all craft, shape (..., n), m^2/s^3.
+
+        Parameters
+        ----------
+        point : ndarray, shape (..., f), or None
+            None: the best for the group.
+
+        Returns
+        -------
+        ndarray, shape (..., n)
+        """
+        return np.asarray(self.excess(point) + np.array([each.ideal_cost_squared for each in self.costs]))
+
+    def group_loss(self, point: Floats | None = None) -> Floats:
+        """Return the weighted sum of excesses, the norm (1.7).
+
+        Parameters
+        ----------
+        point : ndarray, shape (..., f), or None
+            None: the best for the group.
+
+        Returns
+        -------
+        ndarray, shape (...)
+        """
+        return np.asarray(self.excess(point) @ self.encounter.weights)
+
+    def plan(self, index: int, point: Floats | None = None) -> Plan:
+        """Return how one craft flies to a meeting.
+
+        Parameters
+        ----------
+        index : int
+            Which craft.
+        point : ndarray, shape (f,), or None
+            Free values; None: the best for the group.
+
+        Returns
+        -------
+        Plan
+            Its control and trajectory as functions of time.
+        """
+        cost = self.costs[index]
+        chosen = self.point if point is None else point
+        costate = cost.to_costate @ (cost.effort_base + cost.effort_slope @ chosen)
+        return Plan(cost.craft, self.encounter.meeting_s, costate)
+
+    def ideal_plan(self, index: int) -> Plan:
+        """Return how one craft would fly to the meeting that is cheapest for it alone."""
+        return self.plan(index, self.costs[index].ideal)
+
+
+def solve_encounter(encounter: Encounter) -> EncounterSolution:
+    """Solve an encounter.
+
+    Parameters
+    ----------
+    encounter : Encounter
+
+    Returns
+    -------
+    EncounterSolution
+
+    Raises
+    ------
+    ValueError
+        If the numbers overflow, or a Gramian is singular: the craft's control does not reach all components.
+
+    Notes
+    -----
+    (2.1) to (2.7) of Barseghyan and Stepanyan (2008) for any free components. States are divided by (T, T, T, 1, 1, 1)
+    before the Cholesky factor of the Gramian is taken, and the ideal is a least-squares problem of that factor, so no
+    digits are lost to J*. O(n) small matrices.
+    """
+    common, opening, base = encounter.common, encounter.opening, encounter.base
+    known: dict[tuple[int, float], tuple[Floats, Floats, Floats]] = {}
+    costs = []
+    for craft in encounter.craft:
+        key = (id(craft.motion), craft.start_s)
+        if key not in known:
+            known[key] = _factor(craft, encounter.meeting_s, common)
+        transition, drift, whiten = known[key]
+        missing = (base - transition @ craft.state - drift)[:common]
+        costs.append(_craft_cost(craft, whiten, missing, opening[:common]))
+    return EncounterSolution(encounter, tuple(costs), weighted_point(costs, encounter.weights))
+
+
+def weighted_point(costs: Sequence[CraftCost], weights: ArrayLike) -> Floats:
+    """Return the free values that minimise a weighted sum of excesses.
+
+    Parameters
+    ----------
+    costs : sequence of CraftCost
+    weights : array_like, shape (n,)
+        Not negative, one positive.
+
+    Returns
+    -------
+    ndarray, shape (f,)
+
+    Notes
+    -----
+    (sum w_i M_i)^-1 sum w_i M_i p_i*, as a least-squares problem of the roots of M_i.
+    """
+    roots = np.sqrt(np.asarray(weights, dtype=np.float64))
+    rows = np.concatenate([root * each.root for root, each in zip(roots, costs, strict=True)])
+    right = np.concatenate([root * (each.root @ each.ideal) for root, each in zip(roots, costs, strict=True)])
+    orthogonal, upper = np.linalg.qr(rows)
+    return np.asarray(np.linalg.solve(upper, orthogonal.T @ right))
+
+
+def _factor(craft: Craft, meeting_s: float, common: int) -> tuple[Floats, Floats, Floats]:
+    """Return Phi, the drift, and what turns a missing state into scaled effort: L^-1 S^-1."""
+    segment = craft.motion.segment(craft.start_s, meeting_s)
+    scale = np.ones(common)
+    scale[:3] = meeting_s - craft.start_s
+    scaled = segment.gramian[:common, :common] / np.outer(scale, scale)
+    if not (np.isfinite(scaled).all() and np.isfinite(segment.transition).all()):
+        raise ValueError(
+            f"craft {craft.name!r}: the motion overflows over {meeting_s - craft.start_s:g} s; check the units"
+        )
+    try:
+        lower = np.linalg.cholesky(scaled)
+    except np.linalg.LinAlgError:
+        raise ValueError(
+            f"craft {craft.name!r}: its Gramian over {meeting_s - craft.start_s:g} s is singular; check duration, rate"
+        ) from None
+    whiten = np.linalg.solve(lower, np.diag(1.0 / scale))
+    return segment.transition, segment.drift, np.asarray(whiten)
+
+
+def _craft_cost(craft: Craft, whiten: Floats, missing: Floats, opening: Floats) -> CraftCost:
+    base, slope = whiten @ missing, whiten @ opening
+    orthogonal, upper = np.linalg.qr(slope)
+    ideal = -np.linalg.solve(upper, orthogonal.T @ base)
+    # Without the part along the slope: base + slope p* would cancel where the ideal lies far away.
+    rest = base - orthogonal @ (orthogonal.T @ base)
+    to_costate = np.zeros((6, len(base)))
+    to_costate[: len(base)] = whiten.T
+    if not np.isfinite(ideal).all():
+        raise ValueError(f"craft {craft.name!r}: the numbers overflow; check the units")
+    return CraftCost(craft, ideal, float(rest @ rest), upper, base, slope, to_costate)
