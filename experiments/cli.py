@@ -17,7 +17,9 @@ from experiments.commands.engage import engage
 from experiments.commands.experiment import experiment
 from experiments.commands.problems import app as problems
 from experiments.commands.replay import replay
+from experiments.commands.report import report
 from experiments.commands.scenarios import app as scenarios
+from experiments.commands.sweep import sweep
 from experiments.errors import InputError
 
 INPUT_ERROR = 2
@@ -55,6 +57,12 @@ app.command(
     "adversary", epilog="Example: infoset adversary --strategy symmetric-miss --budget 2000 --record worst.npz"
 )(adversary)
 app.command("campaign", epilog="Example: infoset campaign --noise mixed --runs 100000 --out runs")(campaign)
+app.command(
+    "sweep",
+    epilog="Example: infoset sweep --vary angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:8,"
+    "thruster.greatest_impulse_m_s=2:20:7 --runs 200 --out sensors",
+)(sweep)
+app.command("report", epilog="Example: infoset report runs --out figures")(report)
 app.command("replay", epilog="Example: infoset replay flight-random.npz flight-game.npz --out figures")(replay)
 app.add_typer(scenarios, name="scenarios")
 app.add_typer(problems, name="problems")

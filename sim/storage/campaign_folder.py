@@ -196,6 +196,25 @@ class CampaignFolder:
         """Write another file into the folder, whole or not at all."""
         write_whole(self.path / name, content)
 
+    def table_file(self, columns: Mapping[str, Sequence[Any]], units: Mapping[str, str]) -> bytes:
+        """Return a table made of the campaign as a Parquet file.
+
+        Parameters
+        ----------
+        columns : mapping of str to sequence
+            Numbers and text; None is null.
+        units : mapping of str to str
+            Of columns that have one; they stand in the metadata of its fields.
+
+        Returns
+        -------
+        bytes
+        """
+        content: bytes = self._tables.to_bytes(
+            self._tables.plain_table(columns, units), {"campaign": self.manifest.identity}
+        )
+        return content
+
     def discard_damaged(self) -> list[Damage]:
         """Take the damaged shards away, so that their chunks are flown again, and say which they were."""
         for damage in self.damaged:

@@ -100,7 +100,12 @@ def to_bytes(table: Any, extra: Mapping[str, str]) -> bytes:
     sink = pa.BufferOutputStream()
     whole = table.replace_schema_metadata({**(table.schema.metadata or {}), **extra})
     # Numbers drawn at random repeat nowhere: a dictionary of them only takes room.
-    pq.write_table(whole, sink, compression="zstd", use_dictionary=["noise", "tie", "outcome"])
+    pq.write_table(
+        whole,
+        sink,
+        compression="zstd",
+        use_dictionary=[name for name in ("noise", "tie", "outcome") if name in table.column_names],
+    )
     return bytes(sink.getvalue().to_pybytes())
 
 
