@@ -1,0 +1,176 @@
+"""One branch of the game's extremals: the distance l that the evader keeps at a time T, followed as T grows.
+
+At T -> 0 nu is the line of sight and l the distance, so no guess is needed. Capture is where l has fallen to the
+capture radius: l above it on the way says that there was none before, on this branch. Nondimensional.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rendezvous.pursuit_evasion._pair import COARSE, FINE, ROUGH, Node, Pair
+
+Floats = NDArray[np.float64]
+
+_LONGEST_STEP, _SHORTEST_STEP = 0.3, 1e-6
+_PREDICTED_WITHIN = 3e-3
+_MOST_STEPS = 5000
+
+
+class Ending(Enum):
+    """Why a branch was followed no further."""
+
+    CAPTURE = "capture"
+    TIME = "time"
+    FOLD = "fold"
+
+
+@dataclass(frozen=True)
+class Branch:
+    """A branch as far as it was followed.
+
+    Parameters
+    ----------
+    nodes : tuple of Node
+        In the order they were found.
+    ending : Ending
+    """
+
+    nodes: tuple[Node, ...]
+    ending: Ending
+
+    @property
+    def last(self) -> Node:
+        """The last extremal."""
+        return self.nodes[-1]
+
+
+def follow(pair: Pair, first: Node, radius: float, latest: float) -> Branch:
+    """Follow a branch as the duration grows, to the capture, to a time, or to where it folds.
+
+    Parameters
+    ----------
+    pair : Pair
+    first : Node
+    radius : float
+        Distance that is capture; minus infinity to follow the branch beyond it.
+    latest : float
+
+    Returns
+    -------
+    Branch
+        Ends with the capture at full precision, if that is its ending.
+
+    Notes
+    -----
+    Some 20 steps a revolution, of two or three iterations each.
+    """
+    nodes, step = [first], first.duration
+    while len(nodes) < _MOST_STEPS:
+        node = nodes[-1]
+        left = latest - node.duration
+        if left <= _SHORTEST_STEP:
+            return Branch(tuple(nodes), Ending.TIME)
+        step = left if step > 0.9 * left else step
+        guess = _predicted(nodes, node.duration + step)
+        found = pair.solve(
+            guess,
+            node.duration + step,
+            node.distance - step * node.closing,
+            time_free=False,
+            tolerance=COARSE,
+            close=ROUGH,
+        )
+        # The error of a prediction of order two is as the cube of the step.
+        missed = math.inf if found is None else float(np.abs(found.vector - guess).max())
+        if found is None or not found.is_saddle or missed > 8.0 * _PREDICTED_WITHIN:
+            if step < _SHORTEST_STEP:
+                return Branch(tuple(nodes), Ending.FOLD)
+            step *= 0.4
+            continue
+        at = first_crossing(node, found, radius)
+        if at is not None:
+            capture = polish(pair, _predicted(nodes, at), at, radius, latest)
+            if capture is not None and node.duration < capture.duration <= found.duration + _SHORTEST_STEP:
+                return Branch((*nodes, capture), Ending.CAPTURE)
+            if step < _SHORTEST_STEP:
+                return Branch(tuple(nodes), Ending.FOLD)
+            step *= 0.4
+            continue
+        nodes.append(found)
+        step = min(_LONGEST_STEP, step * min(2.0, 0.9 * (_PREDICTED_WITHIN / max(missed, 1e-12)) ** (1.0 / 3.0)))
+    return Branch(tuple(nodes), Ending.FOLD)
+
+
+def polish(pair: Pair, guess: Floats, duration: float, radius: float, latest: float) -> Node | None:
+    """Find the capture near a guess, at full precision.
+
+    Parameters
+    ----------
+    pair : Pair
+    guess : ndarray, shape (15,)
+    duration, radius, latest : float
+
+    Returns
+    -------
+    Node or None
+    """
+    found = pair.solve(guess, duration, radius, time_free=True, tolerance=FINE, latest=latest)
+    if found is None:
+        return None
+    # Once more, linearised at the solution itself: for its costates, curvature and residual.
+    return pair.solve(
+        found.vector, found.duration, radius, time_free=True, tolerance=FINE, linear_tolerance=FINE, latest=latest
+    )
+
+
+def first_crossing(before: Node, after: Node, radius: float) -> float | None:
+    """Return when l first falls to a radius between two extremals, by the cubic through both; None if it does not.
+
+    Parameters
+    ----------
+    before, after : Node
+    radius : float
+
+    Returns
+    -------
+    float or None
+    """
+    step = after.duration - before.duration
+    rise = (after.distance - before.distance) / step
+    a, b = -before.closing, -after.closing
+    cubic = np.array([(a + b - 2.0 * rise) / step**2, (3.0 * rise - 2.0 * a - b) / step, a, before.distance - radius])
+    if not math.isfinite(radius):
+        return None
+    turns = np.roots(np.trim_zeros(cubic[:3] * np.array([3.0, 2.0, 1.0]), "f"))
+    ends = sorted(float(t.real) for t in turns if abs(t.imag) < 1e-12 and 0.0 < t.real < step)
+    low = 0.0
+    for high in (*ends, step):
+        if np.polyval(cubic, high) <= 0.0:
+            return before.duration + _first_below(cubic, low, high)
+        low = high
+    return None
+
+
+def _first_below(cubic: Floats, low: float, high: float) -> float:
+    """Bisect for where a cubic falls below zero."""
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if np.polyval(cubic, middle) <= 0.0 else (middle, high)
+    return high
+
+
+def _predicted(nodes: list[Node], duration: float) -> Floats:
+    """Extrapolate (pursuer, evader, nu) from the last extremal, with its slope and how that changed."""
+    node = nodes[-1]
+    step = duration - node.duration
+    guess = node.vector + step * node.slope
+    if len(nodes) > 1:
+        before = nodes[-2]
+        guess += 0.5 * step * step / (node.duration - before.duration) * (node.slope - before.slope)
+    return guess

@@ -1,0 +1,273 @@
+"""One craft's extremals, from the end of the game back to its start, with their variational equations: compiled.
+
+An extremal carries its craft as far along `nu` as it can by the time of the end. There its costate is (nu, 0), and
+going back it is the same flow for pursuer and evader: thrust along p_v, where p is the costate of the pursuer and the
+costate of the evader with its sign turned. So close to the end p_v / |p_v| is nu, and the flow is smooth to its end.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import DOP853
+
+from rendezvous._compile import compiled
+from rendezvous.pursuit_evasion._gravity import acceleration, derivatives
+
+Floats = NDArray[np.float64]
+
+STATES, COLUMNS = 12, 9
+"""Position, velocity and costate; what they are differentiated by: end state (6), nu in its plane (2), end mass."""
+
+_STAGES = 12
+_NODES = np.ascontiguousarray(DOP853.C[:_STAGES])
+_WEIGHTS = np.vstack([DOP853.A[:_STAGES, :_STAGES], DOP853.B])
+"""Of the stages, a row each, and of the step."""
+_THIRD, _FIFTH = np.ascontiguousarray(DOP853.E3[:_STAGES]), np.ascontiguousarray(DOP853.E5[:_STAGES])
+_SAFETY, _LEAST_FACTOR, _GREATEST_FACTOR = 0.9, 0.2, 6.0
+_MOST_STEPS = 20_000
+_FIRST_STEP = 0.05
+_NOTHING = np.zeros((STATES, COLUMNS))
+
+
+@compiled
+def _rates(
+    s: float,
+    y: Floats,
+    z: Floats,
+    craft: Floats,
+    columns: int,
+    dy: Floats,
+    dz: Floats,
+    first: Floats,
+    second: Floats,
+) -> None:
+    """Rates, in time to go, of the state and of its variations.
+
+    `craft` is mu, oblateness, thrust, mass at the end, flow. At the end of the game p_v is zero: there the direction
+    of thrust is that of p_r, which is its rate.
+    """
+    thrust, mass = craft[2], craft[3] + craft[4] * s
+    push = thrust / mass
+    derivatives(y[:3], y[9:], craft[0], craft[1], dy[3:6], first, second)
+    at = 9 if s > 0.0 else 6
+    x0, x1, x2 = y[at], y[at + 1], y[at + 2]
+    size = np.sqrt(x0 * x0 + x1 * x1 + x2 * x2)
+    u0, u1, u2 = x0 / size, x1 / size, x2 / size
+    for i in range(3):
+        dy[i] = -y[3 + i]
+        dy[6 + i] = first[i, 0] * y[9] + first[i, 1] * y[10] + first[i, 2] * y[11]
+        dy[9 + i] = y[6 + i]
+    dy[3] = -dy[3] - push * u0
+    dy[4] = -dy[4] - push * u1
+    dy[5] = -dy[5] - push * u2
+    if columns == 0:
+        return
+    turn = push / size
+    g00, g01, g02, g11, g12, g22 = first[0, 0], first[0, 1], first[0, 2], first[1, 1], first[1, 2], first[2, 2]
+    m00, m01, m02, m11, m12, m22 = second[0, 0], second[0, 1], second[0, 2], second[1, 1], second[1, 2], second[2, 2]
+    for j in range(COLUMNS):
+        r0, r1, r2 = z[0, j], z[1, j], z[2, j]
+        q0, q1, q2 = z[9, j], z[10, j], z[11, j]
+        t0, t1, t2 = z[at, j], z[at + 1, j], z[at + 2, j]
+        along = u0 * t0 + u1 * t1 + u2 * t2
+        dz[0, j] = -z[3, j]
+        dz[1, j] = -z[4, j]
+        dz[2, j] = -z[5, j]
+        dz[3, j] = -(g00 * r0 + g01 * r1 + g02 * r2 + turn * (t0 - along * u0))
+        dz[4, j] = -(g01 * r0 + g11 * r1 + g12 * r2 + turn * (t1 - along * u1))
+        dz[5, j] = -(g02 * r0 + g12 * r1 + g22 * r2 + turn * (t2 - along * u2))
+        dz[6, j] = g00 * q0 + g01 * q1 + g02 * q2 + m00 * r0 + m01 * r1 + m02 * r2
+        dz[7, j] = g01 * q0 + g11 * q1 + g12 * q2 + m01 * r0 + m11 * r1 + m12 * r2
+        dz[8, j] = g02 * q0 + g12 * q1 + g22 * q2 + m02 * r0 + m12 * r1 + m22 * r2
+        dz[9, j] = z[6, j]
+        dz[10, j] = z[7, j]
+        dz[11, j] = z[8, j]
+    fall = push / mass
+    dz[3, COLUMNS - 1] += fall * u0
+    dz[4, COLUMNS - 1] += fall * u1
+    dz[5, COLUMNS - 1] += fall * u2
+
+
+@compiled
+def flow_back(y: Floats, z: Floats, craft: Floats, begin: float, end: float, tolerance: float, columns: int) -> bool:
+    """Carry a state and its variations back from time to go `begin` to `end`, in place.
+
+    Parameters
+    ----------
+    y : ndarray, shape (12,)
+        Position, velocity, p_r, p_v.
+    z : ndarray, shape (12, 9)
+        Their derivatives; left alone where `columns` is zero.
+    craft : ndarray, shape (5,)
+        mu, oblateness, thrust, mass at the end of the game, mass flow.
+    begin, end : float
+        Times to go; either may be the greater.
+    tolerance : float
+        Of a step's error, relative and absolute, in y.
+    columns : int
+        Zero to carry y alone.
+
+    Returns
+    -------
+    bool
+        False where the steps became too many or too small, or the numbers too great.
+
+    Notes
+    -----
+    Dormand and Prince's method of order 8 (SciPy's coefficients), with the error of y alone steering the steps. A step
+    costs 12 stages of about 0.4 us each with the variations.
+    """
+    span = abs(end - begin)
+    if span == 0.0:
+        return True
+    sign = 1.0 if end > begin else -1.0
+    rows = STATES if columns > 0 else 0
+    ks, kz = np.empty((_STAGES, STATES)), np.empty((_STAGES, rows, COLUMNS))
+    first, second = np.empty((3, 3)), np.empty((3, 3))
+    yn, zn = np.empty(STATES), np.empty((rows, COLUMNS))
+    s, step = begin, min(_FIRST_STEP, span)
+    fresh = 0
+    for _ in range(_MOST_STEPS):
+        left = abs(end - s)
+        last = step >= left * (1.0 - 1e-12)
+        h = sign * (left if last else step)
+        # One place that calls each helper, for each such place is compiled on its own.
+        for k in range(fresh, _STAGES + 1):
+            _stage(y, z, ks, kz, k, h, columns, yn, zn)
+            if k < _STAGES:
+                _rates(s + _NODES[k] * h, yn, zn, craft, columns, ks[k], kz[k], first, second)
+        error = _error(y, yn, ks, tolerance, abs(h))
+        if not error < np.inf:
+            return False
+        fresh = 1
+        if error < 1.0:
+            y[:] = yn
+            if columns > 0:
+                z[:] = zn
+            if last:
+                return True
+            s += h
+            fresh = 0
+        factor = _GREATEST_FACTOR if error < 1e-10 else _SAFETY * error**-0.125
+        step = abs(h) * min(max(factor, _LEAST_FACTOR), _GREATEST_FACTOR)
+        if step < 1e-13 * max(span, 1e-3):
+            return False
+    return False
+
+
+@compiled
+def _stage(
+    y: Floats, z: Floats, ks: Floats, kz: Floats, stage: int, h: float, columns: int, yn: Floats, zn: Floats
+) -> None:
+    """Put y + h sum(weights k) of a stage into yn, and the same of z into zn; after the last stage comes the step."""
+    for i in range(STATES):
+        total = 0.0
+        for k in range(stage):
+            total += _WEIGHTS[stage, k] * ks[k, i]
+        yn[i] = y[i] + h * total
+    if columns == 0:
+        return
+    flat, out, rates = (
+        z.reshape(STATES * COLUMNS),
+        zn.reshape(STATES * COLUMNS),
+        kz.reshape((_STAGES, STATES * COLUMNS)),
+    )
+    for j in range(STATES * COLUMNS):
+        out[j] = flat[j]
+    for k in range(stage):
+        weight = h * _WEIGHTS[stage, k]
+        if weight != 0.0:
+            for j in range(STATES * COLUMNS):
+                out[j] += weight * rates[k, j]
+
+
+@compiled
+def _error(y: Floats, yn: Floats, ks: Floats, tolerance: float, h: float) -> float:
+    """Error of a step over the tolerance (Hairer, Norsett and Wanner, II.10)."""
+    third = fifth = 0.0
+    for i in range(STATES):
+        scale = tolerance * (1.0 + max(abs(y[i]), abs(yn[i])))
+        e3 = e5 = 0.0
+        for k in range(_STAGES):
+            e3 += _THIRD[k] * ks[k, i]
+            e5 += _FIFTH[k] * ks[k, i]
+        third += (e3 / scale) ** 2
+        fifth += (e5 / scale) ** 2
+    if third == 0.0 and fifth == 0.0:
+        return 0.0
+    return float(h * fifth / np.sqrt((fifth + 0.01 * third) * STATES))
+
+
+def shoot_back(
+    end_state: Floats, nu: Floats, plane: Floats, craft: Floats, duration: float, tolerance: float
+) -> tuple[Floats, Floats] | None:
+    """Carry an extremal and its variations from its end to the start of the game.
+
+    Parameters
+    ----------
+    end_state : ndarray, shape (6,)
+    nu : ndarray, shape (3,)
+    plane : ndarray, shape (2, 3)
+        Two directions that nu is varied along.
+    craft : ndarray, shape (5,)
+        As of `flow_back`.
+    duration, tolerance : float
+
+    Returns
+    -------
+    tuple of ndarray or None
+        State and costate at the start, shape (12,), and their derivatives, shape (12, 9), by end state, nu along the
+        two directions, and mass at the end. None where the propagation fails.
+    """
+    y, z = np.zeros(STATES), np.zeros((STATES, COLUMNS))
+    y[:6], y[6:9] = end_state, nu
+    z[:6, :6] = np.eye(6)
+    z[6:9, 6:8] = plane.T
+    return (y, z) if flow_back(y, z, craft, 0.0, duration, tolerance, 1) else None
+
+
+def shoot_state_back(end_state: Floats, nu: Floats, craft: Floats, duration: float, tolerance: float) -> Floats | None:
+    """Carry an extremal alone from its end to the start of the game.
+
+    Parameters
+    ----------
+    end_state : ndarray, shape (6,)
+    nu : ndarray, shape (3,)
+    craft : ndarray, shape (5,)
+        As of `flow_back`.
+    duration, tolerance : float
+
+    Returns
+    -------
+    ndarray or None
+        State and costate at the start, shape (12,); None where the propagation fails.
+    """
+    y = np.zeros(STATES)
+    y[:6], y[6:9] = end_state, nu
+    return y if flow_back(y, _NOTHING, craft, 0.0, duration, tolerance, 0) else None
+
+
+@compiled
+def rate(y: Floats, mu: float, oblateness: float, push: float) -> Floats:
+    """Rate of position and velocity at a state and costate, in time.
+
+    Parameters
+    ----------
+    y : ndarray, shape (12,)
+    mu, oblateness : float
+    push : float
+        Acceleration of the thrust.
+
+    Returns
+    -------
+    ndarray, shape (6,)
+    """
+    out = np.empty(6)
+    acceleration(y[:3], mu, oblateness, out[3:])
+    size = np.sqrt(y[9] * y[9] + y[10] * y[10] + y[11] * y[11])
+    for i in range(3):
+        out[i] = y[3 + i]
+        if size > 0.0:
+            out[3 + i] += push * y[9 + i] / size
+    return out

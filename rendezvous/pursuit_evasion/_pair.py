@@ -1,0 +1,258 @@
+"""The extremals of both sides together, by Newton's method: at a duration T, or at a distance l. Nondimensional.
+
+At each duration T the evader strives along nu, the pursuer too, and r_E - r_P = l nu.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rendezvous.pursuit_evasion._side import Response, Side, across
+
+Floats = NDArray[np.float64]
+
+FINE, COARSE = 1e-13, 1e-9
+"""Tolerances of propagation: of what is kept, and on the way there."""
+
+CLOSE, ROUGH = 1e-7, 1e-4
+"""Last corrections of Newton's method, for the same; what is left of the error is about their square."""
+
+_MOST_ITERATIONS = 12
+_FIRST_DURATION = 0.01
+_LEAST_OF_FIRST = 1e-9
+_FARTHEST, _NEAR, _FRACTION = 0.7, 1e-2, 0.2
+
+
+@dataclass(frozen=True)
+class Node:
+    """An extremal of the game of one duration.
+
+    Parameters
+    ----------
+    duration, distance : float
+        T and l.
+    nu : ndarray, shape (3,)
+    pursuer, evader : ndarray, shape (6,)
+        End states.
+    curvature : ndarray, shape (2,)
+        Eigenvalues of the Hessian of h_P - h_E across nu, ascending.
+    closing : float
+        nu . (v_P - v_E): l falls at this rate.
+    regular : bool
+        Whether neither side's extremal shows a conjugate point.
+    slope : ndarray, shape (15,)
+        d/dT of (pursuer, evader, nu) at l free; of the last guess, so to first order.
+    correction : float
+        Size of the last step of Newton's method: the error that is left is about its square.
+    costates : ndarray, shape (2, 6)
+        p at the start, pursuer's and evader's, of the last guess that was linearised.
+    residual : float
+        By how much that guess missed the start states.
+    """
+
+    duration: float
+    distance: float
+    nu: Floats
+    pursuer: Floats
+    evader: Floats
+    curvature: Floats
+    closing: float
+    regular: bool
+    slope: Floats
+    correction: float
+    costates: Floats
+    residual: float
+
+    @property
+    def is_saddle(self) -> bool:
+        """Whether no small change of nu gives the evader more, or a side's extremal less than it thinks."""
+        return self.regular and bool(self.curvature[0] + self.distance > 0.0)
+
+    @property
+    def vector(self) -> Floats:
+        """Pursuer, evader, nu: shape (15,)."""
+        return np.concatenate([self.pursuer, self.evader, self.nu])
+
+
+@dataclass(frozen=True)
+class _Linear:
+    """Both sides linearised at a guess, and the system of three that joins them solved."""
+
+    pursuer: Response
+    evader: Response
+    plane: Floats
+    time_free: bool
+    inverse: Floats
+    drift: Floats
+
+    def step(self, rho: Floats, state: Floats) -> Floats:
+        """Newton's step of (pursuer, evader, nu, T, l), shape (17,), for corrections of the two end states."""
+        gap = state[6:9] + rho[6:9] - state[:3] - rho[:3] - state[16] * state[12:15]
+        turn = self.inverse @ gap
+        dt, dl = (turn[2], 0.0) if self.time_free else (0.0, turn[2])
+        p, e = self.pursuer, self.evader
+        step = np.empty(17)
+        step[:6] = rho[:6] + p.by_nu @ turn[:2] + p.by_time * dt
+        step[6:12] = rho[6:] + e.by_nu @ turn[:2] + e.by_time * dt
+        step[12:15] = turn[:2] @ self.plane
+        step[15], step[16] = dt, dl
+        return step
+
+    def node(self, state: Floats, correction: float) -> Node:
+        """Return the extremal that the last step led to."""
+        p, e, drift = self.pursuer, self.evader, self.drift[:2]
+        hessian = self.plane @ (p.by_nu[:3] - e.by_nu[:3])
+        return Node(
+            duration=float(state[15]),
+            distance=float(state[16]),
+            nu=state[12:15],
+            pursuer=state[:6],
+            evader=state[6:12],
+            curvature=np.asarray(np.linalg.eigvalsh(0.5 * (hessian + hessian.T)), dtype=np.float64),
+            closing=float(state[12:15] @ (state[3:6] - state[9:12])),
+            regular=p.regular and e.regular,
+            slope=np.concatenate([p.by_nu @ drift + p.by_time, e.by_nu @ drift + e.by_time, drift @ self.plane]),
+            correction=correction,
+            costates=np.stack([p.costate, e.costate]),
+            residual=max(p.residual, e.residual),
+        )
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Both sides of a game.
+
+    Parameters
+    ----------
+    pursuer, evader : Side
+    """
+
+    pursuer: Side
+    evader: Side
+
+    def solve(
+        self,
+        guess: Floats,
+        duration: float,
+        distance: float,
+        *,
+        time_free: bool,
+        tolerance: float,
+        linear_tolerance: float = COARSE,
+        close: float = CLOSE,
+        most_iterations: int = _MOST_ITERATIONS,
+        latest: float = math.inf,
+    ) -> Node | None:
+        """Find the extremal near a guess, for a given duration, or for a given distance with the time free.
+
+        Parameters
+        ----------
+        guess : ndarray, shape (15,)
+            End states and nu.
+        duration, distance : float
+            The guess of the one that is free, and the other.
+        time_free : bool
+        tolerance : float
+            Of the propagation.
+        linear_tolerance : float
+            Of the propagation of derivatives, where that is less fine.
+        close : float
+            How small the last correction must be.
+        most_iterations : int
+        latest : float
+            Longest duration that can be propagated.
+
+        Returns
+        -------
+        Node or None
+            None where Newton's method does not converge.
+
+        Notes
+        -----
+        A propagation of each side with its variations, then some without, with the same derivatives, as long as each
+        correction is a fraction of the one before: half a millisecond and 0.1 ms a revolution.
+        """
+        state = np.concatenate([guess[:12], guess[12:] / np.sqrt(guess[12:] @ guess[12:]), [duration, distance]])
+        before = math.inf
+        linear: _Linear | None = None
+        for _ in range(most_iterations):
+            fresh = linear is None
+            linear = linear or self._linearised(state, max(tolerance, linear_tolerance), time_free)
+            if linear is None:
+                return None
+            if fresh and tolerance >= linear_tolerance:
+                rho = np.concatenate([linear.pursuer.rho, linear.evader.rho])
+            else:
+                corrections = self._corrections(linear, state, tolerance)
+                if corrections is None:
+                    return None
+                rho = corrections
+            step = linear.step(rho, state)
+            correction = float(np.abs(step).max())
+            if not correction < min(_FARTHEST, 4.0 * before):
+                return None
+            state = state + step
+            state[12:15] /= np.sqrt(state[12:15] @ state[12:15])
+            if not 0.0 < state[15] <= latest:
+                return None
+            if correction < close:
+                return linear.node(state, correction)
+            if correction > _FRACTION * before:
+                linear = None
+            before = correction
+        return None
+
+    def _corrections(self, linear: _Linear, state: Floats, tolerance: float) -> Floats | None:
+        """Newton's corrections of both end states, with derivatives from near by; shape (12,)."""
+        nu, duration = state[12:15], float(state[15])
+        p = self.pursuer.correct(linear.pursuer, state[:6], nu, duration, tolerance)
+        e = self.evader.correct(linear.evader, state[6:12], nu, duration, tolerance)
+        return None if p is None or e is None else np.concatenate([p, e])
+
+    def _linearised(self, state: Floats, tolerance: float, time_free: bool) -> _Linear | None:
+        nu, duration, distance = state[12:15], float(state[15]), float(state[16])
+        plane = across(nu)
+        p = self.pursuer.respond(state[:6], nu, plane, duration, tolerance)
+        e = self.evader.respond(state[6:12], nu, plane, duration, tolerance)
+        if p is None or e is None:
+            return None
+        outer = np.empty((3, 3))
+        outer[:, :2] = p.by_nu[:3] - e.by_nu[:3] + distance * plane.T
+        outer[:, 2] = nu
+        drift = e.by_time[:3] - p.by_time[:3]
+        try:
+            at_time = np.asarray(np.linalg.inv(outer), dtype=np.float64)
+            outer[:, 2] = -drift
+            at_distance = np.asarray(np.linalg.inv(outer), dtype=np.float64) if time_free else at_time
+        except np.linalg.LinAlgError:
+            return None
+        return _Linear(p, e, plane, time_free, at_distance, at_time @ drift)
+
+    def begin(self, latest: float) -> Node | None:
+        """Find the extremal of a short duration, where the line of sight is the guess.
+
+        Parameters
+        ----------
+        latest : float
+            The duration is no longer.
+
+        Returns
+        -------
+        Node or None
+        """
+        duration = min(_FIRST_DURATION, 0.5 * latest)
+        while duration > _LEAST_OF_FIRST:
+            still = np.zeros(3)
+            sight = self.evader.ballistic(duration, still)[:3] - self.pursuer.ballistic(duration, still)[:3]
+            distance = float(np.linalg.norm(sight))
+            nu = sight / distance
+            guess = np.concatenate([self.pursuer.ballistic(duration, nu), self.evader.ballistic(duration, nu), nu])
+            node = self.solve(guess, duration, distance, time_free=False, tolerance=COARSE, close=ROUGH)
+            if node is not None and node.is_saddle and float(np.abs(node.vector - guess).max()) < _NEAR:
+                return node
+            duration *= 0.25
+        return None

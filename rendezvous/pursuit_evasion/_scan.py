@@ -1,0 +1,192 @@
+"""Every direction the evader might strive in, at one duration: is there one that keeps it farther away? Nondimensional.
+
+h(nu) is how far a side gets along nu. The evader keeps the greatest of h_E - h_P over all nu, so a branch of extremals
+that is not the greatest is not what a wise evader does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rendezvous.pursuit_evasion._pair import COARSE, ROUGH, Node, Pair
+from rendezvous.pursuit_evasion._side import Response, Side, across
+
+Floats = NDArray[np.float64]
+
+_DIRECTIONS = 120
+_SEEDS, _MOST_PARTS = 2, 4
+_SHORT = 1e-7
+_MOST_ITERATIONS = 8
+_CONVERGED = 1e-5
+_FARTHEST = 0.5
+_CLIMBS, _MOST_CLIMBING, _APART, _LEAST_STRIDE = 4, 40, 0.9, 1e-4
+
+
+@dataclass(frozen=True)
+class Scan:
+    """What directions give the evader, at one duration.
+
+    Parameters
+    ----------
+    nu : ndarray, shape (n, 3)
+        Those for which both sides' extremals were found.
+    distance : ndarray, shape (n,)
+        h_E - h_P.
+    tried : int
+        How many there were.
+    maxima : tuple of Node
+        The local maxima among them, found exactly, the greatest first.
+    """
+
+    nu: Floats
+    distance: Floats
+    tried: int
+    maxima: tuple[Node, ...]
+
+
+@dataclass(frozen=True)
+class _End:
+    state: Floats
+    nu: Floats
+    plane: Floats
+    response: Response
+
+
+def scan(pair: Pair, node: Node) -> Scan:
+    """Look in all directions, at the duration of an extremal, from its own outward.
+
+    Parameters
+    ----------
+    pair : Pair
+    node : Node
+
+    Returns
+    -------
+    Scan
+
+    Notes
+    -----
+    Extremals of 120 directions a side, each from a solved neighbour: 0.5 s a revolution and more. A reachable set that
+    is not convex has several extremals a direction: one that falls short of another direction's end is not the
+    farthest, and its direction counts as not found.
+    """
+    grid = directions(_DIRECTIONS)
+    grid = grid[np.argsort(-(grid @ node.nu))]
+    pursuer = _fan(pair.pursuer, node.pursuer, node.nu, grid, node.duration)
+    evader = _fan(pair.evader, node.evader, node.nu, grid, node.duration)
+    both = [i for i in range(len(grid)) if i in pursuer and i in evader]
+    nu = grid[both]
+    distance = np.array([grid[i] @ (evader[i].state - pursuer[i].state)[:3] for i in both])
+    found: list[Node] = []
+    for index in _starts(nu, distance):
+        peak = _climb(pair, pursuer[both[index]], evader[both[index]], node.duration)
+        if peak is not None and all(np.abs(peak.nu - each.nu).max() > 1e-3 for each in found):
+            found.append(peak)
+    return Scan(nu, distance, len(grid), tuple(sorted(found, key=lambda each: -each.distance)))
+
+
+def directions(count: int) -> Floats:
+    """Return unit vectors spread over the sphere (a Fibonacci lattice), shape (count, 3)."""
+    i = np.arange(count)
+    z = 1.0 - (2.0 * i + 1.0) / count
+    angle = i * np.pi * (3.0 - np.sqrt(5.0))
+    across_axis = np.sqrt(1.0 - z * z)
+    return np.stack([across_axis * np.cos(angle), across_axis * np.sin(angle), z], axis=1)
+
+
+def _fan(side: Side, state: Floats, nu: Floats, grid: Floats, duration: float) -> dict[int, _End]:
+    """Find the end states of one side for the directions of a grid, sorted from nu outward."""
+    first = _end(side, state, nu, duration)
+    solved: dict[int, _End] = {}
+    if first is None:
+        return solved
+    for i, toward in enumerate(grid):
+        seeds = [first, *solved.values()]
+        for j in np.argsort([-(seed.nu @ toward) for seed in seeds])[:_SEEDS]:
+            end = _turn(side, seeds[j], toward, duration)
+            if end is not None:
+                solved[i] = end
+                break
+    ends = np.array([first.state[:3], *(end.state[:3] for end in solved.values())])
+    reach = grid @ ends.T
+    return {i: end for i, end in solved.items() if end.nu @ end.state[:3] >= reach[i].max() - _SHORT}
+
+
+def _turn(side: Side, seed: _End, toward: Floats, duration: float) -> _End | None:
+    """Turn the direction of an extremal, in steps as long as they converge."""
+    parts = 1
+    while parts <= _MOST_PARTS:
+        here = seed
+        for part in range(1, parts + 1):
+            nu = seed.nu + (toward - seed.nu) * (part / parts)
+            nu = nu / np.linalg.norm(nu)
+            end = _end(side, here.state + here.response.by_nu @ (here.plane @ (nu - here.nu)), nu, duration)
+            if end is None:
+                break
+            here = end
+        else:
+            return here
+        parts *= 4
+    return None
+
+
+def _end(side: Side, state: Floats, nu: Floats, duration: float) -> _End | None:
+    """Find the extremal of one side along nu, near a guess of its end."""
+    plane = across(nu)
+    before = np.inf
+    for _ in range(_MOST_ITERATIONS):
+        response = side.respond(state, nu, plane, duration, COARSE)
+        if response is None:
+            return None
+        correction = float(np.abs(response.rho).max())
+        if not correction < min(_FARTHEST, 2.0 * before):
+            return None
+        state, before = state + response.rho, correction
+        if correction < _CONVERGED:
+            return _End(state, nu, plane, response) if response.regular else None
+    return None
+
+
+def _starts(nu: Floats, values: Floats) -> list[int]:
+    """Return some directions of great value, none near another."""
+    chosen: list[int] = []
+    for i in np.argsort(-values):
+        if len(chosen) == _CLIMBS:
+            break
+        if all(nu[i] @ nu[j] < _APART for j in chosen):
+            chosen.append(int(i))
+    return chosen
+
+
+def _climb(pair: Pair, pursuer: _End, evader: _End, duration: float) -> Node | None:
+    """Go up h_E - h_P, whose gradient is r_E - r_P, and end with Newton's method."""
+    stride = 0.2
+    for _ in range(_MOST_CLIMBING):
+        rise = (evader.state - pursuer.state)[:3]
+        value = float(evader.nu @ rise)
+        peak = pair.solve(
+            np.concatenate([pursuer.state, evader.state, evader.nu]),
+            duration,
+            value,
+            time_free=False,
+            tolerance=COARSE,
+            close=ROUGH * 1e-2,
+        )
+        if peak is not None and peak.is_saddle and peak.distance >= value:
+            return peak
+        slope = rise - value * evader.nu
+        while stride > _LEAST_STRIDE:
+            nu = evader.nu + stride * slope / max(float(np.linalg.norm(slope)), 1e-3)
+            nu = nu / np.linalg.norm(nu)
+            p, e = _turn(pair.pursuer, pursuer, nu, duration), _turn(pair.evader, evader, nu, duration)
+            if p is not None and e is not None and nu @ (e.state - p.state)[:3] > value:
+                pursuer, evader = p, e
+                stride *= 1.5
+                break
+            stride *= 0.3
+        else:
+            return None
+    return None

@@ -1,0 +1,165 @@
+"""What one side can do by a time: how its end moves with the direction it strives in. Nondimensional."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rendezvous.pursuit_evasion._extremal import rate, shoot_back, shoot_state_back
+from rendezvous.pursuit_evasion._gravity import acceleration
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Response:
+    """An end state's linear dependence, at a guess of it: rho + by_nu dnu + by_time dT leads to the true one.
+
+    Parameters
+    ----------
+    rho : ndarray, shape (6,)
+        Newton's correction of the guess.
+    by_nu : ndarray, shape (6, 2)
+        Along two directions across nu.
+    by_time : ndarray, shape (6,)
+    regular : bool
+        Whether no conjugate point shows: the end states near by lead to start states one to one, unmirrored.
+    inverse : ndarray, shape (6, 6)
+        Of the derivative of the start state by the end state.
+    costate : ndarray, shape (6,)
+        p_r and p_v at the start.
+    residual : float
+        Greatest component by which the start is missed.
+    """
+
+    rho: Floats
+    by_nu: Floats
+    by_time: Floats
+    regular: bool
+    inverse: Floats
+    costate: Floats
+    residual: float
+
+
+class Side(Protocol):
+    """One side of a game: a craft that can choose, or one whose path is known."""
+
+    def respond(
+        self, end_state: Floats, nu: Floats, plane: Floats, duration: float, tolerance: float
+    ) -> Response | None:
+        """Linearise at a guess of the end state; None where it cannot be propagated."""
+
+    def correct(
+        self, response: Response, end_state: Floats, nu: Floats, duration: float, tolerance: float
+    ) -> Floats | None:
+        """Newton's correction of another guess, with the derivatives of an earlier one near by; shape (6,)."""
+
+    def ballistic(self, duration: float, nu: Floats) -> Floats:
+        """A guess of the end state after a short time, shape (6,)."""
+
+
+@dataclass(frozen=True)
+class Craft:
+    """A side that thrusts as it likes; all nondimensional.
+
+    Parameters
+    ----------
+    start : ndarray, shape (6,)
+    thrust, mass, flow : float
+    mu, oblateness : float
+    """
+
+    start: Floats
+    thrust: float
+    mass: float
+    flow: float
+    mu: float
+    oblateness: float
+
+    def kernel_craft(self, duration: float) -> Floats:
+        """Return what `flow_back` wants to know of it."""
+        return np.array([self.mu, self.oblateness, self.thrust, self.mass - self.flow * duration, self.flow])
+
+    def respond(
+        self, end_state: Floats, nu: Floats, plane: Floats, duration: float, tolerance: float
+    ) -> Response | None:
+        """Shoot back from the guess and linearise there."""
+        shot = shoot_back(end_state, nu, plane, self.kernel_craft(duration), duration, tolerance)
+        if shot is None:
+            return None
+        y, z = shot
+        try:
+            inverse = np.asarray(np.linalg.inv(z[:6, :6]), dtype=np.float64)
+        except np.linalg.LinAlgError:
+            return None
+        miss = y[:6] - self.start
+        # A longer game starts further back, and ends with less mass.
+        by_time = -rate(y, self.mu, self.oblateness, self.thrust / self.mass) - self.flow * z[:6, 8]
+        return Response(
+            rho=-(inverse @ miss),
+            by_nu=-(inverse @ z[:6, 6:8]),
+            by_time=-(inverse @ by_time),
+            regular=bool(np.linalg.det(z[:6, :6]) > 0.0),
+            inverse=inverse,
+            costate=y[6:],
+            residual=float(np.abs(miss).max()),
+        )
+
+    def correct(
+        self, response: Response, end_state: Floats, nu: Floats, duration: float, tolerance: float
+    ) -> Floats | None:
+        """Shoot back from the guess without its variations."""
+        start = shoot_state_back(end_state, nu, self.kernel_craft(duration), duration, tolerance)
+        return None if start is None else response.inverse @ (self.start - start[:6])
+
+    def ballistic(self, duration: float, nu: Floats) -> Floats:
+        """Hold gravity and thrust as they are at the start."""
+        gravity = np.empty(3)
+        acceleration(self.start[:3], self.mu, self.oblateness, gravity)
+        rate = gravity + self.thrust / self.mass * nu
+        velocity = self.start[3:] + duration * rate
+        return np.concatenate([self.start[:3] + 0.5 * duration * (self.start[3:] + velocity), velocity])
+
+
+@dataclass(frozen=True)
+class KnownPath:
+    """A side that flies a path whatever the other does.
+
+    Parameters
+    ----------
+    state_at : callable
+        State (6,) and acceleration (3,) at a time.
+    """
+
+    state_at: Callable[[float], tuple[Floats, Floats]]
+
+    def respond(
+        self, end_state: Floats, nu: Floats, plane: Floats, duration: float, tolerance: float
+    ) -> Response | None:
+        """Return the state on the path, whatever nu is."""
+        state, acceleration_there = self.state_at(duration)
+        by_time = np.concatenate([state[3:], acceleration_there])
+        return Response(state - end_state, np.zeros((6, 2)), by_time, True, np.eye(6), np.zeros(6), 0.0)
+
+    def correct(
+        self, response: Response, end_state: Floats, nu: Floats, duration: float, tolerance: float
+    ) -> Floats | None:
+        """Return what is missing to the state on the path."""
+        return self.state_at(duration)[0] - end_state
+
+    def ballistic(self, duration: float, nu: Floats) -> Floats:
+        """Return the state on the path."""
+        return self.state_at(duration)[0]
+
+
+def across(nu: Floats) -> Floats:
+    """Return two unit vectors across a unit vector and each other, shape (2, 3)."""
+    x, y, z = nu
+    sign = 1.0 if z >= 0.0 else -1.0
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    return np.array([[1.0 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y]])

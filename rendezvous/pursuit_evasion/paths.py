@@ -1,0 +1,243 @@
+"""Paths of the players: extremal, or under a policy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from rendezvous.pursuit_evasion._extremal import COLUMNS, STATES, flow_back, rate
+from rendezvous.pursuit_evasion._pair import FINE, Node
+from rendezvous.pursuit_evasion._side import Craft
+
+Floats = NDArray[np.float64]
+Direction = Callable[[float, Floats], Floats]
+"""Direction of thrust, shape (3,), of a time and a state: any length, zero to coast."""
+
+_TOLERANCE = 1e-12
+
+
+class Policy(Enum):
+    """Ways to steer that need no game; directions follow the craft."""
+
+    COAST = "coast"
+    PROGRADE = "prograde"
+    RETROGRADE = "retrograde"
+    NORMAL = "normal"
+    ANTINORMAL = "antinormal"
+    OUTWARD = "outward"
+    INWARD = "inward"
+
+    def direction(self, _time: float, state: Floats) -> Floats:
+        """Return the direction of thrust.
+
+        Parameters
+        ----------
+        _time : float
+        state : ndarray, shape (6,)
+            Position and velocity, in any units.
+
+        Returns
+        -------
+        ndarray, shape (3,)
+        """
+        sign = -1.0 if self in (Policy.RETROGRADE, Policy.ANTINORMAL, Policy.INWARD) else 1.0
+        if self is Policy.COAST:
+            return np.zeros(3)
+        if self in (Policy.PROGRADE, Policy.RETROGRADE):
+            return sign * state[3:]
+        if self in (Policy.NORMAL, Policy.ANTINORMAL):
+            return sign * np.cross(state[:3], state[3:])
+        return sign * state[:3]
+
+
+@dataclass(frozen=True)
+class ExtremalPath:
+    """The path of one side of an extremal.
+
+    Parameters
+    ----------
+    craft : Craft
+    end_state : ndarray, shape (6,)
+    nu : ndarray, shape (3,)
+    duration : float
+    """
+
+    craft: Craft
+    end_state: Floats
+    nu: Floats
+    duration: float
+
+    def at(self, time: float) -> Floats:
+        """Return state and costate at a time, shape (12,); a little beyond the end too.
+
+        Parameters
+        ----------
+        time : float
+
+        Returns
+        -------
+        ndarray
+        """
+        y = np.zeros(STATES)
+        y[:6], y[6:9] = self.end_state, self.nu
+        self._carry(y, 0.0, self.duration - time)
+        return y
+
+    def sampled(self, times: Floats) -> Floats:
+        """Return states and costates at times, shape (n, 12).
+
+        Parameters
+        ----------
+        times : ndarray, shape (n,)
+            Rising.
+
+        Returns
+        -------
+        ndarray
+        """
+        out = np.empty((len(times), STATES))
+        y = np.zeros(STATES)
+        y[:6], y[6:9] = self.end_state, self.nu
+        to_go = 0.0
+        for i in range(len(times) - 1, -1, -1):
+            self._carry(y, to_go, self.duration - times[i])
+            to_go = self.duration - times[i]
+            out[i] = y
+        return out
+
+    def state_at(self, time: float) -> tuple[Floats, Floats]:
+        """Return state (6,) and acceleration (3,) at a time.
+
+        Parameters
+        ----------
+        time : float
+
+        Returns
+        -------
+        tuple of ndarray
+        """
+        y = self.at(time)
+        mass = self.craft.mass - self.craft.flow * time
+        return y[:6], rate(y, self.craft.mu, self.craft.oblateness, self.craft.thrust / mass)[3:]
+
+    def _carry(self, y: Floats, begin: float, end: float) -> None:
+        if not flow_back(y, _NOTHING, self.craft.kernel_craft(self.duration), begin, end, FINE, 0):
+            raise ArithmeticError("an extremal that was found cannot be propagated")
+
+
+_NOTHING = np.zeros((STATES, COLUMNS))
+
+
+def extremal_paths(pursuer: Craft, evader: Craft, node: Node) -> tuple[ExtremalPath, ExtremalPath]:
+    """Return the paths of both sides of an extremal.
+
+    Parameters
+    ----------
+    pursuer, evader : Craft
+    node : Node
+
+    Returns
+    -------
+    tuple of ExtremalPath
+    """
+    return (
+        ExtremalPath(pursuer, node.pursuer, node.nu, node.duration),
+        ExtremalPath(evader, node.evader, node.nu, node.duration),
+    )
+
+
+@dataclass(frozen=True)
+class SteeredPath:
+    """The path of a craft that steers by a rule.
+
+    Parameters
+    ----------
+    craft : Craft
+    direction : callable
+        Of time and state.
+    solution : object
+        SciPy's dense output, of the state at a time.
+    """
+
+    craft: Craft
+    direction: Direction
+    solution: Callable[[float], Floats]
+
+    def state_at(self, time: float) -> tuple[Floats, Floats]:
+        """Return state (6,) and acceleration (3,) at a time.
+
+        Parameters
+        ----------
+        time : float
+
+        Returns
+        -------
+        tuple of ndarray
+        """
+        state = np.asarray(self.solution(time), dtype=np.float64)
+        return state, _rates(time, state, self.craft, self.direction)[3:]
+
+
+def steered_path(craft: Craft, direction: Direction, duration: float) -> SteeredPath:
+    """Fly a craft by a rule.
+
+    Parameters
+    ----------
+    craft : Craft
+    direction : callable
+        Of time and state.
+    duration : float
+
+    Returns
+    -------
+    SteeredPath
+    """
+    found = solve_ivp(
+        _rates,
+        (0.0, duration),
+        craft.start,
+        method="DOP853",
+        rtol=_TOLERANCE,
+        atol=_TOLERANCE,
+        dense_output=True,
+        args=(craft, direction),
+    )
+    return SteeredPath(craft, direction, found.sol)
+
+
+def steered_end(craft: Craft, direction: Direction, duration: float) -> Floats:
+    """Fly a craft by a rule, and return where it ends, shape (6,).
+
+    Parameters
+    ----------
+    craft : Craft
+    direction : callable
+        Of time and state.
+    duration : float
+
+    Returns
+    -------
+    ndarray
+    """
+    found = solve_ivp(
+        _rates,
+        (0.0, duration),
+        craft.start,
+        method="DOP853",
+        rtol=_TOLERANCE,
+        atol=_TOLERANCE,
+        args=(craft, direction),
+    )
+    return np.asarray(found.y[:, -1], dtype=np.float64)
+
+
+def _rates(time: float, state: Floats, craft: Craft, direction: Direction) -> Floats:
+    """Rates of a steered craft: its thrust goes as its mass does, whether it is used or not."""
+    y = np.zeros(STATES)
+    y[:6], y[9:] = state, direction(time, state)
+    return rate(y, craft.mu, craft.oblateness, craft.thrust / (craft.mass - craft.flow * time))
