@@ -1,0 +1,259 @@
+"""The best order of visits: branch and bound, order and times together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from math import factorial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rendezvous.multipoint.segments import Path, check_times, solve_segments
+from rendezvous.multipoint.targets import Meet
+from rendezvous.multipoint.times import BestTimes, Effort, TimeLimits, optimise_times, room_s
+from rendezvous.multipoint.tour import Tour, nodes_of
+
+Floats = NDArray[np.float64]
+Report = Callable[[float], None]
+
+MOST_TARGETS = 9
+_MARGIN = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class BestOrder:
+    """Targets visited in their best order.
+
+    Parameters
+    ----------
+    order : tuple of int
+        Which target first, second and so on.
+    path : Path
+    objective : float
+        Energy, and the price of the time, m^2/s^3.
+    nodes : int
+        How many beginnings of orders were looked at.
+    evaluations : int
+        How many paths were computed.
+    """
+
+    order: tuple[int, ...]
+    path: Path
+    objective: float
+    nodes: int
+    evaluations: int
+
+
+def best_order(tour: Tour, limits: TimeLimits, *, progress: Report | None = None) -> BestOrder:
+    """Find the best order and the best times together.
+
+    Parameters
+    ----------
+    tour : Tour
+    limits : TimeLimits
+    progress : callable or None
+        Told the share of orders that are decided.
+
+    Returns
+    -------
+    BestOrder
+
+    Raises
+    ------
+    ValueError
+        If there are more than 9 targets, or they do not fit before the latest time.
+
+    Notes
+    -----
+    Depth first, the cheapest beginning first. A beginning costs, at its own best times, no more than any order that
+    goes on from it: what it costs bounds them all, and warms their start.
+    """
+    count = _checked_count(tour)
+    dwell = tour.dwell_s
+    room_s(tour.start_s, dwell, limits)
+    horizon = limits.latest_s
+
+    def solve(order: tuple[int, ...], warm: Sequence[Floats], complete: bool) -> tuple[float, Path, int]:
+        held = limits
+        if horizon is not None and not complete:
+            rest = [each for each in range(count) if each not in order]
+            later = dwell[order[-1]] + dwell[rest].sum() - dwell[rest].max() + len(rest) * limits.least_gap_s
+            held = TimeLimits(horizon - float(later), limits.least_gap_s, limits.price_per_s)
+        found = optimise_times(
+            lambda times: tour.fly(order, times),
+            tour.start_s,
+            dwell[list(order)],
+            held,
+            warm,
+            effort=Effort.ORDER if complete or not warm else Effort.BOUND,
+        )
+        return found.objective, found.path, found.evaluations
+
+    search = _Search(solve, count, progress or (lambda _: None), tour.start_s, horizon)
+    search.branch((), None)
+    assert search.best_path is not None
+    final = optimise_times(
+        lambda times: tour.fly(search.best, times),
+        tour.start_s,
+        dwell[list(search.best)],
+        limits,
+        [search.best_path.nodes.arrive_s],
+    )
+    return BestOrder(search.best, final.path, final.objective, search.nodes, search.evaluations + final.evaluations)
+
+
+def best_order_of_slots(tour: Tour, time_s: ArrayLike, *, progress: Report | None = None) -> BestOrder:
+    """Find the best order where the times of the first, second and so on visit are given.
+
+    Parameters
+    ----------
+    tour : Tour
+    time_s : array_like, shape (n,)
+        Increasing.
+    progress : callable or None
+        Told the share of orders that are decided.
+
+    Returns
+    -------
+    BestOrder
+
+    Raises
+    ------
+    ValueError
+        If there are more than 9 targets, or times do not increase.
+
+    Notes
+    -----
+    Dynamic programming over (visited, last) where every visit is a rendezvous, for then a leg's cost depends on its two
+    ends alone; else branch and bound.
+    """
+    count, times = _checked_count(tour), np.asarray(time_s, dtype=np.float64)
+    if times.shape != (count,):
+        raise ValueError(f"{count} visits need {count} times, found {times.size}")
+    check_times(tour.start_s, times, times)
+    if all(each.meet is Meet.RENDEZVOUS for each in tour.targets.targets):
+        return _by_dynamic_programming(tour, times)
+
+    def solve(order: tuple[int, ...], _warm: Sequence[Floats], _complete: bool) -> tuple[float, Path, int]:
+        path = tour.fly(order, times[: len(order)])
+        return path.cost, path, 1
+
+    search = _Search(solve, count, progress or (lambda _: None), tour.start_s, None)
+    search.branch((), None)
+    assert search.best_path is not None
+    return BestOrder(search.best, search.best_path, search.best_path.cost, search.nodes, search.evaluations)
+
+
+def best_times(tour: Tour, order: Sequence[int], limits: TimeLimits, guesses: Sequence[Floats] = ()) -> BestTimes:
+    """Find the best times of one order.
+
+    Parameters
+    ----------
+    tour : Tour
+    order : sequence of int
+    limits : TimeLimits
+    guesses : sequence of ndarray, shape (N,)
+        Times to start from, beside those of its own.
+
+    Returns
+    -------
+    BestTimes
+    """
+    return optimise_times(
+        lambda times: tour.fly(order, times),
+        tour.start_s,
+        tour.dwell_s[list(order)],
+        limits,
+        guesses,
+    )
+
+
+@dataclass
+class _Search:
+    """Depth first through beginnings of orders."""
+
+    solve: Callable[[tuple[int, ...], Sequence[Floats], bool], tuple[float, Path, int]]
+    count: int
+    progress: Report
+    start_s: float
+    horizon_s: float | None
+    best: tuple[int, ...] = ()
+    best_path: Path | None = None
+    best_objective: float = np.inf
+    nodes: int = 0
+    evaluations: int = 0
+    decided: int = field(default=0)
+
+    def branch(self, beginning: tuple[int, ...], before: Path | None) -> None:
+        """Look at all orders that go on from a beginning."""
+        children = []
+        complete = len(beginning) + 1 == self.count
+        for target in (each for each in range(self.count) if each not in beginning):
+            order = (*beginning, target)
+            objective, path, evaluations = self.solve(order, self._warm(before), complete)
+            self.nodes += 1
+            self.evaluations += evaluations
+            children.append((objective, order, path))
+        for objective, order, path in sorted(children, key=lambda each: each[:2]):
+            if complete:
+                self._done(order)
+                if objective < self.best_objective:
+                    self.best, self.best_path, self.best_objective = order, path, objective
+            elif objective * (1.0 - _MARGIN) < self.best_objective:
+                self.branch(order, path)
+            else:
+                self._done(order)
+
+    def _done(self, order: tuple[int, ...]) -> None:
+        self.decided += factorial(self.count - len(order))
+        self.progress(self.decided / factorial(self.count))
+
+    def _warm(self, before: Path | None) -> list[Floats]:
+        """Times to start from: those before, drawn together to leave room, and one more gap."""
+        if before is None:
+            return []
+        times = before.nodes.arrive_s
+        steps = len(times)
+        last = float(times[-1])
+        end = last if self.horizon_s is None else self.horizon_s
+        shrunk = self.start_s + (times - self.start_s) * steps / (steps + 1.0)
+        return [np.append(shrunk, last), np.append(times, 0.5 * (last + end)) if end > last else np.append(shrunk, end)]
+
+
+def _checked_count(tour: Tour) -> int:
+    count = len(tour.targets.targets)
+    if count > MOST_TARGETS:
+        raise ValueError(
+            f"{count} targets have {factorial(count)} orders; a search takes at most {MOST_TARGETS}, with "
+            f"{factorial(MOST_TARGETS)}, for each more multiplies what it costs: give the order"
+        )
+    return count
+
+
+def _by_dynamic_programming(tour: Tour, times: Floats) -> BestOrder:
+    """Held and Karp's recursion over sets of visited targets."""
+    count, targets, dwell = len(times), tour.targets, tour.dwell_s
+    found: dict[tuple[frozenset[int], int], tuple[float, tuple[int, ...]]] = {}
+    for target in range(count):
+        found[frozenset([target]), target] = tour.fly((target,), times[:1]).cost, (target,)
+    evaluations = count
+    for slot in range(1, count):
+        legs = {}
+        for first in range(count):
+            leave_s = times[slot - 1] + dwell[first]
+            start = targets.states(np.array([first]), np.array([leave_s]))[0]
+            for second in (each for each in range(count) if each != first):
+                leg = nodes_of(targets, (second,), times[slot : slot + 1])
+                legs[first, second] = solve_segments(tour.motion, leave_s, start, leg).cost
+                evaluations += 1
+        longer: dict[tuple[frozenset[int], int], tuple[float, tuple[int, ...]]] = {}
+        for (visited, last), (cost, order) in found.items():
+            for target in (each for each in range(count) if each not in visited):
+                key, total = (visited | {target}, target), cost + legs[last, target]
+                if key not in longer or total < longer[key][0]:
+                    longer[key] = total, (*order, target)
+        found = longer
+    _, best = min(found.values())
+    path = tour.fly(best, times)
+    return BestOrder(best, path, path.cost, len(found), evaluations + 1)

@@ -1,0 +1,239 @@
+"""Fixed times and order: the minimum-energy path through the nodes, segment by segment, in O(N)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rendezvous.multipoint._path import SINGULAR, solve_path
+from rendezvous.relative_motion import LinearMotion
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """Where and when the path must pass, in order.
+
+    Parameters
+    ----------
+    arrive_s, leave_s : ndarray, shape (N,)
+        Equal, but where the chaser stays with a target.
+    arrive, leave : ndarray, shape (N, 6)
+        States of the targets then.
+    arrive_rate, leave_rate : ndarray, shape (N, 6)
+        Their time derivatives.
+    rendezvous : ndarray of bool, shape (N,)
+        Whether the velocity is met too.
+    """
+
+    arrive_s: Floats
+    leave_s: Floats
+    arrive: Floats
+    leave: Floats
+    arrive_rate: Floats
+    leave_rate: Floats
+    rendezvous: Flags
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The minimum-energy path through nodes.
+
+    Parameters
+    ----------
+    motion : LinearMotion
+    nodes : Nodes
+    cost : float
+        I = 1/2 int |u|^2 dt, m^2/s^3.
+    starts_s : ndarray, shape (N,)
+        When each segment starts.
+    start_states : ndarray, shape (N, 6)
+        The chaser's state then.
+    arrival_states : ndarray, shape (N, 6)
+        The chaser's state at each node.
+    costate_before : ndarray, shape (N, 6)
+        lambda at the end of each segment.
+    costate_after : ndarray, shape (N, 6)
+        lambda at the start of the segment that follows; zeros after the last.
+    costate_start : ndarray, shape (6,)
+        lambda at the start.
+    time_gradient : ndarray, shape (N,)
+        dI / dt_i.
+    """
+
+    motion: LinearMotion
+    nodes: Nodes
+    cost: float
+    starts_s: Floats
+    start_states: Floats
+    arrival_states: Floats
+    costate_before: Floats
+    costate_after: Floats
+    costate_start: Floats
+    time_gradient: Floats
+
+    @property
+    def jumps(self) -> Floats:
+        """Costate before less costate after, shape (N, 6): dI / d(target's state); zero in the velocity of a flyby."""
+        return self.costate_before - self.costate_after
+
+    def costate(self, time_s: Floats) -> Floats:
+        """Return lambda at times, those after the jump at a node.
+
+        Parameters
+        ----------
+        time_s : ndarray, shape (k,)
+            From the start to the last node; zero while the chaser stays with a target.
+
+        Returns
+        -------
+        ndarray, shape (k, 6)
+        """
+        which, moving = self._segment_of(time_s)
+        ends = np.maximum(self.nodes.arrive_s[which], time_s)
+        transition = self.motion.transition(time_s, ends)
+        return np.where(moving[:, None], np.einsum("kba,kb->ka", transition, self.costate_before[which]), 0.0)
+
+    def control(self, time_s: Floats) -> Floats:
+        """Return u = B' lambda at times.
+
+        Parameters
+        ----------
+        time_s : ndarray, shape (k,)
+            From the start to the last node.
+
+        Returns
+        -------
+        ndarray, shape (k, 3)
+            m/s^2.
+        """
+        return np.asarray(np.einsum("kai,ka->ki", self.motion.input_map(time_s), self.costate(time_s)))
+
+    def state(self, time_s: Floats) -> Floats:
+        """Return the chaser's state at times.
+
+        Parameters
+        ----------
+        time_s : ndarray, shape (k,)
+            From the start to the last node.
+
+        Returns
+        -------
+        ndarray, shape (k, 6)
+        """
+        which, moving = self._segment_of(time_s)
+        # While it stays with a target it coasts from the arrival there.
+        begins = np.where(moving, self.starts_s[which], self.nodes.arrive_s[which])
+        first = np.where(moving[:, None], self.start_states[which], self.arrival_states[which])
+        segment = self.motion.segment(begins, np.maximum(time_s, begins))
+        forced = np.einsum("kab,kb->ka", segment.gramian, self.costate(time_s))
+        return np.asarray(np.einsum("kab,kb->ka", segment.transition, first) + segment.drift + forced)
+
+    def _segment_of(self, time_s: Floats) -> tuple[NDArray[np.intp], Flags]:
+        """Which segment each time belongs to, and whether it is under way rather than staying at its end."""
+        which = np.searchsorted(self.nodes.leave_s, time_s, side="right")
+        last = len(self.nodes.leave_s) - 1
+        ended = (which > last) & (time_s <= self.nodes.arrive_s[last])
+        which = np.minimum(which, last)
+        return which, (time_s < self.nodes.arrive_s[which]) | ended
+
+
+def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, nodes: Nodes) -> Path:
+    """Find the minimum-energy path through nodes.
+
+    Parameters
+    ----------
+    motion : LinearMotion
+    start_s : float
+    start_state : ndarray, shape (6,)
+        m and m/s.
+    nodes : Nodes
+        In order of time.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ValueError
+        If times do not increase, or the numbers overflow.
+
+    Notes
+    -----
+    Unknown are the velocities at flybys. The cost is the sum of 1/2 |L_k^-1 e_k|^2, e_k = x_k - Phi_k x_(k-1) - d_k;
+    L_k is
+    the Cholesky factor of the Gramian in states divided by (T, T, T, 1, 1, 1): a least-squares problem whose normal
+    equations are symmetric positive definite with 3 x 3 blocks on three diagonals. No block is inverted that may be
+    singular in a well-posed problem, as R13 of the paper's elimination is. O(N) time and memory.
+    """
+    starts = np.concatenate([[start_s], nodes.leave_s[:-1]])
+    durations = nodes.arrive_s - starts
+    check_times(start_s, nodes.arrive_s, nodes.leave_s)
+    segment = motion.segment(starts, nodes.arrive_s)
+    arrive, begin = nodes.arrive.copy(), np.concatenate([start_state[None], nodes.leave[:-1]])
+    before, at_start, after = np.empty_like(arrive), np.empty_like(arrive), np.zeros_like(arrive)
+    cost = solve_path(
+        segment.transition,
+        segment.gramian,
+        segment.drift,
+        durations,
+        begin,
+        arrive,
+        nodes.rendezvous,
+        before,
+        at_start,
+    )
+    if cost == SINGULAR or not np.isfinite(cost):
+        raise ValueError(
+            "the numbers of the path overflow, or a segment is too short or too long for its Gramian; check the units"
+        )
+    after[:-1] = at_start[1:]
+    gradient = _time_gradient(motion, nodes, arrive, before, after)
+    return Path(motion, nodes, cost, starts, begin, arrive, before, after, at_start[0], gradient)
+
+
+def check_times(start_s: float, arrive_s: Floats, leave_s: Floats) -> None:
+    """Refuse times that do not increase.
+
+    Parameters
+    ----------
+    start_s : float
+    arrive_s, leave_s : ndarray, shape (N,)
+
+    Raises
+    ------
+    ValueError
+        If one is not finite, or not after the one before.
+    """
+    if not (np.isfinite(start_s) and np.isfinite(arrive_s).all() and np.isfinite(leave_s).all()):
+        raise ValueError("a time is not finite")
+    before = np.concatenate([[start_s], leave_s[:-1]])
+    late = np.flatnonzero(~(arrive_s > before))
+    if len(late):
+        at = int(late[0])
+        what = f"{before[at]:g} s, when the chaser leaves the one before" if at else f"the start at {start_s:g} s"
+        raise ValueError(f"times must increase: visit {at + 1} is at {arrive_s[at]:g} s, not after {what}")
+
+
+def _time_gradient(motion: LinearMotion, nodes: Nodes, arrive: Floats, before: Floats, after: Floats) -> Floats:
+    """dI/dt: D'(V_i - V) at a flyby, H(t+) - H(t-) + (lambda- - lambda+)' x_i' at a rendezvous."""
+    gradient: Floats = np.einsum("ka,ka->k", (before - after)[:, :3], nodes.arrive[:, 3:] - arrive[:, 3:])
+    met = nodes.rendezvous
+    if met.any():
+        earlier = _hamiltonian(motion, nodes.arrive_s[met], nodes.arrive[met], before[met])
+        later = _hamiltonian(motion, nodes.leave_s[met], nodes.leave[met], after[met])
+        earlier -= np.einsum("ka,ka->k", before[met], nodes.arrive_rate[met])
+        later -= np.einsum("ka,ka->k", after[met], nodes.leave_rate[met])
+        gradient[met] = later - earlier
+    return gradient
+
+
+def _hamiltonian(motion: LinearMotion, times: Floats, states: Floats, costates: Floats) -> Floats:
+    control = np.einsum("kai,ka->ki", motion.input_map(times), costates)
+    rates = np.einsum("kab,kb->ka", motion.dynamics(times), states) + motion.forcing(times)
+    return np.asarray(np.einsum("ka,ka->k", costates, rates) + 0.5 * (control**2).sum(axis=1))

@@ -1,0 +1,130 @@
+"""Targets to be visited, and how each is met."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rendezvous.relative_motion import LinearMotion
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.intp]
+
+
+class Meet(Enum):
+    """How a target is met."""
+
+    FLYBY = "flyby"
+    """At its position, with any velocity."""
+    RENDEZVOUS = "rendezvous"
+    """At its position, with its velocity."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A target.
+
+    Parameters
+    ----------
+    name : str
+    meet : Meet
+    dwell_s : float
+        How long the chaser stays with it, coasting; a rendezvous only.
+
+    Raises
+    ------
+    ValueError
+        If the dwell is negative or not finite, or that of a flyby is not zero.
+    """
+
+    name: str
+    meet: Meet = Meet.FLYBY
+    dwell_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.dwell_s) and self.dwell_s >= 0.0):
+            raise ValueError(
+                f"target {self.name!r}: the dwell must be finite and not negative, found {self.dwell_s!r} s"
+            )
+        if self.meet is Meet.FLYBY and self.dwell_s > 0.0:
+            raise ValueError(f"target {self.name!r}: a flyby cannot dwell; make it a rendezvous")
+
+
+class MovingTargets(Protocol):
+    """Targets whose motion is known. They coast in the same dynamics as the chaser."""
+
+    @property
+    def targets(self) -> tuple[Target, ...]:
+        """The targets, each with a name of its own."""
+
+    def states(self, which: Integers, time_s: Floats) -> Floats:
+        """States of targets, one a time, shape (k, 6)."""
+
+    def rates(self, which: Integers, time_s: Floats) -> Floats:
+        """Time derivatives of these states, shape (k, 6)."""
+
+
+@dataclass(frozen=True, eq=False)
+class DriftingTargets:
+    """Targets that coast in a linear motion.
+
+    Parameters
+    ----------
+    targets : tuple of Target
+    motion : LinearMotion
+    initial : ndarray, shape (n, 6)
+        Their states at the epoch, m and m/s.
+    epoch_s : float
+
+    Raises
+    ------
+    ValueError
+        If there is none, two have one name, or a number is not finite.
+    """
+
+    targets: tuple[Target, ...]
+    motion: LinearMotion
+    initial: Floats
+    epoch_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_names(self.targets)
+        if np.shape(self.initial) != (len(self.targets), 6) or not np.isfinite(self.initial).all():
+            raise ValueError("each target needs a state of six finite numbers")
+        if not np.isfinite(self.epoch_s):
+            raise ValueError("the targets' epoch is not finite")
+
+    def states(self, which: Integers, time_s: Floats) -> Floats:
+        """States of targets, one a time, shape (k, 6)."""
+        transition = self.motion.transition(np.full(time_s.shape, self.epoch_s), time_s)
+        drift = self.motion.drift(np.full(time_s.shape, self.epoch_s), time_s)
+        return np.asarray(np.einsum("kab,kb->ka", transition, self.initial[which]) + drift)
+
+    def rates(self, which: Integers, time_s: Floats) -> Floats:
+        """Time derivatives of these states, shape (k, 6)."""
+        matrices, states = self.motion.dynamics(time_s), self.states(which, time_s)
+        return np.asarray(np.einsum("kab,kb->ka", matrices, states) + self.motion.forcing(time_s))
+
+
+def check_names(targets: tuple[Target, ...]) -> None:
+    """Refuse no targets at all, and targets that are listed twice.
+
+    Parameters
+    ----------
+    targets : tuple of Target
+
+    Raises
+    ------
+    ValueError
+        If there is none, or two have one name.
+    """
+    if not targets:
+        raise ValueError("there is no target to visit")
+    names = [each.name for each in targets]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"target {name!r} is listed twice; each target is visited once")

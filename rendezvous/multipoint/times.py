@@ -1,0 +1,314 @@
+"""The best times of visits in a given order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.stats import qmc
+
+from rendezvous.multipoint.segments import Path
+
+Floats = NDArray[np.float64]
+FlyAt = Callable[[Floats], Path]
+
+LEAST_SHARE = 1e-6
+"""The least gap, as a share of the time there is, where none is given: a visit takes time."""
+_POLISH_ROUNDS = 8
+_DIFFERENCE = 1e-5
+
+
+class Effort(Enum):
+    """How hard the best times are looked for: (starts of its own, how many are followed, relative tolerance)."""
+
+    BOUND = (1, 1, 1e-5)
+    """For a bound on a beginning of an order, from times known to be good."""
+    ORDER = (6, 2, 1e-7)
+    """For comparing orders."""
+    FINAL = (14, 6, 1e-9)
+    """For the answer, to the last digits."""
+
+    @property
+    def spread(self) -> int:
+        """How many starts are made up, beside those given."""
+        return int(self.value[0])
+
+    @property
+    def followed(self) -> int:
+        """How many starts, the best ones, are followed downhill."""
+        return int(self.value[1])
+
+    @property
+    def tolerance(self) -> float:
+        """Relative change of the cost at which a descent ends."""
+        return float(self.value[2])
+
+
+@dataclass(frozen=True)
+class TimeLimits:
+    """What holds the times.
+
+    Parameters
+    ----------
+    latest_s : float or None
+        When the last visit must be over at the latest.
+    least_gap_s : float
+        Between a departure and the next arrival.
+    price_per_s : float
+        kappa: what a second of the last time costs, added to the energy, m^2/s^4.
+
+    Raises
+    ------
+    ValueError
+        If nothing holds the last time: the energy falls to zero as it grows, and there is no best.
+    """
+
+    latest_s: float | None = None
+    least_gap_s: float = 0.0
+    price_per_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in (("least gap", self.least_gap_s), ("price of a second", self.price_per_s)):
+            if not (np.isfinite(value) and value >= 0.0):
+                raise ValueError(f"the {name} must be finite and not negative, found {value!r}")
+        if self.latest_s is not None and not np.isfinite(self.latest_s):
+            raise ValueError("the latest time is not finite")
+        if self.latest_s is None and self.price_per_s == 0.0:
+            raise ValueError(
+                "with the last time free the energy falls to zero as it grows, so there is no best: "
+                "bound it by a latest time, or give a second a price"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class BestTimes:
+    """Visits at their best times.
+
+    Parameters
+    ----------
+    path : Path
+    objective : float
+        Energy, and the price of the time, m^2/s^3.
+    evaluations : int
+        How many paths were computed.
+    """
+
+    path: Path
+    objective: float
+    evaluations: int
+
+    @property
+    def time_s(self) -> Floats:
+        """When the targets are reached, shape (N,)."""
+        return self.path.nodes.arrive_s
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """Gaps, the path they give, what it costs and the slope of that along the gaps."""
+
+    gaps: Floats
+    path: Path
+    objective: float
+    slope: Floats
+
+
+@dataclass
+class _Trials:
+    """Paths of gaps, counted."""
+
+    fly: FlyAt
+    shifts_s: Floats
+    price_per_s: float
+    flown: int = 0
+
+    def __call__(self, gaps: Floats) -> _Trial:
+        times = self.shifts_s + np.cumsum(gaps)
+        self.flown += 1
+        path = self.fly(times)
+        gradient = path.time_gradient.copy()
+        gradient[-1] += self.price_per_s
+        slope = np.cumsum(gradient[::-1])[::-1]
+        return _Trial(gaps, path, path.cost + self.price_per_s * float(times[-1]), slope)
+
+
+def optimise_times(
+    fly: FlyAt,
+    start_s: float,
+    dwell_s: Floats,
+    limits: TimeLimits,
+    guesses: Sequence[Floats] = (),
+    *,
+    effort: Effort = Effort.FINAL,
+) -> BestTimes:
+    """Find the times of least energy, or energy and price, of visits in one order.
+
+    Parameters
+    ----------
+    fly : callable
+        The path of given times.
+    start_s : float
+    dwell_s : ndarray, shape (N,)
+        How long the chaser stays with each target.
+    limits : TimeLimits
+    guesses : sequence of ndarray, shape (N,)
+        Times to start from, beside those of its own; unsound ones are left out.
+    effort : Effort
+
+    Returns
+    -------
+    BestTimes
+        A local minimum, the best of those found.
+
+    Raises
+    ------
+    ValueError
+        If the visits do not fit before the latest time.
+
+    Notes
+    -----
+    Sequential quadratic programming in the gaps, on the logarithm of the cost, with the exact gradient dI/dt; then
+    Newton's method with differences of it on the gaps that no limit holds. Each step is one path.
+    """
+    count = len(dwell_s)
+    shifts = start_s + np.concatenate([[0.0], np.cumsum(dwell_s[:-1])])
+    total = room_s(start_s, dwell_s, limits)
+    scale = total if np.isfinite(total) else _longest(guesses, start_s, count)
+    least = max(limits.least_gap_s, LEAST_SHARE * scale)
+    trials = _Trials(fly, shifts, limits.price_per_s)
+    candidates = [np.diff(np.concatenate([[0.0], np.asarray(each) - shifts])) for each in guesses]
+    candidates += _spread(count, scale, least, bounded=np.isfinite(total))[: effort.spread]
+    sound = [each for each in candidates if (each >= least * (1 - 1e-9)).all() and each.sum() <= total * (1 + 1e-12)]
+    begun = sorted((trials(each) for each in sound), key=lambda each: each.objective)
+    ended = [_descend(trials, each, least, total, scale, effort.tolerance) for each in begun[: effort.followed]]
+    best = min(ended, key=lambda each: each.objective)
+    if effort is Effort.FINAL:
+        best = _polish(trials, best, least, total, scale)
+    return BestTimes(best.path, best.objective, trials.flown)
+
+
+def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
+    """Return the time there is for travelling, s; infinite without a latest time.
+
+    Parameters
+    ----------
+    start_s : float
+    dwell_s : ndarray, shape (N,)
+    limits : TimeLimits
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ValueError
+        If the visits do not fit before the latest time.
+    """
+    if limits.latest_s is None:
+        return float(np.inf)
+    total = limits.latest_s - start_s - float(dwell_s[:-1].sum())
+    need = len(dwell_s) * limits.least_gap_s
+    if not total > 0.0 or total < need:
+        earliest = start_s + float(dwell_s[:-1].sum()) + need
+        raise ValueError(
+            f"{len(dwell_s)} visits do not fit before the latest time, {limits.latest_s:g} s: with gaps of at least "
+            f"{limits.least_gap_s:g} s and the dwells the last one is after {earliest:g} s at the earliest"
+        )
+    return total
+
+
+def _longest(guesses: Sequence[Floats], start_s: float, count: int) -> float:
+    """A length of time to start from, where nothing bounds it: that of the guesses."""
+    ends = [float(each[-1]) - start_s for each in guesses if len(each) == count]
+    if not ends or max(ends) <= 0.0:
+        raise ValueError("with the last time free, times to start from are needed")
+    return max(ends)
+
+
+def _spread(count: int, scale: float, least: float, bounded: bool) -> list[Floats]:
+    """Gaps to start from: even, early, late and some between, over all the time and over half of it."""
+    rising = np.arange(1.0, count + 1.0)
+    shares = [np.ones(count), rising, rising[::-1]]
+    if count > 1:
+        shares += [0.2 - np.log(each) for each in qmc.Halton(count, scramble=False).random(5)[1:]]
+    lengths = (1.0, 0.5) if bounded else (0.5, 1.0, 2.0, 4.0, 8.0)
+    extra = scale - count * least if bounded else scale
+    return [least + length * max(extra, 0.0) * each / each.sum() for each in shares for length in lengths]
+
+
+def _descend(trials: _Trials, begin: _Trial, least: float, total: float, scale: float, tolerance: float) -> _Trial:
+    """Follow one start downhill."""
+    floor = 1e-30 * max(begin.objective, 1e-270)
+
+    def value(x: Floats) -> tuple[float, Floats]:
+        found = trials(np.maximum(x * scale, 0.5 * least))
+        size = max(found.objective, floor)
+        return float(np.log(size)), found.slope * (scale / size)
+
+    constraints = (
+        {"type": "ineq", "fun": lambda x: total / scale - x.sum(), "jac": lambda x: -np.ones_like(x)}
+        if np.isfinite(total)
+        else ()
+    )
+    found = minimize(
+        value,
+        begin.gaps / scale,
+        jac=True,
+        bounds=[(least / scale, None)] * len(begin.gaps),
+        constraints=constraints,
+        method="SLSQP",
+        options={"ftol": tolerance, "maxiter": 100},
+    )
+    ended = trials(_within(np.asarray(found.x) * scale, least, total))
+    return ended if ended.objective <= begin.objective else begin
+
+
+def _within(gaps: Floats, least: float, total: float) -> Floats:
+    """Take back what rounding put outside."""
+    gaps = np.maximum(gaps, least)
+    excess = gaps - least
+    over = gaps.sum() - total
+    if over > 0.0 and excess.sum() > 0.0:
+        gaps = gaps - over * excess / excess.sum()
+    return np.asarray(gaps)
+
+
+def _polish(trials: _Trials, best: _Trial, least: float, total: float, scale: float) -> _Trial:
+    """Newton's method on the gaps that no limit holds, with the sum held where the latest time does."""
+    near = 1e-5 * scale
+    gaps = best.gaps
+    full = total - gaps.sum() <= near
+    held = gaps - least <= near
+    if held.all():
+        return best
+    if full:  # exactly at the latest time, whatever else moves
+        gaps = gaps.copy()
+        gaps[gaps.argmax()] += total - gaps.sum()
+    directions = np.eye(len(gaps))[:, ~held]
+    if full:
+        directions = directions @ np.linalg.svd(np.ones((1, directions.shape[1])))[2][1:].T
+    here = trials(gaps)
+    step = _DIFFERENCE * float(gaps.min())
+    for _ in range(_POLISH_ROUNDS if directions.shape[1] else 0):
+        slopes = [trials(here.gaps + step * way).slope - trials(here.gaps - step * way).slope for way in directions.T]
+        bend = directions.T @ np.stack(slopes, axis=1) / (2.0 * step)
+        bend = 0.5 * (bend + bend.T)
+        if not np.isfinite(bend).all() or np.linalg.eigvalsh(bend)[0] <= 0.0:
+            break
+        move = -directions @ np.linalg.solve(bend, directions.T @ here.slope)
+        there = here.gaps + move
+        outside = bool((there < least * (1.0 - 1e-12)).any() or there.sum() > total * (1.0 + 1e-12))
+        if outside or np.abs(move).max() > 0.1 * float(here.gaps.min()):
+            break
+        found = trials(there)
+        if found.objective > here.objective * (1.0 + 1e-12):
+            break
+        here = found
+        if np.abs(move).max() <= 1e-11 * scale:
+            break
+    return here if here.objective <= best.objective * (1.0 + 1e-12) else best

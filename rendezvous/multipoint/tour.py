@@ -1,0 +1,107 @@
+"""The problem: a chaser that visits moving targets, and the path for given order and times."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rendezvous.multipoint.segments import Nodes, Path, solve_segments
+from rendezvous.multipoint.targets import Meet, MovingTargets
+from rendezvous.relative_motion import LinearMotion
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Tour:
+    """A chaser and the targets it visits, in linear motion.
+
+    Parameters
+    ----------
+    motion : LinearMotion
+        Of the chaser.
+    targets : MovingTargets
+    start_state : ndarray, shape (6,)
+        The chaser's, m and m/s.
+    start_s : float
+
+    Raises
+    ------
+    ValueError
+        If the start is not finite.
+    """
+
+    motion: LinearMotion
+    targets: MovingTargets
+    start_state: Floats
+    start_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        if np.shape(self.start_state) != (6,) or not np.isfinite(self.start_state).all():
+            raise ValueError("the chaser's state must be six finite numbers")
+        if not np.isfinite(self.start_s):
+            raise ValueError("the start is not finite")
+
+    @property
+    def dwell_s(self) -> Floats:
+        """How long the chaser stays with each target, shape (n,)."""
+        return np.array([each.dwell_s for each in self.targets.targets])
+
+    def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
+        """Find the minimum-energy path.
+
+        Parameters
+        ----------
+        order : sequence of int
+            Which targets, first to last; some or all, each once.
+        time_s : array_like, shape (N,)
+            When each is reached, in that order.
+
+        Returns
+        -------
+        Path
+        """
+        return solve_segments(self.motion, self.start_s, self.start_state, nodes_of(self.targets, order, time_s))
+
+
+def nodes_of(targets: MovingTargets, order: Sequence[int], time_s: ArrayLike) -> Nodes:
+    """Return where and when a path must pass.
+
+    Parameters
+    ----------
+    targets : MovingTargets
+    order : sequence of int
+        Which targets, first to last.
+    time_s : array_like, shape (N,)
+        When each is reached.
+
+    Returns
+    -------
+    Nodes
+
+    Raises
+    ------
+    ValueError
+        If there is no visit, a target is visited twice, or there are not as many times as visits.
+    """
+    which, times = np.array(order, dtype=np.intp), np.asarray(time_s, dtype=np.float64)
+    if not len(which) or times.shape != which.shape:
+        raise ValueError(f"{len(which)} visits need {len(which)} times, at least one; found {times.size}")
+    if len(set(order)) < len(which):
+        raise ValueError("a target is visited twice")
+    if not np.isfinite(times).all():
+        raise ValueError("a time is not finite")
+    described = [targets.targets[each] for each in order]
+    rendezvous = np.array([each.meet is Meet.RENDEZVOUS for each in described])
+    leave_s = times + np.array([each.dwell_s for each in described])
+    arrive = targets.states(which, times)
+    if not rendezvous.any():  # rates and departures do not count
+        return Nodes(times, times, arrive, arrive, arrive, arrive, rendezvous)
+    arrive_rate = targets.rates(which, times)
+    if (leave_s == times).all():
+        return Nodes(times, times, arrive, arrive, arrive_rate, arrive_rate, rendezvous)
+    leave, leave_rate = targets.states(which, leave_s), targets.rates(which, leave_s)
+    return Nodes(times, leave_s, arrive, leave, arrive_rate, leave_rate, rendezvous)
