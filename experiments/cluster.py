@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import re
 import socket
 from collections.abc import Iterator
@@ -71,10 +72,14 @@ def connected(address: str) -> Iterator[Cluster]:
         raise InputError(
             "--dask: clusters need Dask, which is not installed; install the extra: pip install 'infoset[distributed]'"
         ) from None
+    # A scheduler that dies is told of in one message here, not in the tracebacks of its client's threads.
+    for name in ("distributed", "distributed.client", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     _need_listener(address, found["host"].strip("[]"), int(found["port"]))
+    _need_scheduler(address)
     try:
         client = Client(address, timeout=PATIENCE_S, set_as_default=False)
-    except (OSError, TimeoutError, ValueError, RuntimeError) as error:
+    except (OSError, ValueError, RuntimeError) as error:
         raise _silent(address, error) from None
     try:
         _need_workers(client, address)
@@ -83,7 +88,7 @@ def connected(address: str) -> Iterator[Cluster]:
         executor = client.get_executor(pure=False, retries=RETRIES)
         yield Cluster(executor, sum(threads.values()), len(threads))
     finally:
-        with contextlib.suppress(OSError, TimeoutError, RuntimeError):
+        with contextlib.suppress(OSError, RuntimeError):
             client.close(timeout=2)
 
 
@@ -96,8 +101,38 @@ def _need_listener(address: str, host: str, port: int) -> None:
         raise _silent(address, error) from None
 
 
+def _need_scheduler(address: str) -> None:
+    """Ask who listens, and wait for an answer only so long; the cluster's own client may wait for ever."""
+    import asyncio
+
+    from distributed.comm.core import connect
+    from distributed.security import Security
+
+    async def kind() -> object:
+        arguments = Security().get_connection_args("client")
+        comm = await connect(address, timeout=PATIENCE_S / 2, **arguments)
+        try:
+            await comm.write({"op": "identity", "reply": True})
+            told = await comm.read()
+            return told.get("type") if isinstance(told, dict) else None
+        finally:
+            comm.abort()
+
+    async def in_time() -> object:
+        return await asyncio.wait_for(kind(), PATIENCE_S / 2)
+
+    try:
+        found = asyncio.run(in_time())
+    except Exception as error:  # whatever listens there may send anything, and reading that may fail in any way
+        raise _silent(address, error) from None
+    if found != "Scheduler":
+        raise _silent(address, OSError(0, f"it is a {str(found)[:40]}"))
+
+
 def _silent(address: str, error: BaseException) -> InputError:
-    reason = (error.strerror if isinstance(error, OSError) else "") or str(error) or "no answer"
+    reason = (error.strerror if isinstance(error, OSError) else "") or str(error) or "no answer in time"
+    if not isinstance(error, OSError | TypeError):  # TypeError: no certificates for TLS
+        reason = "what it sends is not Dask's protocol"
     return InputError(
         f"--dask: no Dask scheduler answers at {address} ({reason[:150]}); start one with: dask scheduler, and check "
         "the address that it prints"
@@ -107,7 +142,7 @@ def _silent(address: str, error: BaseException) -> InputError:
 def _need_workers(client: Client, address: str) -> None:
     try:
         client.wait_for_workers(1, timeout=PATIENCE_S)
-    except (TimeoutError, OSError):
+    except OSError:
         raise InputError(
             f"--dask: the scheduler at {address} has no workers; start some with: dask worker {address}"
         ) from None

@@ -176,7 +176,8 @@ def campaign_errors(resume_hint: str = "") -> Iterator[None]:
             "check its units with: infoset scenarios check FILE"
         ) from None
     except (CancelledError, BrokenExecutor) as error:
-        raise InputError(f"those who fly have gone: {str(error)[:200] or type(error).__name__}{resume_hint}") from None
+        said = f" ({str(error)[:200]})" if str(error) else ""
+        raise InputError(f"what flies the chunks has gone, a cluster or its scheduler{said}{resume_hint}") from None
     except Exception as error:
         # What a cluster raises is known only where Dask is installed.
         if not type(error).__module__.startswith(("distributed.", "dask.")):
