@@ -88,7 +88,7 @@ def follow(pair: Pair, first: Node, radius: float, latest: float) -> Branch:
         )
         # The error of a prediction of order two is as the cube of the step.
         missed = math.inf if found is None else float(np.abs(found.vector - guess).max())
-        if found is None or not found.is_saddle or missed > 8.0 * _PREDICTED_WITHIN:
+        if found is None or not pair.is_sound(found) or missed > 8.0 * _PREDICTED_WITHIN:
             if step < _SHORTEST_STEP:
                 return Branch(tuple(nodes), Ending.FOLD)
             step *= 0.4

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.pursuit_evasion._side import Response, Side, across
+from rendezvous.pursuit_evasion._side import KnownPath, Response, Side, across
 
 Floats = NDArray[np.float64]
 
@@ -71,6 +71,16 @@ class Node:
     def is_saddle(self) -> bool:
         """Whether no small change of nu gives the evader more, or a side's extremal less than it thinks."""
         return self.regular and bool(self.curvature[0] + self.distance > 0.0)
+
+    @property
+    def is_nearest(self) -> bool:
+        """Whether a pursuer alone can come no nearer by a small change, to an evader whose place is given.
+
+        Beyond a conjugate point its reachable set is hollow there: the radius of curvature of the set's edge has gone
+        from plus to minus infinity, and must stay beyond -l.
+        """
+        least, greatest = self.curvature + self.distance
+        return bool(least > 0.0) if self.regular else bool(least < 0.0 < greatest)
 
     @property
     def vector(self) -> Floats:
@@ -133,6 +143,19 @@ class Pair:
 
     pursuer: Side
     evader: Side
+
+    def is_sound(self, node: Node) -> bool:
+        """Whether an extremal is what the sides want: a saddle, or a nearest one where the evader cannot choose.
+
+        Parameters
+        ----------
+        node : Node
+
+        Returns
+        -------
+        bool
+        """
+        return node.is_nearest if isinstance(self.evader, KnownPath) else node.is_saddle
 
     def solve(
         self,

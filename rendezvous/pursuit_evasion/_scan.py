@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 _DIRECTIONS = 120
 _SEEDS, _MOST_PARTS = 2, 4
-_SHORT = 1e-7
+_SHORT, _GAIN = 1e-7, 1e-6
 _MOST_ITERATIONS = 8
 _CONVERGED = 1e-5
 _FARTHEST = 0.5
@@ -86,6 +86,22 @@ def scan(pair: Pair, node: Node) -> Scan:
         if peak is not None and all(np.abs(peak.nu - each.nu).max() > 1e-3 for each in found):
             found.append(peak)
     return Scan(nu, distance, len(grid), tuple(sorted(found, key=lambda each: -each.distance)))
+
+
+def greater(pair: Pair, node: Node) -> Node | None:
+    """Return an extremal of the same duration that keeps the evader farther away, if one is found.
+
+    Parameters
+    ----------
+    pair : Pair
+    node : Node
+
+    Returns
+    -------
+    Node or None
+    """
+    maxima = scan(pair, node).maxima
+    return maxima[0] if maxima and maxima[0].distance > node.distance + _GAIN else None
 
 
 def directions(count: int) -> Floats:

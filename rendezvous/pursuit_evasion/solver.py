@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.pursuit_evasion._branch import Branch, Ending, follow, polish
-from rendezvous.pursuit_evasion._pair import FINE, Node, Pair
-from rendezvous.pursuit_evasion._scan import scan
+from rendezvous.pursuit_evasion._branch import Ending, follow, polish
+from rendezvous.pursuit_evasion._pair import FINE, Node
+from rendezvous.pursuit_evasion._scan import greater
 from rendezvous.pursuit_evasion.game import Game, Player
 from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
 from rendezvous.pursuit_evasion.units import Units, scaled_pair, units_of
@@ -20,7 +20,6 @@ LONGEST_REVOLUTIONS = 50.0
 """How long a game is looked at where neither propellant nor the game itself sets an end."""
 
 _MOST_BRANCHES = 6
-_GAIN = 1e-6
 
 
 def solve(game: Game, *, change_branch: bool = True, all_directions: bool = False) -> Solution:
@@ -57,7 +56,7 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
     while branch.ending is not Ending.TIME and changes < _MOST_BRANCHES:
         if not (change_branch if branch.ending is Ending.FOLD else all_directions):
             break
-        better = _better(pair, branch)
+        better = greater(pair, branch.last)
         if better is None:
             break
         nodes += branch.nodes if branch.ending is Ending.FOLD else branch.nodes[:-1]
@@ -219,15 +218,6 @@ def capture_of(game: Game, units: Units, node: Node) -> Capture:
         residual=node.residual,
         extremal=node,
     )
-
-
-def _better(pair: Pair, branch: Branch) -> Node | None:
-    """Return an extremal that keeps the evader farther away at the end of a branch, if there is one."""
-    last = branch.last
-    maxima = scan(pair, last).maxima
-    if maxima and maxima[0].distance > last.distance + _GAIN:
-        return maxima[0]
-    return None
 
 
 def _uncaptured(game: Game) -> tuple[Verdict, str | None]:

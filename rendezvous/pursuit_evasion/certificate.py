@@ -1,0 +1,330 @@
+"""What speaks for a capture being a saddle point: checks that share as little as they can with the way it was found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from rendezvous.pursuit_evasion._branch import Ending, follow
+from rendezvous.pursuit_evasion._pair import Node, Pair
+from rendezvous.pursuit_evasion._scan import greater, scan
+from rendezvous.pursuit_evasion._side import Craft, KnownPath, Side
+from rendezvous.pursuit_evasion.paths import ExtremalPath, Policy, SteeredPath, extremal_paths, steered_path
+from rendezvous.pursuit_evasion.solution import Capture, Route, Solution
+from rendezvous.pursuit_evasion.units import scaled_craft
+
+Floats = NDArray[np.float64]
+
+MOST_RESIDUAL = 1e-9
+MOST_HAMILTONIAN_DRIFT = 1e-8
+MOST_INTEGRATOR_GAP = 1e-7
+"""In units of length: metres of a geostationary orbit."""
+MOST_GAIN_S = 1e-2
+MOST_EXCESS = 1e-6
+
+_PANELS, _POINTS, _MOST_CHANGES = 32, 8, 3
+_BEYOND = 1.0 + 1e-6
+_SECOND_TOLERANCE = 1e-12
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """One player does something else, and the other answers as well as it can.
+
+    Parameters
+    ----------
+    name : str
+    capture_s : float or None
+        None where there is no capture by the capture time of the game.
+    conclusive : bool
+        False where the best answer could not be followed.
+    """
+
+    name: str
+    capture_s: float | None
+    conclusive: bool
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """The checks of a capture.
+
+    Parameters
+    ----------
+    residual : float
+        Of the start states, nondimensional.
+    hamiltonian_drift : float
+        Greatest change along the paths, of a Hamiltonian that is one.
+    integrator_gap_m : float
+        Distance of the ends that a second integrator, another method flown forward, finds.
+    closing_speed_m_s : float
+    least_curvature : float
+        Of h_P - h_E + R across nu, nondimensional; R is the capture radius.
+    no_conjugate_point : bool
+    no_earlier_capture : bool
+        Whether l was followed from the start of the game and stayed above the capture radius.
+    least_distance_m : float
+        From the planet's centre, on both paths.
+    above_the_planet : bool
+    pursuer_alone_s : float or None
+        Earliest capture of the evader on its fixed optimal path; None where it could not be followed.
+    evader_deviations : tuple of Deviation
+        The pursuer's best answers: each must capture by the capture time.
+    capture_s : float
+        Of the game.
+    directions_found, directions_tried : int
+        Zero where directions were not looked at.
+    greatest_excess_m : float or None
+        By how much some direction keeps the evader farther than the capture radius, at the capture time.
+    unit_length_m : float
+        Of what is nondimensional.
+    """
+
+    residual: float
+    hamiltonian_drift: float
+    integrator_gap_m: float
+    closing_speed_m_s: float
+    least_curvature: float
+    no_conjugate_point: bool
+    no_earlier_capture: bool
+    least_distance_m: float
+    above_the_planet: bool
+    pursuer_alone_s: float | None
+    evader_deviations: tuple[Deviation, ...]
+    capture_s: float
+    directions_found: int
+    directions_tried: int
+    greatest_excess_m: float | None
+    unit_length_m: float
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """Return what speaks against a saddle point, a phrase each."""
+        found = []
+        if not self.residual < MOST_RESIDUAL:
+            found.append(f"the residual is {self.residual:.1e}")
+        if not self.hamiltonian_drift < MOST_HAMILTONIAN_DRIFT:
+            found.append(f"the Hamiltonian drifts by {self.hamiltonian_drift:.1e}")
+        if not self.integrator_gap_m < MOST_INTEGRATOR_GAP * self.unit_length_m:
+            found.append(f"a second integrator ends {self.integrator_gap_m:.3g} m away")
+        if not self.closing_speed_m_s > 0.0:
+            found.append("the closing speed is not positive")
+        if not self.least_curvature > 0.0:
+            found.append("a curvature is not positive")
+        if not self.no_conjugate_point:
+            found.append("an extremal has a conjugate point")
+        if not self.no_earlier_capture:
+            found.append("earlier captures are not excluded")
+        if not self.above_the_planet:
+            found.append("a path goes through the planet")
+        if self.pursuer_alone_s is None:
+            found.append("the pursuer's deviation could not be followed")
+        elif self.pursuer_alone_s < self.capture_s - MOST_GAIN_S:
+            found.append(f"the pursuer alone captures at {self.pursuer_alone_s:.2f} s")
+        for each in self.evader_deviations:
+            if not each.conclusive:
+                found.append(f"the answer to {each.name} could not be followed")
+            elif each.capture_s is None or each.capture_s > self.capture_s + MOST_GAIN_S:
+                found.append(f"the evader gains by {each.name}")
+        if self.greatest_excess_m is not None and self.greatest_excess_m > MOST_EXCESS * self.unit_length_m:
+            found.append(f"another direction keeps the evader {self.greatest_excess_m:.3g} m away")
+        return tuple(found)
+
+    @property
+    def claims_saddle_point(self) -> bool:
+        """Whether every check holds: only then is a saddle point claimed."""
+        return not self.failures
+
+
+def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
+    """Check a capture.
+
+    Parameters
+    ----------
+    solution : Solution
+        With a capture.
+    all_directions : bool, optional
+        Whether to look in all directions at the capture time for one that keeps the evader farther away.
+
+    Returns
+    -------
+    Certificate
+
+    Raises
+    ------
+    ValueError
+        If there is no capture.
+
+    Notes
+    -----
+    A third of a second for one revolution; directions take another half and more.
+    """
+    capture = solution.capture
+    if capture is None:
+        raise ValueError(f"a game that ends as {solution.verdict.value} has no capture to certify")
+    game, units, node = solution.game, solution.units, capture.extremal
+    pursuer, evader = (scaled_craft(player, game.gravity, units) for player in (game.pursuer, game.evader))
+    paths = extremal_paths(pursuer, evader, node)
+    radius = game.capture_radius_m / units.length_m
+    drift, least_distance = _along(paths, node)
+    alone = _best_answer(pursuer, KnownPath(paths[1].state_at), radius, node.duration)
+    deviations = tuple(
+        _deviation(policy, pursuer, evader, radius, node.duration, units.time_s)
+        for policy in Policy
+        if evader.thrust > 0.0
+    )
+    looked = scan(Pair(pursuer, evader), node) if all_directions else None
+    excess = None
+    if looked is not None:
+        excess = max([float(looked.distance.max(initial=-np.inf)), *(each.distance for each in looked.maxima)]) - radius
+    return Certificate(
+        residual=capture.residual,
+        hamiltonian_drift=drift,
+        integrator_gap_m=_integrator_gap(pursuer, evader, node) * units.length_m,
+        closing_speed_m_s=capture.closing_speed_m_s,
+        least_curvature=float(node.curvature[0] + node.distance),
+        no_conjugate_point=node.regular,
+        no_earlier_capture=_stayed_above(solution, capture),
+        least_distance_m=least_distance * units.length_m,
+        above_the_planet=least_distance * units.length_m > game.gravity.planet_radius_m,
+        pursuer_alone_s=None if alone is None else alone * units.time_s,
+        evader_deviations=deviations,
+        capture_s=capture.time_s,
+        directions_found=0 if looked is None else len(looked.nu),
+        directions_tried=0 if looked is None else looked.tried,
+        greatest_excess_m=None if excess is None or not np.isfinite(excess) else float(excess) * units.length_m,
+        unit_length_m=units.length_m,
+    )
+
+
+def best_answer_s(solution: Solution, path: SteeredPath, latest_s: float) -> float | None:
+    """Return the earliest capture of an evader on a known path.
+
+    Parameters
+    ----------
+    solution : Solution
+        For its game and units.
+    path : SteeredPath
+        Nondimensional, in the units of the solution.
+    latest_s : float
+        The path must reach as far.
+
+    Returns
+    -------
+    float or None
+        None where there is none by then, or it cannot be followed.
+    """
+    units = solution.units
+    pursuer = scaled_craft(solution.game.pursuer, solution.game.gravity, units)
+    radius = solution.game.capture_radius_m / units.length_m
+    found, _ = _followed(pursuer, KnownPath(path.state_at), radius, latest_s / units.time_s)
+    return None if found is None else found * units.time_s
+
+
+def _stayed_above(solution: Solution, capture: Capture) -> bool:
+    before = solution.curve.duration_s < capture.time_s * (1.0 - 1e-9)
+    followed = solution.route in (Route.CONTINUATION, Route.SWITCHED) and bool(before.any())
+    return followed and bool((solution.curve.distance_m[before] > solution.game.capture_radius_m).all())
+
+
+def _followed(pursuer: Side, evader: Side, radius: float, latest: float) -> tuple[float | None, bool]:
+    """Return the earliest capture, if there is one, and whether the branch could be followed to its end."""
+    pair = Pair(pursuer, evader)
+    first = pair.begin(latest)
+    if first is None:
+        return None, False
+    branch = follow(pair, first, radius, latest)
+    for _ in range(_MOST_CHANGES):
+        better = greater(pair, branch.last) if branch.ending is Ending.FOLD else None
+        if better is None:
+            break
+        branch = follow(pair, better, radius, latest)
+    if branch.ending is Ending.CAPTURE:
+        return branch.last.duration, True
+    return None, branch.ending is Ending.TIME
+
+
+def _best_answer(pursuer: Side, evader: Side, radius: float, duration: float) -> float | None:
+    """Return the earliest capture, or the end of the game if there is none before it; None if it is not known."""
+    found, conclusive = _followed(pursuer, evader, radius, duration * _BEYOND)
+    return found if found is not None else duration if conclusive else None
+
+
+def _deviation(
+    policy: Policy, pursuer: Craft, evader: Craft, radius: float, duration: float, time_s: float
+) -> Deviation:
+    path = steered_path(evader, policy.direction, duration * _BEYOND)
+    found, conclusive = _followed(pursuer, KnownPath(path.state_at), radius, duration * _BEYOND)
+    return Deviation(policy.value, None if found is None else found * time_s, conclusive)
+
+
+def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float, float]:
+    """Return the drift of the Hamiltonian, scaled to be one, and the least distance from the planet's centre.
+
+    The costate of the mass is the integral of |p_v| thrust / m^2, by Gauss and Legendre's rule on panels.
+    """
+    points, weights = np.polynomial.legendre.leggauss(_POINTS)
+    edges = np.linspace(0.0, node.duration, _PANELS + 1)
+    width = edges[1] - edges[0]
+    inner = edges[:-1, None] + 0.5 * width * (1.0 + points)
+    times = np.sort(np.concatenate([edges, inner.ravel()]))
+    at_edges = np.searchsorted(times, edges)
+    at_inner = np.searchsorted(times, inner.ravel())
+    drift, least = 0.0, np.inf
+    for path in paths:
+        y, craft = path.sampled(times), path.craft
+        mass = craft.mass - craft.flow * times
+        size = np.linalg.norm(y[:, 9:], axis=1)
+        rates = (size * craft.thrust / mass**2)[at_inner].reshape(_PANELS, _POINTS)
+        lost = np.append(np.cumsum((rates @ weights * 0.5 * width)[::-1])[::-1], 0.0)
+        e = y[at_edges]
+        gravity = np.array([_gravity(r, craft) for r in e[:, :3]])
+        hamiltonian = (e[:, 6:9] * e[:, 3:6]).sum(axis=1) + (e[:, 9:] * gravity).sum(axis=1)
+        hamiltonian += (craft.thrust * size / mass)[at_edges] + craft.flow * lost
+        drift = max(drift, float(np.abs(hamiltonian - hamiltonian[-1]).max()) / node.closing)
+        least = min(least, float(np.linalg.norm(y[:, :3], axis=1).min()))
+    return drift, least
+
+
+def _integrator_gap(pursuer: Craft, evader: Craft, node: Node) -> float:
+    """Fly both forward from their start states and costates with a multistep method, and see where they end."""
+    gaps = []
+    for craft, costate, end in zip((pursuer, evader), node.costates, (node.pursuer, node.evader), strict=True):
+        found = solve_ivp(
+            _forward_rates,
+            (0.0, node.duration),
+            np.concatenate([craft.start, costate]),
+            method="LSODA",
+            rtol=_SECOND_TOLERANCE,
+            atol=_SECOND_TOLERANCE,
+            args=(craft,),
+        )
+        gaps.append(float(np.linalg.norm(found.y[:3, -1] - end[:3])))
+    return max(gaps)
+
+
+def _forward_rates(time: float, y: Floats, craft: Craft) -> Floats:
+    """State and costate in time; gravity's gradient along p_v by a complex step, not by its formula."""
+    out = np.empty(12)
+    p = y[9:]
+    size = float(np.linalg.norm(p))
+    out[:3] = y[3:6]
+    out[3:6] = _gravity(y[:3], craft) + craft.thrust / (craft.mass - craft.flow * time) * p / max(size, 1e-300)
+    out[6:9] = -_gravity(y[:3] + 1e-30j * p, craft).imag / 1e-30
+    out[9:] = -y[6:9]
+    return out
+
+
+def _gravity(r: Any, craft: Craft) -> Any:
+    """Gravity as textbooks write it, of a real or complex position."""
+    q = (r * r).sum()
+    cube = q * np.sqrt(q)
+    if craft.oblateness == 0.0:
+        return -craft.mu * r / cube
+    ratio = 5.0 * r[2] * r[2] / q
+    factors = np.array([1.0 - ratio, 1.0 - ratio, 3.0 - ratio])
+    return -craft.mu * r / cube - 3.0 * craft.oblateness / (cube * q) * factors * r
