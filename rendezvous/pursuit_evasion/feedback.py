@@ -1,0 +1,381 @@
+"""Feedback: a pursuer that solves the game anew from time to time, against an evader that does as it likes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, minimize_scalar
+
+from rendezvous.pursuit_evasion._branch import Ending, follow
+from rendezvous.pursuit_evasion._pair import FINE, Node, Pair
+from rendezvous.pursuit_evasion._side import Craft
+from rendezvous.pursuit_evasion.game import Game
+from rendezvous.pursuit_evasion.paths import ExtremalPath, SteeredPath, extremal_paths, steered_path
+from rendezvous.pursuit_evasion.solution import Solution
+from rendezvous.pursuit_evasion.solver import solve
+from rendezvous.pursuit_evasion.steering import Steering
+from rendezvous.pursuit_evasion.units import Units, scaled_craft
+
+Floats = NDArray[np.float64]
+PathNow = Callable[[float], Floats]
+
+HIT_M = 100.0
+"""A point is captured when it is passed within this: what a last leg flown without looking can reach."""
+
+_LOOKS = 65
+_PAST, _WIDE = 1.05, 2.0
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What the pursuer sees of the evader when it plans.
+
+    Parameters
+    ----------
+    delay_s : float, optional
+        Age of what it sees; it assumes that the evader has played its best since.
+    position_error_m, velocity_error_m_s : float, optional
+        Standard deviations, a component.
+    """
+
+    delay_s: float = 0.0
+    position_error_m: float = 0.0
+    velocity_error_m_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no observation."""
+        values = (self.delay_s, self.position_error_m, self.velocity_error_m_s)
+        if not all(np.isfinite(value) and value >= 0.0 for value in values):
+            raise ValueError("delay and errors of the observation must be finite and not negative")
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the pursuer sees the evader as it is."""
+        return self.delay_s == 0.0 and self.position_error_m == 0.0 and self.velocity_error_m_s == 0.0
+
+
+class Ended(Enum):
+    """How a flight ends."""
+
+    CAPTURED = "captured"
+    MISSED = "missed"
+    """Passed, the last leg flown without looking, beyond what counts as a capture of a point."""
+    PROPELLANT_EXHAUSTED = "propellant-exhausted"
+    NO_PLAN = "no-plan"
+    """The game could not be solved from where it had come to."""
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A pursuit as it was flown.
+
+    Parameters
+    ----------
+    ended : Ended
+    time_s : float
+        Of the capture, of the closest approach, or of the end.
+    distance_m : float
+        Then.
+    planned_s, predicted_s : ndarray, shape (n,)
+        When plans were made, and the capture times that they predict.
+    distances_m : ndarray, shape (n,)
+        When plans were made.
+    pursuer_m, evader_m : ndarray, shape (n, 3)
+        Positions then.
+    """
+
+    ended: Ended
+    time_s: float
+    distance_m: float
+    planned_s: Floats
+    predicted_s: Floats
+    distances_m: Floats
+    pursuer_m: Floats
+    evader_m: Floats
+
+
+@dataclass
+class _Log:
+    planned: list[float] = field(default_factory=list)
+    predicted: list[float] = field(default_factory=list)
+    pursuer: list[Floats] = field(default_factory=list)
+    evader: list[Floats] = field(default_factory=list)
+
+    def flight(self, ended: Ended, time: float, distance: float, units: Units) -> Flight:
+        """Return what was noted, in SI units."""
+        pursuer, evader = np.array(self.pursuer).reshape(-1, 3), np.array(self.evader).reshape(-1, 3)
+        return Flight(
+            ended=ended,
+            time_s=time * units.time_s,
+            distance_m=distance * units.length_m,
+            planned_s=np.array(self.planned) * units.time_s,
+            predicted_s=np.array(self.predicted) * units.time_s,
+            distances_m=np.linalg.norm(evader - pursuer, axis=1) * units.length_m,
+            pursuer_m=pursuer * units.length_m,
+            evader_m=evader * units.length_m,
+        )
+
+
+def fly(
+    game: Game,
+    steering: Steering | None,
+    *,
+    replan_s: float = 600.0,
+    observation: Observation | None = None,
+    seed: int | np.random.SeedSequence = 0,
+    solution: Solution | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Flight:
+    """Fly a pursuer that plans anew from time to time, and flies each plan until the next.
+
+    Parameters
+    ----------
+    game : Game
+    steering : callable or None
+        The evader's; None plays its best against where the pursuer really is.
+    replan_s : float, optional
+    observation : Observation or None, optional
+        None sees the evader as it is.
+    seed : int or SeedSequence, optional
+        Of the errors of observation.
+    solution : Solution or None, optional
+        Of the game, where it is known already.
+    progress : callable, optional
+        Told the fraction of the predicted time that is flown.
+
+    Returns
+    -------
+    Flight
+
+    Raises
+    ------
+    ValueError
+        If the game ends in no capture, so that there is no plan to begin with, or replanning takes no time.
+
+    Notes
+    -----
+    Each plan starts Newton's method at the one before: 2 ms and, for a steered evader, 2 ms of its flight. The last leg
+    is flown without looking. Where the plan before does not lead to a new one, the game is solved from nothing.
+    """
+    if not 0.0 < replan_s < np.inf:
+        raise ValueError("the time between plans must be positive")
+    solution = solve(game) if solution is None else solution
+    if solution.capture is None:
+        raise ValueError(f"a game that ends as {solution.verdict.value} gives no plan to begin with")
+    units = solution.units
+    seen = observation or Observation()
+    random = np.random.default_rng(seed)
+    flight = _Pursuit(game, units, steering, seen, random)
+    return flight.run(solution.capture.extremal, replan_s / units.time_s, progress)
+
+
+def fly_many(
+    game: Game,
+    steering: Callable[[int], Steering | None],
+    runs: int,
+    *,
+    replan_s: float = 600.0,
+    observation: Observation | None = None,
+    seed: int = 0,
+    progress: Callable[[float], None] | None = None,
+) -> list[Flight]:
+    """Fly a pursuit many times.
+
+    Parameters
+    ----------
+    game : Game
+    steering : callable
+        Of the number of the run.
+    runs : int
+    replan_s : float, optional
+    observation : Observation or None, optional
+    seed : int, optional
+        Root of what is drawn: each run has its own stream.
+    progress : callable, optional
+        Told the fraction done.
+
+    Returns
+    -------
+    list of Flight
+        In the order of the runs.
+    """
+    solution = solve(game)
+    flights = []
+    for run in range(runs):
+        own = np.random.SeedSequence(entropy=seed, spawn_key=(run, 0))
+        flights.append(
+            fly(game, steering(run), replan_s=replan_s, observation=observation, seed=own, solution=solution)
+        )
+        if progress is not None:
+            progress((run + 1) / runs)
+    return flights
+
+
+def capture_quantiles_s(flights: Sequence[Flight], levels: Sequence[float] = (0.0, 0.1, 0.5, 0.9, 1.0)) -> list[float]:
+    """Return quantiles of the capture times of those that captured, s; empty where none did.
+
+    Parameters
+    ----------
+    flights : sequence of Flight
+    levels : sequence of float, optional
+
+    Returns
+    -------
+    list of float
+    """
+    times = [flight.time_s for flight in flights if flight.ended is Ended.CAPTURED]
+    return [float(each) for each in np.quantile(times, levels)] if times else []
+
+
+class _Pursuit:
+    """One pursuit under way, nondimensional."""
+
+    def __init__(
+        self,
+        game: Game,
+        units: Units,
+        steering: Steering | None,
+        observation: Observation,
+        random: np.random.Generator,
+    ) -> None:
+        self._units, self._steering, self._observation, self._random = units, steering, observation, random
+        self._radius = game.capture_radius_m / units.length_m
+        self._hit = HIT_M / units.length_m
+        self._pursuer = scaled_craft(game.pursuer, game.gravity, units)
+        self._evader = scaled_craft(game.evader, game.gravity, units)
+        self._dry = game.pursuer.dry_mass_kg / units.mass_kg, game.evader.dry_mass_kg / units.mass_kg
+        self._time = 0.0
+        self._past: list[tuple[float, PathNow]] = []
+        self._log = _Log()
+
+    def run(self, plan: Node, leg: float, progress: Callable[[float], None] | None) -> Flight:
+        """Fly to the end."""
+        own = plan
+        while True:
+            self._log.planned.append(self._time)
+            self._log.predicted.append(self._time + plan.duration)
+            self._log.pursuer.append(self._pursuer.start[:3])
+            self._log.evader.append(self._evader.start[:3])
+            if progress is not None:
+                progress(min(1.0, self._time / (self._time + plan.duration)))
+            last = plan.duration <= leg
+            spell = min(leg, plan.duration * _PAST) if last else leg
+            left = (self._pursuer.mass - self._dry[0]) / max(self._pursuer.flow, 1e-300)
+            if spell > left:
+                return self._end(Ended.PROPELLANT_EXHAUSTED)
+            pursuer = extremal_paths(self._pursuer, self._evader, plan)[0]
+            evader, evader_mass = self._evader_path(own, spell)
+            ended = self._look(pursuer, evader, spell, last)
+            if ended is not None:
+                return ended
+            self._past.append((self._time, evader))
+            self._pursuer = _moved(self._pursuer, pursuer.at(spell)[:6], self._pursuer.flow * spell)
+            self._evader = _moved(self._evader, evader(spell), self._evader.mass - evader_mass)
+            self._time += spell
+            planned, known = self._plan(plan, spell, self._seen(plan)), plan
+            if planned is None:
+                return self._end(Ended.NO_PLAN)
+            plan = planned
+            if self._steering is not None or self._observation.is_exact:
+                own = plan
+            else:
+                own = self._plan(own, spell, self._evader) or known
+
+    def _plan(self, before: Node, spell: float, evader: Craft) -> Node | None:
+        """Solve the game from here, from the plan before or from nothing."""
+        pair = Pair(self._pursuer, evader)
+        latest = (self._pursuer.mass - self._dry[0]) / max(self._pursuer.flow, 1e-300)
+        latest = min(latest, 1e3)
+        if before.duration > spell:
+            found = pair.solve(
+                before.vector, before.duration - spell, self._radius, time_free=True, tolerance=FINE, latest=latest
+            )
+            if found is not None and found.is_saddle and found.closing > 0.0:
+                return found
+        if float(np.linalg.norm(evader.start[:3] - self._pursuer.start[:3])) <= self._radius:
+            return None
+        first = pair.begin(latest)
+        branch = None if first is None else follow(pair, first, self._radius, latest)
+        return branch.last if branch is not None and branch.ending is Ending.CAPTURE else None
+
+    def _evader_path(self, own: Node, spell: float) -> tuple[PathNow, float]:
+        """Return the evader's path of a leg, and its mass at the end of it."""
+        if self._steering is None:
+            path = ExtremalPath(self._evader, own.evader, own.nu, own.duration)
+            return (lambda time: path.at(time)[:6]), self._evader.mass - self._evader.flow * spell
+        steered = self._steered(self._evader, self._steering, spell)
+        return (lambda time: np.asarray(steered.solution(time)[:6])), steered.mass_at(spell)
+
+    def _steered(self, craft: Craft, steering: Steering, spell: float) -> SteeredPath:
+        units, begin = self._units, self._time
+        scale = np.repeat([units.length_m, units.speed_m_s], 3)
+        spent = craft.mass <= self._dry[1] + craft.flow * spell
+
+        def direction(time: float, state: Floats) -> Floats:
+            return np.zeros(3) if spent else np.asarray(steering((begin + time) * units.time_s, state * scale))
+
+        return steered_path(craft, direction, spell)
+
+    def _seen(self, plan: Node) -> Craft:
+        """Return the evader as the pursuer sees it."""
+        seen = self._observation
+        if seen.is_exact:
+            return self._evader
+        delay = min(seen.delay_s / self._units.time_s, self._time)
+        state = self._evader.start
+        if delay > 0.0:
+            at = self._time - delay
+            begin, path = next(leg for leg in reversed(self._past) if leg[0] <= at)
+            state = path(at - begin)
+        errors = np.repeat(
+            [seen.position_error_m / self._units.length_m, seen.velocity_error_m_s / self._units.speed_m_s], 3
+        )
+        state = state + errors * self._random.standard_normal(6)
+        if delay > 0.0:
+            # As the plan has it: full thrust, and the direction that it has now, which turns slowly.
+            believed = plan.costates[1][3:]
+            since = steered_path(replace(self._evader, start=state), lambda _time, _state: believed, delay)
+            state = since.state_at(delay)[0]
+        return replace(self._evader, start=state)
+
+    def _look(self, pursuer: ExtremalPath, evader: PathNow, spell: float, last: bool) -> Flight | None:
+        """See whether the leg ends the flight: a capture, or for a point the closest approach of the last leg."""
+
+        def distance(time: float) -> float:
+            return float(np.linalg.norm(pursuer.at(time)[:3] - evader(time)[:3]))
+
+        if not last and min(distance(0.0), distance(spell)) - self._radius > _WIDE * self._drift(spell):
+            return None
+        times = np.linspace(0.0, spell, _LOOKS)
+        if self._radius > 0.0:
+            values = np.array([distance(time) for time in times])
+            inside = np.flatnonzero(values <= self._radius)
+            if not len(inside):
+                return None
+            first = int(inside[0])
+            at = brentq(lambda time: distance(time) - self._radius, times[first - 1], times[first]) if first else 0.0
+            return self._log.flight(Ended.CAPTURED, self._time + at, distance(at), self._units)
+        if not last:
+            return None
+        values = np.array([distance(time) for time in times])
+        near = int(np.argmin(values))
+        low, high = times[max(0, near - 1)], times[min(_LOOKS - 1, near + 1)]
+        at = float(minimize_scalar(distance, bounds=(low, high), method="bounded", options={"xatol": 1e-12}).x)
+        ended = Ended.CAPTURED if distance(at) <= self._hit else Ended.MISSED
+        return self._log.flight(ended, self._time + at, distance(at), self._units)
+
+    def _drift(self, spell: float) -> float:
+        """How far the two drift against each other in a leg, about."""
+        return spell * float(np.linalg.norm(self._pursuer.start[3:] - self._evader.start[3:]))
+
+    def _end(self, ended: Ended) -> Flight:
+        apart = float(np.linalg.norm(self._pursuer.start[:3] - self._evader.start[:3]))
+        return self._log.flight(ended, self._time, apart, self._units)
+
+
+def _moved(craft: Craft, state: Floats, burnt: float) -> Craft:
+    return replace(craft, start=state, mass=craft.mass - burnt)

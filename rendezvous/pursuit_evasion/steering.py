@@ -1,0 +1,73 @@
+"""Ways in which an evader steers that is not the optimal one."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rendezvous.pursuit_evasion.paths import Policy
+
+Floats = NDArray[np.float64]
+
+Steering = Callable[[float, Floats], Floats]
+"""Direction of thrust, shape (3,), of the time (s) and the evader's state (m, m/s): any length, zero to coast."""
+
+
+@dataclass(frozen=True)
+class Script:
+    """Policies one after another.
+
+    Parameters
+    ----------
+    begin_s : tuple of float
+        When each begins, rising, the first at zero.
+    policies : tuple of Policy
+    """
+
+    begin_s: tuple[float, ...]
+    policies: tuple[Policy, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse what is no script."""
+        if not self.begin_s or len(self.begin_s) != len(self.policies):
+            raise ValueError("a script needs as many times as policies, and one at least")
+        if self.begin_s[0] != 0.0 or any(b <= a for a, b in zip(self.begin_s, self.begin_s[1:], strict=False)):
+            raise ValueError("the times of a script must rise, from 0")
+
+    def __call__(self, time_s: float, state: Floats) -> Floats:
+        """Return the direction of the policy of that time."""
+        index = max(0, bisect_right(self.begin_s, time_s) - 1)
+        return self.policies[index].direction(time_s, state)
+
+
+@dataclass(frozen=True)
+class RandomSteering:
+    """Directions drawn anew from time to time, all alike likely.
+
+    Parameters
+    ----------
+    seed, run : int
+        Each run of a seed has its own directions.
+    hold_s : float
+        How long each is held.
+    """
+
+    seed: int
+    run: int
+    hold_s: float
+
+    def __call__(self, time_s: float, _state: Floats) -> Floats:
+        """Return the direction of that time: the same however often it is asked."""
+        return _drawn(self.seed, self.run, max(0, int(time_s / self.hold_s + 1e-9)))
+
+
+@lru_cache(maxsize=4096)
+def _drawn(seed: int, run: int, draw: int) -> Floats:
+    stream = np.random.SeedSequence(entropy=seed, spawn_key=(run, 1, draw))
+    vector = np.random.default_rng(stream).standard_normal(3)
+    return np.asarray(vector / np.linalg.norm(vector), dtype=np.float64)
