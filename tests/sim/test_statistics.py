@@ -4,8 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from sim import band_half_width, empirical_distribution, quantiles
+from sim import band_half_width, empirical_distribution, estimate_quantiles, quantiles
+from sim.statistics import order_statistics
 
 
 def test_the_distribution_of_a_small_sample_by_hand() -> None:
@@ -45,3 +48,56 @@ def test_quantiles_interpolate() -> None:
 def test_no_distribution_of_nothing(sample: list[float]) -> None:
     with pytest.raises(ValueError, match="at least one value, all finite"):
         empirical_distribution(sample)
+
+
+def test_order_statistics_are_the_textbooks() -> None:
+    # The median of 10 values: the second and the ninth hold it with probability 1 - 22/1024 = 0.9785.
+    assert order_statistics(10, 0.5, 0.95) == (2, 9)
+    # Of n values the greatest exceeds the 99 % quantile with probability 1 - 0.99^n: 0.975 from n = 368 on.
+    assert order_statistics(367, 0.99, 0.95)[1] == 368
+    assert order_statistics(368, 0.99, 0.95)[1] == 368
+
+
+@given(size=st.integers(1, 400), level=st.floats(0.01, 0.99), confidence=st.floats(0.5, 0.999))
+@settings(deadline=None)
+def test_order_statistics_enclose_with_the_confidence_and_no_wider(size: int, level: float, confidence: float) -> None:
+    lower, upper = order_statistics(size, level, confidence)
+    tail = 0.5 * (1.0 - confidence)
+
+    def at_most(count: int) -> float:
+        return math.fsum(math.comb(size, k) * level**k * (1.0 - level) ** (size - k) for k in range(count + 1))
+
+    assert at_most(lower - 1) <= tail + 1e-9
+    assert at_most(lower) >= tail - 1e-9
+    assert 1.0 - at_most(upper - 1) <= tail + 1e-9
+    assert 1.0 - at_most(upper - 2) >= tail - 1e-9
+
+
+def test_intervals_hold_the_true_quantile_as_often_as_they_say() -> None:
+    rng = np.random.default_rng(3)
+    truth, held = -math.log(0.1), 0
+    for _ in range(400):
+        (found,) = estimate_quantiles(rng.exponential(size=200), [0.9])
+        assert found.lower is not None
+        assert found.upper is not None
+        held += found.lower <= truth <= found.upper
+    assert held >= 0.925 * 400  # of 0.95 or more; two deviations below
+
+
+def test_quantiles_of_a_small_sample_have_open_ends() -> None:
+    median, high = estimate_quantiles([3.0, 1.0, 2.0], [0.5, 0.99])
+    assert (median.value, median.lower, median.upper, median.width) == (2.0, None, None, None)
+    assert (high.upper, high.width) == (None, None)
+    assert high.value == quantiles([3.0, 1.0, 2.0], 0.99)
+    least, greatest = estimate_quantiles(np.arange(100.0), [0.0, 1.0])
+    assert (least.value, least.lower, least.upper) == (0.0, None, 0.0)
+    assert (greatest.value, greatest.lower, greatest.upper) == (99.0, 99.0, None)
+
+
+@pytest.mark.parametrize(
+    ("sample", "levels", "confidence"),
+    [([], [0.5], 0.9), ([math.nan], [0.5], 0.9), ([1.0], [1.5], 0.9), ([1.0], [0.5], 1.0)],
+)
+def test_no_quantiles_of_nothing(sample: list[float], levels: list[float], confidence: float) -> None:
+    with pytest.raises(ValueError, match=r"quantiles need|levels must"):
+        estimate_quantiles(sample, levels, confidence)

@@ -1,0 +1,113 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sim import QuantileName, Requirement, StoppingRule, estimate_quantiles
+from sim.stopping_rule import Floats, Watch, level_name
+
+RULE = StoppingRule(QuantileName("miss_m", 0.5), 0.5)
+
+
+def test_rules_are_read_and_written() -> None:
+    rule = StoppingRule.parse("miss_m p99 ci<0.5")
+    assert rule == StoppingRule(QuantileName("miss_m", 0.99), 0.5)
+    assert str(rule) == "miss_m p99 ci<0.5"
+    assert StoppingRule.parse("  impulse_m_s  p99.9  ci < 1e-1 ").quantile.level == pytest.approx(0.999)
+    required = Requirement.parse("guaranteed_miss_m p50<12.5")
+    assert required == Requirement(QuantileName("guaranteed_miss_m", 0.5), 12.5)
+    assert str(required) == "guaranteed_miss_m p50<12.5"
+    assert QuantileName.parse("miss_m p5") == QuantileName("miss_m", 0.05)
+    assert [level_name(each) for each in (0.05, 0.5, 0.99, 0.999, 0.9999)] == ["p5", "p50", "p99", "p99.9", "p99.99"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "miss_m",
+        "miss_m p99",
+        "miss_m p0 ci<1",
+        "miss_m p100 ci<1",
+        "miss_m p99 ci<0",
+        "miss_m p99 ci<-1",
+        "miss_m p99 ci<nan",
+        "miss_m p99 ci<1e999",
+        "miss_m p99 ci>1",
+        "miss p99 ci<1",
+        "miss_m p99 ci<1; rm",
+        "miss_m p" + "9" * 10_000 + " ci<1",
+        "outcome p99 ci<1",
+    ],
+)
+def test_what_is_no_rule(text: str) -> None:
+    with pytest.raises(ValueError, match=r"must be|there is no quantity|greater than 0|between p0 and p100"):
+        StoppingRule.parse(text)
+
+
+@pytest.mark.parametrize("text", ["miss_m p99<0", "miss_m p99 10", "miss p99<10", "p99<10", "miss_m p99<1e400"])
+def test_what_is_no_requirement(text: str) -> None:
+    with pytest.raises(ValueError, match=r"must be|there is no quantity|greater than 0"):
+        Requirement.parse(text)
+
+
+def samples(chunks: int, size: int) -> list[Floats]:
+    return [np.random.default_rng([7, chunk]).exponential(size=size) for chunk in range(chunks)]
+
+
+@given(order=st.permutations(list(range(60))))
+@settings(max_examples=40, deadline=None)
+def test_the_campaign_stops_at_the_same_chunk_in_whatever_order_chunks_are_done(order: list[int]) -> None:
+    flown = samples(60, 20)
+    watch = Watch(RULE, 1, lambda chunk: [flown[chunk]], 60)
+    done: set[int] = set()
+    for chunk in order:
+        done.add(chunk)
+        met = watch.met(done.__contains__)
+        if met is not None:
+            break
+    in_order = Watch(RULE, 1, lambda chunk: [flown[chunk]], 60)
+    assert met == in_order.met(lambda _: True)
+    assert met is not None
+    assert set(range(met)) <= done
+
+
+def test_it_stops_as_soon_as_a_look_finds_the_rule_met_and_looks_often_enough() -> None:
+    flown = samples(400, 5)
+    met = Watch(RULE, 1, lambda chunk: [flown[chunk]], 400).met(lambda _: True)
+    assert met is not None
+
+    def width(chunks: int) -> float:
+        (found,) = estimate_quantiles(np.concatenate(flown[:chunks]), [0.5])
+        return np.inf if found.width is None else found.width
+
+    assert width(met) < 0.5
+    first = next(chunks for chunks in range(1, 401) if width(chunks) < 0.5)
+    assert first <= met <= 1.05 * first + 2
+
+
+def test_every_group_must_meet_the_rule() -> None:
+    narrow, wide = np.full(20, 1.0), np.linspace(0.0, 100.0, 20)
+    assert Watch(RULE, 1, lambda _: [narrow], 50).met(lambda _: True) == 1
+    assert Watch(RULE, 2, lambda _: [narrow, wide], 50).met(lambda _: True) is None
+    assert Watch(RULE, 1, lambda _: [np.zeros(0)], 50).met(lambda _: True) is None
+
+
+@dataclass(frozen=True)
+class _MetBy(StoppingRule):
+    size: int = 0
+
+    def met_by(self, sample: Floats) -> bool:
+        return sample.size >= self.size
+
+
+@pytest.mark.parametrize("chunks", [1, 2, 20, 21, 22, 59, 400])
+def test_the_last_chunk_is_looked_at(chunks: int) -> None:
+    rule = _MetBy(RULE.quantile, RULE.width, size=chunks)
+    watch = Watch(rule, 1, lambda _: [np.zeros(1)], chunks)
+    assert watch.met(lambda chunk: chunk < chunks - 1) is None
+    assert watch.met(lambda _: True) == chunks
