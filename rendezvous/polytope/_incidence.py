@@ -1,0 +1,167 @@
+"""Which points lie on which planes, and which of both are essential."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull, QhullError, cKDTree
+
+from rendezvous.polytope.errors import UncertainHullError
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Places = NDArray[np.int64]
+
+MERGE = 1e-10
+"""Points nearer than this to each other are one, in coordinates in which the set is about one wide."""
+_APART = 1e-9
+"""How far both representations of a set may be apart."""
+_LEAST_ON, _MOST_ON = 1e-14, 1e-7
+"""How near to a plane a point is on it, in the same coordinates, lies between these."""
+_OTHERWISE_ON = (1e-11, 1e-10, 1e-12, 1e-13, 1e-9, 1e-8)
+_LEAST_RANK = 1e-11
+_ENTRIES = 4_000_000
+
+
+def essential(points: Floats, normals: Floats, offsets: Floats) -> tuple[Floats, Floats, Floats]:
+    """Keep the points that are vertices and the planes that are facets of a full-dimensional polytope.
+
+    Parameters
+    ----------
+    points : ndarray, shape (k, d)
+        All vertices, and perhaps others of the polytope, in coordinates in which it is about one wide; d >= 2.
+    normals : ndarray, shape (m, d)
+    offsets : ndarray, shape (m,)
+        All facets, and perhaps other half-spaces that hold the polytope.
+
+    Returns
+    -------
+    vertices : ndarray, shape (v, d)
+    normals : ndarray, shape (f, d)
+        Of unit length.
+    offsets : ndarray, shape (f,)
+
+    Raises
+    ------
+    UncertainHullError
+        If a point is outside, or what is left is no polytope: then rounding has the better of the set.
+
+    Notes
+    -----
+    A plane is a facet where the points on it span d - 1 dimensions and are not among those of another one. A point is
+    a vertex where the planes through it have only that in common. O(k m d^2) and O(m^2 k) of matrix products.
+
+    The hull of the vertices is then made once more: it must hold all points, and each simplex of its surface must lie
+    in a facet. Distances of points from planes are of two kinds, rounding and real ones: the widest gap between them
+    tells which points are on which planes. Should that not agree with itself, fixed tolerances are tried.
+    """
+    lengths = np.linalg.norm(normals, axis=1)
+    normals, offsets = normals / lengths[:, None], offsets / lengths
+    gaps = offsets - points @ normals.T
+    if float(gaps.min()) < -_MOST_ON:
+        raise UncertainHullError(f"a vertex is {-float(gaps.min()):.2g} outside its own facets")
+    failed = UncertainHullError("no tolerance fits")
+    labels = together(points, MERGE)
+    kept = np.unique(labels, return_index=True)[1]
+    points = points[kept]
+    for near in (_widest_gap(gaps), *_OTHERWISE_ON):
+        # What is on a plane with one of the points that are one is on it.
+        on = np.zeros((len(kept), len(normals)), dtype=bool)
+        np.logical_or.at(on, labels, gaps <= near)
+        try:
+            corners, facets = _agreeing(points, normals, on, max(near, _LEAST_RANK))
+        except UncertainHullError as error:
+            failed = error
+        else:
+            return points[corners], normals[facets], offsets[facets]
+    raise failed
+
+
+def _agreeing(points: Floats, normals: Floats, on: Flags, negligible: float) -> tuple[Places, Places]:
+    """Return which points are vertices and which planes facets, given which points are on which planes."""
+    size = points.shape[1]
+    facets = _largest(on, size)
+    facets = facets[_affine_ranks(points, on[:, facets], negligible) >= size - 1]
+    through = on[:, facets]
+    corners = np.flatnonzero(through.sum(axis=1) >= size)
+    corners = corners[_ranks(normals[facets], through[corners].T, negligible) == size]
+    if len(corners) <= size or len(facets) <= size:
+        raise UncertainHullError(f"{len(corners)} vertices and {len(facets)} facets are no polytope in R^{size}")
+    if float(through[corners].sum(axis=0).min()) < size:
+        raise UncertainHullError(f"a facet of a polytope in R^{size} has fewer than {size} vertices")
+    if size == 2 and len(corners) != len(facets):
+        raise UncertainHullError(f"{len(corners)} vertices and {len(facets)} sides are no polygon")
+    _need_agreement(points, corners, on[:, facets])
+    return corners, facets
+
+
+def _need_agreement(points: Floats, corners: Places, on_facets: Flags) -> None:
+    """Check that the hull of the vertices holds all points, and that each simplex of its surface is in a facet."""
+    try:
+        hull = ConvexHull(points[corners])
+    except QhullError as error:
+        raise UncertainHullError(f"Qhull: {str(error).splitlines()[0]}") from None
+    outside = float((points @ hull.equations[:, :-1].T + hull.equations[:, -1]).max())
+    if outside > _APART:
+        raise UncertainHullError(f"a point is {outside:.2g} outside the hull of its vertices")
+    covered = np.ones((len(hull.simplices), on_facets.shape[1]), dtype=bool)
+    for place in range(hull.simplices.shape[1]):
+        covered &= on_facets[corners[hull.simplices[:, place]]]
+    if not covered.any(axis=1).all():
+        raise UncertainHullError("a part of the surface is in no facet")
+
+
+def _widest_gap(gaps: Floats) -> float:
+    """Return the middle, by order of magnitude, of the widest gap among small distances."""
+    sizes = np.abs(gaps)
+    small = np.log(np.sort(sizes[(sizes > _LEAST_ON) & (sizes < _MOST_ON)]))
+    ends = np.concatenate([[np.log(_LEAST_ON)], small, [np.log(_MOST_ON)]])
+    place = int(np.diff(ends).argmax())
+    return float(np.exp(0.5 * (ends[place] + ends[place + 1])))
+
+
+def together(points: Floats, within: float) -> Places:
+    """Label points that are nearer to each other than a distance, in every coordinate, with the same number."""
+    pairs = cKDTree(points).query_pairs(within, p=np.inf, output_type="ndarray")
+    graph = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _largest(on: Flags, least: int) -> Places:
+    """Return the planes whose points are not all on another plane too; of planes with the same points, the first."""
+    planes = np.flatnonzero(on.sum(axis=0) >= least)
+    held = on[:, planes].astype(np.float32)
+    counts = held.sum(axis=0)
+    common = held.T @ held
+    order = np.arange(len(planes))
+    within = common >= counts[:, None]
+    beaten = within & ((counts[None, :] > counts[:, None]) | (order[None, :] < order[:, None]))
+    return np.asarray(planes[~beaten.any(axis=1)])
+
+
+def _affine_ranks(points: Floats, groups: Flags, negligible: float) -> Places:
+    """Return the dimension that each group, a column of flags, of points spans."""
+    counts = groups.sum(axis=0)
+    means = (groups.T @ points) / counts[:, None]
+    return _batched(
+        len(means), len(points), lambda one: (points - means[one, None, :]) * groups.T[one, :, None], negligible
+    )
+
+
+def _ranks(rows: Floats, groups: Flags, negligible: float) -> Places:
+    """Return the rank of each group, a column of flags, of rows."""
+    return _batched(groups.shape[1], len(rows), lambda one: rows * groups.T[one, :, None], negligible)
+
+
+def _batched(count: int, height: int, stack: Callable[[slice], Floats], negligible: float) -> Places:
+    """Return the ranks of matrices that are made some at a time."""
+    size = max(1, _ENTRIES // max(1, height))
+    found = [np.zeros(0, np.int64)]
+    for start in range(0, count, size):
+        values = np.linalg.svd(stack(slice(start, start + size)), compute_uv=False)
+        found.append((values > negligible * np.maximum(values[:, :1], 1e-300)).sum(axis=1))
+    return np.concatenate(found)

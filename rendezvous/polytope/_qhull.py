@@ -1,0 +1,141 @@
+"""Facets from vertices and vertices from facets, by Qhull, checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import null_space
+from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
+
+from rendezvous.polytope._frame import FLAT, Frame, frame_of
+from rendezvous.polytope._incidence import MERGE, essential, together
+from rendezvous.polytope.errors import UncertainHullError
+from rendezvous.polytope.relative_interior import chebyshev_ball, relative_interior
+
+Floats = NDArray[np.float64]
+
+_OPTIONS = ("Qt", "QJ Pp")
+_APART = 1e-9
+_ROUND = 30.0
+"""Sets this many times longer than thin are intersected again in coordinates in which they are round."""
+
+
+@dataclass(frozen=True)
+class Description:
+    """Both representations: vertices; facets normals x <= offsets; the affine hull across x = level."""
+
+    vertices: Floats
+    normals: Floats
+    offsets: Floats
+    across: Floats
+    levels: Floats
+
+
+def hull_of_points(points: Floats, flat: float = FLAT) -> Description:
+    """Return both representations of the convex hull of points, shape (k, n).
+
+    Raises
+    ------
+    UncertainHullError
+        If Qhull fails, or its facets and vertices do not agree.
+    """
+    frame = frame_of(points, flat)
+    return _outward(frame, *_hull(frame.inward(points)))
+
+
+def intersection_of_halfspaces(
+    normals: Floats, offsets: Floats, across: Floats, levels: Floats, *, bounded: bool = False
+) -> Description:
+    """Return both representations of {x: normals x <= offsets, across x = levels}, which may be known to be bounded.
+
+    Raises
+    ------
+    EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
+    """
+    found = relative_interior(normals, offsets, across, levels, bounded=bounded)
+    if not found.dimension:
+        return _single(found.point)
+    corners, sides, ends = _corners(found.rows, found.limits, found.centre)
+    return _lifted(found.point, found.basis, corners, sides, ends)
+
+
+def _hull(inner: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return vertices, normals and offsets of points that span their space, about one wide."""
+    size = inner.shape[1]
+    if size == 0:
+        return np.zeros((1, 0)), np.zeros((0, 0)), np.zeros(0)
+    if size == 1:
+        ends = np.array([[inner.min()], [inner.max()]])
+        return ends, np.array([[-1.0], [1.0]]), np.array([-ends[0, 0], ends[1, 0]])
+    inner = inner[np.unique(together(inner, MERGE), return_index=True)[1]]
+    failed = UncertainHullError("Qhull was not tried")
+    for options in _OPTIONS:
+        try:
+            found = ConvexHull(inner, qhull_options=options)
+            planes = np.unique(found.equations.round(13), axis=0)
+            vertices, normals, offsets = essential(inner[found.vertices], planes[:, :-1], -planes[:, -1])
+        except QhullError as error:
+            failed = UncertainHullError(f"Qhull: {str(error).splitlines()[0]}")
+            continue
+        except UncertainHullError as error:
+            failed = error
+            continue
+        outside = float((inner @ normals.T - offsets).max())
+        if outside <= _APART:
+            return vertices, normals, offsets
+        failed = UncertainHullError(f"Qhull lost a point that is {outside:.2g} outside its hull")
+    raise failed
+
+
+def _corners(rows: Floats, limits: Floats, centre: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return vertices and facets of a bounded set with an interior."""
+    if rows.shape[1] == 1:
+        least = float((limits[rows[:, 0] < 0] / rows[rows[:, 0] < 0, 0]).max())
+        most = float((limits[rows[:, 0] > 0] / rows[rows[:, 0] > 0, 0]).min())
+        return np.array([[least], [most]]), np.array([[-1.0], [1.0]]), np.array([-least, most])
+    first = _intersect(rows, limits, centre)
+    frame = frame_of(first)
+    if frame.dimension == rows.shape[1] and frame.extents.max() > _ROUND * frame.extents.min():
+        inner_rows = (rows @ frame.basis) * frame.extents
+        inner_limits = limits - rows @ frame.centre
+        size = np.linalg.norm(inner_rows, axis=1)
+        inner_rows, inner_limits = inner_rows / size[:, None], inner_limits / size
+        inner = _intersect(inner_rows, inner_limits, chebyshev_ball(inner_rows, inner_limits)[0])
+    else:
+        scale = max(float(frame.extents.max(initial=0.0)), 1e-300)
+        frame = Frame(frame.centre, np.eye(rows.shape[1]), np.full(rows.shape[1], scale), np.zeros((rows.shape[1], 0)))
+        inner_rows, inner_limits = rows, (limits - rows @ frame.centre) / scale
+        inner = frame.inward(first)
+    points, sides, ends = essential(inner, inner_rows, inner_limits)
+    return (frame.outward(points), *frame.rows_outward(sides, ends))
+
+
+def _intersect(rows: Floats, limits: Floats, centre: Floats) -> Floats:
+    try:
+        points = HalfspaceIntersection(np.column_stack([rows, -limits]), centre).intersections
+    except QhullError as error:
+        raise UncertainHullError(f"Qhull: {str(error).splitlines()[0]}") from None
+    if not np.isfinite(points).all():
+        raise UncertainHullError("Qhull: a vertex at infinity of a bounded set")
+    return np.asarray(points)
+
+
+def _outward(frame: Frame, vertices: Floats, normals: Floats, offsets: Floats) -> Description:
+    if not frame.dimension:
+        return _single(frame.centre)
+    turned, moved = frame.rows_outward(normals, offsets)
+    across = frame.across.T
+    return Description(frame.outward(vertices), turned, moved, across, across @ frame.centre)
+
+
+def _lifted(point: Floats, basis: Floats, corners: Floats, sides: Floats, ends: Floats) -> Description:
+    turned = sides @ basis.T
+    across = null_space(basis.T).T if basis.shape[1] < len(point) else np.zeros((0, len(point)))
+    return Description(point + corners @ basis.T, turned, ends + turned @ point, across, across @ point)
+
+
+def _single(point: Floats) -> Description:
+    size = len(point)
+    return Description(point[None, :], np.zeros((0, size)), np.zeros(0), np.eye(size), point.copy())

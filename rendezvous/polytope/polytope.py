@@ -1,0 +1,255 @@
+"""A bounded convex polytope in R^n, in both representations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rendezvous.polytope._frame import FLAT, frame_of
+from rendezvous.polytope._incidence import together
+from rendezvous.polytope._qhull import Description, hull_of_points, intersection_of_halfspaces
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Polytope:
+    """A convex polytope that holds at least a point; it may be flat, a segment or a point.
+
+    Make one with `from_vertices` or `from_halfspaces`. Coordinates should be of one size: scale before, for a set that
+    is 1e9 times thinner than it is long counts as flat.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (v, n)
+        Essential ones only.
+    normals : ndarray, shape (f, n)
+        Outward, of unit length, in the directions of the affine hull.
+    offsets : ndarray, shape (f,)
+        normals x <= offsets, a row a facet.
+    across : ndarray, shape (n - dimension, n)
+        Orthonormal rows.
+    levels : ndarray, shape (n - dimension,)
+        across x = levels is the affine hull.
+    """
+
+    vertices: Floats
+    normals: Floats
+    offsets: Floats
+    across: Floats
+    levels: Floats
+
+    @classmethod
+    def from_vertices(cls, points: ArrayLike, flat: float = FLAT) -> Polytope:
+        """Return the convex hull of points.
+
+        Parameters
+        ----------
+        points : array_like, shape (k, n)
+            At least one.
+        flat : float
+            How much thinner than long a set is that counts as flat: more for points that are known to fewer digits.
+
+        Returns
+        -------
+        Polytope
+
+        Raises
+        ------
+        ValueError
+            If there is no point, or one is not finite.
+        UncertainHullError
+            If rounding has the better of the set.
+
+        Notes
+        -----
+        The affine hull first, then Qhull in coordinates of it in which the set is round, then a check that facets and
+        vertices agree. Qhull takes O(k log k) for n to 3, O(k^(n/2)) beyond at worst.
+        """
+        array = np.asarray(points, dtype=float)
+        if array.ndim != 2 or not len(array) or not array.shape[1]:
+            raise ValueError("the hull needs points as an array of shape (k, n), with k and n at least 1")
+        if not np.isfinite(array).all():
+            raise ValueError("the hull needs finite points")
+        return cls._of(hull_of_points(array, flat))
+
+    @classmethod
+    def from_halfspaces(
+        cls,
+        normals: ArrayLike,
+        offsets: ArrayLike,
+        across: ArrayLike | None = None,
+        levels: ArrayLike | None = None,
+        *,
+        bounded: bool = False,
+    ) -> Polytope:
+        """Return {x: normals x <= offsets, across x = levels}.
+
+        Parameters
+        ----------
+        normals : array_like, shape (m, n)
+        offsets : array_like, shape (m,)
+        across : array_like, shape (k, n), optional
+            Equations, if there are any.
+        levels : array_like, shape (k,), optional
+        bounded : bool
+            Whether the set is known to be bounded, which spares a linear program.
+
+        Returns
+        -------
+        Polytope
+
+        Raises
+        ------
+        ValueError
+            If shapes do not fit, or a number is not finite.
+        EmptyPolytopeError
+            If no point meets all; it says by how much the half-spaces must be relaxed.
+        UnboundedPolytopeError
+            If the set goes on without end; it says along what.
+        UncertainHullError
+            If rounding has the better of the set.
+
+        Notes
+        -----
+        Equations hidden in the half-spaces are found first, by linear programs (HiGHS); then Qhull intersects in the
+        affine hull, around the Chebyshev centre.
+        """
+        rows, limits = np.asarray(normals, dtype=float), np.asarray(offsets, dtype=float)
+        if rows.ndim != 2 or limits.shape != (len(rows),) or not rows.shape[1]:
+            raise ValueError("half-spaces need normals of shape (m, n) and offsets of shape (m,)")
+        flat = np.zeros((0, rows.shape[1])) if across is None else np.asarray(across, dtype=float)
+        heights = np.zeros(0) if levels is None else np.asarray(levels, dtype=float)
+        if flat.ndim != 2 or flat.shape[1] != rows.shape[1] or heights.shape != (len(flat),):
+            raise ValueError("equations need rows of shape (k, n) and levels of shape (k,)")
+        if not all(np.isfinite(each).all() for each in (rows, limits, flat, heights)):
+            raise ValueError("half-spaces and equations need finite numbers")
+        return cls._of(intersection_of_halfspaces(rows, limits, flat, heights, bounded=bounded))
+
+    @classmethod
+    def box(cls, lower: ArrayLike, upper: ArrayLike) -> Polytope:
+        """Return {x: lower <= x <= upper}.
+
+        Parameters
+        ----------
+        lower, upper : array_like, shape (n,)
+
+        Returns
+        -------
+        Polytope
+            Flat across the axes along which both are equal.
+
+        Raises
+        ------
+        ValueError
+            If lower exceeds upper somewhere.
+        """
+        least, most = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+        if (least > most).any():
+            raise ValueError(
+                f"the box is empty: its lower end exceeds the upper one by {float((least - most).max()):g}"
+            )
+        unit = np.eye(len(least))
+        return cls.from_halfspaces(np.vstack([unit, -unit]), np.concatenate([most, -least]), bounded=True)
+
+    @classmethod
+    def _of(cls, found: Description) -> Polytope:
+        return cls(found.vertices, found.normals, found.offsets, found.across, found.levels)
+
+    @property
+    def space(self) -> int:
+        """Dimension n of the space."""
+        return int(self.vertices.shape[1])
+
+    @property
+    def dimension(self) -> int:
+        """Dimension of the affine hull."""
+        return int(self.space - len(self.across))
+
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Least and greatest coordinates, each of shape (n,)."""
+        return self.vertices.min(axis=0), self.vertices.max(axis=0)
+
+    def essential_vertices(self, within: float = 1e-7) -> int:
+        """Return the number of vertices, those that lie together counted once.
+
+        Parameters
+        ----------
+        within : float
+            How near, in every coordinate.
+
+        Returns
+        -------
+        int
+        """
+        return int(together(self.vertices, within).max()) + 1
+
+    def support(self, directions: ArrayLike) -> Floats:
+        """Return the support function: the maximum of direction . x over the set.
+
+        Parameters
+        ----------
+        directions : array_like, shape (..., n)
+
+        Returns
+        -------
+        ndarray, shape (...)
+
+        Notes
+        -----
+        O(v n) a direction.
+        """
+        return np.asarray((np.asarray(directions, dtype=float) @ self.vertices.T).max(axis=-1))
+
+    def support_vector(self, direction: ArrayLike) -> Floats:
+        """Return a vertex that is furthest along a direction.
+
+        Parameters
+        ----------
+        direction : array_like, shape (n,)
+
+        Returns
+        -------
+        ndarray, shape (n,)
+        """
+        return np.asarray(self.vertices[int((self.vertices @ np.asarray(direction, dtype=float)).argmax())])
+
+    def excess(self, points: ArrayLike) -> Floats:
+        """Return how far points are outside: the greatest distance beyond a facet, or from the affine hull.
+
+        Parameters
+        ----------
+        points : array_like, shape (..., n)
+
+        Returns
+        -------
+        ndarray, shape (...)
+            At most 0 inside.
+        """
+        given = np.asarray(points, dtype=float)
+        beyond = (given @ self.normals.T - self.offsets).max(axis=-1, initial=-np.inf)
+        away = np.abs(given @ self.across.T - self.levels).max(axis=-1, initial=-np.inf)
+        return np.asarray(np.maximum(beyond, away))
+
+    def volume(self) -> float:
+        """Return the volume within the affine hull: of its dimension; 1 for a point.
+
+        Returns
+        -------
+        float
+
+        Notes
+        -----
+        Of Qhull's triangulation of the vertices.
+        """
+        from scipy.spatial import ConvexHull
+
+        frame = frame_of(self.vertices)
+        scale = float(np.prod(frame.extents))
+        if frame.dimension < 2:
+            return scale * 2.0 if frame.dimension else 1.0
+        return float(ConvexHull(frame.inward(self.vertices)).volume) * scale

@@ -1,0 +1,204 @@
+"""The affine hull of a set that half-spaces and equations describe, and a point deep inside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import null_space
+from scipy.optimize import linprog
+
+from rendezvous.polytope._frame import FLAT
+from rendezvous.polytope.errors import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
+
+Floats = NDArray[np.float64]
+Places = NDArray[np.int64]
+
+HIGHS = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
+
+
+@dataclass(frozen=True, eq=False)
+class RelativeInterior:
+    """{point + basis z: rows z <= limits}, of which z = centre is deep inside.
+
+    Parameters
+    ----------
+    point : ndarray, shape (n,)
+    basis : ndarray, shape (n, d)
+        Orthonormal columns.
+    rows : ndarray, shape (k, d)
+        Of unit length.
+    limits : ndarray, shape (k,)
+    kept : ndarray of int, shape (k,)
+        Which half-space each row was; the others are always tight, or do not depend on z.
+    centre : ndarray, shape (d,)
+        The Chebyshev centre.
+    radius : float
+        Of a largest ball inside.
+    """
+
+    point: Floats
+    basis: Floats
+    rows: Floats
+    limits: Floats
+    kept: Places
+    centre: Floats
+    radius: float
+
+    @property
+    def dimension(self) -> int:
+        """Dimension d of the affine hull."""
+        return int(self.basis.shape[1])
+
+
+def relative_interior(
+    normals: Floats, offsets: Floats, across: Floats, levels: Floats, *, bounded: bool = False
+) -> RelativeInterior:
+    """Find the affine hull of {x: normals x <= offsets, across x = levels}.
+
+    Parameters
+    ----------
+    normals : ndarray, shape (m, n)
+    offsets : ndarray, shape (m,)
+    across : ndarray, shape (e, n)
+    levels : ndarray, shape (e,)
+    bounded : bool
+        Whether the set is known to be bounded, which spares a linear program.
+
+    Returns
+    -------
+    RelativeInterior
+
+    Raises
+    ------
+    EmptyPolytopeError
+        If no point meets all.
+    UnboundedPolytopeError
+        If the set goes on without end.
+
+    Notes
+    -----
+    Equations hidden among the half-spaces show themselves by a largest ball of no radius; linear programs (HiGHS) then
+    tell which rows no point can leave. A set is flat where it is thinner than 1e-9 of its width.
+    """
+    lengths = np.linalg.norm(normals, axis=1)
+    void = np.flatnonzero((lengths == 0.0) & (offsets < 0.0))
+    if len(void):
+        raise EmptyPolytopeError(float(-offsets[void].min()), void)
+    used = np.flatnonzero(lengths > 0.0)
+    normals, offsets = normals[used] / lengths[used, None], offsets[used] / lengths[used]
+    for _ in range(len(normals) + 1):
+        point, basis = solutions(across, levels)
+        slack = FLAT * max(1.0, float(np.abs(point).max(initial=0.0)))
+        rows, limits = normals @ basis, offsets - normals @ point
+        size = np.linalg.norm(rows, axis=1)
+        kept = np.flatnonzero(size > FLAT)
+        worst = float(np.delete(limits, kept).min(initial=np.inf))
+        if worst < -slack:
+            raise EmptyPolytopeError(-worst, used[np.flatnonzero((size <= FLAT) & (limits < -slack))])
+        if not basis.shape[1]:
+            return RelativeInterior(point, basis, rows[:0], limits[:0], used[:0], np.zeros(0), 0.0)
+        rows, limits = rows[kept] / size[kept, None], limits[kept] / size[kept]
+        if not bounded:
+            _need_bounded(rows, basis)
+        centre, radius = chebyshev_ball(rows, limits)
+        width = max(float(np.abs(limits - rows @ centre).max()), float(np.abs(centre).max()), 1e-300)
+        if radius < -FLAT * width:
+            raise EmptyPolytopeError(-radius)
+        if radius > FLAT * width:
+            return RelativeInterior(point, basis, rows, limits, used[kept], centre, radius)
+        tight = _always_tight(rows, limits, FLAT * width)
+        turned = rows[tight] @ basis.T
+        across = np.vstack([across, turned])
+        levels = np.concatenate([levels, limits[tight] + turned @ point])
+    raise UncertainHullError("the affine hull was not found")  # pragma: no cover - each pass lowers the dimension
+
+
+def chebyshev_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
+    """Return the centre and radius of a largest ball in {z: rows z <= limits}.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (k, d)
+        Of unit length.
+    limits : ndarray, shape (k,)
+
+    Returns
+    -------
+    centre : ndarray, shape (d,)
+    radius : float
+        Negative where the set is empty: by so much the rows must be relaxed.
+
+    Notes
+    -----
+    A linear program (HiGHS).
+    """
+    size = rows.shape[1]
+    matrix = np.column_stack([rows, np.ones(len(rows))])
+    cost = np.zeros(size + 1)
+    cost[-1] = -1.0
+    found = linprog(cost, A_ub=matrix, b_ub=limits, bounds=(None, None), method="highs", options=HIGHS)
+    if found.status != 0:
+        raise UncertainHullError(f"the Chebyshev centre was not found: {found.message}")
+    return found.x[:-1], float(found.x[-1])
+
+
+def solutions(across: Floats, levels: Floats) -> tuple[Floats, Floats]:
+    """Return all solutions of equations, which may depend on each other.
+
+    Parameters
+    ----------
+    across : ndarray, shape (e, n)
+    levels : ndarray, shape (e,)
+
+    Returns
+    -------
+    point : ndarray, shape (n,)
+        The solution of least norm.
+    basis : ndarray, shape (n, d)
+        An orthonormal basis of the directions they leave free.
+
+    Raises
+    ------
+    EmptyPolytopeError
+        If they contradict each other.
+    """
+    if not len(across):
+        return np.zeros(across.shape[1]), np.eye(across.shape[1])
+    point = np.linalg.lstsq(across, levels, rcond=FLAT)[0]
+    misfit = float(np.abs(across @ point - levels).max())
+    if misfit > 1e2 * FLAT * max(1.0, float(np.abs(levels).max())):
+        raise EmptyPolytopeError(misfit)
+    return np.asarray(point, dtype=np.float64), np.asarray(null_space(across, rcond=FLAT))
+
+
+def _need_bounded(rows: Floats, basis: Floats) -> None:
+    """Refuse a set with a direction of recession: rows d <= 0 without d = 0."""
+    if np.linalg.matrix_rank(rows, tol=FLAT) < rows.shape[1]:
+        raise UnboundedPolytopeError(basis @ null_space(rows, rcond=FLAT)[:, 0])
+    found = linprog(rows.sum(axis=0), A_ub=rows, b_ub=np.zeros(len(rows)), bounds=(-1.0, 1.0), method="highs")
+    if found.status == 0 and found.fun < -1e-6:
+        raise UnboundedPolytopeError(basis @ found.x / np.linalg.norm(found.x))
+
+
+def _always_tight(rows: Floats, limits: Floats, tolerance: float) -> Places:
+    """Return the rows that every point meets with equality."""
+    loose = np.zeros(len(rows), dtype=bool)
+    size = rows.shape[1]
+    while not loose.all():
+        left = np.flatnonzero(~loose)
+        slack = np.zeros((len(rows), len(left)))
+        slack[left, np.arange(len(left))] = 1.0
+        cost = np.concatenate([np.zeros(size), -np.ones(len(left))])
+        bounds = [(None, None)] * size + [(0.0, 1.0)] * len(left)
+        found = linprog(
+            cost, A_ub=np.hstack([rows, slack]), b_ub=limits + tolerance, bounds=bounds, method="highs", options=HIGHS
+        )
+        if found.status != 0:
+            raise UncertainHullError(f"the affine hull was not found: {found.message}")
+        new = left[found.x[size:] > 30.0 * tolerance]
+        if not len(new):
+            return left
+        loose[new] = True
+    raise UncertainHullError("a thin set without a row that is always tight")

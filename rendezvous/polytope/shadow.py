@@ -1,0 +1,72 @@
+"""A polytope in few dimensions from its support function alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rendezvous.polytope.polytope import Polytope
+
+Floats = NDArray[np.float64]
+
+_MOST_ROUNDS = 200
+_FLAT = 1e-7
+
+
+def shadow(
+    furthest: Callable[[Floats], Floats], space: int, tolerance: float = 1e-9, most_facets: int = 10_000
+) -> Polytope:
+    """Return the polytope whose support vectors are known: a projection of one that is known only by programs over it.
+
+    Parameters
+    ----------
+    furthest : callable
+        Takes a direction, shape (space,), and returns a point of the set furthest along it, shape (space,).
+    space : int
+        2 or 3; more works but grows fast.
+    tolerance : float
+        By how much, relative to its size, a facet found may be short of the set.
+    most_facets : int
+        Where to give up.
+
+    Returns
+    -------
+    Polytope
+        Its vertices are points of the set; its facets are supported to within the tolerance.
+
+    Raises
+    ------
+    ArithmeticError
+        If it has too many facets.
+
+    Notes
+    -----
+    The hull of the points known is widened: each facet (and each direction across it, where it is flat) that the set
+    goes beyond gives a new point. It ends when none does, after a program a facet and a vertex: exact, for a polytope.
+    """
+    unit = np.eye(space)
+    points = np.array([furthest(each) for each in np.vstack([unit, -unit])])
+    known: set[tuple[float, ...]] = set()
+    for _ in range(_MOST_ROUNDS):
+        hull = Polytope.from_vertices(points, _FLAT)
+        size = max(float(np.ptp(points, axis=0).max()), 1e-12 * float(np.abs(points).max()))
+        rows = np.vstack([hull.normals, hull.across, -hull.across])
+        limits = np.concatenate([hull.offsets, hull.levels, -hull.levels])
+        if len(rows) > most_facets:
+            raise ArithmeticError(f"the projection has over {most_facets} facets")
+        new = []
+        for row, limit in zip(rows, limits, strict=True):
+            key = tuple((row + 0.0).round(10))
+            if key in known:
+                continue
+            point = furthest(row)
+            if row @ point > limit + tolerance * size:
+                new.append(point)
+            else:
+                known.add(key)
+        if not new:
+            return hull
+        points = np.vstack([hull.vertices, new])
+    raise ArithmeticError("the projection did not end")

@@ -1,0 +1,220 @@
+"""The same sets in exact rational arithmetic, to check the others against; needs the extra `exact` (pplpy)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from math import lcm
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rendezvous.reachability.blocks import Block
+
+if TYPE_CHECKING:
+    import ppl
+
+Floats = NDArray[np.float64]
+Rationals = list[Fraction]
+
+
+@dataclass(frozen=True, eq=False)
+class RationalSet:
+    """A polytope in exact rationals, of which floats are told.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (v, n)
+        Rounded once.
+    facets : int
+        Number of inequalities that are not redundant.
+    dimension : int
+        Of the affine hull.
+    bounds : ndarray, shape (n, 2)
+        Least and greatest coordinates, rounded once.
+    """
+
+    vertices: Floats
+    facets: int
+    dimension: int
+    bounds: Floats
+
+
+def rational_hull(points: Floats) -> RationalSet:
+    """Return the convex hull of points, exactly.
+
+    Parameters
+    ----------
+    points : ndarray, shape (k, n)
+        Floats, taken as the rationals they are.
+
+    Returns
+    -------
+    RationalSet
+
+    Raises
+    ------
+    ModuleNotFoundError
+        Without the extra `exact`.
+
+    Notes
+    -----
+    The Parma Polyhedra Library's double description.
+    """
+    import ppl
+
+    system = ppl.Generator_System()
+    for point in points:
+        numerators, divisor = _whole([Fraction(float(each)) for each in point])
+        system.insert(ppl.point(_expression(numerators), divisor))
+    return _told(ppl.C_Polyhedron(system), points.shape[1])
+
+
+def rational_intersection(normals: Floats, offsets: Floats) -> RationalSet:
+    """Return {x: normals x <= offsets}, exactly.
+
+    Parameters
+    ----------
+    normals : ndarray, shape (m, n)
+    offsets : ndarray, shape (m,)
+
+    Returns
+    -------
+    RationalSet
+
+    Raises
+    ------
+    ModuleNotFoundError
+        Without the extra `exact`.
+    """
+    import ppl
+
+    found = ppl.C_Polyhedron(normals.shape[1], "universe")
+    _cut(found, normals, offsets, range(normals.shape[1]))
+    return _told(found, normals.shape[1])
+
+
+def rational_sets(block: Block, target: Floats | None = None) -> tuple[list[RationalSet], list[RationalSet]]:
+    """Return the forward sets of a block and its tube to a terminal state, exactly.
+
+    Parameters
+    ----------
+    block : Block
+        With thrust in a box and constraints at whole periods; its floats are taken as the rationals they are.
+    target : ndarray, shape (n,), optional
+        The terminal state; zero by default.
+
+    Returns
+    -------
+    forward, tube : list of RationalSet
+        At t = 0..T.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        Without the extra `exact`.
+
+    Notes
+    -----
+    Forward: states, controls and next states as one polyhedron, projected on the last. Backward: projected on the
+    first. No inverse of A, no rounding; numbers grow by some 50 binary digits a period.
+    """
+    import ppl
+
+    size, group = block.size, len(block.controls)
+    aim = np.zeros(size) if target is None else target
+    current = ppl.C_Polyhedron(size, "universe")
+    _fix(current, block.initial, range(size))
+    forward = [current]
+    for t in range(block.periods):
+        step = _step(block, t, before=size, after=0)
+        step.intersection_assign(_widened(forward[t], size, group))
+        step.remove_higher_space_dimensions(size)
+        _cut(step, block.normals, block.offsets[t + 1], range(size))
+        forward.append(step)
+    backward = ppl.C_Polyhedron(size, "universe")
+    _fix(backward, aim, range(size))
+    tube = [ppl.C_Polyhedron(backward)]
+    for t in range(block.periods - 1, -1, -1):
+        step = _step(block, t, before=0, after=size + group)
+        step.intersection_assign(_widened(backward, size + group, 0))
+        step.remove_higher_space_dimensions(size)
+        _cut(step, block.normals, block.offsets[t], range(size))
+        backward = step
+        both = ppl.C_Polyhedron(step)
+        both.intersection_assign(forward[t])
+        tube.append(both)
+    return [_told(each, size) for each in forward], [_told(each, size) for each in reversed(tube)]
+
+
+def _step(block: Block, period: int, before: int, after: int) -> ppl.C_Polyhedron:
+    """States (their first place: before), controls and next states (after) of a period, states unconstrained."""
+    import ppl
+
+    size, group = block.size, len(block.controls)
+    found = ppl.C_Polyhedron(2 * size + group, "universe")
+    for j in range(group):
+        found.add_constraint(ppl.Variable(before + size + j) <= 1)
+        found.add_constraint(ppl.Variable(before + size + j) >= -1)
+    for i in range(size):
+        row = np.concatenate([block.transition[period, i], block.control[period, i]])
+        numerators, divisor = _whole([Fraction(float(each)) for each in row])
+        found.add_constraint(divisor * ppl.Variable(after + i) == _expression(numerators, before))
+    return found
+
+
+def _widened(given: ppl.C_Polyhedron, before: int, after: int) -> ppl.C_Polyhedron:
+    """The same set with more, free coordinates before and after its own."""
+    import ppl
+
+    found = ppl.C_Polyhedron(before, "universe")
+    found.concatenate_assign(given)
+    found.add_space_dimensions_and_embed(after)
+    return found
+
+
+def _cut(polyhedron: ppl.C_Polyhedron, normals: Floats, offsets: Floats, places: range) -> None:
+    import ppl
+
+    for normal, offset in zip(normals, offsets, strict=True):
+        if np.isfinite(offset):
+            numerators, _ = _whole([Fraction(float(each)) for each in (*normal, offset)])
+            total = sum((n * ppl.Variable(place) for n, place in zip(numerators, places, strict=False)), start=0)
+            polyhedron.add_constraint(total <= numerators[-1])
+
+
+def _fix(polyhedron: ppl.C_Polyhedron, state: Floats, places: range) -> None:
+    import ppl
+
+    for value, place in zip(state, places, strict=True):
+        exact = Fraction(float(value))
+        polyhedron.add_constraint(exact.denominator * ppl.Variable(place) == exact.numerator)
+
+
+def _told(polyhedron: ppl.C_Polyhedron, size: int) -> RationalSet:
+    import ppl
+
+    if polyhedron.is_empty():
+        return RationalSet(np.zeros((0, size)), 0, -1, np.zeros((size, 2)))
+    points = [
+        [Fraction(int(each.coefficient(ppl.Variable(i))), int(each.divisor())) for i in range(size)]
+        for each in polyhedron.minimized_generators()
+    ]
+    facets = sum(1 for each in polyhedron.minimized_constraints() if each.is_inequality())
+    vertices = np.array([[float(each) for each in point] for point in points])
+    bounds = np.stack([vertices.min(axis=0), vertices.max(axis=0)], axis=-1)
+    return RationalSet(vertices, facets, int(polyhedron.affine_dimension()), bounds)
+
+
+def _whole(values: Rationals) -> tuple[list[int], int]:
+    """Numerators over a common denominator."""
+    divisor = lcm(*(each.denominator for each in values))
+    return [int(each * divisor) for each in values], divisor
+
+
+def _expression(numerators: list[int], first: int = 0) -> ppl.Linear_Expression:
+    import ppl
+
+    terms = (n * ppl.Variable(first + place) for place, n in enumerate(numerators))
+    return sum(terms, start=ppl.Linear_Expression(0))
