@@ -333,10 +333,10 @@ def _killed_at_random_moments(file: Path, folder: Path, runs: int, kills: int, s
             # Past the start of Python most moments are in the flight: wait for the first new shard, then at random.
             deadline = time.monotonic() + 60.0
             while process.poll() is None and time.monotonic() < deadline:
-                if chance.random() < 0.002 or (shards.is_dir() and len(list(shards.glob("*.parquet"))) > before):
+                if chance.random() < 0.0004 or (shards.is_dir() and len(list(shards.glob("*.parquet"))) > before):
                     break
                 time.sleep(0.005)
-            time.sleep(chance.uniform(0.0, 0.25))
+            time.sleep(chance.uniform(0.0, 0.5))
             process.send_signal(signal.SIGKILL)
             process.wait()
         if (folder / "manifest.json").exists():
