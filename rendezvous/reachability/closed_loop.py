@@ -53,7 +53,9 @@ class Flight:
         return float(np.linalg.norm(self.states[-1]))
 
 
-def replan(problem: ReachabilityProblem, truth: Truth, observe: Observer | None = None) -> Flight:
+def replan(
+    problem: ReachabilityProblem, truth: Truth, observe: Observer | None = None, *, relative: bool = False
+) -> Flight:
     """Fly a problem with a new plan every period: of all optimal controls the one of least energy.
 
     Parameters
@@ -63,6 +65,9 @@ def replan(problem: ReachabilityProblem, truth: Truth, observe: Observer | None 
     truth : callable
     observe : callable or None
         None sees the true state.
+    relative : bool
+        Whether plans that cannot reach zero, as those of the last period, minimise the norm of states divided by their
+        bounds, and not in the units of the problem.
 
     Returns
     -------
@@ -77,7 +82,7 @@ def replan(problem: ReachabilityProblem, truth: Truth, observe: Observer | None 
     states, controls, misses, relaxations = [state], [], [], []
     for t in range(problem.periods):
         believed = state if observe is None else observe(t, state)
-        optimal, relaxation = _plan(problem, t, believed)
+        optimal, relaxation = _plan(problem, t, believed, relative)
         control = minimum_energy(optimal)[0]
         state = truth(t, state, control)
         states.append(state)
@@ -106,13 +111,15 @@ def relaxed(problem: ReachabilityProblem, fraction: float) -> ReachabilityProble
     return replace(problem, state_bounds=problem.state_bounds * (1.0 + fraction), offsets=offsets)
 
 
-def _plan(problem: ReachabilityProblem, start: int, believed: Floats) -> tuple[OptimalControls, float]:
+def _plan(problem: ReachabilityProblem, start: int, believed: Floats, relative: bool) -> tuple[OptimalControls, float]:
     fraction = 0.0
     while True:
         wider = relaxed(problem, fraction) if fraction else problem
         try:
             rest = wider.rest(start, believed)
-            return OptimalControls(rest, tuple(block_optimum(each) for each in split(rest))), fraction
+            return OptimalControls(
+                rest, tuple(block_optimum(each, relative=relative) for each in split(rest))
+            ), fraction
         except InadmissibleStartError as error:
             sizes = [*problem.state_bounds]
             if problem.normals is not None:

@@ -82,7 +82,7 @@ class Meter:
     def _check(self, count: int, size: int) -> None:
         power = max(1.0, size / 2.0)
         last_count, last_s, facets = self._last.get(size, (1000, 0.02 * 4.0 ** (size - 2), 50 * 4 ** (size - 2)))
-        growth = max(1.0, count / last_count) ** power
+        growth = (count / last_count) ** power
         expected_s = perf_counter() - self._began_s + growth * last_s
         expected_mb = 1e-6 * growth * facets * (8.0 * count + 4.0 * growth * facets)
         if expected_s > self.budget.seconds:

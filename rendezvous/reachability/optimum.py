@@ -74,12 +74,14 @@ class BlockOptimum:
         return float(np.linalg.norm(self.terminal * self.block.scale))
 
 
-def block_optimum(block: Block) -> BlockOptimum:
+def block_optimum(block: Block, *, relative: bool = False) -> BlockOptimum:
     """Find the least terminal norm of a block, and all controls that reach it.
 
     Parameters
     ----------
     block : Block
+    relative : bool
+        Whether the norm is of states divided by their bounds, and not in the units of the problem.
 
     Returns
     -------
@@ -102,7 +104,7 @@ def block_optimum(block: Block) -> BlockOptimum:
     if reaches_zero(lifted):
         terminal = lifted.where(lifted.response[-1], -lifted.free[-1])
         return _with_hull(block, lifted, np.zeros(block.size), True, terminal)
-    weights = block.scale / block.scale.max()
+    weights = np.ones(block.size) if relative else block.scale / block.scale.max()
     response, free = weights[:, None] * lifted.response[-1], weights * lifted.free[-1]
     found = Optimum(np.zeros(lifted.size), np.zeros(0))
     size = 1.0

@@ -1,0 +1,251 @@
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from rendezvous.polytope import (
+    EmptyPolytopeError,
+    Polytope,
+    UnboundedPolytopeError,
+    cut,
+    intersection,
+    linear_image,
+    minkowski_sum,
+    product,
+    projection,
+    shadow,
+)
+from rendezvous.reachability.exact_check import rational_hull, rational_intersection
+
+Floats = NDArray[np.float64]
+
+
+def random_points(seed: int, count: int, size: int, rank: int) -> Floats:
+    """Points that span `rank` dimensions of R^size, each direction of another length."""
+    generator = np.random.default_rng(seed)
+    spread = generator.standard_normal((count, rank)) * 10.0 ** generator.uniform(-2, 2, rank)
+    turn = np.linalg.qr(generator.standard_normal((size, size)))[0]
+    return np.asarray(spread @ turn[:rank] + generator.standard_normal(size))
+
+
+def directions(seed: int, size: int, count: int = 50) -> Floats:
+    found = np.random.default_rng(seed).standard_normal((count, size))
+    return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 6])
+def test_box(size: int) -> None:
+    box = Polytope.box(-np.arange(1.0, size + 1), np.arange(1.0, size + 1))
+    assert (len(box.vertices), len(box.normals), box.dimension) == (2**size, 2 * size, size)
+    assert box.volume() == pytest.approx(np.prod(2.0 * np.arange(1, size + 1)), rel=1e-12)
+    np.testing.assert_allclose(box.support(np.eye(size)), np.arange(1.0, size + 1), rtol=1e-13)
+    assert box.excess(np.zeros(size)) == pytest.approx(-1.0)
+    assert box.excess(2.0 * box.vertices[0]) == pytest.approx(size)
+
+
+def test_flat_box_point_and_segment() -> None:
+    flat = Polytope.box([0.0, 1.0, 2.0], [1.0, 1.0, 4.0])
+    assert (len(flat.vertices), len(flat.normals), flat.dimension, flat.space) == (4, 4, 2, 3)
+    assert flat.volume() == pytest.approx(2.0)
+    assert flat.excess([0.5, 1.1, 3.0]) == pytest.approx(0.1)
+    point = Polytope.from_vertices([[1.0, 2.0]])
+    assert (point.dimension, point.volume(), len(point.normals)) == (0, 1.0, 0)
+    segment = Polytope.from_vertices([[0.0, 0.0], [3.0, 4.0], [1.5, 2.0]])
+    assert (segment.dimension, len(segment.vertices), len(segment.normals)) == (1, 2, 2)
+    assert segment.volume() == pytest.approx(5.0)
+
+
+def test_cross_polytope_and_simplex_counts() -> None:
+    for size in (2, 3, 4, 5):
+        cross = Polytope.from_vertices(np.vstack([np.eye(size), -np.eye(size)]))
+        assert (len(cross.vertices), len(cross.normals)) == (2 * size, 2**size)
+        simplex = Polytope.from_halfspaces(np.vstack([-np.eye(size), np.ones((1, size))]), [*[0.0] * size, 1.0])
+        assert (len(simplex.vertices), len(simplex.normals)) == (size + 1, size + 1)
+        assert simplex.volume() == pytest.approx(1.0 / np.prod(np.arange(1, size + 1)))
+
+
+def test_redundant_points_and_halfspaces_are_dropped() -> None:
+    grid = np.array(list(itertools.product([0.0, 0.5, 1.0], repeat=3)))
+    cube = Polytope.from_vertices(np.vstack([grid, grid]))
+    assert (len(cube.vertices), len(cube.normals)) == (8, 6)
+    rows = np.vstack([np.eye(3), -np.eye(3), np.ones((1, 3)), np.eye(3)])
+    again = Polytope.from_halfspaces(rows, [1, 1, 1, 0, 0, 0, 3, 1, 5, 1])
+    assert (len(again.vertices), len(again.normals)) == (8, 6)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), size=st.integers(2, 6), flat=st.integers(0, 3), extra=st.integers(1, 8))
+def test_hull_is_the_exact_one(seed: int, size: int, flat: int, extra: int) -> None:
+    rank = max(1, size - flat)
+    points = random_points(seed, rank + extra, size, rank)
+    hull = Polytope.from_vertices(points)
+    assert hull.dimension == rank
+    # Every point is inside, every vertex is a point, and supports are those of the points.
+    assert float(hull.excess(points).max()) < 1e-9 * np.abs(points).max()
+    found = directions(seed, size)
+    np.testing.assert_allclose(hull.support(found), (points @ found.T).max(axis=0), atol=1e-9 * np.abs(points).max())
+    if rank == size:  # floats that are flat to rounding only are not flat in rationals
+        exact = rational_hull(points)
+        assert (len(hull.vertices), len(hull.normals)) == (len(exact.vertices), exact.facets)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6), size=st.integers(2, 6), rank=st.integers(1, 5), extra=st.integers(1, 6))
+def test_flat_hull_is_the_exact_one(seed: int, size: int, rank: int, extra: int) -> None:
+    generator = np.random.default_rng(seed)
+    rank = min(rank, size)
+    points = (generator.integers(-9, 10, (rank + extra, rank)) @ generator.integers(-9, 10, (rank, size))).astype(float)
+    exact, hull = rational_hull(points), Polytope.from_vertices(points)
+    facets = 0 if hull.dimension == 0 else len(hull.normals)
+    assert (hull.dimension, len(hull.vertices), facets) == (exact.dimension, len(exact.vertices), exact.facets)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), size=st.integers(2, 5), count=st.integers(1, 8))
+def test_intersection_is_the_exact_one(seed: int, size: int, count: int) -> None:
+    generator = np.random.default_rng(seed)
+    rows = np.vstack([np.eye(size), -np.eye(size), generator.standard_normal((count, size))])
+    limits = np.concatenate([np.ones(2 * size), generator.uniform(0.05, 1.0, count)])
+    found = Polytope.from_halfspaces(rows, limits)
+    exact = rational_intersection(rows, limits)
+    assert (len(found.vertices), len(found.normals)) == (len(exact.vertices), exact.facets)
+    np.testing.assert_allclose(np.stack(found.bounds, axis=-1), exact.bounds, atol=1e-9)
+    again = Polytope.from_vertices(found.vertices)
+    assert (len(again.vertices), len(again.normals)) == (len(found.vertices), len(found.normals))
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6), size=st.integers(2, 4), rank=st.integers(1, 4))
+def test_supports_of_operations(seed: int, size: int, rank: int) -> None:
+    first = Polytope.from_vertices(random_points(seed, 8, size, min(rank, size)))
+    second = Polytope.from_vertices(random_points(seed + 1, 6, size, size))
+    found = directions(seed, size)
+    width = np.abs(first.vertices).max() + np.abs(second.vertices).max()
+    np.testing.assert_allclose(
+        minkowski_sum(first, second).support(found), first.support(found) + second.support(found), atol=1e-9 * width
+    )
+    matrix = np.random.default_rng(seed).standard_normal((3, size))
+    seen = directions(seed, 3)
+    image = linear_image(first, matrix, np.ones(3))
+    np.testing.assert_allclose(image.support(seen), first.support(seen @ matrix) + seen.sum(axis=1), atol=1e-8 * width)
+    axes = [0, size - 1]
+    shade = projection(second, axes)
+    wide = np.zeros((50, size))
+    wide[:, axes] = directions(seed, 2)
+    np.testing.assert_allclose(shade.support(wide[:, axes]), second.support(wide), atol=1e-9 * width)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6), size=st.integers(2, 4))
+def test_intersection_holds_what_both_hold(seed: int, size: int) -> None:
+    first = Polytope.from_vertices(random_points(seed, 10, size, size) - 0.0)
+    middle = first.vertices.mean(axis=0)
+    second = Polytope.from_vertices(first.vertices[::-1] * 0.7 + 0.3 * middle + 0.01 * np.ones(size))
+    assume(float(second.excess(middle)) < 0.0 and float(first.excess(middle)) < 0.0)
+    both = intersection(first, second)
+    width = float(np.abs(first.vertices).max())
+    assert float(first.excess(both.vertices).max()) < 1e-9 * width
+    assert float(second.excess(both.vertices).max()) < 1e-9 * width
+    inside = np.random.default_rng(seed).dirichlet(np.ones(len(both.vertices)), 20) @ both.vertices
+    assert float(both.excess(inside).max()) < 1e-9 * width
+
+
+def test_flat_sets_meet_in_flat_sets() -> None:
+    square = Polytope.box([-1.0, -1.0, 0.0], [1.0, 1.0, 0.0])
+    other = Polytope.box([0.0, -1.0, -1.0], [0.0, 1.0, 1.0])
+    line = intersection(square, other)
+    assert (line.dimension, len(line.vertices)) == (1, 2)
+    cube = Polytope.box([0.0, 0.0, 0.0], [1.0, 1.0, 1.0])
+    touching = Polytope.box([1.0, 0.0, 0.0], [2.0, 1.0, 1.0])
+    face = intersection(cube, touching)  # equations hidden in half-spaces
+    assert (face.dimension, len(face.vertices)) == (2, 4)
+    corner = intersection(cube, Polytope.box([1.0, 1.0, 1.0], [2.0, 2.0, 2.0]))
+    assert corner.dimension == 0
+    np.testing.assert_allclose(corner.vertices, [[1.0, 1.0, 1.0]], atol=1e-12)
+
+
+def test_nearly_parallel_facets_are_told_apart() -> None:
+    # A corner cut off by a plane that turns by little: each vertex is a real one.
+    rows = np.array([[1.0, 0.0], [1.0, 1e-6], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    found = Polytope.from_halfspaces(rows, [1.0, 1.0, 1.0, 1.0, 1.0])
+    assert (len(found.vertices), len(found.normals)) == (5, 5)
+
+
+def test_cut_and_product() -> None:
+    cube = Polytope.box([-1.0] * 3, [1.0] * 3)
+    half = cut(cube, [[1.0, 0.0, 0.0]], [0.0])
+    assert half.volume() == pytest.approx(4.0)
+    assert cut(cube, [[1.0, 1.0, 1.0]], [5.0]) is cube
+    with pytest.raises(EmptyPolytopeError):
+        cut(cube, [[1.0, 0.0, 0.0]], [-2.0])
+    both = product(Polytope.box([0.0], [1.0]), Polytope.from_vertices([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+    assert (len(both.vertices), len(both.normals)) == (6, 5)
+    assert both.volume() == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("size", [2, 3])
+def test_shadow_by_supports_is_the_projection(size: int) -> None:
+    solid = Polytope.from_vertices(random_points(3, 30, 5, 5))
+
+    def furthest(direction: Floats) -> Floats:
+        return solid.support_vector(np.concatenate([direction, np.zeros(5 - size)]))[:size]
+
+    found, expected = shadow(furthest, size), projection(solid, range(size))
+    assert (len(found.vertices), len(found.normals)) == (len(expected.vertices), len(expected.normals))
+    seen = directions(1, size)
+    np.testing.assert_allclose(found.support(seen), expected.support(seen), atol=1e-9 * np.abs(solid.vertices).max())
+
+
+def test_shadow_of_a_flat_set_and_of_one_with_too_many_facets() -> None:
+    flat = Polytope.from_vertices([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]])
+    assert shadow(flat.support_vector, 3).dimension == 2
+    with pytest.raises(ArithmeticError, match="over 20 facets"):
+        shadow(lambda direction: direction / np.linalg.norm(direction), 2, most_facets=20)
+
+
+def test_empty_says_by_how_much() -> None:
+    with pytest.raises(EmptyPolytopeError, match=r"relaxed by 0\.25") as caught:
+        Polytope.from_halfspaces([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [-0.5, 0.0, 1.0, 1.0])
+    assert caught.value.relaxation == pytest.approx(0.25)
+    with pytest.raises(EmptyPolytopeError):
+        Polytope.from_halfspaces([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [-1.0, 1, 1, 1, 1])
+    with pytest.raises(EmptyPolytopeError):
+        Polytope.from_halfspaces(np.vstack([np.eye(2), -np.eye(2)]), np.ones(4), [[1.0, 0.0], [1.0, 0.0]], [0.0, 0.5])
+
+
+def test_unbounded_says_along_what() -> None:
+    with pytest.raises(UnboundedPolytopeError, match="along") as caught:
+        Polytope.from_halfspaces([[1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [1.0, 1.0, 1.0])
+    assert caught.value.direction @ [1.0, 0.0] < -0.9
+    with pytest.raises(UnboundedPolytopeError):
+        Polytope.from_halfspaces([[1.0, 0.0], [-1.0, 0.0]], [1.0, 1.0])
+    with pytest.raises(UnboundedPolytopeError):
+        Polytope.from_halfspaces([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], [0.0, 0.0], [[0.0, 1.0, 0.0]], [0.0])
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Polytope.from_vertices(np.zeros((0, 2))),
+        lambda: Polytope.from_vertices([[np.nan, 0.0]]),
+        lambda: Polytope.from_halfspaces([[1.0, 0.0]], [1.0, 2.0]),
+        lambda: Polytope.from_halfspaces([[np.inf, 0.0]], [1.0]),
+        lambda: Polytope.from_halfspaces([[1.0, 0.0]], [1.0], [[1.0]], [1.0]),
+        lambda: Polytope.box([1.0], [0.0]),
+    ],
+)
+def test_what_is_no_polytope_is_refused(make: object) -> None:
+    assert callable(make)
+    with pytest.raises(ValueError, match=r"hull needs|half-spaces|equations|box is empty"):
+        make()
+
+
+def test_vertices_that_lie_together_count_once() -> None:
+    near = Polytope.from_vertices([[0.0, 0.0], [1.0, 0.0], [1.0, 1e-8], [0.0, 1.0]])
+    assert len(near.vertices) == 4
+    assert near.essential_vertices() == 3

@@ -1,0 +1,71 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rendezvous.reachability import MotionModel, NonlinearMotion, ReachabilityProblem, replan
+from rendezvous.reachability.closed_loop import relaxed
+from rendezvous.relative_motion import EllipticOrbit
+
+Floats = NDArray[np.float64]
+Paper = Callable[..., ReachabilityProblem]
+
+
+@pytest.fixture
+def truth(orbit: EllipticOrbit) -> Callable[[int, Floats, Floats], Floats]:
+    motion = NonlinearMotion(orbit, 1e7)
+
+    def fly(period: int, state: Floats, control: Floats) -> Floats:
+        return np.asarray(motion.paths(180.0 * period, state, 0.15 * control, [180.0 * (period + 1)])[0, 0])
+
+    return fly
+
+
+@pytest.mark.parametrize(
+    ("model", "relative", "plain"), [(MotionModel.TIME_VARYING, 0.00577, 0.000185), (MotionModel.FROZEN, 2.825, 1.266)]
+)
+def test_replanning_on_the_nonlinear_truth(
+    paper: Paper, truth: Callable[[int, Floats, Floats], Floats], model: MotionModel, relative: float, plain: float
+) -> None:
+    problem = paper(model)
+    # The published figures are of plans whose last period minimises states divided by their bounds.
+    assert replan(problem, truth, relative=True).miss == pytest.approx(relative, rel=1e-3)
+    flight = replan(problem, truth)
+    assert flight.miss < plain
+    np.testing.assert_array_equal(flight.relaxations, 0.0)
+    np.testing.assert_allclose(flight.expected_misses[:3], 0.0)
+    assert flight.expected_misses[3] > 0.0
+    assert flight.states.shape == (5, 6)
+    assert flight.controls.shape == (4, 3)
+
+
+def test_on_its_own_model_replanning_keeps_the_first_plan(paper: Paper) -> None:
+    problem = paper()
+    own = replan(problem, lambda t, state, control: problem.transition[t] @ state + problem.control[t] @ control)
+    assert own.miss < 1e-9
+    assert (own.controls**2).sum() == pytest.approx(0.14323052820, abs=1e-9)
+
+
+def test_noise_is_flown_through_with_bounds_relaxed_where_they_must_be(
+    paper: Paper, truth: Callable[[int, Floats, Floats], Floats]
+) -> None:
+    generator = np.random.default_rng(3)
+    noise = np.array([1.0] * 3 + [0.01] * 3)
+    flight = replan(
+        paper(MotionModel.TIME_VARYING), truth, lambda _, state: state + noise * generator.standard_normal(6)
+    )
+    assert 0.01 < flight.miss < 50.0
+    assert (flight.relaxations >= 0.0).all()
+    # A state far outside is brought back, with a plan for bounds wide enough.
+    problem = paper()
+    kicked = replan(problem, lambda t, state, _: state + (400.0 if t == 0 else 0.0) * np.eye(6)[0])
+    assert kicked.relaxations[0] == 0.0
+    assert kicked.relaxations[1] > 0.0
+
+
+def test_relaxed_bounds(paper: Paper) -> None:
+    wider = relaxed(paper(), 0.1)
+    np.testing.assert_allclose(wider.state_bounds, [3300.0] * 3 + [8.25] * 3)

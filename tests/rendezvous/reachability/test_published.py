@@ -1,0 +1,193 @@
+"""The numbers of the paper and of its parameters as identified: acceptance/reachability.json, copied."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rendezvous.reachability import (
+    MotionModel,
+    NonlinearMotion,
+    ReachabilityProblem,
+    Route,
+    SetCounts,
+    SetKind,
+    Solution,
+    ThrustShape,
+    least_periods,
+    solve,
+)
+from rendezvous.reachability.selection import (
+    effort,
+    minimum_energy,
+    minimum_l1,
+    minimum_norms,
+    minimum_peak,
+)
+from rendezvous.relative_motion import EllipticOrbit
+
+Floats = NDArray[np.float64]
+Paper = Callable[..., ReachabilityProblem]
+
+FORWARD = {
+    1: [[1682.1015150268104, 3000], [-3000, -1646.5870806392707], [1714.4010382196716, 3000],
+        [-7.5, 7.145481035439279], [-7.5, 7.5], [-7.5, 6.76333860081409]],
+    2: [[332.3010389098497, 3000], [-3000, -301.26114817966607], [362.40449895191006, 3000],
+        [-7.5, 7.5], [-7.5, 7.5], [-7.5, 7.5]],
+    3: [[-1017.4994372071109, 3000], [-3000, 1042.5863404701045], [-989.5920403158516, 3000],
+        [-7.5, 7.5], [-7.5, 7.5], [-7.5, 7.5]],
+    4: [[-2367.2999133240714, 3000], [-3000, 2386.4338291198756], [-2341.5885795836134, 3000],
+        [-7.5, 7.5], [-7.5, 7.5], [-7.5, 7.5]],
+}  # fmt: skip
+TUBE = {
+    1: [[1682.1015150268104, 2551.9431339090447], [-2549.2793438973335, -1669.1751093012476],
+        [1714.4010382196716, 2547.1961931945375], [-7.5, 1.7290529781477957], [-1.8941071581676396, 7.5],
+        [-7.5, 1.7396148672012093]],
+    2: [[332.30103890984975, 2032.6346647262549], [-2047.0483427549239, -325.3276206514768],
+        [362.40449895191006, 2027.9948089016427], [-7.5, 1.7290529781477961], [-1.8941071581676392, 7.5],
+        [-7.5, 1.7396148672012093]],
+    3: [[-187.00743027294112, 682.8341886092944], [-703.200854105153, 176.90338049093265],
+        [-156.79688534098548, 675.9982696338809], [-7.5, 1.7290529781477963], [-1.8941071581676385, 7.5],
+        [-7.5, 1.7396148672012095]],
+}  # fmt: skip
+
+TABLE_1 = [
+    [-0.1206, 0.0555, -0.2164], [-0.0337, 0.0042, -0.0883], [0.0358, -0.0690, 0.0414], [0.0821, -0.1623, 0.1703]
+]  # fmt: skip
+TABLE_2 = [
+    [-0.1254, 0.0373, -0.2612], [-0.0034, 0.0021, -0.0012], [0.0055, -0.0019, 0.0001], [0.0893, -0.2055, 0.1685]
+]  # fmt: skip
+TABLE_3 = [
+    [-0.0879, 0.0559, -0.1314], [-0.0899, 0.0115, -0.2357], [0.0519, -0.0732, 0.0846], [0.0895, -0.1655, 0.1913]
+]  # fmt: skip
+"""u(0) y in tables 2 and 3 without the minus sign that is printed, which is a misprint."""
+
+TABLE_1_LINEAR = [
+    [1884.2, -2014.2, 2114.6, -5.42, 3.98, -3.06],
+    [937.24, -1202.0, 1332.6, -5.05, 5.07, -5.62],
+    [234.85, -375.2, 413.2, -2.80, 4.06, -4.58],
+    [0, 0, 0, 0, 0, 0],
+]
+"""x6(1) and x5(3) corrected: -3.05 and -4.06 are printed."""
+
+
+@pytest.fixture(scope="module")
+def exact(paper: Paper) -> Solution:
+    return solve(paper(), Route.EXACT)
+
+
+@pytest.fixture(scope="module")
+def lifted(paper: Paper) -> Solution:
+    return solve(paper(), Route.LIFTED)
+
+
+def test_matrices(paper: Paper) -> None:
+    problem = paper()
+    a, b = problem.transition[0], problem.control[0]
+    expected = [1.0008801595082484, 0.002552748205224468, 0, 177.71697310723644, 25.082847920872695, 0]
+    np.testing.assert_allclose(a[0], expected, rtol=1e-11, atol=1e-13)
+    assert a[2, 2] == pytest.approx(0.9911552814183396, rel=1e-12)
+    assert a[2, 5] == pytest.approx(179.46900330815475, rel=1e-12)
+    found = [b[0, 0], b[0, 1], b[5, 2]]
+    np.testing.assert_allclose(found, [2414.5844342853457, 225.9057563126505, 26.920350496223215], rtol=1e-11)
+
+
+@pytest.mark.parametrize("route", ["exact", "lifted"])
+def test_bounds_of_forward_sets_and_tube(route: str, request: pytest.FixtureRequest) -> None:
+    solution: Solution = request.getfixturevalue(route)
+    scale = solution.problem.state_bounds[:, None]
+    forward, tube = solution.sets.bounds(SetKind.FORWARD), solution.sets.bounds(SetKind.TUBE)
+    for t, expected in FORWARD.items():
+        assert np.abs((forward[t] - expected) / scale).max() < 1e-9
+    for t, expected in TUBE.items():
+        assert np.abs((tube[t] - expected) / scale).max() < 1e-9
+    assert np.abs(tube[4] / scale).max() == 0.0
+
+
+def test_counts(exact: Solution, lifted: Solution) -> None:
+    found = [exact.sets.counts(SetKind.FORWARD, t) for t in range(1, 5)]
+    assert found == [SetCounts(10, 7, 3), SetCounts(130, 15, 6), SetCounts(100, 15, 6), SetCounts(96, 15, 6)]
+    assert exact.sets.counts(SetKind.TUBE, 2) == SetCounts(27, 9, 6)
+    dimensions = [exact.sets.counts(SetKind.TUBE, t) for t in (1, 3)]
+    assert [each.dimension for each in dimensions if each is not None] == [3, 3]
+    assert lifted.sets.counts(SetKind.TUBE, 2) is None
+
+
+def test_route_is_told(paper: Paper) -> None:
+    chosen = solve(paper())
+    assert chosen.route is Route.EXACT
+    assert chosen.reason == "blocks of 4, 2 states"
+    assert solve(paper(thrust=ThrustShape.BALL)).reason == "thrust in a ball has sets that are no polytopes"
+    assert solve(paper(periods=32, period_s=22.5)).reason == "over 16 periods hulls lose facets to rounding"
+
+
+def test_least_norms(paper: Paper, exact: Solution) -> None:
+    problem = paper()
+    assert exact.optimal.miss == 0.0
+    assert least_periods(problem) == 3
+    assert solve(problem.first(1)).optimal.miss == pytest.approx(2947.01842678, abs=1e-8)
+    assert solve(problem.first(2)).optimal.miss == pytest.approx(611.79357068, abs=1e-8)
+    assert least_periods(problem.first(2)) is None
+    assert solve(paper(bound=0.15)).optimal.miss == pytest.approx(1.62757318, abs=1e-8)
+
+
+def test_least_energy_l1_and_peak(exact: Solution) -> None:
+    assert effort(minimum_energy(exact.optimal)).energy == pytest.approx(0.14323052820, abs=1e-11)
+    sparse = minimum_l1(exact.optimal)
+    assert effort(sparse).l1 == pytest.approx(0.88770050948, abs=1e-11)
+    np.testing.assert_allclose(sparse[0], [-0.1255926124, 0.0371598443, -0.2619971202], atol=1e-10)
+    np.testing.assert_allclose(sparse[1:3], 0.0, atol=1e-10)
+    np.testing.assert_allclose(sparse[3], [0.0891976706, -0.2056122151, 0.1681410469], atol=1e-10)
+    assert effort(minimum_peak(exact.optimal)).peak == pytest.approx(0.17263864653, abs=1e-11)
+    # With both ends only, the sum of norms has the same minimiser.
+    np.testing.assert_allclose(minimum_norms(exact.optimal), sparse, atol=1e-6)
+
+
+def test_table_1_is_the_control_of_least_energy(exact: Solution) -> None:
+    control = minimum_energy(exact.optimal)
+    assert np.abs(control - TABLE_1).max() <= 0.5e-4 + 1e-12
+    states = exact.problem.run(control)[1:]
+    printed = np.array(TABLE_1_LINEAR, dtype=float)
+    rounding = np.where(np.arange(6) < 3, 0.06, 0.006)
+    assert (np.abs(states - printed) <= rounding).all()
+
+
+def rounding_at_the_end(problem: ReachabilityProblem) -> Floats:
+    """How far controls rounded to 4 decimals move the terminal state at most."""
+    allowed = np.zeros(problem.states)
+    for power in range(problem.periods):
+        allowed += np.abs(np.linalg.matrix_power(problem.transition[0], power) @ problem.control[0]).sum(axis=1)
+    return np.asarray(0.5e-4 * allowed)
+
+
+def test_table_3_is_optimal_to_its_rounding(exact: Solution) -> None:
+    problem = exact.problem
+    assert (np.abs(problem.run(np.array(TABLE_3))[-1]) <= rounding_at_the_end(problem)).all()
+    assert float(problem.excess(np.array(TABLE_3))) <= 0.0
+
+
+def test_table_2_is_near_the_control_of_least_l1_and_contradicts_itself(exact: Solution) -> None:
+    problem, sparse = exact.problem, minimum_l1(exact.optimal)
+    printed = np.array(TABLE_2)
+    np.testing.assert_allclose(sparse[[0, 3]], printed[[0, 3]], atol=1e-3)
+    assert np.abs(sparse - printed).max() < 6e-3
+    # Its controls lead tens of metres past zero, its states are those of the least L1.
+    ends = np.abs(problem.run(printed)[-1])
+    assert (ends[:2] > 4.0 * rounding_at_the_end(problem)[:2]).all()
+    states = problem.run(sparse)
+    assert np.abs(states[1:3, :3] - [[1868.5, -2057.1, 2005.9], [954.3, -1343.4, 1219.6]]).max() < 5.0
+
+
+@pytest.mark.parametrize(
+    ("model", "energy", "miss"),
+    [(MotionModel.FROZEN, 0.14323052820, 1.668028), (MotionModel.TIME_VARYING, 0.143250218, 0.212159)],
+)
+def test_nonlinear_misses(paper: Paper, orbit: EllipticOrbit, model: MotionModel, energy: float, miss: float) -> None:
+    problem = paper(model)
+    control = minimum_energy(solve(problem).optimal)
+    assert effort(control).energy == pytest.approx(energy, abs=1e-9)
+    end = NonlinearMotion(orbit, 1e7).fly(problem.initial, 0.15 * control[None], 180.0)[0, -1]
+    assert float(np.linalg.norm(end)) == pytest.approx(miss, abs=1e-6)

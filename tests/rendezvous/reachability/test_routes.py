@@ -1,0 +1,207 @@
+"""Both routes, and exact rationals, on random systems; the set of optimal controls and its members."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, reject, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from rendezvous.polytope import UncertainHullError
+from rendezvous.reachability import (
+    Budget,
+    EmptyTubeError,
+    ReachabilityProblem,
+    Route,
+    SetKind,
+    ThrustShape,
+    TooLargeError,
+    solve,
+)
+from rendezvous.reachability.blocks import split
+from rendezvous.reachability.exact_check import rational_sets
+from rendezvous.reachability.sampling import samples
+from rendezvous.reachability.selection import (
+    TooManyVerticesError,
+    analytic_centre,
+    chebyshev_centre,
+    effort,
+    minimum_energy,
+    minimum_l1,
+    minimum_norms,
+    minimum_peak,
+    vertices,
+)
+
+Floats = NDArray[np.float64]
+Paper = Callable[..., ReachabilityProblem]
+Random = Callable[[int, int], ReachabilityProblem]
+SHARED = [HealthCheck.function_scoped_fixture]
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=SHARED)
+@given(seed=st.integers(0, 10**6), size=st.integers(2, 6))
+def test_routes_agree_with_each_other(random_problem: Random, seed: int, size: int) -> None:
+    problem = random_problem(seed, size)
+    try:
+        exact, lifted = solve(problem, Route.EXACT), solve(problem, Route.LIFTED)
+    except (EmptyTubeError, TooLargeError, UncertainHullError):
+        reject()
+    for kind in SetKind:
+        one, other = exact.sets.bounds(kind), lifted.sets.bounds(kind)
+        assert np.abs((one - other) / problem.state_bounds[:, None]).max() < 1e-9
+        seen = np.random.default_rng(seed).standard_normal((8, size)) / problem.state_bounds
+        for t in range(1, problem.periods + 1):
+            one, other = exact.sets.support(kind, t, seen), lifted.sets.support(kind, t, seen)
+            assert np.abs(one - other).max() < 1e-9 * np.abs(seen * problem.state_bounds).sum(axis=1).max()
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=SHARED)
+@given(seed=st.integers(0, 10**6), size=st.integers(2, 5))
+def test_exact_route_has_the_vertices_of_exact_rationals(random_problem: Random, seed: int, size: int) -> None:
+    problem = random_problem(seed, size)
+    try:
+        exact = solve(problem, Route.EXACT)
+    except (EmptyTubeError, TooLargeError, UncertainHullError):
+        reject()
+    for block, part, optimum in zip(split(problem), exact.sets.parts, exact.optimal.blocks, strict=True):
+        forward, tube = rational_sets(block)
+        for t, expected in enumerate(forward):
+            found = part.polytope(SetKind.FORWARD, t)
+            assert found is not None
+            bounds = np.stack(found.bounds, axis=-1)
+            assert np.abs(bounds - expected.bounds).max() < 1e-9
+            assert found.dimension == expected.dimension
+            assert found.essential_vertices() <= len(expected.vertices)
+        if optimum.reached:
+            found = part.polytope(SetKind.TUBE, 1)
+            assert found is not None
+            assert np.abs(np.stack(found.bounds, axis=-1) - tube[1].bounds).max() < 1e-9
+
+
+@pytest.mark.parametrize("seed", [0, 4, 8, 12])
+def test_singular_transitions_are_no_obstacle(random_problem: Random, seed: int) -> None:
+    problem = random_problem(seed, 3)
+    assert np.linalg.matrix_rank(problem.transition[0]) < 3
+    both = [solve(problem, route).sets.bounds(SetKind.TUBE) for route in Route]
+    assert np.abs(both[0] - both[1]).max() < 1e-9 * problem.state_bounds.max()
+
+
+@pytest.mark.parametrize("thrust", list(ThrustShape))
+@pytest.mark.parametrize("bound", [1.0, 0.15])
+def test_a_thousand_members_are_optimal_and_a_thousand_others_are_not(
+    paper: Paper, thrust: ThrustShape, bound: float
+) -> None:
+    problem = paper(bound=bound, thrust=thrust)
+    optimal = solve(problem, Route.LIFTED).optimal
+    generator = np.random.default_rng(1)
+    members = samples(optimal, 1000, generator)
+    norms = np.linalg.norm(problem.run(members)[:, -1], axis=1)
+    assert np.abs(norms - optimal.miss).max() < 1e-7
+    assert float(problem.excess(members).max()) < 1e-9
+    assert float(optimal.excess(members).max()) < 1e-9
+    # Controls outside: members moved across the set's own affine hull, and members pushed out of it.
+    moved = members + 1e-3 * generator.standard_normal(members.shape)
+    centre = chebyshev_centre(optimal)
+    pushed = centre + 40.0 * (members - centre)
+    for outside in (moved, pushed) if optimal.dimension else (moved,):
+        broken = problem.excess(outside) > 1e-9
+        missed = np.linalg.norm(problem.run(outside)[:, -1], axis=1) > optimal.miss + 1e-7
+        assert (broken | missed).all()
+        assert (optimal.excess(outside) > 1e-9).all()
+
+
+def test_samples_spread_over_the_set(paper: Paper) -> None:
+    optimal = solve(paper(), Route.LIFTED).optimal
+    corners, drawn = vertices(optimal), samples(optimal, 1500, np.random.default_rng(0))
+    assert len(corners) == 27
+    assert float(optimal.excess(corners).max()) < 1e-9
+    ranges = optimal.ranges()
+    np.testing.assert_allclose(corners.min(axis=0), ranges[..., 0], atol=1e-9)
+    np.testing.assert_allclose(corners.max(axis=0), ranges[..., 1], atol=1e-9)
+    # z: a triangle, uniform over which the mean is the centroid; a direct check of uniformity.
+    triangle = np.unique(corners[:, :, 2].round(9), axis=0)
+    assert len(triangle) == 3
+    spread = np.ptp(triangle, axis=0)
+    assert np.abs((drawn[:, :, 2].mean(axis=0) - triangle.mean(axis=0)) / spread).max() < 0.03
+    again = samples(optimal, 1500, np.random.default_rng(0))
+    np.testing.assert_array_equal(drawn, again)
+
+
+@pytest.mark.parametrize("thrust", list(ThrustShape))
+def test_each_choice_is_best_of_a_thousand(paper: Paper, thrust: ThrustShape) -> None:
+    optimal = solve(paper(thrust=thrust), Route.LIFTED).optimal
+    drawn = [effort(each) for each in samples(optimal, 1000, np.random.default_rng(2))]
+    chosen = {
+        "energy": minimum_energy(optimal),
+        "l1": minimum_l1(optimal),
+        "norms": minimum_norms(optimal),
+        "peak": minimum_peak(optimal),
+    }
+    for name, control in chosen.items():
+        assert float(optimal.excess(control)) < 1e-9
+        if name == "peak" and thrust is ThrustShape.BALL:  # then the peak is of the norm
+            own = float(np.linalg.norm(control, axis=1).max())
+            others = samples(optimal, 1000, np.random.default_rng(2))
+            assert own <= float(np.linalg.norm(others, axis=2).max(axis=1).min())
+        else:
+            assert getattr(effort(control), name) <= min(getattr(each, name) for each in drawn) + 1e-9
+    for centre in (chebyshev_centre(optimal), analytic_centre(optimal)):
+        assert float(optimal.excess(centre)) < 1e-12
+
+
+def test_analytic_centre_has_the_greatest_product_of_slacks(paper: Paper) -> None:
+    optimal = solve(paper(), Route.LIFTED).optimal
+    space, centre = optimal.space, analytic_centre(optimal).ravel()
+
+    def product(control: Floats) -> float:
+        point = np.linalg.lstsq(space.control_response, control / optimal.scale - space.control_free, rcond=None)[0]
+        return float(np.log(space.limits - space.rows @ point).sum())
+
+    best = product(centre)
+    assert all(product(each.ravel()) < best for each in samples(optimal, 200, np.random.default_rng(0)))
+
+
+def test_a_unique_optimal_control(paper: Paper) -> None:
+    optimal = solve(paper().first(2)).optimal
+    assert optimal.dimension == 0
+    choices = [minimum_energy, minimum_l1, minimum_norms, minimum_peak, chebyshev_centre, analytic_centre]
+    for choice in choices:
+        np.testing.assert_allclose(choice(optimal), vertices(optimal)[0], atol=1e-12)
+    assert samples(optimal, 3, np.random.default_rng(0)).shape == (3, 2, 3)
+    np.testing.assert_allclose(optimal.ranges()[..., 0], optimal.ranges()[..., 1], atol=1e-12)
+
+
+def test_vertices_are_refused_where_they_cannot_be_listed(paper: Paper) -> None:
+    with pytest.raises(TooManyVerticesError, match="span 28 dimensions"):
+        vertices(solve(paper(periods=16, period_s=45.0), Route.LIFTED).optimal)
+    with pytest.raises(TooManyVerticesError, match="27 vertices, over 20"):
+        vertices(solve(paper(), Route.LIFTED).optimal, most=20)
+    with pytest.raises(TooManyVerticesError, match="ball"):
+        vertices(solve(paper(thrust=ThrustShape.BALL), Route.LIFTED).optimal)
+
+
+def test_exact_route_is_refused_before_it_takes_too_long_or_too_much(paper: Paper) -> None:
+    problem = paper(periods=16, period_s=45.0)
+    refused = solve(problem, budget=Budget(seconds=0.2))
+    assert refused.route is Route.LIFTED
+    assert "over the 0.2 s they may take" in refused.reason
+    assert "over the 0.01 MB" in solve(problem, budget=Budget(megabytes=0.01)).reason
+    with pytest.raises(TooLargeError, match=r"over the 0\.2 s"):
+        solve(problem, Route.EXACT, Budget(seconds=0.2))
+    with pytest.raises(TooLargeError, match="ball"):
+        solve(paper(thrust=ThrustShape.BALL), Route.EXACT)
+    with pytest.raises(TooLargeError, match="over the 3 of exact sets"):
+        solve(paper(), Route.EXACT, Budget(dimension=3))
+
+
+def test_shadows_of_both_routes(paper: Paper) -> None:
+    both = [solve(paper(), route).sets for route in Route]
+    for kind, t, axes in ((SetKind.TUBE, 2, (0, 1)), (SetKind.FORWARD, 3, (0, 1, 2)), (SetKind.TUBE, 1, (3, 4, 5))):
+        one, other = (sets.shadow(kind, t, axes) for sets in both)
+        seen = np.random.default_rng(0).standard_normal((40, len(axes)))
+        gap = np.abs((seen @ one.T).max(axis=1) - (seen @ other.T).max(axis=1))
+        assert gap.max() < 1e-8 * np.abs(one).max()
