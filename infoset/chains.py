@@ -18,11 +18,14 @@ Both chains are the same thing turned by 180 degrees: their vertices rise from t
 from the chain's own side (`SIDE`). Each is a ring buffer; the ends of a chain are joined to those of the other by
 edges along the level, of no length where the two meet.
 
-A batch of sections is two arrays, `store` and `marks`, a row `n` a section; a kernel takes the three. (Views of rows,
-or a tuple of arrays, cost more than the work: each is counted, atomically, wherever it is handed on.)
+A batch of sections is three arrays, `origins`, `rings` and `marks`; a kernel takes them and a row `n`. (Views of rows,
+or a tuple of arrays, cost more than the work: each is counted, atomically, wherever it is handed on.) A ring is as wide
+as its section needs, not as the widest of the batch does: what a step touches lies close together.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,28 +43,63 @@ RIGHT, LEFT = 0, 1
 
 CAPACITY = 256
 """Vertices a section may have: a power of two."""
-ROOM_AT_START = 32
-"""Vertices each chain has room for at first, a power of two: sections that lie close together are quicker to reach."""
+ROOM_AT_START = 16
+"""Vertices each chain has room for at first, a power of two."""
 MOST_ADDED = 4
 """Vertices that one step can add, two at each of its two turns."""
 REDUCED = 160
 """Vertices left in a section that has grown to CAPACITY."""
 
-# The marks, for each chain: the number of its first vertex, one past the last, and that of the peak. Numbers only
-# grow or fall: the ring holds a vertex at its number modulo the room.
-BEGIN, END, PEAK = range(3)
-MARKS = 3
+# The marks, for each chain: the number of its first vertex, one past the last, and that of the peak; then where its
+# ring is, and the ring's room less one, a power of two less one. Numbers only grow or fall: the ring holds a vertex at
+# its number modulo its room.
+BEGIN, END, PEAK, RING, MASK = range(5)
+MARKS = 5
 
-# The store, for each chain: its origin, a bound on |V| (the right chain has it), then the vertices, each (V, m) from
-# the origin. An origin moves at every step and must not wear, so it is a sum of two floats. The bound is over all that
-# the section ever was: rounding is relative to it.
+# An origin moves at every step and must not wear, so it is a sum of two floats. The right chain's holds a bound on |V|
+# too, over all that the section ever was: rounding is relative to it. The rest makes it a line of the cache.
 V_ORIGIN, V_REST, M_ORIGIN, M_REST, REACH = range(5)
-VERTICES = 6
+ORIGIN = 8
+
+TAKEN = 0
+"""Where the rings say how many of their floats belong to chains; rings that were outgrown stay taken."""
+FIRST_RING = 8
 
 
-def empty_sections(number: int, room: int = CAPACITY) -> tuple[Floats, Integers]:
-    """Room for a number of sections: their store and marks."""
-    return np.zeros((number, 2, VERTICES + 2 * room)), np.zeros((number, 2, MARKS), dtype=np.int64)
+class Chains(NamedTuple):
+    """The chains of N sections.
+
+    Parameters
+    ----------
+    origins : ndarray, shape (N, 2, ORIGIN)
+    rings : ndarray, shape (any,)
+        The vertices of all chains, each (V, m) from the origin of its chain.
+    marks : ndarray of int, shape (N, 2, MARKS)
+    """
+
+    origins: Floats
+    rings: Floats
+    marks: Integers
+
+
+def empty_sections(number: int, room: int = CAPACITY) -> Chains:
+    """Sections not begun yet, with room for so many vertices (a power of two) in each chain."""
+    marks = np.zeros((number, 2, MARKS), dtype=np.int64)
+    marks[:, :, RING] = FIRST_RING + 2 * room * np.arange(2 * number).reshape(number, 2)
+    marks[:, :, MASK] = room - 1
+    rings = np.empty(FIRST_RING + 4 * room * number)
+    rings[TAKEN] = rings.size
+    return Chains(np.zeros((number, 2, ORIGIN)), rings, marks)
+
+
+def with_room(rings: Floats, floats: int) -> Floats:
+    """The same rings with room for so many floats more; themselves if they have it."""
+    taken = int(rings[TAKEN])
+    if taken + floats <= rings.size:
+        return rings
+    wider = np.empty(max(taken + floats, 2 * rings.size))
+    wider[:taken] = rings[:taken]
+    return wider
 
 
 def working_room() -> Floats:
@@ -70,29 +108,9 @@ def working_room() -> Floats:
 
 
 @substituted
-def place(store: Floats, i: int) -> int:
-    """Where the store has a vertex of a chain."""
-    return int(VERTICES + 2 * (i & (((store.shape[2] - VERTICES) >> 1) - 1)))
-
-
-@entry
-def move_to_wider_rings(store: Floats, marks: Integers, kept: Flags, wider: Floats) -> None:
-    """Copy the sections that are kept to a store with more room; the others stay unwritten, and take no memory."""
-    for n in range(store.shape[0]):
-        if not kept[n]:
-            continue
-        for side in (RIGHT, LEFT):
-            for i in range(VERTICES):
-                wider[n, side, i] = store[n, side, i]
-            for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
-                at = place(store, i)
-                put(wider, n, side, i, store[n, side, at], store[n, side, at + 1])
-
-
-@substituted
-def sign_of(side: int) -> float:
-    """The side from which a chain is seen to rise: 1 for the right one, -1 for the left one."""
-    return 1.0 - 2.0 * side
+def place(marks: Integers, n: int, side: int, i: int) -> int:
+    """Where the rings have a vertex of a chain."""
+    return int(marks[n, side, RING] + 2 * (i & marks[n, side, MASK]))
 
 
 @substituted
@@ -107,45 +125,113 @@ def end_of(marks: Integers, n: int, side: int) -> int:
     return int(marks[n, side, END])
 
 
+@substituted
+def count_of(marks: Integers, n: int) -> int:
+    """Number of vertices of both chains."""
+    right, left = marks[n, RIGHT, END] - marks[n, RIGHT, BEGIN], marks[n, LEFT, END] - marks[n, LEFT, BEGIN]
+    return int(right + left)
+
+
+@substituted
+def room_of(marks: Integers, n: int) -> int:
+    """Vertices that either chain of a section has room for."""
+    return int(marks[n, RIGHT, MASK] + 1)
+
+
+@allocation_free
+def widen_rings(rings: Floats, marks: Integers, n: int, room: int) -> None:
+    """Give both chains of a section rings of so much room, a power of two, from what is not taken."""
+    for side in (RIGHT, LEFT):
+        first = int(rings[TAKEN])
+        rings[TAKEN] = first + 2 * room
+        for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
+            old, new = place(marks, n, side, i), first + 2 * (i & (room - 1))
+            rings[new] = rings[old]
+            rings[new + 1] = rings[old + 1]
+        marks[n, side, RING] = first
+        marks[n, side, MASK] = room - 1
+
+
 @inlined
-def rise(store: Floats, n: int, side: int, i: int, tau: float) -> float:
+def room_for(vertices: int, room: int) -> int:
+    """Room that a chain needs for so many vertices, at least what it has: a power of two."""
+    while room < vertices:
+        room *= 2
+    return room
+
+
+@substituted
+def sign_of(side: int) -> float:
+    """The side from which a chain is seen to rise: 1 for the right one, -1 for the left one."""
+    return 1.0 - 2.0 * side
+
+
+@inlined
+def rise(rings: Floats, marks: Integers, n: int, side: int, i: int, tau: float) -> float:
     """Height of a vertex over the origin of its chain, seen from the chain's own side: it rises along the chain."""
-    at = place(store, i)
-    return float(sign_of(side) * (store[n, side, at + 1] - tau * store[n, side, at]))
+    at = place(marks, n, side, i)
+    return float(sign_of(side) * (rings[at + 1] - tau * rings[at]))
 
 
 @inlined
-def origin_height(store: Floats, n: int, side: int, tau: float) -> float:
+def origin_height(origins: Floats, n: int, side: int, tau: float) -> float:
     """Height of the origin of a chain."""
-    whole = store[n, side, M_ORIGIN] - tau * store[n, side, V_ORIGIN]
-    return float(whole + (store[n, side, M_REST] - tau * store[n, side, V_REST]))
+    whole = origins[n, side, M_ORIGIN] - tau * origins[n, side, V_ORIGIN]
+    return float(whole + (origins[n, side, M_REST] - tau * origins[n, side, V_REST]))
 
 
 @inlined
-def vertex(store: Floats, n: int, side: int, i: int) -> tuple[float, float]:
+def vertex(origins: Floats, rings: Floats, marks: Integers, n: int, side: int, i: int) -> tuple[float, float]:
     """A vertex: V and m."""
-    at = place(store, i)
-    v = (store[n, side, at] + store[n, side, V_REST]) + store[n, side, V_ORIGIN]
-    m = (store[n, side, at + 1] + store[n, side, M_REST]) + store[n, side, M_ORIGIN]
+    at = place(marks, n, side, i)
+    v = (rings[at] + origins[n, side, V_REST]) + origins[n, side, V_ORIGIN]
+    m = (rings[at + 1] + origins[n, side, M_REST]) + origins[n, side, M_ORIGIN]
     return v, m
 
 
 @substituted
-def put(store: Floats, n: int, side: int, i: int, v: float, m: float) -> None:
+def put(rings: Floats, marks: Integers, n: int, side: int, i: int, v: float, m: float) -> None:
     """Write a vertex, from the origin of its chain."""
-    at = place(store, i)
-    store[n, side, at] = v
-    store[n, side, at + 1] = m
+    at = place(marks, n, side, i)
+    rings[at] = v
+    rings[at + 1] = m
+
+
+@allocation_free
+def copy_section(
+    origins: Floats,
+    rings: Floats,
+    marks: Integers,
+    n: int,
+    to_origins: Floats,
+    to_rings: Floats,
+    to_marks: Integers,
+    to: int,
+) -> None:
+    """Copy a section to a row of other chains, which have room for it that is not taken."""
+    for side in (RIGHT, LEFT):
+        to_marks[to, side, BEGIN] = to_marks[to, side, END] = 0
+    wanted = room_for(count_of(marks, n), room_of(to_marks, to))
+    if wanted > room_of(to_marks, to):
+        widen_rings(to_rings, to_marks, to, wanted)
+    for side in (RIGHT, LEFT):
+        for part in range(ORIGIN):
+            to_origins[to, side, part] = origins[n, side, part]
+        for part in (BEGIN, END, PEAK):
+            to_marks[to, side, part] = marks[n, side, part]
+        for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
+            at = place(marks, n, side, i)
+            put(to_rings, to_marks, to, side, i, rings[at], rings[at + 1])
 
 
 @inlined
-def move_part(store: Floats, n: int, side: int, part: int, value: float) -> None:
+def move_part(origins: Floats, n: int, side: int, part: int, value: float) -> None:
     """Add to a coordinate of an origin; its rest keeps what rounding takes away."""
-    before = store[n, side, part]
+    before = origins[n, side, part]
     after = before + value
     added = after - before
-    store[n, side, part] = after
-    store[n, side, part + 1] += (before - (after - added)) + (value - added)
+    origins[n, side, part] = after
+    origins[n, side, part + 1] += (before - (after - added)) + (value - added)
 
 
 @substituted
@@ -161,7 +247,8 @@ def product_error(a: float, b: float, product: float) -> float:
 
 @allocation_free
 def start(
-    store: Floats,
+    origins: Floats,
+    rings: Floats,
     marks: Integers,
     n: int,
     tau: float,
@@ -172,7 +259,7 @@ def start(
 
     Parameters
     ----------
-    store, marks, n : section
+    origins, rings, marks, n : section
     tau : float
         Time to go.
     bottom, top : tuple of float
@@ -180,149 +267,202 @@ def start(
     """
     reach = 0.0
     for side in (RIGHT, LEFT):
-        for i in range(VERTICES):
-            store[n, side, i] = 0.0
+        for i in range(ORIGIN):
+            origins[n, side, i] = 0.0
         for i in range(2):
             at_top = (i == 1) == (side == RIGHT)
             v = top[1 - side] if at_top else bottom[1 - side]
-            put(store, n, side, i, v, (top[2] if at_top else bottom[2]) + tau * v)
+            put(rings, marks, n, side, i, v, (top[2] if at_top else bottom[2]) + tau * v)
             reach = max(reach, abs(v))
         marks[n, side, BEGIN] = 0
         marks[n, side, END] = 2
         marks[n, side, PEAK] = 0
-    store[n, RIGHT, REACH] = reach
+    origins[n, RIGHT, REACH] = reach
 
 
 @inlined
-def hand_over(store: Floats, marks: Integers, n: int, giver: int, tau: float) -> None:
+def hand_over(
+    rings: Floats,
+    sign: float,
+    giver: tuple[int, int],
+    first: int,
+    end: int,
+    taker: tuple[int, int],
+    front: int,
+    between: tuple[float, float, float],
+    same: float,
+    tau: float,
+) -> tuple[int, int]:
     """Give the last vertices of a chain, past its highest now, to the front of the other chain.
+
+    Parameters
+    ----------
+    rings : ndarray
+    sign : float
+        The side from which the giver is seen to rise.
+    giver : tuple of int
+        Ring and mask of the chain that gives.
+    first, end : int
+        Its first vertex, and one past its last.
+    taker, front : tuple of int, int
+        Ring and mask of the other chain, and its first vertex.
+    between : tuple of float
+        V, m and height of the giver's origin, from the taker's.
+    same : float
+        Differences of V that are rounding.
+    tau : float
+        Time to go.
+
+    Returns
+    -------
+    end, front : int
 
     Notes
     -----
     A falling time to go lifts what is on the right: only a vertex with the one before it on its outer side is passed.
     Where the level has not turned, heights along it are equal to within rounding, and must not pass the others.
     """
-    taker = 1 - giver
-    same = 4.0 * EPSILON * store[n, RIGHT, REACH]
-    origin = sign_of(giver) * (origin_height(store, n, giver, tau) - origin_height(store, n, taker, tau))
-    first, back, front = begin_of(marks, n, giver), end_of(marks, n, giver) - 1, begin_of(marks, n, taker)
-    back_rise = rise(store, n, giver, back, tau)
-    front_rise = -rise(store, n, taker, front, tau)
+    back = end - 1
+    at = giver[0] + 2 * (back & giver[1])
+    v, m = rings[at], rings[at + 1]
+    rise = sign * (m - tau * v)
+    at = taker[0] + 2 * (front & taker[1])
+    front_rise = sign * (rings[at + 1] - tau * rings[at])
     while True:
-        if back_rise + origin > front_rise:
+        if rise + sign * between[2] > front_rise:
             front -= 1
-            adopt(store, n, giver, back, taker, front)
-            front_rise = -rise(store, n, taker, front, tau)
-            marks[n, taker, BEGIN] = front
+            taken_v, taken_m = v + between[0], m + between[1]
+            at = taker[0] + 2 * (front & taker[1])
+            rings[at] = taken_v
+            rings[at + 1] = taken_m
+            front_rise = sign * (taken_m - tau * taken_v)
         if back == first:
             break
-        before_rise = rise(store, n, giver, back - 1, tau)
-        inward = store[n, giver, place(store, back)] - store[n, giver, place(store, back - 1)]
-        if before_rise < back_rise or sign_of(giver) * inward > same:
+        at = giver[0] + 2 * ((back - 1) & giver[1])
+        before_v, before_m = rings[at], rings[at + 1]
+        before_rise = sign * (before_m - tau * before_v)
+        if before_rise < rise or sign * (v - before_v) > same:
             break
         back -= 1
-        back_rise = before_rise
-    marks[n, giver, END] = back + 1
+        v, m, rise = before_v, before_m, before_rise
+    return back + 1, front
 
 
-@substituted
-def adopt(store: Floats, n: int, giver: int, i: int, taker: int, j: int) -> None:
-    """Write vertex i of one chain as vertex j of the other, from the other's origin."""
-    at = place(store, i)
-    v_rest = store[n, giver, V_REST] - store[n, taker, V_REST]
-    m_rest = store[n, giver, M_REST] - store[n, taker, M_REST]
-    v = store[n, giver, at] + ((store[n, giver, V_ORIGIN] - store[n, taker, V_ORIGIN]) + v_rest)
-    m = store[n, giver, at + 1] + ((store[n, giver, M_ORIGIN] - store[n, taker, M_ORIGIN]) + m_rest)
-    put(store, n, taker, j, v, m)
-
-
-@substituted
-def turn(store: Floats, marks: Integers, n: int, tau: float) -> None:
+@inlined
+def turn(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float) -> None:
     """Let the time to go fall to `tau`: the level turns, and each chain ends where it is highest or lowest now."""
-    hand_over(store, marks, n, RIGHT, tau)
-    hand_over(store, marks, n, LEFT, tau)
+    right = (marks[n, RIGHT, RING], marks[n, RIGHT, MASK])
+    left = (marks[n, LEFT, RING], marks[n, LEFT, MASK])
+    right_begin, left_begin = marks[n, RIGHT, BEGIN], marks[n, LEFT, BEGIN]
+    same = 4.0 * EPSILON * origins[n, RIGHT, REACH]
+    v_rest = origins[n, RIGHT, V_REST] - origins[n, LEFT, V_REST]
+    m_rest = origins[n, RIGHT, M_REST] - origins[n, LEFT, M_REST]
+    v = (origins[n, RIGHT, V_ORIGIN] - origins[n, LEFT, V_ORIGIN]) + v_rest
+    m = (origins[n, RIGHT, M_ORIGIN] - origins[n, LEFT, M_ORIGIN]) + m_rest
+    height = origin_height(origins, n, RIGHT, tau) - origin_height(origins, n, LEFT, tau)
+    right_end, left_begin = hand_over(
+        rings, 1.0, right, right_begin, marks[n, RIGHT, END], left, left_begin, (v, m, height), same, tau
+    )
+    left_end, right_begin = hand_over(
+        rings, -1.0, left, left_begin, marks[n, LEFT, END], right, right_begin, (-v, -m, -height), same, tau
+    )
+    marks[n, RIGHT, BEGIN], marks[n, RIGHT, END] = right_begin, right_end
+    marks[n, LEFT, BEGIN], marks[n, LEFT, END] = left_begin, left_end
 
 
 @substituted
-def spread(store: Floats, n: int, tau: float, half_v: float) -> None:
+def spread(origins: Floats, n: int, tau: float, half_v: float) -> None:
     """Minkowski sum with the segment of V from -half_v to half_v that lies along the level of `tau`."""
     half_m = half_v * tau
-    move_part(store, n, RIGHT, V_ORIGIN, half_v)
-    move_part(store, n, RIGHT, M_ORIGIN, half_m)
-    move_part(store, n, LEFT, V_ORIGIN, -half_v)
-    move_part(store, n, LEFT, M_ORIGIN, -half_m)
-    store[n, RIGHT, REACH] += half_v
+    move_part(origins, n, RIGHT, V_ORIGIN, half_v)
+    move_part(origins, n, RIGHT, M_ORIGIN, half_m)
+    move_part(origins, n, LEFT, V_ORIGIN, -half_v)
+    move_part(origins, n, LEFT, M_ORIGIN, -half_m)
+    origins[n, RIGHT, REACH] += half_v
 
 
 @substituted
-def shift(store: Floats, n: int, tau: float, v: float) -> None:
+def shift(origins: Floats, n: int, tau: float, v: float) -> None:
     """Move by V along the level of `tau`: z stays, the predicted miss changes by V tau."""
     m = v * tau
     rest = product_error(v, tau, m)
     for side in (RIGHT, LEFT):
-        move_part(store, n, side, V_ORIGIN, v)
-        move_part(store, n, side, M_ORIGIN, m)
-        store[n, side, M_REST] += rest
-    store[n, RIGHT, REACH] += abs(v)
+        move_part(origins, n, side, V_ORIGIN, v)
+        move_part(origins, n, side, M_ORIGIN, m)
+        origins[n, side, M_REST] += rest
+    origins[n, RIGHT, REACH] += abs(v)
 
 
 @substituted
-def heights(store: Floats, marks: Integers, n: int, tau: float) -> tuple[float, float]:
+def heights(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float) -> tuple[float, float]:
     """Least and greatest z of a section that is turned to `tau`."""
-    right, left = origin_height(store, n, RIGHT, tau), origin_height(store, n, LEFT, tau)
+    right, left = origin_height(origins, n, RIGHT, tau), origin_height(origins, n, LEFT, tau)
     least = min(
-        right + rise(store, n, RIGHT, begin_of(marks, n, RIGHT), tau),
-        left - rise(store, n, LEFT, end_of(marks, n, LEFT) - 1, tau),
+        right + rise(rings, marks, n, RIGHT, begin_of(marks, n, RIGHT), tau),
+        left - rise(rings, marks, n, LEFT, end_of(marks, n, LEFT) - 1, tau),
     )
     greatest = max(
-        right + rise(store, n, RIGHT, end_of(marks, n, RIGHT) - 1, tau),
-        left - rise(store, n, LEFT, begin_of(marks, n, LEFT), tau),
+        right + rise(rings, marks, n, RIGHT, end_of(marks, n, RIGHT) - 1, tau),
+        left - rise(rings, marks, n, LEFT, begin_of(marks, n, LEFT), tau),
     )
     return least, greatest
 
 
 @inlined
-def put_on_edge(store: Floats, n: int, side: int, near: int, far: int, at: int, tau: float, level: float) -> None:
-    """Put, as vertex `at`, the point at a rise of `level` on the edge near-far; a lone vertex goes there."""
-    v = store[n, side, place(store, near)]
-    if near != far:
-        near_rise = rise(store, n, side, near, tau)
-        far_rise = rise(store, n, side, far, tau)
-        # From the nearer end: least rounding.
-        if abs(level - near_rise) <= abs(far_rise - level):
-            v += (level - near_rise) / (far_rise - near_rise) * (store[n, side, place(store, far)] - v)
-        else:
-            far_v = store[n, side, place(store, far)]
-            v = far_v + (level - far_rise) / (near_rise - far_rise) * (v - far_v)
-    put(store, n, side, at, v, sign_of(side) * level + tau * v)
+def cut_end(
+    rings: Floats, ring: tuple[int, int], end: int, other_end: int, way: int, up: float, tau: float, level: float
+) -> int:
+    """Cut off what is above a level at one end of a chain, and put a vertex where the level crosses it.
+
+    Parameters
+    ----------
+    rings : ndarray
+    ring : tuple of int
+        Ring and mask of the chain.
+    end, other_end : int
+        Its vertex that may be too high, and the one at its other end.
+    way : int
+        From the one to the other: 1 or -1.
+    up : float
+        1 if above is toward greater z, -1 if toward lesser.
+    tau : float
+        Time to go.
+    level : float
+        From the chain's origin, counted upward.
+
+    Returns
+    -------
+    int
+        Number of the vertex that is the end now.
+    """
+    at = ring[0] + 2 * (end & ring[1])
+    v = rings[at]
+    height = up * (rings[at + 1] - tau * v)
+    if height <= level:
+        return end
+    while end != other_end:
+        at = ring[0] + 2 * ((end + way) & ring[1])
+        inner_v = rings[at]
+        inner_height = up * (rings[at + 1] - tau * inner_v)
+        if inner_height <= level:
+            # From the nearer end of the edge: least rounding.
+            if level - inner_height <= height - level:
+                v = inner_v + (level - inner_height) / (height - inner_height) * (v - inner_v)
+            else:
+                v += (level - height) / (inner_height - height) * (inner_v - v)
+            break
+        v, height = inner_v, inner_height
+        end += way
+    at = ring[0] + 2 * (end & ring[1])
+    rings[at] = v
+    rings[at + 1] = up * level + tau * v
+    return end
 
 
 @inlined
-def cut_back(store: Floats, marks: Integers, n: int, side: int, tau: float, level: float) -> None:
-    """Cut off the end of a chain that rises above `level`."""
-    first, last = begin_of(marks, n, side), end_of(marks, n, side) - 1
-    if rise(store, n, side, last, tau) <= level:
-        return
-    while last > first and rise(store, n, side, last - 1, tau) > level:
-        last -= 1
-    put_on_edge(store, n, side, max(last - 1, first), last, last, tau, level)
-    marks[n, side, END] = last + 1
-
-
-@inlined
-def cut_front(store: Floats, marks: Integers, n: int, side: int, tau: float, level: float) -> None:
-    """Cut off the beginning of a chain that is below `level`."""
-    first, last = begin_of(marks, n, side), end_of(marks, n, side) - 1
-    if rise(store, n, side, first, tau) >= level:
-        return
-    while first < last and rise(store, n, side, first + 1, tau) < level:
-        first += 1
-    put_on_edge(store, n, side, min(first + 1, last), first, first, tau, level)
-    marks[n, side, BEGIN] = first
-
-
-@inlined
-def cut(store: Floats, marks: Integers, n: int, tau: float, lower: float, upper: float) -> tuple[bool, float]:
+def cut(
+    origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, lower: float, upper: float
+) -> tuple[bool, float]:
     """Keep the band lower <= z <= upper of a section that is turned to `tau`.
 
     Returns
@@ -332,68 +472,125 @@ def cut(store: Floats, marks: Integers, n: int, tau: float, lower: float, upper:
     overlap : float
         Least overlap of the section and the band across either border; negative is the distance between them.
     """
-    least, greatest = heights(store, marks, n, tau)
+    least, greatest = heights(origins, rings, marks, n, tau)
     overlap = min(greatest - lower, upper - least)
     if overlap < 0.0:
         return False, overlap
-    right, left = origin_height(store, n, RIGHT, tau), origin_height(store, n, LEFT, tau)
+    right = (marks[n, RIGHT, RING], marks[n, RIGHT, MASK])
+    left = (marks[n, LEFT, RING], marks[n, LEFT, MASK])
+    right_first, right_last = marks[n, RIGHT, BEGIN], marks[n, RIGHT, END] - 1
+    left_first, left_last = marks[n, LEFT, BEGIN], marks[n, LEFT, END] - 1
+    right_height, left_height = origin_height(origins, n, RIGHT, tau), origin_height(origins, n, LEFT, tau)
     if greatest > upper:
-        cut_back(store, marks, n, RIGHT, tau, upper - right)
-        cut_front(store, marks, n, LEFT, tau, left - upper)
+        right_last = cut_end(rings, right, right_last, right_first, -1, 1.0, tau, upper - right_height)
+        left_first = cut_end(rings, left, left_first, left_last, 1, 1.0, tau, upper - left_height)
+        marks[n, RIGHT, END] = right_last + 1
+        marks[n, LEFT, BEGIN] = left_first
     if least < lower:
-        cut_back(store, marks, n, LEFT, tau, left - lower)
-        cut_front(store, marks, n, RIGHT, tau, lower - right)
+        left_last = cut_end(rings, left, left_last, left_first, -1, -1.0, tau, left_height - lower)
+        right_first = cut_end(rings, right, right_first, right_last, 1, -1.0, tau, right_height - lower)
+        marks[n, LEFT, END] = left_last + 1
+        marks[n, RIGHT, BEGIN] = right_first
     return True, overlap
 
 
 @substituted
-def miss_of(store: Floats, n: int, side: int, i: int) -> float:
+def miss_of(rings: Floats, marks: Integers, n: int, side: int, i: int) -> float:
     """Predicted miss of a vertex over that of its chain's origin, counted outward."""
-    return float(sign_of(side) * store[n, side, place(store, i) + 1])
+    return float(sign_of(side) * rings[place(marks, n, side, i) + 1])
 
 
 @inlined
-def find_peak(store: Floats, marks: Integers, n: int, side: int) -> int:
+def find_peak(
+    rings: Floats, ring: tuple[int, int], first: int, last: int, peak: int, sign: float, m_origin: float
+) -> int:
     """Number of the vertex of a chain whose predicted miss is the greatest (right) or the least (left).
+
+    Parameters
+    ----------
+    rings : ndarray
+    ring : tuple of int
+        Ring and mask of the chain.
+    first, last : int
+        Its ends.
+    peak : int
+        Where the peak was.
+    sign : float
+        The side from which the chain is seen.
+    m_origin : float
+        Predicted miss of the chain's origin.
+
+    Returns
+    -------
+    int
 
     Notes
     -----
     The search starts where the peak was. It ends where the miss falls by more than rounding: vertices that repeat
     one another, or nearly so, must not stop it.
     """
-    first, last = begin_of(marks, n, side), end_of(marks, n, side) - 1
-    peak = int(min(max(marks[n, side, PEAK], first), last))
-    miss = miss_of(store, n, side, peak)
-    rounding = 16.0 * EPSILON * (abs(miss) + abs(store[n, side, M_ORIGIN]))
+    peak = min(max(peak, first), last)
+    miss = sign * rings[ring[0] + 2 * (peak & ring[1]) + 1]
+    rounding = 16.0 * EPSILON * (abs(miss) + abs(m_origin))
     start_at = peak
     for way in (1, -1):
         i = start_at + way
         while first <= i <= last:
-            here = miss_of(store, n, side, i)
+            here = sign * rings[ring[0] + 2 * (i & ring[1]) + 1]
             if here > miss:
                 peak, miss = i, here
             elif here < miss - rounding:
                 break
             i += way
-    marks[n, side, PEAK] = peak
     return peak
 
 
-@substituted
-def first_near_peak(store: Floats, marks: Integers, n: int, side: int, peak: int, tolerance: float) -> int:
+@inlined
+def first_near_peak(rings: Floats, ring: tuple[int, int], first: int, peak: int, sign: float, tolerance: float) -> int:
     """First vertex of the edge through the peak along which the predicted miss is the same to within a tolerance."""
-    first = begin_of(marks, n, side)
-    level = miss_of(store, n, side, peak) - tolerance
-    while peak > first and miss_of(store, n, side, peak - 1) >= level:
+    level = sign * rings[ring[0] + 2 * (peak & ring[1]) + 1] - tolerance
+    while peak > first and sign * rings[ring[0] + 2 * ((peak - 1) & ring[1]) + 1] >= level:
         peak -= 1
     return peak
 
 
-@substituted
-def count_of(marks: Integers, n: int) -> int:
-    """Number of vertices of both chains."""
-    right, left = marks[n, RIGHT, END] - marks[n, RIGHT, BEGIN], marks[n, LEFT, END] - marks[n, LEFT, BEGIN]
-    return int(right + left)
+@inlined
+def greatest_and_least_miss(
+    origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, relative: float, slack: float
+) -> tuple[float, float, float, float, float, float]:
+    """Extremes of the predicted miss, and where they are reached.
+
+    Parameters
+    ----------
+    origins, rings, marks, n : section
+    tau : float
+        Time to go.
+    relative, slack : float
+        What is the same to within these parts of the interval and of the magnitudes is the same.
+
+    Returns
+    -------
+    upper, upper_v, upper_m, lower, lower_v, lower_m : float
+        The greatest miss, and V and m of the lowest point that reaches it; the least, and those of the highest.
+    """
+    right = (marks[n, RIGHT, RING], marks[n, RIGHT, MASK])
+    left = (marks[n, LEFT, RING], marks[n, LEFT, MASK])
+    right_first, left_first = marks[n, RIGHT, BEGIN], marks[n, LEFT, BEGIN]
+    right_m, left_m = origins[n, RIGHT, M_ORIGIN], origins[n, LEFT, M_ORIGIN]
+    upper_at = find_peak(rings, right, right_first, marks[n, RIGHT, END] - 1, marks[n, RIGHT, PEAK], 1.0, right_m)
+    lower_at = find_peak(rings, left, left_first, marks[n, LEFT, END] - 1, marks[n, LEFT, PEAK], -1.0, left_m)
+    upper_v, upper = vertex(origins, rings, marks, n, RIGHT, upper_at)
+    lower_v, lower = vertex(origins, rings, marks, n, LEFT, lower_at)
+    magnitude = tau * (abs(upper_v) + abs(lower_v)) + abs(upper) + abs(lower)
+    tolerance = relative * (upper - lower) + slack * magnitude
+    upper_v, upper_m = vertex(
+        origins, rings, marks, n, RIGHT, first_near_peak(rings, right, right_first, upper_at, 1.0, tolerance)
+    )
+    lower_v, lower_m = vertex(
+        origins, rings, marks, n, LEFT, first_near_peak(rings, left, left_first, lower_at, -1.0, tolerance)
+    )
+    marks[n, RIGHT, PEAK], marks[n, LEFT, PEAK] = upper_at, lower_at
+    return upper, upper_v, upper_m, lower, lower_v, lower_m
 
 
 @substituted
@@ -402,13 +599,20 @@ def is_crowded(marks: Integers, n: int) -> bool:
     return bool(count_of(marks, n) > CAPACITY - MOST_ADDED)
 
 
+@substituted
+def lacks_room(marks: Integers, n: int, added: int) -> bool:
+    """Whether so many vertices more may not fit into the rings of a section, or the section is crowded."""
+    wanted = count_of(marks, n) + added
+    return bool(wanted > room_of(marks, n) or wanted > CAPACITY)
+
+
 @allocation_free
-def reduce_outward(store: Floats, marks: Integers, n: int, tau: float, points: Floats) -> None:
+def reduce_outward(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, points: Floats) -> None:
     """Drop edges of the longer chain, outward, until the section has `REDUCED` vertices.
 
     Parameters
     ----------
-    store, marks, n : section
+    origins, rings, marks, n : section
     tau : float
         Time to go.
     points : ndarray, shape (CAPACITY, 2)
@@ -425,8 +629,8 @@ def reduce_outward(store: Floats, marks: Integers, n: int, tau: float, points: F
     side = RIGHT if right > other else LEFT
     count = 0
     for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
-        at = place(store, i)
-        v, m = store[n, side, at], store[n, side, at + 1]
+        at = place(marks, n, side, i)
+        v, m = rings[at], rings[at + 1]
         count = polygon.append(points, polygon.drop_turned(points, count, 1, v, m), v, m)
     while count > REDUCED - other:
         chosen, v, m = polygon.cheapest_edge(points, count, 1, count - 3)
@@ -440,10 +644,10 @@ def reduce_outward(store: Floats, marks: Integers, n: int, tau: float, points: F
             points[i, 1] = points[i + 1, 1]
         count -= 1
     for i in range(count):
-        put(store, n, side, i, points[i, 0], points[i, 1])
+        put(rings, marks, n, side, i, points[i, 0], points[i, 1])
         # New vertices may be farther out than any that the section ever had.
-        v, _ = vertex(store, n, side, i)
-        store[n, RIGHT, REACH] = max(store[n, RIGHT, REACH], abs(v))
+        v, _ = vertex(origins, rings, marks, n, side, i)
+        origins[n, RIGHT, REACH] = max(origins[n, RIGHT, REACH], abs(v))
     marks[n, side, BEGIN] = 0
     marks[n, side, END] = count
     marks[n, side, PEAK] = 0
@@ -468,7 +672,7 @@ def box_around(points: Floats, count: int, sign: float, tau: float) -> int:
 
 
 @entry
-def outline(store: Floats, marks: Integers, n: int, tau: float, out: Floats) -> int:
+def outline(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, out: Floats) -> int:
     """Write the vertices (V, z), counter-clockwise; return how many: at most CAPACITY.
 
     Notes
@@ -479,11 +683,11 @@ def outline(store: Floats, marks: Integers, n: int, tau: float, out: Floats) -> 
     for side in (RIGHT, LEFT):
         first = begin_of(marks, n, side)
         for i in range(first, end_of(marks, n, side)):
-            v, m = vertex(store, n, side, i)
+            v, m = vertex(origins, rings, marks, n, side, i)
             z = m - tau * v
-            if i > first or made == 0 or not meets(out, made - 1, v, z, store[n, RIGHT, REACH], tau):
+            if i > first or made == 0 or not meets(out, made - 1, v, z, origins[n, RIGHT, REACH], tau):
                 made = polygon.append(out, made, v, z)
-    while made > 1 and meets(out, made - 1, out[0, 0], out[0, 1], store[n, RIGHT, REACH], tau):
+    while made > 1 and meets(out, made - 1, out[0, 0], out[0, 1], origins[n, RIGHT, REACH], tau):
         made -= 1
     return made
 
@@ -497,7 +701,7 @@ def meets(points: Floats, i: int, v: float, z: float, reach: float, tau: float) 
 
 @entry
 def cut_misses(
-    store: Floats, marks: Integers, n: int, tau: float, lower: float, upper: float, points: Floats
+    origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, lower: float, upper: float, points: Floats
 ) -> tuple[bool, float]:
     """Keep the band lower <= m <= upper of predicted miss; the rest is as in `cut`.
 
@@ -509,17 +713,17 @@ def cut_misses(
     count = 0
     for side in (RIGHT, LEFT):
         for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
-            v, m = vertex(store, n, side, i)
+            v, m = vertex(origins, rings, marks, n, side, i)
             count = polygon.append(points, count, v, m)
     count, overlap = polygon.clip_to_band(points, count, 0.0, 1.0, lower, upper)
     if count == 0:
         return False, overlap
     for side in (RIGHT, LEFT):
         for part in range(REACH):
-            store[n, side, part] = 0.0
+            origins[n, side, part] = 0.0
     bottom, top = polygon.extremes(points, count, -tau, 1.0)
     thickness = polygon.height(points, top, -tau, 1.0) - polygon.height(points, bottom, -tau, 1.0)
-    if thickness <= 16.0 * EPSILON * (abs(points[top, 1]) + abs(points[bottom, 1]) + tau * store[n, RIGHT, REACH]):
+    if thickness <= 16.0 * EPSILON * (abs(points[top, 1]) + abs(points[bottom, 1]) + tau * origins[n, RIGHT, REACH]):
         # Level to within rounding: its ends are to the right and to the left, and each chain has both.
         bottom, top = polygon.extremes(points, count, -1.0, 0.0)
     for side in (RIGHT, LEFT):
@@ -527,7 +731,7 @@ def cut_misses(
         length = (last - first) % count + 1
         for i in range(length):
             at = (first + i) % count
-            put(store, n, side, i, points[at, 0], points[at, 1])
+            put(rings, marks, n, side, i, points[at, 0], points[at, 1])
         marks[n, side, BEGIN] = 0
         marks[n, side, END] = length
         marks[n, side, PEAK] = 0

@@ -197,7 +197,7 @@ def bound_leaving(
             inner = 1
         labels[number] = label
         tau = (label - travelled) / law.closing_speed
-        counts[number] = chains.outline(room.store, room.marks, 0, tau, outlines[number])
+        counts[number] = chains.outline(room.origins, room.rings, room.marks, 0, tau, outlines[number])
         number += 1
     if spacing == 0.0 or number < 3:
         # So few labels live that they are one to within what is located: a hair's breadth stands for the rest.
@@ -251,7 +251,7 @@ def bound_leaving_all(
     made: Integers,
 ) -> None:
     """Write the pieces of every active engagement, and how many there are."""
-    stored, used, living, _, _, _, _, _ = sections
+    stored, used, living, _, _, _, _, _, _ = sections
     for b in range(active.shape[0]):
         made[b] = 0
         if not active[b] or lower[b] >= upper[b]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from infoset import section_kernels as kernels
-from infoset.chains import CAPACITY, empty_sections, working_room
+from infoset.chains import empty_sections, working_room
 from infoset.convex_polygons import ConvexPolygons
 from infoset.guaranteed_miss import GuaranteedMiss
 from infoset.history import History
@@ -91,6 +91,9 @@ def to_omega_alpha(polygon: ConvexPolygons, range_m: float, closing_speed_m_s: f
     return polygon.linear_map(np.array([[1.0 / x, e / x**2], [0.0, 1.0 / x]]))
 
 
+_TRACKING = SetStatus.TRACKING.value
+
+
 class InformationSetView:
     """What may be asked of an information set; nothing here changes it. Leading axis: B engagements.
 
@@ -143,7 +146,7 @@ class InformationSetView:
     @property
     def tracking(self) -> Flags:
         """Whether each set has states left above the threshold, shape (B,)."""
-        return np.asarray(self._status == SetStatus.TRACKING.value)
+        return np.asarray(self._status == _TRACKING)
 
     @property
     def inconsistent(self) -> Flags:
@@ -196,12 +199,9 @@ class InformationSetView:
         living, ranges = self.living, self.ranges_m
         rows = np.arange(self.batch)
         # Dead or unused slots may stand at any range: divide only where a section lives.
-        alphas_least = np.divide(
-            self._stack.summaries[:, :, kernels.Z_LEAST], ranges, out=np.full(ranges.shape, np.inf), where=living
-        )
-        alphas_greatest = np.divide(
-            self._stack.summaries[:, :, kernels.Z_GREATEST], ranges, out=np.full(ranges.shape, -np.inf), where=living
-        )
+        least, greatest = self._stack.heights
+        alphas_least = np.divide(least, ranges, out=np.full(ranges.shape, np.inf), where=living)
+        alphas_greatest = np.divide(greatest, ranges, out=np.full(ranges.shape, -np.inf), where=living)
         least_at, greatest_at = alphas_least.argmin(axis=1), alphas_greatest.argmax(axis=1)
         tracked = living.any(axis=1)
         return (
@@ -272,7 +272,7 @@ class InformationSetView:
         Some 30 ns an event of the history.
         """
         tape, law, label = self._history, self._stack.law, float(label_m)
-        store, marks = empty_sections(1)
+        section = empty_sections(1)
         died = kernels.replay(
             label,
             tape.kinds,
@@ -281,13 +281,12 @@ class InformationSetView:
             tape.applies[engagement],
             tape.events,
             law,
-            store,
-            marks,
+            *section,
             0,
             np.empty(tape.events),
             working_room(),
         )
-        vertices = outline(store, marks, 0, label, tape.elapsed, law) if died == kernels.ALIVE else np.empty((0, 2))
+        vertices = outline(section, 0, label, tape.elapsed, law) if died == kernels.ALIVE else np.empty((0, 2))
         x = label - law.closing_speed * (law.step * tape.elapsed)
         return Section(label, x, self.model.closing_speed_m_s, _as_polygon(vertices))
 
@@ -484,9 +483,10 @@ class InformationSet(InformationSetView):
         before = self._lower_label.copy(), self._upper_label.copy()
         self._lower_label[active] = np.maximum(self._lower_label, lower)[active]
         self._upper_label[active] = np.minimum(self._upper_label, upper)[active]
-        self._stack.keep_labels(self._lower_label, self._upper_label, active)
-        emptied = self._keep_enough(active, emptied=SetStatus.EMPTY)
-        self._recover(emptied, None, *before)
+        _, removed = self._stack.keep_labels(self._lower_label, self._upper_label, active)
+        if removed:
+            emptied = self._keep_enough(active, emptied=SetStatus.EMPTY)
+            self._recover(emptied, None, *before)
 
     def _greatest_alpha(self, measured_rad: ArrayLike | None) -> Floats:
         """Bound of |alpha| now, rad, shape (B,): from a measured one, or from the fastest the object can go."""
@@ -516,9 +516,9 @@ class InformationSet(InformationSetView):
         active = self._active(where)
         event = self._history.record(kernels.ANGLE, measured, active)
         before = self._lower_label.copy(), self._upper_label.copy()
-        self._stack.measure_angle(active, measured, self._history.elapsed, event)
-        emptied = self._keep_enough(active, emptied=SetStatus.EMPTY)
-        self._recover(emptied, event, *before)
+        if self._stack.measure_angle(active, measured, self._history.elapsed, event):
+            emptied = self._keep_enough(active, emptied=SetStatus.EMPTY)
+            self._recover(emptied, event, *before)
 
     def measure_rate(self, omega_rad_s: ArrayLike, error_rad_s: float, where: ArrayLike = True) -> None:
         """Cut every section by a measurement of the line of sight's rate: |omega - omega_m| <= error.
@@ -541,9 +541,9 @@ class InformationSet(InformationSetView):
         error = error_rad_s * (1.0 + BOUND_SLACK)
         event = self._history.record(kernels.RATE, measured, active, error)
         before = self._lower_label.copy(), self._upper_label.copy()
-        self._stack.measure_rate(active, measured, error, self._history.elapsed, event)
-        emptied = self._keep_enough(active, emptied=SetStatus.EMPTY)
-        self._recover(emptied, event, *before)
+        if self._stack.measure_rate(active, measured, error, self._history.elapsed, event):
+            emptied = self._keep_enough(active, emptied=SetStatus.EMPTY)
+            self._recover(emptied, event, *before)
 
     def shift(self, impulse_m_s: ArrayLike, where: ArrayLike = True) -> None:
         """Shift every section by an impulse: V becomes V - k, that is omega becomes omega - k/x.
@@ -570,19 +570,27 @@ class InformationSet(InformationSetView):
         ndarray of bool, shape (B, S)
             Which stored sections left.
         """
-        active = self.tracking
-        elapsed = self.model.step_s * (self._history.elapsed + 1)
-        least_label = self.model.range_threshold_m + self.model.closing_speed_m_s * elapsed
+        active, least_label = self.tracking, self._least_label_next()
         if self._phi is not None:
             leaving_below = np.minimum(self._upper_label, least_label)
             self._phi.leave(active, self._lower_label, leaving_below, self._stack, self._history)
         self._lower_label[active] = np.maximum(self._lower_label, least_label)[active]
-        left = self._stack.keep_labels(self._lower_label, self._upper_label, active)
-        self._some_left |= left.any(axis=1)
+        left, removed = self._stack.keep_labels(self._lower_label, self._upper_label, active)
         if self._phi is not None:
             self._some_left |= self._phi.exists
-        self._keep_enough(active, emptied=SetStatus.FINISHED)
+        if removed:
+            self._some_left |= left.any(axis=1)
+            self._keep_enough(active, emptied=SetStatus.FINISHED)
         return left
+
+    def sections_are_leaving(self) -> bool:
+        """Whether `drop_below_threshold` would let any stored section leave now."""
+        return bool(((self._stack.labels < self._least_label_next()) & self.living).any())
+
+    def _least_label_next(self) -> float:
+        """Least label whose range will not be below the threshold after the next step, m."""
+        elapsed = self.model.step_s * (self._history.elapsed + 1)
+        return self.model.range_threshold_m + self.model.closing_speed_m_s * elapsed
 
     def predict(self) -> None:
         """Move the set one step on, under every disturbance within its bound.
@@ -659,8 +667,7 @@ class InformationSet(InformationSetView):
 
     def _regrid(self, wanted: Flags, sections: int) -> None:
         tape, stack = self._history, self._stack
-        # A replayed section may have any number of vertices.
-        stack.make_room(CAPACITY)
+        stack.make_room_for_new(wanted, sections)
         refine_all(
             wanted,
             sections,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from infoset._compile import allocation_free, entry
-from infoset.chains import empty_sections, working_room
+from infoset.chains import copy_section, empty_sections, working_room
 from infoset.section_kernels import (
     ALIVE,
     Flags,
@@ -36,7 +36,8 @@ class Tape(NamedTuple):
 class Workspace(NamedTuple):
     """Room for replays."""
 
-    store: Floats
+    origins: Floats
+    rings: Floats
     marks: Integers
     overlaps: Floats
     living_overlaps: Floats
@@ -84,7 +85,8 @@ def run(label: float, tape: Tape, law: SectionLaw, room: Workspace) -> tuple[int
         tape.applies,
         tape.events,
         law,
-        room.store,
+        room.origins,
+        room.rings,
         room.marks,
         0,
         room.overlaps,
@@ -273,7 +275,7 @@ def refine_all(
     `limit_below` and `limit_above` are narrowed to labels known to be dead. Where nothing lives, the engagement is
     left with no living section.
     """
-    labels, used, alive, died, overlaps, store, marks, summaries = sections
+    labels, used, alive, died, overlaps, origins, rings, marks, summaries = sections
     for b in range(labels.shape[0]):
         if not wanted[b]:
             continue
@@ -303,11 +305,8 @@ def refine_all(
                 label = living.upper
             labels[b, s] = label
             n = b * labels.shape[1] + s
-            died[b, s] = replay(
-                label, kinds, errors, values[b], applies[b], events, law, store, marks, n, room.overlaps, room.points
-            )
+            died[b, s], overlaps[b, s] = run(label, tape, law, room)
             alive[b, s] = died[b, s] == ALIVE
             if alive[b, s]:
-                summarise_section(store, marks, n, label, elapsed, law, summaries, b, s)
-            else:
-                overlaps[b, s] = room.overlaps[died[b, s]]
+                copy_section(room.origins, room.rings, room.marks, 0, origins, rings, marks, n)
+                summarise_section(origins, rings, marks, n, label, elapsed, law, summaries, b, s)

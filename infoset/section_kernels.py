@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from infoset import chains, polygon
 from infoset._compile import allocation_free, entry, inlined, substituted
-from infoset.chains import LEFT, REACH, RIGHT
+from infoset.chains import REACH, RIGHT
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -32,7 +32,7 @@ ANGLE, IMPULSE, PREDICTION, RATE, WIDENING = range(5)
 ALIVE = np.iinfo(np.int64).max
 
 # Columns of a section's summary.
-Z_LEAST, Z_GREATEST, UPPER_MISS, UPPER_V, UPPER_Z, LOWER_MISS, LOWER_V, LOWER_Z = range(8)
+UPPER_MISS, UPPER_V, UPPER_Z, LOWER_MISS, LOWER_V, LOWER_Z, Z_LEAST, Z_GREATEST = range(8)
 SUMMARY_COLUMNS = 8
 
 
@@ -74,7 +74,7 @@ class Sections(NamedTuple):
         Event that emptied the section, or ALIVE.
     overlaps : ndarray, shape (B, S)
         Overlap of a dead section with the band that emptied it, m: negative.
-    store, marks : ndarray, shapes (B S, ...)
+    origins, rings, marks : ndarray
         The sections themselves, as `chains` has them: slot s of engagement b is row b S + s.
     summaries : ndarray, shape (B, S, columns)
     """
@@ -84,7 +84,8 @@ class Sections(NamedTuple):
     living: Flags
     died: Integers
     overlaps: Floats
-    store: Floats
+    origins: Floats
+    rings: Floats
     marks: Integers
     summaries: Floats
 
@@ -92,14 +93,15 @@ class Sections(NamedTuple):
 def room_for_sections(labels: Floats, used: Integers) -> Sections:
     """Arrays for a batch of sections, none of them written yet."""
     shape = labels.shape
-    store, marks = chains.empty_sections(labels.size, chains.ROOM_AT_START)
+    origins, rings, marks = chains.empty_sections(labels.size, chains.ROOM_AT_START)
     return Sections(
         labels=labels,
         used=used,
         living=np.zeros(shape, dtype=bool),
         died=np.full(shape, ALIVE, dtype=np.int64),
         overlaps=np.zeros(shape),
-        store=store,
+        origins=origins,
+        rings=rings,
         marks=marks,
         summaries=np.zeros((*shape, SUMMARY_COLUMNS)),
     )
@@ -118,7 +120,7 @@ def time_to_go(label: float, elapsed: int, law: SectionLaw) -> float:
 
 
 @entry
-def start_section(store: Floats, marks: Integers, n: int, label: float, law: SectionLaw) -> None:
+def start_section(origins: Floats, rings: Floats, marks: Integers, n: int, label: float, law: SectionLaw) -> None:
     """Write the section at t = 0.
 
     Notes
@@ -138,7 +140,8 @@ def start_section(store: Floats, marks: Integers, n: int, label: float, law: Sec
         z_least, z_greatest = math.atan(z_least / x) * x, math.atan(z_greatest / x) * x
     tau = time_to_go(label, 0, law)
     chains.start(
-        store,
+        origins,
+        rings,
         marks,
         n,
         tau,
@@ -146,12 +149,12 @@ def start_section(store: Floats, marks: Integers, n: int, label: float, law: Sec
         (lowest + shift_at_greatest, highest + shift_at_greatest, z_greatest),
     )
     if law.half_v_at_start > 0.0:
-        chains.spread(store, n, tau, law.half_v_at_start)
+        chains.spread(origins, n, tau, law.half_v_at_start)
 
 
 @inlined
 def measure_section(
-    store: Floats, marks: Integers, n: int, label: float, elapsed: int, alpha: float, law: SectionLaw
+    origins: Floats, rings: Floats, marks: Integers, n: int, label: float, elapsed: int, alpha: float, law: SectionLaw
 ) -> tuple[bool, float]:
     """Cut a section by an angle measurement.
 
@@ -180,13 +183,14 @@ def measure_section(
     elif law.exact_angles:
         lower = math.tan(lower) if lower > -RIGHT_ANGLE else -np.inf
         upper = math.tan(upper) if upper < RIGHT_ANGLE else np.inf
-    slack = CUT_SLACK * (label * (abs(alpha) + bound) + store[n, RIGHT, REACH] * (label / law.closing_speed))
-    return chains.cut(store, marks, n, x / law.closing_speed, x * lower - slack, x * upper + slack)
+    slack = CUT_SLACK * (label * (abs(alpha) + bound) + origins[n, RIGHT, REACH] * (label / law.closing_speed))
+    return chains.cut(origins, rings, marks, n, x / law.closing_speed, x * lower - slack, x * upper + slack)
 
 
 @allocation_free
 def measure_rate_section(
-    store: Floats,
+    origins: Floats,
+    rings: Floats,
     marks: Integers,
     n: int,
     label: float,
@@ -203,48 +207,51 @@ def measure_rate_section(
     What is measured is (V_z x - V_x z)/(x^2 + z^2), less than the model's V/x + e z/x^2 by the square of cos(alpha).
     """
     if chains.is_crowded(marks, n):
-        chains.reduce_outward(store, marks, n, time_to_go(label, elapsed, law), points)
+        chains.reduce_outward(origins, rings, marks, n, time_to_go(label, elapsed, law), points)
     x = range_of(label, elapsed, law)
     tau = x / law.closing_speed
     lower, upper = omega - error, omega + error
     if law.exact_angles:
-        least, greatest = chains.heights(store, marks, n, tau)
+        least, greatest = chains.heights(origins, rings, marks, n, tau)
         widest = 1.0 + (max(abs(least), abs(greatest)) / x) ** 2
         lower *= widest if lower < 0.0 else 1.0
         upper *= widest if upper > 0.0 else 1.0
-    slack = CUT_SLACK * (label * (abs(omega) + error) + store[n, RIGHT, REACH]) * (label / law.closing_speed)
-    return chains.cut_misses(store, marks, n, tau, tau * x * lower - slack, tau * x * upper + slack, points)
+    slack = CUT_SLACK * (label * (abs(omega) + error) + origins[n, RIGHT, REACH]) * (label / law.closing_speed)
+    return chains.cut_misses(origins, rings, marks, n, tau, tau * x * lower - slack, tau * x * upper + slack, points)
 
 
 @inlined
-def widen_section(store: Floats, n: int, label: float, elapsed: int, law: SectionLaw) -> None:
+def widen_section(origins: Floats, n: int, label: float, elapsed: int, law: SectionLaw) -> None:
     """Widen a section by what one angle measurement may err, b: by e b in V, which is x b in the predicted miss."""
     x = range_of(label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x
-    chains.spread(store, n, x / law.closing_speed, law.closing_speed * bound)
+    chains.spread(origins, n, x / law.closing_speed, law.closing_speed * bound)
 
 
 @substituted
-def shift_section(store: Floats, n: int, label: float, elapsed: int, impulse: float, law: SectionLaw) -> None:
+def shift_section(origins: Floats, n: int, label: float, elapsed: int, impulse: float, law: SectionLaw) -> None:
     """Shift a section by an impulse: V becomes V - k, for every k that the commanded one may have been."""
     tau = time_to_go(label, elapsed, law)
-    chains.shift(store, n, tau, -impulse)
+    chains.shift(origins, n, tau, -impulse)
     if law.impulse_error > 0.0:
-        chains.spread(store, n, tau, abs(impulse) * law.impulse_error)
+        chains.spread(origins, n, tau, abs(impulse) * law.impulse_error)
 
 
 @inlined
-def predict_section(store: Floats, marks: Integers, n: int, label: float, elapsed: int, law: SectionLaw) -> None:
+def predict_section(
+    origins: Floats, rings: Floats, marks: Integers, n: int, label: float, elapsed: int, law: SectionLaw
+) -> None:
     """Move a section on to step `elapsed`: time to go falls, and the disturbance adds its segment, 8 ulp longer."""
     tau = time_to_go(label, elapsed, law)
-    chains.turn(store, marks, n, tau + law.disturbance_lead)
-    chains.spread(store, n, tau + law.disturbance_lead, law.half_v + SUM_SLACK * store[n, RIGHT, REACH])
-    chains.turn(store, marks, n, tau)
+    chains.turn(origins, rings, marks, n, tau + law.disturbance_lead)
+    chains.spread(origins, n, tau + law.disturbance_lead, law.half_v + SUM_SLACK * origins[n, RIGHT, REACH])
+    chains.turn(origins, rings, marks, n, tau)
 
 
 @inlined
 def summarise_section(
-    store: Floats,
+    origins: Floats,
+    rings: Floats,
     marks: Integers,
     n: int,
     label: float,
@@ -254,7 +261,7 @@ def summarise_section(
     b: int,
     s: int,
 ) -> None:
-    """Write the extent in z and the extremes of the predicted miss (13), (14) with the points that reach them.
+    """Write the extremes of the predicted miss (13), (14) of a section, with the points that reach them.
 
     Notes
     -----
@@ -262,17 +269,9 @@ def summarise_section(
     for the upper extreme and its highest for the lower one, so that a mirrored engagement is mirrored exactly.
     """
     tau = time_to_go(label, elapsed, law)
-    summaries[b, s, Z_LEAST], summaries[b, s, Z_GREATEST] = chains.heights(store, marks, n, tau)
-    upper_at = chains.find_peak(store, marks, n, RIGHT)
-    lower_at = chains.find_peak(store, marks, n, LEFT)
-    upper_v, upper = chains.vertex(store, n, RIGHT, upper_at)
-    lower_v, lower = chains.vertex(store, n, LEFT, lower_at)
-    magnitude = tau * (abs(upper_v) + abs(lower_v)) + abs(upper) + abs(lower)
-    tolerance = TIE_TOLERANCE * (upper - lower) + CUT_SLACK * magnitude
-    upper_v, upper_m = chains.vertex(
-        store, n, RIGHT, chains.first_near_peak(store, marks, n, RIGHT, upper_at, tolerance)
+    upper, upper_v, upper_m, lower, lower_v, lower_m = chains.greatest_and_least_miss(
+        origins, rings, marks, n, tau, TIE_TOLERANCE, CUT_SLACK
     )
-    lower_v, lower_m = chains.vertex(store, n, LEFT, chains.first_near_peak(store, marks, n, LEFT, lower_at, tolerance))
     drift = 0.5 * law.disturbance * tau * tau
     summaries[b, s, UPPER_MISS] = upper + drift
     summaries[b, s, UPPER_V] = upper_v
@@ -285,31 +284,43 @@ def summarise_section(
 @entry
 def start_all(sections: Sections, law: SectionLaw) -> None:
     """Write the initial sections of a batch; they are not summarised yet."""
-    labels, used, living, _, _, store, marks, _ = sections
+    labels, used, living, _, _, origins, rings, marks, _ = sections
     for b in range(labels.shape[0]):
         for s in range(used[b]):
             n = b * labels.shape[1] + s
-            start_section(store, marks, n, labels[b, s], law)
+            start_section(origins, rings, marks, n, labels[b, s], law)
             living[b, s] = True
 
 
 @entry
-def measure_all(active: Flags, alpha: Floats, elapsed: int, event: int, sections: Sections, law: SectionLaw) -> None:
-    """Cut every living section of the active engagements by their angle measurements, and summarise it."""
-    labels, used, living, died, overlaps, store, marks, summaries = sections
+def measure_all(
+    behind: Flags, active: Flags, alpha: Floats, elapsed: int, event: int, sections: Sections, law: SectionLaw
+) -> int:
+    """Cut every living section of the active engagements by their angle measurements, and summarise it.
+
+    Sections that are a step behind are moved on first, in the same pass. Returned is how many died.
+    """
+    deaths = 0
+    labels, used, living, died, overlaps, origins, rings, marks, summaries = sections
     for b in range(labels.shape[0]):
-        if not active[b]:
+        if not active[b] and not behind[b]:
             continue
         for s in range(used[b]):
             if not living[b, s]:
                 continue
             n = b * labels.shape[1] + s
-            living[b, s], overlap = measure_section(store, marks, n, labels[b, s], elapsed, alpha[b], law)
+            if behind[b]:
+                predict_section(origins, rings, marks, n, labels[b, s], elapsed, law)
+            if not active[b]:
+                continue
+            living[b, s], overlap = measure_section(origins, rings, marks, n, labels[b, s], elapsed, alpha[b], law)
             if living[b, s]:
-                summarise_section(store, marks, n, labels[b, s], elapsed, law, summaries, b, s)
+                summarise_section(origins, rings, marks, n, labels[b, s], elapsed, law, summaries, b, s)
             else:
                 died[b, s] = event
                 overlaps[b, s] = overlap
+                deaths += 1
+    return deaths
 
 
 @entry
@@ -322,9 +333,10 @@ def measure_rate_all(
     sections: Sections,
     law: SectionLaw,
     points: Floats,
-) -> None:
-    """Cut every living section of the active engagements by measured rates, and summarise it."""
-    labels, used, living, died, overlaps, store, marks, summaries = sections
+) -> int:
+    """Cut every living section of the active engagements by measured rates, and summarise it; return how many died."""
+    deaths = 0
+    labels, used, living, died, overlaps, origins, rings, marks, summaries = sections
     for b in range(labels.shape[0]):
         if not active[b]:
             continue
@@ -333,26 +345,28 @@ def measure_rate_all(
                 continue
             n = b * labels.shape[1] + s
             living[b, s], overlap = measure_rate_section(
-                store, marks, n, labels[b, s], elapsed, omega[b], error, law, points
+                origins, rings, marks, n, labels[b, s], elapsed, omega[b], error, law, points
             )
             if living[b, s]:
-                summarise_section(store, marks, n, labels[b, s], elapsed, law, summaries, b, s)
+                summarise_section(origins, rings, marks, n, labels[b, s], elapsed, law, summaries, b, s)
             else:
                 died[b, s] = event
                 overlaps[b, s] = overlap
+                deaths += 1
+    return deaths
 
 
 @entry
 def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, law: SectionLaw) -> None:
     """Shift every living section, and its summary, by its engagement's impulse."""
-    labels, used, living, _, _, store, _, summaries = sections
+    labels, used, living, _, _, origins, _, _, summaries = sections
     for b in range(labels.shape[0]):
         if not active[b] or impulse[b] == 0.0:
             continue
         for s in range(used[b]):
             if not living[b, s]:
                 continue
-            shift_section(store, b * labels.shape[1] + s, labels[b, s], elapsed, impulse[b], law)
+            shift_section(origins, b * labels.shape[1] + s, labels[b, s], elapsed, impulse[b], law)
             tau, error = time_to_go(labels[b, s], elapsed, law), abs(impulse[b]) * law.impulse_error
             summaries[b, s, UPPER_V] += error - impulse[b]
             summaries[b, s, LOWER_V] -= error + impulse[b]
@@ -361,37 +375,82 @@ def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, 
 
 
 @entry
-def predict_all(active: Flags, elapsed: int, sections: Sections, law: SectionLaw, points: Floats) -> int:
-    """Move every living section of the active engagements on to step `elapsed`; return the most vertices of any.
+def catch_up_all(
+    behind: Flags, stale: Flags, heights_wanted: bool, elapsed: int, sections: Sections, law: SectionLaw
+) -> None:
+    """Move the sections that are a step behind on to step `elapsed`, and summarise those whose summary is stale.
 
-    The summaries stay behind.
+    Where it is wanted, the summary has the least and the greatest z too.
     """
-    fullest = 0
-    labels, used, living, _, _, store, marks, _ = sections
+    labels, used, living, _, _, origins, rings, marks, summaries = sections
     for b in range(labels.shape[0]):
-        if not active[b]:
+        if not behind[b] and not stale[b] and not heights_wanted:
             continue
         for s in range(used[b]):
-            if living[b, s]:
-                n = b * labels.shape[1] + s
-                if chains.is_crowded(marks, n):
-                    chains.reduce_outward(store, marks, n, time_to_go(labels[b, s], elapsed - 1, law), points)
-                predict_section(store, marks, n, labels[b, s], elapsed, law)
-                fullest = max(fullest, chains.count_of(marks, n))
-    return fullest
+            if not living[b, s]:
+                continue
+            n = b * labels.shape[1] + s
+            if behind[b]:
+                predict_section(origins, rings, marks, n, labels[b, s], elapsed, law)
+            if stale[b]:
+                summarise_section(origins, rings, marks, n, labels[b, s], elapsed, law, summaries, b, s)
+            if heights_wanted:
+                tau = time_to_go(labels[b, s], elapsed, law)
+                least, greatest = chains.heights(origins, rings, marks, n, tau)
+                summaries[b, s, Z_LEAST] = least
+                summaries[b, s, Z_GREATEST] = greatest
 
 
 @entry
-def summarise_all(active: Flags, elapsed: int, sections: Sections, law: SectionLaw) -> None:
-    """Summarise every living section of the active engagements."""
-    labels, used, living, _, _, store, marks, summaries = sections
+def room_wanted(active: Flags, added: int, sections: Sections) -> int:
+    """Floats that the rings lack before any living section of the active engagements may gain so many vertices."""
+    labels, used, living, _, _, _, _, marks, _ = sections
+    floats = 0
     for b in range(labels.shape[0]):
         if not active[b]:
             continue
         for s in range(used[b]):
-            if living[b, s]:
-                n = b * labels.shape[1] + s
-                summarise_section(store, marks, n, labels[b, s], elapsed, law, summaries, b, s)
+            n = b * labels.shape[1] + s
+            if living[b, s] and chains.lacks_room(marks, n, added):
+                floats += 4 * chains.room_for(chains.count_of(marks, n) + added, chains.room_of(marks, n))
+    return floats
+
+
+@entry
+def make_room_all(active: Flags, added: int, elapsed: int, sections: Sections, law: SectionLaw, points: Floats) -> None:
+    """See that the living sections of the active engagements may gain so many vertices: give them wider rings.
+
+    Those that have all that a section may have are reduced, outward.
+    """
+    labels, used, living, _, _, origins, rings, marks, _ = sections
+    for b in range(labels.shape[0]):
+        if not active[b]:
+            continue
+        for s in range(used[b]):
+            n = b * labels.shape[1] + s
+            if not living[b, s] or not chains.lacks_room(marks, n, added):
+                continue
+            if chains.is_crowded(marks, n):
+                chains.reduce_outward(origins, rings, marks, n, time_to_go(labels[b, s], elapsed, law), points)
+            wanted = chains.room_for(chains.count_of(marks, n) + added, chains.room_of(marks, n))
+            if wanted > chains.room_of(marks, n):
+                chains.widen_rings(rings, marks, n, wanted)
+
+
+@entry
+def keep_labels_all(active: Flags, least: Floats, greatest: Floats, sections: Sections, removed: Flags) -> int:
+    """Remove the living sections whose labels are outside [least, greatest]; write which, and return how many."""
+    labels, used, living, _, _, _, _, _, _ = sections
+    count = 0
+    for b in range(labels.shape[0]):
+        if not active[b]:
+            continue
+        for s in range(used[b]):
+            if living[b, s] and not least[b] <= labels[b, s] <= greatest[b]:
+                living[b, s] = False
+                removed[b, s] = True
+                count += 1
+    return count
 
 
 @entry
@@ -410,7 +469,7 @@ def widest_all(elapsed: int, sections: Sections, law: SectionLaw, exists: Flags,
         For the lower and the upper end: predicted miss, and alpha, omega and range where it is reached; left as they
         are where no section lives.
     """
-    labels, used, living, _, _, _, _, summaries = sections
+    labels, used, living, _, _, _, _, _, summaries = sections
     for b in range(labels.shape[0]):
         for s in range(used[b]):
             if not living[b, s]:
@@ -432,18 +491,20 @@ def margins_all(
     v: Floats, z: Floats, elapsed: int, sections: Sections, law: SectionLaw, points: Floats, margins: Floats
 ) -> None:
     """Write the signed margin of a state (V, z) in the first section of each engagement, m; -inf where it is dead."""
-    labels, _, living, _, _, store, marks, _ = sections
+    labels, _, living, _, _, origins, rings, marks, _ = sections
     for b in range(v.shape[0]):
         margins[b] = -np.inf
         if living[b, 0]:
             tau = time_to_go(labels[b, 0], elapsed, law)
-            margins[b] = margin_in(store, marks, b * labels.shape[1], tau, v[b], z[b], points)
+            margins[b] = margin_in(origins, rings, marks, b * labels.shape[1], tau, v[b], z[b], points)
 
 
 @entry
-def margin_in(store: Floats, marks: Integers, n: int, tau: float, v: float, z: float, points: Floats) -> float:
+def margin_in(
+    origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, v: float, z: float, points: Floats
+) -> float:
     """Signed margin of a state (V, z), m: distances are taken with V counted as V x/e, the miss that it is worth."""
-    count = chains.outline(store, marks, n, tau, points)
+    count = chains.outline(origins, rings, marks, n, tau, points)
     for i in range(count):
         points[i, 0] *= tau
     return polygon.margin(points, count, v * tau, z)
@@ -458,7 +519,8 @@ def replay(
     applies: Flags,
     events: int,
     law: SectionLaw,
-    store: Floats,
+    origins: Floats,
+    rings: Floats,
     marks: Integers,
     n: int,
     overlaps: Floats,
@@ -477,7 +539,7 @@ def replay(
         Number of events.
     law : SectionLaw
         The numbers of the model.
-    store, marks, n : section
+    origins, rings, marks, n : section
         Where it goes.
     overlaps : ndarray, shape (>= events,)
         Receives the overlap with the band of each angle measurement that the section lived to see.
@@ -493,28 +555,28 @@ def replay(
     -----
     Some 30 ns an event.
     """
-    start_section(store, marks, n, label, law)
+    start_section(origins, rings, marks, n, label, law)
     elapsed = 0
     for event in range(events):
         if kinds[event] == PREDICTION:
             if chains.is_crowded(marks, n):
-                chains.reduce_outward(store, marks, n, time_to_go(label, elapsed, law), points)
+                chains.reduce_outward(origins, rings, marks, n, time_to_go(label, elapsed, law), points)
             elapsed += 1
-            predict_section(store, marks, n, label, elapsed, law)
+            predict_section(origins, rings, marks, n, label, elapsed, law)
         elif not applies[event]:
             continue
         elif kinds[event] == ANGLE:
-            living, overlaps[event] = measure_section(store, marks, n, label, elapsed, values[event], law)
+            living, overlaps[event] = measure_section(origins, rings, marks, n, label, elapsed, values[event], law)
             if not living:
                 return event
         elif kinds[event] == IMPULSE:
-            shift_section(store, n, label, elapsed, values[event], law)
+            shift_section(origins, n, label, elapsed, values[event], law)
         elif kinds[event] == WIDENING:
-            widen_section(store, n, label, elapsed, law)
+            widen_section(origins, n, label, elapsed, law)
         elif errors is not None:
             # Compiled only for a history that has rates: this branch would be the greater part of the work.
             living, overlaps[event] = measure_rate_section(
-                store, marks, n, label, elapsed, values[event], errors[event], law, points
+                origins, rings, marks, n, label, elapsed, values[event], errors[event], law, points
             )
             if not living:
                 return event

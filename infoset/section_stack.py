@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from infoset import chains
 from infoset import section_kernels as kernels
+from infoset.chains import Chains
 from infoset.section_kernels import SectionLaw, Sections
 
 Floats = NDArray[np.float64]
@@ -29,8 +30,10 @@ class SectionStack:
         self.law = law
         self.sections = kernels.room_for_sections(labels, used.astype(np.int64))
         self._stale = np.ones(self.batch, dtype=bool)
+        self._nobody = np.zeros(self.batch, dtype=bool)
+        self._behind = self._nobody
+        self._is_stale, self._is_behind, self._has_heights = True, False, False
         self._elapsed = 0
-        self._fullest = 4
         kernels.start_all(self.sections, law)
 
     @property
@@ -50,90 +53,134 @@ class SectionStack:
 
     @property
     def summaries(self) -> Floats:
-        """Summary of each living section, shape (B, S, columns), brought up to date where it is stale."""
-        self._refresh()
+        """Summary of each living section but for its heights, shape (B, S, columns), brought up to date."""
+        self._summarise()
         return self.sections.summaries
 
-    def _refresh(self) -> None:
-        if self._stale.any():
-            kernels.summarise_all(self._stale, self._elapsed, self.sections, self.law)
-            self._stale[:] = False
+    @property
+    def heights(self) -> tuple[Floats, Floats]:
+        """Least and greatest z of each living section, m, each (B, S)."""
+        if not self._has_heights:
+            # Who asks for them will ask for the rest.
+            self._summarise(heights_wanted=True)
+        summaries = self.sections.summaries
+        return summaries[:, :, kernels.Z_LEAST], summaries[:, :, kernels.Z_GREATEST]
+
+    def _summarise(self, heights_wanted: bool = False) -> None:
+        """Bring sections and summaries up to date."""
+        if self._is_stale or heights_wanted:
+            kernels.catch_up_all(self._behind, self._stale, heights_wanted, self._elapsed, self.sections, self.law)
+            self._behind = self._stale = self._nobody
+            self._is_behind = self._is_stale = False
+            self._has_heights |= heights_wanted
+
+    def _catch_up(self) -> None:
+        """Bring sections up to date."""
+        if self._is_behind:
+            kernels.catch_up_all(self._behind, self._nobody, False, self._elapsed, self.sections, self.law)
+            self._behind, self._is_behind = self._nobody, False
 
     def ranges(self, elapsed: int) -> Floats:
         """Range of every slot after a number of steps, m, shape (B, S)."""
         return self.labels - self.law.closing_speed * (self.law.step * elapsed)
 
-    def make_room(self, vertices: int) -> None:
-        """See that each chain of every slot has room for so many vertices."""
-        store, marks = self.sections.store, self.sections.marks
-        room = (store.shape[2] - chains.VERTICES) // 2
-        if room < vertices and room < chains.CAPACITY:
-            while room < min(vertices, chains.CAPACITY):
-                room *= 2
-            wider, _ = chains.empty_sections(len(store), room)
-            chains.move_to_wider_rings(store, marks, self.living.ravel(), wider)
-            self.sections = self.sections._replace(store=wider)
+    def _make_room(self, active: Flags, vertices: int) -> None:
+        """See that each living section may gain so many vertices."""
+        floats = kernels.room_wanted(active, vertices, self.sections)
+        if floats:
+            self.sections = self.sections._replace(rings=chains.with_room(self.sections.rings, floats))
+            room = chains.working_room()
+            kernels.make_room_all(active, vertices, self._elapsed, self.sections, self.law, room)
 
-    def measure_angle(self, active: Flags, alpha: Floats, elapsed: int, event: int) -> None:
-        """Cut the living sections by angle measurements (rad)."""
-        kernels.measure_all(active, alpha, elapsed, event, self.sections, self.law)
-        self._stale &= ~active
+    def make_room_for_new(self, wanted: Flags, number: int) -> None:
+        """See that there is room for so many sections of any size in each of the wanted engagements."""
+        self._catch_up()
+        self._has_heights = False
+        floats = 4 * chains.CAPACITY * number * int(np.count_nonzero(wanted))
+        self.sections = self.sections._replace(rings=chains.with_room(self.sections.rings, floats))
 
-    def measure_rate(self, active: Flags, omega: Floats, error: float, elapsed: int, event: int) -> None:
-        """Cut the living sections by measured rates of the line of sight (rad/s)."""
-        self.make_room(self._fullest + 2 * chains.MOST_ADDED)
-        kernels.measure_rate_all(active, omega, error, elapsed, event, self.sections, self.law, chains.working_room())
-        self._stale &= ~active
-        self._fullest += chains.MOST_ADDED
+    def measure_angle(self, active: Flags, alpha: Floats, elapsed: int, event: int) -> int:
+        """Cut the living sections by angle measurements (rad); return how many died."""
+        deaths = kernels.measure_all(self._behind, active, alpha, elapsed, event, self.sections, self.law)
+        self._behind, self._is_behind = self._nobody, False
+        self._measured(active)
+        return deaths
+
+    def measure_rate(self, active: Flags, omega: Floats, error: float, elapsed: int, event: int) -> int:
+        """Cut the living sections by measured rates of the line of sight (rad/s); return how many died."""
+        self._catch_up()
+        self._make_room(active, chains.MOST_ADDED)
+        room = chains.working_room()
+        deaths = kernels.measure_rate_all(active, omega, error, elapsed, event, self.sections, self.law, room)
+        self._measured(active)
+        return deaths
+
+    def _measured(self, active: Flags) -> None:
+        """Note that the summaries of the active engagements are fresh, but for the heights."""
+        if self._is_stale:
+            self._stale = self._stale & ~active
+            self._is_stale = bool(self._stale.any())
+        self._has_heights = False
 
     def shift(self, active: Flags, impulse: Floats, elapsed: int) -> None:
         """Shift the living sections, and their summaries, by impulses (m/s)."""
+        self._catch_up()
         kernels.shift_all(active, impulse, elapsed, self.sections, self.law)
 
     def predict(self, active: Flags, elapsed: int) -> None:
-        """Move the living sections to step `elapsed`."""
-        self.make_room(self._fullest + chains.MOST_ADDED)
-        self._fullest = kernels.predict_all(active, elapsed, self.sections, self.law, chains.working_room())
-        self._stale |= active
+        """Move the living sections to step `elapsed`.
+
+        Notes
+        -----
+        They are moved when somebody looks at them, or with the next measurement: one pass over the memory, not two.
+        """
+        self._catch_up()
+        self._make_room(active, chains.MOST_ADDED)
+        self._behind = active.copy()
+        self._stale = self._stale | active if self._is_stale else self._behind
+        self._is_behind = self._is_stale = True
+        self._has_heights = False
         self._elapsed = elapsed
 
-    def keep_labels(self, least: Floats, greatest: Floats, active: Flags) -> Flags:
-        """Remove the living sections whose labels are outside [least, greatest]; return which."""
-        outside = (self.labels < least[:, None]) | (self.labels > greatest[:, None])
-        removed = outside & self.living & active[:, None]
-        self.living[removed] = False
-        return removed
+    def keep_labels(self, least: Floats, greatest: Floats, active: Flags) -> tuple[Flags, int]:
+        """Remove the living sections whose labels are outside [least, greatest]; return which, and how many."""
+        removed = np.zeros(self.labels.shape, dtype=bool)
+        return removed, kernels.keep_labels_all(active, least, greatest, self.sections, removed)
 
     def margins(self, v: Floats, z: Floats, elapsed: int) -> Floats:
         """Signed margin of states (V, z) in the first slot of each engagement, m."""
+        self._catch_up()
         margins = np.empty(self.batch)
         kernels.margins_all(v, z, elapsed, self.sections, self.law, chains.working_room(), margins)
         return margins
 
     def widest(self, elapsed: int) -> tuple[Flags, Floats]:
         """Predicted-miss interval of each engagement, as `section_kernels.widest_all` writes it."""
-        self._refresh()
+        self._summarise()
         exists, ends = np.zeros(self.batch, dtype=bool), np.zeros((self.batch, 2, 4))
         kernels.widest_all(elapsed, self.sections, self.law, exists, ends)
         return exists, ends
 
     def polygon(self, engagement: int, slot: int, elapsed: int) -> Floats:
         """Vertices (V, z) of a living section, counter-clockwise, shape (n, 2)."""
-        store, marks = self.sections.store, self.sections.marks
+        self._catch_up()
         row = engagement * self.labels.shape[1] + slot
-        return outline(store, marks, row, float(self.labels[engagement, slot]), elapsed, self.law)
+        section = Chains(self.sections.origins, self.sections.rings, self.sections.marks)
+        return outline(section, row, float(self.labels[engagement, slot]), elapsed, self.law)
 
     def copy(self) -> SectionStack:
         """A stack of its own with the same sections."""
         twin = SectionStack.__new__(SectionStack)
         twin.law = self.law
         twin.sections = Sections(**{name: array.copy() for name, array in self.sections._asdict().items()})
-        twin._stale, twin._elapsed, twin._fullest = self._stale.copy(), self._elapsed, self._fullest
+        twin._stale, twin._behind, twin._nobody = self._stale, self._behind, self._nobody
+        twin._is_stale, twin._is_behind = self._is_stale, self._is_behind
+        twin._has_heights, twin._elapsed = self._has_heights, self._elapsed
         return twin
 
 
-def outline(store: Floats, marks: NDArray[np.int64], row: int, label: float, elapsed: int, law: SectionLaw) -> Floats:
+def outline(section: Chains, row: int, label: float, elapsed: int, law: SectionLaw) -> Floats:
     """Vertices (V, z) of a section, counter-clockwise, shape (n, 2)."""
     points = chains.working_room()
     time_to_go = (label - law.closing_speed * (law.step * elapsed)) / law.closing_speed
-    return points[: chains.outline(store, marks, row, time_to_go, points)].copy()
+    return points[: chains.outline(*section, row, time_to_go, points)].copy()

@@ -115,6 +115,7 @@ class Engagements:
         self._model = model = on_board_model(scenario)
         arrival_s = self._truth.arrival_s()
         self._information = InformationSet(model, batch, guarantee=guarantee)
+        self._view = self._information.view()
         self._truth_section = TruthSection(model, arrival_s)
         self._arrival_s = arrival_s
         self._angle_every = _steps_in(scenario.set_model.angle_sensor.period_s, scenario)
@@ -173,7 +174,7 @@ class Engagements:
                     miss,
                     self._impulse,
                     self._truth_section.margin_m.copy(),
-                    self._information.view(),
+                    self._view,
                 )
             )
         self._budget = np.maximum(self._budget - np.abs(self._impulse), 0.0)
@@ -209,7 +210,7 @@ class Engagements:
                 sight.omega_rad_s,
                 rate_sensor.error_rad_s if rate_sensor is not None and rating else None,
             ),
-            self._information.view(),
+            self._view,
         )
         if measurement.range_m is not None and sensor is not None:
             self._information.measure_range(
@@ -262,7 +263,7 @@ class Engagements:
             measured_range_m=self._measured_range,
             measured_rate_rad_s=self._measured_rate,
             last_impulse_m_s=self._impulse.copy(),
-            information=self._information.view(),
+            information=self._view,
             angle_is_new=self.step % self._angle_every == 0,
             range_is_new=self._range_every > 0 and self.step % self._range_every == 0,
             range_sensor=self.scenario.range_sensor,
@@ -279,6 +280,9 @@ class Engagements:
     def _finish_labels(self) -> None:
         """Let labels leave below the threshold, and note the predicted miss of those that do."""
         if self._model.is_guaranteed:
+            self._information.drop_below_threshold()
+            return
+        if not self._information.sections_are_leaving():
             self._information.drop_below_threshold()
             return
         worst = self._information.worst_predicted_miss_m()

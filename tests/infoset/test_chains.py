@@ -28,7 +28,21 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from infoset import chains
-from infoset.chains import BEGIN, CAPACITY, END, LEFT, M_ORIGIN, REACH, RIGHT, V_ORIGIN, VERTICES
+from infoset.chains import (
+    BEGIN,
+    CAPACITY,
+    END,
+    FIRST_RING,
+    LEFT,
+    M_ORIGIN,
+    MASK,
+    PEAK,
+    REACH,
+    RIGHT,
+    RING,
+    TAKEN,
+    V_ORIGIN,
+)
 
 Floats = NDArray[np.float64]
 Exact = tuple[Fraction, Fraction]
@@ -126,51 +140,52 @@ def assert_contains(polygon: Sequence[Exact], points: Sequence[Exact], box: Exac
     assert lost is None, f"{tuple(map(float, lost))} is not in {[tuple(map(float, point)) for point in polygon]}"
 
 
-# A section, and what its store holds, exactly.
+# A section, and what its chains hold, exactly.
 
 
 class Section:
-    """One row of a store, with the time to go that it was last turned to."""
+    """One row of three, with the time to go that it was last turned to."""
 
     def __init__(self, tau: float, bottom: Level, top: Level, room: int = CAPACITY) -> None:
-        self.store, self.marks = chains.empty_sections(3, room)
+        self.chains = chains.empty_sections(3, room)
+        self.chains.rings[FIRST_RING:] = 0.0
         self.tau = tau
-        chains.start(self.store, self.marks, ROW, tau, bottom, top)
+        chains.start(*self.chains, ROW, tau, bottom, top)
 
     def turn(self, tau: float) -> None:
         self.tau = tau
-        chains.turn(self.store, self.marks, ROW, tau)
+        chains.turn(*self.chains, ROW, tau)
 
     def spread(self, half_v: float) -> None:
-        chains.spread(self.store, ROW, self.tau, half_v)
+        chains.spread(self.chains.origins, ROW, self.tau, half_v)
 
     def shift(self, v: float) -> None:
-        chains.shift(self.store, ROW, self.tau, v)
+        chains.shift(self.chains.origins, ROW, self.tau, v)
 
     def cut(self, lower: float, upper: float) -> tuple[bool, float]:
-        return chains.cut(self.store, self.marks, ROW, self.tau, lower, upper)
+        return chains.cut(*self.chains, ROW, self.tau, lower, upper)
 
     def cut_misses(self, lower: float, upper: float) -> tuple[bool, float]:
         room = chains.working_room()
-        return chains.cut_misses(self.store, self.marks, ROW, self.tau, lower, upper, room)
+        return chains.cut_misses(*self.chains, ROW, self.tau, lower, upper, room)
 
     def reduce(self) -> None:
-        chains.reduce_outward(self.store, self.marks, ROW, self.tau, chains.working_room())
+        chains.reduce_outward(*self.chains, ROW, self.tau, chains.working_room())
 
     @property
     def reach(self) -> float:
-        return float(self.store[ROW, RIGHT, REACH])
+        return float(self.chains.origins[ROW, RIGHT, REACH])
 
     @property
     def count(self) -> int:
-        return chains.count_of(self.marks, ROW)
+        return chains.count_of(self.chains.marks, ROW)
 
     def heights(self) -> tuple[float, float]:
-        return chains.heights(self.store, self.marks, ROW, self.tau)
+        return chains.heights(*self.chains, ROW, self.tau)
 
     def outline(self) -> Floats:
         out = chains.working_room()
-        return out[: chains.outline(self.store, self.marks, ROW, self.tau, out)].copy()
+        return out[: chains.outline(*self.chains, ROW, self.tau, out)].copy()
 
     def corners(self) -> list[Exact]:
         """The outline, as (V, m)."""
@@ -179,28 +194,34 @@ class Section:
         return hull([(v, z + tau * v) for v, z in outline])
 
     def numbers(self, side: int) -> range:
-        return range(int(self.marks[ROW, side, BEGIN]), int(self.marks[ROW, side, END]))
+        return range(int(self.chains.marks[ROW, side, BEGIN]), int(self.chains.marks[ROW, side, END]))
 
     def local(self, side: int) -> list[tuple[float, float]]:
         """Vertices from the origin of their chain."""
-        chain = self.store[ROW, side]
-        room = (len(chain) - VERTICES) // 2
-        places = [VERTICES + 2 * (i % room) for i in self.numbers(side)]
-        return [(float(chain[at]), float(chain[at + 1])) for at in places]
+        places = [chains.place(self.chains.marks, ROW, side, i) for i in self.numbers(side)]
+        return [(float(self.chains.rings[at]), float(self.chains.rings[at + 1])) for at in places]
 
     def chain(self, side: int) -> list[Exact]:
-        """Vertices as the store has them, without any rounding."""
-        parts = [Fraction(float(part)) for part in self.store[ROW, side, :REACH]]
+        """Vertices as the rings have them, without any rounding."""
+        parts = [Fraction(float(part)) for part in self.chains.origins[ROW, side, :REACH]]
         v, m = parts[V_ORIGIN] + parts[V_ORIGIN + 1], parts[M_ORIGIN] + parts[M_ORIGIN + 1]
         return [(Fraction(x) + v, Fraction(y) + m) for x, y in self.local(side)]
 
     def peak(self, side: int) -> int:
-        return chains.find_peak(self.store, self.marks, ROW, side)
+        numbers, (origins, rings, marks) = self.numbers(side), self.chains
+        ring, known = (int(marks[ROW, side, RING]), int(marks[ROW, side, MASK])), int(marks[ROW, side, PEAK])
+        sign, m_origin = (1.0, -1.0)[side], float(origins[ROW, side, M_ORIGIN])
+        marks[ROW, side, PEAK] = chains.find_peak(rings, ring, numbers[0], numbers[-1], known, sign, m_origin)
+        return int(marks[ROW, side, PEAK])
 
     def is_alone(self) -> bool:
         """Whether the rows before and after are as they were made."""
         others = [row for row in range(3) if row != ROW]
-        return not self.store[others].any() and not self.marks[others].any()
+        room = chains.room_of(self.chains.marks, 0)
+        rings = [self.chains.rings[at : at + 2 * room] for at in self.chains.marks[others, :, RING].ravel()]
+        return not any(
+            part.any() for part in (self.chains.origins[others], self.chains.marks[others, :, :RING], *rings)
+        )
 
 
 class Life:
@@ -532,7 +553,8 @@ def test_the_first_vertex_near_a_peak(start: Start, story: list[Step], part: flo
         misses = [sign * m for _, m in section.local(side)]
         first, peak = section.numbers(side)[0], section.peak(side)
         tolerance = part * (max(misses) - min(misses))
-        near = chains.first_near_peak(section.store, section.marks, ROW, side, peak, tolerance)
+        ring = int(section.chains.marks[ROW, side, RING]), int(section.chains.marks[ROW, side, MASK])
+        near = chains.first_near_peak(section.chains.rings, ring, first, peak, sign, tolerance)
         level = misses[peak - first] - tolerance
         assert all(miss >= level for miss in misses[near - first : peak - first + 1])
         assert near == first or misses[near - first - 1] < level
@@ -561,8 +583,8 @@ def test_vertices_that_repeat_one_another_do_not_stop_the_search_for_a_peak() ->
     section = Section(3.0, (-1.0, 1.0, 0.0), (-1.0, 1.0, 1.0))
     (v, m), (v_top, m_top) = section.local(RIGHT)
     for i, vertex in enumerate([(v, m), (math.nextafter(v, 2.0), m), (v, m), (v_top, m_top)]):
-        chains.put(section.store, ROW, RIGHT, i, *vertex)
-    section.marks[ROW, RIGHT, END] = 4
+        chains.put(section.chains.rings, section.chains.marks, ROW, RIGHT, i, *vertex)
+    section.chains.marks[ROW, RIGHT, END] = 4
     assert section.peak(RIGHT) == 3
 
 
@@ -590,7 +612,7 @@ def crowded(tau: float, size_v: float, size_z: float, fall: float) -> Life:
     """A section that has grown until it may have no room for another step; its exact polygon is taken from there."""
     life = Life(tau, (-size_v, 1.3 * size_v, -size_z), (-size_v, size_v, 1.3 * size_z))
     section = life.section
-    while not chains.is_crowded(section.marks, ROW):
+    while not chains.is_crowded(section.chains.marks, ROW):
         before = section.count
         section.turn(section.tau * fall)
         section.spread(0.01 * size_v)
@@ -636,8 +658,8 @@ def test_reduction_of_a_round_chain_keeps_the_bound_on_v() -> None:
     turns = np.linspace(-0.8, 0.8, 248)
     for i, turn in enumerate(turns):
         v, z = math.cos(turn), math.sin(turn)
-        chains.put(section.store, ROW, RIGHT, i, v, z + 3.0 * v)
-    section.marks[ROW, RIGHT, END] = len(turns)
+        chains.put(section.chains.rings, section.chains.marks, ROW, RIGHT, i, v, z + 3.0 * v)
+    section.chains.marks[ROW, RIGHT, END] = len(turns)
     before = hull(section.chain(RIGHT) + section.chain(LEFT))
     section.reduce()
     assert section.count == chains.REDUCED
@@ -654,9 +676,9 @@ def test_reduction_of_a_chain_as_thin_as_rounding_contains_it() -> None:
         rises = np.sort(rng.uniform(0.0, 1.0, 250))
         for i, rise in enumerate(rises):
             v = 1.0 + 0.3 * rise + thickness * rng.uniform(-1.0, 1.0) * 10.0
-            chains.put(section.store, ROW, RIGHT, i, float(v), float(rise + 3.0 * v))
-        section.marks[ROW, RIGHT, END] = len(rises)
-        section.store[ROW, RIGHT, REACH] = 2.0
+            chains.put(section.chains.rings, section.chains.marks, ROW, RIGHT, i, float(v), float(rise + 3.0 * v))
+        section.chains.marks[ROW, RIGHT, END] = len(rises)
+        section.chains.origins[ROW, RIGHT, REACH] = 2.0
         before = section.chain(RIGHT) + section.chain(LEFT)
         section.reduce()
         assert section.count <= chains.REDUCED
@@ -669,17 +691,18 @@ def test_reduction_of_a_chain_as_thin_as_rounding_contains_it() -> None:
 @briefly
 @given(starts(), st.lists(steps(st.none()), min_size=1, max_size=6), st.lists(steps(BANDS), max_size=3))
 def test_moving_to_wider_rings_keeps_everything(start: Start, before: list[Step], after: list[Step]) -> None:
-    life, twin = Life(*start, room=chains.ROOM_AT_START), Life(*start)
+    life, twin = Life(*start, room=32), Life(*start)
     for step in before:
         assert tell(life, step) == tell(twin, step)
-    wider, _ = chains.empty_sections(3)
-    chains.move_to_wider_rings(life.section.store, life.section.marks, np.ones(3, dtype=bool), wider)
-    life.section.store = wider
+    rings = chains.with_room(life.section.chains.rings, 4 * CAPACITY)
+    life.section.chains = life.section.chains._replace(rings=rings)
+    chains.widen_rings(*life.section.chains[1:], ROW, CAPACITY)
+    assert rings[TAKEN] <= rings.size
     for i in range(len(after) + 1):
         for side in (RIGHT, LEFT):
             assert life.section.local(side) == twin.section.local(side)
-        np.testing.assert_array_equal(life.section.store[ROW, :, :VERTICES], twin.section.store[ROW, :, :VERTICES])
-        np.testing.assert_array_equal(life.section.marks, twin.section.marks)
+        np.testing.assert_array_equal(life.section.chains.origins, twin.section.chains.origins)
+        np.testing.assert_array_equal(life.section.chains.marks[:, :, :RING], twin.section.chains.marks[:, :, :RING])
         if i < len(after) and not (tell(life, after[i]) & tell(twin, after[i])):
             break
 
@@ -691,7 +714,9 @@ def assert_mirrored(section: Section, mirror: Section) -> None:
     """Turned by 180 degrees the right chain is the left one, to the last bit."""
     for side in (RIGHT, LEFT):
         assert mirror.local(1 - side) == [(-v, -m) for v, m in section.local(side)]
-        np.testing.assert_array_equal(mirror.store[ROW, 1 - side, :REACH], -section.store[ROW, side, :REACH])
+        np.testing.assert_array_equal(
+            mirror.chains.origins[ROW, 1 - side, :REACH], -section.chains.origins[ROW, side, :REACH]
+        )
         assert mirror.numbers(1 - side) == section.numbers(side)
     assert mirror.heights() == tuple(-height for height in section.heights()[::-1])
 
