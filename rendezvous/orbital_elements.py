@@ -97,8 +97,8 @@ def perigee_m(position_m: Floats, velocity_m_s: Floats, gravitational_parameter_
     -------
     float
     """
-    momentum = np.cross(position_m, velocity_m_s)
-    latus_rectum = float(momentum @ momentum) / gravitational_parameter_m3_s2
-    radius = float(np.linalg.norm(position_m))
-    vector = np.cross(velocity_m_s, momentum) / gravitational_parameter_m3_s2 - position_m / radius
-    return latus_rectum / (1.0 + float(np.linalg.norm(vector)))
+    inward = float(position_m @ velocity_m_s)
+    momentum_squared = float((position_m @ position_m) * (velocity_m_s @ velocity_m_s)) - inward * inward
+    latus_rectum = max(0.0, momentum_squared) / gravitational_parameter_m3_s2
+    axis = semi_major_axis_m(position_m, velocity_m_s, gravitational_parameter_m3_s2)
+    return latus_rectum / (1.0 + np.sqrt(max(0.0, 1.0 - latus_rectum / axis)))

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous._compile import compiled
+from rendezvous._compile import allocation_free
 
 Floats = NDArray[np.float64]
 
 
-@compiled
+@allocation_free
 def acceleration(r: Floats, mu: float, oblateness: float, g: Floats) -> None:
     """Put the acceleration at `r` into `g`; `oblateness` is mu J2 R^2 / 2, the axis z.
 
@@ -31,9 +31,11 @@ def acceleration(r: Floats, mu: float, oblateness: float, g: Floats) -> None:
     g[2] = radial * r[2] + axial
 
 
-@compiled
-def derivatives(r: Floats, p: Floats, mu: float, oblateness: float, g: Floats, first: Floats, second: Floats) -> None:
-    """Put the acceleration, its gradient (3, 3) and the gradient of gradient times `p` (3, 3) at `r` into arrays.
+@allocation_free
+def derivatives(
+    r: Floats, p: Floats, mu: float, oblateness: float, g: Floats, first: Floats, second: Floats, with_second: bool
+) -> None:
+    """Put the acceleration, its gradient (3, 3) and the gradient of gradient times `p` (3, 3), if wanted, at `r` into arrays.
 
     Notes
     -----
@@ -42,28 +44,31 @@ def derivatives(r: Floats, p: Floats, mu: float, oblateness: float, g: Floats, f
     """
     q = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
     s = r[0] * p[0] + r[1] * p[1] + r[2] * p[2]
-    f = mu / np.sqrt(q)
+    inverse = 1.0 / q
+    f = mu * np.sqrt(inverse)
+    f1 = -0.5 * f * inverse
+    f2 = -1.5 * f1 * inverse
+    f4 = -2.5 * f2 * inverse
     if oblateness != 0.0:
-        f3 = oblateness / (q * np.sqrt(q))
-        f1 = -0.5 * f / q - 1.5 * f3 / q
-        f2 = 0.75 * f / (q * q) + 3.75 * f3 / (q * q)
-        f4 = -1.875 * f / (q * q * q) - 13.125 * f3 / (q * q * q)
-    else:
-        f1 = -0.5 * f / q
-        f2 = 0.75 * f / (q * q)
-        f4 = -1.875 * f / (q * q * q)
+        f3 = oblateness * inverse * np.sqrt(inverse)
+        f1 -= 1.5 * f3 * inverse
+        f2 += 3.75 * f3 * inverse * inverse
+        f4 -= 13.125 * f3 * inverse * inverse * inverse
     for i in range(3):
         g[i] = 2.0 * f1 * r[i]
         for j in range(3):
             first[i, j] = 4.0 * f2 * r[i] * r[j]
-            second[i, j] = 8.0 * f4 * s * r[i] * r[j] + 4.0 * f2 * (r[i] * p[j] + p[i] * r[j])
         first[i, i] += 2.0 * f1
-        second[i, i] += 4.0 * f2 * s
+    if with_second:
+        for i in range(3):
+            for j in range(3):
+                second[i, j] = 8.0 * f4 * s * r[i] * r[j] + 4.0 * f2 * (r[i] * p[j] + p[i] * r[j])
+            second[i, i] += 4.0 * f2 * s
     if oblateness != 0.0:
         _subtract_axial(r, p, s, q, oblateness, g, first, second)
 
 
-@compiled
+@allocation_free
 def _subtract_axial(
     r: Floats, p: Floats, s: float, q: float, oblateness: float, g: Floats, first: Floats, second: Floats
 ) -> None:

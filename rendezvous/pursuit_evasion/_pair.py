@@ -24,7 +24,7 @@ CLOSE, ROUGH = 1e-7, 1e-4
 _MOST_ITERATIONS = 12
 _FIRST_DURATION = 0.01
 _LEAST_OF_FIRST = 1e-9
-_FARTHEST, _NEAR, _FRACTION = 0.7, 1e-2, 0.2
+_FARTHEST, _NEAR, _FRACTION, _NEAR_ENOUGH = 0.7, 1e-2, 0.2, 1e-3
 
 
 @dataclass(frozen=True)
@@ -200,7 +200,7 @@ class Pair:
         correction is a fraction of the one before: half a millisecond and 0.1 ms a revolution.
         """
         state = np.concatenate([guess[:12], guess[12:] / np.sqrt(guess[12:] @ guess[12:]), [duration, distance]])
-        before = math.inf
+        before, uses = math.inf, 0
         linear: _Linear | None = None
         for _ in range(most_iterations):
             fresh = linear is None
@@ -224,7 +224,9 @@ class Pair:
                 return None
             if correction < close:
                 return linear.node(state, correction)
-            if correction > _FRACTION * before:
+            # The first correction only brings both back to their start states: the second may be as great.
+            uses = 0 if fresh else uses + 1
+            if correction > _NEAR_ENOUGH or (uses > 1 and correction > _FRACTION * before):
                 linear = None
             before = correction
         return None

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from rendezvous.pursuit_evasion._extremal import COLUMNS, STATES, flow_back, rate
+from rendezvous.pursuit_evasion._extremal import STATES, flow_back, rate
 from rendezvous.pursuit_evasion._pair import FINE, Node
 from rendezvous.pursuit_evasion._side import Craft
 
@@ -19,7 +19,6 @@ Direction = Callable[[float, Floats], Floats]
 """Direction of thrust, shape (3,), of a time and a state: any length, zero to coast."""
 
 _TOLERANCE = 1e-12
-_NOTHING = np.zeros((STATES, COLUMNS))
 
 
 class Policy(Enum):
@@ -127,7 +126,7 @@ class ExtremalPath:
         return y[:6], rate(y, self.craft.mu, self.craft.oblateness, self.craft.thrust / mass)[3:]
 
     def _carry(self, y: Floats, begin: float, end: float) -> None:
-        if not flow_back(y, _NOTHING, self.craft.kernel_craft(self.duration), begin, end, FINE, 0):
+        if not flow_back(y, None, self.craft.kernel_craft(self.duration), begin, end, FINE):
             raise ArithmeticError("an extremal that was found cannot be propagated")
 
 
