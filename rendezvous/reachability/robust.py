@@ -1,0 +1,321 @@
+"""Bounded disturbances: constraints tightened by what they add up to, and plans with feedback from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linprog
+from scipy.sparse import coo_array
+
+from rendezvous.polytope.relative_interior import HIGHS
+from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
+
+Floats = NDArray[np.float64]
+
+MOST_PERIODS_WITH_FEEDBACK = 24
+_TIDY = 1e-7
+
+
+class NoRobustPlanError(ValueError):
+    """No plan keeps the constraints whatever the disturbance does."""
+
+
+@dataclass(frozen=True, eq=False)
+class FeedbackPlan:
+    """Controls u(t) = nominal(t) + sum over s < t of gains[t, s] w(s).
+
+    Parameters
+    ----------
+    problem : ReachabilityProblem
+    disturbance : ndarray, shape (T, n, q)
+        x(t + 1) = A x + B u + disturbance[t] w(t), |w_k(t)| <= 1.
+    nominal : ndarray, shape (T, m)
+    gains : ndarray, shape (T, T, m, q)
+    lower, upper : ndarray, shape (T + 1, n)
+        What each state stays between, whatever w does: the robust tube.
+    """
+
+    problem: ReachabilityProblem
+    disturbance: Floats
+    nominal: Floats
+    gains: Floats
+    lower: Floats
+    upper: Floats
+
+    @property
+    def worst_miss(self) -> float:
+        """A bound on the terminal norm."""
+        return float(np.linalg.norm(np.maximum(np.abs(self.lower[-1]), np.abs(self.upper[-1]))))
+
+    def run(self, moves: ArrayLike) -> tuple[Floats, Floats]:
+        """Fly against a disturbance.
+
+        Parameters
+        ----------
+        moves : array_like, shape (T, q)
+            w, each within 1.
+
+        Returns
+        -------
+        states : ndarray, shape (T + 1, n)
+        controls : ndarray, shape (T, m)
+        """
+        given = np.asarray(moves, dtype=float)
+        controls = self.nominal + np.einsum("tsmq,sq->tm", self.gains, given)
+        states = [self.problem.initial]
+        for t in range(self.problem.periods):
+            pushed = self.disturbance[t] @ given[t]
+            states.append(self.problem.transition[t] @ states[-1] + self.problem.control[t] @ controls[t] + pushed)
+        return np.array(states), controls
+
+
+def accumulated(problem: ReachabilityProblem, disturbance: Floats) -> Floats:
+    """Return what each disturbance has become by each time, without feedback.
+
+    Parameters
+    ----------
+    problem : ReachabilityProblem
+    disturbance : ndarray, shape (T, n, q)
+
+    Returns
+    -------
+    ndarray, shape (T + 1, T, n, q)
+        Of w(s) at t: A(t - 1) ... A(s + 1) disturbance[s], zero for s >= t.
+    """
+    periods = problem.periods
+    effect = np.zeros((periods + 1, periods, *disturbance.shape[1:]))
+    for t in range(periods):
+        effect[t + 1] = problem.transition[t] @ effect[t]
+        effect[t + 1, t] = disturbance[t]
+    return effect
+
+
+def tightened(problem: ReachabilityProblem, disturbance: Floats) -> ReachabilityProblem:
+    """Return the problem whose controls keep the constraints whatever the disturbance does, without feedback.
+
+    Parameters
+    ----------
+    problem : ReachabilityProblem
+        With constraints at whole periods only.
+    disturbance : ndarray, shape (T, n, q)
+        x(t + 1) = A x + B u + disturbance[t] w(t), |w_k(t)| <= 1.
+
+    Returns
+    -------
+    ReachabilityProblem
+        For the state without disturbance.
+
+    Notes
+    -----
+    Each constraint is tightened by the support of the accumulated disturbance along its normal, which is exact.
+    """
+    _check(problem, disturbance)
+    effect = accumulated(problem, disturbance)
+    normals, offsets, names = _all_constraints(problem)
+    taken = np.abs(np.einsum("kn,tsnq->tksq", normals, effect)).sum(axis=(2, 3))
+    return replace(problem, normals=normals, offsets=offsets - taken, constraint_names=names)
+
+
+def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> FeedbackPlan:
+    """Plan with feedback from the disturbances seen so far, for the least worst terminal state.
+
+    Parameters
+    ----------
+    problem : ReachabilityProblem
+        With thrust in a box and constraints at whole periods only.
+    disturbance : ndarray, shape (T, n, q)
+        x(t + 1) = A x + B u + disturbance[t] w(t), |w_k(t)| <= 1; w(t) is known from t + 1 on, by the state.
+
+    Returns
+    -------
+    FeedbackPlan
+
+    Raises
+    ------
+    NoRobustPlanError
+        If no plan keeps the constraints.
+    ValueError
+        If there are too many periods, or thrust is in a ball.
+
+    Notes
+    -----
+    Affine feedback makes every constraint linear in (nominal, gains) but for absolute values, one more variable each:
+    one linear program (HiGHS) of some T^2 (n + m) q / 2 of them. It minimises the sum of the greatest terminal states,
+    divided by their bounds.
+    """
+    _check(problem, disturbance)
+    if problem.thrust is ThrustShape.BALL:
+        raise ValueError("feedback from disturbances is planned for thrust in a box")
+    if problem.periods > MOST_PERIODS_WITH_FEEDBACK:
+        raise ValueError(
+            f"feedback from disturbances over {problem.periods} periods would not finish; at most "
+            f"{MOST_PERIODS_WITH_FEEDBACK} are taken"
+        )
+    return _Program(problem, disturbance).solve()
+
+
+def _check(problem: ReachabilityProblem, disturbance: Floats) -> None:
+    shape = (problem.periods, problem.states)
+    if disturbance.ndim != 3 or disturbance.shape[:2] != shape or not np.isfinite(disturbance).all():
+        raise ValueError(f"the disturbance must be finite, of shape ({shape[0]}, {shape[1]}, q)")
+    if problem.between is not None:
+        raise ValueError("disturbances are allowed for at whole periods only")
+
+
+def _all_constraints(problem: ReachabilityProblem) -> tuple[Floats, Floats, tuple[str, ...]]:
+    """Constraints with the bounds on states among them."""
+    unit = np.eye(problem.states)
+    normals, names = [unit, -unit], [f"bound on state {i + 1}" for i in range(problem.states)] * 2
+    offsets = [np.tile(np.concatenate([problem.state_bounds] * 2), (problem.periods + 1, 1))]
+    if problem.normals is not None and problem.offsets is not None:
+        normals.append(problem.normals)
+        offsets.append(problem.offsets)
+        names += [problem.name_of(k) for k in range(len(problem.normals))]
+    return np.vstack(normals), np.hstack(offsets), tuple(names)
+
+
+class _Program:
+    """The linear program of a plan: variables are nominal controls, gains, and absolute values."""
+
+    def __init__(self, problem: ReachabilityProblem, disturbance: Floats) -> None:
+        self.problem, self.disturbance = problem, disturbance
+        self.periods, self.states, self.group = problem.periods, problem.states, problem.controls
+        self.width = disturbance.shape[2]
+        pairs = [(t, s) for t in range(self.periods) for s in range(t)]
+        self.gain_at = {pair: place for place, pair in enumerate(pairs)}
+        self.gains = self.periods * self.group  # where they begin
+        self.begin = self.size = self.gains + len(pairs) * self.group * self.width
+        self.rows: list[dict[int, float]] = []
+        self.limits: list[float] = []
+        self.free, self.response = self._unfold()
+        self.effect = accumulated(problem, disturbance)
+
+    def solve(self) -> FeedbackPlan:
+        """Build and solve it."""
+        problem = self.problem
+        scale = problem.state_bounds
+        normals, offsets, _ = _all_constraints(problem)
+        n = self.states
+        margins = {}
+        for t in range(1, self.periods + 1):
+            for i in range(n):
+                margins[t, i] = self._spread(np.eye(n)[i] / scale[i], t)
+                self._keep(np.eye(n)[i] / scale[i], t, offsets[t, i] / scale[i], margins[t, i])
+                self._keep(-np.eye(n)[i] / scale[i], t, offsets[t, n + i] / scale[i], margins[t, i])
+            for k in range(2 * n, len(normals)):
+                if np.isfinite(offsets[t, k]):
+                    size = float(np.abs(normals[k]) @ scale)
+                    row = normals[k] / size
+                    self._keep(row, t, offsets[t, k] / size, self._spread(row, t))
+        self._bound_controls()
+        greatest = [self._new() for _ in range(n)]
+        for i in range(n):
+            row = np.eye(n)[i] / scale[i]
+            for sign in (1.0, -1.0):
+                entries, constant = self._nominal(sign * row, self.periods)
+                entries |= margins[self.periods, i]
+                entries[greatest[i]] = -1.0
+                self._add(entries, -constant)
+        cost = np.zeros(self.size)
+        cost[self.begin :] = _TIDY  # of plans alike, the one with small gains
+        cost[greatest] = 1.0
+        places = [(r, c, v) for r, entries in enumerate(self.rows) for c, v in entries.items()]
+        r, c, v = zip(*places, strict=True)
+        matrix = coo_array((v, (r, c)), shape=(len(self.rows), self.size)).tocsr()
+        found = linprog(cost, A_ub=matrix, b_ub=self.limits, bounds=(None, None), method="highs", options=HIGHS)
+        if found.status == 2:
+            raise NoRobustPlanError(
+                "no plan with feedback keeps the constraints whatever the disturbance does; reduce the disturbance, "
+                "or relax the bounds"
+            )
+        if found.status != 0:
+            raise ArithmeticError(f"HiGHS: {found.message}")
+        return self._plan(found.x)
+
+    def _plan(self, solution: Floats) -> FeedbackPlan:
+        problem, reach = self.problem, self.problem.control_bounds
+        nominal = solution[: self.gains].reshape(self.periods, self.group) * reach
+        gains = np.zeros((self.periods, self.periods, self.group, self.width))
+        block = self.group * self.width
+        for (t, s), place in self.gain_at.items():
+            start = self.gains + place * block
+            gains[t, s] = solution[start : start + block].reshape(self.group, self.width) * reach[:, None]
+        centre = problem.run(nominal)
+        # What w(s) has become at t: by itself and by the controls it moves.
+        total = self.effect.copy()
+        for s in range(self.periods):
+            state = np.zeros((self.states, self.width))
+            for t in range(self.periods):
+                state = problem.transition[t] @ state + problem.control[t] @ gains[t, s]
+                if t == s:
+                    state = state + self.disturbance[s]
+                total[t + 1, s] = state
+        spread = np.abs(total).sum(axis=(1, 3))
+        return FeedbackPlan(problem, self.disturbance, nominal, gains, centre - spread, centre + spread)
+
+    def _unfold(self) -> tuple[Floats, Floats]:
+        """x(t) = free[t] + response[t] of all controls, these divided by their bounds."""
+        problem = self.problem
+        free = np.zeros((self.periods + 1, self.states))
+        response = np.zeros((self.periods + 1, self.states, self.periods, self.group))
+        free[0] = problem.initial
+        for t in range(self.periods):
+            free[t + 1] = problem.transition[t] @ free[t]
+            response[t + 1] = np.einsum("ij,jsm->ism", problem.transition[t], response[t])
+            response[t + 1][:, t] += problem.control[t] * problem.control_bounds
+        return free, response
+
+    def _new(self) -> int:
+        self.size += 1
+        return int(self.size - 1)
+
+    def _add(self, entries: dict[int, float], limit: float) -> None:
+        self.rows.append(entries)
+        self.limits.append(limit)
+
+    def _absolute(self, entries: dict[int, float], constant: float) -> int:
+        """A variable not below |entries + constant|."""
+        place = self._new()
+        self._add({**entries, place: -1.0}, -constant)
+        self._add({**{c: -v for c, v in entries.items()}, place: -1.0}, constant)
+        return place
+
+    def _spread(self, row: Floats, time: int) -> dict[int, float]:
+        """Variables whose sum is how far disturbances move row . x(time)."""
+        places: dict[int, float] = {}
+        turned = np.einsum("n,nsm->sm", row, self.response[time])
+        for s in range(time):
+            for q in range(self.width):
+                entries = {
+                    self._gain(t, s, j, q): float(turned[t, j])
+                    for t in range(s + 1, time)
+                    for j in range(self.group)
+                    if turned[t, j] != 0.0
+                }
+                constant = float(row @ self.effect[time, s, :, q])
+                if entries or constant != 0.0:
+                    places[self._absolute(entries, constant)] = 1.0
+        return places
+
+    def _nominal(self, row: Floats, time: int) -> tuple[dict[int, float], float]:
+        turned = np.einsum("n,nsm->sm", row, self.response[time]).ravel()
+        return {int(c): float(turned[c]) for c in np.flatnonzero(turned)}, float(row @ self.free[time])
+
+    def _keep(self, row: Floats, time: int, limit: float, spread: dict[int, float]) -> None:
+        entries, constant = self._nominal(row, time)
+        self._add({**entries, **spread}, limit - constant)
+
+    def _bound_controls(self) -> None:
+        for t in range(self.periods):
+            for j in range(self.group):
+                spread = {
+                    self._absolute({self._gain(t, s, j, q): 1.0}, 0.0): 1.0 for s in range(t) for q in range(self.width)
+                }
+                for sign in (1.0, -1.0):
+                    self._add({t * self.group + j: sign, **spread}, 1.0)
+
+    def _gain(self, time: int, cause: int, control: int, move: int) -> int:
+        block = self.group * self.width
+        return int(self.gains + self.gain_at[time, cause] * block + control * self.width + move)

@@ -1,0 +1,115 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rendezvous.reachability import EmptyTubeError, ReachabilityProblem, Route, ThrustShape, solve
+from rendezvous.reachability.robust import NoRobustPlanError, feedback_plan, tightened
+from rendezvous.reachability.sampling import samples
+
+Floats = NDArray[np.float64]
+Paper = Callable[..., ReachabilityProblem]
+
+
+def pushes(problem: ReachabilityProblem, acceleration_m_s2: float) -> Floats:
+    """An acceleration held over each period, unknown within a bound on each axis."""
+    return np.asarray(problem.control * (acceleration_m_s2 / 0.15))
+
+
+def flown(problem: ReachabilityProblem, disturbance: Floats, controls: Floats, moves: Floats) -> Floats:
+    states = [problem.initial]
+    for t in range(problem.periods):
+        states.append(problem.transition[t] @ states[-1] + problem.control[t] @ controls[t] + disturbance[t] @ moves[t])
+    return np.array(states)
+
+
+def extreme_moves(count: int, periods: int, seed: int) -> Floats:
+    return np.asarray(np.random.default_rng(seed).choice([-1.0, 1.0], (count, periods, 3)))
+
+
+def test_tightened_constraints_hold_for_every_disturbance(paper: Paper) -> None:
+    problem = paper()
+    disturbance = pushes(problem, 1e-3)
+    safe = solve(tightened(problem, disturbance), Route.LIFTED)
+    assert safe.optimal.miss == 0.0
+    for control in samples(safe.optimal, 5, np.random.default_rng(0)):
+        for moves in extreme_moves(50, 4, 1):
+            states = flown(problem, disturbance, control, moves)
+            assert (np.abs(states) <= problem.state_bounds + 1e-9).all()
+
+
+def test_tightening_is_by_the_support_and_no_more(paper: Paper) -> None:
+    problem = paper()
+    disturbance = pushes(problem, 1e-3)
+    safe = tightened(problem, disturbance)
+    assert safe.offsets is not None
+    # One axis: the greatest x1(4) over the corners of all disturbances is what is taken.
+    reached = [
+        flown(problem, disturbance, np.zeros((4, 3)), np.array(corner).reshape(4, 1) * [[1.0, 0.0, 0.0]])[-1, 2]
+        for corner in product([-1.0, 1.0], repeat=4)
+    ]
+    assert max(reached) - min(reached) == pytest.approx(0.0, abs=1e-9)  # x pushes never move z
+    worst = max(
+        flown(problem, disturbance, np.zeros((4, 3)), np.array(corner).reshape(4, 1) * [[0.0, 0.0, 1.0]])[-1, 2]
+        for corner in product([-1.0, 1.0], repeat=4)
+    )
+    still = problem.run(np.zeros((4, 3)))[-1, 2]
+    assert problem.state_bounds[2] - safe.offsets[4, 2] == pytest.approx(worst - still, rel=1e-12)
+
+
+def test_feedback_keeps_what_no_fixed_control_keeps(paper: Paper) -> None:
+    problem = paper()
+    disturbance = pushes(problem, 0.012)
+    with pytest.raises(EmptyTubeError):
+        solve(tightened(problem, disturbance))
+    plan = feedback_plan(problem, disturbance)
+    for moves in (*extreme_moves(200, 4, 2), np.zeros((4, 3))):
+        states, controls = plan.run(moves)
+        assert (np.abs(states) <= problem.state_bounds + 1e-6).all()
+        assert (np.abs(controls) <= 1.0 + 1e-9).all()
+        assert (states >= plan.lower - 1e-6).all()
+        assert (states <= plan.upper + 1e-6).all()
+        assert float(np.linalg.norm(states[-1])) <= plan.worst_miss + 1e-6
+    # Controls know nothing of what is to come.
+    moves = extreme_moves(1, 4, 3)[0]
+    later = moves.copy()
+    later[2:] *= -1.0
+    np.testing.assert_array_equal(plan.run(moves)[1][:3], plan.run(later)[1][:3])
+
+
+def test_without_a_disturbance_feedback_changes_nothing(paper: Paper) -> None:
+    problem = paper()
+    plan = feedback_plan(problem, pushes(problem, 0.0))
+    assert plan.worst_miss < 1e-5
+    np.testing.assert_allclose(plan.lower, plan.upper)
+    np.testing.assert_array_equal(plan.gains, 0.0)
+
+
+def test_the_terminal_spread_is_what_the_last_disturbance_does(paper: Paper) -> None:
+    # Earlier ones can be answered, the last one cannot: its own effect is a lower bound.
+    problem = paper()
+    disturbance = pushes(problem, 1e-3)
+    plan = feedback_plan(problem, disturbance)
+    last = np.abs(disturbance[-1]).sum(axis=1)
+    spread = 0.5 * (plan.upper[-1] - plan.lower[-1])
+    assert (spread >= last - 1e-9).all()
+    open_loop = tightened(problem, disturbance)
+    assert open_loop.offsets is not None
+    fixed = problem.state_bounds - open_loop.offsets[4, :6]
+    assert (spread / problem.state_bounds).sum() < 0.6 * (fixed / problem.state_bounds).sum()
+
+
+def test_what_cannot_be_planned_is_said(paper: Paper) -> None:
+    with pytest.raises(NoRobustPlanError, match="whatever the disturbance does"):
+        feedback_plan(paper(), pushes(paper(), 0.2))
+    with pytest.raises(ValueError, match="thrust in a box"):
+        feedback_plan(paper(thrust=ThrustShape.BALL), pushes(paper(), 1e-3))
+    long = paper(periods=32, period_s=22.5)
+    with pytest.raises(ValueError, match="at most 24"):
+        feedback_plan(long, pushes(long, 1e-3))
+    with pytest.raises(ValueError, match="finite, of shape"):
+        tightened(paper(), np.zeros((3, 6, 3)))
