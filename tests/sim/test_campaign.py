@@ -54,12 +54,12 @@ COLUMNS = [
 
 @pytest.fixture(scope="module")
 def reference(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """The table of 200 runs of mixed noise, flown by one thread."""
+    """The table of 96 runs of mixed noise, flown by one thread."""
     folder = tmp_path_factory.mktemp("reference") / "campaign"
-    return Campaign(brief, 200, folder, seed=5, noise=CampaignNoise.MIXED).run(workers=1).table
+    return Campaign(brief, 96, folder, seed=5, noise=CampaignNoise.MIXED).run(workers=1).table
 
 
-def mixed(brief: Scenario, folder: Path, runs: int = 200, chunk: int | None = 16) -> Campaign:
+def mixed(brief: Scenario, folder: Path, runs: int = 96, chunk: int | None = 16) -> Campaign:
     return Campaign(brief, runs, folder, seed=5, noise=CampaignNoise.MIXED, chunk=chunk)
 
 
@@ -92,12 +92,12 @@ class Late(Executor):
 
 def test_rows_are_those_of_simulate(brief: Scenario, reference: Any) -> None:
     assert reference.column_names == COLUMNS
-    assert reference.column("run").to_pylist() == list(range(200))
-    assert reference.column("noise").to_pylist() == ["random", "game"] * 100
-    assert reference.column("tie").to_pylist() == [None, "upper"] * 100
+    assert reference.column("run").to_pylist() == list(range(96))
+    assert reference.column("noise").to_pylist() == ["random", "game"] * 48
+    assert reference.column("tie").to_pylist() == [None, "upper"] * 48
     for kind, first in ((NoiseKind.RANDOM, 0), (NoiseKind.GAME, 1)):
-        flown = simulate(replace(brief, noise=kind), 200, seed=5)
-        rows = reference.take(list(range(first, 200, 2)))
+        flown = simulate(replace(brief, noise=kind), 96, seed=5)
+        rows = reference.take(list(range(first, 96, 2)))
         assert rows.column("miss_m").to_pylist() == flown.miss_m[first::2].tolist()
         assert rows.column("impulse_m_s").to_pylist() == flown.impulse_m_s[first::2].tolist()
         assert rows.column("outcome").to_pylist() == [each.value for each in flown.outcomes[first::2]]
@@ -123,7 +123,7 @@ def test_columns_carry_their_units(reference: Any) -> None:
 def test_workers_and_chunks_change_no_bit(
     workers: int, chunk: int | None, brief: Scenario, reference: Any, tmp_path: Path
 ) -> None:
-    runs = 20 if chunk == 1 else 200
+    runs = 20 if chunk == 1 else 96
     result = mixed(brief, tmp_path / "campaign", runs, chunk).run(workers=workers)
     assert result.table.equals(reference.slice(0, runs), check_metadata=True)
     assert result.complete
@@ -142,7 +142,7 @@ def test_any_executor_will_do(brief: Scenario, reference: Any, tmp_path: Path) -
 
 
 def test_a_row_is_the_engagement_flown_alone(brief: Scenario, reference: Any) -> None:
-    for run in (0, 1, 77, 198):
+    for run in (0, 1, 77, 95):
         row = reference.slice(run, 1).to_pylist()[0]
         alone = fly_one(replace(brief, noise=NoiseKind(row["noise"])), run, seed=5).result
         assert (row["miss_m"], row["impulse_m_s"]) == (float(alone.miss_m[0]), float(alone.impulse_m_s[0]))
@@ -152,7 +152,7 @@ def test_a_row_is_the_engagement_flown_alone(brief: Scenario, reference: Any) ->
 def test_shards_are_plain_parquet(brief: Scenario, reference: Any, tmp_path: Path) -> None:
     mixed(brief, tmp_path / "campaign").run()
     files = shards(tmp_path / "campaign")
-    assert len(files) == 13
+    assert len(files) == 6
     whole = pa.concat_tables([pq.read_table(each) for each in files])
     assert whole.replace_schema_metadata(reference.schema.metadata).equals(reference)
 
@@ -228,13 +228,13 @@ def test_what_was_broken_off_is_gone_on_with(brief: Scenario, reference: Any, tm
     asked, told = mixed(brief, tmp_path / "campaign"), list[Progress]()
     for _ in range(3):
         with pytest.raises(Stop):
-            asked.run(workers=2, resume=True, progress=breaking_off_after(40))
+            asked.run(workers=2, resume=True, progress=breaking_off_after(16))
     result = asked.run(resume=True, progress=told.append)
     assert result.table.equals(reference)
-    assert told[0].done >= 120
+    assert told[0].done >= 48
     assert told[0].flown == 0
-    assert told[-1].done == told[-1].total == 200
-    assert told[-1].flown == 200 - told[0].done
+    assert told[-1].done == told[-1].total == 96
+    assert told[-1].flown == 96 - told[0].done
     assert [each.done for each in told] == sorted(each.done for each in told)
     assert asked.run(resume=True).table.equals(reference)
 
@@ -243,19 +243,19 @@ def test_an_unfinished_campaign_can_be_read(brief: Scenario, reference: Any, tmp
     with pytest.raises(Stop):
         mixed(brief, tmp_path).run(workers=1, progress=breaking_off_after(32))
     folder = CampaignFolder.read(tmp_path)
-    assert (folder.complete, folder.finished_runs, folder.wanted_runs) == (False, 32, 200)
+    assert (folder.complete, folder.finished_runs, folder.wanted_runs) == (False, 32, 96)
     assert folder.table().equals(reference.slice(0, 32))
 
 
 def test_more_runs_extend_a_campaign(brief: Scenario, reference: Any, tmp_path: Path) -> None:
-    mixed(brief, tmp_path, 90).run()
-    assert len(shards(tmp_path)) == 6
-    result = mixed(brief, tmp_path, 200, None).run(resume=True)
+    mixed(brief, tmp_path, 40).run()
+    assert len(shards(tmp_path)) == 3
+    result = mixed(brief, tmp_path, 96, None).run(resume=True)
     assert result.redone == ()
     assert result.table.equals(reference)
-    assert read_manifest(tmp_path).runs == 200
-    with pytest.raises(ManifestError, match="it has 200 runs, now 100 are asked for"):
-        mixed(brief, tmp_path, 100).run(resume=True)
+    assert read_manifest(tmp_path).runs == 96
+    with pytest.raises(ManifestError, match="it has 96 runs, now 90 are asked for"):
+        mixed(brief, tmp_path, 90).run(resume=True)
 
 
 @pytest.mark.parametrize("harm", ["cut", "empty", "flipped", "foreign", "garbage"])
@@ -277,7 +277,7 @@ def test_a_damaged_shard_is_said_and_flown_again(harm: str, brief: Scenario, ref
         )
     read = CampaignFolder.read(tmp_path / "campaign")
     assert [each.file for each in read.damaged] == [victim]
-    assert (read.complete, read.finished_runs) == (False, 184)
+    assert (read.complete, read.finished_runs) == (False, 80)
     assert victim.exists()  # reading takes nothing away
     result = mixed(brief, tmp_path / "campaign").run(resume=True)
     (redone,) = result.redone
@@ -340,7 +340,7 @@ def test_a_full_disk_leaves_a_valid_folder(
     if (tmp_path / "manifest.json").exists():
         folder = CampaignFolder.read(tmp_path)
         assert folder.damaged == []
-        assert folder.finished_runs < 200
+        assert folder.finished_runs < 96
     assert mixed(brief, tmp_path).run(resume=True).table.equals(reference)
 
 
@@ -490,7 +490,7 @@ def rule() -> StoppingRule:
 @pytest.fixture
 def stopped(brief: Scenario, rule: StoppingRule, tmp_path: Path) -> Any:
     """The table of a campaign that a rule stopped, flown in order."""
-    result = replace(mixed(brief, tmp_path / "stopped"), noise=None, until=rule).run(workers=1)
+    result = replace(mixed(brief, tmp_path / "stopped", 200), noise=None, until=rule).run(workers=1)
     assert 16 < len(result) < 200
     assert len(result) % 16 == 0
     assert result.complete
@@ -501,7 +501,7 @@ def stopped(brief: Scenario, rule: StoppingRule, tmp_path: Path) -> Any:
 def test_a_rule_stops_at_the_same_run_whoever_flies(
     brief: Scenario, rule: StoppingRule, stopped: Any, tmp_path: Path
 ) -> None:
-    asked = replace(mixed(brief, tmp_path / "late"), noise=None, until=rule)
+    asked = replace(mixed(brief, tmp_path / "late", 200), noise=None, until=rule)
     result = asked.run(Late(), workers=5)
     assert result.table.equals(stopped)
     assert len(shards(tmp_path / "late")) * 16 == len(stopped)
@@ -519,7 +519,7 @@ def test_a_rule_stops_at_the_same_run_whoever_flies(
 def test_a_rule_that_comes_later_takes_nothing_away(
     brief: Scenario, rule: StoppingRule, stopped: Any, tmp_path: Path
 ) -> None:
-    plain = replace(mixed(brief, tmp_path / "plain"), noise=None)
+    plain = replace(mixed(brief, tmp_path / "plain", 200), noise=None)
     whole = plain.run().table
     assert replace(plain, until=rule).run(resume=True).table.equals(stopped)
     assert len(CampaignFolder.read(tmp_path / "plain").table()) == len(stopped)
@@ -530,8 +530,8 @@ def test_a_rule_that_comes_later_takes_nothing_away(
 
 def test_a_rule_that_is_never_met_lets_all_runs_fly(brief: Scenario, tmp_path: Path) -> None:
     rule = StoppingRule(QuantileName("miss_m", 0.999), 1e-6)
-    result = replace(mixed(brief, tmp_path), until=rule).run()
-    assert len(result) == 200
+    result = replace(mixed(brief, tmp_path, 64), until=rule).run()
+    assert len(result) == 64
     assert result.folder.manifest.stopped_after is None
 
 
