@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 _PARTS = 512
 _MOST_DOUBLINGS = 80
-_PRECISE = 1e-15
+_TURNED = 1e-8
 _MOST_NEWTON = 60
 
 
@@ -222,7 +222,6 @@ def _greatest_distance(
     times = (np.arange(panels)[:, None] + 0.5 * (1.0 + points)).ravel() * width
     effects = motion.transition(0.0, times)[:, :3, 3:]
     shares = advantage * 0.5 * width * np.tile(weights, panels)
-    scale = float(shares @ np.linalg.norm(effects, axis=(1, 2)))
 
     def value(nu: Floats) -> float:
         return float(nu @ there - shares @ np.linalg.norm(nu @ effects, axis=1))
@@ -249,9 +248,9 @@ def _greatest_distance(
             stride *= 0.5
         else:
             break
-        nu, done = trial, np.linalg.norm(slope) < _PRECISE * scale or np.linalg.norm(step) < _PRECISE
-        now = reached
-        if done:
+        nu, now = trial, reached
+        # The distance errs as the square of what is left.
+        if stride * float(np.linalg.norm(step)) < _TURNED:
             break
     return now, nu
 

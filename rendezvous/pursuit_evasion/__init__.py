@@ -1,1 +1,51 @@
 """The orbital pursuit-evasion game with free final time: solution, certificate, feedback and maps."""
+
+from rendezvous.pursuit_evasion.certificate import Certificate, Deviation, best_answer_s, certify
+from rendezvous.pursuit_evasion.fallbacks import solve_by_homotopy, solve_by_linear_game
+from rendezvous.pursuit_evasion.feedback import Ended, Flight, Observation, capture_quantiles_s, fly, fly_many
+from rendezvous.pursuit_evasion.game import Game, Gravity, Player
+from rendezvous.pursuit_evasion.history import History, PlayerHistory, history
+from rendezvous.pursuit_evasion.maps import STATUSES, CaptureMap, PointStatus, capture_map
+from rendezvous.pursuit_evasion.paths import Policy
+from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
+from rendezvous.pursuit_evasion.solver import solve, solve_near
+from rendezvous.pursuit_evasion.steering import RandomSteering, Script, Steering
+from rendezvous.pursuit_evasion.units import Units
+
+__all__ = [
+    "STATUSES",
+    "Capture",
+    "CaptureMap",
+    "Certificate",
+    "Deviation",
+    "DistanceCurve",
+    "Ended",
+    "Flight",
+    "Game",
+    "Gravity",
+    "History",
+    "Observation",
+    "Player",
+    "PlayerEnd",
+    "PlayerHistory",
+    "PointStatus",
+    "Policy",
+    "RandomSteering",
+    "Route",
+    "Script",
+    "Solution",
+    "Steering",
+    "Units",
+    "Verdict",
+    "best_answer_s",
+    "capture_map",
+    "capture_quantiles_s",
+    "certify",
+    "fly",
+    "fly_many",
+    "history",
+    "solve",
+    "solve_by_homotopy",
+    "solve_by_linear_game",
+    "solve_near",
+]

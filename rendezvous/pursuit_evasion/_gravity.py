@@ -35,7 +35,7 @@ def acceleration(r: Floats, mu: float, oblateness: float, g: Floats) -> None:
 def derivatives(
     r: Floats, p: Floats, mu: float, oblateness: float, g: Floats, first: Floats, second: Floats, with_second: bool
 ) -> None:
-    """Put the acceleration, its gradient (3, 3) and the gradient of gradient times `p` (3, 3), if wanted, at `r` into arrays.
+    """Put the acceleration, its gradient (3, 3) and, if wanted, the gradient of gradient times `p` (3, 3) into arrays.
 
     Notes
     -----

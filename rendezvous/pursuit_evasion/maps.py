@@ -9,10 +9,11 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from rendezvous.pursuit_evasion._capture import horizon_s
 from rendezvous.pursuit_evasion._pair import Node
 from rendezvous.pursuit_evasion.game import Game
 from rendezvous.pursuit_evasion.solution import Verdict
-from rendezvous.pursuit_evasion.solver import horizon_s, solve
+from rendezvous.pursuit_evasion.solver import solve
 from rendezvous.pursuit_evasion.units import Units, scaled_pair, units_of
 
 Floats = NDArray[np.float64]
@@ -114,8 +115,8 @@ def capture_map(
 
     Notes
     -----
-    Along a row a point starts from the three before it: 1 to 2 ms. Every 25th point and the last are solved from nothing;
-    where these disagree with what the row led to, the points between are solved from nothing too.
+    Along a row a point starts from the three before it: 1 to 2 ms. Every 25th point and the last are solved from
+    nothing; where these disagree with what the row led to, the points between are solved from nothing too.
     """
     shape = (len(rows), len(columns))
     status = np.zeros(shape, dtype=np.int64)
