@@ -22,7 +22,7 @@ SUSPICIOUSLY_GREAT_MU = Decimal("1e12")
 
 PLAYERS = ("pursuer", "evader")
 RATIOS = ("phase_deg", "thrust_ratio", "mass_ratio")
-"""What a map may vary beside the keys: the evader's lead in true longitude, and its thrust and mass by the pursuer's."""
+"""What a map may vary beside the keys: the evader's lead in true longitude, its thrust and mass by the pursuer's."""
 
 _TOP = ("capture_radius_km", "gravitational_parameter_km3_s2", "j2", "longest_s")
 _OWN = (*ELEMENTS, "mass_kg", "dry_mass_kg", "thrust_N", "specific_impulse_s")
@@ -201,10 +201,12 @@ def _start(known: Known, name: str, mu_si: float) -> tuple[Any, Any] | None:
     if not isinstance(known.document.get(name), dict):
         return None
     if all(each in known.document[name] for each in STATE):
-        values = [known.value(name, each) for each in STATE]
-        if not all(isinstance(value, list) for value in values):
+        vectors = [known.value(name, each) for each in STATE]
+        if not all(isinstance(vector, list) for vector in vectors):
             return None
-        position, velocity = ([si(Decimal(each), KILO) for each in value] for value in values)  # type: ignore[union-attr]
+        position, velocity = (
+            [si(Decimal(each), KILO) for each in vector] for vector in vectors if isinstance(vector, list)
+        )
         return position, velocity
     numbers = {each: known.number(name, each) for each in ELEMENTS}
     if any(value is None for value in numbers.values()):
