@@ -16,6 +16,8 @@ from experiments.commands.compare import compare
 from experiments.commands.engage import engage
 from experiments.commands.experiment import experiment
 from experiments.commands.problems import app as problems
+from experiments.commands.reach import reach
+from experiments.commands.pursuit import pursuit
 from experiments.commands.replay import replay
 from experiments.commands.report import report
 from experiments.commands.scenarios import app as scenarios
@@ -64,6 +66,10 @@ app.command(
 )(sweep)
 app.command("report", epilog="Example: infoset report runs --out figures")(report)
 app.command("replay", epilog="Example: infoset replay flight-random.npz flight-game.npz --out figures")(replay)
+app.command("pursuit", epilog="Example: infoset pursuit geo-pursuit --certify --feedback coast --out results")(pursuit)
+app.command("reach", epilog="Example: infoset reach rendezvous-2021 --select energy,vertices --replan --out reach")(
+    reach
+)
 app.add_typer(scenarios, name="scenarios")
 app.add_typer(problems, name="problems")
 

@@ -54,6 +54,14 @@ def _compiled_before() -> bool:
     )
 
 
+def tell_of_compiling_pursuit(quiet: bool) -> None:
+    """Say the same of the kernels of the pursuit-evasion game."""
+    from rendezvous.pursuit_evasion import _extremal
+
+    if not quiet and not _stored(_extremal.flow_kernel, Path(_extremal.__file__ or "")):
+        typer.echo("compiling the kernels, once (about ten seconds) ...", err=True)
+
+
 def _stored(kernel: object, source: Path) -> bool:
     """Whether Numba has an index of a kernel that is no older than its source."""
     name = getattr(kernel, "__name__", "")

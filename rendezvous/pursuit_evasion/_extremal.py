@@ -120,14 +120,14 @@ def flow_back(y: Floats, z: Floats | None, craft: Floats, begin: float, end: flo
     ks, first, second = np.empty((_STAGES + 1, STATES)), np.empty((3, 3)), np.empty((3, 3))
     if z is None:
         return bool(
-            _flow(y, _NOTHING, craft, begin, end, tolerance, 0, ks, _NONE, np.empty((1, COLUMNS)), first, second)
+            flow_kernel(y, _NOTHING, craft, begin, end, tolerance, 0, ks, _NONE, np.empty((1, COLUMNS)), first, second)
         )
     kz, zn = np.empty((_STAGES, STATES, COLUMNS)), np.empty((STATES, COLUMNS))
-    return bool(_flow(y, z, craft, begin, end, tolerance, 1, ks, kz, zn, first, second))
+    return bool(flow_kernel(y, z, craft, begin, end, tolerance, 1, ks, kz, zn, first, second))
 
 
 @allocation_free
-def _flow(
+def flow_kernel(
     y: Floats,
     z: Floats,
     craft: Floats,
@@ -141,6 +141,7 @@ def _flow(
     first: Floats,
     second: Floats,
 ) -> bool:
+    """Do what `flow_back` does, with room given for the stages."""
     span = abs(end - begin)
     sign = 1.0 if end > begin else -1.0
     yn = ks[_STAGES]

@@ -181,6 +181,7 @@ def fly_many(
     replan_s: float = 600.0,
     observation: Observation | None = None,
     seed: int = 0,
+    solution: Solution | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> list[Flight]:
     """Fly a pursuit many times.
@@ -195,6 +196,8 @@ def fly_many(
     observation : Observation or None, optional
     seed : int, optional
         Root of what is drawn: each run has its own stream.
+    solution : Solution or None, optional
+        Of the game, where it is known already.
     progress : callable, optional
         Told the fraction done.
 
@@ -203,7 +206,7 @@ def fly_many(
     list of Flight
         In the order of the runs.
     """
-    solution = solve(game)
+    solution = solve(game) if solution is None else solution
     flights = []
     for run in range(runs):
         own = np.random.SeedSequence(entropy=seed, spawn_key=(run, 0))

@@ -1,0 +1,299 @@
+"""The orbital pursuit-evasion game: orbits, relative motion, thrust, the distance that the evader keeps, feedback."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from experiments.figures.style import IMPULSE, LIMIT, TRUTH, new_figure, place_axes, style
+from rendezvous.pursuit_evasion import Flight, History, PlayerHistory, Solution, Verdict
+from rendezvous.pursuit_evasion.history import orbital_axes
+
+Floats = NDArray[np.float64]
+
+PURSUER: dict[str, Any] = {"color": TRUTH, "linestyle": "-"}
+EVADER: dict[str, Any] = {"color": "#e6842a", "linestyle": (0, (5, 1.5))}
+
+_M_PER_KM = 1e3
+_S_PER_HOUR = 3600.0
+_ARROWS, _ARROW_LENGTH, _LEAST_HEIGHT = 14, 0.17, 0.15
+_THOUSANDS_FROM_M = 2e6
+_HOURS_FROM_S = 4 * _S_PER_HOUR
+
+
+def draw_orbits(solution: Solution, sampled: History) -> Figure:
+    """Draw both paths in space with arrows of thrust, and seen along the planet's axis.
+
+    Parameters
+    ----------
+    solution : Solution
+    sampled : History
+
+    Returns
+    -------
+    Figure
+        Two axes, the first in three dimensions.
+    """
+    unit, scale = _length_unit(solution)
+    with style():
+        figure = new_figure(height_mm=88.0)
+        space: Any = figure.add_axes((-0.02, 0.0, 0.54, 1.0), projection="3d")
+        flat = figure.add_axes((0.63, 0.13, 0.35, 0.78))
+        for player, look, name in _players(sampled):
+            r = player.position_m / scale
+            _draw_path(space, flat, r, player.thrust_direction, look, name)
+        end = sampled.evader.position_m[-1] / scale
+        for axes, point in ((space, end), (flat, end[:2])):
+            axes.plot(
+                *(np.array([each]) for each in point),
+                marker="*",
+                markersize=9.0,
+                color=IMPULSE,
+                linestyle="none",
+                label="capture",
+            )
+        across = float(np.abs(sampled.pursuer.position_m / scale).max())
+        low, high = space.get_zlim()
+        middle, half = 0.5 * (low + high), max(0.5 * (high - low), _LEAST_HEIGHT * across)
+        space.set_zlim(middle - half, middle + half)
+        space.set_xlabel(f"$x$, {unit}", labelpad=-4.0)
+        space.set_ylabel(f"$y$, {unit}", labelpad=-4.0)
+        space.set_zlabel(f"$z$, {unit}", labelpad=-4.0)
+        space.tick_params(pad=-2.0, labelsize=6.5)
+        space.set_box_aspect((1.0, 1.0, 0.6), zoom=0.88)
+        space.view_init(elev=28.0, azim=-62.0)
+        space.set_title("(a) paths and thrust", y=0.91)
+        for axis in (space.xaxis, space.yaxis, space.zaxis):
+            axis.set_major_locator(_few())
+        flat.plot([0.0], [0.0], marker="+", color=LIMIT, markersize=7.0, linestyle="none")
+        flat.set_aspect("equal", adjustable="datalim")
+        flat.margins(0.12)
+        flat.xaxis.set_major_locator(_few())
+        flat.set_xlabel(f"$x$, {unit}")
+        flat.set_ylabel(f"$y$, {unit}")
+        flat.set_title("(b) seen along the planet's axis")
+        flat.legend(loc="lower right")
+    return figure
+
+
+def draw_relative(solution: Solution, sampled: History) -> Figure:
+    """Draw the pursuer's way in the evader's orbital frame.
+
+    Parameters
+    ----------
+    solution : Solution
+    sampled : History
+
+    Returns
+    -------
+    Figure
+        Three axes.
+    """
+    evader = sampled.evader
+    axes_of_evader = orbital_axes(evader.position_m, evader.velocity_m_s)
+    offset = (sampled.pursuer.position_m - evader.position_m) / _M_PER_KM
+    relative = np.einsum("nij,nj->ni", axes_of_evader, offset)
+    with style():
+        figure = new_figure(height_mm=66.0)
+        ((plane, side, distance),) = place_axes(figure, 1, 3, margins_mm=(15.0, 4.0, 12.0, 8.0), gaps_mm=(17.0, 0.0))
+        for axes, column, name, title in (
+            (plane, 0, "radial, km", "(a) in the evader's plane"),
+            (side, 2, "normal, km", "(b) out of the plane"),
+        ):
+            axes.plot(relative[:, 1], relative[:, column], **PURSUER)
+            axes.plot(relative[0, 1], relative[0, column], marker="o", markersize=4.0, color=TRUTH)
+            axes.plot(0.0, 0.0, marker="*", markersize=9.0, color=IMPULSE, linestyle="none")
+            axes.set_xlabel("along the motion, km")
+            axes.set_ylabel(name)
+            axes.set_title(title)
+            axes.xaxis.set_major_locator(_few())
+        time, unit = _times(sampled.time_s)
+        distance.plot(time, np.linalg.norm(offset, axis=1), **PURSUER)
+        distance.set_xlabel(f"time, {unit}")
+        distance.set_ylabel("distance, km")
+        distance.set_title("(c) distance")
+        distance.set_ylim(bottom=0.0)
+    return figure
+
+
+def draw_control(sampled: History) -> Figure:
+    """Draw the directions of thrust in each craft's own orbital frame, and the switching functions.
+
+    Parameters
+    ----------
+    sampled : History
+
+    Returns
+    -------
+    Figure
+        Three axes.
+    """
+    time, unit = _times(sampled.time_s)
+    with style():
+        figure = new_figure(height_mm=66.0)
+        ((inside, outside, switching),) = place_axes(
+            figure, 1, 3, margins_mm=(16.0, 4.0, 12.0, 8.0), gaps_mm=(16.0, 0.0)
+        )
+        for player, look, name in _players(sampled):
+            if not player.thrust_direction.any():
+                continue
+            u = np.einsum("nij,nj->ni", orbital_axes(player.position_m, player.velocity_m_s), player.thrust_direction)
+            angle = np.degrees(np.arctan2(u[:, 0], u[:, 1]))
+            _plot_angle(inside, time, angle, name, look)
+            outside.plot(time, np.degrees(np.arcsin(np.clip(u[:, 2], -1.0, 1.0))), label=name, **look)
+            switching.plot(time, player.switching, label=name, **look)
+        inside.set_ylim(-180.0, 180.0)
+        inside.set_yticks([-180, -90, 0, 90, 180])
+        inside.set_ylabel("from along-track to outward, deg")
+        inside.set_title("(a) thrust in the plane")
+        outside.set_ylim(-90.0, 90.0)
+        outside.set_yticks([-90, -45, 0, 45, 90])
+        outside.set_ylabel("out of the plane, deg")
+        outside.set_title("(b) thrust out of the plane")
+        switching.set_ylim(bottom=0.0)
+        switching.set_ylabel("switching function over its start")
+        switching.set_title("(c) full thrust while positive")
+        for axes in (inside, outside, switching):
+            axes.set_xlabel(f"time, {unit}")
+        switching.legend(loc="best")
+    return figure
+
+
+def draw_distance(solution: Solution) -> Figure:
+    """Draw the distance that the evader can keep against the duration, and the curvature that certifies it.
+
+    Parameters
+    ----------
+    solution : Solution
+
+    Returns
+    -------
+    Figure
+        Two axes.
+    """
+    curve = solution.curve
+    time, unit = _times(curve.duration_s)
+    radius = solution.game.capture_radius_m / _M_PER_KM
+    with style():
+        figure = new_figure(height_mm=66.0)
+        ((left, right),) = place_axes(figure, 1, 2, margins_mm=(15.0, 4.0, 12.0, 8.0), gaps_mm=(20.0, 0.0))
+        left.plot(time, curve.distance_m / _M_PER_KM, marker="o", markersize=2.2, color=TRUTH)
+        left.axhline(radius, color=LIMIT, linewidth=0.8, linestyle="--")
+        if solution.verdict is Verdict.CAPTURED:
+            left.plot(time[-1], radius, marker="*", markersize=9.0, color=IMPULSE, linestyle="none", zorder=5)
+        left.set_ylim(bottom=0.0)
+        left.set_xlabel(f"duration $T$, {unit}")
+        left.set_ylabel("distance kept $l(T)$, km")
+        left.set_title(f"(a) {solution.verdict.value}")
+        right.plot(time, curve.least_curvature, marker="o", markersize=2.2, color=TRUTH)
+        right.set_ylim(bottom=0.0)
+        right.set_xlabel(f"duration $T$, {unit}")
+        right.set_ylabel("least curvature of $h_P - h_E + l$")
+        right.set_title("(b) a saddle while positive")
+    return figure
+
+
+def draw_feedback(solution: Solution, flights: Sequence[Flight]) -> Figure:
+    """Draw what each plan predicted and how far the two were apart; of many flights, how their times spread.
+
+    Parameters
+    ----------
+    solution : Solution
+    flights : sequence of Flight
+
+    Returns
+    -------
+    Figure
+        Two axes.
+    """
+    optimal_s = None if solution.capture is None else solution.capture.time_s
+    with style():
+        figure = new_figure(height_mm=66.0)
+        ((left, right),) = place_axes(figure, 1, 2, margins_mm=(15.0, 4.0, 12.0, 8.0), gaps_mm=(18.0, 0.0))
+        faint = {"linewidth": 0.6, "alpha": 0.5} if len(flights) > 1 else {"marker": "o", "markersize": 2.0}
+        _, unit = _times(flights[0].planned_s)
+        scale = _S_PER_HOUR if unit == "h" else 1.0
+        for flight in flights[:100]:
+            left.plot(flight.planned_s / scale, flight.predicted_s / scale, color=TRUTH, **faint)
+        if optimal_s is not None:
+            left.axhline(optimal_s / scale, color=LIMIT, linewidth=0.8, linestyle="--", label="both play their best")
+            left.legend(loc="best")
+        left.set_xlabel(f"time of the plan, {unit}")
+        left.set_ylabel(f"predicted capture, {unit}")
+        left.set_title("(a) what the plans predict")
+        if len(flights) == 1:
+            (flight,) = flights
+            right.plot(flight.planned_s / scale, flight.distances_m / _M_PER_KM, **PURSUER)
+            right.set_xlabel(f"time, {unit}")
+            right.set_ylabel("distance, km")
+            right.set_ylim(bottom=0.0)
+            right.set_title(f"(b) {flight.ended.value} at {flight.time_s:.1f} s")
+        else:
+            times = np.sort([flight.time_s for flight in flights if flight.ended.value == "captured"]) / scale
+            if len(times):
+                right.step(times, np.arange(1, len(times) + 1) / len(flights), where="post", color=TRUTH)
+            right.set_ylim(0.0, 1.02)
+            right.set_xlabel(f"capture time, {unit}")
+            right.set_ylabel("share of flights captured")
+            right.set_title(f"(b) {len(times)} of {len(flights)} captured")
+    return figure
+
+
+def _draw_path(space: Any, flat: Axes, r: Floats, direction: Floats, look: dict[str, Any], name: str) -> None:
+    """Draw a path with its start and its thrust in both views; in space thrust is a stroke from a point of the path."""
+    for axes, points in ((space, r), (flat, r[:, :2])):
+        axes.plot(*points.T, label=name, **look)
+        axes.plot(
+            *(np.array([each]) for each in points[0]), marker="o", markersize=4.0, color=look["color"], linestyle="none"
+        )
+    if not direction.any():
+        return
+    places = np.linspace(0, len(r) - 1, _ARROWS).astype(int)
+    length = _ARROW_LENGTH * float(np.abs(r[:, :2]).max())
+    u = length * direction[places]
+    space.quiver(*r[places].T, *u.T, color=look["color"], linewidth=0.9, arrow_length_ratio=0.0)
+    flat.quiver(
+        *r[places, :2].T,
+        *u[:, :2].T,
+        color=look["color"],
+        angles="xy",
+        scale_units="xy",
+        scale=1.0,
+        width=0.005,
+        headwidth=4.0,
+    )
+    tips = r[places, :2] + u[:, :2]
+    flat.update_datalim(tips)
+
+
+def _players(sampled: History) -> tuple[tuple[PlayerHistory, dict[str, Any], str], ...]:
+    return (sampled.pursuer, PURSUER, "pursuer"), (sampled.evader, EVADER, "evader")
+
+
+def _plot_angle(axes: Axes, time: Floats, angle: Floats, name: str, look: dict[str, Any]) -> None:
+    """Plot an angle without the lines across where it wraps."""
+    jumps = np.flatnonzero(np.abs(np.diff(angle)) > 180.0) + 1
+    for index, (x, y) in enumerate(zip(np.split(time, jumps), np.split(angle, jumps), strict=True)):
+        axes.plot(x, y, label=name if index == 0 else None, **look)
+
+
+def _times(seconds: Floats) -> tuple[Floats, str]:
+    if len(seconds) and seconds[-1] > _HOURS_FROM_S:
+        return seconds / _S_PER_HOUR, "h"
+    return seconds, "s"
+
+
+def _length_unit(solution: Solution) -> tuple[str, float]:
+    """Return the unit that positions are drawn in, and its metres."""
+    return ("10$^3$ km", 1e6) if solution.units.length_m > _THOUSANDS_FROM_M else ("km", _M_PER_KM)
+
+
+def _few() -> Any:
+    from matplotlib.ticker import MaxNLocator
+
+    return MaxNLocator(nbins=4)
