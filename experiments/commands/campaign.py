@@ -11,6 +11,7 @@ from experiments.commands._campaign_options import (
     Chunk,
     Dask,
     NoiseName,
+    Processes,
     RangeMeter,
     Resume,
     Workers,
@@ -68,6 +69,7 @@ def campaign(
     ] = None,
     chunk: Chunk = None,
     workers: Workers = None,
+    processes: Processes = None,
     dask: Dask = None,
     resume: Resume = False,
     json_: Json = None,
@@ -119,7 +121,7 @@ def campaign(
         warnings = scenario_warnings(given)
         for warning in warnings:
             say(f"warning: {warning}", quiet)
-        with crew(dask, workers, quiet) as flying:
+        with crew(dask, workers, processes, quiet) as flying:
             tell_of_compiling(quiet)
             _tell_estimate(asked, flying.cores, quiet)
             result, elapsed_s = _fly(asked, flying, resume, quiet)

@@ -13,6 +13,7 @@ from experiments.commands._campaign_options import (
     Chunk,
     Dask,
     NoiseName,
+    Processes,
     RangeMeter,
     Resume,
     Workers,
@@ -91,6 +92,7 @@ def sweep(
     ] = False,
     chunk: Chunk = None,
     workers: Workers = None,
+    processes: Processes = None,
     dask: Dask = None,
     resume: Resume = False,
     yes: Annotated[
@@ -151,7 +153,7 @@ def sweep(
         warnings = list(dict.fromkeys(line for cell in asked.cells for line in scenario_warnings(cell)))
         for warning in warnings[:5]:
             say(f"warning: {warning}", quiet)
-        with crew(dask, workers, quiet) as flying:
+        with crew(dask, workers, processes, quiet) as flying:
             tell_of_compiling(quiet)
             result, elapsed_s = _fly(asked, flying, resume, quiet)
         table = sweep_table(result.folder, [*shown, required.quantile])

@@ -194,7 +194,9 @@ def test_damage_is_said_and_mended(infoset: Infoset, file: Path, tmp_path: Path)
             ["--until: must be a quantity, a quantile and a width", 'for example "miss_m p99 ci<0.5"'],
         ),
         (["--dask", "localhost"], ["--dask: must be an address such as tcp://host:8786"]),
-        (["--dask", "tcp://h:1", "--workers", 2], ["--workers is of this machine"]),
+        (["--dask", "tcp://h:1", "--workers", 2], ["say who flies; leave all but one out"]),
+        (["--processes", 2, "--workers", 2], ["say who flies; leave all but one out"]),
+        (["--processes", 0], ["--processes: must be from 1"]),
         (["--json", "missing/x.json"], ["there is no folder missing"]),
         (["--out", "brief.toml"], ["brief.toml: is a file, not a folder"]),
         (["--out", "."], ["is not empty, and holds no campaign"]),
@@ -417,3 +419,42 @@ def test_a_second_campaign_in_the_folder_is_refused(infoset: Infoset, file: Path
         code, _, err = infoset(*asked, "--resume")
     assert code == 2
     assert "another campaign is at work in this folder" in err
+
+
+@pytest.mark.slow
+def test_processes_give_the_same_bits_and_die_with_their_parent(brief: Scenario, file: Path, tmp_path: Path) -> None:
+    arguments = ["campaign", file, "--runs", 6000, "--chunk", 8, "--noise", "mixed", "--out", tmp_path / "runs", "-q"]
+    command = [sys.executable, "-m", "experiments.cli", *map(str, arguments), "--resume", "--processes", "2"]
+    with subprocess.Popen(command) as process:
+        shards = tmp_path / "runs" / "shards"
+        while not shards.is_dir() or len(list(shards.glob("*.parquet"))) < 10:
+            assert process.poll() is None
+            time.sleep(0.05)
+        children = {child: _parent(child) for child in _processes() if _parent(child) == process.pid}
+        assert len(children) >= 2
+        process.kill()
+        process.wait()
+    deadline = time.monotonic() + 10.0
+    while children.keys() & set(_processes()) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert not children.keys() & set(_processes())
+    there = CampaignFolder.read(tmp_path / "runs")
+    assert 80 <= there.finished_runs < 6000
+    subprocess.run([*command], check=True)
+    expected = Campaign(brief, 6000, tmp_path / "whole", noise=CampaignNoise.MIXED).run().table
+    assert CampaignFolder.read(tmp_path / "runs").table().equals(expected)
+
+
+def _processes() -> list[int]:
+    """Processes that live."""
+    if not Path("/proc/self/stat").exists():
+        pytest.skip("this system does not list its processes")
+    return [int(each.name) for each in Path("/proc").iterdir() if each.name.isdigit()]
+
+
+def _parent(process: int) -> int:
+    """The parent of a process; 0 if it has gone."""
+    try:
+        return int((Path("/proc") / str(process) / "stat").read_text().rpartition(")")[2].split()[1])
+    except OSError:
+        return 0

@@ -2,13 +2,12 @@ from __future__ import annotations
 
 import errno
 import json
-import multiprocessing
 import os
 import subprocess
 import sys
 import threading
 from collections.abc import Callable
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -45,6 +44,7 @@ from sim.storage import (
 )
 from sim.stored_flight import Progress
 from sim.versions import VersionError
+from sim.worker_processes import worker_processes
 
 COLUMNS = [
     *("run", "noise", "tie", "range_meter", "miss_m", "impulse_m_s", "guaranteed_miss_m", "outcome", "truth_margin"),
@@ -136,8 +136,7 @@ def test_any_executor_will_do(brief: Scenario, reference: Any, tmp_path: Path) -
     late = Late()
     assert mixed(brief, tmp_path / "late").run(late, workers=4).table.equals(reference)
     assert late.most <= 4
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(2, mp_context=context) as pool:
+    with worker_processes(2) as pool:
         assert mixed(brief, tmp_path / "processes", 64).run(pool).table.equals(reference.slice(0, 64))
 
 

@@ -1,0 +1,84 @@
+"""Time of a campaign over its runs, and of a run over its sections: `python benchmarks/campaign_cost.py --out DIR`.
+
+Prints the straight lines that fit, with the greatest deviation from them, and writes figure-campaign-cost.pdf and .png.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from experiments import load_scenario
+from experiments.figures.style import CURVE_LOOKS, new_figure, place_axes, save_figure, style
+from guidance import NoiseKind
+from sim import Campaign, Scenario, simulate
+
+RUNS = (128, 256, 512, 1024, 2048)
+SECTIONS = (15, 29, 58, 116, 232)
+ROUNDS = 3
+BATCHES = 2
+
+
+def campaign_s(scenario: Scenario, runs: int) -> float:
+    """Least time of a campaign of some rounds."""
+    times = []
+    for _ in range(ROUNDS):
+        with tempfile.TemporaryDirectory() as folder:
+            began_s = time.perf_counter()
+            Campaign(scenario, runs, Path(folder) / "campaign", guarantee=False).run(workers=1)
+            times.append(time.perf_counter() - began_s)
+    return min(times)
+
+
+def main() -> None:
+    """Measure, print and draw."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, required=True)
+    out: Path = parser.parse_args().out
+    paper = replace(load_scenario("asteroid-1997"), range_sensor=None)
+    with style():
+        figure = new_figure(height_mm=78.0)
+        ((left, right),) = place_axes(figure, 1, 2, margins_mm=(16.0, 4.0, 24.0, 7.0), gaps_mm=(18.0, 0.0))
+        for noise in NoiseKind:
+            scenario = replace(paper, noise=noise)
+            simulate(scenario, 64)
+            look = CURVE_LOOKS[1 if noise is NoiseKind.RANDOM else 4]
+            by_runs = [campaign_s(scenario, runs) for runs in RUNS]
+            model = scenario.set_model
+            by_sections = [
+                campaign_s(replace(scenario, set_model=replace(model, sections=each)), 64 * BATCHES) / (64 * BATCHES)
+                for each in SECTIONS
+            ]
+            for axes, ticks, values, what in (
+                (left, RUNS, np.array(by_runs), "a campaign, s over runs"),
+                (right, SECTIONS, 1e3 * np.array(by_sections), "a run, ms over sections"),
+            ):
+                rise, fixed = np.polyfit(ticks, values, 1)
+                line = fixed + rise * np.array(ticks)
+                off = float(np.abs(values / line - 1.0).max())
+                print(f"{noise.value}: {what}: {fixed:.3g} + {rise:.3g} n, within {off:.0%}: {np.round(values, 3)}")  # noqa: T201
+                axes.plot(ticks, values, linestyle="", marker="o", markersize=4.0, color=look["color"])
+                axes.plot(ticks, line, label=f"{noise.value} noise", **look)
+        for axes, ticks, title, label in (
+            (left, RUNS, "(a) a campaign, 29 sections", "runs"),
+            (right, SECTIONS, f"(b) a run, of {64 * BATCHES}", "sections at the start"),
+        ):
+            axes.set_xlim(0.0, 1.05 * ticks[-1])
+            axes.set_ylim(bottom=0.0)
+            axes.set_title(title)
+            axes.set_xlabel(label)
+        left.set_ylabel("time, s")
+        right.set_ylabel("time a run, ms")
+        figure.legend(
+            *left.get_legend_handles_labels(), loc="lower center", ncols=2, title="points measured, lines fitted"
+        )
+    save_figure(figure, out, "figure-campaign-cost")
+
+
+if __name__ == "__main__":
+    main()
