@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from rendezvous.multipoint.segments import Path, check_times, solve_segments
 from rendezvous.multipoint.targets import Meet
 from rendezvous.multipoint.times import BestTimes, Effort, TimeLimits, optimise_times, room_s
-from rendezvous.multipoint.tour import Tour, nodes_of
+from rendezvous.multipoint.tour import Tour, Visits, nodes_of
 
 Floats = NDArray[np.float64]
 Report = Callable[[float], None]
@@ -45,12 +45,12 @@ class BestOrder:
     evaluations: int
 
 
-def best_order(tour: Tour, limits: TimeLimits, *, progress: Report | None = None) -> BestOrder:
+def best_order(tour: Visits, limits: TimeLimits, *, progress: Report | None = None) -> BestOrder:
     """Find the best order and the best times together.
 
     Parameters
     ----------
-    tour : Tour
+    tour : Visits
     limits : TimeLimits
     progress : callable or None
         Told the share of orders that are decided.
@@ -81,7 +81,7 @@ def best_order(tour: Tour, limits: TimeLimits, *, progress: Report | None = None
             later = dwell[order[-1]] + dwell[rest].sum() - dwell[rest].max() + len(rest) * limits.least_gap_s
             held = TimeLimits(horizon - float(later), limits.least_gap_s, limits.price_per_s)
         found = optimise_times(
-            lambda times: tour.fly(order, times),
+            tour.flyer(order),
             tour.start_s,
             dwell[list(order)],
             held,
@@ -94,7 +94,7 @@ def best_order(tour: Tour, limits: TimeLimits, *, progress: Report | None = None
     search.branch((), None)
     assert search.best_path is not None
     final = optimise_times(
-        lambda times: tour.fly(search.best, times),
+        tour.flyer(search.best),
         tour.start_s,
         dwell[list(search.best)],
         limits,
@@ -103,12 +103,12 @@ def best_order(tour: Tour, limits: TimeLimits, *, progress: Report | None = None
     return BestOrder(search.best, final.path, final.objective, search.nodes, search.evaluations + final.evaluations)
 
 
-def best_order_of_slots(tour: Tour, time_s: ArrayLike, *, progress: Report | None = None) -> BestOrder:
+def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | None = None) -> BestOrder:
     """Find the best order where the times of the first, second and so on visit are given.
 
     Parameters
     ----------
-    tour : Tour
+    tour : Visits
     time_s : array_like, shape (n,)
         Increasing.
     progress : callable or None
@@ -132,7 +132,7 @@ def best_order_of_slots(tour: Tour, time_s: ArrayLike, *, progress: Report | Non
     if times.shape != (count,):
         raise ValueError(f"{count} visits need {count} times, found {times.size}")
     check_times(tour.start_s, times, times)
-    if all(each.meet is Meet.RENDEZVOUS for each in tour.targets.targets):
+    if isinstance(tour, Tour) and all(each.meet is Meet.RENDEZVOUS for each in tour.targets.targets):
         return _by_dynamic_programming(tour, times)
 
     def solve(order: tuple[int, ...], _warm: Sequence[Floats], _complete: bool) -> tuple[float, Path, int]:
@@ -145,27 +145,37 @@ def best_order_of_slots(tour: Tour, time_s: ArrayLike, *, progress: Report | Non
     return BestOrder(search.best, search.best_path, search.best_path.cost, search.nodes, search.evaluations)
 
 
-def best_times(tour: Tour, order: Sequence[int], limits: TimeLimits, guesses: Sequence[Floats] = ()) -> BestTimes:
+def best_times(
+    tour: Visits,
+    order: Sequence[int],
+    limits: TimeLimits,
+    guesses: Sequence[Floats] = (),
+    *,
+    progress: Report | None = None,
+) -> BestTimes:
     """Find the best times of one order.
 
     Parameters
     ----------
-    tour : Tour
+    tour : Visits
     order : sequence of int
     limits : TimeLimits
     guesses : sequence of ndarray, shape (N,)
         Times to start from, beside those of its own.
+    progress : callable or None
+        Told the share of starts that are followed.
 
     Returns
     -------
     BestTimes
     """
     return optimise_times(
-        lambda times: tour.fly(order, times),
+        tour.flyer(order),
         tour.start_s,
         tour.dwell_s[list(order)],
         limits,
         guesses,
+        progress=progress,
     )
 
 
@@ -221,7 +231,7 @@ class _Search:
         return [np.append(shrunk, last), np.append(times, 0.5 * (last + end)) if end > last else np.append(shrunk, end)]
 
 
-def _checked_count(tour: Tour) -> int:
+def _checked_count(tour: Visits) -> int:
     count = len(tour.targets.targets)
     if count > MOST_TARGETS:
         raise ValueError(

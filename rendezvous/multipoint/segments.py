@@ -165,11 +165,10 @@ def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, no
 
     Notes
     -----
-    Unknown are the velocities at flybys. The cost is the sum of 1/2 |L_k^-1 e_k|^2, e_k = x_k - Phi_k x_(k-1) - d_k;
-    L_k is
-    the Cholesky factor of the Gramian in states divided by (T, T, T, 1, 1, 1): a least-squares problem whose normal
-    equations are symmetric positive definite with 3 x 3 blocks on three diagonals. No block is inverted that may be
-    singular in a well-posed problem, as R13 of the paper's elimination is. O(N) time and memory.
+    Unknown are the velocities at flybys. The cost is the sum of 1/2 |L_k^-1 e_k|^2, e_k = x_k - Phi_k x_(k-1) - d_k,
+    with L_k the Cholesky factor of the Gramian, in states divided by (T, T, T, 1, 1, 1): a least-squares problem whose
+    normal equations are symmetric positive definite with 3 x 3 blocks on three diagonals. No block is inverted that may
+    be singular in a well-posed problem, as R13 of the paper's elimination is. O(N) time and memory.
     """
     starts = np.concatenate([[start_s], nodes.leave_s[:-1]])
     durations = nodes.arrive_s - starts

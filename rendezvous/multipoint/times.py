@@ -20,6 +20,7 @@ LEAST_SHARE = 1e-6
 """The least gap, as a share of the time there is, where none is given: a visit takes time."""
 _POLISH_ROUNDS = 8
 _DIFFERENCE = 1e-5
+_WALL = 20.0
 
 
 class Effort(Enum):
@@ -135,6 +136,13 @@ class _Trials:
         slope = np.cumsum(gradient[::-1])[::-1]
         return _Trial(gaps, path, path.cost + self.price_per_s * float(times[-1]), slope)
 
+    def attempt(self, gaps: Floats) -> _Trial | None:
+        """Fly, or return None where there is no path of such times."""
+        try:
+            return self(gaps)
+        except ValueError:
+            return None
+
 
 def optimise_times(
     fly: FlyAt,
@@ -144,6 +152,7 @@ def optimise_times(
     guesses: Sequence[Floats] = (),
     *,
     effort: Effort = Effort.FINAL,
+    progress: Callable[[float], None] | None = None,
 ) -> BestTimes:
     """Find the times of least energy, or energy and price, of visits in one order.
 
@@ -158,6 +167,8 @@ def optimise_times(
     guesses : sequence of ndarray, shape (N,)
         Times to start from, beside those of its own; unsound ones are left out.
     effort : Effort
+    progress : callable or None
+        Told the share of starts that are followed.
 
     Returns
     -------
@@ -183,8 +194,15 @@ def optimise_times(
     candidates = [np.diff(np.concatenate([[0.0], np.asarray(each) - shifts])) for each in guesses]
     candidates += _spread(count, scale, least, bounded=np.isfinite(total))[: effort.spread]
     sound = [each for each in candidates if (each >= least * (1 - 1e-9)).all() and each.sum() <= total * (1 + 1e-12)]
-    begun = sorted((trials(each) for each in sound), key=lambda each: each.objective)
-    ended = [_descend(trials, each, least, total, scale, effort.tolerance) for each in begun[: effort.followed]]
+    begun = [each for each in map(trials.attempt, sound) if each is not None]
+    if not begun:
+        trials(sound[0])  # says why
+    followed = sorted(begun, key=lambda each: each.objective)[: effort.followed]
+    ended = []
+    for index, each in enumerate(followed):
+        ended.append(_descend(trials, each, least, total, scale, effort.tolerance))
+        if progress is not None:
+            progress((index + 1) / len(followed))
     best = min(ended, key=lambda each: each.objective)
     if effort is Effort.FINAL:
         best = _polish(trials, best, least, total, scale)
@@ -246,7 +264,9 @@ def _descend(trials: _Trials, begin: _Trial, least: float, total: float, scale: 
     floor = 1e-30 * max(begin.objective, 1e-270)
 
     def value(x: Floats) -> tuple[float, Floats]:
-        found = trials(np.maximum(x * scale, 0.5 * least))
+        found = trials.attempt(np.maximum(x * scale, 0.5 * least))
+        if found is None:  # a wall
+            return float(np.log(begin.objective)) + _WALL, np.zeros_like(x)
         size = max(found.objective, floor)
         return float(np.log(size)), found.slope * (scale / size)
 
@@ -264,8 +284,8 @@ def _descend(trials: _Trials, begin: _Trial, least: float, total: float, scale: 
         method="SLSQP",
         options={"ftol": tolerance, "maxiter": 100},
     )
-    ended = trials(_within(np.asarray(found.x) * scale, least, total))
-    return ended if ended.objective <= begin.objective else begin
+    ended = trials.attempt(_within(np.asarray(found.x) * scale, least, total))
+    return ended if ended is not None and ended.objective <= begin.objective else begin
 
 
 def _within(gaps: Floats, least: float, total: float) -> Floats:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +14,28 @@ from rendezvous.multipoint.targets import Meet, MovingTargets
 from rendezvous.relative_motion import LinearMotion
 
 Floats = NDArray[np.float64]
+
+
+class Visits(Protocol):
+    """Targets to be visited from a start, and what finds paths to them."""
+
+    @property
+    def targets(self) -> MovingTargets:
+        """What is visited."""
+
+    @property
+    def start_s(self) -> float:
+        """When the chaser starts."""
+
+    @property
+    def dwell_s(self) -> Floats:
+        """How long the chaser stays with each target, shape (n,)."""
+
+    def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
+        """Find the path of least energy to targets in an order at times of shape (N,)."""
+
+    def flyer(self, order: Sequence[int]) -> Callable[[Floats], Path]:
+        """Return what finds paths of one order for times asked in turn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +88,19 @@ class Tour:
         Path
         """
         return solve_segments(self.motion, self.start_s, self.start_state, nodes_of(self.targets, order, time_s))
+
+    def flyer(self, order: Sequence[int]) -> Callable[[Floats], Path]:
+        """Return what finds the path of times of shape (N,), for one order.
+
+        Parameters
+        ----------
+        order : sequence of int
+
+        Returns
+        -------
+        callable
+        """
+        return lambda time_s: self.fly(order, time_s)
 
 
 def nodes_of(targets: MovingTargets, order: Sequence[int], time_s: ArrayLike) -> Nodes:

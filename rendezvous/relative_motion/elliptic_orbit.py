@@ -164,14 +164,14 @@ class EllipticOrbit:
         return float(true_rad - 2.0 * np.arctan2(fraction * np.sin(true_rad), 1.0 + fraction * np.cos(true_rad)))
 
 
-def eccentric_of_mean(mean_rad: ArrayLike, eccentricity: float) -> Floats:
+def eccentric_of_mean(mean_rad: ArrayLike, eccentricity: ArrayLike) -> Floats:
     """Solve Kepler's equation E - e sin E = M.
 
     Parameters
     ----------
     mean_rad : array_like
         M; E grows with it without end.
-    eccentricity : float
+    eccentricity : array_like
         0 <= e < 1.
 
     Returns
@@ -183,13 +183,13 @@ def eccentric_of_mean(mean_rad: ArrayLike, eccentricity: float) -> Floats:
     -----
     Newton's method from above, where the function is convex: it falls to the root and cannot overshoot.
     """
-    mean = np.asarray(mean_rad, dtype=np.float64)
+    mean, e = np.asarray(mean_rad, dtype=np.float64), np.asarray(eccentricity, dtype=np.float64)
     turns = 2.0 * np.pi * np.round(mean / (2.0 * np.pi))
     sign, rest = np.where(mean < turns, -1.0, 1.0), np.abs(mean - turns)
-    found = np.minimum(np.minimum(rest + eccentricity, rest / (1.0 - eccentricity)), np.pi)
+    found = np.minimum(np.minimum(rest + e, rest / (1.0 - e)), np.pi)
     for _ in range(_MOST_STEPS):
-        excess = found - eccentricity * np.sin(found) - rest
-        step = excess / (1.0 - eccentricity * np.cos(found))
+        excess = found - e * np.sin(found) - rest
+        step = excess / (1.0 - e * np.cos(found))
         found = np.maximum(found - step, 0.0)
         if np.all(np.abs(step) <= 4e-16 * (1.0 + found)):
             break

@@ -86,6 +86,20 @@ class TimeVaryingMotion:
         found = self._solved(start_s, end_s)
         return Segment(found.transition, found.gramian, found.drift)
 
+    def short_segment(self, start_s: Floats, end_s: Floats) -> Segment:
+        """Transition, Gramian and drift over intervals known to be well under a radian: one panel, unchecked.
+
+        Parameters
+        ----------
+        start_s, end_s : ndarray, shape (k,)
+
+        Returns
+        -------
+        Segment
+        """
+        found = _collocated(self, start_s, end_s, 1)
+        return Segment(found.transition, found.gramian, found.drift)
+
     def held_input(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Effect at the end of a unit control held from the start, int Phi(end, t) B dt, shape (..., 6, 3)."""
         checked_durations(start_s, end_s)

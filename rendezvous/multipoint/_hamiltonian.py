@@ -1,0 +1,107 @@
+"""Kernel of the nonlinear two-body problem: states and costates, and how they depend on where they start.
+
+Lengths and times are such that the gravitational parameter is one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rendezvous._compile import compiled
+
+Floats = NDArray[np.float64]
+
+STEP_RAD = 0.01
+MOST_STEPS = 200_000
+LEAST_RADIUS = 1e-3
+
+
+@compiled
+def propagate(z: Floats, variations: Floats, duration: float) -> bool:
+    """Carry (r, v, lambda_r, lambda_v) and its variations on, in place.
+
+    Parameters
+    ----------
+    z : ndarray, shape (12,)
+    variations : ndarray, shape (12, m)
+        Derivatives of z by what the caller likes; m may be zero.
+    duration : float
+
+    Returns
+    -------
+    bool
+        False where the trajectory falls into the centre or never ends.
+
+    Notes
+    -----
+    Runge and Kutta's classical method in steps of 0.01 radians of the circular orbit at the present distance: relative
+    errors of about 1e-10 a revolution, enough to start the combined method from.
+    """
+    columns = variations.shape[1]
+    slope, total = np.empty((12, columns + 1)), np.empty((12, columns + 1))
+    base, trial = np.empty((12, columns + 1)), np.empty((12, columns + 1))
+    base[:, 0] = z
+    base[:, 1:] = variations
+    left = duration
+    for _ in range(MOST_STEPS):
+        radius = np.sqrt(base[0, 0] ** 2 + base[1, 0] ** 2 + base[2, 0] ** 2)
+        if not radius > LEAST_RADIUS:
+            return False
+        step = min(left, STEP_RAD * radius * np.sqrt(radius))
+        if left - step < 1e-3 * step:
+            step = left
+        _slopes(base, total)
+        for stage in range(3):
+            part = 0.5 * step if stage < 2 else step
+            source = total if stage == 0 else slope
+            for row in range(12):
+                for column in range(columns + 1):
+                    trial[row, column] = base[row, column] + part * source[row, column]
+            _slopes(trial, slope)
+            weight = 2.0 if stage < 2 else 1.0
+            for row in range(12):
+                for column in range(columns + 1):
+                    total[row, column] += weight * slope[row, column]
+        for row in range(12):
+            for column in range(columns + 1):
+                base[row, column] += step / 6.0 * total[row, column]
+        left -= step
+        if left <= 0.0:
+            for row in range(12):
+                z[row] = base[row, 0]
+                for column in range(columns):
+                    variations[row, column] = base[row, column + 1]
+            return True
+    return False
+
+
+@compiled
+def _slopes(z: Floats, slope: Floats) -> None:
+    """Time derivatives: of z in column 0, of its variations in the others."""
+    r0, r1, r2 = z[0, 0], z[1, 0], z[2, 0]
+    l0, l1, l2 = z[9, 0], z[10, 0], z[11, 0]
+    squared = r0 * r0 + r1 * r1 + r2 * r2
+    third = 1.0 / (squared * np.sqrt(squared))
+    fifth = third / squared
+    along = r0 * l0 + r1 * l1 + r2 * l2
+    for column in range(z.shape[1]):
+        for axis in range(3):
+            slope[axis, column] = z[3 + axis, column]
+            slope[9 + axis, column] = -z[6 + axis, column]
+    for axis in range(3):
+        slope[3 + axis, 0] = -third * z[axis, 0] + z[9 + axis, 0]
+        slope[6 + axis, 0] = third * z[9 + axis, 0] - 3.0 * fifth * along * z[axis, 0]
+    for column in range(1, z.shape[1]):
+        d0, d1, d2 = z[0, column], z[1, column], z[2, column]
+        e0, e1, e2 = z[9, column], z[10, column], z[11, column]
+        out = r0 * d0 + r1 * d1 + r2 * d2
+        turned = l0 * d0 + l1 * d1 + l2 * d2
+        costate = r0 * e0 + r1 * e1 + r2 * e2
+        for axis in range(3):
+            position, primer = z[axis, 0], z[9 + axis, 0]
+            slope[3 + axis, column] = 3.0 * fifth * out * position - third * z[axis, column] + z[9 + axis, column]
+            second = 3.0 * fifth * (along * z[axis, column] + position * turned + primer * out)
+            second -= 15.0 * fifth / squared * along * out * position
+            first = 3.0 * fifth * costate * position - third * z[9 + axis, column]
+            slope[6 + axis, column] = -first - second
