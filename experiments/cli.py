@@ -16,8 +16,8 @@ from experiments.commands.compare import compare
 from experiments.commands.engage import engage
 from experiments.commands.experiment import experiment
 from experiments.commands.problems import app as problems
-from experiments.commands.reach import reach
 from experiments.commands.pursuit import pursuit
+from experiments.commands.reach import reach
 from experiments.commands.replay import replay
 from experiments.commands.report import report
 from experiments.commands.scenarios import app as scenarios

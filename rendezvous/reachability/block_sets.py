@@ -32,7 +32,7 @@ class BlockSets(Protocol):
     def bounds(self, kind: SetKind) -> Floats:
         """Return the least and greatest of each state at each time, shape (T + 1, n, 2)."""
 
-    def shadow(self, kind: SetKind, time: int, rows: Floats) -> Polytope:
+    def shadow(self, kind: SetKind, time: int, rows: Floats, tolerance: float = 1e-9) -> Polytope:
         """Return the image of a set under a matrix, shape (d, n), of few rows."""
 
     def polytope(self, kind: SetKind, time: int) -> Polytope | None:

@@ -107,7 +107,7 @@ def _block(problem: ReachabilityProblem, members: Places) -> Block:
     transition = np.array([each[square] for each in problem.transition]) / scale[:, None] * scale
     control = np.array([each[oblong] for each in problem.control]) / scale[:, None] * reach
     unit = np.eye(len(states))
-    normals, names = [unit, -unit], [f"bound on state {i + 1}" for i in states] * 2
+    normals, names = [unit, -unit], [f"the bound on {problem.state_name(i)}" for i in states.tolist()] * 2
     offsets = [np.ones((problem.periods + 1, 2 * len(states)))]
     if problem.normals is not None and problem.offsets is not None:
         mine = np.flatnonzero(np.abs(problem.normals[:, states]).max(axis=1, initial=0.0) > 0.0)

@@ -143,7 +143,7 @@ class ExactSets:
         sets = self._forward if kind is SetKind.FORWARD else self._tube
         return np.array([np.stack(each.bounds, axis=-1) for each in sets])
 
-    def shadow(self, kind: SetKind, time: int, rows: Floats) -> Polytope:
+    def shadow(self, kind: SetKind, time: int, rows: Floats, tolerance: float = 1e-9) -> Polytope:
         """Return the image of a set under a matrix, shape (d, n), of few rows."""
         return linear_image(self.polytope(kind, time), rows, np.zeros(len(rows)))
 

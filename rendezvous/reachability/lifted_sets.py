@@ -15,6 +15,7 @@ Floats = NDArray[np.float64]
 
 _FEW_CONTROLS = 24
 _AT_BOUND = 1.0 - 1e-10
+_SHARP = 1e-7
 
 
 class LiftedSets:
@@ -72,7 +73,7 @@ class LiftedSets:
         result[periods] = self._optimum.terminal[:, None]
         return result
 
-    def shadow(self, kind: SetKind, time: int, rows: Floats) -> Polytope:
+    def shadow(self, kind: SetKind, time: int, rows: Floats, tolerance: float = 1e-9) -> Polytope:
         """Return the image of a set under a matrix, shape (d, n), of few rows."""
         if time == 0:
             return Polytope.from_vertices((rows @ self._optimum.block.initial)[None, :])
@@ -80,10 +81,12 @@ class LiftedSets:
         free, response = rows @ lifted.free[time], rows @ lifted.response[time]
         program = self._programs[kind, 0 if kind is SetKind.TUBE else time]
 
-        def furthest(direction: Floats) -> Floats:
-            return np.asarray(free + response @ program.maximise_sharply(direction @ response))
+        solve = program.maximise if tolerance > _SHARP else program.maximise_sharply
 
-        return shadow(furthest, len(rows))
+        def furthest(direction: Floats) -> Floats:
+            return np.asarray(free + response @ solve(direction @ response))
+
+        return shadow(furthest, len(rows), tolerance)
 
     def polytope(self, kind: SetKind, time: int) -> Polytope | None:
         """Return None: only its support is known."""

@@ -59,6 +59,8 @@ class ReachabilityProblem:
         What to call these k in messages.
     between : ndarray, shape (T, s, n, n + m) or None
         States between the periods, x = between[t, i] (x(t), u(t)), at which the constraints are to hold too.
+    state_names : tuple of str
+        What to call the states in messages.
 
     Raises
     ------
@@ -78,6 +80,7 @@ class ReachabilityProblem:
     offsets: Floats | None = None
     constraint_names: tuple[str, ...] = ()
     between: Floats | None = None
+    state_names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.transition.ndim != 3 or not len(self.transition):
@@ -120,6 +123,8 @@ class ReachabilityProblem:
                 raise ValueError("a constraint has a normal of zero length")
             if len(self.constraint_names) not in (0, k):
                 raise ValueError("there must be a name for each constraint, or none")
+        if len(self.state_names) not in (0, n):
+            raise ValueError("there must be a name for each state, or none")
         if self.between is not None and (
             self.between.ndim != 4 or self.between.shape[0] != periods or self.between.shape[2:] != (n, n + m)
         ):
@@ -127,7 +132,7 @@ class ReachabilityProblem:
 
     def _check_start(self) -> None:
         over = np.abs(self.initial) - self.state_bounds
-        broken = [(f"state {i + 1}", float(over[i])) for i in np.flatnonzero(over > 0.0).tolist()]
+        broken = [(self.state_name(i), float(over[i])) for i in np.flatnonzero(over > 0.0).tolist()]
         if self.normals is not None and self.offsets is not None:
             excess = self.normals @ self.initial - self.offsets[0]
             slack = 1e-12 * np.abs(self.normals) @ self.state_bounds
@@ -138,6 +143,10 @@ class ReachabilityProblem:
     def name_of(self, constraint: int) -> str:
         """Return what to call one of the constraints beyond the bounds, by its place."""
         return self.constraint_names[constraint] if self.constraint_names else f"constraint {constraint + 1}"
+
+    def state_name(self, state: int) -> str:
+        """Return what to call a state, by its place."""
+        return self.state_names[state] if self.state_names else f"state {state + 1}"
 
     @property
     def periods(self) -> int:
@@ -253,4 +262,5 @@ class ReachabilityProblem:
             None if self.offsets is None else self.offsets[start : end + 1],
             self.constraint_names,
             None if self.between is None else self.between[start:end],
+            self.state_names,
         )

@@ -81,7 +81,7 @@ class Maximiser:
             found = self._program.maximise(cost)
             if self._used.all():
                 return found
-            broken = self._lifted.rows @ found.point - self._lifted.limits > _BROKEN
+            broken = (self._lifted.rows @ found.point - self._lifted.limits > _BROKEN) & ~self._used
             if not broken.any():
                 return found
             for place in np.flatnonzero(broken):

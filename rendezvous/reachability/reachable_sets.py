@@ -102,7 +102,7 @@ class ReachableSets:
             sum(each.dimension for each in sets),
         )
 
-    def shadow(self, kind: SetKind, time: int, axes: Sequence[int]) -> Floats:
+    def shadow(self, kind: SetKind, time: int, axes: Sequence[int], tolerance: float = 1e-9) -> Floats:
         """Return the vertices of the projection of a set on some states.
 
         Parameters
@@ -111,6 +111,8 @@ class ReachableSets:
         time : int
         axes : sequence of int
             Two or three states, by their places.
+        tolerance : float
+            By how much of its size the projection may be short of a set that is known by programs only.
 
         Returns
         -------
@@ -125,7 +127,7 @@ class ReachableSets:
             if not mine:
                 continue
             order += [int(block.states[place]) for place in mine]
-            found: Polytope = part.shadow(kind, time, np.eye(block.size)[mine])
+            found: Polytope = part.shadow(kind, time, np.eye(block.size)[mine], tolerance)
             scaled = found.vertices * block.scale[mine]
             points = np.hstack([np.repeat(points, len(scaled), axis=0), np.tile(scaled, (len(points), 1))])
         return points[:, [order.index(axis) for axis in wanted]]

@@ -167,7 +167,7 @@ def _check(problem: ReachabilityProblem, disturbance: Floats) -> None:
 def _all_constraints(problem: ReachabilityProblem) -> tuple[Floats, Floats, tuple[str, ...]]:
     """Constraints with the bounds on states among them."""
     unit = np.eye(problem.states)
-    normals, names = [unit, -unit], [f"bound on state {i + 1}" for i in range(problem.states)] * 2
+    normals, names = [unit, -unit], [f"the bound on {problem.state_name(i)}" for i in range(problem.states)] * 2
     offsets = [np.tile(np.concatenate([problem.state_bounds] * 2), (problem.periods + 1, 1))]
     if problem.normals is not None and problem.offsets is not None:
         normals.append(problem.normals)
@@ -224,7 +224,7 @@ class _Program:
         places = [(r, c, v) for r, entries in enumerate(self.rows) for c, v in entries.items()]
         r, c, v = zip(*places, strict=True)
         matrix = coo_array((v, (r, c)), shape=(len(self.rows), self.size)).tocsr()
-        found = linprog(cost, A_ub=matrix, b_ub=self.limits, bounds=(None, None), method="highs", options=HIGHS)
+        found = linprog(cost, A_ub=matrix, b_ub=self.limits, bounds=(None, None), method="highs-ipm", options=HIGHS)
         if found.status == 2:
             raise NoRobustPlanError(
                 "no plan with feedback keeps the constraints whatever the disturbance does; reduce the disturbance, "

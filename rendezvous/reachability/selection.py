@@ -156,6 +156,28 @@ def minimum_peak(optimal: OptimalControls) -> Floats:
     return optimal.at(face.point + face.basis @ _least_energy(inner, scale))
 
 
+def nearest(optimal: OptimalControls, control: Floats) -> Floats:
+    """Return the optimal control nearest to another one.
+
+    Parameters
+    ----------
+    optimal : OptimalControls
+    control : ndarray, shape (T, m)
+
+    Returns
+    -------
+    ndarray, shape (T, m)
+
+    Notes
+    -----
+    A quadratic program.
+    """
+    space, scale = optimal.space, optimal.scale
+    turned = scale[:, None] * space.control_response
+    away = scale * space.control_free - control.ravel()
+    return optimal.at(quadratic(space, turned.T @ turned, turned.T @ away).point)
+
+
 def chebyshev_centre(optimal: OptimalControls) -> Floats:
     """Return a centre of a largest ball of controls, within the affine hull, that are all optimal.
 
