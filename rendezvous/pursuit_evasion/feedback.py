@@ -27,7 +27,7 @@ HIT_M = 100.0
 """A point is captured when it is passed within this: what a last leg flown without looking can reach."""
 
 _LOOKS = 65
-_PAST, _WIDE = 1.05, 2.0
+_PAST, _WIDE, _PATIENCE = 1.05, 2.0, 1.0
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,8 @@ def fly(
     Notes
     -----
     Each plan starts Newton's method at the one before: 2 ms and, for a steered evader, 2 ms of its flight. The last leg
-    is flown without looking. Where the plan before does not lead to a new one, the game is solved from nothing.
+    is flown without looking. Where the plan before does not lead to a new one, the game is solved from nothing;
+    the plan before is kept where that would take much longer.
     """
     if not 0.0 < replan_s < np.inf:
         raise ValueError("the time between plans must be positive")
@@ -293,17 +294,22 @@ class _Pursuit:
         pair = Pair(self._pursuer, evader)
         latest = (self._pursuer.mass - self._dry[0]) / max(self._pursuer.flow, 1e-300)
         latest = min(latest, 1e3)
-        if before.duration > spell:
-            found = pair.solve(
-                before.vector, before.duration - spell, self._radius, time_free=True, tolerance=FINE, latest=latest
-            )
+        kept = replace(before, duration=before.duration - spell) if before.duration > spell else None
+        if kept is not None:
+            found = pair.solve(kept.vector, kept.duration, self._radius, time_free=True, tolerance=FINE, latest=latest)
             if found is not None and found.is_saddle and found.closing > 0.0:
                 return found
         if float(np.linalg.norm(evader.start[:3] - self._pursuer.start[:3])) <= self._radius:
-            return None
+            return kept
         first = pair.begin(latest)
         branch = None if first is None else follow(pair, first, self._radius, latest)
-        return branch.last if branch is not None and branch.ending is Ending.CAPTURE else None
+        afresh = branch.last if branch is not None and branch.ending is Ending.CAPTURE else None
+        # Close to the end a point may slip out of reach by metres: a pass near it is better than another revolution.
+        if kept is not None and (
+            afresh is None or afresh.duration > kept.duration + _PATIENCE * (kept.duration + spell)
+        ):
+            return kept
+        return afresh
 
     def _evader_path(self, own: Node, spell: float) -> tuple[PathNow, float]:
         """Return the evader's path of a leg, and its mass at the end of it."""
