@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from numba import njit
+from llvmlite import ir
+from numba import config, njit, types
+from numba.core import cgutils
+from numba.extending import intrinsic
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -51,3 +54,26 @@ def inlined(function: F) -> F:
 def substituted(function: F) -> F:
     """Compile an expression of a line or two by writing it out where it is used: quicker to compile, and leaner."""
     return _compile(function, inline="always", _nrt=False)
+
+
+def _prefetch(_context: Any, array: Any, index: Any) -> Any:
+    """Type and code of `prefetch`."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        flag = ir.IntType(32)
+        pointer = builder.bitcast(builder.gep(data, [arguments[1]]), ir.PointerType(ir.IntType(8)))
+        kind = ir.FunctionType(ir.VoidType(), [pointer.type, flag, flag, flag])
+        function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")  # type: ignore[no-untyped-call]
+        builder.call(function, [pointer, flag(1), flag(3), flag(1)])
+        return context.get_dummy_value()
+
+    return types.void(array, index), generate
+
+
+def _nothing(_array: Any, _index: int) -> None:
+    """Stand in for `prefetch` where nothing is compiled."""
+
+
+prefetch: Any = _nothing if getattr(config, "DISABLE_JIT", False) else intrinsic(_prefetch)
+"""Ask for the line of memory at a place of a one-dimensional array, soon to be read and written."""

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import polygon
-from infoset._compile import allocation_free, entry, inlined, substituted
+from infoset._compile import allocation_free, entry, inlined, prefetch, substituted
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -83,12 +83,15 @@ class Chains(NamedTuple):
 
 
 def empty_sections(number: int, room: int = CAPACITY) -> Chains:
-    """Sections not begun yet, with room for so many vertices (a power of two) in each chain."""
+    """Sections not begun yet, with room for so many vertices (a power of two) in each chain.
+
+    The rings have what all may ever need: what is not written takes no memory.
+    """
     marks = np.zeros((number, 2, MARKS), dtype=np.int64)
     marks[:, :, RING] = FIRST_RING + 2 * room * np.arange(2 * number).reshape(number, 2)
     marks[:, :, MASK] = room - 1
-    rings = np.empty(FIRST_RING + 4 * room * number)
-    rings[TAKEN] = rings.size
+    rings = np.empty(FIRST_RING + 8 * CAPACITY * number)
+    rings[TAKEN] = FIRST_RING + 4 * room * number
     return Chains(np.zeros((number, 2, ORIGIN)), rings, marks)
 
 
@@ -97,9 +100,15 @@ def with_room(rings: Floats, floats: int) -> Floats:
     taken = int(rings[TAKEN])
     if taken + floats <= rings.size:
         return rings
-    wider = np.empty(max(taken + floats, 2 * rings.size))
-    wider[:taken] = rings[:taken]
-    return wider
+    return copy_of_rings(rings, max(taken + floats, 2 * rings.size))
+
+
+def copy_of_rings(rings: Floats, size: int) -> Floats:
+    """The same rings in other memory, of so many floats."""
+    taken = int(rings[TAKEN])
+    copy = np.empty(size)
+    copy[:taken] = rings[:taken]
+    return copy
 
 
 def working_room() -> Floats:
@@ -130,6 +139,16 @@ def count_of(marks: Integers, n: int) -> int:
     """Number of vertices of both chains."""
     right, left = marks[n, RIGHT, END] - marks[n, RIGHT, BEGIN], marks[n, LEFT, END] - marks[n, LEFT, BEGIN]
     return int(right + left)
+
+
+@inlined
+def expect(rings: Floats, marks: Integers, n: int) -> None:
+    """Ask for the vertices of a section that a step reads: it comes next, and memory is slow."""
+    if n < marks.shape[0]:
+        for side in (RIGHT, LEFT):
+            prefetch(rings, place(marks, n, side, begin_of(marks, n, side)))
+            prefetch(rings, place(marks, n, side, end_of(marks, n, side) - 1))
+            prefetch(rings, place(marks, n, side, marks[n, side, PEAK]))
 
 
 @substituted
@@ -597,13 +616,6 @@ def greatest_and_least_miss(
 def is_crowded(marks: Integers, n: int) -> bool:
     """Whether a section may have more vertices than there is room for before the next step is over."""
     return bool(count_of(marks, n) > CAPACITY - MOST_ADDED)
-
-
-@substituted
-def lacks_room(marks: Integers, n: int, added: int) -> bool:
-    """Whether so many vertices more may not fit into the rings of a section, or the section is crowded."""
-    wanted = count_of(marks, n) + added
-    return bool(wanted > room_of(marks, n) or wanted > CAPACITY)
 
 
 @allocation_free

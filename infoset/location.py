@@ -124,19 +124,27 @@ def locate_end(
     Notes
     -----
     The overlap at the measurement that kills is concave in the label, so the Illinois form of false position
-    converges fast; every fourth probe halves the bracket, against a change of the killing measurement.
+    converges fast; where four probes have not narrowed the bracket to an eighth, against a change of the killing
+    measurement, one halves it.
     """
     run(living, tape, law, room)
     keep_overlaps(room, tape.events)
     weight_dead = overlap
     weight_living = room.living_overlaps[died]
     side = 0
+    before = 0.0
     for probes in range(MOST_PROBES):
-        if abs(living - dead) <= resolution:
+        width = abs(living - dead)
+        if width <= resolution:
             break
+        slow = probes % 4 == 3 and width > 0.125 * before
+        if probes % 4 == 0:
+            before = width
         fraction = 0.5
-        if probes % 4 != 3 and weight_living > weight_dead:
-            fraction = min(max(-weight_dead / (weight_living - weight_dead), 1e-3), 1.0 - 1e-3)
+        if not slow and weight_living > weight_dead:
+            # A probe on either end would tell nothing: it goes half a resolution inside.
+            least = 0.5 * resolution / width
+            fraction = min(max(-weight_dead / (weight_living - weight_dead), least), 1.0 - least)
         label = dead + fraction * (living - dead)
         probe_died, probe_overlap = run(label, tape, law, room)
         if probe_died == ALIVE:

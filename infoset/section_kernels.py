@@ -309,6 +309,7 @@ def measure_all(
             if not living[b, s]:
                 continue
             n = b * labels.shape[1] + s
+            chains.expect(rings, marks, n + 1)
             if behind[b]:
                 predict_section(origins, rings, marks, n, labels[b, s], elapsed, law)
             if not active[b]:
@@ -390,6 +391,7 @@ def catch_up_all(
             if not living[b, s]:
                 continue
             n = b * labels.shape[1] + s
+            chains.expect(rings, marks, n + 1)
             if behind[b]:
                 predict_section(origins, rings, marks, n, labels[b, s], elapsed, law)
             if stale[b]:
@@ -402,18 +404,30 @@ def catch_up_all(
 
 
 @entry
-def room_wanted(active: Flags, added: int, sections: Sections) -> int:
-    """Floats that the rings lack before any living section of the active engagements may gain so many vertices."""
+def room_wanted(active: Flags, added: int, sections: Sections) -> tuple[int, int]:
+    """Say what room the living sections of the active engagements have.
+
+    Returns
+    -------
+    floats : int
+        Floats that the rings lack before any section may gain so many vertices.
+    spare : int
+        Vertices that every section may gain; negative where one must be reduced first.
+    """
     labels, used, living, _, _, _, _, marks, _ = sections
     floats = 0
+    spare = chains.CAPACITY
     for b in range(labels.shape[0]):
         if not active[b]:
             continue
         for s in range(used[b]):
-            n = b * labels.shape[1] + s
-            if living[b, s] and chains.lacks_room(marks, n, added):
-                floats += 4 * chains.room_for(chains.count_of(marks, n) + added, chains.room_of(marks, n))
-    return floats
+            if living[b, s]:
+                n = b * labels.shape[1] + s
+                count, room = chains.count_of(marks, n), chains.room_of(marks, n)
+                spare = min(spare, room - count)
+                if min(count + added, chains.CAPACITY) > room:
+                    floats += 4 * chains.room_for(count + added, room)
+    return floats, spare
 
 
 @entry
@@ -428,11 +442,12 @@ def make_room_all(active: Flags, added: int, elapsed: int, sections: Sections, l
             continue
         for s in range(used[b]):
             n = b * labels.shape[1] + s
-            if not living[b, s] or not chains.lacks_room(marks, n, added):
+            if not living[b, s]:
                 continue
             if chains.is_crowded(marks, n):
                 chains.reduce_outward(origins, rings, marks, n, time_to_go(labels[b, s], elapsed, law), points)
-            wanted = chains.room_for(chains.count_of(marks, n) + added, chains.room_of(marks, n))
+            vertices = min(chains.count_of(marks, n) + added, chains.CAPACITY)
+            wanted = chains.room_for(vertices, chains.room_of(marks, n))
             if wanted > chains.room_of(marks, n):
                 chains.widen_rings(rings, marks, n, wanted)
 

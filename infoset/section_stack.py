@@ -13,6 +13,9 @@ from infoset.section_kernels import SectionLaw, Sections
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+STEPS_AHEAD = 8
+"""Steps that rings are given room for at a time."""
+
 
 class SectionStack:
     """B engagements x S slots of one section each, carried in place.
@@ -33,6 +36,7 @@ class SectionStack:
         self._nobody = np.zeros(self.batch, dtype=bool)
         self._behind = self._nobody
         self._is_stale, self._is_behind, self._has_heights = True, False, False
+        self._spare = 0
         self._elapsed = 0
         kernels.start_all(self.sections, law)
 
@@ -84,18 +88,25 @@ class SectionStack:
         """Range of every slot after a number of steps, m, shape (B, S)."""
         return self.labels - self.law.closing_speed * (self.law.step * elapsed)
 
-    def _make_room(self, active: Flags, vertices: int) -> None:
-        """See that each living section may gain so many vertices."""
-        floats = kernels.room_wanted(active, vertices, self.sections)
-        if floats:
+    def _make_room(self, active: Flags) -> None:
+        """See that each living section may gain what a step adds; mostly that was seen to some steps ago."""
+        self._spare -= chains.MOST_ADDED
+        if self._spare >= 0:
+            return
+        ahead = STEPS_AHEAD * chains.MOST_ADDED
+        floats, spare = kernels.room_wanted(active, ahead, self.sections)
+        if floats or spare < chains.MOST_ADDED:
             self.sections = self.sections._replace(rings=chains.with_room(self.sections.rings, floats))
             room = chains.working_room()
-            kernels.make_room_all(active, vertices, self._elapsed, self.sections, self.law, room)
+            kernels.make_room_all(active, ahead, self._elapsed, self.sections, self.law, room)
+            _, spare = kernels.room_wanted(active, 0, self.sections)
+        self._spare = spare - chains.MOST_ADDED
 
     def make_room_for_new(self, wanted: Flags, number: int) -> None:
         """See that there is room for so many sections of any size in each of the wanted engagements."""
         self._catch_up()
         self._has_heights = False
+        self._spare = 0
         floats = 4 * chains.CAPACITY * number * int(np.count_nonzero(wanted))
         self.sections = self.sections._replace(rings=chains.with_room(self.sections.rings, floats))
 
@@ -109,7 +120,7 @@ class SectionStack:
     def measure_rate(self, active: Flags, omega: Floats, error: float, elapsed: int, event: int) -> int:
         """Cut the living sections by measured rates of the line of sight (rad/s); return how many died."""
         self._catch_up()
-        self._make_room(active, chains.MOST_ADDED)
+        self._make_room(active)
         room = chains.working_room()
         deaths = kernels.measure_rate_all(active, omega, error, elapsed, event, self.sections, self.law, room)
         self._measured(active)
@@ -135,7 +146,7 @@ class SectionStack:
         They are moved when somebody looks at them, or with the next measurement: one pass over the memory, not two.
         """
         self._catch_up()
-        self._make_room(active, chains.MOST_ADDED)
+        self._make_room(active)
         self._behind = active.copy()
         self._stale = self._stale | active if self._is_stale else self._behind
         self._is_behind = self._is_stale = True
@@ -172,10 +183,12 @@ class SectionStack:
         """A stack of its own with the same sections."""
         twin = SectionStack.__new__(SectionStack)
         twin.law = self.law
-        twin.sections = Sections(**{name: array.copy() for name, array in self.sections._asdict().items()})
+        arrays = {name: array.copy() for name, array in self.sections._asdict().items() if name != "rings"}
+        rings = chains.copy_of_rings(self.sections.rings, self.sections.rings.size)
+        twin.sections = Sections(**arrays, rings=rings)
         twin._stale, twin._behind, twin._nobody = self._stale, self._behind, self._nobody
         twin._is_stale, twin._is_behind = self._is_stale, self._is_behind
-        twin._has_heights, twin._elapsed = self._has_heights, self._elapsed
+        twin._has_heights, twin._elapsed, twin._spare = self._has_heights, self._elapsed, self._spare
         return twin
 
 

@@ -12,8 +12,8 @@ from sim.engagement import Engagements
 from sim.results import Results, join
 from sim.scenario import Scenario
 
-ENGAGEMENTS_AT_ONCE = 64
-SECTIONS_AT_ONCE = 4096
+ENGAGEMENTS_AT_ONCE = 200
+SECTIONS_AT_ONCE = 6000
 
 
 def simulate(
