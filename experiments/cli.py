@@ -15,8 +15,10 @@ from experiments.commands.campaign import campaign
 from experiments.commands.compare import compare
 from experiments.commands.engage import engage
 from experiments.commands.experiment import experiment
+from experiments.commands.pareto import pareto
 from experiments.commands.problems import app as problems
 from experiments.commands.pursuit import pursuit
+from experiments.commands.pursuit_map import pursuit_map
 from experiments.commands.reach import reach
 from experiments.commands.replay import replay
 from experiments.commands.report import report
@@ -67,9 +69,14 @@ app.command(
 app.command("report", epilog="Example: infoset report runs --out figures")(report)
 app.command("replay", epilog="Example: infoset replay flight-random.npz flight-game.npz --out figures")(replay)
 app.command("pursuit", epilog="Example: infoset pursuit geo-pursuit --certify --feedback coast --out results")(pursuit)
+app.command(
+    "pursuit-map",
+    epilog="Example: infoset pursuit-map geo-pursuit --x phase_deg=-60:60:61 --y thrust_ratio=0:0.9:19 --out map",
+)(pursuit_map)
 app.command("reach", epilog="Example: infoset reach rendezvous-2021 --select energy,vertices --replan --out reach")(
     reach
 )
+app.command("pareto", epilog="Example: infoset pareto pareto-2008 --prefer y_m=0,z_m=50 --out figures")(pareto)
 app.add_typer(scenarios, name="scenarios")
 app.add_typer(problems, name="problems")
 
