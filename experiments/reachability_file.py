@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
@@ -55,6 +56,7 @@ MOST_PERIODS = 256
 MOST_FACES = 24
 MOST_HALFSPACES = 50
 MOST_CHECKS = 10
+_INSTANTS = 12
 STATE_NAMES = ("x", "y", "z", "vx", "vy", "vz")
 
 
@@ -196,6 +198,11 @@ class Rendezvous:
     acceleration_m_s2: float
     disturbance: Floats | None
     navigation_error: Floats | None
+
+    @cached_property
+    def instants(self) -> Floats:
+        """Matrices of states between the periods, at which all members are checked."""
+        return between_periods(self.motion, self.problem.periods, self.period_s, self.acceleration_m_s2, _INSTANTS)
 
     def lasting(self, periods: int) -> ReachabilityProblem:
         """Return the problem with another number of periods, its last constraints kept on.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -14,12 +14,10 @@ from experiments.reachability_file import KIND, MOST_PERIODS, Rendezvous
 from rendezvous.reachability import (
     EmptyTubeError,
     Flight,
-    ReachabilityProblem,
     Route,
     SetKind,
     Solution,
     TooLargeError,
-    between_periods,
     least_periods,
     replan,
     solve,
@@ -52,7 +50,6 @@ SINGLE = {
 """Choices that are one control each: least sum of squares, of absolute values, of Euclidean norms, and so on."""
 VERTICES, SAMPLES = "vertices", "samples"
 MOST_SAMPLES = 1000
-_INSTANTS = 12
 _LONGER = 4
 
 
@@ -358,20 +355,11 @@ def fly_members(rendezvous: Rendezvous, names: Sequence[str], controls: Floats) 
     problem = rendezvous.problem
     linear = problem.run(controls)
     nonlinear = rendezvous.truth.fly(problem.initial, rendezvous.acceleration_m_s2 * controls, rendezvous.period_s)
-    inner = between_periods(
-        rendezvous.motion, problem.periods, rendezvous.period_s, rendezvous.acceleration_m_s2, _INSTANTS
-    )
-    between = _with_instants(problem, inner).excess(controls)
+    between = replace(problem, between=rendezvous.instants).excess(controls)
     return tuple(
         Member(*each)
         for each in zip(names, controls, linear, nonlinear, (float(each) for each in between), strict=True)
     )
-
-
-def _with_instants(problem: ReachabilityProblem, inner: Floats) -> ReachabilityProblem:
-    from dataclasses import replace
-
-    return replace(problem, between=inner)
 
 
 def _least_periods(rendezvous: Rendezvous, solution: Solution) -> tuple[int, int | None]:

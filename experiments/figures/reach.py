@@ -25,6 +25,7 @@ _TOLERANCE, _TOLERANCE_IN_SPACE = 2e-3, 1e-2
 """By how much of their size sets may be drawn too small."""
 _MOST_TIMES, _MOST_TIMES_IN_SPACE = 6, 4
 _TOGETHER = 0.06
+_MANY_EDGES = 120
 _SHARP = np.cos(np.radians(4.0))
 _NAMES = {
     "energy": "least energy",
@@ -99,7 +100,7 @@ def _distinct(members: Sequence[Member]) -> list[Member]:
 def _space(report: Report, members: Sequence[Member], part: int) -> Figure:
     """Positions (0) or velocities (1)."""
     figure = new_figure(height_mm=112.0)
-    axes: Any = figure.add_axes((0.0, 0.0, 0.74, 1.0), projection="3d", computed_zorder=False)
+    axes: Any = figure.add_axes((-0.03, 0.0, 0.74, 1.0), projection="3d", computed_zorder=False)
     first = 3 * part
     places = slice(first, first + 3)
     sets = report.solution.sets
@@ -124,7 +125,7 @@ def _space(report: Report, members: Sequence[Member], part: int) -> Figure:
         getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(6))
     axes.view_init(elev=22.0, azim=-58.0)
     axes.set_box_aspect((1.0, 1.0, 0.85), zoom=1.0)
-    figure.legend(*axes.get_legend_handles_labels(), loc="center left", bbox_to_anchor=(0.75, 0.5))
+    figure.legend(*axes.get_legend_handles_labels(), loc="center left", bbox_to_anchor=(0.705, 0.5))
     return figure
 
 
@@ -161,8 +162,9 @@ def _solid(axes: Any, points: Floats) -> None:
         outline = _outline(points)
         faces, edges = [outline], [np.vstack([outline, outline[:1]])]
     axes.add_collection3d(Poly3DCollection(faces, facecolor=SET_FILL, edgecolor="none", alpha=0.28))
+    fine = {"linewidth": 0.2, "alpha": 0.5} if len(edges) > _MANY_EDGES else {"linewidth": 0.45, "alpha": 1.0}
     for edge in edges:
-        axes.plot(*edge.T, color=SET_EDGE, linewidth=0.45)
+        axes.plot(*edge.T, color=SET_EDGE, **fine)
 
 
 def _sharp_edges(points: Floats, hull: ConvexHull) -> list[Floats]:

@@ -63,13 +63,14 @@ def discretised(
 
     Notes
     -----
-    Equation (3). A block exponential a period for the frozen model, closed forms and quadrature for the other.
+    Equation (3). A block exponential for the frozen model, closed forms and quadrature for the other.
     """
     if periods < 1:
         raise ValueError("T = 0: there must be at least one period")
-    starts = period_s * np.arange(periods)
-    ends = period_s * np.arange(1, periods + 1)
-    return motion.transition(starts, ends), acceleration_m_s2 * motion.held_input(starts, ends)
+    starts = period_s * np.arange(periods if isinstance(motion, TschaunerHempel) else 1)
+    transition = motion.transition(starts, starts + period_s)
+    control = acceleration_m_s2 * motion.held_input(starts, starts + period_s)
+    return _repeated(transition, periods), _repeated(control, periods)
 
 
 def between_periods(
@@ -94,7 +95,12 @@ def between_periods(
     -------
     ndarray, shape (periods, instants, 6, 9)
     """
-    starts = period_s * np.arange(periods)[:, None]
+    starts = period_s * np.arange(periods if isinstance(motion, TschaunerHempel) else 1)[:, None]
     ends = starts + period_s * np.arange(1, instants + 1) / (instants + 1)
     moved = motion.transition(starts, ends)
-    return np.concatenate([moved, acceleration_m_s2 * motion.held_input(starts, ends)], axis=-1)
+    return _repeated(np.concatenate([moved, acceleration_m_s2 * motion.held_input(starts, ends)], axis=-1), periods)
+
+
+def _repeated(matrices: Floats, periods: int) -> Floats:
+    """All periods are alike where A is constant, and then one of them was computed."""
+    return np.repeat(matrices, periods, axis=0) if len(matrices) < periods else matrices
