@@ -7,17 +7,20 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from guidance import NoiseKind
+from infoset import InitialSet, Model
 from sim import Scenario, simulate
 
 Check = Callable[[str, float, float, str], None]
 
+RATE_TARGET = {NoiseKind.RANDOM: 450.0, NoiseKind.GAME: 150.0}
+MANY = 400
 CURVE_TARGET_S = {NoiseKind.RANDOM: 0.2, NoiseKind.GAME: 0.5}
 ROUNDS = 5
 
@@ -55,6 +58,29 @@ def test_curve(benchmark: BenchmarkFixture, curve: Scenario, under: Check) -> No
     assert benchmark.stats is not None
     elapsed_s = float(benchmark.stats.stats.median)
     under(f"50 engagements, {curve.noise.value}", elapsed_s, CURVE_TARGET_S[curve.noise], "s")
+
+
+@pytest.mark.benchmark(group="engagements a second, one core")
+def test_rate(benchmark: BenchmarkFixture, curve: Scenario, at_least: Check) -> None:
+    benchmark.pedantic(simulate, args=(curve, MANY), rounds=ROUNDS, warmup_rounds=1)
+    assert benchmark.stats is not None
+    rate = MANY / float(benchmark.stats.stats.median)
+    at_least(f"engagements, {curve.noise.value}, 29 sections", rate, RATE_TARGET[curve.noise], "a second")
+
+
+def test_phi_costs_at_most_three_times(curve: Scenario, under: Check) -> None:
+    model = replace(curve.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    scenario = replace(curve, set_model=model)
+
+    def elapsed_s(guarantee: bool) -> float:
+        began = time.perf_counter()
+        simulate(scenario, 100, guarantee=guarantee)
+        return time.perf_counter() - began
+
+    for guarantee in (True, False):
+        elapsed_s(guarantee)
+    ratios = [elapsed_s(True) / elapsed_s(False) for _ in range(ROUNDS)]
+    under(f"time with Phi over time without, {curve.noise.value}", sorted(ratios)[ROUNDS // 2], 3.0, "times")
 
 
 def test_first_run(tmp_path: Path, under: Check) -> None:
