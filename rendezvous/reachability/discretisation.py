@@ -95,10 +95,18 @@ def between_periods(
     -------
     ndarray, shape (periods, instants, 6, 9)
     """
-    starts = period_s * np.arange(periods if isinstance(motion, TschaunerHempel) else 1)[:, None]
+    if isinstance(motion, ConstantMotion):
+        step_s = period_s / (instants + 1)
+        step = motion.transition(0.0, step_s)
+        found = [np.hstack([step, acceleration_m_s2 * motion.held_input(0.0, step_s)])]
+        for _ in range(instants - 1):
+            found.append(step @ found[-1])
+            found[-1][:, 6:] += found[0][:, 6:]
+        return _repeated(np.array(found)[None], periods)
+    starts = period_s * np.arange(periods)[:, None]
     ends = starts + period_s * np.arange(1, instants + 1) / (instants + 1)
-    moved = motion.transition(starts, ends)
-    return _repeated(np.concatenate([moved, acceleration_m_s2 * motion.held_input(starts, ends)], axis=-1), periods)
+    moved, held = motion.transition(starts, ends), motion.held_input(starts, ends)
+    return np.concatenate([moved, acceleration_m_s2 * held], axis=-1)
 
 
 def _repeated(matrices: Floats, periods: int) -> Floats:

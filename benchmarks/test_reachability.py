@@ -1,0 +1,184 @@
+"""Reachable rendezvous: the paper's case, long horizons, and forward sets beside two polytope libraries.
+
+Times are of the processor, so that other work on the machine does not count; the best of a few.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+from benchmarks.conftest import LINES
+from experiments.reachability_file import load_rendezvous
+from experiments.reachability_published import compare_published, comparison_rows
+from experiments.reachability_report import SINGLE, make_report, report_json
+from rendezvous.polytope import Polytope, cut
+from rendezvous.reachability import (
+    Budget,
+    MotionModel,
+    ReachabilityProblem,
+    Route,
+    SetKind,
+    discretised,
+    motion_of,
+    solve,
+)
+from rendezvous.reachability.blocks import Block, split
+from rendezvous.reachability.exact_check import rational_sets
+from rendezvous.relative_motion import EllipticOrbit
+
+Floats = NDArray[np.float64]
+Check = Callable[[str, float, float, str], None]
+
+PAPER_S, LONG_S = 0.5, 2.5
+MERGE = 1e-7
+
+
+def best_s(work: Callable[[], object], rounds: int) -> float:
+    times = []
+    for _ in range(rounds):
+        began = time.process_time()
+        work()
+        times.append(time.process_time() - began)
+    return min(times)
+
+
+def paper(periods: int) -> ReachabilityProblem:
+    """The paper's 720 s in so many periods."""
+    orbit = EllipticOrbit.of_size(1e7, 0.1, 3.986004418e14)
+    transition, control = discretised(motion_of(orbit, MotionModel.FROZEN), periods, 720.0 / periods, 0.15)
+    start = np.array([2650.0, -2540.0, 2120.0, -3.0, 2.0, 3.0])
+    return ReachabilityProblem(transition, control, start, np.array([3000.0] * 3 + [7.5] * 3), np.ones(3))
+
+
+def test_the_papers_case_with_everything_it_prints(under: Check) -> None:
+    def work() -> None:
+        given = load_rendezvous("rendezvous-2021")
+        report = make_report(given, [*SINGLE])
+        report_json(report)
+        comparison_rows(compare_published(given, report.solution))
+
+    under("the paper's case: sets, ranges, six controls flown, tables 1-3", best_s(work, 7), PAPER_S, "s")
+
+
+def test_axis_supports_of_the_tube_at_64_periods(under: Check) -> None:
+    problem = paper(64)
+    under(
+        "axis supports of the tube at T = 64, with the optimum",
+        best_s(lambda: solve(problem, Route.LIFTED).sets.bounds(SetKind.TUBE), 3),
+        LONG_S,
+        "s",
+    )
+
+
+@pytest.mark.parametrize("periods", [4, 16, 32])
+def test_axis_supports_grow_slowly(under: Check, periods: int) -> None:
+    problem = paper(periods)
+    taken = best_s(lambda: solve(problem, Route.LIFTED).sets.bounds(SetKind.TUBE), 3)
+    under(f"axis supports of the tube at T = {periods}", taken, LONG_S, "s")
+
+
+@pytest.mark.parametrize("periods", [8, 16, 64])
+def test_the_exact_route_is_refused_in_time(under: Check, periods: int) -> None:
+    problem = paper(periods)
+    began = time.process_time()
+    found = solve(problem, budget=Budget(seconds=2.0))
+    taken = time.process_time() - began
+    under(f"T = {periods}: {found.route.value} ({found.reason[:60]})", taken, 4.0, "s")
+
+
+def own_step(block: Block, vertices: Floats, period: int) -> Floats:
+    hull = Polytope.from_vertices(_moved(block, vertices, period))
+    return cut(hull, block.normals, block.offsets[period + 1]).vertices
+
+
+def cdd_step(block: Block, vertices: Floats, period: int) -> Floats:
+    """Floats, by double description: generators, then half-spaces, then generators of the cut."""
+    import cdd
+
+    points = _moved(block, vertices, period)
+    generators = cdd.matrix_from_array(
+        np.column_stack([np.ones(len(points)), points]).tolist(), rep_type=cdd.RepType.GENERATOR
+    )
+    halves = cdd.copy_inequalities(cdd.polyhedron_from_matrix(generators))
+    rows = [*halves.array, *np.column_stack([block.offsets[period + 1], -block.normals]).tolist()]
+    both = cdd.matrix_from_array(rows, rep_type=cdd.RepType.INEQUALITY, lin_set=halves.lin_set)
+    found = np.array(cdd.copy_generators(cdd.polyhedron_from_matrix(both)).array)
+    return np.asarray(found[found[:, 0] == 1.0, 1:])
+
+
+def polytope_step(block: Block, vertices: Floats, period: int) -> Floats:
+    """The package `polytope`: the hull by its quickhull, vertices by its own enumeration."""
+    import polytope
+
+    box = polytope.Polytope(block.normals, block.offsets[period + 1])
+    found = polytope.extreme(polytope.qhull(_moved(block, vertices, period)).intersect(box))
+    if found is None:
+        raise ArithmeticError("it finds the set empty")
+    return np.asarray(found)
+
+
+def _moved(block: Block, vertices: Floats, period: int) -> Floats:
+    corners = Polytope.box(-np.ones(len(block.controls)), np.ones(len(block.controls))).vertices
+    sums = (vertices @ block.transition[period].T)[:, None] + (corners @ block.control[period].T)[None]
+    return np.asarray(sums.reshape(-1, block.size))
+
+
+def essential(vertices: Floats) -> int:
+    """How many vertices are more than 1e-7 away from the hull of the others: by linear programs, one at a time."""
+    kept = list(range(len(vertices)))
+    size = vertices.shape[1]
+    for place in range(len(vertices)):
+        others = vertices[[each for each in kept if each != place]]
+        rows = np.block([[others.T, -np.ones((size, 1))], [-others.T, -np.ones((size, 1))]])
+        ends = np.concatenate([vertices[place], -vertices[place]])
+        cost = np.concatenate([np.zeros(len(others)), [1.0]])
+        sums = np.concatenate([np.ones(len(others)), [0.0]])[None]
+        found = linprog(cost, A_ub=rows, b_ub=ends, A_eq=sums, b_eq=[1.0], bounds=(0.0, None), method="highs")
+        if found.fun < MERGE:
+            kept.remove(place)
+    return len(kept)
+
+
+STEPS: dict[str, tuple[str, Callable[[Block, Floats, int], Floats]]] = {
+    "infoset": ("rendezvous", own_step),
+    "pycddlib-standalone, floats": ("cdd", cdd_step),
+    "polytope": ("polytope", polytope_step),
+}
+
+
+@pytest.mark.parametrize("first", [0, 2], ids=["from the start", "from t = 2, where sets have an interior"])
+@pytest.mark.parametrize("which", [0, 1], ids=["x-y block, 4-D", "z block, 2-D"])
+def test_forward_sets_beside_other_libraries(pytestconfig: pytest.Config, which: int, first: int) -> None:
+    """Time, whether each finishes, and whether its vertex counts are those of exact rationals."""
+    block = split(paper(4))[which]
+    exact = [each.vertices for each in rational_sets(block)[0]]
+    right = [essential(each) for each in exact[first + 1 :]]
+    lines = [
+        f"forward sets of {block.size} states, t = {first + 1}..4: essential vertices {right}, "
+        f"by exact rationals {[len(each) for each in exact[first + 1 :]]}"
+    ]
+    for name, (module, step) in STEPS.items():
+        if importlib.util.find_spec(module) is None:
+            lines.append(f"    {name}: not installed")
+            continue
+        vertices, counts, failure = exact[first], [], ""
+        began = time.process_time()
+        try:
+            for period in range(first, 4):
+                vertices = step(block, vertices, period)
+                counts.append(len(vertices))
+        except Exception as error:
+            failure = f", does not finish at t = {len(counts) + first + 1}: {type(error).__name__}: {str(error)[:50]}"
+        taken = time.process_time() - began
+        verdict = "right" if counts == right else "not right"
+        lines.append(f"    {name}: {1e3 * taken:.0f} ms, counts {counts} {'' if failure else verdict}{failure}")
+        if name == "infoset":
+            assert counts == right
+    pytestconfig.stash[LINES] += lines
