@@ -11,7 +11,7 @@ from sim.scenario import Scenario
 from sim.simulate import ENGAGEMENTS_AT_ONCE
 
 FEWEST_CHUNKS = 256
-LARGEST_CHUNK = 64 * ENGAGEMENTS_AT_ONCE
+LARGEST_CHUNK = 4096
 
 
 class CampaignNoise(Enum):
@@ -106,4 +106,4 @@ def chunk_size(runs: int) -> int:
     A process that dies loses the chunks under way, so they are small; each is a file, so there are not too many.
     """
     batches = -(-runs // (FEWEST_CHUNKS * ENGAGEMENTS_AT_ONCE))
-    return min(max(1, batches) * ENGAGEMENTS_AT_ONCE, LARGEST_CHUNK)
+    return max(1, min(batches, LARGEST_CHUNK // ENGAGEMENTS_AT_ONCE)) * ENGAGEMENTS_AT_ONCE

@@ -23,6 +23,7 @@ from experiments.scenario_file import load_scenario, scenario_hash, scenario_to_
 from guidance import NoiseKind
 from infoset import StateBox
 from sim import Campaign, CampaignNoise, Scenario, fly_one
+from sim.plan import chunk_size
 from sim.storage import CampaignFolder
 
 Infoset = Callable[..., tuple[int, str, str]]
@@ -287,7 +288,10 @@ def test_a_large_campaign_says_time_and_disk_first(
     code, _, err = infoset(*asked)
     assert code == 2
     assert "5000000 engagements: about" in err
-    assert "on 2 cores, and 337 MB in 1221 shards, but the disk has 1 MB left" in err
+    shards = -(-5_000_000 // chunk_size(5_000_000))
+    assert (
+        f"on 2 cores, and {size(66 * 5_000_000 + 6000 * shards)} in {shards} shards, but the disk has 1 MB left" in err
+    )
     assert not (tmp_path / "runs").exists()
 
 

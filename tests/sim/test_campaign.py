@@ -32,6 +32,7 @@ from sim import (
 )
 from sim.chunk import Chunk, fly_chunk
 from sim.plan import Plan, chunk_size
+from sim.simulate import ENGAGEMENTS_AT_ONCE
 from sim.storage import (
     Axis,
     CampaignFolder,
@@ -566,9 +567,12 @@ def test_numbers_that_make_no_campaign(wrong: dict[str, int], brief: Scenario, t
 
 
 def test_chunks_suit_the_number_of_runs() -> None:
-    assert [chunk_size(runs) for runs in (1, 50, 16_384, 16_385, 100_000, 10**6, 10**9)] == [
-        *(64, 64, 64, 128, 448, 3968, 4096),
-    ]
+    batch = ENGAGEMENTS_AT_ONCE
+    assert [chunk_size(runs) for runs in (1, batch, 256 * batch, 256 * batch + 1)] == [batch, batch, batch, 2 * batch]
+    for runs in (10**5, 10**6, 10**7, 10**9):
+        assert chunk_size(runs) % batch == 0
+        assert chunk_size(runs) <= 4096
+        assert runs / chunk_size(runs) <= max(256, runs / (4096 - batch))
 
 
 def test_cells_of_a_sweep_are_campaigns_of_their_scenarios(brief: Scenario, tmp_path: Path) -> None:
