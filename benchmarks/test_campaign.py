@@ -18,7 +18,7 @@ from sim.worker_processes import worker_processes
 
 Check = Callable[[str, float, float, str], None]
 
-RUNS = 512
+RUNS = 800
 ROUNDS = 5
 FEW, MANY = 10_000, 1_000_000
 

@@ -23,7 +23,7 @@ ESTIMATED_FROM = 50_000
 
 LINE_EVERY_S = 60.0
 BYTES_A_RUN, BYTES_A_SHARD = 66, 6_000
-_PILOT, _WARM = 64, 8
+_WARM = 8
 
 
 @contextlib.contextmanager
@@ -117,10 +117,11 @@ def estimate(plan: Plan, cores: int, folder: Path) -> str:
 
     from experiments.errors import InputError
     from sim.chunk import fly_chunk
+    from sim.simulate import ENGAGEMENTS_AT_ONCE
 
     chunk = plan.chunk_at(plan.chunks // 2)
     fly_chunk(replace(chunk, first=0, runs=_WARM))  # loads or compiles the kernels
-    pilot = min(_PILOT, plan.runs)
+    pilot = min(ENGAGEMENTS_AT_ONCE, plan.runs)
     began_s = time.perf_counter()
     fly_chunk(replace(chunk, first=0, runs=pilot))
     seconds = (time.perf_counter() - began_s) / pilot * plan.engagements / cores
