@@ -62,6 +62,16 @@ def tell_of_compiling_pursuit(quiet: bool) -> None:
         typer.echo("compiling the kernels, once (about ten seconds) ...", err=True)
 
 
+def tell_of_compiling_rendezvous(quiet: bool) -> None:
+    """Say the same of the kernels of encounters and of visits to several targets."""
+    from rendezvous.multipoint import _path
+    from rendezvous.relative_motion import _circular
+
+    kernels = ((_circular, _circular.fill_gramians), (_path, _path.solve_path))
+    if not quiet and not all(_stored(kernel, Path(module.__file__ or "")) for module, kernel in kernels):
+        typer.echo("compiling the kernels, once (about ten seconds) ...", err=True)
+
+
 def _stored(kernel: object, source: Path) -> bool:
     """Whether Numba has an index of a kernel that is no older than its source."""
     name = getattr(kernel, "__name__", "")

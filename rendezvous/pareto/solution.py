@@ -247,7 +247,8 @@ def _craft_cost(craft: Craft, whiten: Floats, missing: Floats, opening: Floats) 
     orthogonal, upper = np.linalg.qr(slope)
     ideal = -np.linalg.solve(upper, orthogonal.T @ base)
     # Without the part along the slope: base + slope p* would cancel where the ideal lies far away.
-    rest = base - orthogonal @ (orthogonal.T @ base)
+    # Where all that is common is free there is no rest at all.
+    rest = base - orthogonal @ (orthogonal.T @ base) if len(base) > slope.shape[1] else np.zeros(0)
     to_costate = np.zeros((6, len(base)))
     to_costate[: len(base)] = whiten.T
     if not np.isfinite(ideal).all():
