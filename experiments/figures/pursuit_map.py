@@ -16,6 +16,7 @@ from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus
 Floats = NDArray[np.float64]
 
 _S_PER_HOUR = 3600.0
+_BOTTOM, _BOTTOM_WITH_LEGEND, _TOP = 0.13, 0.22, 0.93
 _SHADES = LinearSegmentedColormap.from_list("blues", ["#eef4fa", "#9dc0df", TRUTH])
 _UNKNOWN: dict[PointStatus, tuple[str, str, str]] = {
     PointStatus.NOT_CERTIFIED: ("#f6d9bd", "////", "not certified"),
@@ -43,10 +44,12 @@ def draw_map(found: CaptureMap, column: str, row: str) -> Figure:
     hours = found.capture_s / _S_PER_HOUR
     with style():
         figure = new_figure(height_mm=95.0, width_mm=150.0)
-        axes = figure.add_axes((0.12, 0.22, 0.71, 0.71))
+        has_unknown = any(found.count(status) for status in _UNKNOWN)
+        bottom = _BOTTOM_WITH_LEGEND if has_unknown else _BOTTOM
+        axes = figure.add_axes((0.12, bottom, 0.71, _TOP - bottom))
         if hours.count():
             mesh = axes.pcolormesh(found.columns, found.rows, hours, cmap=_SHADES, shading="nearest", rasterized=True)
-            scale = figure.colorbar(mesh, cax=figure.add_axes((0.86, 0.22, 0.025, 0.71)))
+            scale = figure.colorbar(mesh, cax=figure.add_axes((0.86, bottom, 0.025, _TOP - bottom)))
             scale.set_label("capture time, h")
             if hours.count() > 3 and min(hours.shape) > 1 and float(np.ptp(hours.compressed())) > 0.0:
                 lines = axes.contour(found.columns, found.rows, hours, levels=8, colors=INK, linewidths=0.6)

@@ -115,8 +115,8 @@ def capture_map(
 
     Notes
     -----
-    Along a row a point starts from the three before it: 1 to 2 ms. Every 25th point and the last are solved from
-    nothing; where these disagree with what the row led to, the points between are solved from nothing too.
+    Along a row a point starts from the three before it: 1 to 2 ms. Every 25th point, and the last before the row has to
+    start anew, are solved from nothing; where that is another answer, so are the points since the last such check.
     """
     shape = (len(rows), len(columns))
     status = np.zeros(shape, dtype=np.int64)
@@ -155,22 +155,34 @@ def _game(game_at: Callable[[float, float], Game], x: float, y: float) -> Game |
 def _row(games: list[Game | None], follow_all: bool) -> tuple[list[_Point], int]:
     """Solve a row, and return how many of its points were solved from nothing."""
     points: list[_Point] = []
-    afresh, trusted = 0, -1
+    afresh, unchecked = 0, 0
     for i, game in enumerate(games):
-        check = follow_all or i % CHECKED_EVERY == 0 or i == len(games) - 1
         seeded = None if follow_all or game is None else _seeded(game, points)
-        if seeded is not None and not check:
-            points.append(seeded)
+        if seeded is None:
+            # The stretch before ends here: its last point has to stand for it.
+            afresh += _check(games, points, unchecked, follow_all)
+            points.append(_from_nothing(game, follow_all))
+            afresh += 1
+            unchecked = i + 1
             continue
-        points.append(_from_nothing(game, follow_all))
-        afresh += 1
-        if seeded is not None and not _agree(points[-1], seeded):
-            for k in range(trusted + 1, i):
-                if points[k].status is PointStatus.NEIGHBOUR:
-                    points[k] = _from_nothing(games[k], follow_all)
-                    afresh += 1
-        trusted = i
+        points.append(seeded)
+        if i % CHECKED_EVERY == 0 or i == len(games) - 1:
+            afresh += _check(games, points, unchecked, follow_all)
+            unchecked = i + 1
     return points, afresh
+
+
+def _check(games: list[Game | None], points: list[_Point], first: int, follow_all: bool) -> int:
+    """Solve the last point from nothing, and where that is another answer, all since `first`; return how many were."""
+    last = len(points) - 1
+    if last < first:
+        return 0
+    seeded, points[last] = points[last], _from_nothing(games[last], follow_all)
+    if _agree(points[last], seeded):
+        return 1
+    for k in range(first, last):
+        points[k] = _from_nothing(games[k], follow_all)
+    return 1 + last - first
 
 
 def _from_nothing(game: Game | None, change_branch: bool) -> _Point:
