@@ -164,7 +164,7 @@ def test_constraints_between_the_periods_bind(tmp_path: Path) -> None:
         "rendezvous-2021",
         model='"time-varying"',
         position_m="[2990.0, -2540.0, 2120.0]",
-        velocity_m_s="[0.8, 2.0, 3.0]",
+        velocity_m_s="[1.0, 2.0, 3.0]",
     )
     free, bound = tmp_path / "free.toml", tmp_path / "bound.toml"
     free.write_text(text)
