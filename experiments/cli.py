@@ -15,6 +15,7 @@ from experiments.commands.campaign import campaign
 from experiments.commands.compare import compare
 from experiments.commands.engage import engage
 from experiments.commands.experiment import experiment
+from experiments.commands.multipoint import multipoint
 from experiments.commands.pareto import pareto
 from experiments.commands.problems import app as problems
 from experiments.commands.pursuit import pursuit
@@ -77,6 +78,9 @@ app.command("reach", epilog="Example: infoset reach rendezvous-2021 --select ene
     reach
 )
 app.command("pareto", epilog="Example: infoset pareto pareto-2008 --prefer y_m=0,z_m=50 --out figures")(pareto)
+app.command("multipoint", epilog="Example: infoset multipoint service-3 --order best --times best --out figures")(
+    multipoint
+)
 app.add_typer(scenarios, name="scenarios")
 app.add_typer(problems, name="problems")
 

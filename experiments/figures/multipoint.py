@@ -1,0 +1,325 @@
+"""Visits to several targets: the path with the targets' motion, the control, the costates, cost against each time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from experiments._multipoint_tables import Axes as FrameAxes
+from experiments.figures.style import IMPULSE, INK, LIMIT, MEASURED, SET_EDGE, TRUTH, new_figure, place_axes, style
+from rendezvous.multipoint import Path, Visits
+
+Floats = NDArray[np.float64]
+Progress = Callable[[float], None]
+
+_POINTS = 1601
+_TRACK_POINTS = 241
+_CURVE_POINTS = {FrameAxes.HILL: 41, FrameAxes.INERTIAL: 9}
+_NEAREST = 0.12
+_COMPONENTS: tuple[dict[str, Any], ...] = (
+    {"color": TRUTH, "linestyle": "-"},
+    {"color": MEASURED, "linestyle": (0, (5, 1.5))},
+    {"color": IMPULSE, "linestyle": (0, (1.2, 1.0))},
+)
+_MOST_NAMED = 12
+_MOST_CURVES = 9
+_DAY_S, _HOUR_S = 86400.0, 3600.0
+_AU_M = 149_597_870_700.0
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What is drawn.
+
+    Parameters
+    ----------
+    axes : Axes
+        What positions are in.
+    tour : Visits
+    order : tuple of int
+        Which target first, second and so on.
+    path : Path
+    """
+
+    axes: FrameAxes
+    tour: Visits
+    order: tuple[int, ...]
+    path: Path
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the targets, in the order of the visits."""
+        return [self.tour.targets.targets[each].name for each in self.order]
+
+    @property
+    def end_s(self) -> float:
+        """When the last target is met."""
+        return float(self.path.nodes.arrive_s[-1])
+
+    def times(self, count: int) -> Floats:
+        """Return equally spaced times, with both sides of every node among them."""
+        even = np.linspace(self.tour.start_s, self.end_s, count)
+        nodes = self.path.nodes.arrive_s
+        return np.unique(np.concatenate([even, nodes, np.nextafter(nodes, -np.inf), self.path.nodes.leave_s[:-1]]))
+
+    @property
+    def time_unit(self) -> tuple[float, str]:
+        """Seconds in the unit that times are drawn in, and its name."""
+        span = self.end_s - self.tour.start_s
+        if span > 10.0 * _DAY_S:
+            return _DAY_S, "days"
+        return (_HOUR_S, "h") if span > 10.0 * _HOUR_S else (1.0, "s")
+
+    @property
+    def length_unit(self) -> tuple[float, str]:
+        """Metres in the unit that positions are drawn in, and its name."""
+        if self.axes is FrameAxes.INERTIAL:
+            size = float(np.abs(self.path.arrival_states[:, :3]).max())
+            return (_AU_M, "au") if size > 0.05 * _AU_M else (1e3, "km")
+        return (1e3, "km") if float(np.abs(self.path.arrival_states[:, :3]).max()) > 3e3 else (1.0, "m")
+
+
+@dataclass(frozen=True)
+class CostCurve:
+    """The cost against one time, the others as they are.
+
+    Parameters
+    ----------
+    time_s, cost : ndarray, shape (k,)
+    """
+
+    time_s: Floats
+    cost: Floats
+
+
+def cost_curves(scene: Scene, progress: Progress = lambda _done: None) -> list[CostCurve]:
+    """Compute the cost against each time between its neighbours.
+
+    Parameters
+    ----------
+    scene : Scene
+    progress : callable
+        Told the fraction done.
+
+    Returns
+    -------
+    list of CostCurve
+        One a visit, of the first nine; times without a path are left out.
+    """
+    nodes, curves = scene.path.nodes, []
+    count = min(len(scene.order), _MOST_CURVES)
+    for index in range(count):
+        low = scene.tour.start_s if index == 0 else float(nodes.leave_s[index - 1])
+        stay = float(nodes.leave_s[index] - nodes.arrive_s[index])
+        last = index == len(scene.order) - 1
+        now = float(nodes.arrive_s[index])
+        high = now + 0.5 * (now - low) if last else float(nodes.arrive_s[index + 1]) - stay
+        width = high - low
+        times = np.linspace(
+            low + _NEAREST * width, high if last else high - _NEAREST * width, _CURVE_POINTS[scene.axes]
+        )
+        times = np.unique(np.append(times, now))
+        known, costs, fly = [], [], scene.tour.flyer(scene.order)
+        for time in times:
+            varied = nodes.arrive_s.copy()
+            varied[index] = time
+            try:
+                costs.append(fly(varied).cost)
+            except ValueError:
+                continue
+            known.append(float(time))
+        curves.append(CostCurve(np.array(known), np.array(costs)))
+        progress((index + 1) / count)
+    return curves
+
+
+def draw_path(scene: Scene) -> Figure:
+    """Draw the path with the targets' motion, in two planes.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    Figure
+        Two axes.
+    """
+    unit, name = scene.length_unit
+    times = scene.times(_POINTS)
+    flown = scene.path.state(times)[:, :3] / unit
+    hill = scene.axes is FrameAxes.HILL
+    planes = ((1, 0), (1, 2)) if hill else ((0, 1), (0, 2))
+    labels = ("x (radial)", "y (along the motion)", "z (normal)") if hill else ("x", "y", "z")
+    with style():
+        figure = new_figure(height_mm=88.0)
+        (panels,) = place_axes(figure, 1, 2, margins_mm=(14.0, 4.0, 12.0, 7.0), gaps_mm=(17.0, 0.0))
+        for panel, (across, up), letter in zip(panels, planes, "ab", strict=True):
+            for place, target in enumerate(scene.order):
+                track = _track(scene, place, target) / unit
+                panel.plot(track[:, across], track[:, up], color=LIMIT, linewidth=0.7, linestyle=(0, (3, 2)),
+                           label="targets until they are met" if place == 0 else None)  # fmt: skip
+                panel.plot(track[0, across], track[0, up], marker=".", color=LIMIT, markersize=4.0)
+            panel.plot(flown[:, across], flown[:, up], color=TRUTH, label="chaser", zorder=3)
+            panel.plot(flown[0, across], flown[0, up], marker="s", color=TRUTH, markersize=4.5, zorder=4)
+            if not hill and across == 0 and up == 1:
+                panel.plot(0.0, 0.0, marker="*", color=MEASURED, markersize=8.0, linestyle="none")
+            _mark_nodes(panel, scene, across, up, unit)
+            panel.set_xlabel(f"{labels[across]}, {name}")
+            panel.set_ylabel(f"{labels[up]}, {name}")
+            panel.set_title(f"({letter})", loc="left")
+            panel.margins(0.1)
+        if not hill:
+            panels[0].set_aspect("equal", adjustable="datalim")
+        panels[0].legend(loc="best")
+    return figure
+
+
+def draw_control(scene: Scene, bound_m_s2: float | None = None) -> Figure:
+    """Draw the control's components and size against time.
+
+    Parameters
+    ----------
+    scene : Scene
+    bound_m_s2 : float or None
+        A bound on its size.
+
+    Returns
+    -------
+    Figure
+        Two axes.
+    """
+    times = scene.times(_POINTS)
+    control = scene.path.control(times) * 1e3
+    with style():
+        figure = new_figure(height_mm=100.0)
+        ((above,), (below,)) = place_axes(figure, 2, 1, margins_mm=(17.0, 4.0, 12.0, 9.0), gaps_mm=(0.0, 8.0))
+        for axis, letter in enumerate("xyz"):
+            _line(above, scene, times, control[:, axis], label=f"$u_{letter}$", **_COMPONENTS[axis])
+        _line(below, scene, times, np.linalg.norm(control, axis=1), color=INK)
+        if bound_m_s2 is not None:
+            below.axhline(1e3 * bound_m_s2, color=LIMIT, linewidth=0.9, linestyle=(0, (2, 2)))
+        above.set_ylabel("$u$, mm/s$^2$")
+        below.set_ylabel("$|u|$, mm/s$^2$")
+        below.set_ylim(bottom=0.0)
+        above.legend(loc="best", ncols=3)
+        _mark_times(scene, above, below)
+    return figure
+
+
+def draw_costates(scene: Scene) -> Figure:
+    """Draw the costates: that of the position jumps where a target is met.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    Figure
+        Two axes.
+    """
+    times = scene.times(_POINTS)
+    costate = scene.path.costate(times)
+    with style():
+        figure = new_figure(height_mm=100.0)
+        ((above,), (below,)) = place_axes(figure, 2, 1, margins_mm=(17.0, 4.0, 12.0, 9.0), gaps_mm=(0.0, 8.0))
+        for axis, letter in enumerate("xyz"):
+            _line(above, scene, times, costate[:, axis], label=rf"$\lambda_{{r,{letter}}}$", **_COMPONENTS[axis])
+            _line(below, scene, times, costate[:, 3 + axis], label=rf"$\lambda_{{V,{letter}}}$", **_COMPONENTS[axis])
+        above.set_ylabel(r"$\lambda_r$, m/s$^3$")
+        below.set_ylabel(r"$\lambda_V$, m/s$^2$")
+        for panel in (above, below):
+            panel.legend(loc="best", ncols=3)
+            panel.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
+        _mark_times(scene, above, below)
+    return figure
+
+
+def draw_times(scene: Scene, curves: list[CostCurve]) -> Figure:
+    """Draw the cost against each time.
+
+    Parameters
+    ----------
+    scene : Scene
+    curves : list of CostCurve
+
+    Returns
+    -------
+    Figure
+        One axes a visit.
+    """
+    unit, name = scene.time_unit
+    columns = min(len(curves), 3)
+    rows = -(-len(curves) // columns)
+    with style():
+        figure = new_figure(height_mm=20.0 + 48.0 * rows)
+        grid = place_axes(figure, rows, columns, margins_mm=(16.0, 4.0, 12.0, 7.0), gaps_mm=(15.0, 16.0))
+        panels = [panel for row in grid for panel in row]
+        for index, panel in enumerate(panels):
+            if index >= len(curves):
+                panel.remove()
+                continue
+            curve, now = curves[index], float(scene.path.nodes.arrive_s[index])
+            panel.plot(curve.time_s / unit, curve.cost, color=SET_EDGE)
+            panel.plot(now / unit, scene.path.cost, marker="o", color=INK, markersize=4.0)
+            reach = 0.12 * float(np.ptp(curve.time_s))
+            ends = np.array([-reach, reach])
+            panel.plot(
+                (now + ends) / unit, scene.path.cost + scene.path.time_gradient[index] * ends, color=MEASURED,
+                linewidth=0.9, label="slope $dI/dt$",
+            )  # fmt: skip
+            panel.set_yscale("log" if curve.cost.max() > 20.0 * max(curve.cost.min(), 1e-300) else "linear")
+            panel.set_xlabel(f"time of {scene.names[index]}, {name}")
+            panel.set_title(f"({chr(ord('a') + index)})", loc="left")
+            if index % columns == 0:
+                panel.set_ylabel("$I$, m$^2$/s$^3$")
+        panels[0].legend(loc="best")
+    return figure
+
+
+def _track(scene: Scene, place: int, target: int) -> Floats:
+    """Positions of a target until it is met, and while the chaser stays."""
+    until = float(scene.path.nodes.leave_s[place])
+    times = np.linspace(scene.tour.start_s, until, _TRACK_POINTS)
+    return scene.tour.targets.states(np.full(len(times), target), times)[:, :3]
+
+
+def _mark_nodes(panel: Axes, scene: Scene, across: int, up: int, unit: float) -> None:
+    for place, name in enumerate(scene.names):
+        where = scene.path.arrival_states[place, :3] / unit
+        met = bool(scene.path.nodes.rendezvous[place])
+        panel.plot(where[across], where[up], marker="D" if met else "o", markersize=5.0, color="white",
+                   markeredgecolor=INK, linestyle="none", zorder=5)  # fmt: skip
+        if len(scene.order) <= _MOST_NAMED:
+            panel.annotate(name, (where[across], where[up]), xytext=(4, 4), textcoords="offset points", fontsize=7.0,
+                           zorder=6)  # fmt: skip
+
+
+def _line(panel: Axes, scene: Scene, times: Floats, values: Floats, **look: Any) -> None:
+    """A line that breaks where it jumps: at nodes."""
+    unit, _ = scene.time_unit
+    cuts = np.searchsorted(times, scene.path.nodes.arrive_s[:-1], side="left")
+    label = look.pop("label", None)
+    for piece, (one, other) in enumerate(zip(np.split(times, cuts), np.split(values, cuts), strict=True)):
+        panel.plot(one / unit, other, label=label if piece == 0 else None, **look)
+
+
+def _mark_times(scene: Scene, above: Axes, below: Axes) -> None:
+    unit, name = scene.time_unit
+    for panel, letter in ((above, "a"), (below, "b")):
+        for when in scene.path.nodes.arrive_s:
+            panel.axvline(when / unit, color=LIMIT, linewidth=0.7, linestyle=(0, (2, 2)), zorder=0)
+        panel.set_xlim(scene.tour.start_s / unit, scene.end_s / unit)
+        panel.annotate(f"({letter})", (0.0, 1.0), xycoords="axes fraction", xytext=(-24, 2), textcoords="offset points")
+    if len(scene.order) <= _MOST_NAMED:
+        for when, target in zip(scene.path.nodes.arrive_s, scene.names, strict=True):
+            above.annotate(target, (when / unit, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 3),
+                           textcoords="offset points", ha="center", fontsize=7.0)  # fmt: skip
+    below.set_xlabel(f"time, {name}")
