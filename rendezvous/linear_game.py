@@ -20,6 +20,7 @@ Floats = NDArray[np.float64]
 _PARTS = 512
 _MOST_DOUBLINGS = 80
 _TURNED = 1e-8
+_REAL, _POLISHING = 1e-7, 3
 _MOST_NEWTON = 60
 
 
@@ -116,13 +117,12 @@ def free_space_capture(
     length = float(np.linalg.norm(position))
     time = math.sqrt(length / advantage)
     r, v = position / length, velocity * (time / length)
-    roots = np.roots([0.25, 0.0, -float(v @ v), -2.0 * float(r @ v), -1.0])
-    found = min(float(root.real) for root in roots if root.real > 0.0 and abs(root.imag) < 1e-9 * abs(root))
-
-    def gap(t: float) -> float:
-        return float(np.linalg.norm(r + v * t)) - 0.5 * t * t
-
-    at = _first_root(gap, found * 2.0, found)
+    quartic = np.array([0.25, 0.0, -float(v @ v), -2.0 * float(r @ v), -1.0])
+    roots = np.roots(quartic)
+    at = min(float(root.real) for root in roots if root.real > 0.0 and abs(root.imag) < _REAL * abs(root))
+    for _ in range(_POLISHING):
+        slope = float(np.polyval(np.polyder(quartic), at))
+        at -= float(np.polyval(quartic, at)) / slope if slope != 0.0 else 0.0
     return LinearCapture(at * time, _unit(r + v * at))
 
 

@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from rendezvous.orbital_elements import OrbitalElements
+from rendezvous.pursuit_evasion import Game, Gravity, Player, Solution, solve
+
+MU_M3_S2 = 398600.4418e9
+EARTH_M = 6378137.0
+MakeGame = Callable[..., Game]
+
+
+def player(
+    thrust_n: float,
+    *,
+    axis_km: float = 42166.0,
+    eccentricity: float,
+    inclination_deg: float,
+    raan_deg: float,
+    anomaly_deg: float,
+    dry_kg: float = 1000.0,
+) -> Player:
+    elements = OrbitalElements(
+        axis_km * 1e3,
+        eccentricity,
+        *(math.radians(each) for each in (inclination_deg, raan_deg, 0.0, anomaly_deg)),
+    )
+    position, velocity = elements.state(MU_M3_S2)
+    return Player(tuple(position), tuple(velocity), 2000.0, dry_kg, thrust_n, 350.0)
+
+
+@pytest.fixture(scope="session")
+def slides() -> MakeGame:
+    """The slides' case, with another thrust, place or capture radius."""
+
+    def make(
+        thrust_n: float = 10.0,
+        *,
+        anomaly_deg: float = 309.0,
+        inclination_deg: float = 0.828,
+        capture_radius_m: float = 0.0,
+        dry_kg: float = 200.0,
+    ) -> Game:
+        return Game(
+            Gravity(MU_M3_S2, EARTH_M),
+            player(20.0, eccentricity=0.00013, inclination_deg=1.565, raan_deg=47.0, anomaly_deg=350.0, dry_kg=dry_kg),
+            player(
+                thrust_n,
+                eccentricity=0.00016,
+                inclination_deg=inclination_deg,
+                raan_deg=79.0,
+                anomaly_deg=anomaly_deg,
+                dry_kg=dry_kg,
+            ),
+            capture_radius_m,
+        )
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def solved(slides: MakeGame) -> Solution:
+    """The slides' case, 20 against 10 N."""
+    return solve(slides())

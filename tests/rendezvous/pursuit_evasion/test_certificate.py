@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from rendezvous.pursuit_evasion import Policy, Solution, best_answer_s, certify, solve
+from rendezvous.pursuit_evasion.paths import steered_path
+from rendezvous.pursuit_evasion.units import scaled_craft
+
+from .conftest import MakeGame
+from .published import CASES, Case
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.thrust_n:g}N")
+def test_every_check_of_the_slides_cases_holds(case: Case, slides: MakeGame) -> None:
+    solution = solve(slides(case.thrust_n))
+    certificate = certify(solution)
+    assert certificate.failures == ()
+    assert certificate.claims_saddle_point
+    assert certificate.residual < 1e-10
+    assert certificate.hamiltonian_drift < 1e-11
+    assert certificate.integrator_gap_m < 0.1
+    assert certificate.pursuer_alone_s == pytest.approx(case.capture_s, abs=1e-4)
+    assert len(certificate.evader_deviations) == (len(Policy) if case.thrust_n else 0)
+    for deviation in certificate.evader_deviations:
+        assert deviation.conclusive
+        assert deviation.capture_s is not None
+        assert deviation.capture_s < case.capture_s
+
+
+def test_an_evader_that_coasts_instead_is_captured_as_one_without_thrust(solved: Solution) -> None:
+    coast = next(each for each in certify(solved).evader_deviations if each.name == "coast")
+    assert solved.capture is not None
+    assert coast.capture_s is not None
+    assert coast.capture_s == pytest.approx(34287.714264, abs=1e-5)
+    assert coast.capture_s - solved.capture.time_s == pytest.approx(-11055.906, abs=1e-3)
+
+
+def test_all_directions_are_looked_in(solved: Solution) -> None:
+    certificate = certify(solved, all_directions=True)
+    assert certificate.claims_saddle_point
+    assert certificate.directions_tried == 120
+    assert certificate.directions_found > 50
+    assert certificate.greatest_excess_m is not None
+    assert certificate.greatest_excess_m < 1.0
+
+
+def test_a_pursuer_that_does_better_alone_is_told(slides: MakeGame) -> None:
+    # Close to equal thrusts l(T) stays above zero long after the planned path of the evader can be met.
+    certificate = certify(solve(slides(18.0, anomaly_deg=324.0)))
+    assert not certificate.claims_saddle_point
+    assert certificate.pursuer_alone_s is not None
+    assert certificate.pursuer_alone_s < certificate.capture_s
+    assert any("the pursuer alone captures" in each for each in certificate.failures)
+
+
+def test_a_capture_that_is_off_is_told(solved: Solution) -> None:
+    assert solved.capture is not None
+    node = solved.capture.extremal
+    off = replace(node, pursuer=node.pursuer + 1e-5, duration=node.duration * 1.001)
+    wrong = replace(solved, capture=replace(solved.capture, extremal=off, residual=1e-5))
+    failures = certify(wrong).failures
+    assert any("residual" in each for each in failures)
+    assert any("second integrator" in each for each in failures)
+
+
+def test_without_a_curve_an_earlier_capture_is_not_excluded(solved: Solution) -> None:
+    bare = replace(solved, curve=replace(solved.curve, duration_s=solved.curve.duration_s[:0]))
+    assert "earlier captures are not excluded" in certify(bare).failures
+
+
+def test_what_is_not_captured_has_no_certificate(slides: MakeGame) -> None:
+    with pytest.raises(ValueError, match="escapes has no capture"):
+        certify(solve(slides(20.0)))
+
+
+def test_the_best_answer_to_any_path(solved: Solution) -> None:
+    game, units = solved.game, solved.units
+    evader = scaled_craft(game.evader, game.gravity, units)
+    path = steered_path(evader, Policy.PROGRADE.direction, 3.4)
+    found = best_answer_s(solved, path, 45e3)
+    assert found is not None
+    assert 34e3 < found < 35e3
+    assert best_answer_s(solved, path, 30e3) is None

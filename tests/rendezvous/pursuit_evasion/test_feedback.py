@@ -1,0 +1,141 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rendezvous.pursuit_evasion import (
+    Ended,
+    Observation,
+    Policy,
+    RandomSteering,
+    Script,
+    Solution,
+    Steering,
+    capture_quantiles_s,
+    fly,
+    fly_many,
+    solve,
+)
+
+from .conftest import MakeGame
+
+# Theory, receding horizon: plans every 600 s; the last plan's prediction.
+PUBLISHED: list[tuple[str, Steering | None, float]] = [
+    ("optimal", None, 45343.6),
+    ("coast", Policy.COAST.direction, 34632.0),
+    ("prograde", Policy.PROGRADE.direction, 34947.7),
+    ("normal", Policy.NORMAL.direction, 36473.4),
+]
+
+
+@pytest.mark.parametrize(("name", "steering", "capture_s"), PUBLISHED, ids=[each[0] for each in PUBLISHED])
+def test_receding_horizon(name: str, steering: Steering | None, capture_s: float, solved: Solution) -> None:
+    flight = fly(solved.game, steering, solution=solved)
+    assert flight.ended is Ended.CAPTURED
+    assert flight.predicted_s[-1] == pytest.approx(capture_s, abs=0.1)
+    assert flight.time_s == pytest.approx(capture_s, abs=2.0)
+    assert flight.distance_m < 20.0
+
+
+@pytest.mark.parametrize(("name", "steering", "capture_s"), PUBLISHED[:3], ids=[each[0] for each in PUBLISHED[:3]])
+def test_predictions_never_increase(name: str, steering: Steering | None, capture_s: float, solved: Solution) -> None:
+    flight = fly(solved.game, steering, solution=solved)
+    assert np.diff(flight.predicted_s).max() < 1e-8
+
+
+@pytest.mark.parametrize("policy", [Policy.NORMAL, Policy.RETROGRADE])
+def test_what_a_held_plan_loses_vanishes_with_the_time_it_is_held(policy: Policy, solved: Solution) -> None:
+    # Within a leg the pursuer does not answer: its loss is of high order in the leg.
+    losses = [
+        np.diff(fly(solved.game, policy.direction, solution=solved, replan_s=leg).predicted_s).max()
+        for leg in (600.0, 120.0)
+    ]
+    assert losses[0] < 0.05
+    assert losses[1] < losses[0] / 50.0
+
+
+def test_a_radius_is_reached_when_it_is_said_to_be(slides: MakeGame) -> None:
+    solution = solve(slides(capture_radius_m=10e3))
+    assert solution.capture is not None
+    flight = fly(solution.game, None, solution=solution)
+    assert flight.ended is Ended.CAPTURED
+    assert flight.time_s == pytest.approx(solution.capture.time_s, abs=1e-3)
+    assert flight.distance_m == pytest.approx(10e3, abs=0.1)
+
+
+def test_old_and_noisy_sight_costs_time(slides: MakeGame) -> None:
+    solution = solve(slides(capture_radius_m=20e3))
+    assert solution.capture is not None
+    noisy = fly(solution.game, None, solution=solution, observation=Observation(300.0, 500.0, 0.05), seed=3)
+    assert noisy.ended is Ended.CAPTURED
+    assert noisy.time_s > solution.capture.time_s
+    assert noisy.time_s == pytest.approx(solution.capture.time_s, rel=1e-3)
+
+
+def test_a_batch_draws_each_flight_from_its_own_stream(slides: MakeGame) -> None:
+    game = slides(capture_radius_m=20e3)
+    seen = Observation(position_error_m=200.0)
+
+    def coast(_run: int) -> Steering:
+        return Policy.COAST.direction
+
+    told: list[float] = []
+    three = fly_many(game, coast, 3, observation=seen, seed=5, progress=told.append)
+    two = fly_many(game, coast, 2, observation=seen, seed=5)
+    assert [each.time_s for each in two] == [each.time_s for each in three[:2]]
+    assert len({each.time_s for each in three}) == 3
+    assert all(each.ended is Ended.CAPTURED for each in three)
+    assert told == pytest.approx([1.0 / 3.0, 2.0 / 3.0, 1.0])
+    quantiles = capture_quantiles_s(three)
+    assert quantiles == sorted(quantiles)
+    assert quantiles[0] == min(each.time_s for each in three)
+    assert capture_quantiles_s([]) == []
+
+
+def test_a_random_evader_is_captured_before_one_that_plays_its_best(slides: MakeGame) -> None:
+    solution = solve(slides(capture_radius_m=20e3))
+    flight = fly(solution.game, RandomSteering(5, 0, 600.0), solution=solution)
+    assert solution.capture is not None
+    assert flight.ended is Ended.CAPTURED
+    assert flight.time_s < solution.capture.time_s
+
+
+def test_a_script_changes_its_policy_at_its_times() -> None:
+    script = Script((0.0, 100.0), (Policy.COAST, Policy.PROGRADE))
+    state = np.array([7e6, 0.0, 0.0, 0.0, 7e3, 0.0])
+    np.testing.assert_array_equal(script(99.0, state), np.zeros(3))
+    np.testing.assert_array_equal(script(100.0, state), state[3:])
+
+
+@pytest.mark.parametrize("times", [(1.0,), (0.0, 0.0), (0.0,), ()])
+def test_what_is_no_script_is_refused(times: tuple[float, ...]) -> None:
+    with pytest.raises(ValueError, match="script"):
+        Script(times, (Policy.COAST, Policy.COAST) if len(times) != 1 or times[0] == 0.0 else (Policy.COAST,))
+
+
+def test_a_scripted_evader_is_captured_between_coasting_and_its_best(solved: Solution) -> None:
+    script = Script((0.0, 20e3), (Policy.COAST, Policy.OUTWARD))
+    flight = fly(solved.game, script, solution=solved)
+    assert flight.ended is Ended.CAPTURED
+    assert 34e3 < flight.time_s < 45343.6
+
+
+def test_random_steering_is_the_same_however_often_it_is_asked() -> None:
+    steering = RandomSteering(1, 0, 100.0)
+    state = np.zeros(6)
+    first = steering(50.0, state)
+    assert np.linalg.norm(first) == pytest.approx(1.0)
+    np.testing.assert_array_equal(first, steering(99.0, state))
+    assert not np.array_equal(first, steering(100.0, state))
+    assert not np.array_equal(first, RandomSteering(1, 1, 100.0)(50.0, state))
+
+
+def test_a_game_without_a_capture_has_no_plan(slides: MakeGame) -> None:
+    with pytest.raises(ValueError, match="no plan to begin with"):
+        fly(slides(20.0), None)
+
+
+@pytest.mark.parametrize("delay", [-1.0, float("nan")])
+def test_what_is_no_observation_is_refused(delay: float) -> None:
+    with pytest.raises(ValueError, match="finite and not negative"):
+        Observation(delay)

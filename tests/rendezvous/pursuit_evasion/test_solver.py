@@ -1,0 +1,289 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.optimize import fsolve
+
+from rendezvous.linear_game import circular_orbit_capture
+from rendezvous.pursuit_evasion import (
+    Capture,
+    Game,
+    Gravity,
+    Player,
+    Route,
+    Solution,
+    Verdict,
+    solve,
+    solve_by_homotopy,
+    solve_by_linear_game,
+    solve_near,
+)
+from rendezvous.pursuit_evasion._branch import Ending, follow, polish
+from rendezvous.pursuit_evasion.units import scaled_pair, units_of
+
+from .conftest import EARTH_M, MU_M3_S2, MakeGame
+from .published import CASES, Case
+
+Floats = NDArray[np.float64]
+
+
+def captured(solution: Solution) -> Capture:
+    assert solution.verdict is Verdict.CAPTURED
+    assert solution.capture is not None
+    return solution.capture
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.thrust_n:g}N")
+def test_the_slides_cases(case: Case, slides: MakeGame) -> None:
+    solution = solve(slides(case.thrust_n))
+    capture, units = captured(solution), solution.units
+    assert solution.route is Route.CONTINUATION
+    assert units.length_m == pytest.approx(42166e3, rel=1e-12)
+    assert capture.time_s == pytest.approx(case.capture_s, rel=1e-9)
+    assert capture.pursuer.propellant_kg == pytest.approx(case.propellant_kg[0], rel=1e-9)
+    assert capture.evader.propellant_kg == pytest.approx(case.propellant_kg[1], rel=1e-9)
+    assert capture.closing_speed_m_s / 1e3 == pytest.approx(case.closing_km_s, abs=1e-10)
+    np.testing.assert_allclose(capture.curvature, case.curvature, atol=5e-6)
+    end = np.array(case.end)
+    found = np.concatenate(
+        [
+            capture.position_m / units.length_m,
+            capture.pursuer.velocity_m_s / units.speed_m_s,
+            capture.evader.velocity_m_s / units.speed_m_s,
+            capture.direction,
+            [capture.time_s / units.time_s],
+        ]
+    )
+    np.testing.assert_allclose(found, end, rtol=1e-8, atol=1e-10)
+    costates = np.concatenate([capture.pursuer.costate_at_start, capture.evader.costate_at_start])
+    np.testing.assert_allclose(costates, case.costates, rtol=1e-8, atol=1e-8)
+    assert capture.residual < 1e-10
+
+
+@pytest.mark.parametrize(("radius_m", "capture_s"), [(1e3, 45340.161530), (100e3, 44998.078864)])
+def test_capture_radii(radius_m: float, capture_s: float, slides: MakeGame) -> None:
+    solution = solve(slides(capture_radius_m=radius_m))
+    capture = captured(solution)
+    assert capture.time_s == pytest.approx(capture_s, abs=1e-6)
+    apart = capture.evader.position_m - capture.pursuer.position_m
+    np.testing.assert_allclose(apart, radius_m * capture.direction, atol=1e-3)
+
+
+def test_a_greater_radius_is_reached_earlier_by_the_closing_speed(slides: MakeGame) -> None:
+    point, near = captured(solve(slides())), captured(solve(slides(capture_radius_m=10.0)))
+    assert (near.time_s - point.time_s) / 10.0 == pytest.approx(-1.0 / point.closing_speed_m_s, rel=1e-5)
+
+
+def test_a_coasting_evader_is_captured_the_first_time_it_can_be(slides: MakeGame) -> None:
+    game = slides(0.0)
+    capture, units, pair = captured(solve(game)), units_of(game), scaled_pair(game, units_of(game))
+    first = pair.begin(10.0)
+    assert first is not None
+    # There is another extremal at 138928 s; before and after the first capture l changes its sign.
+    branch = follow(pair, first, -math.inf, capture.time_s / units.time_s * 1.02)
+    assert branch.ending is Ending.TIME
+    assert branch.last.distance < 0.0
+    assert capture.time_s == pytest.approx(34287.714264, abs=1e-5)
+
+
+@pytest.mark.parametrize("thrust_n", [20.0, 25.0])
+@pytest.mark.parametrize("radius_m", [0.0, 100e3])
+def test_an_evader_that_is_not_weaker_is_not_said_to_be_captured(
+    thrust_n: float, radius_m: float, slides: MakeGame
+) -> None:
+    solution = solve(slides(thrust_n, capture_radius_m=radius_m))
+    assert solution.capture is None
+    assert (solution.curve.distance_m > radius_m).all()
+    if thrust_n == 20.0:
+        assert (solution.verdict, solution.exhausted) == (Verdict.ESCAPES, "pursuer")
+    else:  # its propellant is spent first: what it does then is not looked at
+        assert (solution.verdict, solution.exhausted) == (Verdict.PROPELLANT_EXHAUSTED, "evader")
+
+
+def test_a_stronger_evader_can_pass_within_a_capture_radius() -> None:
+    fast = Player((7e6, 0.0, 0.0), (0.0, 7546.0, 0.0), 1000.0, 500.0, 10.0, 300.0)
+    near = Player((7e6, 20e3, 0.0), (-22.0, 7526.0, 0.0), 1000.0, 500.0, 11.0, 300.0)
+    solution = solve(Game(Gravity(MU_M3_S2, EARTH_M), fast, near, 15e3))
+    assert captured(solution).is_local_saddle
+
+
+def test_propellant_that_is_spent_too_early(slides: MakeGame) -> None:
+    solution = solve(slides(dry_kg=1800.0))
+    assert (solution.verdict, solution.exhausted) == (Verdict.PROPELLANT_EXHAUSTED, "pursuer")
+    assert solution.looked_at_s == pytest.approx(200.0 * 350.0 * 9.80665 / 20.0)
+    assert solution.looked_at_s < 45343.6
+
+
+def test_a_game_is_looked_at_as_long_as_it_says(slides: MakeGame) -> None:
+    game = slides()
+    solution = solve(Game(game.gravity, game.pursuer, game.evader, longest_s=20e3))
+    assert (solution.verdict, solution.exhausted) == (Verdict.ESCAPES, None)
+    assert solution.looked_at_s == pytest.approx(20e3, rel=1e-6)
+
+
+@pytest.mark.parametrize("thrust_n", [5.0, 10.0, 15.0])
+def test_homotopy_agrees(thrust_n: float, slides: MakeGame) -> None:
+    game = slides(thrust_n)
+    other = solve_by_homotopy(game)
+    assert other is not None
+    assert other.time_s == pytest.approx(captured(solve(game)).time_s, rel=1e-10)
+
+
+def test_the_linear_games_start_agrees(slides: MakeGame) -> None:
+    other = solve_by_linear_game(slides(10.0))
+    assert other is not None
+    assert other.time_s == pytest.approx(45343.620266, abs=1e-5)
+
+
+def test_a_neighbour_is_enough_of_a_guess(slides: MakeGame, solved: Solution) -> None:
+    found = solve_near(slides(10.3), solved.units, captured(solved).extremal)
+    assert found is not None
+    assert found.time_s == pytest.approx(captured(solve(slides(10.3))).time_s, rel=1e-9)
+
+
+# Theory, analytic checks: pursuer on a circular orbit, evader offset along the arc, masses that stay.
+@pytest.mark.parametrize(("share", "difference"), [(1.0, -4.278e-3), (0.1, -4.566e-4), (0.01, -4.595e-5)])
+def test_small_games_approach_the_linear_one(share: float, difference: float) -> None:
+    axis = 42166e3
+    rate = math.sqrt(MU_M3_S2 / axis**3)
+    offset, drift = np.array([100e3, 1500e3, 200e3]), np.array([10.0, -20.0, 15.0])
+    linear = circular_orbit_capture(offset, drift, 0.01, 0.005, rate)
+    assert linear is not None
+    (x, y, z), (vx, vy, vz) = share * offset, share * drift
+    angle, radius = y / axis, axis + x
+    outward, ahead = (
+        np.array([math.cos(angle), math.sin(angle), 0.0]),
+        np.array([-math.sin(angle), math.cos(angle), 0.0]),
+    )
+    position = radius * outward + np.array([0.0, 0.0, z])
+    velocity = vx * outward + radius * (rate + vy / axis) * ahead + np.array([0.0, 0.0, vz])
+    pursuer = Player((axis, 0.0, 0.0), (0.0, rate * axis, 0.0), 2000.0, 200.0, share * 20.0, math.inf)
+    evader = Player(tuple(position), tuple(velocity), 2000.0, 200.0, share * 10.0, math.inf)
+    found = captured(solve(Game(Gravity(MU_M3_S2, EARTH_M), pursuer, evader)))
+    assert found.time_s / linear.time_s - 1.0 == pytest.approx(difference, abs=5e-4 * abs(difference))
+
+
+def rates(t: float, y: Floats, thrust: float, mass: float, flow: float) -> Floats:
+    """The conditions as the theory writes them, for the pursuer, or the evader with its costate turned."""
+    r, v, lr, lv = y[:3], y[3:6], y[6:9], y[9:]
+    cube = float(r @ r) ** 1.5
+    push = thrust / (mass - flow * t) * lv / np.linalg.norm(lv)
+    turned = lv / cube - 3.0 * r * (lv @ r) / (cube * float(r @ r))
+    return np.concatenate([v, -r / cube + push, turned, -lr])
+
+
+def independent_capture(game: Game, capture: Capture) -> float:
+    """Shoot forward on 13 unknowns with SciPy from a guess a little off, nondimensional; return the capture time, s."""
+    units = units_of(game)
+    pair = scaled_pair(game, units)
+    crafts = (pair.pursuer, pair.evader)
+    node = capture.extremal
+
+    def miss(unknown: Floats) -> Floats:
+        ends = []
+        for k, craft in enumerate(crafts):
+            begin = np.concatenate([craft.start, unknown[6 * k : 6 * k + 6]])  # type: ignore[attr-defined]
+            found = solve_ivp(
+                rates,
+                (0.0, unknown[12]),
+                begin,
+                method="DOP853",
+                rtol=1e-10,
+                atol=1e-12,
+                args=(craft.thrust, craft.mass, craft.flow),  # type: ignore[attr-defined]
+            )
+            ends.append(found.y[:, -1])
+        p, e = ends
+        scale = [float(p[6:9] @ p[6:9]) - 1.0]
+        return np.concatenate([p[:3] - e[:3], p[6:9] - e[6:9], p[9:], e[9:], scale])
+
+    off = 1.0 + 1e-4 * np.cos(np.arange(13.0))
+    guess = np.concatenate([node.costates[0], node.costates[1], [node.duration]]) * off
+    found, _, _, _ = fsolve(miss, guess, full_output=True, xtol=1e-11)
+    assert np.abs(miss(found)).max() < 1e-7
+    return float(found[12]) * units.time_s
+
+
+@pytest.mark.parametrize(
+    ("thrust_n", "anomaly_deg", "inclination_deg"), [(10.0, 312.0, 0.3), (10.0, 325.0, 2.0), (14.0, 305.0, 1.0)]
+)
+def test_other_geometries_agree_with_an_independent_solver(
+    thrust_n: float, anomaly_deg: float, inclination_deg: float, slides: MakeGame
+) -> None:
+    game = slides(thrust_n, anomaly_deg=anomaly_deg, inclination_deg=inclination_deg)
+    capture = captured(solve(game))
+    assert independent_capture(game, capture) == pytest.approx(capture.time_s, rel=1e-7)
+
+
+def test_where_the_branch_folds_another_one_keeps_the_evader_farther(slides: MakeGame) -> None:
+    game = slides(18.0, anomaly_deg=330.0)
+    plain, changed = solve(game, change_branch=False), solve(game)
+    assert plain.verdict is Verdict.BRANCH_NOT_CERTIFIED
+    assert plain.capture is None
+    assert captured(changed).time_s > plain.looked_at_s
+    assert changed.route is Route.SWITCHED
+    assert (changed.curve.distance_m[:-1] > 0.0).all()
+
+
+def test_polishing_what_is_no_guess_gives_nothing(slides: MakeGame, solved: Solution) -> None:
+    node = captured(solved).extremal
+    pair = scaled_pair(slides(), solved.units)
+    assert polish(pair, -node.vector, node.duration, 0.0, 20.0) is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"mass_kg": 0.0}, "mass must be positive"),
+        ({"dry_mass_kg": 3000.0}, "below the mass"),
+        ({"thrust_n": -1.0}, "thrust must not be negative"),
+        ({"specific_impulse_s": 0.0}, "specific impulse"),
+        ({"position_m": (math.nan, 0.0, 0.0)}, "finite"),
+    ],
+)
+def test_what_is_no_player_is_refused(changes: dict[str, object], message: str) -> None:
+    values: dict[str, object] = {
+        "position_m": (7e6, 0.0, 0.0),
+        "velocity_m_s": (0.0, 7546.0, 0.0),
+        "mass_kg": 100.0,
+        "dry_mass_kg": 50.0,
+        "thrust_n": 1.0,
+        "specific_impulse_s": 300.0,
+    }
+    with pytest.raises(ValueError, match=message):
+        Player(**{**values, **changes})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("position", "velocity", "message"),
+    [
+        ((7e6, 0.0, 0.0), (0.0, 12e3, 0.0), "no ellipse"),
+        ((7e6, 0.0, 0.0), (100.0, 0.0, 0.0), "falls along a line"),
+        ((7e6, 0.0, 0.0), (0.0, 5e3, 0.0), "reaches into the planet"),
+        ((0.0, 0.0, 0.0), (0.0, 5e3, 0.0), "centre of the planet"),
+        ((8e6, 0.0, 0.0), (0.0, 7058.0, 0.0), "same position"),
+        ((8e6, 500.0, 0.0), (0.0, 7058.0, 0.0), "within the capture radius"),
+    ],
+)
+def test_what_is_no_game_is_refused(
+    position: tuple[float, float, float], velocity: tuple[float, float, float], message: str
+) -> None:
+    pursuer = Player((8e6, 0.0, 0.0), (0.0, 7058.0, 0.0), 100.0, 50.0, 1.0, 300.0)
+    with pytest.raises(ValueError, match=message):
+        Game(Gravity(MU_M3_S2, EARTH_M), pursuer, Player(position, velocity, 100.0, 50.0, 1.0, 300.0), 1e3)
+
+
+def test_gravity_with_j2_needs_its_radius() -> None:
+    with pytest.raises(ValueError, match="equatorial radius"):
+        Gravity(MU_M3_S2, EARTH_M, 1e-3)
+
+
+def test_a_pursuer_without_thrust_is_refused(slides: MakeGame) -> None:
+    game = slides()
+    still = Player(game.evader.position_m, game.evader.velocity_m_s, 2000.0, 200.0, 0.0, 350.0)
+    with pytest.raises(ValueError, match="the pursuer's thrust"):
+        Game(game.gravity, still, game.pursuer)
