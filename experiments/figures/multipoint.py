@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from experiments._multipoint_tables import Axes as FrameAxes
@@ -20,7 +21,7 @@ Progress = Callable[[float], None]
 
 _POINTS = 1601
 _TRACK_POINTS = 241
-_CURVE_POINTS = {FrameAxes.HILL: 41, FrameAxes.INERTIAL: 9}
+_CURVE_POINTS = {FrameAxes.HILL: 41, FrameAxes.INERTIAL: 17}
 _NEAREST = 0.12
 _COMPONENTS: tuple[dict[str, Any], ...] = (
     {"color": TRUTH, "linestyle": "-"},
@@ -125,16 +126,19 @@ def cost_curves(scene: Scene, progress: Progress = lambda _done: None) -> list[C
             low + _NEAREST * width, high if last else high - _NEAREST * width, _CURVE_POINTS[scene.axes]
         )
         times = np.unique(np.append(times, now))
-        known, costs, fly = [], [], scene.tour.flyer(scene.order)
-        for time in times:
-            varied = nodes.arrive_s.copy()
-            varied[index] = time
-            try:
-                costs.append(fly(varied).cost)
-            except ValueError:
-                continue
-            known.append(float(time))
-        curves.append(CostCurve(np.array(known), np.array(costs)))
+        # From the time as it is outward, so that each path begins from a near one.
+        found = {now: scene.path.cost}
+        for side in (times[times > now], times[times < now][::-1]):
+            fly = scene.tour.flyer(scene.order, scene.path)
+            for time in side:
+                varied = nodes.arrive_s.copy()
+                varied[index] = time
+                try:
+                    found[float(time)] = fly(varied).cost
+                except ValueError:
+                    break
+        known = np.array(sorted(found))
+        curves.append(CostCurve(known, np.array([found[time] for time in known])))
         progress((index + 1) / count)
     return curves
 
@@ -199,7 +203,7 @@ def draw_control(scene: Scene, bound_m_s2: float | None = None) -> Figure:
     control = scene.path.control(times) * 1e3
     with style():
         figure = new_figure(height_mm=100.0)
-        ((above,), (below,)) = place_axes(figure, 2, 1, margins_mm=(17.0, 4.0, 12.0, 9.0), gaps_mm=(0.0, 8.0))
+        ((above,), (below,)) = place_axes(figure, 2, 1, margins_mm=(17.0, 8.0, 12.0, 9.0), gaps_mm=(0.0, 8.0))
         for axis, letter in enumerate("xyz"):
             _line(above, scene, times, control[:, axis], label=f"$u_{letter}$", **_COMPONENTS[axis])
         _line(below, scene, times, np.linalg.norm(control, axis=1), color=INK)
@@ -229,7 +233,7 @@ def draw_costates(scene: Scene) -> Figure:
     costate = scene.path.costate(times)
     with style():
         figure = new_figure(height_mm=100.0)
-        ((above,), (below,)) = place_axes(figure, 2, 1, margins_mm=(17.0, 4.0, 12.0, 9.0), gaps_mm=(0.0, 8.0))
+        ((above,), (below,)) = place_axes(figure, 2, 1, margins_mm=(17.0, 8.0, 12.0, 9.0), gaps_mm=(0.0, 8.0))
         for axis, letter in enumerate("xyz"):
             _line(above, scene, times, costate[:, axis], label=rf"$\lambda_{{r,{letter}}}$", **_COMPONENTS[axis])
             _line(below, scene, times, costate[:, 3 + axis], label=rf"$\lambda_{{V,{letter}}}$", **_COMPONENTS[axis])
@@ -275,7 +279,11 @@ def draw_times(scene: Scene, curves: list[CostCurve]) -> Figure:
                 (now + ends) / unit, scene.path.cost + scene.path.time_gradient[index] * ends, color=MEASURED,
                 linewidth=0.9, label="slope $dI/dt$",
             )  # fmt: skip
-            panel.set_yscale("log" if curve.cost.max() > 20.0 * max(curve.cost.min(), 1e-300) else "linear")
+            if curve.cost.max() > 20.0 * max(curve.cost.min(), 1e-300):
+                panel.set_yscale("log")
+                panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+                panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
+                panel.yaxis.set_minor_formatter(NullFormatter())
             panel.set_xlabel(f"time of {scene.names[index]}, {name}")
             panel.set_title(f"({chr(ord('a') + index)})", loc="left")
             if index % columns == 0:
@@ -303,9 +311,11 @@ def _mark_nodes(panel: Axes, scene: Scene, across: int, up: int, unit: float) ->
 
 
 def _line(panel: Axes, scene: Scene, times: Floats, values: Floats, **look: Any) -> None:
-    """A line that breaks where it jumps: at nodes."""
+    """A line that breaks where it jumps: where a target is met, and where it is left."""
     unit, _ = scene.time_unit
-    cuts = np.searchsorted(times, scene.path.nodes.arrive_s[:-1], side="left")
+    nodes = scene.path.nodes
+    stays = nodes.leave_s[:-1][nodes.leave_s[:-1] > nodes.arrive_s[:-1]]
+    cuts = np.searchsorted(times, np.sort(np.concatenate([nodes.arrive_s[:-1], stays])), side="left")
     label = look.pop("label", None)
     for piece, (one, other) in enumerate(zip(np.split(times, cuts), np.split(values, cuts), strict=True)):
         panel.plot(one / unit, other, label=label if piece == 0 else None, **look)

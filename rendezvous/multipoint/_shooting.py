@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rendezvous.multipoint._hamiltonian import propagate
-from rendezvous.multipoint.segments import Nodes
+from rendezvous.multipoint.segments import Nodes, Path
 from rendezvous.two_body import coast
 
 Floats = NDArray[np.float64]
@@ -53,6 +53,19 @@ def blocks_of(start_s: float, start_state: Floats, nodes: Nodes) -> list[Block]:
             )
             start_s, start_state, first = float(nodes.leave_s[node]), nodes.leave[node], node + 1
     return blocks
+
+
+def unknowns_of(path: Path, gravitational_parameter_m3_s2: float) -> list[Floats]:
+    """Return the unknowns of each block of a known path."""
+    found, first = [], 0
+    for block in blocks_of(float(path.starts_s[0]), path.start_states[0], path.nodes):
+        length, duration = _units(block, gravitational_parameter_m3_s2)
+        scale = np.array([length / duration**3] * 3 + [length / duration**2] * 3)
+        start = path.costate_start if first == 0 else path.costate_after[first - 1]
+        last = first + len(block.time_s) - 1
+        found.append(np.concatenate([start / scale, (path.jumps[first:last, :3] / scale[:3]).ravel()]))
+        first = last + 1
+    return found
 
 
 @dataclass(frozen=True, eq=False)

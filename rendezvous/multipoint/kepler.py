@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rendezvous.multipoint._reference import Mixture, Reference
-from rendezvous.multipoint._shooting import Shot, blocks_of, shoot
+from rendezvous.multipoint._shooting import Shot, blocks_of, shoot, unknowns_of
 from rendezvous.multipoint.segments import Nodes, Path, check_times, solve_segments
 from rendezvous.multipoint.targets import Integers, Target, check_names
 from rendezvous.multipoint.tour import nodes_of
@@ -135,19 +135,22 @@ class KeplerTour:
         """
         return self.flyer(order)(np.asarray(time_s, dtype=np.float64))
 
-    def flyer(self, order: Sequence[int]) -> Callable[[Floats], Path]:
+    def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Path]:
         """Return what finds paths of one order for times asked in turn, each from the last one's costates.
 
         Parameters
         ----------
         order : sequence of int
+        near : Path or None
+            A path of that order, to begin from; None begins from the coasting orbit.
 
         Returns
         -------
         callable
             The path of times of shape (N,).
         """
-        last: list[Floats] = []
+        mu = self.targets.gravitational_parameter_m3_s2
+        last: list[Floats] = [] if near is None else unknowns_of(near, mu)
 
         def fly(time_s: Floats) -> Path:
             nodes = nodes_of(self.targets, order, time_s)
@@ -158,7 +161,7 @@ class KeplerTour:
                     return self._relinearise(nodes, self._coasting(nodes), rounds=FEW_ROUNDS)
             shots = []
             for place, block in enumerate(blocks_of(self.start_s, self.start_state, nodes)):
-                shot = shoot(block, self.targets.gravitational_parameter_m3_s2, last[place] if last else None)
+                shot = shoot(block, mu, last[place] if last else None)
                 if shot is None:
                     raise NotSettledError(
                         "no trajectory was found: the targets were followed from the chaser's coasting orbit, but not "

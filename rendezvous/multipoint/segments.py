@@ -93,10 +93,7 @@ class Path:
         -------
         ndarray, shape (k, 6)
         """
-        which, moving = self._segment_of(time_s)
-        ends = np.maximum(self.nodes.arrive_s[which], time_s)
-        transition = self.motion.transition(time_s, ends)
-        return np.where(moving[:, None], np.einsum("kba,kb->ka", transition, self.costate_before[which]), 0.0)
+        return self.along(time_s)[1]
 
     def control(self, time_s: Floats) -> Floats:
         """Return u = B' lambda at times.
@@ -125,13 +122,40 @@ class Path:
         -------
         ndarray, shape (k, 6)
         """
-        which, moving = self._segment_of(time_s)
-        # While it stays with a target it coasts from the arrival there.
-        begins = np.where(moving, self.starts_s[which], self.nodes.arrive_s[which])
-        first = np.where(moving[:, None], self.start_states[which], self.arrival_states[which])
-        segment = self.motion.segment(begins, np.maximum(time_s, begins))
-        forced = np.einsum("kab,kb->ka", segment.gramian, self.costate(time_s))
-        return np.asarray(np.einsum("kab,kb->ka", segment.transition, first) + segment.drift + forced)
+        return self.along(time_s)[0]
+
+    def along(self, time_s: Floats) -> tuple[Floats, Floats]:
+        """Return states and costates at times.
+
+        Parameters
+        ----------
+        time_s : ndarray, shape (k,)
+            From the start to the last node.
+
+        Returns
+        -------
+        tuple of ndarray, each of shape (k, 6)
+
+        Notes
+        -----
+        From each time to the next one of its segment: long intervals of a motion that varies are dear.
+        """
+        times = np.asarray(time_s, dtype=np.float64)
+        which, moving = self._segment_of(times)
+        states, costates = np.empty((len(times), 6)), np.zeros((len(times), 6))
+        order = np.argsort(times, kind="stable")
+        for segment in np.unique(which):
+            mine = order[which[order] == segment]
+            flying, staying = mine[moving[mine]], mine[~moving[mine]]
+            end = float(self.nodes.arrive_s[segment])
+            if len(flying):
+                start, last = self.start_states[segment], self.costate_before[segment]
+                grid = np.concatenate([[self.starts_s[segment]], times[flying], [end]])
+                states[flying], costates[flying] = _carried(self.motion, grid, start, last)
+            if len(staying):  # coasting with a target, from the arrival there
+                grid = np.concatenate([[end], times[staying], times[staying[-1:]]])
+                states[staying] = _carried(self.motion, grid, self.arrival_states[segment], np.zeros(6))[0]
+        return states, costates
 
     def _segment_of(self, time_s: Floats) -> tuple[NDArray[np.intp], Flags]:
         """Which segment each time belongs to, and whether it is under way rather than staying at its end."""
@@ -194,6 +218,21 @@ def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, no
     after[:-1] = at_start[1:]
     gradient = _time_gradient(motion, nodes, arrive, before, after)
     return Path(motion, nodes, cost, starts, begin, arrive, before, after, at_start[0], gradient)
+
+
+def _carried(motion: LinearMotion, grid: Floats, start: Floats, costate_end: Floats) -> tuple[Floats, Floats]:
+    """States and costates at the inner times of a grid, from the state at its start and the costate at its end."""
+    segment = motion.segment(grid[:-1], grid[1:])
+    count = len(grid) - 2
+    states, costates = np.empty((count, 6)), np.empty((count, 6))
+    costate, state = costate_end, start
+    for index in range(count - 1, -1, -1):
+        costate = segment.transition[index + 1].T @ costate
+        costates[index] = costate
+    for index in range(count):
+        state = segment.transition[index] @ state + segment.drift[index] + segment.gramian[index] @ costates[index]
+        states[index] = state
+    return states, costates
 
 
 def check_times(start_s: float, arrive_s: Floats, leave_s: Floats) -> None:

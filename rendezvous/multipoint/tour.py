@@ -34,8 +34,8 @@ class Visits(Protocol):
     def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
         """Find the path of least energy to targets in an order at times of shape (N,)."""
 
-    def flyer(self, order: Sequence[int]) -> Callable[[Floats], Path]:
-        """Return what finds paths of one order for times asked in turn."""
+    def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Path]:
+        """Return what finds paths of one order for times asked in turn, the first near a known one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +89,14 @@ class Tour:
         """
         return solve_segments(self.motion, self.start_s, self.start_state, nodes_of(self.targets, order, time_s))
 
-    def flyer(self, order: Sequence[int]) -> Callable[[Floats], Path]:
+    def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Path]:
         """Return what finds the path of times of shape (N,), for one order.
 
         Parameters
         ----------
         order : sequence of int
+        near : Path or None
+            Does not count: the path is one.
 
         Returns
         -------
