@@ -57,6 +57,8 @@ MOST_FACES = 24
 MOST_HALFSPACES = 50
 MOST_CHECKS = 10
 _INSTANTS = 12
+_MOST_REVOLUTIONS = 100
+_MOST_REACH = 1e4
 STATE_NAMES = ("x", "y", "z", "vx", "vy", "vz")
 
 
@@ -302,7 +304,42 @@ def _checks(known: Known) -> Iterator[Problem]:
         yield Problem(
             ("disturbance",), "is allowed for at whole periods only", "remove it, or write checks_between_periods = 0"
         )
+    yield from _size_problems(known)
     yield from _keep_in_problems(known)
+
+
+def _size_problems(known: Known) -> Iterator[Problem]:
+    """Refuse numbers with which nothing would finish, or be told from rounding: mostly a unit taken for another."""
+    period, periods = known.number("period_s"), known.value("periods")
+    axis, mu = known.number("orbit", "semi_major_axis_km"), known.number("orbit", "gravitational_parameter_m3_s2")
+    if period is None:
+        return
+    if isinstance(periods, int) and axis is not None and mu is not None:
+        turns = periods * float(period) * (float(mu) / (1e3 * float(axis)) ** 3) ** 0.5 / (2.0 * np.pi)
+        if turns > _MOST_REVOLUTIONS:
+            yield Problem(
+                ("period_s",),
+                f"{periods} periods are {turns:.3g} revolutions, over {_MOST_REVOLUTIONS}: found {period}",
+                "check its unit, and those of [orbit]",
+            )
+    push = known.number("acceleration_m_s2")
+    for name, power in (("position_m", 2), ("velocity_m_s", 1)):
+        bound, control = known.value("bounds", name), known.value("bounds", "control")
+        if push is None or bound is None or control is None:
+            continue
+        least, most = min(_numbers(bound)), max(_numbers(control))
+        reach = float(push) * most * float(period) ** power / least
+        if reach > _MOST_REACH:
+            yield Problem(
+                ("acceleration_m_s2",),
+                f"full thrust over one period changes {name} by {reach:.3g} bounds, over {_MOST_REACH:g}: found {push}",
+                f"check its unit, and those of period_s and bounds.{name}",
+            )
+
+
+def _numbers(value: object) -> list[float]:
+    """The numbers of a sound value: one, or an array."""
+    return [float(Decimal(each)) for each in (value if isinstance(value, list) else [value])]
 
 
 def _keep_in_problems(known: Known) -> Iterator[Problem]:

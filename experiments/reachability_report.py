@@ -172,18 +172,32 @@ def make_report(
     InputError
         If the constraints conflict, or what was asked for cannot be had.
     """
-    began_s = perf_counter()
-    problem = rendezvous.problem
     try:
-        solution = solve(problem, route)
+        return _report(
+            rendezvous, selection, sample_count, seed, route, closed_loop, noisy_flights, perf_counter(), progress
+        )
     except EmptyTubeError as error:
         raise InputError(_conflict(rendezvous, error)) from None
     except TooLargeError as error:
         raise InputError(f"--route exact: {error}; choose --route lifted") from None
     except ArithmeticError as error:
         raise InputError(
-            f"{rendezvous.name}: could not be solved: {error}; try --route lifted, or round units"
+            f"{rendezvous.name}: could not be solved: {error}; its numbers differ too much in size, check their units"
         ) from None
+
+
+def _report(
+    rendezvous: Rendezvous,
+    selection: Sequence[str],
+    sample_count: int,
+    seed: int,
+    route: Route | None,
+    closed_loop: bool,
+    noisy_flights: int,
+    began_s: float,
+    progress: Progress,
+) -> Report:
+    solution = solve(rendezvous.problem, route)
     progress(0.2)
     searched, least = _least_periods(rendezvous, solution)
     progress(0.3)

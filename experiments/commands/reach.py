@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -124,13 +124,17 @@ def _selection(text: str) -> tuple[list[str], int]:
     return names, count
 
 
-def _draw(folder: Path, report: Report, progress: object) -> None:
+def _draw(folder: Path, report: Report, progress: Callable[[float], None]) -> None:
+    from experiments.errors import InputError
     from experiments.figures.reach import draw_reach
     from experiments.figures.style import save_figure
     from experiments.output import reporting_failures
 
-    assert callable(progress)
-    for place, (name, figure) in enumerate(zip(FIGURES, draw_reach(report, progress), strict=True)):
+    try:
+        figures = list(draw_reach(report, progress))
+    except ArithmeticError as error:
+        raise InputError(f"the tube could not be drawn: {error}; the results themselves are in {folder}") from None
+    for place, (name, figure) in enumerate(zip(FIGURES, figures, strict=True)):
         with reporting_failures(folder):
             save_figure(figure, folder, name)
         progress(0.8 + 0.2 * (place + 1) / len(FIGURES))
