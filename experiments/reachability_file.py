@@ -339,7 +339,7 @@ def _size_problems(known: Known) -> Iterator[Problem]:
 
 def _numbers(value: object) -> list[float]:
     """The numbers of a sound value: one, or an array."""
-    return [float(Decimal(each)) for each in (value if isinstance(value, list) else [value])]
+    return [float(str(each)) for each in (value if isinstance(value, list) else [value])]
 
 
 def _keep_in_problems(known: Known) -> Iterator[Problem]:
