@@ -1,0 +1,203 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from rendezvous.relative_motion import (
+    HILL,
+    ORBITAL,
+    ORBITAL_INTERLEAVED,
+    ClohessyWiltshire,
+    ConstantMotion,
+    EllipticOrbit,
+    LinearMotion,
+    TimeVaryingMotion,
+    TschaunerHempel,
+)
+from rendezvous.relative_motion.elliptic_orbit import eccentric_of_mean
+
+Floats = NDArray[np.float64]
+
+RATE = 1.13e-3
+MOTIONS: dict[str, Callable[[], LinearMotion]] = {
+    "circular": lambda: ClohessyWiltshire(RATE),
+    "circular, orbital frame": lambda: ClohessyWiltshire(RATE, ORBITAL),
+    "elliptic": lambda: TschaunerHempel(EllipticOrbit(RATE, 0.3, 1.0)),
+    "elliptic, orbital frame": lambda: TschaunerHempel(EllipticOrbit(RATE, 0.7, -2.0), ORBITAL),
+    "frozen": lambda: EllipticOrbit(RATE, 0.1, 0.4).frozen(0.0, ORBITAL),
+    "any": lambda: TimeVaryingMotion(EllipticOrbit(RATE, 0.3, 1.0).dynamics),
+}
+# Barseghyan and Stepanyan's Gramian, state (x, x', y, y', z, z'), T = 30 s, w = 0.001176.
+PUBLISHED_GRAMIAN = np.array(
+    [
+        [8997.761636941204, 449.8135383406748, 0.09879027439642714, -10.575438652455434, 0.0, 0.0],
+        [449.8135383406748, 30.000027881906004, 10.595195887584822, 0.0009878207706748873, 0.0, 0.0],
+        [0.09879027439642714, 10.595195887584822, 9004.480111945337, 450.37331832075387, 0.0, 0.0],
+        [-10.575438652455434, 0.0009878207706748873, 450.37331832075387, 30.03733105775588, 0.0, 0.0],
+        [0.0, 0.0, 0.0, 0.0, 8997.759844442951, 449.8133292217318],
+        [0.0, 0.0, 0.0, 0.0, 449.8133292217318, 29.987556314081377],
+    ]
+)
+
+
+def integrated(motion: LinearMotion, start: float, end: float) -> tuple[Floats, Floats, Floats]:
+    """Transition, Gramian and effect of a held control by DOP853."""
+
+    def rates(time: float, values: Floats) -> Floats:
+        matrix, inputs = motion.dynamics(time), motion.input_map(time)
+        transition, gramian, held = values[:36].reshape(6, 6), values[36:72].reshape(6, 6), values[72:].reshape(6, 3)
+        spread = matrix @ gramian
+        parts = (matrix @ transition, spread + spread.T + inputs @ inputs.T, matrix @ held + inputs)
+        return np.concatenate([part.ravel() for part in parts])
+
+    begin = np.concatenate([np.eye(6).ravel(), np.zeros(54)])
+    found = solve_ivp(rates, (start, end), begin, method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+    return found[:36].reshape(6, 6), found[36:72].reshape(6, 6), found[72:].reshape(6, 3)
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+@pytest.mark.parametrize("duration", [20.0, 900.0, 7000.0])
+def test_matrices_satisfy_their_differential_equations(name: str, duration: float) -> None:
+    motion, start = MOTIONS[name](), 130.0
+    transition, gramian, held = integrated(motion, start, start + duration)
+    scale = np.array([duration] * 3 + [1.0] * 3)
+    weight = scale[None, :] / scale[:, None]
+    found = motion.segment(start, start + duration)
+    size = np.abs(transition * weight).max()
+    np.testing.assert_allclose(found.transition * weight, transition * weight, rtol=0.0, atol=2e-10 * size)
+    spread = np.sqrt(np.outer(np.diag(gramian), np.diag(gramian)))
+    np.testing.assert_allclose(found.gramian / spread, gramian / spread, rtol=0.0, atol=2e-10)
+    effect = motion.held_input(start, start + duration) / scale[:, None]
+    np.testing.assert_allclose(
+        effect, held / scale[:, None], rtol=0.0, atol=2e-10 * float(np.abs(held / scale[:, None]).max())
+    )
+    assert not found.drift.any()
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+@given(st.floats(0.0, 5000.0), st.floats(1.0, 3000.0), st.floats(1.0, 3000.0))
+@settings(max_examples=8, deadline=None)
+def test_intervals_join(name: str, start: float, first: float, second: float) -> None:
+    motion = MOTIONS[name]()
+    one, other = motion.segment(start, start + first), motion.segment(start + first, start + first + second)
+    whole = motion.segment(start, start + first + second)
+    scale = np.array([first + second] * 3 + [1.0] * 3)
+    joined = other.transition @ one.transition
+    weight = scale[None, :] / scale[:, None]
+    size = np.abs(other.transition * weight).max() * np.abs(one.transition * weight).max()
+    np.testing.assert_allclose(joined * weight, whole.transition * weight, rtol=0.0, atol=1e-11 * size)
+    spread = other.transition @ one.gramian @ other.transition.T + other.gramian
+    by = np.sqrt(np.outer(np.diag(whole.gramian), np.diag(whole.gramian)))
+    np.testing.assert_allclose(spread / by, whole.gramian / by, rtol=0.0, atol=1e-10)
+    back = motion.transition(start + first, start)
+    np.testing.assert_allclose(back @ one.transition * weight, np.eye(6), rtol=0.0, atol=1e-9)
+
+
+def test_an_ellipse_without_eccentricity_is_a_circle() -> None:
+    circle, ellipse = ClohessyWiltshire(RATE), TschaunerHempel(EllipticOrbit(RATE, 0.0, 2.0))
+    for end in (30.0, 800.0, 9000.0):
+        scale = np.array([end] * 3 + [1.0] * 3)
+        weight = scale[None, :] / scale[:, None]
+        apart = (circle.transition(0.0, end) - ellipse.transition(0.0, end)) * weight
+        assert np.abs(apart).max() < 1e-13 * np.abs(circle.transition(0.0, end) * weight).max()
+
+
+def test_a_frozen_motion_is_the_exponential_of_its_matrix() -> None:
+    motion = ConstantMotion(ClohessyWiltshire(RATE).dynamics(0.0))
+    np.testing.assert_allclose(motion.transition(0.0, 600.0), ClohessyWiltshire(RATE).transition(0.0, 600.0), atol=1e-9)
+    assert motion.transition(5.0, 5.0) == pytest.approx(np.eye(6), abs=0.0)
+    assert not motion.gramian(5.0, 5.0).any()
+
+
+def test_drift_and_actuators_of_a_general_motion() -> None:
+    inputs = np.vstack([np.zeros((3, 3)), np.diag([1.0, 0.5, 2.0])])
+    pushed = TimeVaryingMotion(
+        ClohessyWiltshire(RATE).dynamics,
+        input_at=lambda times: np.broadcast_to(inputs, (len(times), 6, 3)),
+        drift_at=lambda times: np.column_stack([np.zeros((len(times), 3)), 1e-5 * np.ones((len(times), 3))]),
+    )
+    end = 1500.0
+    held = ClohessyWiltshire(RATE).held_input(0.0, end)
+    np.testing.assert_allclose(pushed.drift(0.0, end), held @ np.full(3, 1e-5), rtol=1e-12)
+    found = integrated(pushed, 0.0, end)[1]
+    np.testing.assert_allclose(pushed.gramian(0.0, end), found, rtol=0.0, atol=1e-9 * found.max())
+    assert pushed.forcing(3.0) == pytest.approx([0.0, 0.0, 0.0, 1e-5, 1e-5, 1e-5])
+
+
+def test_times_may_be_arrays() -> None:
+    for name, make in MOTIONS.items():
+        motion = make()
+        ends = np.array([[100.0, 2000.0], [30.0, 900.0]])
+        found = motion.segment(10.0, ends)
+        assert found.transition.shape == (2, 2, 6, 6), name
+        assert found.gramian.shape == (2, 2, 6, 6)
+        assert found.drift.shape == (2, 2, 6)
+        assert motion.held_input(10.0, ends).shape == (2, 2, 6, 3)
+        np.testing.assert_allclose(found.gramian[1, 1], motion.gramian(10.0, 900.0), rtol=1e-9)
+
+
+def test_the_published_gramian() -> None:
+    found = ORBITAL.matrices_to(ORBITAL_INTERLEAVED, ClohessyWiltshire(0.001176, ORBITAL).gramian(0.0, 30.0))
+    np.testing.assert_allclose(found, PUBLISHED_GRAMIAN, rtol=2e-12, atol=1e-18)
+
+
+def test_one_motion_in_two_frames() -> None:
+    hill, orbital = ClohessyWiltshire(RATE), ClohessyWiltshire(RATE, ORBITAL)
+    state = np.array([100.0, -250.0, 30.0, 0.2, -0.1, 0.05])
+    carried = HILL.states_to(ORBITAL, hill.transition(0.0, 700.0) @ state)
+    np.testing.assert_allclose(orbital.transition(0.0, 700.0) @ HILL.states_to(ORBITAL, state), carried, rtol=1e-13)
+    # x'' = 2 w y', y'' = 3 w^2 y - 2 w x', z'' = -w^2 z: (1.8) of Barseghyan and Stepanyan.
+    rates = orbital.dynamics(0.0) @ np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    expected = [4.0, 5.0, 6.0, 2 * RATE * 5, 3 * RATE**2 * 2 - 2 * RATE * 4, -(RATE**2) * 3]
+    np.testing.assert_allclose(rates, expected, rtol=1e-15)
+
+
+@given(st.floats(0.0, 0.99), st.floats(-50.0, 50.0))
+def test_keplers_equation(eccentricity: float, mean: float) -> None:
+    found = float(eccentric_of_mean(mean, eccentricity))
+    assert found - eccentricity * np.sin(found) == pytest.approx(mean, rel=1e-14, abs=1e-14)
+
+
+def test_an_orbit_of_a_size() -> None:
+    orbit = EllipticOrbit.of_size(1e7, 0.1, 3.986004418e14)
+    # Shorikov and Goranov (2021), identified from their tables: frozen at perigee, a period of 180 s, 0.15 m/s^2.
+    frozen = orbit.frozen(0.0, ORBITAL)
+    matrix, effect = frozen.transition(0.0, 180.0), 0.15 * frozen.held_input(0.0, 180.0)
+    row = [1.000880159508, 2.552748205224e-3, 0.0, 177.7169731072, 25.08284792087, 0.0]
+    np.testing.assert_allclose(matrix[0], row, rtol=1e-12, atol=1e-18)
+    assert matrix[2, 2] == pytest.approx(0.9911552814183, rel=1e-12)
+    assert matrix[2, 5] == pytest.approx(179.4690033082, rel=1e-12)
+    np.testing.assert_allclose(effect[0, :2], [2414.584434285, 225.9057563127], rtol=1e-12)
+    assert effect[5, 2] == pytest.approx(26.92035049622, rel=1e-12)
+    turn = 2.0 * np.pi / orbit.mean_motion_rad_s
+    assert float(orbit.true_anomaly(3.0 * turn)) == pytest.approx(6.0 * np.pi, rel=1e-14)
+    assert float(orbit.time_of_eccentric(orbit.eccentric_anomaly(777.0))) == pytest.approx(777.0, rel=1e-13)
+
+
+@pytest.mark.parametrize("rate", [0.0, -1e-3, np.inf, np.nan])
+def test_a_rate_must_be_positive(rate: float) -> None:
+    with pytest.raises(ValueError, match="orbit rate must be positive"):
+        ClohessyWiltshire(rate)
+
+
+@pytest.mark.parametrize("eccentricity", [-0.1, 1.0, 2.0, np.nan])
+def test_an_eccentricity_must_be_an_ellipses(eccentricity: float) -> None:
+    with pytest.raises(ValueError, match="eccentricity must be at least 0 and below 1"):
+        EllipticOrbit(RATE, eccentricity)
+
+
+def test_unsound_times_and_frames_are_refused() -> None:
+    with pytest.raises(ValueError, match="needs start <= end"):
+        ClohessyWiltshire(RATE).gramian(10.0, 5.0)
+    with pytest.raises(ValueError, match="a time is not finite"):
+        TschaunerHempel(EllipticOrbit(RATE, 0.2)).transition(0.0, np.nan)
+    with pytest.raises(ValueError, match="position before velocity"):
+        ClohessyWiltshire(RATE, ORBITAL_INTERLEAVED)
+    with pytest.raises(ValueError, match="shape"):
+        ConstantMotion(np.eye(5))
