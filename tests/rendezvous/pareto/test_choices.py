@@ -1,0 +1,343 @@
+"""The Pareto set, choices from it, coalitions, bounds on the control, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from rendezvous.pareto import (
+    Component,
+    Core,
+    Craft,
+    Encounter,
+    EncounterSolution,
+    Feasibility,
+    Meeting,
+    analyse_coalitions,
+    check_bound,
+    distances,
+    front_of_three,
+    front_of_two,
+    least_greatest_excess,
+    least_peak,
+    least_sum_of_costs,
+    nearest_to,
+    pareto_set,
+    peak_control,
+    simplex_weights,
+    solve_encounter,
+    sweep_meeting_time,
+    total_impulse,
+)
+from rendezvous.pareto.hull import nearest_in_hull
+from rendezvous.relative_motion import ORBITAL, ClohessyWiltshire
+
+Floats = NDArray[np.float64]
+
+POSITION = (Component.X, Component.Y, Component.Z)
+
+
+def some(
+    seed: int, count: int, free: tuple[Component, ...] = POSITION, *, own_starts: bool = False, **changes: object
+) -> EncounterSolution:
+    random, motion = np.random.default_rng(seed), ClohessyWiltshire(1.13e-3, ORBITAL)
+    scale = np.array([300.0] * 3 + [1.0] * 3)
+    craft = tuple(
+        Craft(
+            str(each),
+            random.normal(size=6) * scale,
+            motion,
+            float(random.uniform(0.5, 2.0)),
+            float(random.uniform(0.0, 200.0)) if own_starts else 0.0,
+        )
+        for each in range(count)
+    )
+    return solve_encounter(replace(Encounter(craft, 600.0, free, np.zeros(6)), **changes))  # type: ignore[arg-type]
+
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+@given(SEEDS, st.integers(2, 5), st.booleans())
+@settings(max_examples=20, deadline=None)
+def test_no_meeting_dominates_the_pareto_set(seed: int, count: int, own_starts: bool) -> None:
+    solution, random = some(seed, count, own_starts=own_starts), np.random.default_rng(seed)
+    found = pareto_set(solution, random.dirichlet(np.ones(count), size=20))
+    spread = float(np.ptp(solution.ideals, axis=0).max())
+    elsewhere = solution.excess(found.points[:, None] + random.normal(size=(20, 50, 3)) * spread)
+    gain = found.excess[:, None] - elsewhere
+    assert not (gain > 1e-9 * found.excess.max()).all(axis=-1).any()
+
+
+def test_the_front_of_two_in_closed_form() -> None:
+    solution = some(1, 2)
+    between = float(distances(solution)[0, 1])
+    found = pareto_set(solution, simplex_weights(2, 101))
+    np.testing.assert_allclose(np.sqrt(found.excess).sum(axis=1), between, rtol=1e-12)
+    np.testing.assert_allclose(front_of_two(between, found.excess[:, 0]), found.excess[:, 1], atol=1e-12 * between**2)
+
+
+def test_the_front_of_three_in_closed_form() -> None:
+    solution = some(2, 3)
+    inside = np.random.default_rng(3).dirichlet([2.0, 2.0, 2.0], size=200)
+    found = pareto_set(solution, inside)
+    third = front_of_three(distances(solution), found.excess[:, 0], found.excess[:, 1])
+    # Near the edge between the first two the third's distance hangs on a square root of what cancels.
+    np.testing.assert_allclose(third, found.excess[:, 2], rtol=1e-7)
+    with pytest.raises(ValueError, match="coincide"):
+        front_of_three(np.zeros((3, 3)), 0.0, 0.0)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 6])
+def test_weights_cover_the_simplex(count: int) -> None:
+    weights = simplex_weights(count, 300)
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0, rtol=1e-14)
+    assert (weights >= 0.0).all()
+    for corner in np.eye(count):
+        assert (np.abs(weights - corner).max(axis=1) < 1e-15).any()
+    np.testing.assert_array_equal(weights, simplex_weights(count, 300))
+
+
+@given(SEEDS, st.integers(1, 5), st.booleans(), st.sampled_from(list(Meeting)))
+@settings(max_examples=30, deadline=None)
+def test_the_least_sum_of_costs_is_least(seed: int, count: int, own_starts: bool, meeting: Meeting) -> None:
+    solution = some(seed, count, own_starts=own_starts, meeting=meeting)
+
+    def value(point: Floats) -> float:
+        return float(solution.encounter.weights @ np.sqrt(solution.cost_squared(point)))
+
+    found = value(least_sum_of_costs(solution))
+    spread = float(np.ptp(solution.ideals, axis=0).max()) + 1.0
+    random = np.random.default_rng(seed)
+    for size in (1.0, 0.1, 1e-2, 1e-3):
+        near = least_sum_of_costs(solution) + size * spread * random.normal(size=(40, 3))
+        values = np.sqrt(solution.cost_squared(near)) @ solution.encounter.weights
+        assert values.min() >= found * (1.0 - 1e-10)
+
+
+def test_an_intercept_in_which_one_craft_outweighs_the_rest_is_where_that_one_coasts() -> None:
+    solution = some(5, 3, meeting=Meeting.INTERCEPT)
+    craft = tuple(
+        replace(each, weight=weight) for each, weight in zip(solution.encounter.craft, (9.0, 1.0, 1.0), strict=True)
+    )
+    heavy = solve_encounter(replace(solution.encounter, craft=craft))
+    np.testing.assert_allclose(least_sum_of_costs(heavy), heavy.costs[0].ideal, rtol=1e-9)
+    assert heavy.costs[0].ideal_cost_squared == 0.0
+
+
+@given(SEEDS, st.integers(2, 6), st.booleans())
+@settings(max_examples=30, deadline=None)
+def test_the_least_greatest_excess_is_least(seed: int, count: int, own_starts: bool) -> None:
+    solution = some(seed, count, own_starts=own_starts)
+    weights, point = solution.encounter.weights, least_greatest_excess(solution)
+    excess = weights * solution.excess(point)
+    top = float(excess.max())
+    # Optimal where a mix of the slopes of those that bind vanishes: then no direction lowers them all.
+    bound = np.flatnonzero(excess > top * (1.0 - 1e-7))
+    slopes = np.array(
+        [weights[each] * solution.costs[each].matrix @ (point - solution.costs[each].ideal) for each in bound]
+    )
+    mixed = nearest_in_hull(slopes, np.zeros(3)) @ slopes
+    assert np.linalg.norm(mixed) <= 1e-6 * np.linalg.norm(slopes, axis=1).max()
+
+
+@given(SEEDS, st.integers(2, 5))
+@settings(max_examples=30, deadline=None)
+def test_the_nearest_point_of_a_hull(seed: int, count: int) -> None:
+    random = np.random.default_rng(seed)
+    points, target = random.normal(size=(count, 3)), 2.0 * random.normal(size=3)
+    weights = nearest_in_hull(points, target)
+    assert (weights >= 0.0).all()
+    assert weights.sum() == pytest.approx(1.0, rel=1e-13)
+    near = weights @ points
+    # The plane through the nearest point, across the way to the target, has the hull behind it.
+    assert ((points - near) @ (target - near) <= 1e-9 * (1.0 + np.abs(points).max() ** 2)).all()
+
+
+def test_nearest_in_hulls_that_are_no_bodies() -> None:
+    same = np.ones((4, 2))
+    assert nearest_in_hull(same, np.array([3.0, 0.0])) @ same == pytest.approx([1.0, 1.0])
+    assert nearest_in_hull(same, np.ones(2)) @ same == pytest.approx([1.0, 1.0])
+    line = np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0], [0.5, 0.5]])
+    assert nearest_in_hull(line, np.array([2.0, 0.0])) @ line == pytest.approx([1.0, 1.0])
+
+
+@pytest.mark.parametrize("own_starts", [False, True])
+def test_a_preferred_meeting_that_is_one_of_the_best_stays(own_starts: bool) -> None:
+    solution = some(11, 4, own_starts=own_starts)
+    spread = float(np.ptp(solution.ideals, axis=0).max())
+    np.testing.assert_allclose(nearest_to(solution, solution.point), solution.point, atol=1e-5 * spread)
+    far = solution.ideals[0] + 1e4 * (solution.ideals[0] - solution.point)
+    chosen = nearest_to(solution, far)
+    # It is one of the set: some weights make it best.
+    slopes = np.array([each.matrix @ (chosen - each.ideal) for each in solution.costs])
+    mixed = nearest_in_hull(slopes, np.zeros(3)) @ slopes
+    assert np.linalg.norm(mixed) <= 1e-6 * np.linalg.norm(slopes, axis=1).max()
+
+
+@given(SEEDS, st.integers(1, 5), st.booleans())
+@settings(max_examples=15, deadline=None)
+def test_coalitions_are_superadditive_and_shares_add_up(seed: int, count: int, own_starts: bool) -> None:
+    solution = some(seed, count, own_starts=own_starts)
+    found = analyse_coalitions(solution)
+    worth = {each.members: each.excess for each in found.coalitions}
+    size = worth[tuple(range(count))]
+    assert size == pytest.approx(float(solution.group_loss()), rel=1e-9, abs=1e-12)
+    for (one, first), (other, second) in product(worth.items(), worth.items()):
+        if not set(one) & set(other):
+            assert worth[tuple(sorted(one + other))] >= first + second - 1e-10 * size
+    assert found.shapley.sum() == pytest.approx(size, rel=1e-10, abs=1e-12)
+    assert found.transfers.sum() == pytest.approx(0.0, abs=1e-10 * (1.0 + size))
+    assert (found.core is Core.ZERO) == (count == 1)
+    assert found.core.reason
+    # The Shapley value as it is defined: mean of what each adds over all orders of joining.
+    added = np.zeros(count)
+    orders = list(permutations(range(count)))
+    for order in orders:
+        for place, member in enumerate(order):
+            joined, before = tuple(sorted(order[: place + 1])), tuple(sorted(order[:place]))
+            added[member] += (worth[joined] - worth.get(before, 0.0)) / len(orders)
+    np.testing.assert_allclose(found.shapley, added, rtol=1e-9, atol=1e-12)
+
+
+def test_regret_with_equal_weights_is_the_distance_from_the_coalitions_own_mean() -> None:
+    solution = some(4, 4)
+    craft = tuple(replace(each, weight=1.0) for each in solution.encounter.craft)
+    solution = solve_encounter(replace(solution.encounter, craft=craft))
+    matrix = solution.costs[0].matrix
+    for each in analyse_coalitions(solution).coalitions:
+        away = solution.point - solution.ideals[list(each.members)].mean(axis=0)
+        assert each.regret == pytest.approx(len(each.members) * away @ matrix @ away, rel=1e-9, abs=1e-12)
+
+
+def test_craft_that_agree_have_nothing_to_share() -> None:
+    solution = some(9, 1)
+    twins = tuple(replace(solution.encounter.craft[0], name=name) for name in ("a", "b"))
+    found = analyse_coalitions(solve_encounter(replace(solution.encounter, craft=twins)))
+    assert found.core is Core.ZERO
+    np.testing.assert_allclose(found.shapley, 0.0, atol=1e-12)
+
+
+def test_too_many_craft_for_coalitions() -> None:
+    with pytest.raises(ValueError, match="13 craft have 8191 coalitions"):
+        analyse_coalitions(some(0, 13))
+
+
+def test_peak_and_impulse_of_a_flight() -> None:
+    plan = some(6, 2).plan(0)
+    times = np.linspace(0.0, 600.0, 200_001)
+    sizes = np.linalg.norm(plan.control(times), axis=1)
+    assert peak_control(plan) == pytest.approx(sizes.max(), rel=1e-9)
+    assert total_impulse(plan) == pytest.approx(np.trapezoid(sizes, times), rel=1e-8)
+
+
+def test_the_least_peak_of_a_straight_line() -> None:
+    # Far from the orbit's own motion, along one axis: rest to rest over d in T needs 4 d / T^2, intercept 2 d / T^2.
+    motion = ClohessyWiltshire(1e-9, ORBITAL)
+    craft = (Craft("one", np.zeros(6), motion),)
+    fixed = np.array([10.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    at_rest = solve_encounter(Encounter(craft, 100.0, (Component.Y,), fixed))
+    plan = at_rest.plan(0, np.zeros(1))
+    assert least_peak(plan) == pytest.approx(4.0 * 10.0 / 100.0**2, rel=1e-4)
+    assert peak_control(plan) == pytest.approx(6.0 * 10.0 / 100.0**2, rel=1e-9)
+    passing = solve_encounter(Encounter(craft, 100.0, (Component.Y,), fixed, Meeting.INTERCEPT))
+    assert least_peak(passing.plan(0, np.zeros(1)), 3) == pytest.approx(2.0 * 10.0 / 100.0**2, rel=1e-6)
+
+
+def test_bounds_are_met_or_not() -> None:
+    plan = some(6, 2).plan(0)
+    peak, least = peak_control(plan), least_peak(plan)
+    assert least < peak
+    assert check_bound(plan, 1.001 * peak).feasibility is Feasibility.WITHIN
+    assert check_bound(plan, 0.5 * (peak + least)).feasibility is Feasibility.ANOTHER_CONTROL
+    check = check_bound(plan, 0.99 * least)
+    assert check.feasibility is Feasibility.IMPOSSIBLE
+    assert check.least_peak_m_s2 == pytest.approx(least)
+    with pytest.raises(ValueError, match="bound on the control"):
+        check_bound(plan, 0.0)
+
+
+def test_no_control_beats_the_least_peak() -> None:
+    # A bound of one component after another by a linear program's relaxation: |u| on 16 directions of a cone.
+    plan = some(8, 1, (Component.X,)).plan(0)
+    least = least_peak(plan)
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    times, weights = 300.0 * (1.0 + nodes), 300.0 * weights
+    motion = plan.craft.motion
+    effect = np.einsum("k,kai->kai", weights, motion.transition(times, np.full(60, 600.0))[:, :, 3:])
+    effect[:, :3] /= 600.0
+    achieved = np.einsum("kai,ki->a", effect, plan.control(times))
+    rows = effect.transpose(1, 0, 2).reshape(6, -1)
+
+    def smooth_peak(shift: Floats) -> float:
+        controls = (base + null @ shift).reshape(60, 3)
+        sizes = np.linalg.norm(controls, axis=1) / least
+        return float(np.log(np.mean(np.exp(60.0 * (sizes - sizes.max())))) / 60.0 + sizes.max())
+
+    base = np.linalg.lstsq(rows, achieved, rcond=None)[0]
+    null = np.linalg.svd(rows)[2][6:].T
+    found = minimize(smooth_peak, np.zeros(null.shape[1]), method="L-BFGS-B", options={"maxiter": 60}).x
+    assert np.linalg.norm((base + null @ found).reshape(60, 3), axis=1).max() >= least * (1.0 - 1e-6)
+
+
+def test_a_sweep_over_the_meeting_time() -> None:
+    solution = some(7, 3)
+    found = sweep_meeting_time(solution.encounter, [300.0, 600.0, 1200.0])
+    assert found.group_loss[1] == pytest.approx(float(solution.group_loss()), rel=1e-13)
+    np.testing.assert_allclose(found.points[1], solution.point, rtol=1e-12)
+    assert found.cost_squared.shape == found.ideal_cost_squared.shape == (3, 3)
+    assert (np.diff(found.group_loss) < 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"craft": ()}, "needs a craft"),
+        ({"free": ()}, "no component"),
+        ({"free": (Component.X, Component.X)}, "twice"),
+        ({"free": (Component.VX,), "meeting": Meeting.INTERCEPT}, "each craft's own"),
+        ({"fixed": np.array([np.nan] * 6)}, "finite"),
+        ({"meeting_s": np.inf}, "finite"),
+        ({"meeting_s": 0.0}, "must start before the meeting"),
+    ],
+)
+def test_unsound_encounters_are_refused(changes: dict[str, object], says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        some(0, 2, **changes)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"weight": -1.0}, "must be finite and not negative"),
+        ({"weight": np.inf}, "must be finite and not negative"),
+        ({"state": np.zeros(5)}, "six finite numbers"),
+        ({"name": "1"}, "two craft are called"),
+        ({"motion": ClohessyWiltshire(1e-3)}, "frame"),
+    ],
+)
+def test_unsound_craft_are_refused(changes: dict[str, object], says: str) -> None:
+    encounter = some(0, 2).encounter
+    craft = (replace(encounter.craft[0], **changes), encounter.craft[1])  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=says):
+        replace(encounter, craft=craft)
+
+
+def test_weights_must_not_all_be_zero() -> None:
+    encounter = some(0, 2).encounter
+    with pytest.raises(ValueError, match="all weights are zero"):
+        replace(encounter, craft=tuple(replace(each, weight=0.0) for each in encounter.craft))
+
+
+def test_overflow_is_told() -> None:
+    encounter = some(0, 1).encounter
+    craft = (replace(encounter.craft[0], motion=ClohessyWiltshire(1e-160, ORBITAL)),)
+    with pytest.raises(ValueError, match=r"overflows|singular"):
+        solve_encounter(replace(encounter, craft=craft))

@@ -1,0 +1,282 @@
+"""Barseghyan and Stepanyan (2008), section 3, at the rate of their text and at that of their arithmetic."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rendezvous.pareto import (
+    Component,
+    Core,
+    Craft,
+    Encounter,
+    EncounterSolution,
+    analyse_coalitions,
+    distances,
+    solve_encounter,
+)
+from rendezvous.relative_motion import ORBITAL, ClohessyWiltshire
+
+Floats = NDArray[np.float64]
+
+NINE_DIGITS = 1e-9
+STARTS = (
+    (0.0, 60.0, 80.0, -1.2328, -4.1115, 0.0369),
+    (40.0, -50.0, 60.0, -9.0613, 7.6229, 0.065),
+    (-10.0, -80.0, -30.0, -4.9545, -7.2583, -0.0841),
+)
+PLANE = (Component.Z, Component.Y)
+
+
+def solved(rate: float, free: tuple[Component, ...] = PLANE) -> EncounterSolution:
+    motion = ClohessyWiltshire(rate, ORBITAL)
+    craft = tuple(Craft(str(number), np.array(start), motion) for number, start in enumerate(STARTS, 1))
+    return solve_encounter(Encounter(craft, 30.0, free, np.zeros(6)))
+
+
+@dataclass(frozen=True)
+class Published:
+    """Numbers of the acceptance file; control coefficients of (1, t, cos, sin) a component."""
+
+    matrix: tuple[float, float]
+    ideal_cost: tuple[float, ...]
+    ideals: tuple[tuple[float, float], ...]
+    meeting: tuple[float, float]
+    cost: tuple[float, ...]
+    norm: float
+    constants: tuple[float, ...]
+
+
+STATED = Published(
+    (0.00044433382734868196, 0.00044485026472908484),
+    (0.7901642781355673, 8.534913129850537, 5.9364085496591095),
+    (
+        (80.55360965382751, -1.174016541433578),
+        (60.97519838200814, 67.41878755620706),
+        (-31.261759751178044, -187.01493562363027),
+    ),
+    (36.755682761552535, -40.25672153628559),
+    (2.3220013947895253, 13.953153416863753, 17.573235512747196),
+    18.58690436675526,
+    (3.6740080973558626, 12.208909867349611, 21.92910884880655),
+)
+COMPUTED = Published(
+    (0.0004443336598865096, 0.0004448508794367192),
+    (0.7901825370721238, 8.534741491481373, 5.936569084124324),
+    (
+        (80.55360981202425, -1.1735915207611503),
+        (60.97519867651114, 67.42102073157228),
+        (-31.261760141541178, -187.01344476333423),
+    ),
+    (36.755682782331405, -40.2553385175077),
+    (2.321986965723627, 13.953070257633685, 17.573394455903994),
+    18.586958566583483,
+    (3.674024837957454, 12.20887437025884, 21.929042670046957),
+)
+CASES = {0.001176: STATED, 0.00117689: COMPUTED}
+# Positions and velocities at t = 10 and 20 s at the rate of the paper's arithmetic, interleaved (x, x', y, y', z, z').
+FLIGHTS = {
+    (0, 10.0): (
+        -5.344378630577603,
+        0.013521524754778191,
+        15.802417722794061,
+        -4.449052881135596,
+        68.95260571078214,
+        -1.9219780916348208,
+    ),
+    (0, 20.0): (
+        -2.604342491850879,
+        0.39745986646977705,
+        -23.332482073659392,
+        -3.0920805193045364,
+        48.04908805571231,
+        -1.9342791900586358,
+    ),
+    (1, 10.0): (
+        -10.276450851110589,
+        -1.7409093476457942,
+        -13.264853633331455,
+        0.465885893979185,
+        54.26264396869938,
+        -1.0330847498586664,
+    ),
+    (1, 20.0): (
+        -9.397173511124777,
+        1.206018561096732,
+        -25.514061461941964,
+        -2.1407908378752687,
+        42.92639184401269,
+        -1.0547533862436296,
+    ),
+    (2, 10.0): (
+        -29.945201357854685,
+        0.39287627880331577,
+        -101.65627844448937,
+        1.7964780831553515,
+        -13.066901424629432,
+        2.966931895642457,
+    ),
+    (2, 20.0): (
+        -14.118265907336237,
+        2.1477246717852667,
+        -66.38858359020409,
+        4.155996128237325,
+        19.26189163345096,
+        2.9949678196780387,
+    ),
+}
+# The printed table of positions, five digits.
+PRINTED = {
+    (0, 10.0): (-5.34422, 15.8021, 68.9528),
+    (0, 20.0): (-2.60426, -23.3328, 48.0493),
+    (1, 10.0): (-10.2766, -13.265, 54.2627),
+    (1, 20.0): (-9.39724, -25.5143, 42.9265),
+    (2, 10.0): (-29.9452, -101.657, -13.0669),
+    (2, 20.0): (-14.1183, -66.3889, 19.262),
+}
+# Control coefficients of (1, t, cos w t, sin w t), craft by component.
+CONTROLS = {
+    0.001176: (
+        (
+            (28.99869280829192, 0.02658358248995661, -28.818612429684418, -30.380622757457175),
+            (15.070058100882433, 0.0, -15.190311378728587, 14.409306214842209),
+            (0.0, 0.0, -0.29309244971541193, 16.548344225429158),
+        ),
+        (
+            (78.69628535911619, 0.12425428683514336, -77.75633820550163, -142.79322670839633),
+            (70.43893811516064, 0.0, -71.39661335419817, 38.87816910275082),
+            (0.0, 0.0, -0.1635386618783952, 9.150903880875209),
+        ),
+        (
+            (-113.24397486036332, 0.115816870759409, 113.96493561208618, -128.84213557465927),
+            (65.65582242596882, 0.0, -64.42106778732963, -56.98246780604309),
+            (0.0, 0.0, 0.4561903347920312, -25.69926366336498),
+        ),
+    ),
+    0.00117689: (
+        (
+            (28.97559229502432, 0.02658503612149108, -28.795500256000594, -30.35945853732769),
+            (15.059485095741646, 0.0, -15.179729268663845, 14.397750128000297),
+            (0.0, 0.0, -0.293092263348778, 16.535823627156713),
+        ),
+        (
+            (78.63548264570474, 0.12425149452554692, -77.69553691182203, -142.68351805886527),
+            (70.38408830366299, 0.0, -71.34175902943264, 38.847768455911016),
+            (0.0, 0.0, -0.16353852529358787, 9.143980237751709),
+        ),
+        (
+            (-113.16010667337771, 0.11581942452631913, 113.8810623774689, -128.74570475763178),
+            (65.60761811572259, 0.0, -64.37285237881589, -56.94053118873445),
+            (0.0, 0.0, 0.45619024274255504, -25.679819425596676),
+        ),
+    ),
+}
+
+
+@pytest.mark.parametrize("rate", CASES)
+def test_costs_ideals_and_meeting(rate: float) -> None:
+    solution, expected = solved(rate), CASES[rate]
+    for cost in solution.costs:
+        np.testing.assert_allclose(np.diag(cost.matrix), expected.matrix, rtol=NINE_DIGITS)
+        assert abs(cost.matrix[0, 1]) < 1e-18
+    np.testing.assert_allclose(
+        [each.ideal_cost_squared for each in solution.costs], expected.ideal_cost, rtol=NINE_DIGITS
+    )
+    np.testing.assert_allclose(solution.ideals, expected.ideals, rtol=NINE_DIGITS)
+    np.testing.assert_allclose(solution.point, expected.meeting, rtol=NINE_DIGITS)
+    np.testing.assert_allclose(solution.cost_squared(), expected.cost, rtol=NINE_DIGITS)
+    np.testing.assert_allclose(solution.group_loss(), expected.norm, rtol=NINE_DIGITS)
+    # (3.1): J^2 = a alpha^2 + b alpha + c beta^2 + d beta + constant.
+    np.testing.assert_allclose(solution.cost_squared(np.zeros(2)), expected.constants, rtol=NINE_DIGITS)
+    meeting = solution.meeting_state()
+    np.testing.assert_allclose(
+        meeting, [0.0, expected.meeting[1], expected.meeting[0], 0.0, 0.0, 0.0], rtol=NINE_DIGITS
+    )
+
+
+@pytest.mark.parametrize(("craft", "time"), FLIGHTS)
+def test_flights(craft: int, time: float) -> None:
+    state = solved(0.00117689).plan(craft).state(time)
+    np.testing.assert_allclose(state[[0, 3, 1, 4, 2, 5]], FLIGHTS[craft, time], rtol=NINE_DIGITS)
+    # The printed positions: their last digits are rounded from arithmetic that loses some.
+    np.testing.assert_allclose(state[:3], PRINTED[craft, time], rtol=3e-5, atol=4e-4)
+
+
+@pytest.mark.parametrize("rate", CASES)
+@pytest.mark.parametrize("craft", [0, 1, 2])
+def test_all_meet_where_they_should(rate: float, craft: int) -> None:
+    solution = solved(rate)
+    plan = solution.plan(craft)
+    assert plan.state(0.0) == pytest.approx(np.array(STARTS[craft]), abs=1e-13)
+    assert plan.state(30.0) == pytest.approx(solution.meeting_state(), abs=1e-11)
+
+
+@pytest.mark.parametrize("rate", CASES)
+def test_controls_as_trigonometric_sums(rate: float) -> None:
+    # The coefficients cancel to the control: their own error, 1e-15 of 100, bounds what can be compared.
+    solution, times = solved(rate), np.linspace(0.0, 30.0, 13)
+    basis = np.stack([np.ones(13), times, np.cos(rate * times), np.sin(rate * times)])
+    for craft, components in enumerate(CONTROLS[rate]):
+        expected = (np.array(components) @ basis).T
+        np.testing.assert_allclose(solution.plan(craft).control(times), expected, rtol=0.0, atol=1e-9)
+
+
+def test_a_printed_control_with_three_digits_misses_the_meeting() -> None:
+    # Theory: the paper's 3-digit coefficients miss by up to 4 m; so controls are never given as coefficients.
+    solution, rate = solved(0.00117689), 0.00117689
+    motion = ClohessyWiltshire(rate, ORBITAL)
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    times = 15.0 * (1.0 + nodes)
+    printed = np.array(
+        [
+            [(28.98, 0.027, -28.795, -30.359), (15.059, 0, -15.179, 14.398), (0, 0, -0.293, 16.536)],
+            [(78.636, 0.124, -77.696, -142.684), (70.384, 0, -71.342, 38.848), (0, 0, -0.164, 9.144)],
+            [(-113.16, 0.116, 113.881, -128.746), (65.608, 0, -64.373, -56.941), (0, 0, 0.456, -25.68)],
+        ]
+    )
+    basis = np.stack([np.ones(40), times, np.cos(rate * times), np.sin(rate * times)])
+    reach = motion.transition(times, np.full(40, 30.0))[:, :, 3:]
+    missed = [
+        motion.transition(0.0, 30.0) @ np.array(STARTS[craft])
+        + 15.0 * np.einsum("k,kai,ki->a", weights, reach, (printed[craft] @ basis).T)
+        - solution.meeting_state()
+        for craft in range(3)
+    ]
+    greatest = max(float(np.linalg.norm(each[:3])) for each in missed)
+    assert 1.0 < greatest < 5.0
+
+
+def test_a_free_position() -> None:
+    solution = solved(0.001176, (Component.X, Component.Y, Component.Z))
+    position = [-66.65262761541355, -40.25745249455223, 36.755682761552535]
+    np.testing.assert_allclose(solution.point, position, rtol=NINE_DIGITS)
+    np.testing.assert_allclose(
+        solution.cost_squared(), [3.1155874056460897, 10.406777978846758, 14.401611908995068], rtol=NINE_DIGITS
+    )
+    np.testing.assert_allclose(
+        [each.ideal_cost_squared for each in solution.costs],
+        [0.6135294694527276, 4.675869285891647, 2.5834535211007577],
+        rtol=NINE_DIGITS,
+    )
+    expected = np.diag([0.00044451817606285535, 0.00044485026472908484, 0.00044433382734868196])
+    expected[0, 1] = expected[1, 0] = -4.878532025781595e-09
+    np.testing.assert_allclose(solution.costs[0].matrix, expected, rtol=NINE_DIGITS, atol=1e-18)
+
+
+def test_coalitions() -> None:
+    # Theory: c(12), c(13), c(23) and the Shapley value of the paper's case.
+    solution = solved(0.001176)
+    found = analyse_coalitions(solution)
+    by_members = {each.members: each for each in found.coalitions}
+    assert by_members[0, 1].excess == pytest.approx(1.131663922, rel=NINE_DIGITS)
+    assert by_members[0, 2].excess == pytest.approx(10.45954394, rel=NINE_DIGITS)
+    assert by_members[1, 2].excess == pytest.approx(16.28914869, rel=NINE_DIGITS)
+    np.testing.assert_allclose(found.shapley, [2.697786535, 5.612588912, 10.27652892], rtol=NINE_DIGITS)
+    assert found.core is Core.EMPTY
+    between = distances(solution)
+    for pair in ((0, 1), (0, 2), (1, 2)):
+        assert by_members[pair].excess == pytest.approx(between[pair] ** 2 / 2.0, rel=1e-13)
+    assert by_members[0, 1, 2].regret == pytest.approx(0.0, abs=1e-13)
