@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,4 +102,4 @@ def perigee_m(position_m: Floats, velocity_m_s: Floats, gravitational_parameter_
     momentum_squared = float((position_m @ position_m) * (velocity_m_s @ velocity_m_s)) - inward * inward
     latus_rectum = max(0.0, momentum_squared) / gravitational_parameter_m3_s2
     axis = semi_major_axis_m(position_m, velocity_m_s, gravitational_parameter_m3_s2)
-    return latus_rectum / (1.0 + np.sqrt(max(0.0, 1.0 - latus_rectum / axis)))
+    return latus_rectum / (1.0 + math.sqrt(max(0.0, 1.0 - latus_rectum / axis)))
