@@ -1,0 +1,52 @@
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rendezvous.multipoint import DriftingTargets, Meet, Target, Tour
+from rendezvous.relative_motion import ClohessyWiltshire, LinearMotion
+
+Floats = NDArray[np.float64]
+
+RATE = 1.13e-3
+# T1 to T3 of the acceptance, then three more: (x, y, z, x', -2 n x, z') at t = 0.
+TARGETS = np.array(
+    [
+        [100.0, 2000.0, 50.0, 0.05, -2 * RATE * 100.0, 0.02],
+        [-150.0, 3500.0, -80.0, -0.10, 2 * RATE * 150.0, 0.05],
+        [200.0, 5000.0, 0.0, 0.0, -2 * RATE * 200.0, -0.10],
+        [-300.0, 1000.0, 100.0, 0.0, 2 * RATE * 300.0, 0.03],
+        [250.0, -1500.0, -40.0, 0.02, -2 * RATE * 250.0, 0.0],
+        [50.0, 2500.0, -140.0, 0.02, -2 * RATE * 50.0, 0.0],
+    ]
+)
+
+
+class Tours:
+    """Makes tours of the first few targets."""
+
+    def __call__(
+        self,
+        count: int,
+        meets: Sequence[Meet] | None = None,
+        dwell_s: Sequence[float] | None = None,
+        motion: LinearMotion | None = None,
+        initial: Floats | None = None,
+    ) -> Tour:
+        meets = meets or [Meet.FLYBY] * count
+        dwell_s = dwell_s or [0.0] * count
+        motion = motion or ClohessyWiltshire(RATE)
+        targets = tuple(
+            Target(f"T{number}", meet, dwell)
+            for number, (meet, dwell) in enumerate(zip(meets, dwell_s, strict=True), 1)
+        )
+        states = TARGETS[:count] if initial is None else initial
+        return Tour(motion, DriftingTargets(targets, motion, states), np.zeros(6))
+
+
+@pytest.fixture(scope="session")
+def tours() -> Tours:
+    return Tours()

@@ -1,0 +1,238 @@
+"""Independent proof on random problems: a quadratic program, integration, finite differences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import clarabel
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+from scipy.sparse import csc_matrix
+
+from rendezvous.multipoint import DriftingTargets, Meet, Nodes, Target, Tour, solve_dense, solve_segments
+from rendezvous.relative_motion import (
+    ClohessyWiltshire,
+    EllipticOrbit,
+    LinearMotion,
+    TimeVaryingMotion,
+    TschaunerHempel,
+)
+
+Floats = NDArray[np.float64]
+
+RATE = 1.13e-3
+NODES = 20
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def drifting() -> TimeVaryingMotion:
+    """A circular orbit with a push that varies."""
+
+    def push(times: Floats) -> Floats:
+        zeros = np.zeros((len(times), 3))
+        return np.column_stack(
+            [zeros, 1e-4 * np.sin(RATE * times), 2e-5 * np.cos(RATE * times), 1e-5 * np.ones(len(times))]
+        )
+
+    return TimeVaryingMotion(ClohessyWiltshire(RATE).dynamics, drift_at=push)
+
+
+MOTIONS: dict[str, Callable[[], LinearMotion]] = {
+    "circular": lambda: ClohessyWiltshire(RATE),
+    "elliptic": lambda: TschaunerHempel(EllipticOrbit(RATE, 0.3, 0.7)),
+    "drifting": drifting,
+}
+
+
+def some_tour(seed: int, motion: LinearMotion, *, dwell: bool = False, flybys: bool = False) -> tuple[Tour, Floats]:
+    """A random tour, and times."""
+    random = np.random.default_rng(seed)
+    count = int(random.integers(1, 6))
+    meets = [Meet.RENDEZVOUS if random.random() < 0.4 and not flybys else Meet.FLYBY for _ in range(count)]
+    targets = tuple(
+        Target(str(index), meet, float(random.uniform(50.0, 300.0)) if dwell and meet is Meet.RENDEZVOUS else 0.0)
+        for index, meet in enumerate(meets)
+    )
+    states = random.normal(size=(count, 6)) * np.array([500.0, 2000.0, 200.0, 0.3, 0.5, 0.2])
+    gaps = random.uniform(300.0, 2500.0, size=count)
+    stays = np.array([each.dwell_s for each in targets])
+    times = 100.0 + np.cumsum(gaps) + np.concatenate([[0.0], np.cumsum(stays[:-1])])
+    start = random.normal(size=6) * np.array([100.0, 100.0, 100.0, 0.1, 0.1, 0.1])
+    return Tour(motion, DriftingTargets(targets, motion, states), start, 100.0), times
+
+
+def flown(tour: Tour, times: Floats) -> tuple[Floats, float]:
+    """Greatest miss of the nodes in units of the segments, and the cost, by DOP853 under the computed control."""
+    path = tour.fly(range(len(times)), times)
+    worst, spent = 0.0, 0.0
+    for index, (start, end) in enumerate(zip(path.starts_s, path.nodes.arrive_s, strict=True)):
+        ahead = path.costate_before[index]
+
+        def rates(time: float, values: Floats) -> Floats:
+            # The costate comes along, integrated backward from its end beforehand: here forward from its start.
+            state, costate = values[:6], values[6:12]
+            matrix, inputs = tour.motion.dynamics(time), tour.motion.input_map(time)
+            control = inputs.T @ costate
+            moved = matrix @ state + inputs @ control + tour.motion.forcing(time)
+            return np.concatenate([moved, -matrix.T @ costate, [0.5 * control @ control]])
+
+        scale = np.array([end - start] * 3 + [1.0] * 3)
+        begin = np.concatenate([path.start_states[index], path.costate(np.array([start]))[0], [0.0]])
+        found = solve_ivp(rates, (start, end), begin, method="DOP853", rtol=1e-12, atol=1e-18).y[:, -1]
+        wanted = 3 if not path.nodes.rendezvous[index] else 6
+        size = np.abs(np.concatenate([path.start_states[index], path.arrival_states[index]]) / np.tile(scale, 2)).max()
+        worst = max(worst, float(np.abs((found[:6] - path.nodes.arrive[index]) / scale)[:wanted].max() / size))
+        worst = max(worst, float(np.abs((found[:6] - path.arrival_states[index]) / scale).max() / size))
+        assert found[6:12] == pytest.approx(ahead, rel=1e-6, abs=1e-8 * float(np.abs(ahead).max()))
+        spent += float(found[12])
+    return np.array(worst), spent
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+@given(SEEDS)
+@settings(max_examples=4, deadline=None)
+def test_flying_the_control_passes_the_nodes_at_the_cost(name: str, seed: int) -> None:
+    tour, times = some_tour(seed, MOTIONS[name](), dwell=True)
+    missed, spent = flown(tour, times)
+    assert missed < 1e-8
+    assert spent == pytest.approx(tour.fly(range(len(times)), times).cost, rel=1e-8)
+
+
+def quadratic_program(tour: Tour, times: Floats) -> float:
+    """Least cost over controls at Gauss points, by clarabel; the transition from a plain matrix exponential."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    matrix = tour.motion.dynamics(0.0)
+    which = np.arange(len(times))
+    goals = tour.targets.states(which, times)
+    met = [each.meet is Meet.RENDEZVOUS for each in tour.targets.targets]
+    starts = np.concatenate([[tour.start_s], times[:-1]])
+    size = 3 * NODES
+    rows, right = [], []
+    longest = float((times - starts).max())
+    scale = np.array([longest] * 3 + [1.0] * 3)
+    for index, end in enumerate(times):
+        row = np.zeros((6, size * len(times)))
+        for segment in range(index + 1):
+            half = 0.5 * (times[segment] - starts[segment])
+            at = starts[segment] + half * (1.0 + nodes)
+            effect = [
+                expm(matrix * (end - time))[:, 3:] * np.sqrt(half * weight / longest)
+                for time, weight in zip(at, weights, strict=True)
+            ]
+            row[:, segment * size : (segment + 1) * size] = np.concatenate(effect, axis=1)
+        missing = goals[index] - expm(matrix * (end - tour.start_s)) @ tour.start_state
+        wanted = 6 if met[index] else 3
+        rows.append((row / scale[:, None])[:wanted])
+        right.append((missing / scale)[:wanted])
+    system, goal = np.concatenate(rows), np.concatenate(right)
+    goal_size = float(np.abs(goal).max())
+    options = clarabel.DefaultSettings()
+    options.verbose = False
+    options.tol_gap_abs = options.tol_gap_rel = options.tol_feas = 1e-13
+    count = system.shape[1]
+    solver = clarabel.DefaultSolver(
+        csc_matrix(np.eye(count)), np.zeros(count), csc_matrix(system), goal / goal_size,
+        [clarabel.ZeroConeT(len(goal))], options,
+    )  # fmt: skip
+    found = np.array(solver.solve().x)
+    return 0.5 * float(found @ found) * goal_size**2 / longest
+
+
+@given(SEEDS)
+@settings(max_examples=12, deadline=None)
+def test_a_discretised_quadratic_program_agrees(seed: int) -> None:
+    tour, times = some_tour(seed, ClohessyWiltshire(RATE))
+    cost = tour.fly(range(len(times)), times).cost
+    assert quadratic_program(tour, times) == pytest.approx(cost, rel=1e-8)
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+@given(SEEDS)
+@settings(max_examples=3, deadline=None)
+def test_time_gradients_against_finite_differences(name: str, seed: int) -> None:
+    tour, times = some_tour(seed, MOTIONS[name](), dwell=True)
+    order = range(len(times))
+    path = tour.fly(order, times)
+    size = float(np.abs(path.time_gradient).max())
+    for index in range(len(times)):
+        # Fourth order in the step: the truncation and the rounding are both below the 1e-6 asked for.
+        way = np.zeros(len(times))
+        way[index] = step = 0.02 * float(np.diff(np.concatenate([[tour.start_s], times])).min())
+        values = {factor: tour.fly(order, times + factor * way / 4.0).cost for factor in (-2, -1, 1, 2)}
+        near, far = (values[1] - values[-1]) / (0.5 * step), (values[2] - values[-2]) / step
+        assert (4.0 * near - far) / 3.0 == pytest.approx(path.time_gradient[index], rel=1e-6, abs=1e-6 * size)
+
+
+@given(SEEDS)
+@settings(max_examples=10, deadline=None)
+def test_jumps_are_the_sensitivity_to_the_targets(seed: int) -> None:
+    tour, times = some_tour(seed, ClohessyWiltshire(RATE))
+    path = tour.fly(range(len(times)), times)
+    for index in range(len(times)):
+        for axis in range(6 if path.nodes.rendezvous[index] else 3):
+            step = (10.0, 10.0, 10.0, 0.01, 0.01, 0.01)[axis]
+            costs = []
+            for side in (-1.0, 1.0):
+                moved = path.nodes.arrive.copy()
+                moved[index, axis] += side * step
+                nodes = replace(path.nodes, arrive=moved, leave=moved)
+                costs.append(solve_segments(tour.motion, tour.start_s, tour.start_state, nodes).cost)
+            # The cost is quadratic in a target's state: the central difference is exact.
+            size = float(np.abs(path.jumps[:, axis]).max())
+            assert (costs[1] - costs[0]) / (2.0 * step) == pytest.approx(
+                path.jumps[index, axis], rel=1e-6, abs=1e-6 * size
+            )
+
+
+@pytest.mark.parametrize("name", ["circular", "elliptic"])
+@given(SEEDS)
+@settings(max_examples=10, deadline=None)
+def test_the_papers_dense_system_agrees(name: str, seed: int) -> None:
+    tour, times = some_tour(seed, MOTIONS[name](), flybys=True)
+    path = tour.fly(range(len(times)), times)
+    dense = solve_dense(tour.motion, tour.start_s, tour.start_state, path.nodes)
+    assert dense.cost == pytest.approx(path.cost, rel=1e-8)
+    size = np.abs(path.jumps[:, :3]).max()
+    np.testing.assert_allclose(dense.jumps, path.jumps[:, :3], rtol=0.0, atol=1e-7 * size)
+
+
+def test_the_dense_system_knows_no_rendezvous() -> None:
+    tour, times = some_tour(0, ClohessyWiltshire(RATE))
+    path = tour.fly(range(len(times)), times)
+    nodes = replace(path.nodes, rendezvous=np.ones(len(times), dtype=bool))
+    with pytest.raises(ValueError, match="flybys only"):
+        solve_dense(tour.motion, tour.start_s, tour.start_state, nodes)
+
+
+def test_many_nodes_and_the_dense_system() -> None:
+    # The theory: the dense system's condition number is 1e13 at N = 100; ours does not care.
+    motion, random = ClohessyWiltshire(RATE), np.random.default_rng(0)
+    times = 150.0 * np.arange(1.0, 101.0)
+    states = 100.0 * random.normal(size=(100, 6))
+    nodes = Nodes(times, times, states, states, states, states, np.zeros(100, dtype=bool))
+    path = solve_segments(motion, 0.0, np.zeros(6), nodes)
+    dense = solve_dense(motion, 0.0, np.zeros(6), nodes)
+    assert np.linalg.cond(dense.matrix) > 1e8
+    assert dense.cost == pytest.approx(path.cost, rel=1e-6)
+
+
+def test_states_and_costates_along_a_path(tours: Callable[..., Tour]) -> None:
+    meets, stays = [Meet.FLYBY, Meet.RENDEZVOUS, Meet.FLYBY], [0.0, 400.0, 0.0]
+    path = tours(3, meets, stays).fly((0, 1, 2), [1200.0, 2600.0, 4000.0])
+    staying = np.array([2600.0, 2700.0, 2999.0])
+    target = path.motion.transition(np.full(3, 2600.0), staying) @ path.nodes.arrive[1]
+    np.testing.assert_allclose(path.state(staying), target, rtol=1e-12)
+    assert not path.control(staying).any()
+    mixed = np.array([3500.0, 0.0, 2800.0, 4000.0, 600.0, 1200.0])
+    one_by_one = np.concatenate([path.state(mixed[each : each + 1]) for each in range(6)])
+    np.testing.assert_allclose(path.state(mixed), one_by_one, rtol=1e-10, atol=1e-9)
+    np.testing.assert_allclose(path.costate(np.array([0.0]))[0], path.costate_start, rtol=1e-13)
+    np.testing.assert_allclose(path.state(np.array([4000.0]))[0], path.arrival_states[2], rtol=1e-10)
+    # At the end of a path that ends in a flyby nothing pushes any more.
+    assert np.abs(path.control(np.array([4000.0]))).max() < 1e-12

@@ -1,0 +1,152 @@
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rendezvous.multipoint import (
+    DriftingTargets,
+    Meet,
+    Target,
+    TimeLimits,
+    Tour,
+    best_order,
+    best_order_of_slots,
+    best_times,
+)
+from rendezvous.relative_motion import ClohessyWiltshire
+
+Floats = NDArray[np.float64]
+Make = Callable[..., Tour]
+
+
+def by_brute_force(tour: Tour, limits: TimeLimits) -> float:
+    count = len(tour.targets.targets)
+    return min(best_times(tour, order, limits).objective for order in itertools.permutations(range(count)))
+
+
+def random_tour(seed: int, count: int, share: float) -> Tour:
+    random, motion = np.random.default_rng(seed), ClohessyWiltshire(1.1e-3)
+    targets = tuple(
+        Target(str(index), Meet.RENDEZVOUS if random.random() < share else Meet.FLYBY) for index in range(count)
+    )
+    states = random.normal(size=(count, 6)) * np.array([300.0, 3000.0, 150.0, 0.1, 0.3, 0.1])
+    states[:, 4] = -2.0 * 1.1e-3 * states[:, 0]
+    return Tour(motion, DriftingTargets(targets, motion, states), np.zeros(6))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_branch_and_bound_finds_what_brute_force_finds(seed: int) -> None:
+    tour, limits = random_tour(seed, 3, 0.3), TimeLimits(latest_s=5000.0)
+    found = best_order(tour, limits)
+    assert found.objective == pytest.approx(by_brute_force(tour, limits), rel=1e-7)
+    assert sorted(found.order) == [0, 1, 2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "count"), [(0, 4), (1, 4), (2, 5), (3, 5), (4, 6)])
+def test_branch_and_bound_finds_what_brute_force_finds_of_more(seed: int, count: int) -> None:
+    tour, limits = random_tour(seed, count, 0.3), TimeLimits(latest_s=1500.0 * count)
+    found = best_order(tour, limits)
+    assert found.objective <= by_brute_force(tour, limits) * (1.0 + 1e-7)
+
+
+@pytest.mark.parametrize("count", [2, 4, 5, 6])
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+def test_orders_of_slots_against_brute_force(count: int, share: float) -> None:
+    # With rendezvous everywhere this is dynamic programming, else branch and bound.
+    tour, slots = random_tour(10 + count, count, share), 1200.0 * np.arange(1.0, count + 1.0)
+    found = best_order_of_slots(tour, slots)
+    costs = {order: tour.fly(order, slots).cost for order in itertools.permutations(range(count))}
+    assert found.objective == pytest.approx(min(costs.values()), rel=1e-12)
+    assert costs[found.order] == pytest.approx(min(costs.values()), rel=1e-12)
+    if share == 1.0:
+        assert found.nodes == count  # what dynamic programming compares at its end
+
+
+def test_bounds_leave_orders_unseen(tours: Make) -> None:
+    found = best_order_of_slots(tours(6), 1000.0 * np.arange(1.0, 7.0))
+    beginnings = sum(len(list(itertools.permutations(range(6), size))) for size in range(1, 7))
+    assert found.nodes < 0.25 * beginnings
+
+
+def test_gaps_and_stays_are_kept(tours: Make) -> None:
+    meets = [Meet.FLYBY, Meet.RENDEZVOUS, Meet.FLYBY]
+    tour = tours(3, meets, [0.0, 500.0, 0.0])
+    found = best_times(tour, (0, 1, 2), TimeLimits(latest_s=4500.0, least_gap_s=1300.0))
+    times, leave = found.time_s, found.path.nodes.leave_s
+    gaps = np.diff(np.concatenate([[0.0], times])) - np.array([0.0, 0.0, 500.0])
+    assert (gaps >= 1300.0 * (1.0 - 1e-9)).all()
+    assert times[-1] <= 4500.0 * (1.0 + 1e-12)
+    assert leave[1] == pytest.approx(times[1] + 500.0)
+    free = best_times(tour, (0, 1, 2), TimeLimits(latest_s=4500.0)).objective
+    assert found.objective >= free * (1.0 - 1e-9)
+
+
+def test_at_best_times_every_slope_that_may_vanish_does(tours: Make) -> None:
+    path = best_times(tours(4), (3, 0, 2, 1), TimeLimits(latest_s=6000.0)).path
+    scale = path.cost / 6000.0
+    assert np.abs(path.time_gradient[:-1]).max() < 1e-8 * scale
+    assert path.time_gradient[-1] < 0.0
+    assert path.nodes.arrive_s[-1] == pytest.approx(6000.0, rel=1e-12)
+
+
+def test_progress_is_told(tours: Make) -> None:
+    told: list[float] = []
+    best_order_of_slots(tours(4), 900.0 * np.arange(1.0, 5.0), progress=told.append)
+    assert told == sorted(told)
+    assert told[-1] == pytest.approx(1.0)
+    told.clear()
+    best_times(tours(2), (0, 1), TimeLimits(latest_s=3000.0), progress=told.append)
+    assert told[-1] == pytest.approx(1.0)
+
+
+def test_a_free_last_time_needs_a_limit_or_a_price() -> None:
+    with pytest.raises(ValueError, match="falls to zero as it grows, so there is no best"):
+        TimeLimits()
+
+
+@pytest.mark.parametrize("changes", [{"least_gap_s": -1.0}, {"price_per_s": np.nan}, {"latest_s": np.inf}])
+def test_unsound_limits_are_refused(changes: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="finite"):
+        TimeLimits(**{"latest_s": 100.0, **changes})
+
+
+def test_visits_that_do_not_fit_are_refused(tours: Make) -> None:
+    with pytest.raises(ValueError, match="do not fit before the latest time, 1000 s"):
+        best_times(tours(3), (0, 1, 2), TimeLimits(latest_s=1000.0, least_gap_s=400.0))
+    with pytest.raises(ValueError, match="do not fit"):
+        best_order(tours(2), TimeLimits(latest_s=-5.0))
+
+
+def test_unsound_visits_are_refused(tours: Make) -> None:
+    with pytest.raises(ValueError, match="times must increase: visit 2 is at 500 s"):
+        tours(2).fly((0, 1), [500.0, 500.0])
+    with pytest.raises(ValueError, match="times must increase: visit 1 is at -5 s"):
+        tours(1).fly((0,), [-5.0])
+    with pytest.raises(ValueError, match="visited twice"):
+        tours(2).fly((0, 0), [500.0, 900.0])
+    with pytest.raises(ValueError, match="need 2 times"):
+        tours(2).fly((0, 1), [500.0])
+    with pytest.raises(ValueError, match="not finite"):
+        tours(2).fly((0, 1), [500.0, np.nan])
+    with pytest.raises(ValueError, match="listed twice"):
+        DriftingTargets((Target("a"), Target("a")), ClohessyWiltshire(1e-3), np.zeros((2, 6)))
+    with pytest.raises(ValueError, match="no target"):
+        DriftingTargets((), ClohessyWiltshire(1e-3), np.zeros((0, 6)))
+    with pytest.raises(ValueError, match="six finite numbers"):
+        DriftingTargets((Target("a"),), ClohessyWiltshire(1e-3), np.full((1, 6), np.inf))
+    with pytest.raises(ValueError, match="a flyby cannot dwell"):
+        Target("a", Meet.FLYBY, 5.0)
+    with pytest.raises(ValueError, match="dwell must be finite"):
+        Target("a", Meet.RENDEZVOUS, -5.0)
+    with pytest.raises(ValueError, match="need 2 times"):
+        best_order_of_slots(tours(2), [500.0])
+
+
+def test_too_many_targets_for_a_search() -> None:
+    with pytest.raises(ValueError, match="10 targets have 3628800 orders"):
+        best_order(random_tour(0, 10, 0.0), TimeLimits(latest_s=1e4))
