@@ -93,6 +93,8 @@ class PursuitTables(Table):
     )
     equatorial_radius_km: Positive | None = key("that j2 refers to", "6378.1363", default=None)
     capture_radius_km: NotNegative = key("distance that counts as capture; 0 for a point", "1.0", default=ZERO)
-    longest_s: Positive | None = key("how long the game is looked at", "200000.0", default=None)
+    longest_s: Positive | None = key(
+        "how long the game is looked at; 15 revolutions by default", "200000.0", default=None
+    )
     pursuer: PlayerTable = key("who hastens the capture", "")
     evader: PlayerTable = key("who delays it", "")

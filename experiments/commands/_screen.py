@@ -59,7 +59,7 @@ def tell_of_compiling_pursuit(quiet: bool) -> None:
     from rendezvous.pursuit_evasion import _extremal
 
     if not quiet and not _stored(_extremal.flow_kernel, Path(_extremal.__file__ or "")):
-        typer.echo("compiling the kernels, once (about ten seconds) ...", err=True)
+        typer.echo("compiling the kernels, once (about five seconds) ...", err=True)
 
 
 def tell_of_compiling_rendezvous(quiet: bool) -> None:
@@ -69,7 +69,7 @@ def tell_of_compiling_rendezvous(quiet: bool) -> None:
 
     kernels = ((_circular, _circular.fill_gramians), (_path, _path.solve_path))
     if not quiet and not all(_stored(kernel, Path(module.__file__ or "")) for module, kernel in kernels):
-        typer.echo("compiling the kernels, once (about ten seconds) ...", err=True)
+        typer.echo("compiling the kernels, once (about five seconds) ...", err=True)
 
 
 def _stored(kernel: object, source: Path) -> bool:

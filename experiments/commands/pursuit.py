@@ -250,23 +250,27 @@ def _fly(
     quiet: bool,
 ) -> Feedback | None:
     from experiments.commands._screen import progress_bar, say
-    from rendezvous.pursuit_evasion import Observation, fly_many
+    from experiments.errors import InputError
+    from rendezvous.pursuit_evasion import Observation, PathError, fly_many
 
     if solution.capture is None:
         say(f"no feedback: a game that ends as {solution.verdict.value} gives no plan to begin with", quiet)
         return None
     seen = Observation(delay_s, position_noise_m, velocity_noise_m_s)
     with progress_bar(quiet) as begin:
-        flights = fly_many(
-            problem.game(),
-            steerings,
-            runs,
-            replan_s=replan_s,
-            observation=seen,
-            seed=seed,
-            progress=begin("feedback"),
-            solution=solution,
-        )
+        try:
+            flights = fly_many(
+                problem.game(),
+                steerings,
+                runs,
+                replan_s=replan_s,
+                observation=seen,
+                seed=seed,
+                progress=begin("feedback"),
+                solution=solution,
+            )
+        except PathError as error:
+            raise InputError(f"--feedback: {error}; choose another policy, or check the units of the problem") from None
     return Feedback(policy, replan_s, delay_s, position_noise_m, velocity_noise_m_s, seed, tuple(flights))
 
 

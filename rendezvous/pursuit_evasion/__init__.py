@@ -6,7 +6,7 @@ from rendezvous.pursuit_evasion.feedback import Ended, Flight, Observation, capt
 from rendezvous.pursuit_evasion.game import Game, Gravity, Player
 from rendezvous.pursuit_evasion.history import History, PlayerHistory, history
 from rendezvous.pursuit_evasion.maps import STATUSES, CaptureMap, PointStatus, capture_map
-from rendezvous.pursuit_evasion.paths import Policy
+from rendezvous.pursuit_evasion.paths import PathError, Policy
 from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
 from rendezvous.pursuit_evasion.solver import solve, solve_near
 from rendezvous.pursuit_evasion.steering import RandomSteering, Script, Steering
@@ -25,6 +25,7 @@ __all__ = [
     "Gravity",
     "History",
     "Observation",
+    "PathError",
     "Player",
     "PlayerEnd",
     "PlayerHistory",

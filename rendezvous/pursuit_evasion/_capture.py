@@ -12,8 +12,8 @@ from rendezvous.pursuit_evasion.units import Units, scaled_pair, units_of
 
 Floats = NDArray[np.float64]
 
-LONGEST_REVOLUTIONS = 50.0
-"""How long a game is looked at where neither propellant nor the game itself sets an end."""
+LONGEST_REVOLUTIONS = 15.0
+"""How long a game is looked at, at most, where it does not say."""
 
 
 def near(game: Game, units: Units, guess: Node) -> Node | None:
@@ -52,7 +52,9 @@ def horizon_s(game: Game) -> float:
     -------
     float
     """
-    longest = min(game.longest_s, 2.0 * np.pi * LONGEST_REVOLUTIONS * units_of(game).time_s)
+    longest = game.longest_s
+    if not np.isfinite(longest):
+        longest = 2.0 * np.pi * LONGEST_REVOLUTIONS * units_of(game).time_s
     # Not to the last drop of a craft without dry mass: its acceleration would be infinite.
     burns = [
         player.burn_time_s * (1.0 if player.dry_mass_kg > 0.0 else 0.999) for player in (game.pursuer, game.evader)

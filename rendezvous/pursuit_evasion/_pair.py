@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rendezvous.pursuit_evasion._elimination import eliminate
 from rendezvous.pursuit_evasion._side import KnownPath, Response, Side, across
 
 Floats = NDArray[np.float64]
@@ -22,6 +23,7 @@ CLOSE, ROUGH = 1e-7, 1e-4
 """Last corrections of Newton's method, for the same; what is left of the error is about their square."""
 
 _MOST_ITERATIONS = 12
+_IDENTITY = np.eye(3)
 _FIRST_DURATION = 0.01
 _LEAST_OF_FIRST = 1e-9
 _FARTHEST, _NEAR, _FRACTION, _NEAR_ENOUGH = 0.7, 1e-2, 0.2, 1e-3
@@ -249,13 +251,17 @@ class Pair:
         outer[:, :2] = p.by_nu[:3] - e.by_nu[:3] + distance * plane.T
         outer[:, 2] = nu
         drift = e.by_time[:3] - p.by_time[:3]
-        try:
-            at_time = np.asarray(np.linalg.inv(outer), dtype=np.float64)
-            outer[:, 2] = -drift
-            at_distance = np.asarray(np.linalg.inv(outer), dtype=np.float64) if time_free else at_time
-        except np.linalg.LinAlgError:
+        # The inverse of the system at this duration, and what a longer one does to (nu, l).
+        at_time = np.concatenate([_IDENTITY, drift[:, None]], axis=1)
+        if eliminate(outer.copy(), at_time) == 0.0:
             return None
-        return _Linear(p, e, plane, time_free, at_distance, at_time @ drift)
+        at_distance = at_time[:, :3]
+        if time_free:
+            outer[:, 2] = -drift
+            at_distance = _IDENTITY.copy()
+            if eliminate(outer, at_distance) == 0.0:
+                return None
+        return _Linear(p, e, plane, time_free, at_distance, at_time[:, 3])
 
     def begin(self, latest: float) -> Node | None:
         """Find the extremal of a short duration, where the line of sight is the guess.

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 _DIRECTIONS = 120
 _SEEDS, _MOST_PARTS = 2, 4
-_SHORT, _GAIN = 1e-7, 1e-6
+_SHORT, _GAIN, _LONGEST = 1e-7, 1e-6, 40.0
 _MOST_ITERATIONS = 8
 _CONVERGED = 1e-5
 _FARTHEST = 0.5
@@ -99,7 +99,10 @@ def greater(pair: Pair, node: Node) -> Node | None:
     Returns
     -------
     Node or None
+        None for durations of more than six revolutions too: a scan would take minutes.
     """
+    if node.duration > _LONGEST:
+        return None
     maxima = scan(pair, node).maxima
     return maxima[0] if maxima and maxima[0].distance > node.distance + _GAIN else None
 

@@ -9,10 +9,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from rendezvous.pursuit_evasion._elimination import eliminate
 from rendezvous.pursuit_evasion._extremal import rate, shoot_back, shoot_state_back
 from rendezvous.pursuit_evasion._gravity import acceleration
 
 Floats = NDArray[np.float64]
+
+_IDENTITY = np.eye(6)
 
 
 @dataclass(frozen=True)
@@ -92,21 +95,24 @@ class Craft:
         if shot is None:
             return None
         y, z = shot
-        try:
-            inverse = np.asarray(np.linalg.inv(z[:6, :6]), dtype=np.float64)
-        except np.linalg.LinAlgError:
-            return None
-        miss = y[:6] - self.start
+        right = np.empty((6, 10))
+        right[:, :6] = _IDENTITY
+        right[:, 6] = self.start - y[:6]
+        right[:, 7:9] = -z[:6, 6:8]
         # A longer game starts further back, and ends with less mass.
-        by_time = -rate(y, self.mu, self.oblateness, self.thrust / self.mass) - self.flow * z[:6, 8]
+        right[:, 9] = rate(y, self.mu, self.oblateness, self.thrust / self.mass) + self.flow * z[:6, 8]
+        residual = float(np.abs(right[:, 6]).max())
+        determinant = eliminate(z[:6, :6].copy(), right)
+        if determinant == 0.0:
+            return None
         return Response(
-            rho=-(inverse @ miss),
-            by_nu=-(inverse @ z[:6, 6:8]),
-            by_time=-(inverse @ by_time),
-            regular=bool(np.linalg.det(z[:6, :6]) > 0.0),
-            inverse=inverse,
+            rho=right[:, 6],
+            by_nu=right[:, 7:9],
+            by_time=right[:, 9],
+            regular=determinant > 0.0,
+            inverse=right[:, :6],
             costate=y[6:],
-            residual=float(np.abs(miss).max()),
+            residual=residual,
         )
 
     def correct(

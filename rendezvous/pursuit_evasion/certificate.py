@@ -13,7 +13,7 @@ from rendezvous.pursuit_evasion._branch import Ending, follow
 from rendezvous.pursuit_evasion._pair import Node, Pair
 from rendezvous.pursuit_evasion._scan import greater, scan
 from rendezvous.pursuit_evasion._side import Craft, KnownPath, Side
-from rendezvous.pursuit_evasion.paths import ExtremalPath, Policy, SteeredPath, extremal_paths, steered_path
+from rendezvous.pursuit_evasion.paths import ExtremalPath, PathError, Policy, SteeredPath, extremal_paths, steered_path
 from rendezvous.pursuit_evasion.solution import Capture, Route, Solution
 from rendezvous.pursuit_evasion.units import scaled_craft
 
@@ -257,7 +257,10 @@ def _best_answer(pursuer: Side, evader: Side, radius: float, duration: float) ->
 def _deviation(
     policy: Policy, pursuer: Craft, evader: Craft, radius: float, duration: float, time_s: float
 ) -> Deviation:
-    path = steered_path(evader, policy.direction, duration * _BEYOND)
+    try:
+        path = steered_path(evader, policy.direction, duration * _BEYOND)
+    except PathError:
+        return Deviation(policy.value, None, False)
     found, conclusive = _followed(pursuer, KnownPath(path.state_at), radius, duration * _BEYOND)
     return Deviation(policy.value, None if found is None else found * time_s, conclusive)
 

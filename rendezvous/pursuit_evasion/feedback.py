@@ -155,6 +155,8 @@ def fly(
     ------
     ValueError
         If the game ends in no capture, so that there is no plan to begin with, or replanning takes no time.
+    PathError
+        If the evader's path cannot be followed.
 
     Notes
     -----

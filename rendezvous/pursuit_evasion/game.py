@@ -109,7 +109,7 @@ class Game:
     capture_radius_m : float
         Distance that counts as capture; zero for a point.
     longest_s : float
-        How long the game is looked at, at most.
+        How long the game is looked at, at most; infinite for 15 revolutions of the pursuer.
     """
 
     gravity: Gravity

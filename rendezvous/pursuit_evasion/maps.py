@@ -18,10 +18,10 @@ from rendezvous.pursuit_evasion.units import Units, scaled_pair, units_of
 
 Floats = NDArray[np.float64]
 
-CHECKED_EVERY = 25
+CHECKED_EVERY = 50
 """Points of a row from one that is solved from nothing to the next."""
 
-_PRECISE, _CLOSE = 1e-11, 1e-6
+_PRECISE, _CLOSE = 1e-10, 1e-6
 _EXTRAPOLATIONS = {1: np.array([1.0]), 2: np.array([2.0, -1.0]), 3: np.array([3.0, -3.0, 1.0])}
 _SAME = 1e-6
 
@@ -115,7 +115,7 @@ def capture_map(
 
     Notes
     -----
-    Along a row a point starts from the three before it: 1 to 2 ms. Every 25th point, and the last before the row has to
+    Along a row a point starts from the three before it: 1 to 2 ms. Every 50th point, and the last before the row has to
     start anew, are solved from nothing; where that is another answer, so are the points since the last such check.
     """
     shape = (len(rows), len(columns))

@@ -19,6 +19,11 @@ Direction = Callable[[float, Floats], Floats]
 """Direction of thrust, shape (3,), of a time and a state: any length, zero to coast."""
 
 _TOLERANCE = 1e-12
+_MOST_RATES = 200_000
+
+
+class PathError(ArithmeticError):
+    """A path cannot be followed."""
 
 
 class Policy(Enum):
@@ -127,7 +132,7 @@ class ExtremalPath:
 
     def _carry(self, y: Floats, begin: float, end: float) -> None:
         if not flow_back(y, None, self.craft.kernel_craft(self.duration), begin, end, FINE):
-            raise ArithmeticError("an extremal that was found cannot be propagated")
+            raise PathError("an extremal that was found cannot be propagated")
 
 
 def extremal_paths(pursuer: Craft, evader: Craft, node: Node) -> tuple[ExtremalPath, ExtremalPath]:
@@ -207,20 +212,35 @@ def steered_path(craft: Craft, direction: Direction, duration: float) -> Steered
     -------
     SteeredPath
 
+    Raises
+    ------
+    PathError
+        If it turns so fast that it takes too long to follow.
+
     Notes
     -----
     SciPy's DOP853 to 1e-12: some 3 ms a revolution.
     """
+    asked = 0
+
+    def counted(time: float, state: Floats) -> Floats:
+        nonlocal asked
+        asked += 1
+        if asked > _MOST_RATES:
+            raise PathError("a steered path turns too fast to be followed")
+        return _rates(time, state, craft, direction)
+
     found = solve_ivp(
-        _rates,
+        counted,
         (0.0, duration),
         np.append(craft.start, craft.mass),
         method="DOP853",
         rtol=_TOLERANCE,
         atol=_TOLERANCE,
         dense_output=True,
-        args=(craft, direction),
     )
+    if not found.success:
+        raise PathError("a steered path cannot be followed: it comes too near the planet's centre")
     return SteeredPath(craft, direction, found.sol)
 
 

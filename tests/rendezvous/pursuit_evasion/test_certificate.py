@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from rendezvous.pursuit_evasion import Policy, Solution, best_answer_s, certify, solve
+from rendezvous.pursuit_evasion import PathError, Policy, Solution, best_answer_s, certify, solve
 from rendezvous.pursuit_evasion.paths import steered_path
 from rendezvous.pursuit_evasion.units import scaled_craft
 
@@ -83,3 +83,12 @@ def test_the_best_answer_to_any_path(solved: Solution) -> None:
     assert found is not None
     assert 34e3 < found < 35e3
     assert best_answer_s(solved, path, 30e3) is None
+
+
+def test_a_path_that_turns_too_fast_is_told(solved: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rendezvous.pursuit_evasion.paths._MOST_RATES", 100)
+    evader = scaled_craft(solved.game.evader, solved.game.gravity, solved.units)
+    with pytest.raises(PathError, match="turns too fast"):
+        steered_path(evader, Policy.PROGRADE.direction, 3.4)
+    failures = certify(solved).failures
+    assert "the answer to coast could not be followed" in failures
