@@ -65,9 +65,9 @@ class KeplerTargets:
         """States of targets, one a time, shape (k, 6)."""
         return coast(self.initial[which], time_s - self.epoch_s[which], self.gravitational_parameter_m3_s2)
 
-    def rates(self, which: Integers, time_s: Floats) -> Floats:
-        """Time derivatives of these states, shape (k, 6)."""
-        return coasting_rates(self.states(which, time_s), self.gravitational_parameter_m3_s2)
+    def rates(self, time_s: Floats, states: Floats) -> Floats:
+        """Time derivatives of such states, at any times, shape (k, 6)."""
+        return coasting_rates(states, self.gravitational_parameter_m3_s2)
 
 
 @dataclass(frozen=True, eq=False)

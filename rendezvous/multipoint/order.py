@@ -19,6 +19,7 @@ Report = Callable[[float], None]
 
 MOST_TARGETS = 9
 _MARGIN = 1e-4
+_PROMISING = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,15 +81,16 @@ def best_order(tour: Visits, limits: TimeLimits, *, progress: Report | None = No
             rest = [each for each in range(count) if each not in order]
             later = dwell[order[-1]] + dwell[rest].sum() - dwell[rest].max() + len(rest) * limits.least_gap_s
             held = TimeLimits(horizon - float(later), limits.least_gap_s, limits.price_per_s)
-        found = optimise_times(
-            tour.flyer(order),
-            tour.start_s,
-            dwell[list(order)],
-            held,
-            warm,
-            effort=Effort.ORDER if complete or not warm else Effort.BOUND,
-        )
-        return found.objective, found.path, found.evaluations
+        flyer, stays = tour.flyer(order), dwell[list(order)]
+        effort = Effort.BOUND if warm else Effort.ORDER
+        found = optimise_times(flyer, tour.start_s, stays, held, warm, effort=effort)
+        if not complete or found.objective * (1.0 - _PROMISING) >= search.best_objective:
+            return found.objective, found.path, found.evaluations
+        # An order that may be the best deserves more starts.
+        again = optimise_times(flyer, tour.start_s, stays, held, [found.time_s], effort=Effort.ORDER)
+        if again.objective < found.objective:
+            return again.objective, again.path, found.evaluations + again.evaluations
+        return found.objective, found.path, found.evaluations + again.evaluations
 
     search = _Search(solve, count, progress or (lambda _: None), tour.start_s, horizon)
     search.branch((), None)

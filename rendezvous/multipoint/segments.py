@@ -260,18 +260,19 @@ def check_times(start_s: float, arrive_s: Floats, leave_s: Floats) -> None:
 
 def _time_gradient(motion: LinearMotion, nodes: Nodes, arrive: Floats, before: Floats, after: Floats) -> Floats:
     """dI/dt: D'(V_i - V) at a flyby, H(t+) - H(t-) + (lambda- - lambda+)' x_i' at a rendezvous."""
-    gradient: Floats = np.einsum("ka,ka->k", (before - after)[:, :3], nodes.arrive[:, 3:] - arrive[:, 3:])
+    gradient: Floats = ((before - after)[:, :3] * (nodes.arrive[:, 3:] - arrive[:, 3:])).sum(axis=1)
     met = nodes.rendezvous
     if met.any():
-        earlier = _hamiltonian(motion, nodes.arrive_s[met], nodes.arrive[met], before[met])
-        later = _hamiltonian(motion, nodes.leave_s[met], nodes.leave[met], after[met])
-        earlier -= np.einsum("ka,ka->k", before[met], nodes.arrive_rate[met])
-        later -= np.einsum("ka,ka->k", after[met], nodes.leave_rate[met])
-        gradient[met] = later - earlier
+        times = np.concatenate([nodes.arrive_s[met], nodes.leave_s[met]])
+        states = np.concatenate([nodes.arrive[met], nodes.leave[met]])
+        rates = np.concatenate([nodes.arrive_rate[met], nodes.leave_rate[met]])
+        costates = np.concatenate([before[met], after[met]])
+        sides = _hamiltonian(motion, times, states, costates) - (costates * rates).sum(axis=1)
+        gradient[met] = sides[len(sides) // 2 :] - sides[: len(sides) // 2]
     return gradient
 
 
 def _hamiltonian(motion: LinearMotion, times: Floats, states: Floats, costates: Floats) -> Floats:
-    control = np.einsum("kai,ka->ki", motion.input_map(times), costates)
-    rates = np.einsum("kab,kb->ka", motion.dynamics(times), states) + motion.forcing(times)
-    return np.asarray(np.einsum("ka,ka->k", costates, rates) + 0.5 * (control**2).sum(axis=1))
+    control = (costates[:, None, :] @ motion.input_map(times))[:, 0]
+    rates = (motion.dynamics(times) @ states[:, :, None])[:, :, 0] + motion.forcing(times)
+    return np.asarray((costates * rates).sum(axis=1) + 0.5 * (control**2).sum(axis=1))

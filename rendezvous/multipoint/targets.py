@@ -64,8 +64,8 @@ class MovingTargets(Protocol):
     def states(self, which: Integers, time_s: Floats) -> Floats:
         """States of targets, one a time, shape (k, 6)."""
 
-    def rates(self, which: Integers, time_s: Floats) -> Floats:
-        """Time derivatives of these states, shape (k, 6)."""
+    def rates(self, time_s: Floats, states: Floats) -> Floats:
+        """Time derivatives of such states at times, shape (k, 6)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,14 +100,14 @@ class DriftingTargets:
 
     def states(self, which: Integers, time_s: Floats) -> Floats:
         """States of targets, one a time, shape (k, 6)."""
-        transition = self.motion.transition(np.full(time_s.shape, self.epoch_s), time_s)
-        drift = self.motion.drift(np.full(time_s.shape, self.epoch_s), time_s)
-        return np.asarray(np.einsum("kab,kb->ka", transition, self.initial[which]) + drift)
+        epochs = np.full(time_s.shape, self.epoch_s)
+        coasted = self.motion.transition(epochs, time_s) @ self.initial[which][:, :, None]
+        return np.asarray(coasted[:, :, 0] + self.motion.drift(epochs, time_s))
 
-    def rates(self, which: Integers, time_s: Floats) -> Floats:
-        """Time derivatives of these states, shape (k, 6)."""
-        matrices, states = self.motion.dynamics(time_s), self.states(which, time_s)
-        return np.asarray(np.einsum("kab,kb->ka", matrices, states) + self.motion.forcing(time_s))
+    def rates(self, time_s: Floats, states: Floats) -> Floats:
+        """Time derivatives of such states at times, shape (k, 6)."""
+        pulled = self.motion.dynamics(time_s) @ states[:, :, None]
+        return np.asarray(pulled[:, :, 0] + self.motion.forcing(time_s))
 
 
 def check_names(targets: tuple[Target, ...]) -> None:

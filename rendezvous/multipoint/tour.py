@@ -135,11 +135,14 @@ def nodes_of(targets: MovingTargets, order: Sequence[int], time_s: ArrayLike) ->
     described = [targets.targets[each] for each in order]
     rendezvous = np.array([each.meet is Meet.RENDEZVOUS for each in described])
     leave_s = times + np.array([each.dwell_s for each in described])
-    arrive = targets.states(which, times)
     if not rendezvous.any():  # rates and departures do not count
+        arrive = targets.states(which, times)
         return Nodes(times, times, arrive, arrive, arrive, arrive, rendezvous)
-    arrive_rate = targets.rates(which, times)
     if (leave_s == times).all():
-        return Nodes(times, times, arrive, arrive, arrive_rate, arrive_rate, rendezvous)
-    leave, leave_rate = targets.states(which, leave_s), targets.rates(which, leave_s)
-    return Nodes(times, leave_s, arrive, leave, arrive_rate, leave_rate, rendezvous)
+        arrive = targets.states(which, times)
+        rate = targets.rates(times, arrive)
+        return Nodes(times, times, arrive, arrive, rate, rate, rendezvous)
+    both, count = np.concatenate([times, leave_s]), len(times)
+    states = targets.states(np.concatenate([which, which]), both)
+    rates = targets.rates(both, states)
+    return Nodes(times, leave_s, states[:count], states[count:], rates[:count], rates[count:], rendezvous)

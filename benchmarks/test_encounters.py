@@ -1,0 +1,86 @@
+"""The encounter of several craft, and visits to several targets: times of the core, and memory.
+
+Times are the best of several rounds, so that other work on the machine counts little; ratios are of one run.
+"""
+
+from __future__ import annotations
+
+import time
+import tracemalloc
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from pytest_benchmark.fixture import BenchmarkFixture
+
+from experiments.multipoint_file import load_multipoint
+from experiments.pareto_file import load_pareto
+from rendezvous.multipoint import Nodes, best_order, solve_dense, solve_segments
+from rendezvous.pareto import analyse_coalitions, solve_encounter
+from rendezvous.relative_motion import ClohessyWiltshire
+
+Floats = NDArray[np.float64]
+Check = Callable[[str, float, float, str], None]
+
+RATE = 1.13e-3
+
+
+def best_s(work: Callable[[], object], rounds: int) -> float:
+    """Shortest of several rounds."""
+    found = np.inf
+    for _ in range(rounds):
+        began = time.perf_counter()
+        work()
+        found = min(found, time.perf_counter() - began)
+    return float(found)
+
+
+def equally_spaced(count: int) -> Nodes:
+    """Random targets, 150 s apart."""
+    times = 150.0 * np.arange(1.0, count + 1.0)
+    states = 100.0 * np.random.default_rng(0).normal(size=(count, 6))
+    return Nodes(times, times, states, states, states, states, np.zeros(count, dtype=bool))
+
+
+def test_pareto(benchmark: BenchmarkFixture, under: Check) -> None:
+    encounter = load_pareto("pareto-2008").encounter
+    benchmark.pedantic(solve_encounter, args=(encounter,), rounds=300, warmup_rounds=5)
+    under("pareto, 3 craft", 1e3 * best_s(lambda: solve_encounter(encounter), 500), 1.0, "ms")
+    both = 1e3 * best_s(lambda: analyse_coalitions(solve_encounter(encounter)), 300)
+    under("the same with its coalitions", both, 2.0, "ms")
+
+
+def test_segments_and_the_dense_system(benchmark: BenchmarkFixture, under: Check, at_least: Check) -> None:
+    motion, nodes, start = ClohessyWiltshire(RATE), equally_spaced(1000), np.zeros(6)
+    benchmark.pedantic(solve_segments, args=(motion, 0.0, start, nodes), rounds=20, warmup_rounds=2)
+    segments = best_s(lambda: solve_segments(motion, 0.0, start, nodes), 20)
+    dense = best_s(lambda: solve_dense(motion, 0.0, start, nodes), 2)
+    under("segment solver, N = 1000", 1e3 * segments, 40.0, "ms")
+    at_least("dense system over segment solver, N = 1000", dense / segments, 10.0, "times")
+
+
+def test_memory_is_linear(under: Check) -> None:
+    motion, start, peaks = ClohessyWiltshire(RATE), np.zeros(6), []
+    for count in (1000, 4000):
+        nodes = equally_spaced(count)
+        solve_segments(motion, 0.0, start, nodes)
+        tracemalloc.start()
+        solve_segments(motion, 0.0, start, nodes)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    under("memory of 4000 nodes over that of 1000", peaks[1] / peaks[0], 4.4, "times")
+    under("memory a node", peaks[1] / 4000 / 1024, 10.0, "kB")
+
+
+def test_time_is_linear(under: Check) -> None:
+    motion, start = ClohessyWiltshire(RATE), np.zeros(6)
+    few, many = equally_spaced(1000), equally_spaced(8000)
+    short = best_s(lambda: solve_segments(motion, 0.0, start, few), 20)
+    long = best_s(lambda: solve_segments(motion, 0.0, start, many), 10)
+    under("time of 8000 nodes over that of 1000", long / short, 12.0, "times")
+
+
+def test_order_and_times_of_five(benchmark: BenchmarkFixture, under: Check) -> None:
+    problem = load_multipoint("service-5")
+    benchmark.pedantic(best_order, args=(problem.tour, problem.limits()), rounds=3, warmup_rounds=1)
+    under("N = 5, order and times", best_s(lambda: best_order(problem.tour, problem.limits()), 3), 2.0, "s")
