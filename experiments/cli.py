@@ -68,7 +68,7 @@ app.command(
     "thruster.greatest_impulse_m_s=2:20:7 --runs 200 --out sensors",
 )(sweep)
 app.command("report", epilog="Example: infoset report runs --out figures")(report)
-app.command("replay", epilog="Example: infoset replay flight-random.npz flight-game.npz --out figures")(replay)
+app.command("replay", epilog="Example: infoset replay flight-random.npz flight-game.npz --html flights.html")(replay)
 app.command("pursuit", epilog="Example: infoset pursuit geo-pursuit --certify --feedback coast --out results")(pursuit)
 app.command(
     "pursuit-map",

@@ -45,6 +45,10 @@ Json = Annotated[
 Csv = Annotated[
     Path | None, typer.Option("--csv", metavar="FILE", help="Write a table as CSV; - prints it alone on stdout.")
 ]
+Html = Annotated[
+    Path | None,
+    typer.Option("--html", metavar="FILE.html", help="Write a page to play with: one file, for any browser, offline."),
+]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files, and write into a folder that has some.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress and no tables.")]
 

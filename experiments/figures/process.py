@@ -20,12 +20,11 @@ from experiments.figures.style import (
     SET_FILL,
     TRUTH,
     new_figure,
-    outcome_title,
     place_axes,
-    record_titles,
     style,
     width_mm,
 )
+from experiments.record_titles import outcome_title, record_titles
 from sim import Record
 
 Floats = NDArray[np.float64]

@@ -14,7 +14,8 @@ from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from experiments.figures.style import INK, new_figure, place_axes, record_titles, style, width_mm
+from experiments.figures.style import INK, new_figure, place_axes, style, width_mm
+from experiments.record_titles import record_titles
 from infoset import Section
 from sim import Record, StepRecord
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
@@ -11,8 +10,6 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-
-from sim import Outcome, Record
 
 WIDTH_MM = 180.0
 PNG_DPI = 200
@@ -61,7 +58,6 @@ _STYLE: dict[Any, Any] = {
     "path.simplify": True,
 }
 _MM_PER_INCH = 25.4
-_TITLES = {Outcome.SET_LOST: "set lost", Outcome.BUDGET_SPENT: "budget spent", Outcome.DIVERGED: "diverged"}
 
 
 def style() -> AbstractContextManager[None]:
@@ -137,47 +133,6 @@ def width_mm(axes: Axes) -> float:
     return float(axes.get_position().width * figure.get_figwidth() * _MM_PER_INCH)
 
 
-def noise_title(record: Record) -> str:
-    """Return what a reader calls the noise of an engagement: `random noise`, or `game noise, range meter`."""
-    return f"{record.noise_name} noise" + (", range meter" if record.scenario.range_sensor is not None else "")
-
-
-def record_titles(records: Sequence[Record]) -> list[str]:
-    """Return a title for each record, with what tells it apart where the noise alone does not.
-
-    Parameters
-    ----------
-    records : sequence of Record
-
-    Returns
-    -------
-    list of str
-    """
-    titles = [noise_title(record) for record in records]
-    candidates = (
-        [f"run {record.run}" for record in records],
-        [f"seed {record.seed}" for record in records],
-        [record.strategy for record in records],
-        [f"{record.scenario.set_model.kind.value} model" for record in records],
-        [f"tie {record.scenario.tie.value}" for record in records],
-        [record.scenario.name for record in records],
-    )
-    for extra in candidates:
-        if len(set(titles)) < len(titles) and len(set(extra)) > 1:
-            titles = [f"{title}, {more}" for title, more in zip(titles, extra, strict=True)]
-    if len(records) == 1:
-        return titles
-    return [f"({chr(ord('a') + index)}) {title}" for index, title in enumerate(titles)]
-
-
-def outcome_title(record: Record) -> str:
-    """Return the miss and the impulse spent, and the outcome where it was no interception."""
-    result = record.result
-    text = f"miss {_shown(float(result.miss_m[0]))} m, impulse spent {float(result.impulse_m_s[0]):.1f} m/s"
-    outcome = _TITLES.get(result.outcomes[0])
-    return text if outcome is None else f"{text}, {outcome}"
-
-
 def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
     """Write a figure as NAME.pdf (vector) and NAME.png (200 dpi); the same figure gives the same bytes.
 
@@ -200,7 +155,3 @@ def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
         figure.savefig(pdf, format="pdf", metadata={"CreationDate": None})
         figure.savefig(png, format="png", dpi=PNG_DPI, metadata={"Software": None})
     return [pdf, png]
-
-
-def _shown(metres: float) -> str:
-    return f"{metres:.2f}" if metres < 100.0 else f"{metres:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}")

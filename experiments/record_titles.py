@@ -1,0 +1,54 @@
+"""What a reader calls an engagement: titles for figures and pages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sim import Outcome, Record
+
+_OUTCOMES = {Outcome.SET_LOST: "set lost", Outcome.BUDGET_SPENT: "budget spent", Outcome.DIVERGED: "diverged"}
+
+
+def noise_title(record: Record) -> str:
+    """Return what a reader calls the noise of an engagement: `random noise`, or `game noise, range meter`."""
+    return f"{record.noise_name} noise" + (", range meter" if record.scenario.range_sensor is not None else "")
+
+
+def record_titles(records: Sequence[Record]) -> list[str]:
+    """Return a title for each record, with what tells it apart where the noise alone does not.
+
+    Parameters
+    ----------
+    records : sequence of Record
+
+    Returns
+    -------
+    list of str
+    """
+    titles = [noise_title(record) for record in records]
+    candidates = (
+        [f"run {record.run}" for record in records],
+        [f"seed {record.seed}" for record in records],
+        [record.strategy for record in records],
+        [f"{record.scenario.set_model.kind.value} model" for record in records],
+        [f"tie {record.scenario.tie.value}" for record in records],
+        [record.scenario.name for record in records],
+    )
+    for extra in candidates:
+        if len(set(titles)) < len(titles) and len(set(extra)) > 1:
+            titles = [f"{title}, {more}" for title, more in zip(titles, extra, strict=True)]
+    if len(records) == 1:
+        return titles
+    return [f"({chr(ord('a') + index)}) {title}" for index, title in enumerate(titles)]
+
+
+def outcome_title(record: Record) -> str:
+    """Return the miss and the impulse spent, and the outcome where it was no interception."""
+    result = record.result
+    text = f"miss {_shown(float(result.miss_m[0]))} m, impulse spent {float(result.impulse_m_s[0]):.1f} m/s"
+    outcome = _OUTCOMES.get(result.outcomes[0])
+    return text if outcome is None else f"{text}, {outcome}"
+
+
+def _shown(metres: float) -> str:
+    return f"{metres:.2f}" if metres < 100.0 else f"{metres:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}")

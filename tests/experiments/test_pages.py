@@ -1,0 +1,151 @@
+"""Pages as text: what is in them, what is not, and that their colours can be told apart. tests/browser opens them."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+import re
+from dataclasses import replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from experiments.pages.document import asset, embedded_json, page
+from experiments.pages.interception import interception_page
+from experiments.pages.packing import STEPS_OF_A_BOX, packed_outlines
+from experiments.pages.replayed_sets import replayed
+from experiments.scenario_file import load_scenario
+from infoset import InitialSet, Model
+from sim import Record, fly_one
+
+MOST_BYTES = 6_000_000
+
+
+@pytest.fixture(scope="module")
+def record() -> Record:
+    return fly_one(load_scenario("asteroid-1997-single"))
+
+
+@given(
+    st.recursive(st.text() | st.floats(allow_nan=False, allow_infinity=False), lambda each: st.lists(each, max_size=3))
+)
+def test_embedded_json_reads_back_and_cannot_end_its_block(value: object) -> None:
+    text = embedded_json({"value": value, "more": "</script>\u2028&"})
+    assert not re.search("[<>&\u2028\u2029]", text)
+    assert json.loads(text)["value"] == value
+
+
+def test_numbers_that_are_not_finite_are_refused() -> None:
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        embedded_json({"value": float("nan")})
+
+
+def test_the_policy_names_each_script_and_the_style_and_nothing_else() -> None:
+    text = page("A <b>title</b>", ["sets.js"], {"heading": "h", "about": []})
+    (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', text)
+    assert policy.startswith("default-src 'none'; script-src 'sha256-")
+    assert "unsafe" not in policy
+    scripts = re.findall(r"<script>(.*?)</script>", text, flags=re.DOTALL)
+    styles = re.findall(r"<style>(.*?)</style>", text, flags=re.DOTALL)
+    assert len(scripts) == 5
+    for code in scripts + styles:
+        assert base64.b64encode(hashlib.sha256(code.encode()).digest()).decode() in policy
+    assert policy.count("sha256-") == 6
+    assert f"<title>{html.escape('A <b>title</b>')}</title>" in text
+
+
+def test_a_page_is_small_and_fetches_nothing(record: Record) -> None:
+    text = interception_page([record, replace(record, run=1)])
+    assert len(text.encode()) < MOST_BYTES
+    code = re.sub(r'<script type="application/json".*?</script>', "", text, flags=re.DOTALL)
+    assert not re.search(r"https?:|src=|href=|@import|url\(|innerHTML|outerHTML|document\.write|eval\(", code)
+
+
+def test_replaying_gives_the_recorded_sets_bit_for_bit(record: Record) -> None:
+    stages = list(replayed(record))
+    assert len(stages) == len(record.steps) + 1
+    for each, step in zip(stages, record.steps, strict=False):
+        assert each.measured == step.sections
+        least = min(miss[0] for miss in each.miss_m) if each.miss_m else None
+        greatest = max(miss[1] for miss in each.miss_m) if each.miss_m else None
+        assert (least, greatest) == (step.predicted_miss_m or (None, None))
+
+
+@pytest.mark.parametrize("kind", list(Model))
+def test_what_was_before_holds_what_is_after(kind: Model) -> None:
+    scenario = load_scenario("asteroid-1997")
+    initial = InitialSet.BOX if kind is Model.GUARANTEED else InitialSet.RECTANGLE
+    model = replace(scenario.set_model, kind=kind, initial_set=initial)
+    flown = fly_one(replace(scenario, set_model=model))
+    for each in list(replayed(flown))[:-1:20]:
+        before = {section.label_m: section.polygon for section in each.before}
+        for section in each.measured:
+            if section.label_m in before:
+                points = section.polygon.polygon()
+                scale = np.abs(points).max()
+                assert all(before[section.label_m].margin(point) >= -1e-9 * scale for point in points)
+
+
+def test_outlines_keep_their_boxes_exactly() -> None:
+    outline = np.array([[1e-9, 3.0], [2e-9, 5.0], [1.75e-9, 7.0]])
+    packed = packed_outlines([outline, np.array([[4.0, 4.0]])])
+    boxes = np.frombuffer(base64.b64decode(packed["boxes"])).reshape(-1, 4)
+    assert boxes.tolist() == [[1e-9, 3.0, 2e-9, 7.0], [4.0, 4.0, 4.0, 4.0]]
+    grid = np.frombuffer(base64.b64decode(packed["vertices"]), dtype="<u2").reshape(-1, 2)
+    assert grid.tolist() == [[0, 0], [STEPS_OF_A_BOX, 32768], [49151, STEPS_OF_A_BOX], [0, 0]]
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance, as the Web Content Accessibility Guidelines 2.1 define it."""
+    parts = [int(colour[at : at + 2], 16) / 255.0 for at in (1, 3, 5)]
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return sum(weight * part for weight, part in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+
+
+def contrast(one: str, other: str) -> float:
+    """Contrast ratio of two colours, from 1 to 21."""
+    lights = sorted((luminance(one), luminance(other)))
+    return (lights[1] + 0.05) / (lights[0] + 0.05)
+
+
+def seen_without(colour: str, kind: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """A colour as people without red, or without green, cones see it (Viénot, Brettel and Mollon 1999), linear RGB."""
+    parts = np.array([int(colour[at : at + 2], 16) / 255.0 for at in (1, 3, 5)])
+    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+    share = {"protan": 0.11238, "deutan": 0.29275}[kind]
+    mixed = share * linear[0] + (1.0 - share) * linear[1]
+    return np.array([mixed, mixed, linear[2]])
+
+
+def palettes() -> dict[str, dict[str, str]]:
+    """The colours of the style sheet: light, and dark."""
+    light, dark = (
+        dict(re.findall(r"--([\w-]+): (#[0-9a-f]{6});", block))
+        for block in re.findall(r":root[^{]*\{(.*?)\}", asset("page.css"), flags=re.DOTALL)
+    )
+    return {"light": light, "dark": dark}
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_contrast(theme: str) -> None:
+    colours = palettes()[theme]
+    for back in ("paper", "panel"):
+        for text in ("ink", "quiet"):
+            assert contrast(colours[text], colours[back]) >= 4.5, (text, back)
+        for line in ("line", "near", "far", "set", "measured", "impulse", "extra", "focus"):
+            assert contrast(colours[line], colours[back]) >= 3.0, (line, back)
+
+
+@pytest.mark.parametrize("kind", ["protan", "deutan"])
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_colours_that_stand_together_can_be_told_apart_by_the_colour_blind(theme: str, kind: str) -> None:
+    colours = palettes()[theme]
+    for one, other in combinations(("ink", "set", "measured"), 2):
+        apart = np.abs(seen_without(colours[one], kind) - seen_without(colours[other], kind)).max()
+        assert apart >= 0.1, (one, other)
