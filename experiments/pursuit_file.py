@@ -284,7 +284,7 @@ def parameter_names() -> list[str]:
 
 
 def _state(elements: Mapping[str, float], mu_si: float) -> tuple[Any, Any]:
-    angles = [radians(Decimal(repr(elements[each]))) for each in ELEMENTS[2:]]
+    angles = [radians(Decimal(repr(float(elements[each])))) for each in ELEMENTS[2:]]
     orbit = OrbitalElements(elements["semi_major_axis_km"] * 1e3, elements["eccentricity"], *angles)
     return orbit.state(mu_si)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,11 +12,14 @@ from experiments.commands._options import Json, Out, Overwrite, Quiet, Seed, who
 
 if TYPE_CHECKING:
     from experiments.pursuit_file import PursuitProblem
-    from rendezvous.pursuit_evasion import Capture, Certificate, Flight, PlayerEnd, Solution, Steering
+    from experiments.pursuit_report import Feedback
+    from rendezvous.pursuit_evasion import Certificate, Solution, Steering
 
 FIGURES = ("figure-orbits", "figure-relative", "figure-control", "figure-distance")
 FEEDBACK_FIGURE = "figure-feedback"
 MOST_RUNS = 10_000
+REPLAN_S, LEAST_PLANS, MOST_PLANS = 600.0, 50, 2000
+"""Time between plans, and how many a game is given at least where the time is not asked for, and at most."""
 M_PER_KM = 1e3
 OPTIMAL, RANDOM = "optimal", "random"
 
@@ -28,19 +30,6 @@ Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="A value in place of the file's: evader.thrust_N=5; repeatable."),
 ]
-
-
-@dataclass(frozen=True)
-class Feedback:
-    """Flights with feedback, and how they were asked for."""
-
-    policy: str
-    replan_s: float
-    delay_s: float
-    position_noise_m: float
-    velocity_noise_m_s: float
-    seed: int
-    flights: tuple[Flight, ...]
 
 
 def pursuit(
@@ -59,7 +48,14 @@ def pursuit(
             "retrograde, normal, antinormal, outward, inward, or a CSV file of time_s,policy.",
         ),
     ] = None,
-    replan: Annotated[float, typer.Option("--replan-s", metavar="S", help="Time between plans.")] = 600.0,
+    replan: Annotated[
+        float | None,
+        typer.Option(
+            "--replan-s",
+            metavar="S",
+            help="Time between plans; 600, or less for a game of less than 30 000 s, which gets 50 plans.",
+        ),
+    ] = None,
     delay: Annotated[float, typer.Option("--delay-s", metavar="S", help="Age of what the pursuer sees.")] = 0.0,
     position_noise: Annotated[
         float, typer.Option("--position-noise-m", metavar="M", help="Its standard deviation, a component.")
@@ -81,12 +77,13 @@ def pursuit(
     """
     from experiments.commands._screen import figure_files, say, tell_of_compiling_pursuit
     from experiments.output import STDOUT, checked_destinations, to_json, write_file
+    from experiments.pursuit_report import report_json
 
     whole_number("--runs", runs, 1, MOST_RUNS, 100)
     whole_number("--seed", seed, 0, None, 0)
     _check_feedback_options(feedback, replan, delay, position_noise, velocity_noise, runs)
     given = problem_with(problem, settings)
-    steerings = None if feedback is None else _steerings(feedback, replan, seed)
+    steerings = None if feedback is None else _steerings(feedback, seed)
     names = [*FIGURES, FEEDBACK_FIGURE] if feedback is not None else [*FIGURES]
     files = ("problem.toml", "results.json", *figure_files(*names))
     with checked_destinations(folder=out, names=files, files={"--json": json_}, overwrite=overwrite):
@@ -96,10 +93,11 @@ def pursuit(
         solution, certificate, elapsed_s = _solve(given, certify, quiet)
         flown = None
         if steerings is not None and feedback is not None:
+            every_s = _time_between_plans(solution, replan)
             flown = _fly(
-                solution, given, steerings, feedback, replan, delay, position_noise, velocity_noise, runs, seed, quiet
+                solution, given, steerings, feedback, every_s, delay, position_noise, velocity_noise, runs, seed, quiet
             )
-        json_text = to_json(_summary(given, solution, certificate, flown, elapsed_s))
+        json_text = to_json(report_json(given, solution, certificate, flown, elapsed_s))
         if json_ is not None and str(json_) == STDOUT:
             typer.echo(json_text, nl=False)
         elif json_ is not None:
@@ -145,13 +143,13 @@ def problem_with(name: str, settings: Sequence[str] | None) -> PursuitProblem:
 
 
 def _check_feedback_options(
-    feedback: str | None, replan: float, delay: float, position: float, velocity: float, runs: int
+    feedback: str | None, replan: float | None, delay: float, position: float, velocity: float, runs: int
 ) -> None:
     import math
 
     from experiments.errors import InputError
 
-    if not (math.isfinite(replan) and replan >= 1.0):
+    if replan is not None and not (math.isfinite(replan) and replan >= 1.0):
         raise InputError(f"--replan-s: must be at least 1, found {replan:g}; for example --replan-s 600")
     for option, value in (
         ("--delay-s", delay),
@@ -160,24 +158,42 @@ def _check_feedback_options(
     ):
         if not (math.isfinite(value) and value >= 0.0):
             raise InputError(f"{option}: must be 0 or more, found {value:g}; for example {option} 10")
-    if feedback is None and (runs > 1 or delay > 0.0 or position > 0.0 or velocity > 0.0):
-        raise InputError("--runs, --delay-s and noises are of feedback; add a policy, for example --feedback random")
+    if feedback is None and (runs > 1 or delay > 0.0 or position > 0.0 or velocity > 0.0 or replan is not None):
+        said = "--runs, --replan-s, --delay-s and noises are of feedback; add a policy, for example --feedback random"
+        raise InputError(said)
 
 
-def _steerings(policy: str, hold_s: float, seed: int) -> Any:
-    """Return the evader's steering of a run, by the number of the run."""
+def _time_between_plans(solution: Solution, asked_s: float | None) -> float:
+    """Return how often to plan: often enough for a short game, not so often that a long one never ends."""
+    from experiments.errors import InputError
+
+    if solution.capture is None:
+        return REPLAN_S if asked_s is None else asked_s
+    game_s = solution.capture.time_s
+    if asked_s is None:
+        return max(min(REPLAN_S, game_s / LEAST_PLANS), game_s / MOST_PLANS)
+    if asked_s * MOST_PLANS < game_s:
+        raise InputError(
+            f"--replan-s: {asked_s:g} makes more than {MOST_PLANS} plans in a game of {game_s:.6g} s; "
+            f"make it {game_s / MOST_PLANS:.3g} or more"
+        )
+    return asked_s
+
+
+def _steerings(policy: str, seed: int) -> Any:
+    """Return the evader's steering of a run, by the number of the run and the time between plans."""
     from experiments.commands._options import choice
     from rendezvous.pursuit_evasion import Policy, RandomSteering
 
     if policy.endswith(".csv"):
         script = _script(policy)
-        return lambda _run: script
+        return lambda _run, _hold_s: script
     name = choice("--feedback", policy, [OPTIMAL, RANDOM, *(each.value for each in Policy)])
     if name == OPTIMAL:
-        return lambda _run: None
+        return lambda _run, _hold_s: None
     if name == RANDOM:
-        return lambda run: RandomSteering(seed, run, hold_s)
-    return lambda _run: Policy(name).direction
+        return lambda run, hold_s: RandomSteering(seed, run, hold_s)
+    return lambda _run, _hold_s: Policy(name).direction
 
 
 def _script(path: str) -> Steering:
@@ -251,6 +267,7 @@ def _fly(
 ) -> Feedback | None:
     from experiments.commands._screen import progress_bar, say
     from experiments.errors import InputError
+    from experiments.pursuit_report import Feedback
     from rendezvous.pursuit_evasion import Observation, PathError, fly_many
 
     if solution.capture is None:
@@ -261,7 +278,7 @@ def _fly(
         try:
             flights = fly_many(
                 problem.game(),
-                steerings,
+                lambda run: steerings(run, replan_s),
                 runs,
                 replan_s=replan_s,
                 observation=seen,
@@ -272,113 +289,6 @@ def _fly(
         except PathError as error:
             raise InputError(f"--feedback: {error}; choose another policy, or check the units of the problem") from None
     return Feedback(policy, replan_s, delay_s, position_noise_m, velocity_noise_m_s, seed, tuple(flights))
-
-
-def _summary(
-    problem: PursuitProblem,
-    solution: Solution,
-    certificate: Certificate | None,
-    feedback: Feedback | None,
-    elapsed_s: float,
-) -> dict[str, object]:
-    from experiments.output import library_version
-
-    capture = solution.capture
-    return {
-        "version": library_version(),
-        "problem": problem.name,
-        "problem_hash": problem.hash,
-        **({"warnings": problem.warnings()} if problem.warnings() else {}),
-        "elapsed_s": elapsed_s,
-        "verdict": solution.verdict.value,
-        **_captured(capture),
-        "route": solution.route.value,
-        "looked_at_s": solution.looked_at_s,
-        "propellant_exhausted_by": solution.exhausted,
-        "fallback_capture_time_s": None if solution.fallback is None else solution.fallback.time_s,
-        "units": {"length_km": solution.units.length_m / M_PER_KM, "time_s": solution.units.time_s},
-        "certificate": None if certificate is None else _certified(certificate),
-        "distance_curve": {
-            "duration_s": solution.curve.duration_s.tolist(),
-            "distance_km": (solution.curve.distance_m / M_PER_KM).tolist(),
-            "least_curvature": solution.curve.least_curvature.tolist(),
-        },
-        **({"feedback": _flown(feedback)} if feedback is not None else {}),
-    }
-
-
-def _captured(capture: Capture | None) -> dict[str, object]:
-    if capture is None:
-        keys = ("capture_time_s", "capture_position_km", "direction", "pursuer", "evader")
-        return dict.fromkeys((*keys, "closing_speed_km_s", "curvature"))
-    return {
-        "capture_time_s": capture.time_s,
-        "capture_position_km": (capture.position_m / M_PER_KM).tolist(),
-        "direction": capture.direction.tolist(),
-        "pursuer": _player(capture.pursuer),
-        "evader": _player(capture.evader),
-        "closing_speed_km_s": capture.closing_speed_m_s / M_PER_KM,
-        "curvature": capture.curvature.tolist(),
-    }
-
-
-def _player(end: PlayerEnd) -> dict[str, object]:
-    return {
-        "propellant_kg": end.propellant_kg,
-        "final_position_km": (end.position_m / M_PER_KM).tolist(),
-        "final_velocity_km_s": (end.velocity_m_s / M_PER_KM).tolist(),
-        "costate0": end.costate_at_start.tolist(),
-    }
-
-
-def _certified(certificate: Certificate) -> dict[str, object]:
-    return {
-        "saddle_point": certificate.claims_saddle_point,
-        "failures": list(certificate.failures),
-        "residual": certificate.residual,
-        "hamiltonian_drift": certificate.hamiltonian_drift,
-        "second_integrator_gap_m": certificate.integrator_gap_m,
-        "closing_speed_km_s": certificate.closing_speed_m_s / M_PER_KM,
-        "least_curvature": certificate.least_curvature,
-        "no_conjugate_point": certificate.no_conjugate_point,
-        "no_earlier_capture": certificate.no_earlier_capture,
-        "least_distance_from_centre_km": certificate.least_distance_m / M_PER_KM,
-        "above_the_planet": certificate.above_the_planet,
-        "pursuer_alone_s": certificate.pursuer_alone_s,
-        "evader_deviations": [
-            {"policy": each.name, "capture_time_s": each.capture_s, "conclusive": each.conclusive}
-            for each in certificate.evader_deviations
-        ],
-        "directions_found": certificate.directions_found,
-        "directions_tried": certificate.directions_tried,
-        "greatest_excess_m": certificate.greatest_excess_m,
-    }
-
-
-def _flown(feedback: Feedback) -> dict[str, object]:
-    from rendezvous.pursuit_evasion import Ended, capture_quantiles_s
-
-    quantiles = capture_quantiles_s(feedback.flights)
-    return {
-        "policy": feedback.policy,
-        "replan_s": feedback.replan_s,
-        "delay_s": feedback.delay_s,
-        "position_noise_m": feedback.position_noise_m,
-        "velocity_noise_m_s": feedback.velocity_noise_m_s,
-        "seed": feedback.seed,
-        "runs": len(feedback.flights),
-        "captured": sum(flight.ended is Ended.CAPTURED for flight in feedback.flights),
-        "capture_time_quantiles_s": dict(zip(("least", "10%", "50%", "90%", "greatest"), quantiles, strict=False)),
-        "flights": [
-            {
-                "ended": flight.ended.value,
-                "time_s": flight.time_s,
-                "distance_m": flight.distance_m,
-                "last_predicted_capture_s": float(flight.predicted_s[-1]),
-            }
-            for flight in feedback.flights
-        ],
-    }
 
 
 def _fill(
@@ -456,7 +366,7 @@ def _verdict(solution: Solution) -> str:
     if solution.verdict is Verdict.ESCAPES:
         why = f"the {solution.exhausted}'s propellant is spent" if solution.exhausted else "the time looked at ends"
         return f"escapes: the evader keeps away until {why}, {until}"
-    text = f"branch-not-certified: the extremals fold at a duration of {until}; nothing is claimed beyond"
+    text = f"branch-not-certified: the extremals are a saddle up to a duration of {until}; nothing is claimed beyond"
     if solution.fallback is not None:
         text += f" (another route finds an extremal at {solution.fallback.time_s:.3f} s)"
     return text
@@ -500,7 +410,7 @@ def _show_feedback(console: Any, feedback: Feedback) -> None:
     said = f"feedback, plans every {feedback.replan_s:g} s, evader {feedback.policy}: "
     if len(flights) == 1:
         (flight,) = flights
-        said += f"{flight.ended.value} at {flight.time_s:.1f} s, {flight.distance_m:.3g} m apart; predicted last "
+        said += f"{flight.ended.value} at {flight.time_s:.1f} s, {flight.distance_m:.4g} m apart; predicted last "
         said += f"{flight.predicted_s[-1]:.1f} s"
     else:
         caught = sum(flight.ended is Ended.CAPTURED for flight in flights)

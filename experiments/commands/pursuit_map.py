@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 
 FIGURE = "figure-map"
 MOST_VALUES, MOST_POINTS = 2000, 100_000
-COLUMNS, ROWS = "phase_deg=-30:30:61", "evader.inclination_deg=0.2:2.2:21"
+COLUMNS, ROWS = "phase_deg=-30:30:61", "thrust_ratio=0:0.8:17"
+COLUMNS_OF_STATES = "mass_ratio=0.5:1.5:21"
+PHASE_BY_THRUST = 12.0
+"""Half of the columns' span in radians over thrust by gravity: about what a revolution changes the phase by."""
 M_PER_KM = 1e3
 
 Axis = tuple[str, "NDArray[np.float64]"]
@@ -29,8 +32,13 @@ Axis = tuple[str, "NDArray[np.float64]"]
 def pursuit_map(
     problem: ProblemName = "geo-pursuit",
     columns: Annotated[
-        str, typer.Option("--x", metavar="KEY=FROM:TO:N", help="Parameter of the columns, its ends and how many.")
-    ] = COLUMNS,
+        str | None,
+        typer.Option(
+            "--x",
+            metavar="KEY=FROM:TO:N",
+            help="Parameter of the columns, its ends and how many; phases as far as the pursuer's thrust goes.",
+        ),
+    ] = None,
     rows: Annotated[str, typer.Option("--y", metavar="KEY=FROM:TO:N", help="Parameter of the rows.")] = ROWS,
     settings: Settings = None,
     certify: Annotated[
@@ -53,7 +61,7 @@ def pursuit_map(
     from experiments.output import STDOUT, checked_destinations, to_csv, to_json, write_file
 
     given = problem_with(problem, settings)
-    x, y = _axis("--x", columns), _axis("--y", rows)
+    x, y = _axis("--x", _columns(given) if columns is None else columns), _axis("--y", rows)
     if x[0] == y[0]:
         raise InputError(f"--y: {y[0]} is the parameter of --x too; choose another, for example --y {ROWS}")
     if len(x[1]) * len(y[1]) > MOST_POINTS:
@@ -75,6 +83,18 @@ def pursuit_map(
             _fill(out, given, x, y, found, json_text, csv_text, overwrite)
     if not quiet:
         _show(given, found, elapsed_s, STDOUT in (str(json_), str(csv)))
+
+
+def _columns(problem: PursuitProblem) -> str:
+    """Return the columns of a map for which none are asked."""
+    if problem.tables.pursuer.position_km is not None or problem.tables.evader.position_km is not None:
+        return COLUMNS_OF_STATES
+    game = problem.game()
+    gravity_m_s2 = game.gravity.parameter_m3_s2 / math.hypot(*game.pursuer.position_m) ** 2
+    half = math.degrees(PHASE_BY_THRUST * game.pursuer.acceleration_m_s2 / gravity_m_s2)
+    # To one digit, for ticks that read well.
+    half = float(f"{min(90.0, max(1e-6, half)):.0e}")
+    return f"phase_deg={-half!r}:{half!r}:61"
 
 
 def _axis(option: str, text: str) -> Axis:

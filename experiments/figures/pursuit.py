@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from experiments.figures.style import IMPULSE, LIMIT, TRUTH, new_figure, place_axes, style
@@ -71,8 +72,8 @@ def draw_orbits(solution: Solution, sampled: History) -> Figure:
         for axis in (space.xaxis, space.yaxis, space.zaxis):
             axis.set_major_locator(_few())
         flat.plot([0.0], [0.0], marker="+", color=LIMIT, markersize=7.0, linestyle="none")
-        flat.set_aspect("equal", adjustable="datalim")
         flat.margins(0.12)
+        flat.set_aspect("equal", adjustable="box", anchor="C")
         flat.xaxis.set_major_locator(_few())
         flat.set_xlabel(f"$x$, {unit}")
         flat.set_ylabel(f"$y$, {unit}")
@@ -143,16 +144,13 @@ def draw_control(sampled: History) -> Figure:
             if not player.thrust_direction.any():
                 continue
             u = np.einsum("nij,nj->ni", orbital_axes(player.position_m, player.velocity_m_s), player.thrust_direction)
-            angle = np.degrees(np.arctan2(u[:, 0], u[:, 1]))
-            _plot_angle(inside, time, angle, name, look)
+            inside.plot(time, np.degrees(np.unwrap(np.arctan2(u[:, 0], u[:, 1]))), label=name, **look)
             outside.plot(time, np.degrees(np.arcsin(np.clip(u[:, 2], -1.0, 1.0))), label=name, **look)
             switching.plot(time, player.switching, label=name, **look)
-        inside.set_ylim(-180.0, 180.0)
-        inside.set_yticks([-180, -90, 0, 90, 180])
+        inside.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1.0, 1.5, 3.0, 4.5, 9.0, 10.0]))
         inside.set_ylabel("from along-track to outward, deg")
         inside.set_title("(a) thrust in the plane")
-        outside.set_ylim(-90.0, 90.0)
-        outside.set_yticks([-90, -45, 0, 45, 90])
+        outside.yaxis.set_major_locator(_few())
         outside.set_ylabel("out of the plane, deg")
         outside.set_title("(b) thrust out of the plane")
         switching.set_ylim(bottom=0.0)
@@ -185,7 +183,9 @@ def draw_distance(solution: Solution) -> Figure:
         left.plot(time, curve.distance_m / _M_PER_KM, marker="o", markersize=2.2, color=TRUTH)
         left.axhline(radius, color=LIMIT, linewidth=0.8, linestyle="--")
         if solution.verdict is Verdict.CAPTURED:
-            left.plot(time[-1], radius, marker="*", markersize=9.0, color=IMPULSE, linestyle="none", zorder=5)
+            left.plot(
+                time[-1], radius, marker="*", markersize=9.0, color=IMPULSE, linestyle="none", zorder=5, clip_on=False
+            )
         left.set_ylim(bottom=0.0)
         left.set_xlabel(f"duration $T$, {unit}")
         left.set_ylabel("distance kept $l(T)$, km")
@@ -228,7 +228,8 @@ def draw_feedback(solution: Solution, flights: Sequence[Flight]) -> Figure:
         left.set_title("(a) what the plans predict")
         if len(flights) == 1:
             (flight,) = flights
-            right.plot(flight.planned_s / scale, flight.distances_m / _M_PER_KM, **PURSUER)
+            at = np.append(flight.planned_s, flight.time_s) / scale
+            right.plot(at, np.append(flight.distances_m, flight.distance_m) / _M_PER_KM, **PURSUER)
             right.set_xlabel(f"time, {unit}")
             right.set_ylabel("distance, km")
             right.set_ylim(bottom=0.0)
@@ -245,7 +246,7 @@ def draw_feedback(solution: Solution, flights: Sequence[Flight]) -> Figure:
 
 
 def _draw_path(space: Any, flat: Axes, r: Floats, direction: Floats, look: dict[str, Any], name: str) -> None:
-    """Draw a path with its start and its thrust in both views; in space thrust is a stroke from a point of the path."""
+    """Draw a path with its start and its thrust in both views."""
     for axes, points in ((space, r), (flat, r[:, :2])):
         axes.plot(*points.T, label=name, **look)
         axes.plot(
@@ -256,7 +257,7 @@ def _draw_path(space: Any, flat: Axes, r: Floats, direction: Floats, look: dict[
     places = np.linspace(0, len(r) - 1, _ARROWS).astype(int)
     length = _ARROW_LENGTH * float(np.abs(r[:, :2]).max())
     u = length * direction[places]
-    space.quiver(*r[places].T, *u.T, color=look["color"], linewidth=0.9, arrow_length_ratio=0.0)
+    space.quiver(*r[places].T, *u.T, color=look["color"], linewidth=0.9, arrow_length_ratio=0.25)
     flat.quiver(
         *r[places, :2].T,
         *u[:, :2].T,
@@ -275,13 +276,6 @@ def _players(sampled: History) -> tuple[tuple[PlayerHistory, dict[str, Any], str
     return (sampled.pursuer, PURSUER, "pursuer"), (sampled.evader, EVADER, "evader")
 
 
-def _plot_angle(axes: Axes, time: Floats, angle: Floats, name: str, look: dict[str, Any]) -> None:
-    """Plot an angle without the lines across where it wraps."""
-    jumps = np.flatnonzero(np.abs(np.diff(angle)) > 180.0) + 1
-    for index, (x, y) in enumerate(zip(np.split(time, jumps), np.split(angle, jumps), strict=True)):
-        axes.plot(x, y, label=name if index == 0 else None, **look)
-
-
 def _times(seconds: Floats) -> tuple[Floats, str]:
     if len(seconds) and seconds[-1] > _HOURS_FROM_S:
         return seconds / _S_PER_HOUR, "h"
@@ -293,7 +287,5 @@ def _length_unit(solution: Solution) -> tuple[str, float]:
     return ("10$^3$ km", 1e6) if solution.units.length_m > _THOUSANDS_FROM_M else ("km", _M_PER_KM)
 
 
-def _few() -> Any:
-    from matplotlib.ticker import MaxNLocator
-
+def _few() -> MaxNLocator:
     return MaxNLocator(nbins=4)

@@ -10,14 +10,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from experiments.figures.style import INK, LIMIT, TRUTH, new_figure, style
+from experiments.figures.style import INK, LIMIT, new_figure, style
 from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus
 
 Floats = NDArray[np.float64]
 
 _S_PER_HOUR = 3600.0
 _BOTTOM, _BOTTOM_WITH_LEGEND, _TOP = 0.13, 0.22, 0.93
-_SHADES = LinearSegmentedColormap.from_list("blues", ["#eef4fa", "#9dc0df", TRUTH])
+_SHADES = LinearSegmentedColormap.from_list("blues", ["#f4f8fc", "#b4d0e8", "#5b93c4"])
 _UNKNOWN: dict[PointStatus, tuple[str, str, str]] = {
     PointStatus.NOT_CERTIFIED: ("#f6d9bd", "////", "not certified"),
     PointStatus.ESCAPES: ("#e4e4e4", "....", "escapes"),
@@ -53,14 +53,16 @@ def draw_map(found: CaptureMap, column: str, row: str) -> Figure:
             scale.set_label("capture time, h")
             if hours.count() > 3 and min(hours.shape) > 1 and float(np.ptp(hours.compressed())) > 0.0:
                 lines = axes.contour(found.columns, found.rows, hours, levels=8, colors=INK, linewidths=0.6)
-                axes.clabel(lines, fontsize=6.5, fmt="%g")
+                for label in axes.clabel(lines, fontsize=6.5, fmt="%g"):
+                    # Upright: a 6 on its side may be a 9.
+                    label.set_rotation(0.0)
         handles = _hatch_unknown(axes, found)
         axes.set_xlim(*_edges(found.columns)[[0, -1]])
         axes.set_ylim(*_edges(found.rows)[[0, -1]])
         axes.set_xlabel(axis_name(column))
         axes.set_ylabel(axis_name(row))
-        certified = found.count(PointStatus.FOLLOWED) + found.count(PointStatus.NEIGHBOUR)
-        axes.set_title(f"{certified} of {found.status.size} points captured")
+        followed, seeded = found.count(PointStatus.FOLLOWED), found.count(PointStatus.NEIGHBOUR)
+        axes.set_title(f"captures: {followed} solved from nothing, {seeded} from neighbours")
         axes.grid(visible=False)
         if handles:
             axes.legend(

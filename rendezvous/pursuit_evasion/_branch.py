@@ -19,7 +19,9 @@ Floats = NDArray[np.float64]
 
 _LONGEST_STEP, _SHORTEST_STEP = 0.3, 1e-6
 _PREDICTED_WITHIN = 3e-3
-_MOST_STEPS = 1500
+
+MOST_WORK = 20_000.0
+"""Radians of extremals tried on the way, a pair of sides: 15 revolutions of 28 steps each; seconds."""
 
 
 class Ending(Enum):
@@ -28,6 +30,8 @@ class Ending(Enum):
     CAPTURE = "capture"
     TIME = "time"
     FOLD = "fold"
+    WORK = "work"
+    """It would take too long."""
 
 
 @dataclass(frozen=True)
@@ -39,10 +43,13 @@ class Branch:
     nodes : tuple of Node
         In the order they were found.
     ending : Ending
+    work : float
+        Radians of extremals that were tried.
     """
 
     nodes: tuple[Node, ...]
     ending: Ending
+    work: float
 
     @property
     def last(self) -> Node:
@@ -50,7 +57,7 @@ class Branch:
         return self.nodes[-1]
 
 
-def follow(pair: Pair, first: Node, radius: float, latest: float) -> Branch:
+def follow(pair: Pair, first: Node, radius: float, latest: float, most_work: float = MOST_WORK) -> Branch:
     """Follow a branch as the duration grows, to the capture, to a time, or to where it folds.
 
     Parameters
@@ -60,6 +67,8 @@ def follow(pair: Pair, first: Node, radius: float, latest: float) -> Branch:
     radius : float
         Distance that is capture; minus infinity to follow the branch beyond it.
     latest : float
+    most_work : float, optional
+        Radians of extremals that may be tried: a bound that is the same on every machine.
 
     Returns
     -------
@@ -70,13 +79,14 @@ def follow(pair: Pair, first: Node, radius: float, latest: float) -> Branch:
     -----
     Some 20 steps a revolution, of two or three iterations each.
     """
-    nodes, step = [first], first.duration
-    while len(nodes) < _MOST_STEPS:
+    nodes, step, work = [first], first.duration, 0.0
+    while work < most_work:
         node = nodes[-1]
         left = latest - node.duration
         if left <= _SHORTEST_STEP:
-            return Branch(tuple(nodes), Ending.TIME)
+            return Branch(tuple(nodes), Ending.TIME, work)
         step = left if step > 0.9 * left else step
+        work += node.duration + step
         guess = _predicted(nodes, node.duration + step)
         found = pair.solve(
             guess,
@@ -90,21 +100,21 @@ def follow(pair: Pair, first: Node, radius: float, latest: float) -> Branch:
         missed = math.inf if found is None else float(np.abs(found.vector - guess).max())
         if found is None or not pair.is_sound(found) or missed > 8.0 * _PREDICTED_WITHIN:
             if step < _SHORTEST_STEP:
-                return Branch(tuple(nodes), Ending.FOLD)
+                return Branch(tuple(nodes), Ending.FOLD, work)
             step *= 0.4
             continue
         at = first_crossing(node, found, radius)
         if at is not None:
             capture = polish(pair, _predicted(nodes, at), at, radius, latest)
             if capture is not None and node.duration < capture.duration <= found.duration + _SHORTEST_STEP:
-                return Branch((*nodes, capture), Ending.CAPTURE)
+                return Branch((*nodes, capture), Ending.CAPTURE, work)
             if step < _SHORTEST_STEP:
-                return Branch(tuple(nodes), Ending.FOLD)
+                return Branch(tuple(nodes), Ending.FOLD, work)
             step *= 0.4
             continue
         nodes.append(found)
         step = min(_LONGEST_STEP, step * min(2.0, 0.9 * (_PREDICTED_WITHIN / max(missed, 1e-12)) ** (1.0 / 3.0)))
-    return Branch(tuple(nodes), Ending.FOLD)
+    return Branch(tuple(nodes), Ending.WORK, work)
 
 
 def polish(pair: Pair, guess: Floats, duration: float, radius: float, latest: float) -> Node | None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from rendezvous.pursuit_evasion._branch import Ending, follow
+from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
 from rendezvous.pursuit_evasion._pair import Node, Pair
 from rendezvous.pursuit_evasion._scan import greater, scan
 from rendezvous.pursuit_evasion._side import Craft, KnownPath, Side
@@ -29,6 +29,7 @@ MOST_EXCESS = 1e-6
 _PANELS, _POINTS, _MOST_CHANGES = 32, 8, 3
 _BEYOND = 1.0 + 1e-6
 _SECOND_TOLERANCE = 1e-12
+_MOST_WORK = 2.0 * MOST_WORK
 
 
 @dataclass(frozen=True)
@@ -161,7 +162,8 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
 
     Notes
     -----
-    A third of a second for one revolution; directions take another half and more.
+    A third of a second for one revolution; directions take another half and more. All deviations together may take
+    twice as long as solving a game ever does: in games of more than six revolutions the last ones may be inconclusive.
     """
     capture = solution.capture
     if capture is None:
@@ -171,12 +173,11 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
     paths = extremal_paths(pursuer, evader, node)
     radius = game.capture_radius_m / units.length_m
     drift, least_distance = _along(paths, node)
-    alone = _best_answer(pursuer, KnownPath(paths[1].state_at), radius, node.duration)
-    deviations = tuple(
-        _deviation(policy, pursuer, evader, radius, node.duration, units.time_s)
-        for policy in Policy
-        if evader.thrust > 0.0
-    )
+    alone, left = _best_answer(pursuer, KnownPath(paths[1].state_at), radius, node.duration, _MOST_WORK)
+    deviations: list[Deviation] = []
+    for policy in Policy if evader.thrust > 0.0 else ():
+        deviation, left = _deviation(policy, pursuer, evader, radius, node.duration, units.time_s, left)
+        deviations.append(deviation)
     looked = scan(Pair(pursuer, evader), node) if all_directions else None
     excess = None
     if looked is not None:
@@ -192,7 +193,7 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
         least_distance_m=least_distance * units.length_m,
         above_the_planet=least_distance * units.length_m > game.gravity.planet_radius_m,
         pursuer_alone_s=None if alone is None else alone * units.time_s,
-        evader_deviations=deviations,
+        evader_deviations=tuple(deviations),
         capture_s=capture.time_s,
         directions_found=0 if looked is None else len(looked.nu),
         directions_tried=0 if looked is None else looked.tried,
@@ -221,7 +222,7 @@ def best_answer_s(solution: Solution, path: SteeredPath, latest_s: float) -> flo
     units = solution.units
     pursuer = scaled_craft(solution.game.pursuer, solution.game.gravity, units)
     radius = solution.game.capture_radius_m / units.length_m
-    found, _ = _followed(pursuer, KnownPath(path.state_at), radius, latest_s / units.time_s)
+    found, _, _ = _followed(pursuer, KnownPath(path.state_at), radius, latest_s / units.time_s, _MOST_WORK)
     return None if found is None else found * units.time_s
 
 
@@ -231,38 +232,44 @@ def _stayed_above(solution: Solution, capture: Capture) -> bool:
     return followed and bool((solution.curve.distance_m[before] > solution.game.capture_radius_m).all())
 
 
-def _followed(pursuer: Side, evader: Side, radius: float, latest: float) -> tuple[float | None, bool]:
-    """Return the earliest capture, if there is one, and whether the branch could be followed to its end."""
+def _followed(
+    pursuer: Side, evader: Side, radius: float, latest: float, left: float
+) -> tuple[float | None, bool, float]:
+    """Return the earliest capture, if any, whether the branch could be followed to its end, and the work still left."""
     pair = Pair(pursuer, evader)
     first = pair.begin(latest)
     if first is None:
-        return None, False
-    branch = follow(pair, first, radius, latest)
+        return None, False, left
+    branch = follow(pair, first, radius, latest, left)
+    left -= branch.work
     for _ in range(_MOST_CHANGES):
         better = greater(pair, branch.last) if branch.ending is Ending.FOLD else None
         if better is None:
             break
-        branch = follow(pair, better, radius, latest)
+        branch = follow(pair, better, radius, latest, left)
+        left -= branch.work
     if branch.ending is Ending.CAPTURE:
-        return branch.last.duration, True
-    return None, branch.ending is Ending.TIME
+        return branch.last.duration, True, left
+    return None, branch.ending is Ending.TIME, left
 
 
-def _best_answer(pursuer: Side, evader: Side, radius: float, duration: float) -> float | None:
-    """Return the earliest capture, or the end of the game if there is none before it; None if it is not known."""
-    found, conclusive = _followed(pursuer, evader, radius, duration * _BEYOND)
-    return found if found is not None else duration if conclusive else None
+def _best_answer(
+    pursuer: Side, evader: Side, radius: float, duration: float, left: float
+) -> tuple[float | None, float]:
+    """Return the earliest capture, the end of the game if there is none before it, or None if it is not known."""
+    found, conclusive, left = _followed(pursuer, evader, radius, duration * _BEYOND, left)
+    return found if found is not None else duration if conclusive else None, left
 
 
 def _deviation(
-    policy: Policy, pursuer: Craft, evader: Craft, radius: float, duration: float, time_s: float
-) -> Deviation:
+    policy: Policy, pursuer: Craft, evader: Craft, radius: float, duration: float, time_s: float, left: float
+) -> tuple[Deviation, float]:
     try:
         path = steered_path(evader, policy.direction, duration * _BEYOND)
     except PathError:
-        return Deviation(policy.value, None, False)
-    found, conclusive = _followed(pursuer, KnownPath(path.state_at), radius, duration * _BEYOND)
-    return Deviation(policy.value, None if found is None else found * time_s, conclusive)
+        return Deviation(policy.value, None, False), left
+    found, conclusive, left = _followed(pursuer, KnownPath(path.state_at), radius, duration * _BEYOND, left)
+    return Deviation(policy.value, None if found is None else found * time_s, conclusive), left
 
 
 def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float, float]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
-from rendezvous.pursuit_evasion._branch import Ending, follow
+from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
 from rendezvous.pursuit_evasion._pair import FINE, Node, Pair
 from rendezvous.pursuit_evasion._side import Craft
 from rendezvous.pursuit_evasion.game import Game
@@ -28,6 +28,7 @@ HIT_M = 100.0
 
 _LOOKS = 65
 _PAST, _WIDE, _PATIENCE = 1.05, 2.0, 1.0
+_MOST_PLANS, _LONGEST = 10_000, 1e3
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ class Ended(Enum):
     """Passed, the last leg flown without looking, beyond what counts as a capture of a point."""
     PROPELLANT_EXHAUSTED = "propellant-exhausted"
     NO_PLAN = "no-plan"
-    """The game could not be solved from where it had come to."""
+    """The game could not be solved from where it had come to, or there had been too many plans."""
 
 
 @dataclass(frozen=True)
@@ -254,14 +255,14 @@ class _Pursuit:
         self._pursuer = scaled_craft(game.pursuer, game.gravity, units)
         self._evader = scaled_craft(game.evader, game.gravity, units)
         self._dry = game.pursuer.dry_mass_kg / units.mass_kg, game.evader.dry_mass_kg / units.mass_kg
-        self._time = 0.0
+        self._time, self._work = 0.0, MOST_WORK
         self._past: list[tuple[float, PathNow]] = []
         self._log = _Log()
 
     def run(self, plan: Node, leg: float, progress: Callable[[float], None] | None) -> Flight:
         """Fly to the end."""
         own = plan
-        while True:
+        while len(self._log.planned) < _MOST_PLANS:
             self._log.planned.append(self._time)
             self._log.predicted.append(self._time + plan.duration)
             self._log.pursuer.append(self._pursuer.start[:3])
@@ -270,8 +271,7 @@ class _Pursuit:
                 progress(min(1.0, self._time / (self._time + plan.duration)))
             last = plan.duration <= leg
             spell = min(leg, plan.duration * _PAST) if last else leg
-            left = (self._pursuer.mass - self._dry[0]) / max(self._pursuer.flow, 1e-300)
-            if spell > left:
+            if spell > _lasts(self._pursuer, self._dry[0]):
                 return self._end(Ended.PROPELLANT_EXHAUSTED)
             pursuer = extremal_paths(self._pursuer, self._evader, plan)[0]
             evader, evader_mass = self._evader_path(own, spell)
@@ -290,12 +290,14 @@ class _Pursuit:
                 own = plan
             else:
                 own = self._plan(own, spell, self._evader) or known
+        return self._end(Ended.NO_PLAN)
 
     def _plan(self, before: Node, spell: float, evader: Craft) -> Node | None:
         """Solve the game from here, from the plan before or from nothing."""
+        if _lasts(evader, self._dry[1]) < spell:
+            evader = replace(evader, thrust=0.0, flow=0.0)
         pair = Pair(self._pursuer, evader)
-        latest = (self._pursuer.mass - self._dry[0]) / max(self._pursuer.flow, 1e-300)
-        latest = min(latest, 1e3)
+        latest = min(_lasts(self._pursuer, self._dry[0]), _lasts(evader, self._dry[1]), _LONGEST)
         kept = replace(before, duration=before.duration - spell) if before.duration > spell else None
         if kept is not None:
             found = pair.solve(kept.vector, kept.duration, self._radius, time_free=True, tolerance=FINE, latest=latest)
@@ -304,7 +306,8 @@ class _Pursuit:
         if float(np.linalg.norm(evader.start[:3] - self._pursuer.start[:3])) <= self._radius:
             return kept
         first = pair.begin(latest)
-        branch = None if first is None else follow(pair, first, self._radius, latest)
+        branch = None if first is None else follow(pair, first, self._radius, latest, self._work)
+        self._work -= 0.0 if branch is None else branch.work
         afresh = branch.last if branch is not None and branch.ending is Ending.CAPTURE else None
         # Close to the end a point may slip out of reach by metres: a pass near it is better than another revolution.
         if kept is not None and (
@@ -386,6 +389,12 @@ class _Pursuit:
     def _end(self, ended: Ended) -> Flight:
         apart = float(np.linalg.norm(self._pursuer.start[:3] - self._evader.start[:3]))
         return self._log.flight(ended, self._time, apart, self._units)
+
+
+def _lasts(craft: Craft, dry: float) -> float:
+    """Return how long the propellant lasts: not to the last drop of a craft without dry mass."""
+    share = 1.0 if dry > 0.0 else 0.999
+    return share * (craft.mass - dry) / craft.flow if craft.flow > 0.0 else np.inf
 
 
 def _moved(craft: Craft, state: Floats, burnt: float) -> Craft:

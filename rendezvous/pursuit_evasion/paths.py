@@ -19,7 +19,7 @@ Direction = Callable[[float, Floats], Floats]
 """Direction of thrust, shape (3,), of a time and a state: any length, zero to coast."""
 
 _TOLERANCE = 1e-12
-_MOST_RATES = 200_000
+_MOST_RATES = 50_000
 
 
 class PathError(ArithmeticError):

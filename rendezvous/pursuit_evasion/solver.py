@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.pursuit_evasion._branch import Ending, follow
+from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
 from rendezvous.pursuit_evasion._capture import capture_of, horizon_s, near
 from rendezvous.pursuit_evasion._pair import Node
 from rendezvous.pursuit_evasion._scan import greater
@@ -49,16 +49,16 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
         return Solution(game, units, Verdict.BRANCH_NOT_CERTIFIED, None, Route.CONTINUATION, empty, 0.0)
     nodes: list[Node] = []
     branch = follow(pair, first, radius, latest)
-    changes = 0
-    while branch.ending is not Ending.TIME and changes < _MOST_BRANCHES:
+    changes, work = 0, branch.work
+    while branch.ending in (Ending.CAPTURE, Ending.FOLD) and changes < _MOST_BRANCHES:
         if not (change_branch if branch.ending is Ending.FOLD else all_directions):
             break
         better = greater(pair, branch.last)
         if better is None:
             break
         nodes += branch.nodes if branch.ending is Ending.FOLD else branch.nodes[:-1]
-        branch = follow(pair, better, radius, latest)
-        changes += 1
+        branch = follow(pair, better, radius, latest, MOST_WORK - work)
+        changes, work = changes + 1, work + branch.work
     nodes += branch.nodes
     route = Route.SWITCHED if changes else Route.CONTINUATION
     curve = DistanceCurve(
@@ -74,7 +74,8 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
     if branch.ending is Ending.TIME:
         verdict, exhausted = _uncaptured(game)
         return Solution(game, units, verdict, None, route, curve, looked_at_s, exhausted)
-    fallback = (solve_by_homotopy(game) or solve_by_linear_game(game)) if change_branch else None
+    asked = change_branch and branch.ending is Ending.FOLD
+    fallback = (solve_by_homotopy(game) or solve_by_linear_game(game)) if asked else None
     return Solution(game, units, Verdict.BRANCH_NOT_CERTIFIED, None, route, curve, looked_at_s, None, fallback)
 
 
