@@ -62,14 +62,19 @@ def tell_of_compiling_pursuit(quiet: bool) -> None:
         typer.echo("compiling the kernels, once (about five seconds) ...", err=True)
 
 
-def tell_of_compiling_rendezvous(quiet: bool) -> None:
-    """Say the same of the kernels of encounters and of visits to several targets."""
-    from rendezvous.multipoint import _path
+def tell_of_compiling_rendezvous(quiet: bool, *, nonlinear: bool = False) -> None:
+    """Say the same of the kernels of encounters and of visits to several targets, nonlinear ones too."""
+    from rendezvous.multipoint import _hamiltonian, _path
     from rendezvous.relative_motion import _circular
 
-    kernels = ((_circular, _circular.fill_gramians), (_path, _path.solve_path))
-    if not quiet and not all(_stored(kernel, Path(module.__file__ or "")) for module, kernel in kernels):
-        typer.echo("compiling the kernels, once (about five seconds) ...", err=True)
+    kernels: list[tuple[str | None, object]] = [
+        (_circular.__file__, _circular.fill_gramians),
+        (_path.__file__, _path.solve_path),
+    ]
+    if nonlinear:
+        kernels.append((_hamiltonian.__file__, _hamiltonian.propagate))
+    if not quiet and not all(_stored(kernel, Path(file or "")) for file, kernel in kernels):
+        typer.echo(f"compiling the kernels, once (about {'ten' if nonlinear else 'five'} seconds) ...", err=True)
 
 
 def _stored(kernel: object, source: Path) -> bool:

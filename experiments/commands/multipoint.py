@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.commands._options import Json, Out, Overwrite, Quiet, choice
+from experiments.commands._options import Html, Json, Out, Overwrite, Quiet, choice
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,6 +37,7 @@ class Found:
     objective: float
     evaluations: int
     searched: int
+    lost: int
     best_times: bool
     best_order: bool
     peak_m_s2: float
@@ -53,6 +54,7 @@ def multipoint(
     ] = None,
     out: Out = None,
     json_: Json = None,
+    html: Html = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> None:
@@ -61,24 +63,33 @@ def multipoint(
     With --order best and --times given the file's times are slots: the first target visited takes the earliest. Without
     --out or --json nothing is written.
     """
+    from experiments._multipoint_tables import Axes
     from experiments.commands._screen import figure_files, tell_of_compiling_rendezvous
     from experiments.multipoint_file import load_multipoint
     from experiments.output import STDOUT, checked_destinations, to_json, write_file
+    from experiments.pages.document import page_path
 
+    page_path("--html", html)
     given = load_multipoint(problem)
     choices = (GIVEN, BEST)
     best_order = order is not None and choice("--order", order, choices) == BEST
     best_times = given.optimise if times is None else choice("--times", times, choices) == BEST
     _check(given, best_order, best_times)
     files = ("results.json", *figure_files(*FIGURES))
-    with checked_destinations(folder=out, names=files, files={"--json": json_}, overwrite=overwrite):
-        tell_of_compiling_rendezvous(quiet)
+    with checked_destinations(folder=out, names=files, files={"--json": json_, "--html": html}, overwrite=overwrite):
+        tell_of_compiling_rendezvous(quiet, nonlinear=given.axes is Axes.INERTIAL)
         found = _find(given, best_order, best_times, quiet)
         json_text = to_json(_summary(found))
         if json_ is not None and str(json_) == STDOUT:
             typer.echo(json_text, nl=False)
         elif json_ is not None:
             write_file(json_, json_text, overwrite=overwrite)
+        if html is not None:
+            from experiments.pages.multipoint import multipoint_page
+
+            bound = given.greatest_control_m_s2
+            shown = multipoint_page(given.name, given.tour, found.order, found.path, given.axes, bound)
+            write_file(html, shown, overwrite=overwrite)
         if out is not None:
             _fill(out, found, json_text, overwrite, quiet)
     if not quiet:
@@ -135,21 +146,21 @@ def _find(problem: MultipointProblem, best_order: bool, best_times: bool, quiet:
     try:
         with progress_bar(quiet) as begin:
             if best_order and best_times:
-                best = core.best_order(tour, problem.limits(), progress=begin("orders and times"))
-                told = (best.order, best.path, best.objective, best.evaluations, best.nodes)
+                best = core.best_order(tour, problem.limits(), guesses, progress=begin("orders and times"))
+                told = (best.order, best.path, best.objective, best.evaluations, best.nodes, len(best.lost))
             elif best_order:
                 best = core.best_order_of_slots(tour, guesses[0], progress=begin("orders"))
-                told = (best.order, best.path, best.objective, best.evaluations, best.nodes)
+                told = (best.order, best.path, best.objective, best.evaluations, best.nodes, len(best.lost))
             elif best_times:
                 timed = core.best_times(tour, listed, problem.limits(), guesses, progress=begin("times"))
-                told = (listed, timed.path, timed.objective, timed.evaluations, 1)
+                told = (listed, timed.path, timed.objective, timed.evaluations, 1, 0)
             else:
                 assert problem.times_s is not None
                 path = tour.fly(listed, problem.times_s)
-                told = (listed, path, path.cost + problem.price_per_s * float(problem.times_s[-1]), 1, 1)
+                told = (listed, path, path.cost + problem.price_per_s * float(problem.times_s[-1]), 1, 1, 0)
     except ValueError as error:
         raise InputError(f"{problem.source}: {error}") from None
-    order, path, objective, evaluations, searched = told
+    order, path, objective, evaluations, searched, lost = told
     numbers = (path.cost, objective, path.costate_start, path.arrival_states, path.time_gradient)
     if not all(np.isfinite(each).all() for each in numbers):
         raise InputError(f"{problem.source}: the numbers are so large that results are not finite; check the units")
@@ -160,7 +171,7 @@ def _find(problem: MultipointProblem, best_order: bool, best_times: bool, quiet:
             f"{problem.source}: greatest_control_m_s2: the minimum-energy control reaches {peak:.6g} m/s^2, "
             f"{peak / bound - 1.0:.2%} over the bound of {bound:g} m/s^2; raise it, or give the visits more time"
         )
-    return Found(problem, order, path, objective, evaluations, searched, best_times, best_order, peak)
+    return Found(problem, order, path, objective, evaluations, searched, lost, best_times, best_order, peak)
 
 
 def _peak(path: FlightPath) -> float:
@@ -201,6 +212,7 @@ def _summary(found: Found) -> dict[str, object]:
         "peak_control_m_s2": found.peak_m_s2,
         "evaluations": found.evaluations,
         "orders_begun": found.searched,
+        "orders_left_out": found.lost,
     }
 
 
@@ -270,4 +282,5 @@ def _show(found: Found, stdout_taken: bool) -> None:
         said = f"{found.evaluations} paths computed"
         if found.best_order:
             said += f", {found.searched} beginnings of orders looked at"
+            said += f", {found.lost} of them left out, for no trajectory was found" if found.lost else ""
         console.print(Text(said + "; a local minimum of the times" if found.best_times else said), soft_wrap=True)

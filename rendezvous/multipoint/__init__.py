@@ -1,9 +1,9 @@
 """Minimum-energy visits to several moving targets: flybys and rendezvous, their times and their order."""
 
 from rendezvous.multipoint.dense import DenseSolution, solve_dense
-from rendezvous.multipoint.kepler import KeplerTargets, KeplerTour, NotSettledError
+from rendezvous.multipoint.kepler import KeplerTargets, KeplerTour
 from rendezvous.multipoint.order import MOST_TARGETS, BestOrder, best_order, best_order_of_slots, best_times
-from rendezvous.multipoint.segments import Nodes, Path, solve_segments
+from rendezvous.multipoint.segments import Flown, Nodes, NotSettledError, Path, solve_segments
 from rendezvous.multipoint.targets import DriftingTargets, Meet, MovingTargets, Target
 from rendezvous.multipoint.times import BestTimes, Effort, TimeLimits, optimise_times
 from rendezvous.multipoint.tour import Tour, Visits, nodes_of
@@ -15,6 +15,7 @@ __all__ = [
     "DenseSolution",
     "DriftingTargets",
     "Effort",
+    "Flown",
     "KeplerTargets",
     "KeplerTour",
     "Meet",

@@ -7,23 +7,29 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import DOP853
 
 from rendezvous._compile import compiled
 
 Floats = NDArray[np.float64]
 
-STEP_RAD = 0.01
-MOST_STEPS = 200_000
-LEAST_RADIUS = 1e-3
+ROWS = 13
+"""Position, velocity, their costates, and the energy spent."""
+STEP_RAD = 0.1
+MOST_STEPS = 50_000
+LEAST_RADIUS = 0.02
+_STAGES = int(DOP853.n_stages)
+_TABLE = np.ascontiguousarray(DOP853.A[:_STAGES, :_STAGES], dtype=np.float64)
+_WEIGHTS = np.ascontiguousarray(DOP853.B, dtype=np.float64)
 
 
 @compiled
 def propagate(z: Floats, variations: Floats, duration: float) -> bool:
-    """Carry (r, v, lambda_r, lambda_v) and its variations on, in place.
+    """Carry (r, v, lambda_r, lambda_v, energy) and variations of all but the energy on, in place.
 
     Parameters
     ----------
-    z : ndarray, shape (12,)
+    z : ndarray, shape (13,)
     variations : ndarray, shape (12, m)
         Derivatives of z by what the caller likes; m may be zero.
     duration : float
@@ -35,14 +41,16 @@ def propagate(z: Floats, variations: Floats, duration: float) -> bool:
 
     Notes
     -----
-    Runge and Kutta's classical method in steps of 0.01 radians of the circular orbit at the present distance: relative
-    errors of about 1e-10 a revolution, enough to start the combined method from.
+    The method of Dormand and Prince of order 8 in steps of 0.1 radians of the circular orbit at the present distance:
+    relative errors of about 1e-12 a revolution.
     """
-    columns = variations.shape[1]
-    slope, total = np.empty((12, columns + 1)), np.empty((12, columns + 1))
-    base, trial = np.empty((12, columns + 1)), np.empty((12, columns + 1))
+    columns = variations.shape[1] + 1
+    slopes = np.zeros((_STAGES, ROWS, columns))
+    base, trial = np.zeros((ROWS, columns)), np.zeros((ROWS, columns))
+    flat_base, flat_trial = base.reshape(-1), trial.reshape(-1)
+    flat_slopes = slopes.reshape(_STAGES, -1)
     base[:, 0] = z
-    base[:, 1:] = variations
+    base[: ROWS - 1, 1:] = variations
     left = duration
     for _ in range(MOST_STEPS):
         radius = np.sqrt(base[0, 0] ** 2 + base[1, 0] ** 2 + base[2, 0] ** 2)
@@ -51,29 +59,29 @@ def propagate(z: Floats, variations: Floats, duration: float) -> bool:
         step = min(left, STEP_RAD * radius * np.sqrt(radius))
         if left - step < 1e-3 * step:
             step = left
-        _slopes(base, total)
-        for stage in range(3):
-            part = 0.5 * step if stage < 2 else step
-            source = total if stage == 0 else slope
-            for row in range(12):
-                for column in range(columns + 1):
-                    trial[row, column] = base[row, column] + part * source[row, column]
-            _slopes(trial, slope)
-            weight = 2.0 if stage < 2 else 1.0
-            for row in range(12):
-                for column in range(columns + 1):
-                    total[row, column] += weight * slope[row, column]
-        for row in range(12):
-            for column in range(columns + 1):
-                base[row, column] += step / 6.0 * total[row, column]
+        for stage in range(_STAGES):
+            _combine(flat_base, flat_slopes[:stage], _TABLE[stage], step, flat_trial)
+            _slopes(trial, slopes[stage])
+        _combine(flat_base, flat_slopes, _WEIGHTS, step, flat_trial)
+        flat_base[:] = flat_trial
         left -= step
         if left <= 0.0:
-            for row in range(12):
-                z[row] = base[row, 0]
-                for column in range(columns):
-                    variations[row, column] = base[row, column + 1]
+            z[:] = base[:, 0]
+            variations[:] = base[: ROWS - 1, 1:]
             return True
     return False
+
+
+@compiled
+def _combine(base: Floats, slopes: Floats, weights: Floats, step: float, found: Floats) -> None:
+    """Base and a step along a weighted sum of slopes, all flat."""
+    found[:] = base
+    for each in range(len(slopes)):
+        part = step * weights[each]
+        if part != 0.0:
+            slope = slopes[each]
+            for place in range(len(found)):
+                found[place] += part * slope[place]
 
 
 @compiled
@@ -85,6 +93,7 @@ def _slopes(z: Floats, slope: Floats) -> None:
     third = 1.0 / (squared * np.sqrt(squared))
     fifth = third / squared
     along = r0 * l0 + r1 * l1 + r2 * l2
+    slope[12, 0] = 0.5 * (l0 * l0 + l1 * l1 + l2 * l2)
     for column in range(z.shape[1]):
         for axis in range(3):
             slope[axis, column] = z[3 + axis, column]

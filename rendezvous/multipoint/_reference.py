@@ -22,6 +22,35 @@ _SAMPLES = 64
 
 
 @dataclass(frozen=True, eq=False)
+class Panels:
+    """A function of time, by polynomials.
+
+    Parameters
+    ----------
+    breaks_s : ndarray, shape (P + 1,)
+        Ends of the panels.
+    values : ndarray, shape (P, 12, m)
+        At the Chebyshev points of each panel, both ends among them.
+    """
+
+    breaks_s: Floats
+    values: Floats
+
+    def __call__(self, time_s: Floats) -> Floats:
+        """Return values at times of shape (k,), shape (k, m); at a break those of the panel that begins there."""
+        inside = np.clip(time_s, self.breaks_s[0], self.breaks_s[-1])
+        panel = np.clip(np.searchsorted(self.breaks_s, inside, side="right") - 1, 0, len(self.values) - 1)
+        width = self.breaks_s[panel + 1] - self.breaks_s[panel]
+        places, weights = _chebyshev()
+        apart = (inside - self.breaks_s[panel])[:, None] / width[:, None] - places
+        exact = apart == 0.0
+        shares = weights / np.where(exact, 1.0, apart)
+        hit = exact.any(axis=1)
+        shares[hit] = exact[hit]
+        return np.asarray(np.einsum("kj,kja->ka", shares / shares.sum(axis=1, keepdims=True), self.values[panel]))
+
+
+@dataclass(frozen=True, eq=False)
 class Reference:
     """States as functions of time.
 
@@ -41,21 +70,12 @@ class Reference:
 
     def __call__(self, time_s: Floats) -> Floats:
         """States at times of shape (k,), shape (k, 6)."""
-        inside = np.clip(time_s, self.breaks_s[0], self.breaks_s[-1])
-        panel = np.clip(np.searchsorted(self.breaks_s, inside, side="right") - 1, 0, len(self.values) - 1)
-        width = self.breaks_s[panel + 1] - self.breaks_s[panel]
-        places, weights = _chebyshev()
-        apart = (inside - self.breaks_s[panel])[:, None] / width[:, None] - places
-        exact = apart == 0.0
-        shares = weights / np.where(exact, 1.0, apart)
-        hit = exact.any(axis=1)
-        shares[hit] = exact[hit]
-        states = np.einsum("kj,kja->ka", shares / shares.sum(axis=1, keepdims=True), self.values[panel])
+        states = Panels(self.breaks_s, self.values)(time_s)
         after = time_s > self.breaks_s[-1]
         if after.any():
             last = np.broadcast_to(self.values[-1, -1], (int(after.sum()), 6))
             states[after] = coast(last, time_s[after] - self.breaks_s[-1], self.gravitational_parameter_m3_s2)
-        return np.asarray(states)
+        return states
 
     def edges(self, start_s: float, end_s: float) -> Floats:
         """Ends of the panels from one break to another."""
@@ -98,28 +118,77 @@ class Reference:
         cls, path: Path, gravitational_parameter_m3_s2: float, before: Reference, *, keep: bool = False
     ) -> Reference:
         """Represent the trajectory of a path whose motion is linear about another one, on its panels or on new ones."""
-        assert isinstance(path.motion, TimeVaryingMotion)
-        mu, places = gravitational_parameter_m3_s2, _chebyshev()[0]
-        breaks: list[Floats] = []
-        values: list[Floats] = []
-        for segment, (start, end) in enumerate(zip(path.starts_s, path.nodes.arrive_s, strict=True)):
-            edges = before.edges(start, end) if keep else np.linspace(start, end, _panels(before, start, end, mu) + 1)
+        mu = gravitational_parameter_m3_s2
+        found = panels_of(path, mu, before, keep=keep)
+        return cls(found.breaks_s, found.values[..., :6], mu)
+
+
+@dataclass(frozen=True, eq=False)
+class TracedPath(Path):
+    """A path whose states and costates are known at all times.
+
+    Parameters
+    ----------
+    trace : Panels
+        States and costates.
+    """
+
+    trace: Panels
+
+    def along(self, time_s: Floats) -> tuple[Floats, Floats]:
+        """Return states and costates at times.
+
+        Parameters
+        ----------
+        time_s : ndarray, shape (k,)
+            From the start to the last node.
+
+        Returns
+        -------
+        tuple of ndarray, each of shape (k, 6)
+        """
+        found = self.trace(np.asarray(time_s, dtype=np.float64))
+        return found[:, :6], found[:, 6:]
+
+
+def panels_of(path: Path, gravitational_parameter_m3_s2: float, before: Reference, *, keep: bool = False) -> Panels:
+    """Represent states and costates of a path whose motion is linear about a reference.
+
+    Parameters
+    ----------
+    path : Path
+    gravitational_parameter_m3_s2 : float
+    before : Reference
+    keep : bool
+        Whether its panels are the reference's.
+
+    Returns
+    -------
+    Panels
+    """
+    assert isinstance(path.motion, TimeVaryingMotion)
+    mu, places = gravitational_parameter_m3_s2, _chebyshev()[0]
+    breaks: list[Floats] = []
+    values: list[Floats] = []
+    for segment, (start, end) in enumerate(zip(path.starts_s, path.nodes.arrive_s, strict=True)):
+        edges = before.edges(start, end) if keep else np.linspace(start, end, _panels(before, start, end, mu) + 1)
+        breaks.append(edges[:-1])
+        values.append(_segment_values(path.motion, edges, path.start_states[segment], path.costate_before[segment]))
+        leave = path.nodes.leave_s[segment]
+        if leave > end:
+            stay = path.nodes.arrive[segment]
+
+            def staying(times: Floats, state: Floats = stay, since: float = end) -> Floats:
+                return coast(np.broadcast_to(state, (len(times), 6)), times - since, mu)
+
+            fresh = np.linspace(end, leave, _panels(staying, end, leave, mu) + 1)
+            edges = before.edges(end, leave) if keep else fresh
+            times = edges[:-1, None] + np.diff(edges)[:, None] * places
             breaks.append(edges[:-1])
-            values.append(_segment_states(path.motion, edges, path.start_states[segment], path.costate_before[segment]))
-            leave = path.nodes.leave_s[segment]
-            if leave > end:
-                stay = path.nodes.arrive[segment]
-
-                def staying(times: Floats, state: Floats = stay, since: float = end) -> Floats:
-                    return coast(np.broadcast_to(state, (len(times), 6)), times - since, mu)
-
-                fresh = np.linspace(end, leave, _panels(staying, end, leave, mu) + 1)
-                edges = before.edges(end, leave) if keep else fresh
-                times = edges[:-1, None] + np.diff(edges)[:, None] * places
-                breaks.append(edges[:-1])
-                values.append(staying(times.ravel()).reshape(len(edges) - 1, NODES, 6))
-        last = max(float(path.nodes.leave_s[-1]), float(path.nodes.arrive_s[-1]))
-        return cls(np.append(np.concatenate(breaks), last), np.concatenate(values), mu)
+            states = staying(times.ravel()).reshape(len(edges) - 1, NODES, 6)
+            values.append(np.concatenate([states, np.zeros_like(states)], axis=2))
+    last = max(float(path.nodes.leave_s[-1]), float(path.nodes.arrive_s[-1]))
+    return Panels(np.append(np.concatenate(breaks), last), np.concatenate(values))
 
 
 class Mixture:
@@ -171,8 +240,8 @@ def _chebyshev() -> tuple[Floats, Floats]:
     return 0.5 - 0.5 * np.cos(np.pi * index / (NODES - 1)), weights
 
 
-def _segment_states(motion: TimeVaryingMotion, edges: Floats, start: Floats, costate_end: Floats) -> Floats:
-    """States at the points of a segment's panels, shape (P, 12, 6)."""
+def _segment_values(motion: TimeVaryingMotion, edges: Floats, start: Floats, costate_end: Floats) -> Floats:
+    """States and costates at the points of a segment's panels, shape (P, 12, 12)."""
     count, places = len(edges) - 1, _chebyshev()[0][1:]
     begins = np.repeat(edges[:-1], NODES - 1)
     ends = (edges[:-1, None] + np.diff(edges)[:, None] * places).ravel()
@@ -180,18 +249,18 @@ def _segment_states(motion: TimeVaryingMotion, edges: Floats, start: Floats, cos
     transition = found.transition.reshape(count, NODES - 1, 6, 6)
     gramian = found.gramian.reshape(count, NODES - 1, 6, 6)
     drift = found.drift.reshape(count, NODES - 1, 6)
-    costates = np.empty((count, 6))
+    values = np.empty((count, NODES, 12))
     costate = costate_end
     for panel in range(count - 1, -1, -1):
         costate = transition[panel, -1].T @ costate
-        costates[panel] = costate
+        values[panel, 0, 6:] = costate
     # At the points, from the panel's start: lambda = Phi^-T lambda_start.
-    inside = np.linalg.solve(np.swapaxes(transition, -1, -2), costates[:, None, :, None])[..., 0]
+    inside = np.linalg.solve(np.swapaxes(transition, -1, -2), values[:, :1, 6:, None])[..., 0]
+    values[:, 1:, 6:] = inside
     forced = drift + np.einsum("pjab,pjb->pja", gramian, inside)
-    values = np.empty((count, NODES, 6))
     state = start
     for panel in range(count):
-        values[panel, 0] = state
-        values[panel, 1:] = transition[panel] @ state + forced[panel]
-        state = values[panel, -1]
+        values[panel, 0, :6] = state
+        values[panel, 1:, :6] = transition[panel] @ state + forced[panel]
+        state = values[panel, -1, :6]
     return values

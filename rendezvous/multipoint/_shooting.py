@@ -10,14 +10,19 @@ from numpy.typing import NDArray
 
 from rendezvous.multipoint._hamiltonian import propagate
 from rendezvous.multipoint.segments import Nodes, Path
-from rendezvous.two_body import coast
 
 Floats = NDArray[np.float64]
 
-TOLERANCE = 1e-9
-LEAST_STEP = 1.0 / 512.0
-_ROUNDS = 8
-_GREATEST_CORRECTION = 0.3
+TOLERANCE = 1e-11
+ON_THE_WAY = 1e-4
+ROUNDING = 1e-8
+LEAST_STEP = 1.0 / 64.0
+LEAST_STEP_FROM_NEAR = 1.0 / 8.0
+_ROUNDS = 12
+_FAST = 0.2
+_GREATEST_CORRECTION = 0.5
+_FIRST_STEP = 0.3
+_NONE: Floats = np.zeros((12, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,34 +89,77 @@ class Shot:
     unknowns: Floats
     gravitational_parameter_m3_s2: float
 
-    def states(self, time_s: Floats) -> Floats:
-        """States at increasing times of the block, shape (k, 6), m and m/s."""
-        length, duration = _units(self.block, self.gravitational_parameter_m3_s2)
-        scale = np.array([length] * 3 + [length / duration] * 3)
-        z = np.concatenate([self.block.start_state / scale, self.unknowns[:6]])
-        none, now, node = np.zeros((12, 0)), self.block.start_s, 0
-        found = np.empty((len(time_s), 6))
+    def along(self, time_s: Floats) -> tuple[Floats, Floats]:
+        """Return states and costates at increasing times of the block, those after the jump at a node.
+
+        Parameters
+        ----------
+        time_s : ndarray, shape (k,)
+
+        Returns
+        -------
+        tuple of ndarray, each of shape (k, 6)
+            m, m/s; m/s^3, m/s^2.
+        """
+        _, duration = _units(self.block, self.gravitational_parameter_m3_s2)
+        z, now, node = self._begin(), self.block.start_s, 0
+        found = np.empty((len(time_s), 12))
         for row, time in enumerate(time_s):
             while node < len(self.block.time_s) - 1 and self.block.time_s[node] <= time:
-                _advance(z, none, (self.block.time_s[node] - now) / duration)
-                z[6:9] -= self.unknowns[6 + 3 * node : 9 + 3 * node]
+                _advance(z, _NONE, (self.block.time_s[node] - now) / duration)
+                self._jump(z, node)
                 now, node = self.block.time_s[node], node + 1
-            _advance(z, none, (time - now) / duration)
+            _advance(z, _NONE, (time - now) / duration)
             now = time
-            found[row] = z[:6] * scale
-        return found
+            found[row] = z[:12]
+        return self._in_si(found)
+
+    def ends(self) -> tuple[Floats, Floats, Floats, float]:
+        """Return states and costates where each segment ends, costates where each starts, and the energy spent.
+
+        Returns
+        -------
+        states : ndarray, shape (k, 6)
+        before, starting : ndarray, shape (k, 6)
+        energy : float
+            m^2/s^3.
+        """
+        length, duration = _units(self.block, self.gravitational_parameter_m3_s2)
+        count = len(self.block.time_s)
+        z, starting, ending = self._begin(), np.empty((count, 12)), np.empty((count, 12))
+        for node, (start, end) in enumerate(zip(starts_of(self.block), self.block.time_s, strict=True)):
+            starting[node] = z[:12]
+            _advance(z, _NONE, (float(end) - start) / duration)
+            ending[node] = z[:12]
+            if node < count - 1:
+                self._jump(z, node)
+        states, before = self._in_si(ending)
+        return states, before, self._in_si(starting)[1], float(z[12]) * length**2 / duration**3
+
+    def _begin(self) -> Floats:
+        length, duration = _units(self.block, self.gravitational_parameter_m3_s2)
+        state = self.block.start_state / np.array([length] * 3 + [length / duration] * 3)
+        return np.concatenate([state, self.unknowns[:6], [0.0]])
+
+    def _jump(self, z: Floats, node: int) -> None:
+        z[6:9] -= self.unknowns[6 + 3 * node : 9 + 3 * node]
+
+    def _in_si(self, z: Floats) -> tuple[Floats, Floats]:
+        length, duration = _units(self.block, self.gravitational_parameter_m3_s2)
+        states = z[:, :6] * np.array([length] * 3 + [length / duration] * 3)
+        return states, z[:, 6:] * np.array([length / duration**3] * 3 + [length / duration**2] * 3)
 
 
 def shoot(block: Block, gravitational_parameter_m3_s2: float, near: Floats | None = None) -> Shot | None:
-    """Find a block's trajectory by Newton's method.
+    """Find a block's trajectory by Newton's method, as what the nodes are missed by is taken away in steps.
 
     Parameters
     ----------
     block : Block
     gravitational_parameter_m3_s2 : float
     near : ndarray, shape (3 + 3 k,), or None
-        Unknowns of like times; None follows the targets from the coasting orbit, in steps as long as Newton's method
-        bears.
+        Unknowns of other times, to begin from; where that leads nowhere, and with None, it begins from the coasting
+        orbit.
 
     Returns
     -------
@@ -119,26 +167,13 @@ def shoot(block: Block, gravitational_parameter_m3_s2: float, near: Floats | Non
         None where it leads nowhere.
     """
     mu = gravitational_parameter_m3_s2
-    size = 3 + 3 * len(block.time_s)
-    if near is not None and near.shape == (size,):
-        found = _newton(block, mu, near, 1.0)
+    coasting = np.zeros(3 + 3 * len(block.time_s))
+    begins = [] if near is None else [(near, LEAST_STEP_FROM_NEAR)]
+    for begin, least_step in (*begins, (coasting, LEAST_STEP)):
+        found = _follow(block, mu, begin, least_step)
         if found is not None:
-            return Shot(block, found[0], mu)
-    unknowns, done, step = np.zeros(size), 0.0, 0.25
-    slope = _tangent(block, mu, unknowns, 0.0)
-    while done < 1.0:
-        ahead = min(done + step, 1.0)
-        found = _newton(block, mu, unknowns + (ahead - done) * slope, ahead)
-        if found is None:
-            step *= 0.5
-            if step < LEAST_STEP:
-                return None
-            continue
-        unknowns, rounds = found
-        done, step = ahead, step * (1.6 if rounds <= 3 else 1.0)
-        if done < 1.0:
-            slope = _tangent(block, mu, unknowns, done)
-    return Shot(block, unknowns, mu)
+            return Shot(block, found, mu)
+    return None
 
 
 def starts_of(block: Block) -> Iterator[float]:
@@ -157,72 +192,90 @@ def _advance(z: Floats, variations: Floats, duration: float) -> None:
         raise ValueError("a trajectory falls into the centre")
 
 
-def _goals(block: Block, mu: float, share: float) -> Floats:
-    """Where the nodes are when the targets are so far on the way from the coasting orbit, shape (k, 6)."""
-    begin = np.broadcast_to(block.start_state, (len(block.time_s), 6))
-    coasting = coast(begin, block.time_s - block.start_s, mu)
-    return np.asarray(coasting + share * (block.goal - coasting))
-
-
-def _residual(block: Block, mu: float, unknowns: Floats, share: float) -> tuple[Floats, Floats] | None:
-    """What the nodes are missed by, and its derivatives by the unknowns; None where there is no trajectory."""
+def _missed(block: Block, mu: float, unknowns: Floats, slopes: Floats | None = None) -> Floats | None:
+    """What the nodes are missed by; None where there is no trajectory. Its derivatives are filled in, if asked for."""
     length, duration = _units(block, mu)
     scale = np.array([length] * 3 + [length / duration] * 3)
-    goals = _goals(block, mu, share) / scale
+    goals = block.goal / scale
     size, last = len(unknowns), len(block.time_s) - 1
-    z = np.concatenate([block.start_state / scale, unknowns[:6]])
+    z = np.concatenate([block.start_state / scale, unknowns[:6], [0.0]])
     variations = np.zeros((12, size))
     variations[6:, :6] = np.eye(6)
-    missed, slopes = np.empty(size), np.empty((size, size))
+    missed = np.empty(size)
     for node, (start, end) in enumerate(zip(starts_of(block), block.time_s, strict=True)):
+        known = 0 if slopes is None else 6 + 3 * node  # columns of jumps still ahead are zero
+        varied = np.ascontiguousarray(variations[:, :known])
         try:
-            _advance(z, variations, (float(end) - start) / duration)
+            _advance(z, varied, (float(end) - start) / duration)
         except ValueError:
             return None
-        rows = slice(3 * node, 3 * node + 3)
-        missed[rows], slopes[rows] = z[:3] - goals[node, :3], variations[:3]
+        variations[:, :known] = varied
+        rows, jump = slice(3 * node, 3 * node + 3), slice(6 + 3 * node, 9 + 3 * node)
+        missed[rows] = z[:3] - goals[node, :3]
+        if slopes is not None:
+            slopes[rows] = variations[:3]
         if node < last:
-            jump = slice(6 + 3 * node, 9 + 3 * node)
             z[6:9] -= unknowns[jump]
             variations[6:9, jump] -= np.eye(3)
-    if block.rendezvous:
-        missed[-3:], slopes[-3:] = z[3:6] - goals[last, 3:], variations[3:6]
-    else:
-        missed[-3:], slopes[-3:] = z[9:], variations[9:]
-    return (missed, slopes) if np.isfinite(missed).all() and np.isfinite(slopes).all() else None
+    missed[-3:] = z[3:6] - goals[last, 3:] if block.rendezvous else z[9:12]
+    if slopes is not None:
+        slopes[-3:] = variations[3:6] if block.rendezvous else variations[9:]
+    return missed if np.isfinite(missed).all() and (slopes is None or np.isfinite(slopes).all()) else None
 
 
-def _newton(block: Block, mu: float, unknowns: Floats, share: float) -> tuple[Floats, int] | None:
-    """Newton's method at one share of the way; None where it does not converge fast."""
-    before = np.inf
+def _follow(block: Block, mu: float, begin: Floats, least_step: float) -> Floats | None:
+    """Go from unknowns that miss the nodes to such that do not, in steps as long as Newton's method bears."""
+    slopes = np.empty((len(begin), len(begin)))
+    first = _missed(block, mu, begin, slopes)
+    if first is None:
+        return None
+    unknowns, done, step = begin, 0.0, min(1.0, _FIRST_STEP / max(float(np.abs(first).max()), _FIRST_STEP))
+    while True:
+        ahead = _solved(slopes, -first)
+        if ahead is None:
+            return None
+        while True:
+            share = min(done + step, 1.0)
+            tried = _newton(block, mu, unknowns + (share - done) * ahead, share, (1.0 - share) * first, slopes.copy())
+            if tried is not None:
+                break
+            step *= 0.5
+            if step < least_step:
+                return None
+        unknowns, rounds = tried
+        if share == 1.0:
+            return unknowns
+        done, step = share, step * (2.0 if rounds <= 2 else 1.5 if rounds <= 4 else 1.0)
+        if _missed(block, mu, unknowns, slopes) is None:
+            return None
+
+
+def _newton(
+    block: Block, mu: float, unknowns: Floats, share: float, goal: Floats, slopes: Floats
+) -> tuple[Floats, int] | None:
+    """Newton's method towards a residual, with derivatives as old as they may be; None where it is not fast."""
+    before, fresh = np.inf, False
     for rounds in range(_ROUNDS):
-        found = _residual(block, mu, unknowns, share)
+        found = _missed(block, mu, unknowns)
         if found is None:
             return None
-        missed, slopes = found
-        size = float(np.abs(missed).max())
-        if size <= TOLERANCE:
+        size = float(np.abs(found - goal).max())
+        if size <= (TOLERANCE if share == 1.0 else ON_THE_WAY) or (fresh and size <= ROUNDING and size > 0.3 * before):
             return unknowns, rounds
         if size > _GREATEST_CORRECTION or size > 2.0 * before:
             return None
-        try:
-            unknowns = unknowns - np.linalg.solve(slopes, missed)
-        except np.linalg.LinAlgError:
+        fresh = size > _FAST * before
+        if fresh and _missed(block, mu, unknowns, slopes) is None:
             return None
-        before = size
+        move = _solved(slopes, found - goal)
+        if move is None:
+            return None
+        unknowns, before = unknowns - move, size
     return None
 
 
-def _tangent(block: Block, mu: float, unknowns: Floats, share: float) -> Floats:
-    """How the unknowns change with the share, once it is solved there."""
-    found = _residual(block, mu, unknowns, share)
-    if found is None:
-        return np.zeros_like(unknowns)
-    length, duration = _units(block, mu)
-    scale = np.array([length] * 3 + [length / duration] * 3)
-    away = (_goals(block, mu, 1.0) - _goals(block, mu, 0.0)) / scale
-    moved = np.concatenate([away[:, :3].ravel(), away[-1, 3:] if block.rendezvous else np.zeros(3)])
+def _solved(matrix: Floats, right: Floats) -> Floats | None:
     try:
-        return np.asarray(np.linalg.solve(found[1], moved))
+        return np.asarray(np.linalg.solve(matrix, right))
     except np.linalg.LinAlgError:
-        return np.zeros_like(unknowns)
+        return None

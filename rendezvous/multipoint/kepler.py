@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rendezvous.multipoint._reference import Mixture, Reference
-from rendezvous.multipoint._shooting import Shot, blocks_of, shoot, unknowns_of
-from rendezvous.multipoint.segments import Nodes, Path, check_times, solve_segments
-from rendezvous.multipoint.targets import Integers, Target, check_names
-from rendezvous.multipoint.tour import nodes_of
+from rendezvous.multipoint._reference import Mixture, Reference, TracedPath, panels_of
+from rendezvous.multipoint._shooting import blocks_of, shoot, unknowns_of
+from rendezvous.multipoint._shot_path import ShotPath
+from rendezvous.multipoint.segments import Flown, Nodes, NotSettledError, Path, check_times, solve_segments
+from rendezvous.multipoint.targets import Integers, Target, check_targets, dwells
+from rendezvous.multipoint.tour import check_start, nodes_of
 from rendezvous.relative_motion import TimeVaryingMotion
 from rendezvous.two_body import coast, coasting_rates, gravity_gradient
 
@@ -23,12 +24,10 @@ SETTLED = 1e-11
 ROUNDING = 1e-8
 MOST_ROUNDS = 30
 FEW_ROUNDS = 8
+MOST_KNOWN = 64
+RUGGED = 3.0
 GREATEST_CHANGE = 2.0
 LEAST_RADIUS = 0.02
-
-
-class NotSettledError(ValueError):
-    """Re-linearising leads to no trajectory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +54,7 @@ class KeplerTargets:
     gravitational_parameter_m3_s2: float
 
     def __post_init__(self) -> None:
-        check_names(self.targets)
-        if np.shape(self.initial) != (len(self.targets), 6) or not np.isfinite(self.initial).all():
-            raise ValueError("each target needs a state of six finite numbers")
+        check_targets(self.targets, self.initial)
         if np.shape(self.epoch_s) != (len(self.targets),) or not np.isfinite(self.epoch_s).all():
             raise ValueError("each target needs a finite epoch")
 
@@ -102,16 +99,18 @@ class KeplerTour:
         mu = self.targets.gravitational_parameter_m3_s2
         if not (np.isfinite(mu) and mu > 0.0):
             raise ValueError(f"the gravitational parameter must be positive and finite, found {mu!r} m^3/s^2")
-        if np.shape(self.start_state) != (6,) or not np.isfinite(self.start_state).all():
-            raise ValueError("the chaser's state must be six finite numbers")
-        if not np.isfinite(self.start_s):
-            raise ValueError("the start is not finite")
+        check_start(self.start_state, self.start_s)
         coast(self.start_state, 0.0, mu)
 
     @property
     def dwell_s(self) -> Floats:
         """How long the chaser stays with each target, shape (n,)."""
-        return np.array([each.dwell_s for each in self.targets.targets])
+        return dwells(self.targets.targets)
+
+    @property
+    def ruggedness(self) -> float:
+        """Much: revolutions and encounters' geometry make many local minima."""
+        return RUGGED
 
     def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
         """Find a path that satisfies the conditions of least energy, near the chaser's coasting orbit.
@@ -133,10 +132,14 @@ class KeplerTour:
         NotSettledError
             If re-linearising leads to no trajectory, not even where the targets are followed from the coasting orbit.
         """
-        return self.flyer(order)(np.asarray(time_s, dtype=np.float64))
+        nodes = nodes_of(self.targets, order, time_s)
+        check_times(self.start_s, nodes.arrive_s, nodes.leave_s)
+        with contextlib.suppress(NotSettledError):
+            return self._relinearise(nodes, self._coasting(nodes), rounds=FEW_ROUNDS)
+        return self.flyer(order)(nodes.arrive_s).settled()
 
-    def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Path]:
-        """Return what finds paths of one order for times asked in turn, each from the last one's costates.
+    def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Flown]:
+        """Return what finds paths of one order for times asked in turn, each from the nearest one known.
 
         Parameters
         ----------
@@ -147,30 +150,30 @@ class KeplerTour:
         Returns
         -------
         callable
-            The path of times of shape (N,).
+            The path of times of shape (N,), shot; it is re-linearised about when it settles.
         """
         mu = self.targets.gravitational_parameter_m3_s2
-        last: list[Floats] = [] if near is None else unknowns_of(near, mu)
+        known: list[tuple[Floats, list[Floats]]] = []
+        if near is not None:
+            known.append((near.nodes.arrive_s, unknowns_of(near, mu)))
 
-        def fly(time_s: Floats) -> Path:
+        def fly(time_s: Floats) -> ShotPath:
             nodes = nodes_of(self.targets, order, time_s)
             check_times(self.start_s, nodes.arrive_s, nodes.leave_s)
-            reference = None
-            if not last:
-                with contextlib.suppress(NotSettledError):
-                    return self._relinearise(nodes, self._coasting(nodes), rounds=FEW_ROUNDS)
-            shots = []
-            for place, block in enumerate(blocks_of(self.start_s, self.start_state, nodes)):
-                shot = shoot(block, mu, last[place] if last else None)
-                if shot is None:
-                    raise NotSettledError(
-                        "no trajectory was found: the targets were followed from the chaser's coasting orbit, but not "
-                        "all the way; give visits more time, or nearer targets first"
-                    )
-                shots.append(shot)
-            last[:] = [each.unknowns for each in shots]
-            reference = self._reference_of(nodes, shots)
-            return self._relinearise(nodes, reference)
+            pieces = blocks_of(self.start_s, self.start_state, nodes)
+            begin: Sequence[Floats | None] = [None] * len(pieces)
+            if known:
+                begin = min(known, key=lambda each: float(np.abs(each[0] - time_s).max()))[1]
+            tried = [shoot(block, mu, one) for block, one in zip(pieces, begin, strict=True)]
+            shots = tuple(each for each in tried if each is not None)
+            if len(shots) < len(tried):
+                raise NotSettledError(
+                    "no trajectory was found: the targets were followed from the chaser's coasting orbit, but not all "
+                    "the way; give visits more time, or nearer targets first"
+                )
+            known.append((nodes.arrive_s, [each.unknowns for each in shots]))
+            del known[:-MOST_KNOWN]
+            return ShotPath(nodes, shots, self._settled)
 
         return fly
 
@@ -209,42 +212,28 @@ class KeplerTour:
             if hopeless or not change <= GREATEST_CHANGE or found.least_radius < nearest:
                 break
             if change <= SETTLED or (change <= ROUNDING and change > 0.3 * before):
-                return solve_segments(self._motion_about(found), self.start_s, self.start_state, nodes)
+                path = solve_segments(self._motion_about(found), self.start_s, self.start_state, nodes)
+                own = {each.name: getattr(path, each.name) for each in fields(path)}
+                return TracedPath(**own, trace=panels_of(path, mu, found, keep=True))
             reference = mixture.mix(reference, found) if each > 1 else found
         raise NotSettledError(
             f"re-linearising does not settle: trajectories still differ by {change:.2g} of the distance from the "
             "centre from round to round; give visits more time, or nearer targets first"
         )
 
-    def _reference_of(self, nodes: Nodes, shots: Sequence[Shot]) -> Reference:
-        """Represent trajectories that were shot, and the stays between them."""
-        mu = self.targets.gravitational_parameter_m3_s2
-        ends = np.array([float(each.block.time_s[-1]) for each in shots])
-
-        def states(times: Floats) -> Floats:
-            found = np.empty((len(times), 6))
-            which = np.searchsorted(np.array([each.block.start_s for each in shots]), times, side="right") - 1
-            for place, shot in enumerate(shots):
-                mine = np.flatnonzero(which == place)
-                mine = mine[np.argsort(times[mine], kind="stable")]
-                found[mine] = shot.states(np.minimum(times[mine], ends[place]))
-                stays = mine[times[mine] > ends[place]]
-                at = np.broadcast_to(shot.block.goal[-1], (len(stays), 6))
-                found[stays] = coast(at, times[stays] - ends[place], mu)
-            return found
-
-        starts = np.concatenate([[self.start_s], nodes.leave_s[:-1]])
-        return Reference.of_states(states, starts, nodes, mu)
+    def _settled(self, shot: ShotPath) -> Path:
+        return self._relinearise(shot.nodes, self._reference(shot.nodes, shot.states))
 
     def _coasting(self, nodes: Nodes) -> Reference:
         mu = self.targets.gravitational_parameter_m3_s2
-        starts = np.concatenate([[self.start_s], nodes.leave_s[:-1]])
-        return Reference.of_states(
-            lambda times: coast(np.broadcast_to(self.start_state, (len(times), 6)), times - self.start_s, mu),
-            starts,
-            nodes,
-            mu,
+        begin = self.start_state
+        return self._reference(
+            nodes, lambda times: coast(np.broadcast_to(begin, (len(times), 6)), times - self.start_s, mu)
         )
+
+    def _reference(self, nodes: Nodes, states: Callable[[Floats], Floats]) -> Reference:
+        starts = np.concatenate([[self.start_s], nodes.leave_s[:-1]])
+        return Reference.of_states(states, starts, nodes, self.targets.gravitational_parameter_m3_s2)
 
     def _motion_about(self, reference: Reference) -> TimeVaryingMotion:
         mu = self.targets.gravitational_parameter_m3_s2

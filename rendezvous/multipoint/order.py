@@ -9,17 +9,16 @@ from math import factorial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rendezvous.multipoint.segments import Path, check_times, solve_segments
+from rendezvous.multipoint.segments import Flown, NotSettledError, Path, check_times, solve_segments
 from rendezvous.multipoint.targets import Meet
 from rendezvous.multipoint.times import BestTimes, Effort, TimeLimits, optimise_times, room_s
-from rendezvous.multipoint.tour import Tour, Visits, nodes_of
+from rendezvous.multipoint.tour import SMOOTH, Tour, Visits, nodes_of
 
 Floats = NDArray[np.float64]
 Report = Callable[[float], None]
 
 MOST_TARGETS = 9
 _MARGIN = 1e-4
-_PROMISING = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +36,8 @@ class BestOrder:
         How many beginnings of orders were looked at.
     evaluations : int
         How many paths were computed.
+    lost : tuple of tuple of int
+        Beginnings of orders that were left out, for no path was found.
     """
 
     order: tuple[int, ...]
@@ -44,15 +45,20 @@ class BestOrder:
     objective: float
     nodes: int
     evaluations: int
+    lost: tuple[tuple[int, ...], ...] = ()
 
 
-def best_order(tour: Visits, limits: TimeLimits, *, progress: Report | None = None) -> BestOrder:
+def best_order(
+    tour: Visits, limits: TimeLimits, guesses: Sequence[Floats] = (), *, progress: Report | None = None
+) -> BestOrder:
     """Find the best order and the best times together.
 
     Parameters
     ----------
     tour : Visits
     limits : TimeLimits
+    guesses : sequence of ndarray, shape (n,)
+        Times to start from, whatever the order, beside those of its own.
     progress : callable or None
         Told the share of orders that are decided.
 
@@ -64,18 +70,21 @@ def best_order(tour: Visits, limits: TimeLimits, *, progress: Report | None = No
     ------
     ValueError
         If there are more than 9 targets, or they do not fit before the latest time.
+    NotSettledError
+        If no order has a path that is found.
 
     Notes
     -----
     Depth first, the cheapest beginning first. A beginning costs, at its own best times, no more than any order that
-    goes on from it: what it costs bounds them all, and warms their start.
+    goes on from it: what it costs bounds them all, and warms their start. That holds of global minima; the local ones
+    that are found bound in practice in linear motion, and in Kepler's only with a factor (`ruggedness`).
     """
     count = _checked_count(tour)
     dwell = tour.dwell_s
     room_s(tour.start_s, dwell, limits)
     horizon = limits.latest_s
 
-    def solve(order: tuple[int, ...], warm: Sequence[Floats], complete: bool) -> tuple[float, Path, int]:
+    def solve(order: tuple[int, ...], warm: Sequence[Floats], complete: bool) -> tuple[float, Flown, int]:
         held = limits
         if horizon is not None and not complete:
             rest = [each for each in range(count) if each not in order]
@@ -83,26 +92,31 @@ def best_order(tour: Visits, limits: TimeLimits, *, progress: Report | None = No
             held = TimeLimits(horizon - float(later), limits.least_gap_s, limits.price_per_s)
         flyer, stays = tour.flyer(order), dwell[list(order)]
         effort = Effort.BOUND if warm else Effort.ORDER
-        found = optimise_times(flyer, tour.start_s, stays, held, warm, effort=effort)
-        if not complete or found.objective * (1.0 - _PROMISING) >= search.best_objective:
-            return found.objective, found.path, found.evaluations
+        begins = [*warm, *guesses] if complete else warm
+        found = optimise_times(flyer, tour.start_s, stays, held, begins, effort=effort)
+        if not complete or found.objective >= tour.ruggedness * search.best_objective:
+            return found.objective, found.flown, found.evaluations
         # An order that may be the best deserves more starts.
-        again = optimise_times(flyer, tour.start_s, stays, held, [found.time_s], effort=Effort.ORDER)
+        careful = Effort.RUGGED if tour.ruggedness > SMOOTH else Effort.ORDER
+        again = optimise_times(flyer, tour.start_s, stays, held, [found.time_s, *guesses], effort=careful)
         if again.objective < found.objective:
-            return again.objective, again.path, found.evaluations + again.evaluations
-        return found.objective, found.path, found.evaluations + again.evaluations
+            return again.objective, again.flown, found.evaluations + again.evaluations
+        return found.objective, found.flown, found.evaluations + again.evaluations
 
-    search = _Search(solve, count, progress or (lambda _: None), tour.start_s, horizon)
+    # Where local minima lie far apart a beginning's is no bound, and is taken for one that much lower.
+    slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0 / (1.0 - _MARGIN)
+    search = _Search(solve, count, progress or (lambda _: None), tour.start_s, horizon, slack)
     search.branch((), None)
-    assert search.best_path is not None
+    best = search.found()
     final = optimise_times(
         tour.flyer(search.best),
         tour.start_s,
         dwell[list(search.best)],
         limits,
-        [search.best_path.nodes.arrive_s],
+        [best.nodes.arrive_s, *guesses],
     )
-    return BestOrder(search.best, final.path, final.objective, search.nodes, search.evaluations + final.evaluations)
+    evaluations = search.evaluations + final.evaluations
+    return BestOrder(search.best, final.path, final.objective, search.nodes, evaluations, tuple(search.lost))
 
 
 def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | None = None) -> BestOrder:
@@ -124,6 +138,8 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
     ------
     ValueError
         If there are more than 9 targets, or times do not increase.
+    NotSettledError
+        If no order has a path that is found.
 
     Notes
     -----
@@ -137,14 +153,15 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
     if isinstance(tour, Tour) and all(each.meet is Meet.RENDEZVOUS for each in tour.targets.targets):
         return _by_dynamic_programming(tour, times)
 
-    def solve(order: tuple[int, ...], _warm: Sequence[Floats], _complete: bool) -> tuple[float, Path, int]:
-        path = tour.fly(order, times[: len(order)])
-        return path.cost, path, 1
+    def solve(order: tuple[int, ...], _warm: Sequence[Floats], _complete: bool) -> tuple[float, Flown, int]:
+        flown = tour.flyer(order)(times[: len(order)])
+        return flown.cost, flown, 1
 
-    search = _Search(solve, count, progress or (lambda _: None), tour.start_s, None)
+    slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0
+    search = _Search(solve, count, progress or (lambda _: None), tour.start_s, None, slack)
     search.branch((), None)
-    assert search.best_path is not None
-    return BestOrder(search.best, search.best_path, search.best_path.cost, search.nodes, search.evaluations)
+    path = search.found().settled()
+    return BestOrder(search.best, path, path.cost, search.nodes, search.evaluations, tuple(search.lost))
 
 
 def best_times(
@@ -185,26 +202,39 @@ def best_times(
 class _Search:
     """Depth first through beginnings of orders."""
 
-    solve: Callable[[tuple[int, ...], Sequence[Floats], bool], tuple[float, Path, int]]
+    solve: Callable[[tuple[int, ...], Sequence[Floats], bool], tuple[float, Flown, int]]
     count: int
     progress: Report
     start_s: float
     horizon_s: float | None
+    slack: float
     best: tuple[int, ...] = ()
-    best_path: Path | None = None
+    best_path: Flown | None = None
     best_objective: float = np.inf
     nodes: int = 0
     evaluations: int = 0
-    decided: int = field(default=0)
+    decided: int = 0
+    lost: list[tuple[int, ...]] = field(default_factory=list)
 
-    def branch(self, beginning: tuple[int, ...], before: Path | None) -> None:
+    def found(self) -> Flown:
+        """The path of the best order."""
+        if self.best_path is None:
+            raise NotSettledError("no order has a path that was found; give visits more time")
+        return self.best_path
+
+    def branch(self, beginning: tuple[int, ...], before: Flown | None) -> None:
         """Look at all orders that go on from a beginning."""
         children = []
         complete = len(beginning) + 1 == self.count
         for target in (each for each in range(self.count) if each not in beginning):
             order = (*beginning, target)
-            objective, path, evaluations = self.solve(order, self._warm(before), complete)
             self.nodes += 1
+            try:
+                objective, path, evaluations = self.solve(order, self._warm(before), complete)
+            except NotSettledError:
+                self.lost.append(order)
+                self._done(order)
+                continue
             self.evaluations += evaluations
             children.append((objective, order, path))
         for objective, order, path in sorted(children, key=lambda each: each[:2]):
@@ -212,7 +242,7 @@ class _Search:
                 self._done(order)
                 if objective < self.best_objective:
                     self.best, self.best_path, self.best_objective = order, path, objective
-            elif objective * (1.0 - _MARGIN) < self.best_objective:
+            elif objective < self.slack * self.best_objective:
                 self.branch(order, path)
             else:
                 self._done(order)
@@ -221,7 +251,7 @@ class _Search:
         self.decided += factorial(self.count - len(order))
         self.progress(self.decided / factorial(self.count))
 
-    def _warm(self, before: Path | None) -> list[Floats]:
+    def _warm(self, before: Flown | None) -> list[Floats]:
         """Times to start from: those before, drawn together to leave room, and one more gap."""
         if before is None:
             return []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,29 @@ class Nodes:
     arrive_rate: Floats
     leave_rate: Floats
     rendezvous: Flags
+
+
+class NotSettledError(ValueError):
+    """No path of least energy was found, which does not say that there is none."""
+
+
+class Flown(Protocol):
+    """A path as far as the choice of times needs it."""
+
+    @property
+    def nodes(self) -> Nodes:
+        """Where and when it passes."""
+
+    @property
+    def cost(self) -> float:
+        """I = 1/2 int |u|^2 dt, m^2/s^3."""
+
+    @property
+    def time_gradient(self) -> Floats:
+        """Slopes dI / dt_i, shape (N,)."""
+
+    def settled(self) -> Path:
+        """Return the path with everything that can be asked of one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +104,10 @@ class Path:
     def jumps(self) -> Floats:
         """Costate before less costate after, shape (N, 6): dI / d(target's state); zero in the velocity of a flyby."""
         return self.costate_before - self.costate_after
+
+    def settled(self) -> Path:
+        """Return the path itself."""
+        return self
 
     def costate(self, time_s: Floats) -> Floats:
         """Return lambda at times, those after the jump at a node.

@@ -92,9 +92,7 @@ class DriftingTargets:
     epoch_s: float = 0.0
 
     def __post_init__(self) -> None:
-        check_names(self.targets)
-        if np.shape(self.initial) != (len(self.targets), 6) or not np.isfinite(self.initial).all():
-            raise ValueError("each target needs a state of six finite numbers")
+        check_targets(self.targets, self.initial)
         if not np.isfinite(self.epoch_s):
             raise ValueError("the targets' epoch is not finite")
 
@@ -110,17 +108,18 @@ class DriftingTargets:
         return np.asarray(pulled[:, :, 0] + self.motion.forcing(time_s))
 
 
-def check_names(targets: tuple[Target, ...]) -> None:
-    """Refuse no targets at all, and targets that are listed twice.
+def check_targets(targets: tuple[Target, ...], initial: Floats) -> None:
+    """Refuse no targets at all, targets that are listed twice, and states that are none.
 
     Parameters
     ----------
     targets : tuple of Target
+    initial : ndarray, shape (n, 6)
 
     Raises
     ------
     ValueError
-        If there is none, or two have one name.
+        If there is no target, two have one name, or a state is not of six finite numbers.
     """
     if not targets:
         raise ValueError("there is no target to visit")
@@ -128,3 +127,20 @@ def check_names(targets: tuple[Target, ...]) -> None:
     for name in names:
         if names.count(name) > 1:
             raise ValueError(f"target {name!r} is listed twice; each target is visited once")
+    if np.shape(initial) != (len(targets), 6) or not np.isfinite(initial).all():
+        raise ValueError("each target needs a state of six finite numbers")
+
+
+def dwells(targets: tuple[Target, ...]) -> Floats:
+    """Return how long the chaser stays with each target, shape (n,).
+
+    Parameters
+    ----------
+    targets : tuple of Target
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        s.
+    """
+    return np.array([each.dwell_s for each in targets])

@@ -5,22 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
-from rendezvous.multipoint.segments import Path
+from rendezvous.multipoint.segments import Flown, Path
 
 Floats = NDArray[np.float64]
-FlyAt = Callable[[Floats], Path]
+FlyAt = Callable[[Floats], Flown]
 
 LEAST_SHARE = 1e-6
 """The least gap, as a share of the time there is, where none is given: a visit takes time."""
 _POLISH_ROUNDS = 8
 _DIFFERENCE = 1e-5
 _WALL = 20.0
+_MOST_WALLS = 6
 
 
 class Effort(Enum):
@@ -30,6 +32,8 @@ class Effort(Enum):
     """For a bound on a beginning of an order, from times known to be good."""
     ORDER = (6, 2, 1e-7)
     """For comparing orders."""
+    RUGGED = (14, 5, 1e-5)
+    """For comparing orders whose cost has many local minima."""
     FINAL = (14, 6, 1e-9)
     """For the answer, to the last digits."""
 
@@ -91,21 +95,26 @@ class BestTimes:
 
     Parameters
     ----------
-    path : Path
+    flown : Flown
     objective : float
         Energy, and the price of the time, m^2/s^3.
     evaluations : int
         How many paths were computed.
     """
 
-    path: Path
+    flown: Flown
     objective: float
     evaluations: int
+
+    @cached_property
+    def path(self) -> Path:
+        """The path, settled at the first call."""
+        return self.flown.settled()
 
     @property
     def time_s(self) -> Floats:
         """When the targets are reached, shape (N,)."""
-        return self.path.nodes.arrive_s
+        return self.flown.nodes.arrive_s
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,9 +122,13 @@ class _Trial:
     """Gaps, the path they give, what it costs and the slope of that along the gaps."""
 
     gaps: Floats
-    path: Path
+    flown: Flown
     objective: float
     slope: Floats
+
+
+class _WalledInError(Exception):
+    """A descent that finds no paths around it."""
 
 
 @dataclass
@@ -130,11 +143,11 @@ class _Trials:
     def __call__(self, gaps: Floats) -> _Trial:
         times = self.shifts_s + np.cumsum(gaps)
         self.flown += 1
-        path = self.fly(times)
-        gradient = path.time_gradient.copy()
+        found = self.fly(times)
+        gradient = found.time_gradient.copy()
         gradient[-1] += self.price_per_s
         slope = np.cumsum(gradient[::-1])[::-1]
-        return _Trial(gaps, path, path.cost + self.price_per_s * float(times[-1]), slope)
+        return _Trial(gaps, found, found.cost + self.price_per_s * float(times[-1]), slope)
 
     def attempt(self, gaps: Floats) -> _Trial | None:
         """Fly, or return None where there is no path of such times."""
@@ -206,7 +219,7 @@ def optimise_times(
     best = min(ended, key=lambda each: each.objective)
     if effort is Effort.FINAL:
         best = _polish(trials, best, least, total, scale)
-    return BestTimes(best.path, best.objective, trials.flown)
+    return BestTimes(best.flown, best.objective, trials.flown)
 
 
 def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
@@ -260,13 +273,21 @@ def _spread(count: int, scale: float, least: float, bounded: bool) -> list[Float
 
 
 def _descend(trials: _Trials, begin: _Trial, least: float, total: float, scale: float, tolerance: float) -> _Trial:
-    """Follow one start downhill."""
+    """Follow one start downhill; where there are no paths all around, only so far."""
     floor = 1e-30 * max(begin.objective, 1e-270)
+    walls, lowest = 0, begin
 
     def value(x: Floats) -> tuple[float, Floats]:
-        found = trials.attempt(np.maximum(x * scale, 0.5 * least))
-        if found is None:  # a wall
+        nonlocal walls, lowest
+        gaps = np.maximum(x * scale, 0.5 * least)
+        found = trials.attempt(gaps)
+        if found is None:
+            walls += 1
+            if walls > _MOST_WALLS:
+                raise _WalledInError
             return float(np.log(begin.objective)) + _WALL, np.zeros_like(x)
+        if found.objective < lowest.objective and (gaps == _within(gaps, least, total)).all():
+            lowest = found
         size = max(found.objective, floor)
         return float(np.log(size)), found.slope * (scale / size)
 
@@ -275,17 +296,20 @@ def _descend(trials: _Trials, begin: _Trial, least: float, total: float, scale: 
         if np.isfinite(total)
         else ()
     )
-    found = minimize(
-        value,
-        begin.gaps / scale,
-        jac=True,
-        bounds=[(least / scale, None)] * len(begin.gaps),
-        constraints=constraints,
-        method="SLSQP",
-        options={"ftol": tolerance, "maxiter": 100},
-    )
+    try:
+        found = minimize(
+            value,
+            begin.gaps / scale,
+            jac=True,
+            bounds=[(least / scale, None)] * len(begin.gaps),
+            constraints=constraints,
+            method="SLSQP",
+            options={"ftol": tolerance, "maxiter": 100},
+        )
+    except _WalledInError:
+        return lowest
     ended = trials.attempt(_within(np.asarray(found.x) * scale, least, total))
-    return ended if ended is not None and ended.objective <= begin.objective else begin
+    return ended if ended is not None and ended.objective <= lowest.objective else lowest
 
 
 def _within(gaps: Floats, least: float, total: float) -> Floats:

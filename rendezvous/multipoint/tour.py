@@ -9,11 +9,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rendezvous.multipoint.segments import Nodes, Path, solve_segments
-from rendezvous.multipoint.targets import Meet, MovingTargets
+from rendezvous.multipoint.segments import Flown, Nodes, Path, solve_segments
+from rendezvous.multipoint.targets import Meet, MovingTargets, dwells
 from rendezvous.relative_motion import LinearMotion
 
 Floats = NDArray[np.float64]
+
+SMOOTH = 4.0 / 3.0
 
 
 class Visits(Protocol):
@@ -31,10 +33,14 @@ class Visits(Protocol):
     def dwell_s(self) -> Floats:
         """How long the chaser stays with each target, shape (n,)."""
 
+    @property
+    def ruggedness(self) -> float:
+        """By how many times the local minima that are found of one order may differ: orders are compared with that."""
+
     def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
         """Find the path of least energy to targets in an order at times of shape (N,)."""
 
-    def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Path]:
+    def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Flown]:
         """Return what finds paths of one order for times asked in turn, the first near a known one."""
 
 
@@ -63,15 +69,17 @@ class Tour:
     start_s: float = 0.0
 
     def __post_init__(self) -> None:
-        if np.shape(self.start_state) != (6,) or not np.isfinite(self.start_state).all():
-            raise ValueError("the chaser's state must be six finite numbers")
-        if not np.isfinite(self.start_s):
-            raise ValueError("the start is not finite")
+        check_start(self.start_state, self.start_s)
 
     @property
     def dwell_s(self) -> Floats:
         """How long the chaser stays with each target, shape (n,)."""
-        return np.array([each.dwell_s for each in self.targets.targets])
+        return dwells(self.targets.targets)
+
+    @property
+    def ruggedness(self) -> float:
+        """Little: paths of given times are unique, and the costs of an order's few local minima near one another."""
+        return SMOOTH
 
     def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
         """Find the minimum-energy path.
@@ -89,7 +97,7 @@ class Tour:
         """
         return solve_segments(self.motion, self.start_s, self.start_state, nodes_of(self.targets, order, time_s))
 
-    def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Path]:
+    def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Flown]:
         """Return what finds the path of times of shape (N,), for one order.
 
         Parameters
@@ -103,6 +111,25 @@ class Tour:
         callable
         """
         return lambda time_s: self.fly(order, time_s)
+
+
+def check_start(start_state: Floats, start_s: float) -> None:
+    """Refuse a start that is none.
+
+    Parameters
+    ----------
+    start_state : ndarray, shape (6,)
+    start_s : float
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite.
+    """
+    if np.shape(start_state) != (6,) or not np.isfinite(start_state).all():
+        raise ValueError("the chaser's state must be six finite numbers")
+    if not np.isfinite(start_s):
+        raise ValueError("the start is not finite")
 
 
 def nodes_of(targets: MovingTargets, order: Sequence[int], time_s: ArrayLike) -> Nodes:
@@ -132,9 +159,9 @@ def nodes_of(targets: MovingTargets, order: Sequence[int], time_s: ArrayLike) ->
         raise ValueError("a target is visited twice")
     if not np.isfinite(times).all():
         raise ValueError("a time is not finite")
-    described = [targets.targets[each] for each in order]
+    described = tuple(targets.targets[each] for each in order)
     rendezvous = np.array([each.meet is Meet.RENDEZVOUS for each in described])
-    leave_s = times + np.array([each.dwell_s for each in described])
+    leave_s = times + dwells(described)
     if not rendezvous.any():  # rates and departures do not count
         arrive = targets.states(which, times)
         return Nodes(times, times, arrive, arrive, arrive, arrive, rendezvous)
