@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.commands._options import Json, Out, Overwrite, Quiet
+from experiments.commands._options import Html, Json, Out, Overwrite, Quiet
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -56,25 +56,28 @@ def pareto(
     ] = 31,
     out: Out = None,
     json_: Json = None,
+    html: Html = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> None:
     """Find where several craft should meet so that nobody can do better without another doing worse.
 
     Each craft flies at least energy; the meeting minimises the weighted sum of what it costs them beyond their own
-    cheapest meetings. Other choices, coalitions and the bound on the control are told beside it. Without --out or
-    --json nothing is written.
+    cheapest meetings. Other choices, coalitions and the bound on the control are told beside it. Without --out,
+    --json or --html nothing is written.
     """
     from experiments.commands._options import whole_number
     from experiments.commands._screen import figure_files, tell_of_compiling_rendezvous
     from experiments.output import STDOUT, checked_destinations, to_json, write_file
+    from experiments.pages.document import page_path
     from experiments.pareto_file import load_pareto
 
+    page_path("--html", html)
     whole_number("--samples", samples, 2, MOST_SAMPLES, 31)
     given = load_pareto(problem)
     preferred = None if prefer is None else _preferred(prefer, given)
     files = ("results.json", *figure_files(*FIGURES))
-    with checked_destinations(folder=out, names=files, files={"--json": json_}, overwrite=overwrite):
+    with checked_destinations(folder=out, names=files, files={"--json": json_, "--html": html}, overwrite=overwrite):
         tell_of_compiling_rendezvous(quiet)
         found = _find(given, preferred, samples)
         json_text = to_json(_summary(found))
@@ -82,6 +85,10 @@ def pareto(
             typer.echo(json_text, nl=False)
         elif json_ is not None:
             write_file(json_, json_text, overwrite=overwrite)
+        if html is not None:
+            from experiments.pages.pareto import pareto_page
+
+            write_file(html, pareto_page(given.name, found.solution, found.selections), overwrite=overwrite)
         if out is not None:
             _fill(out, found, json_text, overwrite, quiet)
     if not quiet:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.commands._options import Json, Out, Overwrite, Quiet, Seed, whole_number
+from experiments.commands._options import Html, Json, Out, Overwrite, Quiet, Seed, whole_number
 
 if TYPE_CHECKING:
     from experiments.pursuit_file import PursuitProblem
@@ -67,18 +67,21 @@ def pursuit(
     seed: Seed = 0,
     out: Out = None,
     json_: Json = None,
+    html: Html = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> None:
     """Solve a game of two spacecraft: one hastens the capture, the other delays it, both as well as can be.
 
-    Every capture comes with a certificate; a saddle point is claimed only where all its checks hold. Without --out or
-    --json nothing is written.
+    Every capture comes with a certificate; a saddle point is claimed only where all its checks hold. Without --out,
+    --json or --html nothing is written.
     """
     from experiments.commands._screen import figure_files, say, tell_of_compiling_pursuit
     from experiments.output import STDOUT, checked_destinations, to_json, write_file
+    from experiments.pages.document import page_path
     from experiments.pursuit_report import report_json
 
+    page_path("--html", html)
     whole_number("--runs", runs, 1, MOST_RUNS, 100)
     whole_number("--seed", seed, 0, None, 0)
     _check_feedback_options(feedback, replan, delay, position_noise, velocity_noise, runs)
@@ -86,7 +89,7 @@ def pursuit(
     steerings = None if feedback is None else _steerings(feedback, seed)
     names = [*FIGURES, FEEDBACK_FIGURE] if feedback is not None else [*FIGURES]
     files = ("problem.toml", "results.json", *figure_files(*names))
-    with checked_destinations(folder=out, names=files, files={"--json": json_}, overwrite=overwrite):
+    with checked_destinations(folder=out, names=files, files={"--json": json_, "--html": html}, overwrite=overwrite):
         for warning in given.warnings():
             say(f"warning: {warning}", quiet)
         tell_of_compiling_pursuit(quiet)
@@ -102,10 +105,25 @@ def pursuit(
             typer.echo(json_text, nl=False)
         elif json_ is not None:
             write_file(json_, json_text, overwrite=overwrite)
+        if html is not None:
+            _write_page(html, given, solution, overwrite)
         if out is not None:
             _fill(out, given, solution, flown, json_text, overwrite)
     if not quiet:
         _show(given, solution, certificate, flown, str(json_) == STDOUT)
+
+
+def _write_page(file: Path, problem: PursuitProblem, solution: Solution, overwrite: bool) -> None:
+    from experiments.errors import InputError
+    from experiments.output import write_file
+    from experiments.pages.pursuit import pursuit_page
+
+    if solution.capture is None and solution.fallback is None:
+        raise InputError(
+            f"--html: a game that ends as {solution.verdict.value} has no flight to show; leave --html out"
+        )
+    description = problem.tables.description or ""
+    write_file(file, pursuit_page(problem.name, description, solution), overwrite=overwrite)
 
 
 def problem_with(name: str, settings: Sequence[str] | None) -> PursuitProblem:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from experiments.commands._options import Json, Out, Overwrite, Quiet, Seed, choice, whole_number
+from experiments.commands._options import Html, Json, Out, Overwrite, Quiet, Seed, choice, whole_number
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -48,21 +48,25 @@ def reach(
     seed: Seed = 0,
     out: Out = None,
     json_: Json = None,
+    html: Html = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> None:
     """Find every optimal control of a rendezvous under constraints, and the sets of states on the way.
 
     Least terminal norm, forward sets, the tube, and all optimal controls as one set; members of it by choice, each
-    flown on the linear model and on the nonlinear truth. Without --out or --json nothing is written.
+    flown on the linear model and on the nonlinear truth. Without --out, --json or --html nothing is
+    written.
     """
     from experiments.commands._screen import figure_files, progress_bar, say
     from experiments.output import STDOUT, checked_destinations, to_csv, to_json, write_file
+    from experiments.pages.document import page_path
     from experiments.reachability_file import load_rendezvous
     from experiments.reachability_published import COLUMNS, compare_published, comparison_rows, is_published
     from experiments.reachability_report import make_report, report_json
     from rendezvous.reachability import Route
 
+    page_path("--html", html)
     names, sample_count = _selection(select)
     chosen = choice("--route", route, ["auto", *(each.value for each in Route)])
     whole_number("--noisy-flights", noisy_flights, 0, MOST_NOISY_FLIGHTS, 10)
@@ -71,7 +75,7 @@ def reach(
     published = is_published(given)
     files = ("results.json", *((TABLES,) if published else ()), *figure_files(*FIGURES))
     with (
-        checked_destinations(folder=out, names=files, files={"--json": json_}, overwrite=overwrite),
+        checked_destinations(folder=out, names=files, files={"--json": json_, "--html": html}, overwrite=overwrite),
         progress_bar(quiet) as begin,
     ):
         report = make_report(
@@ -90,6 +94,10 @@ def reach(
             typer.echo(json_text, nl=False)
         elif json_ is not None:
             write_file(json_, json_text, overwrite=overwrite)
+        if html is not None:
+            from experiments.pages.reachability import reachability_page
+
+            write_file(html, reachability_page(report), overwrite=overwrite)
         if out is not None:
             write_file(out / "results.json", json_text, overwrite=overwrite)
             if comparisons:

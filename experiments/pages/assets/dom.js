@@ -39,10 +39,12 @@ function unitFor(size, units) {
 const ANGLES = [["\u00b5rad", 1e6], ["mrad", 1e3], ["rad", 1]];
 const RATES = [["\u00b5rad/s", 1e6], ["mrad/s", 1e3], ["rad/s", 1]];
 
-/** Rows of a table of numbers, renewed in place: pairs of name and text. */
+/** Rows of a table of numbers, renewed in place: pairs of name and text. Roles are said, for the style takes them away. */
 function fillTable(table, rows) {
   if (table.rows.length !== rows.length) {
-    table.replaceChildren(...rows.map(([name]) => element("tr", {}, element("th", { scope: "row" }, name), element("td"))));
+    table.setAttribute("role", "table");
+    table.replaceChildren(...rows.map(() => element("tr", { role: "row" },
+      element("th", { role: "rowheader", scope: "row" }), element("td", { role: "cell" }))));
   }
   rows.forEach(([name, text], index) => {
     const [head, cell] = table.rows[index].cells;

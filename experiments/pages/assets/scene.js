@@ -33,7 +33,9 @@ class Scene extends Canvas {
   /** Begin a drawing: limits and titles of three axes, the third upright; lengths relative to each other. */
   begin(limits, titles, lengths = [1, 1, 1]) {
     Object.assign(this, { limits, lengths });
-    this.size = Math.min((this.width - 80) / Math.hypot(lengths[0], lengths[1]), (this.height - 60) / Math.hypot(...lengths) * 1.2);
+    const across = Math.hypot(lengths[0], lengths[1]);
+    const tall = Math.cos(this.elevation) * lengths[2] + Math.abs(Math.sin(this.elevation)) * across;
+    this.size = Math.min((this.width - 80) / across, (this.height - 90) / tall);
     this.clear();
     const corners = [-0.5, 0.5];
     const place = (axis, along, a, b) => {
@@ -69,7 +71,7 @@ class Scene extends Canvas {
     const [across, away] = [ca * x - sa * y, sa * x + ca * y];
     return [
       this.width / 2 + 14 + this.size * across,
-      this.height / 2 - 12 - this.size * (ce * z - se * away) * 0.95,
+      this.height / 2 - 12 - this.size * (ce * z - se * away),
       -ce * away - se * z,
     ];
   }

@@ -1,0 +1,3 @@
+
+"use strict";
+const { player, panels } = buildMotion(document.getElementById("main"));

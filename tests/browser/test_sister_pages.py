@@ -1,0 +1,219 @@
+"""The pages of pursuit, reachability, visits and encounters in a browser."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from experiments.multipoint_file import load_multipoint
+from experiments.pages.multipoint import multipoint_page
+from experiments.pages.pareto import pareto_page
+from experiments.pages.pursuit import pursuit_page
+from experiments.pages.reachability import reachability_page
+from experiments.pareto_file import load_pareto
+from experiments.pursuit_file import load_problem
+from experiments.reachability_file import load_rendezvous
+from experiments.reachability_report import Report, make_report
+from rendezvous.multipoint import Path as FlightPath
+from rendezvous.pareto import EncounterSolution, least_greatest_excess, least_sum_of_costs, solve_encounter
+from rendezvous.pursuit_evasion import History, Solution, history, solve
+from rendezvous.pursuit_evasion.history import orbital_axes
+from tests.browser.conftest import Opened, numbers
+
+Open = Callable[..., Opened]
+SIX_DIGITS = 5e-6
+HOSTILE = "<img src=x onerror=alert(1)>"
+CLOSING = "</script><script>alert(2)</script>"
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """One problem of each kind, solved."""
+
+    encounter: EncounterSolution
+    tour: Any  # Visits of either motion: dataclasses both, which their protocol does not say
+    path: FlightPath
+    report: Report
+    game: Solution
+    sampled: History
+
+    def pages(self, name: str = "a name", description: str = "a line about it") -> dict[str, str]:
+        """All four pages."""
+        selections = {
+            "least_group_loss": self.encounter.point,
+            "least_sum_of_costs": least_sum_of_costs(self.encounter),
+            "least_greatest_excess": least_greatest_excess(self.encounter),
+        }
+        rendezvous = replace(self.report.rendezvous, name=name, description=description)
+        axes = load_multipoint("service-3").axes
+        return {
+            "pareto": pareto_page(name, self.encounter, selections),
+            "multipoint": multipoint_page(name, self.tour, (0, 1, 2), self.path, axes, 0.02),
+            "reach": reachability_page(replace(self.report, rendezvous=rendezvous)),
+            "pursuit": pursuit_page(name, description, self.game),
+        }
+
+
+@pytest.fixture(scope="module")
+def solved() -> Solved:
+    visits = load_multipoint("service-3")
+    assert visits.times_s is not None
+    game = solve(load_problem("leo-pursuit").game())
+    return Solved(
+        solve_encounter(load_pareto("pareto-2008").encounter),
+        visits.tour,
+        visits.tour.fly((0, 1, 2), visits.times_s),
+        make_report(load_rendezvous("rendezvous-2021"), ["energy", "l1", "peak"]),
+        game,
+        history(game, 301),
+    )
+
+
+@pytest.fixture(scope="module")
+def pages(solved: Solved) -> dict[str, str]:
+    return solved.pages()
+
+
+def rows(opened: Opened, table: int) -> dict[str, str]:
+    """A table of numbers: text by name."""
+    cells = opened.page.locator("table").nth(table).locator("th, td").all_inner_texts()
+    return dict(zip(*[iter(cells)] * 2, strict=True))
+
+
+@pytest.mark.parametrize("name", ["pareto", "multipoint", "reach", "pursuit"])
+def test_slider_and_keys_move_the_time_wide_and_narrow(
+    open_page: Open, pages: dict[str, str], screenshots: Path, name: str
+) -> None:
+    for width, scheme in ((1300, "light"), (390, "dark")):
+        opened = open_page(pages[name], width, scheme)
+        page = opened.page
+        assert page.evaluate("player.frame") == 0
+        page.keyboard.press("ArrowRight")
+        assert page.evaluate("player.frame") == 1
+        page.keyboard.press("End")
+        assert page.evaluate("player.frame === DATA.time_s.length - 1")
+        end = opened.shown_at()
+        page.get_by_role("slider", name="Time").fill("60")
+        assert page.evaluate("player.frame") == 60
+        assert opened.shown_at() != end
+        page.keyboard.press(" ")
+        opened.until("player.frame > 62")
+        page.keyboard.press(" ")
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        page.screenshot(path=screenshots / f"{name}-{width}-{scheme}.png", full_page=True)
+
+
+@pytest.mark.parametrize("name", ["pareto", "multipoint", "reach", "pursuit"])
+def test_html_in_names_is_text(open_page: Open, solved: Solved, name: str) -> None:
+    visits = solved.tour.targets
+    first = replace(visits.targets[0], name=f"{HOSTILE}{CLOSING}")
+    cost = solved.encounter.costs[0]
+    craft = replace(cost.craft, name=HOSTILE)
+    worse = replace(
+        solved,
+        tour=replace(solved.tour, targets=replace(visits, targets=(first, *visits.targets[1:]))),
+        encounter=replace(solved.encounter, costs=(replace(cost, craft=craft), *solved.encounter.costs[1:])),
+    )
+    html = worse.pages(f"{HOSTILE}{CLOSING}", CLOSING)[name]
+    assert HOSTILE not in html
+    assert CLOSING not in html
+    opened = open_page(html)
+    assert f"{HOSTILE}{CLOSING}" in opened.page.locator("h1").inner_text()
+    assert opened.page.evaluate("document.images.length") == 0
+
+
+def test_the_meetings_live_numbers_are_the_librarys(open_page: Open, pages: dict[str, str], solved: Solved) -> None:
+    opened = open_page(pages["pareto"])
+    page, solution = opened.page, solved.encounter
+
+    def check() -> None:
+        point = np.array(page.evaluate("point"))
+        shown = rows(opened, 0)
+        values = {name: numbers(text)[0] for name, text in shown.items()}
+        assert values["group loss"] == pytest.approx(float(solution.group_loss(point)), rel=SIX_DIGITS)
+        for cost, whole, excess in zip(
+            solution.costs, solution.cost_squared(point), solution.excess(point), strict=True
+        ):
+            assert values[f"J² of {cost.craft.name}"] == pytest.approx(whole, rel=SIX_DIGITS)
+            assert values[f"excess of {cost.craft.name}"] == pytest.approx(excess, rel=SIX_DIGITS)
+        for index, each in enumerate(page.evaluate("panels[0].view.tracks.map(({ points }) => points)")):
+            flown = solution.plan(index, point).sample(121).state[:, :3]
+            np.testing.assert_allclose(each, flown, rtol=1e-9, atol=1e-9 * np.abs(flown).max())
+
+    check()
+    box = page.evaluate("(() => { const b = panel.canvas.getBoundingClientRect(); return [b.left, b.top]; })()")
+    x, y = page.evaluate("[panel.across(point[0]), panel.up(point[1])]")
+    page.mouse.move(box[0] + x, box[1] + y)
+    page.mouse.down()
+    for step in (10, 40, 70):
+        page.mouse.move(box[0] + x + step, box[1] + y - 0.5 * step)
+        check()
+    page.mouse.up()
+    assert page.evaluate("point[0]") > solution.point[0] + 5.0  # it was dragged
+    inputs = page.locator("input[type=number]")
+    inputs.nth(0).fill("12.5")
+    inputs.nth(1).fill("-3.25")
+    assert page.evaluate("point") == [12.5, -3.25]
+    check()
+    page.get_by_label("Go to").select_option("least sum of costs")
+    assert page.evaluate("point") == pytest.approx(least_sum_of_costs(solution).tolist(), rel=1e-12)
+    check()
+
+
+def test_hover_in_a_pursuit_shows_the_historys_numbers(open_page: Open, pages: dict[str, str], solved: Solved) -> None:
+    opened = open_page(pages["pursuit"])
+    opened.page.evaluate("player.show(120)")
+    sampled = solved.sampled
+    apart = np.linalg.norm(sampled.pursuer.position_m - sampled.evader.position_m, axis=1)
+    opened.point_at("panels[4].panel", "[panels[4].panel.across(panels[4].times[120]), 60]")
+    time, distance_km = numbers(opened.tip())
+    assert [time, distance_km * 1e3] == pytest.approx([sampled.time_s[120], apart[120]], rel=SIX_DIGITS)
+    axes = orbital_axes(sampled.evader.position_m, sampled.evader.velocity_m_s)[120]
+    outward, along, normal = axes @ (sampled.pursuer.position_m - sampled.evader.position_m)[120]
+    opened.point_at("panels[1].panel", "panels[1].place(DATA.views[1].tracks[0].points[120])")
+    said = opened.tip()
+    assert said.startswith("pursuer")
+    time, *seen_km = numbers(said)
+    assert time == pytest.approx(sampled.time_s[120], rel=SIX_DIGITS)
+    assert np.array(seen_km) * 1e3 == pytest.approx([along, normal, outward], rel=SIX_DIGITS)
+
+
+def test_visits_end_at_their_targets(open_page: Open, pages: dict[str, str], solved: Solved) -> None:
+    opened = open_page(pages["multipoint"])
+    for time_s, state in zip(solved.path.nodes.arrive_s.tolist(), solved.path.arrival_states, strict=True):
+        opened.page.evaluate(f"player.show(nearest(DATA.time_s, {time_s!r}))")
+        assert opened.shown_at() == f"t = {time_s:g}\xa0s"
+        at = opened.page.evaluate("DATA.views[0].tracks[0].points[player.frame]")
+        np.testing.assert_allclose(at, state[:3], rtol=1e-9, atol=1e-6)
+    frame = 100
+    opened.page.evaluate(f"player.show({frame})")
+    moment = opened.page.evaluate(f"DATA.time_s[{frame}]")
+    size = np.linalg.norm(solved.path.control(np.array([moment])))
+    assert numbers(rows(opened, 0)["|u|"]) == pytest.approx([size * 1e3], rel=SIX_DIGITS)
+
+
+def test_the_tube_holds_the_flights_and_a_control_can_be_chosen(
+    open_page: Open, pages: dict[str, str], solved: Solved
+) -> None:
+    opened = open_page(pages["reach"])
+    page, report = opened.page, solved.report
+    periods = report.rendezvous.problem.periods
+    for t in range(1, periods):
+        page.evaluate(f"player.show({24 * t})")
+        assert page.evaluate("DATA.views[0].set_of_frame[player.frame]") == t
+        corners = np.array([each for face in page.evaluate(f"DATA.views[0].sets[{t}]") for each in face])
+        np.testing.assert_allclose(corners.min(axis=0), report.tube[t, :3, 0], rtol=1e-6, atol=1e-3)
+        np.testing.assert_allclose(corners.max(axis=0), report.tube[t, :3, 1], rtol=1e-6, atol=1e-3)
+    page.get_by_role("combobox", name="Control").select_option("l1")
+    page.evaluate("player.show(30)")
+    shown = rows(opened, 0)
+    (member,) = [each for each in report.members if each.name == "l1"]
+    found = [numbers(shown[f"u{axis}, l1"])[0] for axis in "xyz"]
+    wanted = report.rendezvous.acceleration_m_s2 * member.controls[1]
+    assert found == pytest.approx(wanted, rel=SIX_DIGITS, abs=1e-10)
+    assert not any("energy" in name for name in shown)
