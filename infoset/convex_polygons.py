@@ -111,6 +111,12 @@ class ConvexPolygons:
     def __iter__(self) -> Iterator[ConvexPolygons]:
         return (self[i] for i in range(len(self)))
 
+    def _repr_svg_(self) -> str:
+        from infoset.pictures import outlines_svg
+
+        outlines = [self.vertices[index][: self.counts[index]] for index in np.ndindex(self.shape)]
+        return outlines_svg(outlines, "x", "y", repr(self).strip("<>"))
+
     def __repr__(self) -> str:
         if self.shape:
             return f"<convex polygons, batch of shape {self.shape}, " + (

@@ -71,6 +71,11 @@ class Section:
         """The section as people look at it: (omega, alpha), rad/s and rad."""
         return to_omega_alpha(self.polygon, self.range_m, self.closing_speed_m_s)
 
+    def _repr_svg_(self) -> str:
+        from infoset.pictures import sections_svg
+
+        return sections_svg([self], f"section at x = {self.range_m / 1e3:.6g} km")
+
 
 def to_omega_alpha(polygon: ConvexPolygons, range_m: float, closing_speed_m_s: float) -> ConvexPolygons:
     """Image of a polygon of (V, z) in the (omega, alpha) plane at a range.
@@ -353,6 +358,12 @@ class InformationSetView:
         from infoset.shapes import to_shapely
 
         return [to_shapely(section.omega_alpha) for section in self.sections(engagement)]
+
+    def _repr_svg_(self) -> str:
+        from infoset.pictures import sections_svg
+
+        which = "" if self.batch == 1 else f", the first of {self.batch} engagements"
+        return sections_svg(self.sections(), f"{self.section_counts[0]} sections at t = {self.time_s:g} s{which}")
 
     def __repr__(self) -> str:
         head = f"{type(self).__name__} at t = {self.time_s:g} s"

@@ -48,3 +48,8 @@ class PredictedMiss:
     upper_m: Floats
     lower_point: ExtremePoints
     upper_point: ExtremePoints
+
+    def _repr_svg_(self) -> str:
+        from infoset.pictures import predicted_miss_svg
+
+        return predicted_miss_svg(self)

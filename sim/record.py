@@ -102,6 +102,11 @@ class Record:
         """What the noise is called that was flown."""
         return self.scenario.noise.value if self.noise is None else self.noise
 
+    def _repr_html_(self) -> str:
+        from sim.pictures import record_html
+
+        return record_html(self)
+
 
 @dataclass
 class _Recorder:

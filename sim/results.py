@@ -72,6 +72,11 @@ class Results:
     def __len__(self) -> int:
         return len(self.runs)
 
+    def _repr_html_(self) -> str:
+        from sim.pictures import results_html
+
+        return results_html(self)
+
     def __repr__(self) -> str:
         miss, fuel = np.median(self.miss_m), np.median(self.impulse_m_s)
         return f"<{len(self)} engagements: median miss {miss:.3g} m for {fuel:.4g} m/s>"
