@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rendezvous.linear_game import circular_orbit_capture
-from rendezvous.pursuit_evasion._branch import Ending, follow, polish
+from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow, polish
 from rendezvous.pursuit_evasion._capture import capture_of, horizon_s, near
 from rendezvous.pursuit_evasion._pair import COARSE, Node
 from rendezvous.pursuit_evasion._side import Craft, across
@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 
 _REACH_STEP, _MOST_REACH_STEPS, _REACHED = 0.1, 400, 1e-6
 _MOST_ITERATIONS = 8
+_LONGEST = 40.0
+"""Radians that the linear game is looked at: more would take many seconds."""
 
 
 def solve_by_homotopy(game: Game, steps: int = 4) -> Capture | None:
@@ -44,7 +46,7 @@ def solve_by_homotopy(game: Game, steps: int = 4) -> Capture | None:
     first = scaled_pair(still, units).begin(latest)
     if first is None:
         return None
-    branch = follow(scaled_pair(still, units), first, game.capture_radius_m / units.length_m, latest)
+    branch = follow(scaled_pair(still, units), first, game.capture_radius_m / units.length_m, latest, 0.25 * MOST_WORK)
     if branch.ending is not Ending.CAPTURE:
         return None
     node: Node = branch.last
@@ -118,7 +120,7 @@ def _linear_guess(game: Game, units: Units) -> tuple[float, Floats] | None:
         game.pursuer.acceleration_m_s2 / force,
         game.evader.acceleration_m_s2 / force,
         1.0,
-        longest_s=horizon_s(game) / units.time_s,
+        longest_s=min(_LONGEST, horizon_s(game) / units.time_s),
     )
     if found is None:
         return None

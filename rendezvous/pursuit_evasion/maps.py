@@ -19,8 +19,9 @@ from rendezvous.pursuit_evasion.units import Units, scaled_pair, units_of
 Floats = NDArray[np.float64]
 
 CHECKED_EVERY = 50
-"""Points of a row from one that is solved from nothing to the next."""
+"""Points of a row from one that is solved from nothing to the next; each row has them elsewhere."""
 
+_GOLDEN, _SURPRISE = 0.618, 0.05
 _PRECISE, _CLOSE = 1e-10, 1e-6
 _EXTRAPOLATIONS = {1: np.array([1.0]), 2: np.array([2.0, -1.0]), 3: np.array([3.0, -3.0, 1.0])}
 _SAME = 1e-6
@@ -32,7 +33,7 @@ class PointStatus(Enum):
     FOLLOWED = "followed"
     """Solved from nothing: no earlier capture on its branch."""
     NEIGHBOUR = "neighbour"
-    """A local saddle found from a neighbour, whose row agrees with points that are followed before and after it."""
+    """A local saddle found from a neighbour, in keeping with the points about it; earlier captures are not excluded."""
     NOT_CERTIFIED = "not-certified"
     ESCAPES = "escapes"
     PROPELLANT_EXHAUSTED = "propellant-exhausted"
@@ -115,74 +116,114 @@ def capture_map(
 
     Notes
     -----
-    Along a row a point starts from the three before it: 1 to 2 ms. Every 50th point, and the last before the row has to
-    start anew, are solved from nothing; where that is another answer, so are the points since the last such check.
+    Along a row a point starts from the three before it: 1 to 2 ms. One in 50, and the last before the row has to start
+    anew, are solved from nothing, and so are those whose time is a surprise beside the rows before. Where that is
+    another answer, so are the points about it, and the points about those, until the answers are the same.
     """
-    shape = (len(rows), len(columns))
-    status = np.zeros(shape, dtype=np.int64)
-    time, closing = np.zeros(shape), np.zeros(shape)
-    hidden = np.ones(shape, dtype=bool)
-    afresh = 0
-    for j, y in enumerate(rows):
-        games = [_game(game_at, float(x), float(y)) for x in columns]
-        points, count = _row(games, follow_all)
-        afresh += count
+    grid = _Grid(game_at, np.asarray(columns, dtype=np.float64), np.asarray(rows, dtype=np.float64))
+    for j in range(len(rows)):
+        points, wrong = _row(grid.games(j), follow_all, int(_GOLDEN * CHECKED_EVERY * j))
         for i, point in enumerate(points):
-            status[j, i] = STATUSES.index(point.status)
-            if point.node is not None and point.units is not None:
-                time[j, i] = point.node.duration * point.units.time_s
-                closing[j, i] = point.node.closing * point.units.speed_m_s
-                hidden[j, i] = False
+            grid.put(j, i, point)
+        about_wrong = [each for i in wrong for each in grid.about(j, i)]
+        grid.settle([*about_wrong, *((k, i) for i in grid.surprises(j) for k in (j, j - 1))])
         if progress is not None:
             progress((j + 1) / len(rows))
-    return CaptureMap(
-        np.asarray(columns, dtype=np.float64),
-        np.asarray(rows, dtype=np.float64),
-        np.ma.MaskedArray(time, hidden),
-        status,
-        np.ma.MaskedArray(closing, hidden),
-        afresh,
-    )
+    return grid.map()
 
 
-def _game(game_at: Callable[[float, float], Game], x: float, y: float) -> Game | None:
-    try:
-        return game_at(x, y)
-    except ValueError:
-        return None
+class _Grid:
+    """What is known so far."""
+
+    def __init__(self, game_at: Callable[[float, float], Game], columns: Floats, rows: Floats) -> None:
+        self._game_at, self._columns, self._rows = game_at, columns, rows
+        shape = (len(rows), len(columns))
+        self._status = np.full(shape, STATUSES.index(PointStatus.NO_GAME))
+        self._time, self._closing = np.zeros(shape), np.zeros(shape)
+        self._hidden = np.ones(shape, dtype=bool)
+        self._afresh = 0
+
+    def game(self, j: int, i: int) -> Game | None:
+        """Return the game of a point, if it is one."""
+        try:
+            return self._game_at(float(self._columns[i]), float(self._rows[j]))
+        except ValueError:
+            return None
+
+    def games(self, j: int) -> list[Game | None]:
+        """Return the games of a row."""
+        return [self.game(j, i) for i in range(len(self._columns))]
+
+    def put(self, j: int, i: int, point: _Point) -> None:
+        """Note a point."""
+        self._afresh += point.status is not PointStatus.NEIGHBOUR
+        self._status[j, i] = STATUSES.index(point.status)
+        self._hidden[j, i] = point.node is None or point.units is None
+        if point.node is not None and point.units is not None:
+            self._time[j, i] = point.node.duration * point.units.time_s
+            self._closing[j, i] = point.node.closing * point.units.speed_m_s
+
+    def surprises(self, j: int) -> list[int]:
+        """Return the columns at which a row is not what the one or two rows before lead one to expect."""
+        if j == 0:
+            return []
+        now, expected = self._time[j], self._time[j - 1].copy()
+        known = ~self._hidden[j - 1]
+        if j > 1:
+            two = known & ~self._hidden[j - 2]
+            expected[two] += self._time[j - 1][two] - self._time[j - 2][two]
+        unlike = np.where(self._hidden[j], known, ~known | (np.abs(now - expected) > _SURPRISE * now))
+        return [int(i) for i in np.flatnonzero(unlike)]
+
+    def about(self, j: int, i: int) -> list[tuple[int, int]]:
+        """Return the points beside a point."""
+        beside = ((j - 1, i), (j + 1, i), (j, i - 1), (j, i + 1))
+        return [(k, h) for k, h in beside if 0 <= k < len(self._rows) and 0 <= h < len(self._columns)]
+
+    def settle(self, doubted: list[tuple[int, int]]) -> None:
+        """Solve points that came from neighbours from nothing, and where that is another answer those about them."""
+        while doubted:
+            j, i = doubted.pop()
+            if STATUSES[self._status[j, i]] is not PointStatus.NEIGHBOUR:
+                continue
+            before_s = self._time[j, i]
+            self.put(j, i, _from_nothing(self.game(j, i), change_branch=False))
+            if self._hidden[j, i] or abs(self._time[j, i] - before_s) > _SAME * before_s:
+                doubted += self.about(j, i)
+
+    def map(self) -> CaptureMap:
+        """Return what is known."""
+        return CaptureMap(
+            self._columns,
+            self._rows,
+            np.ma.MaskedArray(self._time, self._hidden),
+            self._status,
+            np.ma.MaskedArray(self._closing, self._hidden),
+            self._afresh,
+        )
 
 
-def _row(games: list[Game | None], follow_all: bool) -> tuple[list[_Point], int]:
-    """Solve a row, and return how many of its points were solved from nothing."""
+def _row(games: list[Game | None], follow_all: bool, offset: int) -> tuple[list[_Point], list[int]]:
+    """Solve a row, and return at which of its points a neighbour's answer was found not to be the first capture."""
     points: list[_Point] = []
-    afresh, unchecked = 0, 0
+    wrong: list[int] = []
+    every = min(CHECKED_EVERY, len(games))
+
+    def check() -> None:
+        if points and points[-1].status is PointStatus.NEIGHBOUR:
+            seeded, points[-1] = points[-1], _from_nothing(games[len(points) - 1], follow_all)
+            if not _agree(points[-1], seeded):
+                wrong.append(len(points) - 1)
+
     for i, game in enumerate(games):
         seeded = None if follow_all or game is None else _seeded(game, points)
         if seeded is None:
             # The stretch before ends here: its last point has to stand for it.
-            afresh += _check(games, points, unchecked, follow_all)
-            points.append(_from_nothing(game, follow_all))
-            afresh += 1
-            unchecked = i + 1
-            continue
-        points.append(seeded)
-        if i % CHECKED_EVERY == 0 or i == len(games) - 1:
-            afresh += _check(games, points, unchecked, follow_all)
-            unchecked = i + 1
-    return points, afresh
-
-
-def _check(games: list[Game | None], points: list[_Point], first: int, follow_all: bool) -> int:
-    """Solve the last point from nothing, and where that is another answer, all since `first`; return how many were."""
-    last = len(points) - 1
-    if last < first:
-        return 0
-    seeded, points[last] = points[last], _from_nothing(games[last], follow_all)
-    if _agree(points[last], seeded):
-        return 1
-    for k in range(first, last):
-        points[k] = _from_nothing(games[k], follow_all)
-    return 1 + last - first
+            check()
+        points.append(_from_nothing(game, follow_all) if seeded is None else seeded)
+        if (i + offset) % every == 0 or i == len(games) - 1:
+            check()
+    return points, wrong
 
 
 def _from_nothing(game: Game | None, change_branch: bool) -> _Point:

@@ -62,6 +62,24 @@ def slides() -> MakeGame:
 
 
 @pytest.fixture(scope="session")
+def low() -> MakeGame:
+    """In low orbit, with J2 and a capture radius: the evader leads by some degrees, its thrust a share of 20 N."""
+
+    def make(lead_deg: float = 1.6, ratio: float = 0.5, *, j2: float = 1.08262668e-3) -> Game:
+        players = []
+        for axis_km, inclination_deg, raan_deg, anomaly_deg, thrust_n in (
+            (6878.0, 51.6, 10.0, 0.0, 20.0),
+            (6888.0, 51.8, 10.1, lead_deg - 0.1, 20.0 * ratio),
+        ):
+            angles = (math.radians(each) for each in (inclination_deg, raan_deg, 0.0, anomaly_deg))
+            position, velocity = OrbitalElements(axis_km * 1e3, 0.001, *angles).state(MU_M3_S2)
+            players.append(Player(tuple(position), tuple(velocity), 500.0, 400.0, thrust_n, 300.0))
+        return Game(Gravity(MU_M3_S2, EARTH_M, j2, 6378136.3), players[0], players[1], 1e3)
+
+    return make
+
+
+@pytest.fixture(scope="session")
 def solved(slides: MakeGame) -> Solution:
     """The slides' case, 20 against 10 N."""
     return solve(slides())

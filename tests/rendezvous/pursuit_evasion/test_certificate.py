@@ -29,6 +29,17 @@ def test_every_check_of_the_slides_cases_holds(case: Case, slides: MakeGame) -> 
         assert deviation.capture_s < case.capture_s
 
 
+def test_oblateness_passes_the_second_integrator(low: MakeGame) -> None:
+    solution, round_planet = solve(low()), solve(low(j2=0.0))
+    certificate = certify(solution)
+    assert certificate.failures == ()
+    # It flies forward, with J2 as textbooks write it and the costates by a complex step of that.
+    assert certificate.integrator_gap_m < 0.01
+    assert solution.capture is not None
+    assert round_planet.capture is not None
+    assert 1.0 < abs(solution.capture.time_s - round_planet.capture.time_s) < 60.0
+
+
 def test_an_evader_that_coasts_instead_is_captured_as_one_without_thrust(solved: Solution) -> None:
     coast = next(each for each in certify(solved).evader_deviations if each.name == "coast")
     assert solved.capture is not None
