@@ -376,7 +376,7 @@ def _show(
 def _verdict(solution: Solution) -> str:
     from rendezvous.pursuit_evasion import Verdict
 
-    until = f"{solution.looked_at_s:.1f} s"
+    until = f"{solution.looked_at_s:.1f} s" if solution.looked_at_s >= 1.0 else f"{solution.looked_at_s:.3g} s"
     if solution.capture is not None and solution.verdict is Verdict.CAPTURED:
         return f"captured at {solution.capture.time_s:.6f} s ({solution.route.value})"
     if solution.verdict is Verdict.PROPELLANT_EXHAUSTED:
@@ -384,6 +384,8 @@ def _verdict(solution: Solution) -> str:
     if solution.verdict is Verdict.ESCAPES:
         why = f"the {solution.exhausted}'s propellant is spent" if solution.exhausted else "the time looked at ends"
         return f"escapes: the evader keeps away until {why}, {until}"
+    if solution.looked_at_s == 0.0:
+        return "branch-not-certified: not even a short game can be followed; is everything in the units of its key?"
     text = f"branch-not-certified: the extremals are a saddle up to a duration of {until}; nothing is claimed beyond"
     if solution.fallback is not None:
         text += f" (another route finds an extremal at {solution.fallback.time_s:.3f} s)"

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ from experiments.figures.pursuit import draw_control, draw_distance, draw_feedba
 from experiments.figures.pursuit_map import axis_name
 from experiments.pursuit_file import load_problem
 from rendezvous.pursuit_evasion import Policy, Solution, fly, history, solve
+from rendezvous.pursuit_evasion._branch import follow
 
 FIGURES = ["figure-control", "figure-distance", "figure-feedback", "figure-orbits", "figure-relative"]
 MAP_FILES = ["figure-map.pdf", "figure-map.png", "map.csv", "problem.toml", "results.json"]
@@ -70,6 +73,87 @@ def test_the_slides_case_as_json(infoset: Infoset, tmp_path: Path) -> None:
     assert {each["policy"] for each in certificate["evader_deviations"]} == {each.value for each in Policy}
 
 
+def test_the_json_has_what_it_is_asked_for(infoset: Infoset) -> None:
+    _, out, _ = infoset("pursuit", "leo-pursuit", "--json", "-")
+    found = json.loads(out)
+    asked = ["verdict", "capture_time_s", "capture_position_km", "direction", "pursuer", "evader"]
+    asked += ["closing_speed_km_s", "curvature", "certificate"]
+    assert [key for key in found if key in asked] == asked
+    for name in ("pursuer", "evader"):
+        assert {"propellant_kg", "final_velocity_km_s", "costate0"} <= set(found[name])
+        assert len(found[name]["costate0"]) == 6
+    assert found["curvature"] == sorted(found["curvature"])
+    # At a distance of the capture radius, along the direction.
+    apart = np.subtract(found["evader"]["final_position_km"], found["pursuer"]["final_position_km"])
+    np.testing.assert_allclose(apart, found["direction"], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("settings", "verdict"),
+    [
+        pytest.param(["gravitational_parameter_km3_s2=1e14"], "branch-not-certified", marks=pytest.mark.slow),
+        (["pursuer.thrust_N=1e9"], "propellant-exhausted"),
+        (["pursuer.mass_kg=1e-9", "pursuer.dry_mass_kg=0"], "branch-not-certified"),
+        (["pursuer.semi_major_axis_km=1e12"], "branch-not-certified"),
+        (["evader.semi_major_axis_km=1e12"], "propellant-exhausted"),
+        (["longest_s=1e-9"], "branch-not-certified"),
+        (["capture_radius_km=6600"], "captured"),
+    ],
+)
+def test_absurd_values_have_an_answer(settings: list[str], verdict: str, infoset: Infoset) -> None:
+    options = [part for setting in settings for part in ("--set", setting)]
+    began = time.process_time()
+    code, out, _ = infoset("pursuit", *options, "--json", "-")
+    assert code == 0
+    assert json.loads(out)["verdict"] == verdict
+    assert time.process_time() - began < 20.0
+
+
+def test_a_game_that_takes_too_long_to_follow_is_bounded(infoset: Infoset, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rendezvous.pursuit_evasion.solver.follow", partial(follow, most_work=10.0))
+    code, out, _ = infoset("pursuit")
+    assert code == 0
+    assert "branch-not-certified: the extremals are a saddle up to a duration of" in out
+
+
+BAD_STARTS = {
+    "hyperbolic": ["evader.eccentricity=1.5"],
+    "rectilinear": ["evader.eccentricity=1"],
+    "inside the planet": ["pursuer.semi_major_axis_km=6000"],
+    "no mass": ["pursuer.mass_kg=0"],
+    "no thrust": ["pursuer.thrust_N=0"],
+    "same position": [
+        *("evader.eccentricity=0.00013", "evader.inclination_deg=1.565", "evader.raan_deg=47"),
+        "evader.true_anomaly_deg=350",
+    ],
+    "dry mass above mass": ["evader.dry_mass_kg=2001"],
+    "other units": ["pursuer.semi_major_axis_km=42.166"],
+}
+
+
+@pytest.mark.parametrize("settings", BAD_STARTS.values(), ids=BAD_STARTS)
+def test_what_is_no_game_is_told_in_a_line_with_a_remedy(settings: list[str], infoset: Infoset, tmp_path: Path) -> None:
+    options = [part for setting in settings for part in ("--set", setting)]
+    code, out, err = infoset("pursuit", *options, "--out", "found")
+    assert (code, out) == (2, "")
+    assert err.startswith("error: geo-pursuit with --set: ")
+    assert settings[-1].split("=")[0] in err
+    assert ";" in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_time_between_plans_suits_the_game(infoset: Infoset) -> None:
+    code, out, _ = infoset("pursuit", "leo-pursuit", "--feedback", "coast", "--json", "-")
+    assert code == 0
+    found = json.loads(out)
+    assert found["feedback"]["replan_s"] == pytest.approx(found["capture_time_s"] / 50.0)
+    assert found["feedback"]["flights"][0]["time_s"] < found["capture_time_s"]
+    code, _, err = infoset("pursuit", "--feedback", "coast", "--replan-s", "1")
+    assert code == 2
+    assert "more than 2000 plans" in err
+
+
+@pytest.mark.slow
 def test_a_folder_has_the_problem_the_results_and_the_figures(infoset: Infoset, tmp_path: Path) -> None:
     code, out, _ = infoset("pursuit", "leo-pursuit", "--feedback", "coast", "--replan-s", "60", "--out", "found")
     assert code == 0
@@ -141,6 +225,7 @@ def test_a_scripted_evader(infoset: Infoset, tmp_path: Path) -> None:
         (["--feedback", "coast", "--replan-s", "0"], ["--replan-s", "at least 1"]),
         (["--feedback", "coast", "--delay-s", "nan"], ["--delay-s"]),
         (["--runs", "5"], ["--feedback"]),
+        (["--replan-s", "60"], ["--feedback"]),
         (["--runs", "0"], ["--runs", "must be"]),
         (["--json", "missing/x.json"], ["there is no folder missing"]),
         (["--out", "/dev/null"], ["is a file"]),
@@ -239,6 +324,15 @@ def test_figures(geo: Solution) -> None:
     flight = fly(geo.game, Policy.COAST.direction, solution=geo)
     assert [axes.get_title() for axes in draw_feedback(geo, [flight]).axes][1].startswith("(b) captured at")
     assert [axes.get_title() for axes in draw_feedback(geo, [flight, flight]).axes][1] == "(b) 2 of 2 captured"
+
+
+def test_columns_of_a_map_suit_the_thrust(infoset: Infoset) -> None:
+    for name, half in (("geo-pursuit", 30.0), ("leo-pursuit", 3.0)):
+        code, out, _ = infoset("pursuit-map", name, "--y", "evader.thrust_N=0:1:2", "--json", "-")
+        assert code == 0
+        found = json.loads(out)["x"]
+        assert found["parameter"] == "phase_deg"
+        assert (found["values"][0], found["values"][-1]) == (-half, half)
 
 
 def test_axes_of_a_map_have_words_and_units() -> None:
