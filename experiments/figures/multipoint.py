@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
@@ -21,8 +22,9 @@ Progress = Callable[[float], None]
 
 _POINTS = 1601
 _TRACK_POINTS = 241
-_CURVE_POINTS = {FrameAxes.HILL: 41, FrameAxes.INERTIAL: 17}
+_CURVE_POINTS = 41
 _NEAREST = 0.12
+_JUMP = 0.3
 _COMPONENTS: tuple[dict[str, Any], ...] = (
     {"color": TRUTH, "linestyle": "-"},
     {"color": MEASURED, "linestyle": (0, (5, 1.5))},
@@ -111,7 +113,7 @@ def cost_curves(scene: Scene, progress: Progress = lambda _done: None) -> list[C
     Returns
     -------
     list of CostCurve
-        One a visit, of the first nine; times without a path are left out.
+        One a visit, of the first nine; each ends where paths do, or where they jump to another local minimum.
     """
     nodes, curves = scene.path.nodes, []
     count = min(len(scene.order), _MOST_CURVES)
@@ -122,21 +124,25 @@ def cost_curves(scene: Scene, progress: Progress = lambda _done: None) -> list[C
         now = float(nodes.arrive_s[index])
         high = now + 0.5 * (now - low) if last else float(nodes.arrive_s[index + 1]) - stay
         width = high - low
-        times = np.linspace(
-            low + _NEAREST * width, high if last else high - _NEAREST * width, _CURVE_POINTS[scene.axes]
-        )
+        times = np.linspace(low + _NEAREST * width, high if last else high - _NEAREST * width, _CURVE_POINTS)
         times = np.unique(np.append(times, now))
         # From the time as it is outward, so that each path begins from a near one.
         found = {now: scene.path.cost}
         for side in (times[times > now], times[times < now][::-1]):
             fly = scene.tour.flyer(scene.order, scene.path)
+            reached, cost, slope = now, scene.path.cost, float(scene.path.time_gradient[index])
             for time in side:
                 varied = nodes.arrive_s.copy()
                 varied[index] = time
                 try:
-                    found[float(time)] = fly(varied).cost
+                    flown = fly(varied)
                 except ValueError:
                     break
+                expected = cost + 0.5 * (time - reached) * (slope + float(flown.time_gradient[index]))
+                if abs(flown.cost - expected) > _JUMP * max(flown.cost, cost):
+                    break
+                reached, cost, slope = float(time), flown.cost, float(flown.time_gradient[index])
+                found[reached] = cost
         known = np.array(sorted(found))
         curves.append(CostCurve(known, np.array([found[time] for time in known])))
         progress((index + 1) / count)
@@ -174,14 +180,17 @@ def draw_path(scene: Scene) -> Figure:
             panel.plot(flown[0, across], flown[0, up], marker="s", color=TRUTH, markersize=4.5, zorder=4)
             if not hill and across == 0 and up == 1:
                 panel.plot(0.0, 0.0, marker="*", color=MEASURED, markersize=8.0, linestyle="none")
+            panel.margins(0.1)
             _mark_nodes(panel, scene, across, up, unit)
             panel.set_xlabel(f"{labels[across]}, {name}")
             panel.set_ylabel(f"{labels[up]}, {name}")
             panel.set_title(f"({letter})", loc="left")
-            panel.margins(0.1)
         if not hill:
             panels[0].set_aspect("equal", adjustable="datalim")
-        panels[0].legend(loc="best")
+        panels[0].legend(
+            loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=2, borderaxespad=0.0, handlelength=2.0,
+            columnspacing=1.2, fontsize=7.0,
+        )  # fmt: skip
     return figure
 
 
@@ -212,7 +221,7 @@ def draw_control(scene: Scene, bound_m_s2: float | None = None) -> Figure:
         above.set_ylabel("$u$, mm/s$^2$")
         below.set_ylabel("$|u|$, mm/s$^2$")
         below.set_ylim(bottom=0.0)
-        above.legend(loc="best", ncols=3)
+        _legend(above)
         _mark_times(scene, above, below)
     return figure
 
@@ -240,7 +249,7 @@ def draw_costates(scene: Scene) -> Figure:
         above.set_ylabel(r"$\lambda_r$, m/s$^3$")
         below.set_ylabel(r"$\lambda_V$, m/s$^2$")
         for panel in (above, below):
-            panel.legend(loc="best", ncols=3)
+            _legend(panel)
             panel.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
         _mark_times(scene, above, below)
     return figure
@@ -292,6 +301,11 @@ def draw_times(scene: Scene, curves: list[CostCurve]) -> Figure:
     return figure
 
 
+def _legend(panel: Axes) -> None:
+    panel.margins(y=0.16)
+    panel.legend(loc="best", ncols=3, frameon=True, framealpha=0.85, edgecolor="none", borderpad=0.2)
+
+
 def _track(scene: Scene, place: int, target: int) -> Floats:
     """Positions of a target until it is met, and while the chaser stays."""
     until = float(scene.path.nodes.leave_s[place])
@@ -306,8 +320,13 @@ def _mark_nodes(panel: Axes, scene: Scene, across: int, up: int, unit: float) ->
         panel.plot(where[across], where[up], marker="D" if met else "o", markersize=5.0, color="white",
                    markeredgecolor=INK, linestyle="none", zorder=5)  # fmt: skip
         if len(scene.order) <= _MOST_NAMED:
-            panel.annotate(name, (where[across], where[up]), xytext=(4, 4), textcoords="offset points", fontsize=7.0,
-                           zorder=6)  # fmt: skip
+            low, high = panel.get_xlim()
+            near_edge = where[across] > low + 0.85 * (high - low)
+            label = panel.annotate(
+                name, (where[across], where[up]), xytext=(-4 if near_edge else 4, 4), textcoords="offset points",
+                ha="right" if near_edge else "left", fontsize=7.0, zorder=6,
+            )  # fmt: skip
+            label.set_path_effects([Stroke(linewidth=2.0, foreground="white"), Normal()])
 
 
 def _line(panel: Axes, scene: Scene, times: Floats, values: Floats, **look: Any) -> None:

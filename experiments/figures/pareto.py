@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
 
 from experiments.figures.style import INK, LIMIT, SET_EDGE, SET_FILL, new_figure, place_axes, style
 from rendezvous.pareto import (
@@ -71,10 +73,12 @@ def draw_trajectories(solution: EncounterSolution) -> Figure:
             for plane, (first, second) in zip(planes, _PLANES, strict=True):
                 plane.plot(flight[:, first], flight[:, second], markevery=every, markersize=3.0, label=label, **look)
         space.plot(*([value] for value in meeting), marker="*", markersize=9.0, color=INK, linestyle="none")
-        space.set_xlabel("x, m", labelpad=-2.0)
-        space.set_ylabel("y, m", labelpad=-2.0)
-        space.set_zlabel("z, m", labelpad=-5.0)
-        space.tick_params(pad=-1.0)
+        space.set_xlabel("x, m", labelpad=-4.0)
+        space.set_ylabel("y, m", labelpad=-3.0)
+        space.set_zlabel("z, m", labelpad=-2.0)
+        space.tick_params(pad=-2.0, labelsize=6.5)
+        for axis in (space.xaxis, space.yaxis, space.zaxis):
+            axis.set_major_locator(MaxNLocator(4))
         figure.text(0.012, 0.975, "(a) in space; marks at equal times", fontsize=8.5)
         for plane, (first, second), letter in zip(planes, _PLANES, "bcd", strict=True):
             plane.plot(meeting[first], meeting[second], marker="*", markersize=9.0, color=INK, linestyle="none")
@@ -146,8 +150,8 @@ def draw_front(solution: EncounterSolution, selections: Mapping[str, Floats], sw
         Three axes.
     """
     with style():
-        figure = new_figure(height_mm=82.0)
-        ((left, middle, right),) = place_axes(figure, 1, 3, margins_mm=(16.0, 3.0, 22.0, 12.0), gaps_mm=(16.0, 0.0))
+        figure = new_figure(height_mm=78.0)
+        ((left, middle, right),) = place_axes(figure, 1, 3, margins_mm=(16.0, 3.0, 23.0, 6.0), gaps_mm=(16.0, 0.0))
         sampled = pareto_set(solution, simplex_weights(len(solution.costs), _SET_POINTS))
         _draw_set(left, solution, sampled.points, selections)
         _draw_excesses(middle, solution, sampled.excess, selections)
@@ -193,8 +197,12 @@ def draw_costs(solution: EncounterSolution, coalitions: Coalitions | None, impul
         bars.legend(loc="best")
         table = figure.add_axes((0.03, 1.0 / height, 0.94, below / height))
         table.axis("off")
-        shares = ["-"] * count if coalitions is None else [f"{each:.5g}" for each in coalitions.shapley]
-        owed = ["-"] * count if coalitions is None else [f"{each:+.5g}" for each in coalitions.transfers]
+        shares = ["\N{EN DASH}"] * count if coalitions is None else [f"{each:.5g}" for each in coalitions.shapley]
+        owed = (
+            ["\N{EN DASH}"] * count
+            if coalitions is None
+            else [f"{each:+.5g}".replace("-", "\N{MINUS SIGN}") for each in coalitions.transfers]
+        )
         rows = [
             [names[each], f"{ideal[each]:.6g}", f"{ideal[each] + excess[each]:.6g}", f"{excess[each]:.6g}",
              f"{impulses_m_s[each]:.5g}", shares[each], owed[each]]
@@ -226,7 +234,9 @@ def _draw_set(axes: Axes, solution: EncounterSolution, points: Floats, selection
     units = ["m" if name in ("x", "y", "z") else "m/s" for name in free]
     flat = len(free) == 1
     second = np.zeros(len(points)) if flat else points[:, 1]
-    if len(solution.costs) > 2 and not flat:
+    if len(solution.costs) > 2 and not flat and (corners := _hull(solution)) is not None:
+        axes.fill(corners[:, 0], corners[:, 1], facecolor=SET_FILL, edgecolor=SET_EDGE, linewidth=0.8, zorder=1)
+    elif len(solution.costs) > 2 and not flat:
         axes.plot(points[:, 0], second, linestyle="none", marker=".", markersize=2.0, color=SET_FILL, zorder=1)
     else:
         order = np.argsort(points[:, 0])
@@ -250,6 +260,17 @@ def _draw_set(axes: Axes, solution: EncounterSolution, points: Floats, selection
     axes.margins(0.1)
 
 
+def _hull(solution: EncounterSolution) -> Floats | None:
+    """Corners of the hull of the ideals in the plane of the first two free components; None where it has no area."""
+    if not solution.same_matrix:
+        return None
+    ideals = solution.ideals[:, :2]
+    try:
+        return np.asarray(ideals[ConvexHull(ideals).vertices])
+    except QhullError:
+        return None
+
+
 def _draw_excesses(axes: Axes, solution: EncounterSolution, excess: Floats, selections: Mapping[str, Floats]) -> None:
     """The front: e2 against e1 of two, with e3 as a shade of three; ranges of the excesses of one, or of more."""
     names = [each.craft.name for each in solution.costs]
@@ -263,9 +284,9 @@ def _draw_excesses(axes: Axes, solution: EncounterSolution, excess: Floats, sele
         if len(names) == 3:
             third = 3 - first - second
             shade = axes.scatter(excess[:, first], excess[:, second], c=excess[:, third], s=4.0, cmap="cividis")
-            inset = axes.inset_axes((0.42, 1.10, 0.56, 0.04))
+            inset = axes.inset_axes((0.40, 0.86, 0.54, 0.04))
             bar = axes.figure.colorbar(shade, cax=inset, orientation="horizontal")
-            bar.ax.set_title(f"$e$ of {names[third]}", fontsize=7.0, pad=2.0)
+            bar.ax.set_title(f"$e$ of {names[third]}, m$^2$/s$^3$", fontsize=7.0, pad=2.0)
             bar.ax.tick_params(labelsize=6.5, pad=1.0, length=2.0)
         elif not solution.same_matrix:
             axes.plot(excess[:, 0], excess[:, 1], color=SET_EDGE)
