@@ -61,13 +61,13 @@ def draw_process(records: Sequence[Record]) -> Figure:
             _draw_angle(column[0], record)
             _draw_rate(column[1], record)
             _draw_impulse(column[2], record)
-            _draw_predicted_miss(column[3], record)
+            draw_predicted_miss(column[3], record)
             column[0].set_title(f"{title}\n{outcome_title(record)}", linespacing=1.3)
             column[-1].set_xlabel("time t, s")
         _level(grid[0], [_angle_extent(record) for record in records], scale=1e3)
         _level(grid[1], [_rate_extent(record) for record in records], scale=1e6)
         _level_impulse(grid[2], records)
-        _level_predicted_miss(grid[3], records)
+        level_predicted_miss(grid[3], records)
         for record, column in zip(records, zip(*grid, strict=True), strict=True):
             _note_exit(column[0], _angles(record) * 1e3, record, 1.0, "mrad")
             _note_exit(column[1], _rates(record) * 1e6, record, 1e-3, "mrad/s")
@@ -111,7 +111,14 @@ def _draw_impulse(axes: Axes, record: Record) -> None:
     axes.plot(times[given], impulses[given], ".", color=IMPULSE, markersize=2.2, markeredgewidth=0.0)
 
 
-def _draw_predicted_miss(axes: Axes, record: Record) -> None:
+def draw_predicted_miss(axes: Axes, record: Record) -> None:
+    """Draw the predicted-miss interval against time.
+
+    Parameters
+    ----------
+    axes : Axes
+    record : Record
+    """
     times, lower, upper = _predicted_miss(record)
     axes.axhline(0.0, color=LIMIT, linewidth=0.6)
     axes.fill_between(times, lower, upper, color=SET_FILL, linewidth=0.0)
@@ -133,7 +140,14 @@ def _level_impulse(row: Sequence[Axes], records: Sequence[Record]) -> None:
         axes.set_ylim(-1.2 * greatest, 1.35 * greatest)
 
 
-def _level_predicted_miss(row: Sequence[Axes], records: Sequence[Record]) -> None:
+def level_predicted_miss(row: Sequence[Axes], records: Sequence[Record]) -> None:
+    """Give axes of predicted misses the same limits: linear to ten metres, a step a decade beyond.
+
+    Parameters
+    ----------
+    row : sequence of Axes
+    records : sequence of Record
+    """
     bounds = np.concatenate([np.concatenate(_predicted_miss(record)[1:]) for record in records])
     greatest = float(np.abs(bounds).max(initial=10.0))
     decades = int(np.log10(greatest) + 1e-9)

@@ -64,9 +64,9 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
         for time, row in zip(times_s, grid, strict=True):
             steps = [min(record.steps, key=lambda step: abs(step.time_s - time)) for record in records]
             shown = [choose_sections(step.sections, sections) for step in steps]
-            _level(row, [_points(step, chosen) for step, chosen in zip(steps, shown, strict=True)])
+            level_planes(row, [extent_of(step, chosen) for step, chosen in zip(steps, shown, strict=True)])
             for axes, step, chosen, title in zip(row, steps, shown, titles, strict=True):
-                _draw_step(axes, step, chosen)
+                draw_step(axes, step, chosen)
                 axes.set_title(f"{title}, t = {step.time_s:g} s")
                 axes.set_xlabel("line-of-sight rate ω, µrad/s", labelpad=2.0)
                 axes.set_ylabel("line-of-sight angle α, mrad")
@@ -121,7 +121,15 @@ _MEASUREMENT_LOOK: dict[str, Any] = {
 }
 
 
-def _draw_step(axes: Axes, step: StepRecord, chosen: Sequence[Section]) -> None:
+def draw_step(axes: Axes, step: StepRecord, chosen: Sequence[Section]) -> None:
+    """Draw some sections of one step with the truth and the measurement, on axes that have their limits.
+
+    Parameters
+    ----------
+    axes : Axes
+    step : StepRecord
+    chosen : sequence of Section
+    """
     outlines = [_outline(section) for section in chosen]
     for index, outline in enumerate(outlines):
         _draw_outline(axes, outline, _colour(index, len(outlines)), zorder=3.0 - 0.01 * index)
@@ -205,7 +213,15 @@ def _spread(wanted: Sequence[float], spacing: float, low: float, high: float) ->
     return np.asarray(heights - over)
 
 
-def _level(row: Sequence[Axes], points: Sequence[Floats]) -> None:
+def level_planes(row: Sequence[Axes], points: Sequence[Floats]) -> None:
+    """Give planes of sets the same limits, with room for the labels.
+
+    Parameters
+    ----------
+    row : sequence of Axes
+    points : sequence of ndarray, shape (n, 2)
+        What must be seen, as `extent_of` returns it.
+    """
     everything = np.concatenate(points)
     least, greatest = everything.min(axis=0), everything.max(axis=0)
     margin = 0.07 * (greatest - least)
@@ -218,7 +234,18 @@ def _level(row: Sequence[Axes], points: Sequence[Floats]) -> None:
         axes.xaxis.set_major_locator(MaxNLocator(nbins=6 if np.abs(least[0]) < 1e4 else 3, steps=[1, 2, 2.5, 5, 10]))
 
 
-def _points(step: StepRecord, chosen: Sequence[Section]) -> Floats:
+def extent_of(step: StepRecord, chosen: Sequence[Section]) -> Floats:
+    """Return all points (omega in µrad/s, alpha in mrad) that a drawing of a step must have room for.
+
+    Parameters
+    ----------
+    step : StepRecord
+    chosen : sequence of Section
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+    """
     rate, angle = step.true_rate_rad_s * 1e6, step.true_angle_rad * 1e3
     marks = [[rate, angle]]
     if step.measured_angle_rad is not None:
