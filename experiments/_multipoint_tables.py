@@ -9,6 +9,7 @@ from typing import Annotated
 
 from pydantic import Field, PlainValidator
 
+from experiments._orbit_angle import angle_problems
 from experiments.toml_file import Known, Problem
 from experiments.toml_values import (
     NUMBER,
@@ -151,16 +152,23 @@ def checks(known: Known) -> Iterator[Problem]:
     count = len(targets) if isinstance(targets, list) else 0
     for path in (("chaser",), *(("target", str(each)) for each in range(count))):
         yield from _body_problems(known, path, axes)
-    names = [known.value("target", str(each), "name") for each in range(count)]
-    for place, name in enumerate(names):
-        if name is not None and name in names[:place]:
+    seen: set[object] = set()
+    for place in range(count):
+        name = known.value("target", str(place), "name")
+        if isinstance(name, str) and name in seen:
             yield Problem(("target", str(place), "name"), f'lists "{name}" a second time', "list each target once")
+        seen.add(name if isinstance(name, str) else None)
     for place in range(count):
         dwell, meet = known.number("target", str(place), "dwell_s"), known.value("target", str(place), "meet")
         if dwell and meet in (None, Meet.FLYBY.value):
             where = ("target", str(place), "dwell_s")
             yield Problem(where, f"is {dwell}, but a flyby cannot stay", 'set meet = "rendezvous", or remove it')
     yield from _time_problems(known, count)
+    if axes is Axes.HILL:
+        places: list[tuple[str, ...]] = [("target", str(each), "time_s") for each in range(count)]
+        places.append(("times", "latest_s"))
+        last = max(places, key=lambda path: known.number(*path) or ZERO)
+        yield from angle_problems(last, known.number(*last), known.number("orbit_rate_rad_s"))
 
 
 def _axes_problems(known: Known, axes: Axes) -> Iterator[Problem]:

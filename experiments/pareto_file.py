@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
+from experiments._orbit_angle import angle_problems
 from experiments.errors import InputError
 from experiments.problem_file import problem_form, problem_hash
 from experiments.toml_file import Known, Problem, load_tables
@@ -36,9 +37,6 @@ Floats = NDArray[np.float64]
 
 KIND = "pareto-encounter"
 MOST_CRAFT = 50
-MOST_RADIANS = Decimal(1000)
-"""How long a flight may be: beyond, the linear motion means nothing."""
-LEAST_RADIANS = Decimal("1e-9")
 COMPONENTS = {each.name.lower(): each for each in Component}
 TERMINAL = {name: f"{name}_m" if component.value < 3 else f"{name}_m_s" for name, component in COMPONENTS.items()}
 
@@ -115,22 +113,19 @@ def _checks(known: Known) -> Iterator[Problem]:
             yield Problem(where, f"fixes {name}, which free = [...] leaves open", "remove it, or do not free it")
     craft = known.value("craft")
     count = len(craft) if isinstance(craft, list) else 0
-    names = [known.value("craft", str(each), "name") for each in range(count)]
-    for place, name in enumerate(names):
-        if name is not None and name in names[:place]:
+    seen: set[object] = set()
+    for place in range(count):
+        name = known.value("craft", str(place), "name")
+        if isinstance(name, str) and name in seen:
             yield Problem(("craft", str(place), "name"), f'calls a second craft "{name}"', "give each its own name")
+        seen.add(name if isinstance(name, str) else None)
     weights = [known.value("craft", str(each), "weight") for each in range(count)]
     if count and all(isinstance(each, int | Decimal) and each == 0 for each in weights):
         yield Problem(("craft", "0", "weight"), "is zero, and so are all others", "give one craft a positive weight")
     duration, rate = known.number("duration_s"), known.number("orbit_rate_rad_s")
     if duration is None or duration <= 0:
         return
-    if rate is not None and rate > 0 and not LEAST_RADIANS <= duration * rate <= MOST_RADIANS:
-        yield Problem(
-            ("duration_s",),
-            f"is {float(duration * rate):.3g} radians of the orbit; {LEAST_RADIANS:g} to {MOST_RADIANS} make sense",
-            "check the units of orbit_rate_rad_s and duration_s",
-        )
+    yield from angle_problems(("duration_s",), duration, rate)
     for place in range(count):
         start = known.number("craft", str(place), "start_s")
         if start is not None and start >= duration:

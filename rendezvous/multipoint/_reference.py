@@ -228,7 +228,7 @@ def _panels(states: Callable[[Floats], Floats], start_s: float, end_s: float, mu
     # Where the orbit is far from round, panels are as narrow as its nearest point needs.
     count = np.ceil((radians if radians < 3.0 * even else 3.0 * even) / PANEL_RAD)
     if not np.isfinite(count) or count > MOST_PANELS:
-        raise ValueError(f"a trajectory of {radians:.3g} radians between two visits is too long to follow")
+        raise ValueError(f"a trajectory of {radians:.3g} radians between two visits is too long to follow; check units")
     return max(1, int(count))
 
 

@@ -26,6 +26,7 @@ MOST_ROUNDS = 30
 FEW_ROUNDS = 8
 MOST_KNOWN = 64
 RUGGED = 3.0
+REMEDY = "give visits more time, visit nearer targets first, or check units"
 GREATEST_CHANGE = 2.0
 LEAST_RADIUS = 0.02
 
@@ -169,7 +170,7 @@ class KeplerTour:
             if len(shots) < len(tried):
                 raise NotSettledError(
                     "no trajectory was found: the targets were followed from the chaser's coasting orbit, but not all "
-                    "the way; give visits more time, or nearer targets first"
+                    f"the way; {REMEDY}"
                 )
             known.append((nodes.arrive_s, [each.unknowns for each in shots]))
             del known[:-MOST_KNOWN]
@@ -203,7 +204,10 @@ class KeplerTour:
         nearest = LEAST_RADIUS * float(np.linalg.norm(np.vstack([self.start_state, nodes.arrive])[:, :3], axis=1).min())
         mixture = Mixture()
         for each in range(rounds):
-            path = solve_segments(self._motion_about(reference), self.start_s, self.start_state, nodes)
+            try:
+                path = solve_segments(self._motion_about(reference), self.start_s, self.start_state, nodes)
+            except ValueError as error:
+                raise NotSettledError(f"re-linearising leads to no trajectory: {error}; {REMEDY}") from None
             if costs is not None:
                 costs.append(path.cost)
             found = Reference.of_path(path, mu, reference, keep=each > 1)
@@ -218,7 +222,7 @@ class KeplerTour:
             reference = mixture.mix(reference, found) if each > 1 else found
         raise NotSettledError(
             f"re-linearising does not settle: trajectories still differ by {change:.2g} of the distance from the "
-            "centre from round to round; give visits more time, or nearer targets first"
+            f"centre from round to round; {REMEDY}"
         )
 
     def _settled(self, shot: ShotPath) -> Path:

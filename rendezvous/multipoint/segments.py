@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rendezvous.multipoint._path import SINGULAR, solve_path
-from rendezvous.relative_motion import LinearMotion
+from rendezvous.relative_motion import LinearMotion, TimeVaryingMotion
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -120,8 +120,17 @@ class Path:
         Returns
         -------
         ndarray, shape (k, 6)
+
+        Notes
+        -----
+        From the end of each segment where the motion has a closed form; else along with the states.
         """
-        return self.along(time_s)[1]
+        if isinstance(self.motion, TimeVaryingMotion):
+            return self.along(time_s)[1]
+        times = np.asarray(time_s, dtype=np.float64)
+        which, moving = self._segment_of(times)
+        back = self.motion.transition(times, np.where(moving, self.nodes.arrive_s[which], times))
+        return np.asarray(np.where(moving[:, None], np.einsum("kba,kb->ka", back, self.costate_before[which]), 0.0))
 
     def control(self, time_s: Floats) -> Floats:
         """Return u = B' lambda at times.
