@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.scenario_file import load_scenario
-from guidance import GameNoise, LineOfSight, Measurement, MeasurementNoise, RandomNoise, TieRule
+from guidance import GameNoise, LineOfSight, Measurement, MeasurementNoise, NoiseKind, RandomNoise, TieRule
 from infoset import InformationSetView, InitialSet, Model
 from sim import Manoeuvre, Outcome, Scenario, Target
 from sim.draws import Draws, draw
@@ -84,7 +84,8 @@ def every_noise(draws: Draws) -> MixedNoise:
 def guaranteed(scenario: Scenario, hostile: bool) -> Scenario:
     """The scenario with the guaranteed model and starts anywhere in B x D."""
     model = replace(scenario.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
-    scenario = replace(scenario, set_model=model, dispersion=model.bounds)
+    # Draws hold choices between ties for this noise alone; those are used as what else is random here.
+    scenario = replace(scenario, set_model=model, dispersion=model.bounds, noise=NoiseKind.GAME, tie=TieRule.RANDOM)
     if not hostile:
         return scenario
     target = Target(Manoeuvre.WORST_CASE, model.disturbance_m_s2)

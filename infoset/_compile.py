@@ -76,4 +76,4 @@ def _nothing(_array: Any, _index: int) -> None:
 
 
 prefetch: Any = _nothing if getattr(config, "DISABLE_JIT", False) else intrinsic(_prefetch)
-"""Ask for the line of memory at a place of a one-dimensional array, soon to be read and written."""
+"""Ask for the line of memory at a place of an array, counted through all its axes: soon it is read and written."""

@@ -43,10 +43,12 @@ RIGHT, LEFT = 0, 1
 
 CAPACITY = 256
 """Vertices a section may have: a power of two."""
-ROOM_AT_START = 16
+ROOM_AT_START = 64
 """Vertices each chain has room for at first, a power of two."""
 MOST_ADDED = 4
 """Vertices that one step can add, two at each of its two turns."""
+ROOM_AHEAD = 8 * MOST_ADDED
+"""Vertices that a section is given room for beyond those it has."""
 REDUCED = 160
 """Vertices left in a section that has grown to CAPACITY."""
 
@@ -64,6 +66,8 @@ ORIGIN = 8
 TAKEN = 0
 """Where the rings say how many of their floats belong to chains; rings that were outgrown stay taken."""
 FIRST_RING = 8
+LINE = 8
+"""Floats in a line of the cache."""
 
 
 class Chains(NamedTuple):
@@ -88,10 +92,10 @@ def empty_sections(number: int, room: int = CAPACITY) -> Chains:
     The rings have what all may ever need: what is not written takes no memory.
     """
     marks = np.zeros((number, 2, MARKS), dtype=np.int64)
-    marks[:, :, RING] = FIRST_RING + 2 * room * np.arange(2 * number).reshape(number, 2)
+    marks[:, :, RING] = FIRST_RING + (2 * room + LINE) * np.arange(2 * number).reshape(number, 2)
     marks[:, :, MASK] = room - 1
     rings = np.empty(FIRST_RING + 8 * CAPACITY * number)
-    rings[TAKEN] = FIRST_RING + 4 * room * number
+    rings[TAKEN] = FIRST_RING + 2 * (2 * room + LINE) * number
     return Chains(np.zeros((number, 2, ORIGIN)), rings, marks)
 
 
@@ -142,13 +146,21 @@ def count_of(marks: Integers, n: int) -> int:
 
 
 @inlined
+def announce(origins: Floats, marks: Integers, n: int) -> None:
+    """Ask for the origins and marks of a section that comes soon: memory is slow."""
+    prefetch(marks, 2 * MARKS * n)
+    prefetch(marks, 2 * MARKS * n + MARKS)
+    prefetch(origins, 2 * ORIGIN * n)
+    prefetch(origins, 2 * ORIGIN * n + ORIGIN)
+
+
+@inlined
 def expect(rings: Floats, marks: Integers, n: int) -> None:
-    """Ask for the vertices of a section that a step reads: it comes next, and memory is slow."""
-    if n < marks.shape[0]:
-        for side in (RIGHT, LEFT):
-            prefetch(rings, place(marks, n, side, begin_of(marks, n, side)))
-            prefetch(rings, place(marks, n, side, end_of(marks, n, side) - 1))
-            prefetch(rings, place(marks, n, side, marks[n, side, PEAK]))
+    """Ask for the vertices of a section that a step reads: it comes next."""
+    for side in (RIGHT, LEFT):
+        prefetch(rings, place(marks, n, side, begin_of(marks, n, side)))
+        prefetch(rings, place(marks, n, side, end_of(marks, n, side) - 1))
+        prefetch(rings, place(marks, n, side, marks[n, side, PEAK]))
 
 
 @substituted
@@ -162,13 +174,19 @@ def widen_rings(rings: Floats, marks: Integers, n: int, room: int) -> None:
     """Give both chains of a section rings of so much room, a power of two, from what is not taken."""
     for side in (RIGHT, LEFT):
         first = int(rings[TAKEN])
-        rings[TAKEN] = first + 2 * room
+        rings[TAKEN] = first + floats_of(room)
         for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
             old, new = place(marks, n, side, i), first + 2 * (i & (room - 1))
             rings[new] = rings[old]
             rings[new + 1] = rings[old + 1]
         marks[n, side, RING] = first
         marks[n, side, MASK] = room - 1
+
+
+@substituted
+def floats_of(room: int) -> int:
+    """Floats that a ring takes: a line more than its vertices, lest all rings begin in the same lines of a cache."""
+    return 2 * room + LINE
 
 
 @inlined
@@ -208,6 +226,15 @@ def vertex(origins: Floats, rings: Floats, marks: Integers, n: int, side: int, i
     return v, m
 
 
+@inlined
+def scaled_vertex(
+    origins: Floats, rings: Floats, marks: Integers, n: int, side: int, i: int, tau: float
+) -> tuple[float, float]:
+    """A vertex: V tau and z, both of which are lengths."""
+    v, m = vertex(origins, rings, marks, n, side, i)
+    return tau * v, m - tau * v
+
+
 @substituted
 def put(rings: Floats, marks: Integers, n: int, side: int, i: int, v: float, m: float) -> None:
     """Write a vertex, from the origin of its chain."""
@@ -227,10 +254,10 @@ def copy_section(
     to_marks: Integers,
     to: int,
 ) -> None:
-    """Copy a section to a row of other chains, which have room for it that is not taken."""
+    """Copy a section to a row of other chains, which have room for it, and more, that is not taken."""
     for side in (RIGHT, LEFT):
         to_marks[to, side, BEGIN] = to_marks[to, side, END] = 0
-    wanted = room_for(count_of(marks, n), room_of(to_marks, to))
+    wanted = room_for(min(count_of(marks, n) + ROOM_AHEAD, CAPACITY), room_of(to_marks, to))
     if wanted > room_of(to_marks, to):
         widen_rings(to_rings, to_marks, to, wanted)
     for side in (RIGHT, LEFT):
@@ -574,10 +601,25 @@ def first_near_peak(rings: Floats, ring: tuple[int, int], first: int, peak: int,
 
 
 @inlined
-def greatest_and_least_miss(
+def greatest_and_least_miss(origins: Floats, rings: Floats, marks: Integers, n: int) -> tuple[float, float]:
+    """Greatest and least predicted miss of a section; the chains note where they are reached."""
+    right = (marks[n, RIGHT, RING], marks[n, RIGHT, MASK])
+    left = (marks[n, LEFT, RING], marks[n, LEFT, MASK])
+    right_first, left_first = marks[n, RIGHT, BEGIN], marks[n, LEFT, BEGIN]
+    right_m, left_m = origins[n, RIGHT, M_ORIGIN], origins[n, LEFT, M_ORIGIN]
+    upper_at = find_peak(rings, right, right_first, marks[n, RIGHT, END] - 1, marks[n, RIGHT, PEAK], 1.0, right_m)
+    lower_at = find_peak(rings, left, left_first, marks[n, LEFT, END] - 1, marks[n, LEFT, PEAK], -1.0, left_m)
+    marks[n, RIGHT, PEAK], marks[n, LEFT, PEAK] = upper_at, lower_at
+    _, upper = vertex(origins, rings, marks, n, RIGHT, upper_at)
+    _, lower = vertex(origins, rings, marks, n, LEFT, lower_at)
+    return upper, lower
+
+
+@allocation_free
+def extreme_points(
     origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, relative: float, slack: float
-) -> tuple[float, float, float, float, float, float]:
-    """Extremes of the predicted miss, and where they are reached.
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Points that reach the extremes of the predicted miss, as `greatest_and_least_miss` has found them.
 
     Parameters
     ----------
@@ -589,27 +631,20 @@ def greatest_and_least_miss(
 
     Returns
     -------
-    upper, upper_v, upper_m, lower, lower_v, lower_m : float
-        The greatest miss, and V and m of the lowest point that reaches it; the least, and those of the highest.
+    upper, lower : tuple of float
+        V and m of the lowest point that reaches the greatest miss, and of the highest that reaches the least.
     """
     right = (marks[n, RIGHT, RING], marks[n, RIGHT, MASK])
     left = (marks[n, LEFT, RING], marks[n, LEFT, MASK])
     right_first, left_first = marks[n, RIGHT, BEGIN], marks[n, LEFT, BEGIN]
-    right_m, left_m = origins[n, RIGHT, M_ORIGIN], origins[n, LEFT, M_ORIGIN]
-    upper_at = find_peak(rings, right, right_first, marks[n, RIGHT, END] - 1, marks[n, RIGHT, PEAK], 1.0, right_m)
-    lower_at = find_peak(rings, left, left_first, marks[n, LEFT, END] - 1, marks[n, LEFT, PEAK], -1.0, left_m)
+    upper_at, lower_at = marks[n, RIGHT, PEAK], marks[n, LEFT, PEAK]
     upper_v, upper = vertex(origins, rings, marks, n, RIGHT, upper_at)
     lower_v, lower = vertex(origins, rings, marks, n, LEFT, lower_at)
     magnitude = tau * (abs(upper_v) + abs(lower_v)) + abs(upper) + abs(lower)
     tolerance = relative * (upper - lower) + slack * magnitude
-    upper_v, upper_m = vertex(
-        origins, rings, marks, n, RIGHT, first_near_peak(rings, right, right_first, upper_at, 1.0, tolerance)
-    )
-    lower_v, lower_m = vertex(
-        origins, rings, marks, n, LEFT, first_near_peak(rings, left, left_first, lower_at, -1.0, tolerance)
-    )
-    marks[n, RIGHT, PEAK], marks[n, LEFT, PEAK] = upper_at, lower_at
-    return upper, upper_v, upper_m, lower, lower_v, lower_m
+    upper_at = first_near_peak(rings, right, right_first, upper_at, 1.0, tolerance)
+    lower_at = first_near_peak(rings, left, left_first, lower_at, -1.0, tolerance)
+    return vertex(origins, rings, marks, n, RIGHT, upper_at), vertex(origins, rings, marks, n, LEFT, lower_at)
 
 
 @substituted

@@ -11,9 +11,9 @@ import numpy as np
 
 from infoset import chains
 from infoset._compile import allocation_free, entry
-from infoset.history import History
-from infoset.location import Tape, Workspace, locate_end, run, workspace
-from infoset.section_kernels import ALIVE, Flags, Floats, Integers, SectionLaw, Sections
+from infoset.history import History, Tapes
+from infoset.location import LOWER, PROBE, UPPER, Workspace, keep_section, locate_end, run, tape_of, workspace
+from infoset.section_kernels import ALIVE, Flags, Floats, Integers, SectionLaw, Sections, Tape
 from infoset.section_stack import SectionStack
 
 LABELS = 4
@@ -134,6 +134,7 @@ def bound_leaving(
     known: float,
     elapsed: int,
     tape: Tape,
+    errors: Floats | None,
     law: SectionLaw,
     room: Workspace,
     labels: Floats,
@@ -150,7 +151,7 @@ def bound_leaving(
         The limits.
     known : float
         A label between them that is known to live; less than `lower` if none is.
-    elapsed, tape, law : steps so far, history and numbers of the model
+    elapsed, tape, errors, law : steps so far, history with the errors of its rates, and numbers of the model
     room : Workspace
         Room for replays.
     labels, outlines, counts, values : ndarray
@@ -162,8 +163,12 @@ def bound_leaving(
     -------
     int
     """
-    lower_died, lower_overlap = run(lower, tape, law, room)
-    upper_died, upper_overlap = run(upper, tape, law, room)
+    lower_died, lower_overlap = run(lower, tape, errors, law, room)
+    if lower_died == ALIVE:
+        keep_section(room, LOWER)
+    upper_died, upper_overlap = run(upper, tape, errors, law, room)
+    if upper_died == ALIVE:
+        keep_section(room, UPPER)
     living = known
     if lower_died == ALIVE:
         living = lower
@@ -176,9 +181,13 @@ def bound_leaving(
     first_dead, last_dead = lower, upper
     first, last = lower, upper
     if lower_died != ALIVE:
-        first_dead, first = locate_end(lower, lower_died, lower_overlap, living, resolution, tape, law, room)
+        first_dead, first = locate_end(
+            lower, lower_died, lower_overlap, living, resolution, tape, errors, law, room, LOWER
+        )
     if upper_died != ALIVE:
-        last_dead, last = locate_end(upper, upper_died, upper_overlap, living, resolution, tape, law, room)
+        last_dead, last = locate_end(
+            upper, upper_died, upper_overlap, living, resolution, tape, errors, law, room, UPPER
+        )
     spacing = (last - first) / (LABELS - 1)
     travelled = law.closing_speed * (law.step * elapsed)
     number = 0
@@ -190,14 +199,18 @@ def bound_leaving(
         if (spacing == 0.0 and k != 0) or (k < 0 and lower_died != ALIVE) or (k == LABELS and upper_died != ALIVE):
             continue
         label = last if k == LABELS - 1 and spacing > 0.0 else first + k * spacing
-        died, _ = run(label, tape, law, room)
-        if died != ALIVE:
+        row = PROBE
+        if k == 0:
+            row = LOWER
+        elif k == LABELS - 1:
+            row = UPPER
+        elif run(label, tape, errors, law, room)[0] != ALIVE:
             continue
         if outside and k < 0:
             inner = 1
         labels[number] = label
         tau = (label - travelled) / law.closing_speed
-        counts[number] = chains.outline(room.origins, room.rings, room.marks, 0, tau, outlines[number])
+        counts[number] = chains.outline(room.origins, room.rings, room.marks, row, tau, outlines[number])
         number += 1
     if spacing == 0.0 or number < 3:
         # So few labels live that they are one to within what is located: a hair's breadth stands for the rest.
@@ -235,11 +248,8 @@ def bound_leaving_all(
     lower: Floats,
     upper: Floats,
     elapsed: int,
-    kinds: Integers,
+    tapes: Tapes,
     errors: Floats | None,
-    values: Floats,
-    applies: Flags,
-    events: int,
     sections: Sections,
     law: SectionLaw,
     room: Workspace,
@@ -251,7 +261,7 @@ def bound_leaving_all(
     made: Integers,
 ) -> None:
     """Write the pieces of every active engagement, and how many there are."""
-    stored, used, living, _, _, _, _, _, _ = sections
+    stored, used, living, _, _, _, _, _, _, _ = sections
     for b in range(active.shape[0]):
         made[b] = 0
         if not active[b] or lower[b] >= upper[b]:
@@ -260,9 +270,9 @@ def bound_leaving_all(
         for s in range(used[b]):
             if living[b, s] and lower[b] <= stored[b, s] <= upper[b]:
                 known = stored[b, s]
-        tape = Tape(kinds, errors, values[b], applies[b], events)
+        tape = tape_of(tapes, b, room)
         made[b] = bound_leaving(
-            lower[b], upper[b], known, elapsed, tape, law, room, labels, outlines, counts, supports, pieces[b]
+            lower[b], upper[b], known, elapsed, tape, errors, law, room, labels, outlines, counts, supports, pieces[b]
         )
 
 
@@ -327,11 +337,8 @@ class GuaranteedMiss:
             lower,
             upper,
             history.elapsed,
-            history.kinds,
+            history.tapes,
             history.errors_if_any,
-            history.values,
-            history.applies,
-            history.events,
             stack.sections,
             self._law,
             workspace(history.events, 1),

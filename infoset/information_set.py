@@ -279,17 +279,7 @@ class InformationSetView:
         tape, law, label = self._history, self._stack.law, float(label_m)
         section = empty_sections(1)
         died = kernels.replay(
-            label,
-            tape.kinds,
-            tape.errors_if_any,
-            tape.values[engagement],
-            tape.applies[engagement],
-            tape.events,
-            law,
-            *section,
-            0,
-            np.empty(tape.events),
-            working_room(),
+            label, tape.tape(engagement), tape.errors_if_any, law, *section, 0, np.empty(tape.events), working_room()
         )
         vertices = outline(section, 0, label, tape.elapsed, law) if died == kernels.ALIVE else np.empty((0, 2))
         x = label - law.closing_speed * (law.step * tape.elapsed)
@@ -585,10 +575,12 @@ class InformationSet(InformationSetView):
         if self._phi is not None:
             leaving_below = np.minimum(self._upper_label, least_label)
             self._phi.leave(active, self._lower_label, leaving_below, self._stack, self._history)
-        self._lower_label[active] = np.maximum(self._lower_label, least_label)[active]
-        left, removed = self._stack.keep_labels(self._lower_label, self._upper_label, active)
+        np.maximum(self._lower_label, least_label, out=self._lower_label, where=active)
         if self._phi is not None:
             self._some_left |= self._phi.exists
+        if self._stack.least_label >= least_label:
+            return np.zeros(self._stack.labels.shape, dtype=bool)
+        left, removed = self._stack.keep_labels(self._lower_label, self._upper_label, active)
         if removed:
             self._some_left |= left.any(axis=1)
             self._keep_enough(active, emptied=SetStatus.FINISHED)
@@ -596,7 +588,10 @@ class InformationSet(InformationSetView):
 
     def sections_are_leaving(self) -> bool:
         """Whether `drop_below_threshold` would let any stored section leave now."""
-        return bool(((self._stack.labels < self._least_label_next()) & self.living).any())
+        least_label = self._least_label_next()
+        if self._stack.least_label >= least_label:
+            return False
+        return bool(((self._stack.labels < least_label) & self.living).any())
 
     def _least_label_next(self) -> float:
         """Least label whose range will not be below the threshold after the next step, m."""
@@ -611,7 +606,7 @@ class InformationSet(InformationSetView):
         The exact disturbance is a thin lens in (V, z); as in the paper it is the segment between its ends.
         """
         active = self.tracking
-        self._history.record(kernels.PREDICTION, np.zeros(self.batch), np.ones(self.batch, dtype=bool))
+        self._history.record(kernels.PREDICTION)
         self._stack.predict(active, self._history.elapsed)
 
     def stop(self, where: ArrayLike) -> None:
@@ -665,7 +660,7 @@ class InformationSet(InformationSetView):
             return
         if event is not None:
             history.retract(event, empty)
-        history.record(kernels.WIDENING, np.zeros(self.batch), empty)
+        history.record(kernels.WIDENING, applies=empty)
         # Those that this measurement killed live again; their polygons are made anew below.
         sections = self._stack.sections
         stored = np.arange(sections.labels.shape[1]) < sections.used[:, None]
@@ -679,21 +674,19 @@ class InformationSet(InformationSetView):
     def _regrid(self, wanted: Flags, sections: int) -> None:
         tape, stack = self._history, self._stack
         stack.make_room_for_new(wanted, sections)
-        refine_all(
+        spare = refine_all(
             wanted,
             sections,
             tape.elapsed,
             self._lower_label,
             self._upper_label,
-            tape.kinds,
+            tape.tapes,
             tape.errors_if_any,
-            tape.values,
-            tape.applies,
-            tape.events,
             stack.sections,
             stack.law,
             workspace(tape.events, stack.labels.shape[1]),
         )
+        stack.note_new(spare)
 
 
 def _as_polygon(vertices: Floats) -> ConvexPolygons:

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from infoset._compile import allocation_free, entry
-from infoset.chains import copy_section, empty_sections, working_room
+from infoset.chains import CAPACITY, copy_section, count_of, empty_sections, room_of, working_room
+from infoset.history import Tapes
 from infoset.section_kernels import (
     ALIVE,
     Flags,
@@ -15,6 +16,7 @@ from infoset.section_kernels import (
     Integers,
     SectionLaw,
     Sections,
+    Tape,
     replay,
     summarise_section,
 )
@@ -22,20 +24,15 @@ from infoset.section_kernels import (
 LABEL_RESOLUTION = 1e-13
 MOST_PROBES = 200
 
-
-class Tape(NamedTuple):
-    """The history of one engagement, as `section_kernels.replay` takes it."""
-
-    kinds: Integers
-    errors: Floats | None
-    values: Floats
-    applies: Flags
-    events: int
+PROBE, LOWER, UPPER = range(3)
+"""Rows of the workspace: the section of the last replay, and those at the ends of the living labels."""
 
 
 class Workspace(NamedTuple):
     """Room for replays."""
 
+    values: Floats
+    applies: Flags
     origins: Floats
     rings: Floats
     marks: Integers
@@ -64,7 +61,9 @@ def workspace(events: int, slots: int) -> Workspace:
     """Room for replays of histories of so many events, and for a search among so many stored labels."""
     known = slots + 2
     return Workspace(
-        *empty_sections(1),
+        np.empty(events),
+        np.empty(events, dtype=bool),
+        *empty_sections(3),
         overlaps=np.empty(events),
         living_overlaps=np.empty(events),
         points=working_room(),
@@ -75,29 +74,31 @@ def workspace(events: int, slots: int) -> Workspace:
 
 
 @allocation_free
-def run(label: float, tape: Tape, law: SectionLaw, room: Workspace) -> tuple[int, float]:
+def tape_of(tapes: Tapes, b: int, room: Workspace) -> Tape:
+    """Lay the history of one engagement out in one piece: replays read it many times."""
+    for event in range(tapes.events):
+        room.values[event] = tapes.values[event, b]
+        room.applies[event] = tapes.applies[event, b]
+    return Tape(tapes.kinds, room.values, room.applies, tapes.events)
+
+
+@allocation_free
+def run(label: float, tape: Tape, errors: Floats | None, law: SectionLaw, room: Workspace) -> tuple[int, float]:
     """Event at which a label died (or ALIVE) and its overlap there (0 if alive)."""
-    died = replay(
-        label,
-        tape.kinds,
-        tape.errors,
-        tape.values,
-        tape.applies,
-        tape.events,
-        law,
-        room.origins,
-        room.rings,
-        room.marks,
-        0,
-        room.overlaps,
-        room.points,
-    )
+    died = replay(label, tape, errors, law, room.origins, room.rings, room.marks, PROBE, room.overlaps, room.points)
     return died, room.overlaps[died] if died != ALIVE else 0.0
 
 
 @allocation_free
-def keep_overlaps(room: Workspace, events: int) -> None:
-    """Keep the overlaps of the last replay as those of the living label."""
+def keep_section(room: Workspace, row: int) -> None:
+    """Keep the section of the last replay as that of an end."""
+    copy_section(room.origins, room.rings, room.marks, PROBE, room.origins, room.rings, room.marks, row)
+
+
+@allocation_free
+def keep_living(room: Workspace, events: int, row: int) -> None:
+    """Keep section and overlaps of the last replay as those of the living label."""
+    keep_section(room, row)
     for event in range(events):
         room.living_overlaps[event] = room.overlaps[event]
 
@@ -116,10 +117,14 @@ def locate_end(
     living: float,
     resolution: float,
     tape: Tape,
+    errors: Floats | None,
     law: SectionLaw,
     room: Workspace,
+    row: int,
 ) -> tuple[float, float]:
     """Narrow the bracket between a dead and a living label; return the bracket (dead, living).
+
+    The section at the living one is left in a row of the workspace.
 
     Notes
     -----
@@ -127,8 +132,8 @@ def locate_end(
     converges fast; where four probes have not narrowed the bracket to an eighth, against a change of the killing
     measurement, one halves it.
     """
-    run(living, tape, law, room)
-    keep_overlaps(room, tape.events)
+    run(living, tape, errors, law, room)
+    keep_living(room, tape.events, row)
     weight_dead = overlap
     weight_living = room.living_overlaps[died]
     side = 0
@@ -146,10 +151,10 @@ def locate_end(
             least = 0.5 * resolution / width
             fraction = min(max(-weight_dead / (weight_living - weight_dead), least), 1.0 - least)
         label = dead + fraction * (living - dead)
-        probe_died, probe_overlap = run(label, tape, law, room)
+        probe_died, probe_overlap = run(label, tape, errors, law, room)
         if probe_died == ALIVE:
             living = label
-            keep_overlaps(room, tape.events)
+            keep_living(room, tape.events, row)
             weight_living = room.living_overlaps[died]
             weight_dead = 0.5 * weight_dead if side == 1 else overlap
             side = 1
@@ -163,7 +168,14 @@ def locate_end(
 
 @allocation_free
 def search_living(
-    labels: Floats, died: Integers, overlaps: Floats, resolution: float, tape: Tape, law: SectionLaw, room: Workspace
+    labels: Floats,
+    died: Integers,
+    overlaps: Floats,
+    resolution: float,
+    tape: Tape,
+    errors: Floats | None,
+    law: SectionLaw,
+    room: Workspace,
 ) -> int:
     """Look for a living label between dead ones; the arrays hold three, of which the middle outlives the others.
 
@@ -182,7 +194,7 @@ def search_living(
         lower_half = labels[1] - labels[0] > labels[2] - labels[1]
         outer = 0 if lower_half else 2
         label = 0.5 * (labels[1] + labels[outer])
-        probe_died, probe_overlap = run(label, tape, law, room)
+        probe_died, probe_overlap = run(label, tape, errors, law, room)
         if probe_died == ALIVE or outlives(probe_died, probe_overlap, died[1], overlaps[1]):
             other = 2 - outer
             labels[other], died[other], overlaps[other] = labels[1], died[1], overlaps[1]
@@ -203,59 +215,86 @@ def locate_living(
     died: Integers,
     overlaps: Floats,
     tape: Tape,
+    errors: Floats | None,
     law: SectionLaw,
     room: Workspace,
 ) -> Living:
-    """Find the living labels within limits, starting from what is known of the stored ones (in rising order)."""
+    """Find the living labels within limits, starting from what is known of the stored ones (in rising order).
+
+    The sections at both ends are left in the workspace.
+    """
     nothing = Living(False, limit_below, limit_below, limit_above, limit_above)
     if limit_below > limit_above:
         return nothing
     resolution = LABEL_RESOLUTION * max(abs(limit_below), abs(limit_above))
     # The stored labels within the limits, between the limits themselves.
     known, known_died, known_overlap = room.labels, room.died, room.label_overlaps
-    known[0] = limit_below
-    known_died[0], known_overlap[0] = run(limit_below, tape, law, room)
-    size = 1
+    end = 1
+    first = last = 0
     for s in range(labels.shape[0]):
         if limit_below < labels[s] < limit_above:
-            known[size] = labels[s]
-            known_died[size] = ALIVE if alive[s] else died[s]
-            known_overlap[size] = overlaps[s]
-            size += 1
-    if limit_above > limit_below:
-        known[size] = limit_above
-        known_died[size], known_overlap[size] = run(limit_above, tape, law, room)
-        size += 1
-    best = 0
-    for i in range(1, size):
-        if outlives(known_died[i], known_overlap[i], known_died[best], known_overlap[best]):
-            best = i
-    first = last = best
-    if known_died[best] != ALIVE:
+            known[end] = labels[s]
+            known_died[end] = ALIVE if alive[s] else died[s]
+            known_overlap[end] = overlaps[s]
+            if alive[s]:
+                first = first if last > 0 else end
+                last = end
+            end += 1
+    known[0], known[end] = limit_below, limit_above
+    some_live = last > 0
+    # A limit matters only where no dead label stands between it and the living ones.
+    if not some_live or first == 1:
+        known_died[0], known_overlap[0] = run(limit_below, tape, errors, law, room)
+        if known_died[0] == ALIVE:
+            keep_section(room, LOWER)
+            first, some_live = 0, True
+    if not some_live or last == end - 1:
+        known_died[end], known_overlap[end] = run(limit_above, tape, errors, law, room)
+        if known_died[end] == ALIVE:
+            keep_section(room, UPPER)
+            first = first if some_live else end
+            last, some_live = end, True
+    if not some_live:
+        best = 0
+        for i in range(1, end + 1):
+            if outlives(known_died[i], known_overlap[i], known_died[best], known_overlap[best]):
+                best = i
         # The best of the dead and its neighbours, at the front of the same room.
-        first, last = max(best - 1, 0), min(best + 1, size - 1)
+        first, last = max(best - 1, 0), min(best + 1, end)
         known[0], known_died[0], known_overlap[0] = known[first], known_died[first], known_overlap[first]
         middle, middle_died, middle_overlap = known[best], known_died[best], known_overlap[best]
         known[2], known_died[2], known_overlap[2] = known[last], known_died[last], known_overlap[last]
         known[1], known_died[1], known_overlap[1] = middle, middle_died, middle_overlap
-        if search_living(known, known_died, known_overlap, resolution, tape, law, room) == 0:
+        if search_living(known, known_died, known_overlap, resolution, tape, errors, law, room) == 0:
             return nothing
-        below, lower = locate_end(known[0], known_died[0], known_overlap[0], known[1], resolution, tape, law, room)
-        above, upper = locate_end(known[2], known_died[2], known_overlap[2], known[1], resolution, tape, law, room)
-        return Living(True, below, lower, upper, above)
-    for i in range(size):
-        if known_died[i] == ALIVE:
-            first = min(first, i)
-            last = max(last, i)
+        first, last, end = 1, 1, 2
     below = lower = known[first]
     if first > 0:
         below, lower = locate_end(
-            known[first - 1], known_died[first - 1], known_overlap[first - 1], lower, resolution, tape, law, room
+            known[first - 1],
+            known_died[first - 1],
+            known_overlap[first - 1],
+            lower,
+            resolution,
+            tape,
+            errors,
+            law,
+            room,
+            LOWER,
         )
     above = upper = known[last]
-    if last < size - 1:
+    if last < end:
         above, upper = locate_end(
-            known[last + 1], known_died[last + 1], known_overlap[last + 1], upper, resolution, tape, law, room
+            known[last + 1],
+            known_died[last + 1],
+            known_overlap[last + 1],
+            upper,
+            resolution,
+            tape,
+            errors,
+            law,
+            room,
+            UPPER,
         )
     return Living(True, below, lower, upper, above)
 
@@ -267,27 +306,25 @@ def refine_all(
     elapsed: int,
     limit_below: Floats,
     limit_above: Floats,
-    kinds: Integers,
+    tapes: Tapes,
     errors: Floats | None,
-    values: Floats,
-    applies: Flags,
-    events: int,
     sections: Sections,
     law: SectionLaw,
     room: Workspace,
-) -> None:
+) -> int:
     """Give each wanted engagement a new grid of sections over its living labels, ends included, by replay.
 
     Notes
     -----
     `limit_below` and `limit_above` are narrowed to labels known to be dead. Where nothing lives, the engagement is
-    left with no living section.
+    left with no living section. Returned is how many vertices the fullest of the new sections may gain.
     """
-    labels, used, alive, died, overlaps, origins, rings, marks, summaries = sections
+    spare = CAPACITY
+    labels, used, alive, died, overlaps, origins, rings, marks, summaries, _ = sections
     for b in range(labels.shape[0]):
         if not wanted[b]:
             continue
-        tape = Tape(kinds, errors, values[b], applies[b], events)
+        tape = tape_of(tapes, b, room)
         stored = used[b]
         living = locate_living(
             limit_below[b],
@@ -297,6 +334,7 @@ def refine_all(
             died[b, :stored],
             overlaps[b, :stored],
             tape,
+            errors,
             law,
             room,
         )
@@ -313,8 +351,15 @@ def refine_all(
                 label = living.upper
             labels[b, s] = label
             n = b * labels.shape[1] + s
-            died[b, s], overlaps[b, s] = run(label, tape, law, room)
+            row = PROBE
+            if number > 1 and (s == 0 or s == number - 1):
+                row = LOWER if s == 0 else UPPER
+                died[b, s], overlaps[b, s] = ALIVE, 0.0
+            else:
+                died[b, s], overlaps[b, s] = run(label, tape, errors, law, room)
             alive[b, s] = died[b, s] == ALIVE
             if alive[b, s]:
-                copy_section(room.origins, room.rings, room.marks, 0, origins, rings, marks, n)
+                copy_section(room.origins, room.rings, room.marks, row, origins, rings, marks, n)
                 summarise_section(origins, rings, marks, n, label, elapsed, law, summaries, b, s)
+                spare = min(spare, room_of(marks, n) - count_of(marks, n))
+    return spare

@@ -663,19 +663,31 @@ def centroid(points: Points, count: int) -> tuple[float, float]:
 
 
 @inlined
-def squared_distance_to_edge(points: Points, i: int, j: int, x: float, y: float) -> float:
-    """Square of the distance from (x, y) to the edge between vertices i and j."""
-    edge_x = points[j, 0] - points[i, 0]
-    edge_y = points[j, 1] - points[i, 1]
-    from_x = x - points[i, 0]
-    from_y = y - points[i, 1]
+def pass_edge(
+    nearest: float, inside: bool, start: tuple[float, float], end: tuple[float, float], x: float, y: float
+) -> tuple[float, bool]:
+    """Square of the distance from (x, y) to the nearest edge so far, and whether it is inside so far, one edge on.
+
+    Notes
+    -----
+    Only an edge whose line is nearer than what was found is looked at closely: dividing would be most of the work.
+    """
+    edge_x, edge_y = end[0] - start[0], end[1] - start[1]
+    from_x, from_y = x - start[0], y - start[1]
+    beside = cross(edge_x, edge_y, from_x, from_y)
     squared_length = edge_x * edge_x + edge_y * edge_y
-    along = from_x * edge_x + from_y * edge_y
-    if along <= 0.0:
-        return float(from_x * from_x + from_y * from_y)
-    if along >= squared_length:
-        return float((x - points[j, 0]) ** 2 + (y - points[j, 1]) ** 2)
-    return float(cross(edge_x, edge_y, from_x, from_y) ** 2 / squared_length)
+    if not beside * beside > nearest * squared_length:
+        along = from_x * edge_x + from_y * edge_y
+        if along <= 0.0:
+            squared = from_x * from_x + from_y * from_y
+        elif along >= squared_length:
+            squared = (x - end[0]) ** 2 + (y - end[1]) ** 2
+        else:
+            squared = beside * beside / squared_length
+        nearest = min(nearest, squared)
+    if (end[1] > y) != (start[1] > y) and (beside > 0.0) == (end[1] > start[1]):
+        inside = not inside
+    return nearest, inside
 
 
 @compiled
@@ -691,19 +703,10 @@ def margin(points: Points, count: int, x: float, y: float) -> float:
     inside = False
     last = count - 1
     for i in range(count):
-        nearest = min(nearest, squared_distance_to_edge(points, last, i, x, y))
-        if (points[i, 1] > y) != (points[last, 1] > y):
-            turn = cross(
-                points[i, 0] - points[last, 0],
-                points[i, 1] - points[last, 1],
-                x - points[last, 0],
-                y - points[last, 1],
-            )
-            if (turn > 0.0) == (points[i, 1] > points[last, 1]):
-                inside = not inside
+        start, end = (points[last, 0], points[last, 1]), (points[i, 0], points[i, 1])
+        nearest, inside = pass_edge(nearest, inside, start, end, x, y)
         last = i
-    distance = math.sqrt(nearest)
-    return distance if inside else -distance
+    return math.sqrt(nearest) if inside else -math.sqrt(nearest)
 
 
 @compiled

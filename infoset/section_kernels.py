@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import chains, polygon
-from infoset._compile import allocation_free, entry, inlined, substituted
+from infoset._compile import allocation_free, entry, inlined, prefetch, substituted
 from infoset.chains import REACH, RIGHT
 
 Floats = NDArray[np.float64]
@@ -32,8 +32,11 @@ ANGLE, IMPULSE, PREDICTION, RATE, WIDENING = range(5)
 ALIVE = np.iinfo(np.int64).max
 
 # Columns of a section's summary.
-UPPER_MISS, UPPER_V, UPPER_Z, LOWER_MISS, LOWER_V, LOWER_Z, Z_LEAST, Z_GREATEST = range(8)
-SUMMARY_COLUMNS = 8
+LOWER_MISS, UPPER_MISS, Z_LEAST, Z_GREATEST = range(4)
+SUMMARY_COLUMNS = 4
+
+AHEAD = 4
+"""Sections ahead whose memory is asked for."""
 
 
 class SectionLaw(NamedTuple):
@@ -77,6 +80,8 @@ class Sections(NamedTuple):
     origins, rings, marks : ndarray
         The sections themselves, as `chains` has them: slot s of engagement b is row b S + s.
     summaries : ndarray, shape (B, S, columns)
+    rows : ndarray of int, shape (B S,)
+        Room for a list of sections.
     """
 
     labels: Floats
@@ -88,6 +93,25 @@ class Sections(NamedTuple):
     rings: Floats
     marks: Integers
     summaries: Floats
+    rows: Integers
+
+
+class Tape(NamedTuple):
+    """The history of one engagement: what happened, the value, and whether it concerned this one.
+
+    Parameters
+    ----------
+    kinds : ndarray of int, shape (>= events,)
+    values : ndarray, shape (>= events,)
+    applies : ndarray of bool, shape (>= events,)
+    events : int
+        Number of events.
+    """
+
+    kinds: Integers
+    values: Floats
+    applies: Flags
+    events: int
 
 
 def room_for_sections(labels: Floats, used: Integers) -> Sections:
@@ -104,6 +128,7 @@ def room_for_sections(labels: Floats, used: Integers) -> Sections:
         rings=rings,
         marks=marks,
         summaries=np.zeros((*shape, SUMMARY_COLUMNS)),
+        rows=np.empty(labels.size, dtype=np.int64),
     )
 
 
@@ -261,35 +286,47 @@ def summarise_section(
     b: int,
     s: int,
 ) -> None:
-    """Write the extremes of the predicted miss (13), (14) of a section, with the points that reach them.
-
-    Notes
-    -----
-    The predicted miss is z + V x/e -+ nu/2 (x/e)^2. An extreme is usually a whole edge; the point is its lowest
-    for the upper extreme and its highest for the lower one, so that a mirrored engagement is mirrored exactly.
-    """
+    """Write the extremes of the predicted miss (13), (14) of a section: those of z + V x/e -+ nu/2 (x/e)^2."""
     tau = time_to_go(label, elapsed, law)
-    upper, upper_v, upper_m, lower, lower_v, lower_m = chains.greatest_and_least_miss(
-        origins, rings, marks, n, tau, TIE_TOLERANCE, CUT_SLACK
-    )
+    upper, lower = chains.greatest_and_least_miss(origins, rings, marks, n)
     drift = 0.5 * law.disturbance * tau * tau
     summaries[b, s, UPPER_MISS] = upper + drift
-    summaries[b, s, UPPER_V] = upper_v
-    summaries[b, s, UPPER_Z] = upper_m - tau * upper_v
     summaries[b, s, LOWER_MISS] = lower - drift
-    summaries[b, s, LOWER_V] = lower_v
-    summaries[b, s, LOWER_Z] = lower_m - tau * lower_v
 
 
 @entry
 def start_all(sections: Sections, law: SectionLaw) -> None:
     """Write the initial sections of a batch; they are not summarised yet."""
-    labels, used, living, _, _, origins, rings, marks, _ = sections
+    labels, used, living, _, _, origins, rings, marks, _, _ = sections
     for b in range(labels.shape[0]):
         for s in range(used[b]):
             n = b * labels.shape[1] + s
             start_section(origins, rings, marks, n, labels[b, s], law)
             living[b, s] = True
+
+
+@allocation_free
+def list_rows(some: Flags, others: Flags, everyone: bool, sections: Sections) -> int:
+    """List the living sections of the engagements that are among some or others, or of everyone; return how many."""
+    _, used, living, _, _, _, _, _, _, rows = sections
+    count = 0
+    for b in range(living.shape[0]):
+        if some[b] or others[b] or everyone:
+            for s in range(used[b]):
+                if living[b, s]:
+                    rows[count] = b * living.shape[1] + s
+                    count += 1
+    return count
+
+
+@inlined
+def look_ahead(sections: Sections, k: int, count: int) -> None:
+    """Ask memory for what the sections after number k of the list will need."""
+    if k + AHEAD < count:
+        chains.announce(sections.origins, sections.marks, sections.rows[k + AHEAD])
+        prefetch(sections.summaries, SUMMARY_COLUMNS * sections.rows[k + AHEAD])
+    if k + 1 < count:
+        chains.expect(sections.rings, sections.marks, sections.rows[k + 1])
 
 
 @entry
@@ -301,26 +338,23 @@ def measure_all(
     Sections that are a step behind are moved on first, in the same pass. Returned is how many died.
     """
     deaths = 0
-    labels, used, living, died, overlaps, origins, rings, marks, summaries = sections
-    for b in range(labels.shape[0]):
-        if not active[b] and not behind[b]:
+    labels, _, living, died, overlaps, origins, rings, marks, summaries, rows = sections
+    count = list_rows(behind, active, False, sections)
+    for k in range(count):
+        n = rows[k]
+        b, s = divmod(n, labels.shape[1])
+        look_ahead(sections, k, count)
+        if behind[b]:
+            predict_section(origins, rings, marks, n, labels[b, s], elapsed, law)
+        if not active[b]:
             continue
-        for s in range(used[b]):
-            if not living[b, s]:
-                continue
-            n = b * labels.shape[1] + s
-            chains.expect(rings, marks, n + 1)
-            if behind[b]:
-                predict_section(origins, rings, marks, n, labels[b, s], elapsed, law)
-            if not active[b]:
-                continue
-            living[b, s], overlap = measure_section(origins, rings, marks, n, labels[b, s], elapsed, alpha[b], law)
-            if living[b, s]:
-                summarise_section(origins, rings, marks, n, labels[b, s], elapsed, law, summaries, b, s)
-            else:
-                died[b, s] = event
-                overlaps[b, s] = overlap
-                deaths += 1
+        living[b, s], overlap = measure_section(origins, rings, marks, n, labels[b, s], elapsed, alpha[b], law)
+        if living[b, s]:
+            summarise_section(origins, rings, marks, n, labels[b, s], elapsed, law, summaries, b, s)
+        else:
+            died[b, s] = event
+            overlaps[b, s] = overlap
+            deaths += 1
     return deaths
 
 
@@ -337,7 +371,7 @@ def measure_rate_all(
 ) -> int:
     """Cut every living section of the active engagements by measured rates, and summarise it; return how many died."""
     deaths = 0
-    labels, used, living, died, overlaps, origins, rings, marks, summaries = sections
+    labels, used, living, died, overlaps, origins, rings, marks, summaries, _ = sections
     for b in range(labels.shape[0]):
         if not active[b]:
             continue
@@ -360,7 +394,7 @@ def measure_rate_all(
 @entry
 def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, law: SectionLaw) -> None:
     """Shift every living section, and its summary, by its engagement's impulse."""
-    labels, used, living, _, _, origins, _, _, summaries = sections
+    labels, used, living, _, _, origins, _, _, summaries, _ = sections
     for b in range(labels.shape[0]):
         if not active[b] or impulse[b] == 0.0:
             continue
@@ -369,8 +403,6 @@ def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, 
                 continue
             shift_section(origins, b * labels.shape[1] + s, labels[b, s], elapsed, impulse[b], law)
             tau, error = time_to_go(labels[b, s], elapsed, law), abs(impulse[b]) * law.impulse_error
-            summaries[b, s, UPPER_V] += error - impulse[b]
-            summaries[b, s, LOWER_V] -= error + impulse[b]
             summaries[b, s, UPPER_MISS] += (error - impulse[b]) * tau
             summaries[b, s, LOWER_MISS] -= (error + impulse[b]) * tau
 
@@ -383,24 +415,21 @@ def catch_up_all(
 
     Where it is wanted, the summary has the least and the greatest z too.
     """
-    labels, used, living, _, _, origins, rings, marks, summaries = sections
-    for b in range(labels.shape[0]):
-        if not behind[b] and not stale[b] and not heights_wanted:
-            continue
-        for s in range(used[b]):
-            if not living[b, s]:
-                continue
-            n = b * labels.shape[1] + s
-            chains.expect(rings, marks, n + 1)
-            if behind[b]:
-                predict_section(origins, rings, marks, n, labels[b, s], elapsed, law)
-            if stale[b]:
-                summarise_section(origins, rings, marks, n, labels[b, s], elapsed, law, summaries, b, s)
-            if heights_wanted:
-                tau = time_to_go(labels[b, s], elapsed, law)
-                least, greatest = chains.heights(origins, rings, marks, n, tau)
-                summaries[b, s, Z_LEAST] = least
-                summaries[b, s, Z_GREATEST] = greatest
+    labels, _, _, _, _, origins, rings, marks, summaries, rows = sections
+    count = list_rows(behind, stale, heights_wanted, sections)
+    for k in range(count):
+        n = rows[k]
+        b, s = divmod(n, labels.shape[1])
+        look_ahead(sections, k, count)
+        if behind[b]:
+            predict_section(origins, rings, marks, n, labels[b, s], elapsed, law)
+        if stale[b]:
+            summarise_section(origins, rings, marks, n, labels[b, s], elapsed, law, summaries, b, s)
+        if heights_wanted:
+            tau = time_to_go(labels[b, s], elapsed, law)
+            least, greatest = chains.heights(origins, rings, marks, n, tau)
+            summaries[b, s, Z_LEAST] = least
+            summaries[b, s, Z_GREATEST] = greatest
 
 
 @entry
@@ -414,7 +443,7 @@ def room_wanted(active: Flags, added: int, sections: Sections) -> tuple[int, int
     spare : int
         Vertices that every section may gain; negative where one must be reduced first.
     """
-    labels, used, living, _, _, _, _, marks, _ = sections
+    labels, used, living, _, _, _, _, marks, _, _ = sections
     floats = 0
     spare = chains.CAPACITY
     for b in range(labels.shape[0]):
@@ -426,7 +455,7 @@ def room_wanted(active: Flags, added: int, sections: Sections) -> tuple[int, int
                 count, room = chains.count_of(marks, n), chains.room_of(marks, n)
                 spare = min(spare, room - count)
                 if min(count + added, chains.CAPACITY) > room:
-                    floats += 4 * chains.room_for(count + added, room)
+                    floats += 2 * chains.floats_of(chains.room_for(count + added, room))
     return floats, spare
 
 
@@ -436,7 +465,7 @@ def make_room_all(active: Flags, added: int, elapsed: int, sections: Sections, l
 
     Those that have all that a section may have are reduced, outward.
     """
-    labels, used, living, _, _, origins, rings, marks, _ = sections
+    labels, used, living, _, _, origins, rings, marks, _, _ = sections
     for b in range(labels.shape[0]):
         if not active[b]:
             continue
@@ -455,7 +484,7 @@ def make_room_all(active: Flags, added: int, elapsed: int, sections: Sections, l
 @entry
 def keep_labels_all(active: Flags, least: Floats, greatest: Floats, sections: Sections, removed: Flags) -> int:
     """Remove the living sections whose labels are outside [least, greatest]; write which, and return how many."""
-    labels, used, living, _, _, _, _, _, _ = sections
+    labels, used, living, _, _, _, _, _, _, _ = sections
     count = 0
     for b in range(labels.shape[0]):
         if not active[b]:
@@ -483,56 +512,66 @@ def widest_all(elapsed: int, sections: Sections, law: SectionLaw, exists: Flags,
     ends : ndarray, shape (B, 2, 4)
         For the lower and the upper end: predicted miss, and alpha, omega and range where it is reached; left as they
         are where no section lives.
+
+    Notes
+    -----
+    An extreme is usually a whole edge; the point is its lowest for the upper extreme and its highest for the lower
+    one, so that a mirrored engagement is mirrored exactly.
     """
-    labels, used, living, _, _, _, _, _, summaries = sections
+    labels, used, living, _, _, origins, rings, marks, summaries, _ = sections
     for b in range(labels.shape[0]):
+        lowest = highest = -1
         for s in range(used[b]):
             if not living[b, s]:
                 continue
-            x = range_of(labels[b, s], elapsed, law)
-            for end, column, sign in ((0, LOWER_MISS, -1.0), (1, UPPER_MISS, 1.0)):
-                if not exists[b] or sign * (summaries[b, s, column] - ends[b, end, 0]) > 0.0:
-                    v, z = summaries[b, s, column + 1], summaries[b, s, column + 2]
-                    alpha = z / x
-                    ends[b, end, 0] = summaries[b, s, column]
-                    ends[b, end, 1] = alpha
-                    ends[b, end, 2] = (v + law.closing_speed * alpha) / x
-                    ends[b, end, 3] = x
-            exists[b] = True
+            if lowest < 0 or summaries[b, s, LOWER_MISS] < summaries[b, lowest, LOWER_MISS]:
+                lowest = s
+            if highest < 0 or summaries[b, s, UPPER_MISS] > summaries[b, highest, UPPER_MISS]:
+                highest = s
+        if lowest < 0:
+            continue
+        exists[b] = True
+        for end, s in ((0, lowest), (1, highest)):
+            tau, x = time_to_go(labels[b, s], elapsed, law), range_of(labels[b, s], elapsed, law)
+            n = b * labels.shape[1] + s
+            points = chains.extreme_points(origins, rings, marks, n, tau, TIE_TOLERANCE, CUT_SLACK)
+            v, m = points[1 - end]
+            alpha = (m - tau * v) / x
+            ends[b, end, 0] = summaries[b, s, LOWER_MISS + end]
+            ends[b, end, 1] = alpha
+            ends[b, end, 2] = (v + law.closing_speed * alpha) / x
+            ends[b, end, 3] = x
 
 
 @entry
-def margins_all(
-    v: Floats, z: Floats, elapsed: int, sections: Sections, law: SectionLaw, points: Floats, margins: Floats
-) -> None:
+def margins_all(v: Floats, z: Floats, elapsed: int, sections: Sections, law: SectionLaw, margins: Floats) -> None:
     """Write the signed margin of a state (V, z) in the first section of each engagement, m; -inf where it is dead."""
-    labels, _, living, _, _, origins, rings, marks, _ = sections
+    labels, _, living, _, _, origins, rings, marks, _, _ = sections
     for b in range(v.shape[0]):
         margins[b] = -np.inf
         if living[b, 0]:
             tau = time_to_go(labels[b, 0], elapsed, law)
-            margins[b] = margin_in(origins, rings, marks, b * labels.shape[1], tau, v[b], z[b], points)
+            margins[b] = margin_in(origins, rings, marks, b * labels.shape[1], tau, v[b], z[b])
 
 
-@entry
-def margin_in(
-    origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, v: float, z: float, points: Floats
-) -> float:
+@allocation_free
+def margin_in(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, v: float, z: float) -> float:
     """Signed margin of a state (V, z), m: distances are taken with V counted as V x/e, the miss that it is worth."""
-    count = chains.outline(origins, rings, marks, n, tau, points)
-    for i in range(count):
-        points[i, 0] *= tau
-    return polygon.margin(points, count, v * tau, z)
+    nearest, inside = np.inf, False
+    last = chains.scaled_vertex(origins, rings, marks, n, chains.LEFT, chains.end_of(marks, n, chains.LEFT) - 1, tau)
+    for side in (chains.RIGHT, chains.LEFT):
+        for i in range(chains.begin_of(marks, n, side), chains.end_of(marks, n, side)):
+            vertex = chains.scaled_vertex(origins, rings, marks, n, side, i, tau)
+            nearest, inside = polygon.pass_edge(nearest, inside, last, vertex, v * tau, z)
+            last = vertex
+    return math.sqrt(nearest) if inside else -math.sqrt(nearest)
 
 
 @entry
 def replay(
     label: float,
-    kinds: Integers,
+    tape: Tape,
     errors: Floats | None,
-    values: Floats,
-    applies: Flags,
-    events: int,
     law: SectionLaw,
     origins: Floats,
     rings: Floats,
@@ -547,11 +586,11 @@ def replay(
     ----------
     label : float
         Range at t = 0 of the hypothesis, m.
-    kinds, errors, values, applies : ndarray, shape (>= events,)
-        The history of one engagement: what happened, the error bound of a rate, the value, and whether it concerned
-        this engagement. `errors` is None where there is no rate.
-    events : int
-        Number of events.
+    tape : Tape
+        The history.
+    errors : ndarray, shape (>= events,), or None
+        Error bound of each rate; None where there is none. It stands apart, since only an argument that is None lets
+        the compiler leave out the code for rates.
     law : SectionLaw
         The numbers of the model.
     origins, rings, marks, n : section
@@ -570,6 +609,7 @@ def replay(
     -----
     Some 30 ns an event.
     """
+    kinds, values, applies, events = tape
     start_section(origins, rings, marks, n, label, law)
     elapsed = 0
     for event in range(events):

@@ -13,9 +13,6 @@ from infoset.section_kernels import SectionLaw, Sections
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-STEPS_AHEAD = 8
-"""Steps that rings are given room for at a time."""
-
 
 class SectionStack:
     """B engagements x S slots of one section each, carried in place.
@@ -27,6 +24,11 @@ class SectionStack:
         Label of each slot, m; the slots in use come first, in rising order.
     used : ndarray of int, shape (B,)
         Number of slots in use.
+
+    Attributes
+    ----------
+    least_label : float
+        No living section has a lesser label, m.
     """
 
     def __init__(self, law: SectionLaw, labels: Floats, used: NDArray[np.int64]) -> None:
@@ -39,6 +41,7 @@ class SectionStack:
         self._spare = 0
         self._elapsed = 0
         kernels.start_all(self.sections, law)
+        self.least_label = self._least_label()
 
     @property
     def batch(self) -> int:
@@ -93,12 +96,11 @@ class SectionStack:
         self._spare -= chains.MOST_ADDED
         if self._spare >= 0:
             return
-        ahead = STEPS_AHEAD * chains.MOST_ADDED
-        floats, spare = kernels.room_wanted(active, ahead, self.sections)
+        floats, spare = kernels.room_wanted(active, chains.ROOM_AHEAD, self.sections)
         if floats or spare < chains.MOST_ADDED:
             self.sections = self.sections._replace(rings=chains.with_room(self.sections.rings, floats))
             room = chains.working_room()
-            kernels.make_room_all(active, ahead, self._elapsed, self.sections, self.law, room)
+            kernels.make_room_all(active, chains.ROOM_AHEAD, self._elapsed, self.sections, self.law, room)
             _, spare = kernels.room_wanted(active, 0, self.sections)
         self._spare = spare - chains.MOST_ADDED
 
@@ -106,9 +108,16 @@ class SectionStack:
         """See that there is room for so many sections of any size in each of the wanted engagements."""
         self._catch_up()
         self._has_heights = False
-        self._spare = 0
-        floats = 4 * chains.CAPACITY * number * int(np.count_nonzero(wanted))
+        floats = 2 * (2 * chains.CAPACITY + chains.LINE) * number * int(np.count_nonzero(wanted))
         self.sections = self.sections._replace(rings=chains.with_room(self.sections.rings, floats))
+
+    def note_new(self, spare: int) -> None:
+        """Note that there are new sections, of which the fullest may gain so many vertices."""
+        self._spare = min(self._spare, spare)
+        self.least_label = self._least_label()
+
+    def _least_label(self) -> float:
+        return float(np.where(self.sections.living, self.sections.labels, np.inf).min())
 
     def measure_angle(self, active: Flags, alpha: Floats, elapsed: int, event: int) -> int:
         """Cut the living sections by angle measurements (rad); return how many died."""
@@ -162,7 +171,7 @@ class SectionStack:
         """Signed margin of states (V, z) in the first slot of each engagement, m."""
         self._catch_up()
         margins = np.empty(self.batch)
-        kernels.margins_all(v, z, elapsed, self.sections, self.law, chains.working_room(), margins)
+        kernels.margins_all(v, z, elapsed, self.sections, self.law, margins)
         return margins
 
     def widest(self, elapsed: int) -> tuple[Flags, Floats]:
@@ -189,6 +198,7 @@ class SectionStack:
         twin._stale, twin._behind, twin._nobody = self._stale, self._behind, self._nobody
         twin._is_stale, twin._is_behind = self._is_stale, self._is_behind
         twin._has_heights, twin._elapsed, twin._spare = self._has_heights, self._elapsed, self._spare
+        twin.least_label = self.least_label
         return twin
 
 

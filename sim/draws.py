@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance import NoiseKind, TieRule
 from infoset import StateBox
 from sim.scenario import Scenario
 
@@ -27,6 +28,7 @@ class Draws:
         Relative (z, x) and (V_z, V_x) of the truth at t = 0.
     angle, range, tie : ndarray, shape (B, steps)
         Uniform in [-1, 1]: errors of the angle and of the range in units of their bounds, and choices between ties.
+        Zeros where the scenario has no range meter, or does not choose between ties at random.
     rate, execution, target : ndarray, shape (B, steps), or None
         The same for the angular rate, the size of impulses, and the target's changes of side; None is zero.
     """
@@ -63,14 +65,15 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
     def uniform(stream: int) -> Floats:
         return np.stack([generator(seed, run, stream).uniform(-1.0, 1.0, size=steps) for run in runs])
 
+    nothing = np.broadcast_to(0.0, (len(runs), steps))
     lower, upper = corners(box)
     states = lower + (upper - lower) * starts
     return Draws(
         states[:, :2],
         states[:, 2:],
         angle=uniform(ANGLE),
-        range=uniform(RANGE),
-        tie=uniform(TIE),
+        range=uniform(RANGE) if scenario.range_sensor is not None else nothing,
+        tie=uniform(TIE) if scenario.noise is NoiseKind.GAME and scenario.tie is TieRule.RANDOM else nothing,
         rate=uniform(RATE) if scenario.rate_sensor is not None else None,
         execution=uniform(EXECUTION) if scenario.thruster.execution_error_relative > 0.0 else None,
         target=uniform(TARGET) if scenario.target is not None else None,
