@@ -20,7 +20,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from shapely.geometry import LineString, Polygon
 
 from infoset import InformationSet, SetModel
-from sim import Scenario
+from sim import Scenario, simulate
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 
@@ -32,6 +32,7 @@ STEP = 60
 STRETCH = 10
 FAR = 1e6
 OVER_OBJECTS, OVER_VECTORISED = 200.0, 100.0
+WHOLE, WHOLE_TARGET = 200, 100.0
 
 
 @dataclass(frozen=True)
@@ -186,6 +187,26 @@ def test_ratios(flight: Flight, curve: Scenario, median_s: dict[str, float], at_
     sort = f"{noise}, {sections} sections of {vertices:.0f} vertices, {1e9 * engine / sections:.0f} ns each"
     at_least(f"section-step over objects ({sort})", median_s[f"objects {noise}"] / engine, OVER_OBJECTS, "x")
     at_least(f"section-step over vectorised ({sort})", median_s[f"vectorised {noise}"] / engine, OVER_VECTORISED, "x")
+
+
+def test_whole_engagements(flight: Flight, curve: Scenario, median_s: dict[str, float], at_least: Check) -> None:
+    noise = curve.noise.value
+    if f"objects {noise}" not in median_s:
+        pytest.skip("the loop over shapely objects must be run")
+    draws, sections = draw(curve, range(WHOLE), seed=0), []
+    counted = Engagements(curve, draws)
+    while counted.flying:
+        counted.advance(lambda step: sections.append(int(step.information.section_counts[step.tracking].sum())))
+    times = []
+    for _ in range(3):
+        began_s = time.process_time()
+        simulate(curve, WHOLE)
+        times.append(time.process_time() - began_s)
+    objects_s = median_s[f"objects {noise}"] / len(flight.polygons) * sum(sections)
+    sort = f"{noise}, {WHOLE / min(times):.0f} engagements a second, {sum(sections) / WHOLE:.0f} section-steps each"
+    at_least(
+        f"whole engagements over their section-steps as objects ({sort})", objects_s / min(times), WHOLE_TARGET, "x"
+    )
 
 
 def test_all_three_do_the_same_step(flight: Flight) -> None:
