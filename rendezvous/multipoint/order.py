@@ -93,7 +93,8 @@ def best_order(
         flyer, stays = tour.flyer(order), dwell[list(order)]
         effort = Effort.BOUND if warm else Effort.ORDER
         begins = [*warm, *guesses] if complete else warm
-        found = optimise_times(flyer, tour.start_s, stays, held, begins, effort=effort)
+        enough = -np.inf if complete or np.isinf(search.best_objective) else search.best_objective
+        found = optimise_times(flyer, tour.start_s, stays, held, begins, effort=effort, enough=enough)
         if not complete or found.objective >= tour.ruggedness * search.best_objective:
             return found.objective, found.flown, found.evaluations
         # An order that may be the best deserves more starts.

@@ -127,8 +127,8 @@ class _Trial:
     slope: Floats
 
 
-class _WalledInError(Exception):
-    """A descent that finds no paths around it."""
+class _StoppedError(Exception):
+    """A descent that finds no paths around it, or is low enough."""
 
 
 @dataclass
@@ -165,6 +165,7 @@ def optimise_times(
     guesses: Sequence[Floats] = (),
     *,
     effort: Effort = Effort.FINAL,
+    enough: float = -np.inf,
     progress: Callable[[float], None] | None = None,
 ) -> BestTimes:
     """Find the times of least energy, or energy and price, of visits in one order.
@@ -180,6 +181,8 @@ def optimise_times(
     guesses : sequence of ndarray, shape (N,)
         Times to start from, beside those of its own; unsound ones are left out.
     effort : Effort
+    enough : float
+        An objective below which nobody asks how low it gets: the descent stops there.
     progress : callable or None
         Told the share of starts that are followed.
 
@@ -213,9 +216,11 @@ def optimise_times(
     followed = sorted(begun, key=lambda each: each.objective)[: effort.followed]
     ended = []
     for index, each in enumerate(followed):
-        ended.append(_descend(trials, each, least, total, scale, effort.tolerance))
+        ended.append(_descend(trials, each, least, total, scale, effort.tolerance, enough))
         if progress is not None:
             progress((index + 1) / len(followed))
+        if ended[-1].objective < enough:
+            break
     best = min(ended, key=lambda each: each.objective)
     if effort is Effort.FINAL:
         best = _polish(trials, best, least, total, scale)
@@ -272,8 +277,12 @@ def _spread(count: int, scale: float, least: float, bounded: bool) -> list[Float
     return [least + length * max(extra, 0.0) * each / each.sum() for each in shares for length in lengths]
 
 
-def _descend(trials: _Trials, begin: _Trial, least: float, total: float, scale: float, tolerance: float) -> _Trial:
-    """Follow one start downhill; where there are no paths all around, only so far."""
+def _descend(
+    trials: _Trials, begin: _Trial, least: float, total: float, scale: float, tolerance: float, enough: float
+) -> _Trial:
+    """Follow one start downhill; where there are no paths all around, only so far, and no farther than enough."""
+    if begin.objective < enough:
+        return begin
     floor = 1e-30 * max(begin.objective, 1e-270)
     walls, lowest = 0, begin
 
@@ -284,10 +293,12 @@ def _descend(trials: _Trials, begin: _Trial, least: float, total: float, scale: 
         if found is None:
             walls += 1
             if walls > _MOST_WALLS:
-                raise _WalledInError
+                raise _StoppedError
             return float(np.log(begin.objective)) + _WALL, np.zeros_like(x)
         if found.objective < lowest.objective and (gaps == _within(gaps, least, total)).all():
             lowest = found
+            if lowest.objective < enough:
+                raise _StoppedError
         size = max(found.objective, floor)
         return float(np.log(size)), found.slope * (scale / size)
 
@@ -306,7 +317,7 @@ def _descend(trials: _Trials, begin: _Trial, least: float, total: float, scale: 
             method="SLSQP",
             options={"ftol": tolerance, "maxiter": 100},
         )
-    except _WalledInError:
+    except _StoppedError:
         return lowest
     ended = trials.attempt(_within(np.asarray(found.x) * scale, least, total))
     return ended if ended is not None and ended.objective <= lowest.objective else lowest
