@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from experiments.errors import InputError
+from experiments.toml_values import shown
 from infoset import InformationSet, Section
 from sim import Record
 from sim.gravity import on_board_model
@@ -19,7 +21,7 @@ class Stages:
     before : tuple of Section
         As predicted from the step before.
     measured : tuple of Section
-        As recorded.
+        After the measurement: equal to the recorded ones.
     miss_m : tuple of tuple of float
         Predicted-miss interval of each measured section, m.
     """
@@ -41,6 +43,11 @@ def replayed(record: Record) -> Iterator[Stages]:
     Stages
         One a step, and one more whose `measured` is empty: the set as predicted from the last step.
 
+    Raises
+    ------
+    InputError
+        If the sets come out other than recorded: another version of the library has made the record.
+
     Notes
     -----
     After the impulse k a section is the measured one with V less by k; after the prediction it is the next step's
@@ -48,7 +55,7 @@ def replayed(record: Record) -> Iterator[Stages]:
     """
     scenario = record.scenario
     information = InformationSet(on_board_model(scenario))
-    for step in record.steps:
+    for number, step in enumerate(record.steps):
         before = tuple(information.sections())
         if step.measured_range_m is not None and scenario.range_sensor is not None:
             information.measure_range(
@@ -58,21 +65,17 @@ def replayed(record: Record) -> Iterator[Stages]:
             information.measure_angle(step.measured_angle_rad)
         if step.measured_rate_rad_s is not None and scenario.rate_sensor is not None:
             information.measure_rate(step.measured_rate_rad_s, scenario.rate_sensor.error_rad_s)
-        yield Stages(before, step.sections, _misses(information, step.sections))
+        measured = tuple(information.sections())
+        if [section.label_m for section in measured] != [section.label_m for section in step.sections]:
+            raise InputError(
+                f"the record of {shown(scenario.name)}: replaying it gives other sets at step {number} than it holds; "
+                "another version of infoset has made it: make it anew with `infoset engage --record FILE.npz`"
+            )
+        lower, upper = information.predicted_miss_by_section_m()
+        living = information.living[0]
+        ends = zip(lower[0][living].tolist(), upper[0][living].tolist(), strict=True)
+        yield Stages(before, measured, tuple(ends))
         information.shift(step.impulse_m_s)
         information.drop_below_threshold()
         information.predict()
     yield Stages(tuple(information.sections()), (), ())
-
-
-def _misses(information: InformationSet, sections: tuple[Section, ...]) -> tuple[tuple[float, float], ...]:
-    """Predicted-miss interval of each section, by its label."""
-    lower, upper = information.predicted_miss_by_section_m()
-    living = information.living[0]
-    found = {
-        label: (least, greatest)
-        for label, least, greatest in zip(
-            information.labels_m[0][living].tolist(), lower[0][living].tolist(), upper[0][living].tolist(), strict=True
-        )
-    }
-    return tuple(found[section.label_m] for section in sections)

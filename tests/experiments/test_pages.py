@@ -16,13 +16,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from experiments.errors import InputError
 from experiments.pages.document import asset, embedded_json, page
 from experiments.pages.interception import interception_page
 from experiments.pages.packing import STEPS_OF_A_BOX, packed_outlines
 from experiments.pages.replayed_sets import replayed
 from experiments.scenario_file import load_scenario
-from infoset import InitialSet, Model
-from sim import Record, fly_one
+from guidance import NoiseKind
+from infoset import InitialSet, Model, RateSensor, Recovery
+from sim import Outcome, Record, fly_one
 
 MOST_BYTES = 6_000_000
 
@@ -67,14 +69,39 @@ def test_a_page_is_small_and_fetches_nothing(record: Record) -> None:
     assert not re.search(r"https?:|src=|href=|@import|url\(|innerHTML|outerHTML|document\.write|eval\(", code)
 
 
-def test_replaying_gives_the_recorded_sets_bit_for_bit(record: Record) -> None:
+def flown(name: str) -> Record:
+    """Engagements of every kind: two noises, a set that is lost and recovered, the guaranteed model, a rate sensor."""
+    scenario = load_scenario("asteroid-1997")
+    model = scenario.set_model
+    if name == "guaranteed":
+        sound = replace(model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
+        return fly_one(replace(scenario, set_model=sound, rate_sensor=RateSensor(1.0, 2e-6)))
+    if name == "game":
+        return fly_one(replace(scenario, noise=NoiseKind.GAME))
+    recovery = Recovery.NONE if name == "lost" else Recovery.WIDENED
+    return fly_one(replace(scenario, noise=NoiseKind.GAME, set_model=replace(model, recovery=recovery)), 2)
+
+
+@pytest.mark.parametrize("name", ["game", "guaranteed", "lost", "recovered"])
+def test_replaying_gives_the_recorded_sets_bit_for_bit(name: str) -> None:
+    record = flown(name)
+    assert (record.result.outcomes[0] is Outcome.SET_LOST) == (name in ("lost", "recovered"))
     stages = list(replayed(record))
     assert len(stages) == len(record.steps) + 1
     for each, step in zip(stages, record.steps, strict=False):
-        assert each.measured == step.sections
-        least = min(miss[0] for miss in each.miss_m) if each.miss_m else None
-        greatest = max(miss[1] for miss in each.miss_m) if each.miss_m else None
-        assert (least, greatest) == (step.predicted_miss_m or (None, None))
+        for found, recorded in zip(each.measured, step.sections, strict=True):
+            assert (found.label_m, found.range_m) == (recorded.label_m, recorded.range_m)
+            np.testing.assert_array_equal(found.polygon.polygon(), recorded.polygon.polygon())
+        ends = [end for miss in each.miss_m for end in miss]
+        assert (step.predicted_miss_m is None) == (not ends)
+        assert step.predicted_miss_m is None or (min(ends), max(ends)) == step.predicted_miss_m
+
+
+def test_a_record_of_another_librarys_sets_is_refused(record: Record) -> None:
+    step = record.steps[3]
+    other = replace(step, sections=step.sections[1:])
+    with pytest.raises(InputError, match="other sets at step 3"):
+        interception_page([replace(record, steps=(*record.steps[:3], other, *record.steps[4:]))])
 
 
 @pytest.mark.parametrize("kind", list(Model))

@@ -128,11 +128,9 @@ class Column {
   extents() {
     const wanted = this.stage === PREDICTED ? [PREDICTED] : [BEFORE, MEASURED, IMPULSE];
     const boxes = wanted.flatMap((stage) => this.chosen(this.sectionsAt(stage)).map((section) => section.box));
-    const measured = this.record.measured_angle_rad[this.step];
     return {
       rates: [...boxes.flatMap((box) => [box[0], box[2]]), this.truth.rate],
-      angles: [...boxes.flatMap((box) => [box[1], box[3]]), this.truth.angle,
-        ...(measured === null || this.stage === PREDICTED ? [] : [measured])],
+      angles: [...boxes.flatMap((box) => [box[1], box[3]]), this.truth.angle],
     };
   }
 

@@ -1,0 +1,84 @@
+"""How long pages take to make and to draw, how large they are, and how many frames a second they play.
+
+Run: python benchmarks/page_speed.py
+Needs a Chromium and the extra `browser`. Prints a table in Markdown; docs/replay.md has one of them.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any
+
+REPEATS = 3
+PLAYED_S = 5.0
+PAGES = {
+    "replay, random noise": ["replay", "a-random.npz"],
+    "replay, game noise": ["replay", "a-game.npz"],
+    "replay, both side by side": ["replay", "a-random.npz", "a-game.npz"],
+    "pareto-2008": ["pareto", "pareto-2008"],
+    "service-3": ["multipoint", "service-3"],
+    "rendezvous-2021": ["reach", "rendezvous-2021"],
+    "geo-pursuit": ["pursuit", "geo-pursuit"],
+}
+
+
+def main() -> None:
+    """Measure every page and print the table."""
+    from playwright.sync_api import sync_playwright
+
+    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))))
+    with TemporaryDirectory() as name, sync_playwright() as driver:
+        folder = Path(name)
+        infoset(folder, "engage", "asteroid-1997", "--noise", "both", "--record", "a.npz", "--quiet")
+        browser = driver.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        print(f"{browser.browser_type.name} {browser.version}")  # noqa: T201
+        print("| page | command, s | size, MB | first draw, s | frames/s, 1300 px | frames/s, 390 px |")  # noqa: T201
+        print("|---|---|---|---|---|---|")  # noqa: T201
+        for title, command in PAGES.items():
+            took_s = min(timed(folder, command) for _ in range(REPEATS))
+            file = folder / "page.html"
+            wide = [drawn(browser, file, 1300) for _ in range(REPEATS)]
+            narrow = [drawn(browser, file, 390) for _ in range(REPEATS)]
+            first_s = min(each[0] for each in wide)
+            frames = [max(each[1] for each in found) for found in (wide, narrow)]
+            size = file.stat().st_size / 1e6
+            print(f"| {title} | {took_s:.2f} | {size:.2f} | {first_s:.2f} | {frames[0]:.0f} | {frames[1]:.0f} |")  # noqa: T201
+        browser.close()
+
+
+def infoset(folder: Path, *arguments: str) -> None:
+    """Run a command."""
+    code = "from experiments.cli import main; main()"
+    subprocess.run([sys.executable, "-c", code, *arguments], cwd=folder, check=True)
+
+
+def timed(folder: Path, command: list[str]) -> float:
+    """Return how long a command takes to write its page, start of Python and all, s."""
+    began_s = perf_counter()
+    infoset(folder, *command, "--html", "page.html", "--overwrite", "--quiet")
+    return perf_counter() - began_s
+
+
+def drawn(browser: Any, file: Path, width: int) -> tuple[float, float]:
+    """Return when a page first had drawn, s, and how many frames a second it draws while it plays on and on."""
+    page = browser.new_page(viewport={"width": width, "height": 900})
+    page.goto(file.as_uri())
+    while not page.evaluate("performance.getEntriesByName('first-draw').length"):
+        page.wait_for_timeout(10)
+    first_s = page.evaluate("performance.getEntriesByName('first-draw')[0].startTime") / 1e3
+    # As fast as a screen shows, and from the start again after the end.
+    page.evaluate("player.speed = 60 / player.coarse; setInterval(() => player.playing || player.play(), 1)")
+    drawn_before, began_ms = page.evaluate("[player.drawn, performance.now()]")
+    page.wait_for_timeout(1e3 * PLAYED_S)
+    drawn_after, ended_ms = page.evaluate("[player.drawn, performance.now()]")
+    page.close()
+    return first_s, 1e3 * (drawn_after - drawn_before) / (ended_ms - began_ms)
+
+
+if __name__ == "__main__":
+    main()
