@@ -67,7 +67,7 @@ def pareto(
     --json or --html nothing is written.
     """
     from experiments.commands._options import whole_number
-    from experiments.commands._screen import figure_files, tell_of_compiling_rendezvous
+    from experiments.commands._screen import figure_files, progress_bar, tell_of_compiling_rendezvous
     from experiments.output import STDOUT, checked_destinations, to_json, write_file
     from experiments.pages.document import page_path
     from experiments.pareto_file import load_pareto
@@ -79,7 +79,8 @@ def pareto(
     files = ("results.json", *figure_files(*FIGURES))
     with checked_destinations(folder=out, names=files, files={"--json": json_, "--html": html}, overwrite=overwrite):
         tell_of_compiling_rendezvous(quiet)
-        found = _find(given, preferred, samples)
+        with progress_bar(quiet) as begin:
+            found = _find(given, preferred, samples, begin("meetings and coalitions"))
         json_text = to_json(_summary(found))
         if json_ is not None and str(json_) == STDOUT:
             typer.echo(json_text, nl=False)
@@ -126,7 +127,7 @@ def _preferred(text: str, problem: ParetoProblem) -> Any:
     return np.array([values[key] for key in keys])
 
 
-def _find(problem: ParetoProblem, preferred: Any, samples: int) -> Found:
+def _find(problem: ParetoProblem, preferred: Any, samples: int, report: Callable[[float], None]) -> Found:
     import numpy as np
 
     from experiments.errors import InputError
@@ -158,19 +159,23 @@ def _find(problem: ParetoProblem, preferred: Any, samples: int) -> Found:
     }
     if preferred is not None:
         selections["preferred"] = nearest_to(solution, preferred)
+    report(0.2)
     plans = [solution.plan(index) for index in range(len(solution.costs))]
     common = 6 if encounter.meeting is Meeting.RENDEZVOUS else 3
     bounds: tuple[BoundCheck, ...] = ()
     if problem.greatest_control_m_s2 is not None:
         bounds = tuple(check_bound(plan, problem.greatest_control_m_s2, common) for plan in plans)
         _refuse_impossible(problem, bounds)
+    report(0.4)
+    coalitions = analyse_coalitions(solution) if len(plans) <= MOST_CRAFT else None
+    report(0.9)
     latest = max(each.start_s for each in encounter.craft)
     durations = latest + (encounter.meeting_s - latest) * np.linspace(*SWEEP)
     return Found(
         problem,
         solution,
         selections,
-        analyse_coalitions(solution) if len(plans) <= MOST_CRAFT else None,
+        coalitions,
         bounds,
         tuple(peak_control(plan) for plan in plans),
         tuple(total_impulse(plan) for plan in plans),
