@@ -284,6 +284,8 @@ def _draw_excesses(axes: Axes, solution: EncounterSolution, excess: Floats, sele
         if len(names) == 3:
             third = 3 - first - second
             shade = axes.scatter(excess[:, first], excess[:, second], c=excess[:, third], s=4.0, cmap="cividis")
+            low, high = axes.get_ylim()
+            axes.set_ylim(low, high + 0.25 * (high - low))  # room for the bar
             inset = axes.inset_axes((0.40, 0.86, 0.54, 0.04))
             bar = axes.figure.colorbar(shade, cax=inset, orientation="horizontal")
             bar.ax.set_title(f"$e$ of {names[third]}, m$^2$/s$^3$", fontsize=7.0, pad=2.0)
