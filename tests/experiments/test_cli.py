@@ -316,7 +316,7 @@ def test_replay_of_one_record(infoset: Command, tmp_path: Path) -> None:
     code, out, err = infoset("replay", "a.npz")
     assert code == 0
     assert "asteroid-1997" in out
-    assert "give --out DIR for the figures" in err
+    assert "--out DIR for the figures" in err
     assert names_in(tmp_path) == ["a.npz"]
     assert "one record or two" in infoset.refused("replay", "a.npz", "a.npz", "a.npz")
     assert "there is no such file" in infoset.refused("replay", "b.npz", "--out", "out")
