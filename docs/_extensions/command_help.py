@@ -1,0 +1,36 @@
+"""The directive `command-help`: what `infoset COMMAND --help` prints, asked for while building."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+from typer.testing import CliRunner
+
+
+class CommandHelp(SphinxDirective):
+    """Help of one command, or of one of its own commands."""
+
+    required_arguments = 1
+    optional_arguments = 1
+    final_argument_whitespace: ClassVar[bool] = False
+
+    def run(self) -> list[nodes.Node]:
+        """Return the text as a literal block."""
+        from experiments.cli import app
+
+        environment = {"COLUMNS": "100", "TERMINAL_WIDTH": "100", "NO_COLOR": "1"}
+        done = CliRunner().invoke(app, [*self.arguments, "--help"], env=environment)
+        if done.exit_code:
+            raise self.error(f"infoset {' '.join(self.arguments)} --help failed: {done.output}")
+        text = "\n".join(line.rstrip() for line in done.output.splitlines()).strip("\n")
+        block = nodes.literal_block(text, text, language="text")
+        return [block]
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Register the directive."""
+    app.add_directive("command-help", CommandHelp)
+    return {"version": "1", "parallel_read_safe": True}

@@ -1,0 +1,160 @@
+"""How the documentation is built; CONTRIBUTING.md has the command. Nothing here reaches the network."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tomllib
+from pathlib import Path
+from types import ModuleType
+
+from numpydoc import xref
+from sphinx.application import Sphinx
+
+import guidance
+import infoset
+import sim
+from rendezvous import multipoint, pareto, polytope, pursuit_evasion, reachability, relative_motion
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE / "_extensions"))
+
+# Gallery examples draw into files; without a screen pyplot must not look for one.
+os.environ.setdefault("MPLBACKEND", "agg")
+
+_project = tomllib.loads((HERE.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+project = "infoset"
+author = "the infoset authors"
+release = version = _project["version"]
+language = "en"
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "numpydoc",
+    "sphinx_gallery.gen_gallery",
+    "command_help",
+]
+exclude_patterns = ["_build", "_extensions", "examples", "gallery/*.py", "gallery/*.ipynb", "**/sg_execution_times.rst"]
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+nitpicky = True
+# Other projects' types are named and not linked: their inventories would have to be fetched.
+nitpick_ignore_regex = [
+    ("py:.*", r"(numpy|np|os|shapely|pyarrow|concurrent|collections|pathlib|enum|types|typing)\..*"),
+    (
+        "py:.*",
+        r"(ArrayLike|NDArray|Floats|Flags|Integers|Interval|RangeOrRanges|Callable|Sequence|Iterator|Mapping|Executor|Path"
+        r"|Frozen|BaseGeometry|MaskedArray)",
+    ),
+]
+
+# Types of our own that are handed out and not made by people: named and not described here.
+nitpick_ignore = [
+    ("py:class", f"{module}.{name}")
+    for module, names in {
+        "guidance.kalman": ("KalmanState",),
+        "guidance.least_squares": ("LeastSquaresState",),
+        "infoset.history": ("History",),
+        "infoset.section_stack": ("SectionStack",),
+        "infoset.sensors": ("RangeOrRanges",),
+        "rendezvous.pursuit_evasion._pair": ("Node",),
+        "rendezvous.pursuit_evasion.paths": ("SteeredPath",),
+        "rendezvous.reachability.block_sets": ("BlockSets",),
+        "rendezvous.reachability.blocks": ("Block",),
+        "rendezvous.reachability.lifted": ("Lifted",),
+        "rendezvous.reachability.optimum": ("BlockOptimum",),
+        "sim.plan": ("Plan",),
+        "sim.storage.campaign_folder": ("CampaignFolder", "Damage"),
+        "sim.storage.manifest": ("Axis", "Manifest"),
+        "sim.stored_flight": ("Progress",),
+    }.items()
+    for name in names
+]
+
+# --- text
+myst_enable_extensions = ["colon_fence", "deflist"]
+myst_heading_anchors = 3
+myst_links_external_new_tab = False
+
+# --- the reference
+autodoc_default_options = {"members": True}
+autodoc_member_order = "groupwise"
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+python_use_unqualified_type_names = True
+maximum_signature_line_length = 100
+add_module_names = False
+toc_object_entries_show_parents = "hide"
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = True
+numpydoc_xref_ignore = "all"
+# numpydoc would link int, str and array_like to pages of Python and NumPy, which are not fetched.
+xref.DEFAULT_LINKS.clear()
+
+
+def _public(*packages: ModuleType) -> dict[str, str]:
+    """Where a name in a docstring's types is described; a name that two packages have is left alone."""
+    homes: dict[str, list[str]] = {}
+    for package in packages:
+        for name in package.__all__:
+            if isinstance(getattr(package, name), type):
+                homes.setdefault(name, []).append(f"{package.__name__}.{name}")
+    return {name: found[0] for name, found in homes.items() if len(found) == 1}
+
+
+numpydoc_xref_aliases = _public(
+    infoset, guidance, sim, multipoint, pareto, polytope, pursuit_evasion, reachability, relative_motion
+)
+
+# Docstrings are plain text with |moduli| and `names`; to reStructuredText the first would be substitutions.
+default_role = "code"
+
+
+def _keep_moduli(app: Sphinx, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
+    lines[:] = [line if line.lstrip().startswith(">>>") else line.replace("|", r"\|") for line in lines]
+
+
+def setup(app: Sphinx) -> None:
+    """Before numpydoc takes the docstrings apart."""
+    app.connect("autodoc-process-docstring", _keep_moduli, priority=100)
+
+
+# --- pictures made while building
+sphinx_gallery_conf = {
+    "examples_dirs": "examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": "/",
+    "only_warn_on_example_error": False,
+    "abort_on_example_error": True,
+    "remove_config_comments": True,
+    "download_all_examples": False,
+    "show_memory": False,
+    "show_signature": False,
+    "min_reported_time": 1e9,
+    "plot_gallery": "True",
+    "image_scrapers": ("matplotlib",),
+    "default_thumb_file": None,
+    "write_computation_times": False,
+}
+
+# --- pages
+html_theme = "pydata_sphinx_theme"
+html_title = "infoset"
+html_context = {"default_mode": "auto"}
+html_static_path = ["_static"]
+html_css_files = ["infoset.css"]
+html_copy_source = False
+html_show_sourcelink = False
+html_theme_options = {
+    "navbar_start": ["navbar-logo"],
+    "navbar_end": ["theme-switcher"],
+    "navbar_persistent": ["search-button"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "show_prev_next": True,
+    "secondary_sidebar_items": ["page-toc"],
+    "pygments_light_style": "a11y-high-contrast-light",
+    "pygments_dark_style": "a11y-high-contrast-dark",
+}
+copyright = "the infoset authors; MIT licence"  # noqa: A001
