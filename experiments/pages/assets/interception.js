@@ -394,7 +394,11 @@ const player = new Player({
     const together = levelled(columns);
     for (const column of columns) column.limits = options.own ? levelled([column]) : together;
     for (const column of columns) {
-      for (const panel of [column.plane, column.scene, column.miss, column.impulses, column.budget]) panel.draw();
+      column.plane.draw();
+      column.scene.draw();
+      // What is drawn over time does not change with the stage.
+      if (column.step !== column.drawnStep) for (const panel of [column.miss, column.impulses, column.budget]) panel.draw();
+      column.drawnStep = column.step;
       fillTable(column.numbers, column.rows());
     }
   },
