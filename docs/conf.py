@@ -133,7 +133,8 @@ sphinx_gallery_conf = {
     "show_signature": False,
     "min_reported_time": 1e9,
     "plot_gallery": "True",
-    "image_scrapers": ("matplotlib",),
+    "image_scrapers": ("matplotlib", "library_figures.library_figures"),
+    "within_subsection_order": "FileNameSortKey",
     "default_thumb_file": None,
     "write_computation_times": False,
 }
@@ -147,6 +148,7 @@ html_css_files = ["infoset.css"]
 html_copy_source = False
 html_show_sourcelink = False
 html_theme_options = {
+    "header_links_before_dropdown": 7,
     "navbar_start": ["navbar-logo"],
     "navbar_end": ["theme-switcher"],
     "navbar_persistent": ["search-button"],

@@ -55,4 +55,4 @@ for title, record in flights.items():
 
 from experiments.figures.sets import draw_sets
 
-figure = draw_sets(list(flights.values()))
+library_figure = draw_sets(list(flights.values()))

@@ -19,7 +19,7 @@ curves = [
     Curve(number, scenario.noise, scenario.range_sensor is not None, simulate(scenario, runs=50))
     for number, scenario in curve_scenarios(load_scenario("asteroid-1997"))
 ]
-figure = draw_distributions(curves)
+library_figure = draw_distributions(curves)
 
 # %%
 # Fifty runs tell a distribution function to within 0.19, at 95 % confidence: the bands are honest, and wide. The
