@@ -101,12 +101,12 @@ def pursuit(
                 solution, given, steerings, feedback, every_s, delay, position_noise, velocity_noise, runs, seed, quiet
             )
         json_text = to_json(report_json(given, solution, certificate, flown, elapsed_s))
+        if html is not None:
+            _write_page(html, given, solution, overwrite)
         if json_ is not None and str(json_) == STDOUT:
             typer.echo(json_text, nl=False)
         elif json_ is not None:
             write_file(json_, json_text, overwrite=overwrite)
-        if html is not None:
-            _write_page(html, given, solution, overwrite)
         if out is not None:
             _fill(out, given, solution, flown, json_text, overwrite)
     if not quiet:
