@@ -364,8 +364,8 @@ def _finished(file: Path, folder: Path, runs: int) -> Any:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="there is no kill -9")
-def test_killed_twice_and_resumed(brief: Scenario, file: Path, tmp_path: Path) -> None:
-    stored = _killed_at_random_moments(file, tmp_path / "runs", 400, 2, seed=1)
+def test_killed_and_resumed(brief: Scenario, file: Path, tmp_path: Path) -> None:
+    stored = _killed_at_random_moments(file, tmp_path / "runs", 400, 1, seed=1)
     assert stored == sorted(stored)
     expected = Campaign(brief, 400, tmp_path / "whole", noise=CampaignNoise.MIXED).run().table
     assert _finished(file, tmp_path / "runs", 400).equals(expected)
