@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import tomllib
 from pathlib import Path
@@ -115,9 +116,21 @@ def _keep_moduli(app: Sphinx, what: str, name: str, thing: object, options: obje
     lines[:] = [line if line.lstrip().startswith(">>>") else line.replace("|", r"\|") for line in lines]
 
 
+_ARRAY = re.compile(r"~?numpy\.ndarray\[tuple\[~?(?:typing\.)?Any, \.\.\.\], ~?numpy\.dtype\[[^\[\]]*\]\]")
+
+
+def _plain_arrays(
+    app: Sphinx, what: str, name: str, thing: object, options: object, signature: str | None, returned: str | None
+) -> tuple[str | None, str | None]:
+    """Write `ndarray` where the type's full spelling says no more; shapes and units stand in the docstring."""
+    plain = [None if text is None else _ARRAY.sub("numpy.ndarray", text) for text in (signature, returned)]
+    return plain[0], plain[1]
+
+
 def setup(app: Sphinx) -> None:
     """Before numpydoc takes the docstrings apart."""
     app.connect("autodoc-process-docstring", _keep_moduli, priority=100)
+    app.connect("autodoc-process-signature", _plain_arrays, priority=900)
 
 
 # --- pictures made while building

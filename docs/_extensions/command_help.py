@@ -21,12 +21,12 @@ class CommandHelp(SphinxDirective):
         """Return the text as a literal block."""
         from experiments.cli import app
 
-        environment = {"COLUMNS": "100", "TERMINAL_WIDTH": "100", "NO_COLOR": "1"}
+        environment = {"COLUMNS": "88", "TERMINAL_WIDTH": "88", "NO_COLOR": "1"}
         done = CliRunner().invoke(app, [*self.arguments, "--help"], env=environment)
         if done.exit_code:
             raise self.error(f"infoset {' '.join(self.arguments)} --help failed: {done.output}")
         text = "\n".join(line.rstrip() for line in done.output.splitlines()).strip("\n")
-        block = nodes.literal_block(text, text, language="text")
+        block = nodes.literal_block(text, text, language="text", classes=["command-help"])
         return [block]
 
 

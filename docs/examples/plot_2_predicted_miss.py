@@ -41,8 +41,9 @@ panels[0].set_ylabel("predicted miss, m")
 plt.show()
 
 # %%
-# The first impulses are at their limit, until the interval has zero in its middle. From then on it is the measurements
-# that close it. Random errors sooner or later come close to their bounds and cut the set; errors that play a game are
+# At first the interval is as wide as what is known at the start, and symmetric: nothing is to be corrected yet. Once a
+# measurement cuts off one end, impulses at their limit bring zero back into the middle. From then on it is measurements
+# that close it. Random errors now and then come close to their bounds and cut the set; errors that play a game are
 # chosen so that the worst corner of the set stays in it, and the interval closes late:
 
 for title, record in flights.items():

@@ -16,7 +16,7 @@ from infoset import InitialSet, Model
 from sim import simulate
 
 scenario = load_scenario("asteroid-1997")
-model = replace(scenario.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX, disturbance_m_s2=0.0)
+model = replace(scenario.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
 guaranteed = replace(scenario, set_model=model, noise=NoiseKind.GAME)
 results = simulate(guaranteed, runs=60)
 print(f"truth kept {results.truth_kept.sum()}/60, Phi held {results.phi_held.sum()}/60")

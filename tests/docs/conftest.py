@@ -1,0 +1,90 @@
+"""Pages as tests see them: what stands in their blocks, and what is said about running it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+_BLOCK = re.compile(
+    r"(?:^<!-- (?P<comment>[^\n]*?) -->\n)?^(?P<fence>```+|~~~+)(?P<language>[^\n`]*)\n(?P<text>.*?)^(?P=fence)[ ]*$",
+    flags=re.DOTALL | re.MULTILINE,
+)
+_NOT_RUN = "not run: "
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block.
+
+    Parameters
+    ----------
+    page : str
+        The page's path in the project.
+    language : str
+    text : str
+    not_run : str
+        Why tests do not run it, from the comment `<!-- not run: REASON -->` above it; empty where they do.
+    """
+
+    page: str
+    language: str
+    text: str
+    not_run: str
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page of prose.
+
+    Parameters
+    ----------
+    name : str
+        Its path in the project.
+    text : str
+    """
+
+    name: str
+    text: str
+
+    @property
+    def path(self) -> Path:
+        """Where it is."""
+        return ROOT / self.name
+
+    def blocks(self, *languages: str) -> list[Block]:
+        """Fenced blocks in some languages, or in any."""
+        found = []
+        for match in _BLOCK.finditer(self.text):
+            language, comment = match["language"].strip(), match["comment"] or ""
+            if not languages or language in languages:
+                reason = comment.removeprefix(_NOT_RUN) if comment.startswith(_NOT_RUN) else ""
+                found.append(Block(self.name, language, match["text"], reason))
+        return found
+
+    def prose(self) -> str:
+        """The text without its fenced blocks and its comments."""
+        return re.sub(r"<!--.*?-->", "", _BLOCK.sub("", self.text), flags=re.DOTALL)
+
+
+def all_pages() -> list[Page]:
+    """Every page of prose in the project, that of the site first."""
+    site = [path for path in sorted((ROOT / "docs").rglob("*.md")) if not {"_build", "gallery"} & set(path.parts)]
+    others = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "benchmarks/README.md")]
+    return [Page(path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8")) for path in (*site, *others)]
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Give a test that asks for `page` every page."""
+    if "page" in metafunc.fixturenames:
+        pages = all_pages()
+        metafunc.parametrize("page", pages, ids=[page.name for page in pages])
+
+
+@pytest.fixture(scope="session")
+def pages() -> list[Page]:
+    """All pages of prose."""
+    return all_pages()

@@ -1,0 +1,226 @@
+"""Every command line in the prose is run, or says above it why it is not."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+import typer.main
+
+from experiments.cli import app, main
+
+if TYPE_CHECKING:
+    from tests.docs.conftest import Page
+
+ROOT = Path(__file__).resolve().parents[2]
+
+REDUCED = (
+    (r"--runs \d+", "--runs 4"),
+    (r"--single-runs \d+", "--single-runs 2"),
+    (r"--engagements (\d+|N)", "--engagements 8"),
+    (r"--budget \d+", "--budget 20"),
+    # An axis of a sweep or a map: its ends.
+    (r"(=(?:log:)?[\d.e+-]+:[\d.e+-]+):\d+", r"\1:2"),
+    # A map's own grid has 2121 points.
+    (
+        r"^infoset pursuit-map (\S+)(?!.* --x)",
+        r"infoset pursuit-map \1 --x phase_deg=-20:20:3 --y thrust_ratio=0.2:0.5:2",
+    ),
+    # A narrow interval needs more runs than a test flies.
+    (r" --until \"[^\"]*\"", ""),
+)
+"""How a line is made smaller before it is run; in this order. What it does stays the same."""
+
+SLOW = (
+    r"^infoset (sweep|campaign|report|compare|bound|adversary|pursuit-map)\b",
+    r"^infoset (pursuit leo-pursuit|multipoint asteroid-tour)\b",
+    r"^infoset multipoint .*--(order|times) best\b",
+    r"^infoset reach\b",
+    r"^infoset replay .*--(gif|mp4)\b",
+    # Figures take seconds; those of `experiment` and of `replay` are drawn by quick lines.
+    r"^infoset (pareto|multipoint|pursuit)\b.* --out\b",
+    r"^infoset engage (?!.* --record\b).* --out\b",
+    r"^python ",
+)
+"""Lines that are run with -m slow only."""
+
+SET_UP = r"(python3 -m venv \.venv|\.venv/bin/pip install -c constraints\.txt (\S+|-e \S+)|\.venv/bin/python -m pytest)"
+"""What makes an environment and runs these tests. `.ci/run` does it word for word; here the names in it are checked."""
+
+LANGUAGES = {"sh", "python", "pycon", "text", "toml", "{eval-rst}", "{toctree}"}
+
+_PLACEHOLDER = re.compile(r"\[|\||\.\.\.|=?\b[A-Z]+\b(?!\w)|^infoset [a-z-]+( [a-z-]+| --[a-z-]+)?$")
+"""Something that stands for something else, or the mere name of a command."""
+
+
+def lines_of(text: str) -> Iterator[str]:
+    """Command lines of a block, continued ones joined, without comments."""
+    for line in text.replace("\\\n", " ").splitlines():
+        for part in line.split(" && "):
+            bare = re.split(r"(?:^|\s)#", part)[0]
+            if bare.strip():
+                yield re.sub(r"\s+", " ", bare).strip()
+
+
+def inline_lines(page: Page) -> list[str]:
+    """Command lines in the running text."""
+    return re.findall(
+        r"`((?:infoset|python (?:benchmarks|docs)/[^\s`]+)(?: [^`\n]+)?)`", re.sub(r"\s*\n\s*", " ", page.prose())
+    )
+
+
+def is_complete(line: str) -> bool:
+    """Whether a line in the running text can be run as it stands: nothing in it stands for something else."""
+    return " " in line and _PLACEHOLDER.search(re.sub(r"^python \S+", "", line)) is None
+
+
+def reduced(line: str) -> str:
+    """The line, made smaller by the rules above."""
+    for pattern, small in REDUCED:
+        line = re.sub(pattern, small, line)
+    return line
+
+
+def is_slow(line: str) -> bool:
+    """Whether a line takes more than a few seconds, even when it is made smaller."""
+    return any(re.search(pattern, line) for pattern in SLOW)
+
+
+def run(line: str, folder: Path) -> None:
+    """Run a line in a folder as a reader would, in this process where it can be."""
+    words = shlex.split(reduced(line.replace(".venv/bin/", "")))
+    assert words, line
+    if words[0] == "python":
+        assert (ROOT / words[1]).is_file(), line
+        done = subprocess.run(
+            [sys.executable, ROOT / words[1], *words[2:]], cwd=folder, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
+        return
+    assert words[0] == "infoset", (
+        f"{line}: no rule for running it; a comment <!-- not run: REASON --> may stand above it"
+    )
+    into = None
+    if ">" in words:
+        words, into = words[: words.index(">")], folder / words[words.index(">") + 1]
+    if "--out" in words and (folder / words[words.index("--out") + 1]).exists():
+        words.append("--overwrite")  # another line of the page has written there
+    printed, complained = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(complained), pytest.raises(SystemExit) as left:
+        main(words[1:])
+    assert not left.value.code, f"{line}\n{printed.getvalue()}\n{complained.getvalue()}"
+    if into is not None:
+        into.write_text(printed.getvalue(), encoding="utf-8")
+
+
+def fenced_lines(page: Page) -> list[str]:
+    """Command lines of the page's blocks that are to be run, set-up left out."""
+    lines = [line for block in page.blocks("sh", "console") if not block.not_run for line in lines_of(block.text)]
+    return [line for line in lines if not re.fullmatch(SET_UP, line.replace('"', ""))]
+
+
+def lines_to_run(page: Page) -> list[str]:
+    """All that a reader could copy from a page, in its order, each once."""
+    return list(dict.fromkeys([*fenced_lines(page), *filter(is_complete, inline_lines(page))]))
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder to be in."""
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_quick_lines_run(page: Page, folder: Path) -> None:
+    for line in lines_to_run(page):
+        if not is_slow(line):
+            run(line, folder)
+
+
+@pytest.mark.slow
+def test_all_lines_run_in_their_order(page: Page, folder: Path) -> None:
+    lines = lines_to_run(page)
+    if any(map(is_slow, lines)):
+        for line in lines:
+            run(line, folder)
+
+
+def test_blocks_are_in_known_languages(page: Page) -> None:
+    # A block without one, or in another, would not be run by anything here.
+    known = {block.language.split(" ")[0] for block in page.blocks()}
+    assert known <= {*LANGUAGES, "{command-help}"}
+
+
+def test_blocks_that_are_not_run_say_why(pages: list[Page]) -> None:
+    left_out = {(block.page, block.text): block.not_run for page in pages for block in page.blocks() if block.not_run}
+    for (name, text), reason in left_out.items():
+        print(f"not run: {name}: {next(lines_of(text))}: {reason}")  # noqa: T201 (listed with -s or -rA)
+        assert len(reason.split()) >= 4, f"{name}: {text}"
+    # Whoever leaves out another one says so here, too.
+    assert sorted(name for name, _ in left_out) == [
+        *["CONTRIBUTING.md"] * 3,
+        "benchmarks/README.md",
+        *["docs/campaigns.md"] * 2,
+    ]
+
+
+def test_set_up_lines_name_what_exists(pages: list[Page]) -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    lines = [line for page in pages for block in page.blocks("sh") for line in lines_of(block.text)]
+    named = [line for line in lines if " install " in line]
+    assert len(named) >= 4
+    for line in named:
+        asked = re.search(r"\.\[(.*)\]", line)
+        assert set(asked[1].split(",") if asked else []) <= set(extras), line
+
+
+def check_options(line: str) -> None:
+    """See that a line's command, and every option in it, exist."""
+    words = re.sub(r"[\[\]|,]", " ", line).split()[1:]
+    command: Any = typer.main.get_command(app)
+    while words and words[0] in getattr(command, "commands", {}):
+        command, words = command.commands[words[0]], words[1:]
+    named = not words or words[0].startswith("--") or words[0].isupper() or not hasattr(command, "commands")
+    assert named, f"{line}: no such command"
+    known = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
+    assert {word for word in words if word.startswith("-")} <= {*known, "--help", "-"}, line
+
+
+def test_lines_with_placeholders_name_commands_and_options_that_exist(page: Page) -> None:
+    for line in inline_lines(page):
+        if line.startswith("infoset"):
+            check_options(line)
+        else:
+            assert (ROOT / line.split()[1]).is_file(), line
+
+
+def test_examples_in_the_help_name_options_that_exist() -> None:
+    root: Any = typer.main.get_command(app)
+    examples = [command.epilog.removeprefix("Example: ") for command in root.commands.values() if command.epilog]
+    assert len(examples) >= 14
+    for example in examples:
+        check_options(example)
+    with pytest.raises(AssertionError):
+        check_options("infoset reach --no-such-option")
+    with pytest.raises(AssertionError):
+        check_options("infoset teleport")
+
+
+def test_the_rules_make_lines_smaller() -> None:
+    sweep = reduced("infoset sweep --vary a.b=0.5e-4:5e-4:8,c.d=log:2:20:7 --runs 400 --out x")
+    assert sweep == "infoset sweep --vary a.b=0.5e-4:5e-4:2,c.d=log:2:20:2 --runs 4 --out x"
+    assert is_complete("infoset compare --runs 300 --seed 0")
+    assert not is_complete("infoset engage --noise NOISE --seed S --run K")
+    assert not is_complete("infoset reach")
+    assert list(lines_of("a b \\\n  c  # d\n\n# e\nf && g\n")) == ["a b c", "f", "g"]

@@ -1,0 +1,93 @@
+"""Links between pages lead to files and anchors that exist; nothing is fetched."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tests.docs.conftest import Page
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+# Others' addresses are not looked up; this is all there are.
+OUTSIDE = {"https://keepachangelog.com/en/1.1.0/", "https://semver.org/spec/v2.0.0.html"}
+
+_LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
+_TOCTREE_ENTRY = re.compile(r"^(?:.*<)?([\w/.-]+)>?$")
+
+
+@cache
+def anchors(path: Path) -> set[str]:
+    """Anchors of a page's headings, as both the site and hosts of repositories make them."""
+    text = re.sub(r"^```.*?^```$", "", path.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    titles = re.findall(r"^#+ (.+)$", text, flags=re.MULTILINE)
+    return {re.sub(r"\s", "-", re.sub(r"[^\w\s-]", "", title.strip().lower())) for title in titles}
+
+
+def source_of(target: Path) -> Path | None:
+    """The file that a link leads to; of a page that the gallery makes, the example it is made from."""
+    if target.exists() and "gallery" not in target.parts:
+        return target
+    if target.parent == DOCS / "gallery":
+        made_from = DOCS / "examples" / ("GALLERY_HEADER.rst" if target.stem == "index" else f"{target.stem}.py")
+        return made_from if made_from.exists() else None
+    return None
+
+
+def test_links_lead_somewhere(page: Page) -> None:
+    for link in _LINK.findall(page.prose()):
+        if "://" in link:
+            assert link in OUTSIDE, f"{page.name}: {link} is not among the addresses known here"
+            continue
+        file, _, anchor = link.partition("#")
+        target = (page.path.parent / file).resolve() if file else page.path
+        source = source_of(target)
+        assert source is not None, f"{page.name}: {link} leads nowhere"
+        if anchor:
+            assert anchor in anchors(source), f"{page.name}: {link}: no such heading"
+
+
+def test_tables_of_contents_name_pages_that_exist(page: Page) -> None:
+    for block in page.blocks("{toctree}"):
+        for line in block.text.splitlines():
+            if line and not line.startswith(":"):
+                entry = _TOCTREE_ENTRY.match(line)
+                assert entry is not None, line
+                stem = page.path.parent / entry[1]
+                found = [source_of(stem.with_name(stem.name + ending)) for ending in (".md", ".rst")]
+                assert any(found), f"{page.name}: {line}"
+
+
+def test_every_page_of_the_site_is_in_a_table_of_contents(pages: list[Page]) -> None:
+    site = [page for page in pages if page.name.startswith("docs/")]
+    listed = {
+        (page.path.parent / entry[1]).resolve()
+        for page in site
+        for block in page.blocks("{toctree}")
+        for line in block.text.splitlines()
+        if (entry := _TOCTREE_ENTRY.match(line)) is not None
+    }
+    assert {page.path.with_suffix("") for page in site} - listed == {DOCS / "index"}
+
+
+def test_files_named_in_the_site_exist(page: Page) -> None:
+    named = re.findall(r"`((?:docs|tests|benchmarks|infoset|guidance|sim|rendezvous|experiments)/[\w./-]+)`", page.text)
+    made = ("infoset/__pycache__", "docs/_build")
+    missing = [name for name in named if not (ROOT / name).exists() and not name.startswith(made)]
+    assert missing == [], page.name
+
+
+def test_examples_link_to_pages_that_exist() -> None:
+    for example in (DOCS / "examples").iterdir():
+        for link in re.findall(r"<(\.\./[\w-]+)\.html>`_", example.read_text(encoding="utf-8")):
+            assert (DOCS / "gallery" / f"{link}.md").resolve().is_file(), f"{example.name}: {link}"
+
+
+def test_pictures_are_small_and_made_by_commands() -> None:
+    pictures = [path for path in DOCS.iterdir() if path.suffix in {".png", ".gif"}]
+    assert pictures
+    assert (DOCS / "flight.gif").stat().st_size < 300_000
+    assert all(path.stat().st_size < 400_000 for path in pictures)

@@ -1,0 +1,59 @@
+"""Every Python block in the prose runs, those of a page one after the other in one namespace."""
+
+from __future__ import annotations
+
+import ast
+import doctest
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from tests.docs.conftest import Page
+
+REDUCED = ((r"\bruns=[\d_]+", "runs=4"), (r"\bprobes=\d+", "probes=2"))
+"""How blocks are made smaller before they are run."""
+
+SLOW = ("docs/campaigns.md", "docs/pursuit.md", "docs/multipoint.md")
+"""Pages whose blocks are run with -m slow only."""
+
+
+def run_blocks(page: Page) -> None:
+    """Run the blocks of a page."""
+    namespace: dict[str, Any] = {"__name__": "__main__"}
+    for block in page.blocks("python"):
+        if block.not_run:
+            continue
+        text = block.text
+        for pattern, small in REDUCED:
+            text = re.sub(pattern, small, text)
+        exec(compile(ast.parse(text), page.name, "exec"), namespace)
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What blocks write goes to a folder of their own."""
+    monkeypatch.chdir(tmp_path)
+
+
+def test_blocks_run(page: Page) -> None:
+    if page.name not in SLOW:
+        run_blocks(page)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SLOW)
+def test_slow_blocks_run(name: str, pages: list[Page]) -> None:
+    (page,) = (each for each in pages if each.name == name)
+    assert page.blocks("python")
+    run_blocks(page)
+
+
+def test_sessions_print_what_they_say(page: Page) -> None:
+    for block in page.blocks("pycon"):
+        test = doctest.DocTestParser().get_doctest(block.text, {}, page.name, page.name, 0)
+        result = doctest.DocTestRunner().run(test)
+        assert result.attempted > 0
+        assert result.failed == 0

@@ -1,0 +1,133 @@
+"""The built site: links, pictures, and that it needs nothing from elsewhere. CONTRIBUTING.md says how to build it.
+
+INFOSET_SITE names the folder of the site; then a site that is not there is a failure.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import ClassVar
+from urllib.parse import unquote, urlsplit
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = (
+    *("infoset", "guidance", "sim", "rendezvous.relative_motion", "rendezvous.pareto", "rendezvous.multipoint"),
+    *("rendezvous.reachability", "rendezvous.pursuit_evasion", "rendezvous.polytope"),
+)
+LOADED = {"script": "src", "img": "src", "source": "src", "iframe": "src"}
+
+
+@dataclass
+class _Reader(HTMLParser):
+    """What a page has, loads and links to."""
+
+    ids: set[str] = field(default_factory=set)
+    links: list[str] = field(default_factory=list)
+    loads: list[str] = field(default_factory=list)
+    pictures: list[str | None] = field(default_factory=list)
+    LOADING_LINKS: ClassVar[tuple[str, ...]] = ("stylesheet", "preload", "icon", "modulepreload", "shortcut icon")
+
+    def __post_init__(self) -> None:
+        super().__init__()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        if identity := given.get("id"):
+            self.ids.add(identity)
+        if tag == "a" and (link := given.get("href")):
+            self.links.append(link)
+        if tag == "link" and given.get("rel") in self.LOADING_LINKS:
+            self.loads.append(given.get("href") or "")
+        if tag in LOADED and (source := given.get(LOADED[tag])):
+            self.loads.append(source)
+        if tag == "img":
+            self.pictures.append(given.get("alt"))
+
+
+@pytest.fixture(scope="module")
+def site() -> Path:
+    """The folder of the built site."""
+    named = os.environ.get("INFOSET_SITE")
+    folder = Path(named) if named else ROOT / "docs" / "_build"
+    if not (folder / "index.html").is_file():
+        assert named is None, f"there is no site in {folder}"
+        pytest.skip("the site is not built: python -m sphinx -W --keep-going docs docs/_build")
+    return folder.resolve()
+
+
+@pytest.fixture(scope="module")
+def read(site: Path) -> dict[Path, _Reader]:
+    """All pages of the site."""
+    pages = {}
+    for path in sorted(site.rglob("*.html")):
+        if "_static" not in path.parts:
+            pages[path] = _Reader()
+            pages[path].feed(path.read_text(encoding="utf-8"))
+    return pages
+
+
+def public_names() -> Iterator[str]:
+    """Every name that a package gives out."""
+    for package in PACKAGES:
+        yield from (f"{package}.{name}" for name in importlib.import_module(package).__all__)
+
+
+def test_there_is_a_page_for_every_file(site: Path, read: dict[Path, _Reader]) -> None:
+    sources = [path for path in (ROOT / "docs").rglob("*.md") if not {"_build", "gallery"} & set(path.parts)]
+    made = {path.relative_to(site).with_suffix("") for path in read}
+    assert {path.relative_to(ROOT / "docs").with_suffix("") for path in sources} <= made
+    examples = (ROOT / "docs" / "examples").glob("plot_*.py")
+    assert {Path("gallery") / path.stem for path in examples} <= made
+
+
+def test_links_and_anchors_inside_lead_somewhere(site: Path, read: dict[Path, _Reader]) -> None:
+    seen = 0
+    for page, reader in read.items():
+        for link in reader.links:
+            parts = urlsplit(link)
+            if parts.scheme or parts.netloc:
+                continue
+            target = (page.parent / unquote(parts.path)).resolve() if parts.path else page
+            assert target.is_file(), f"{page.relative_to(site)}: {link}"
+            if parts.fragment and target in read:
+                ids = read[target].ids
+                assert unquote(parts.fragment) in ids, f"{page.relative_to(site)}: {link}: no such anchor"
+            seen += 1
+    assert seen > 1000
+
+
+def test_nothing_is_loaded_from_elsewhere(site: Path, read: dict[Path, _Reader]) -> None:
+    for page, reader in read.items():
+        for source in reader.loads:
+            if source.startswith("data:"):
+                continue
+            parts = urlsplit(source)
+            assert not parts.scheme, f"{page.relative_to(site)} loads {source}"
+            assert not parts.netloc, f"{page.relative_to(site)} loads {source}"
+            assert (page.parent / unquote(parts.path)).is_file(), f"{page.relative_to(site)}: no {source}"
+    for sheet in site.rglob("*.css"):
+        assert re.search(r"url\(\s*['\"]?(https?:)?//|@import\s+['\"]?https?:", sheet.read_text("utf-8")) is None, sheet
+
+
+def test_pictures_say_what_they_show(site: Path, read: dict[Path, _Reader]) -> None:
+    for page, reader in read.items():
+        assert all(reader.pictures), f"{page.relative_to(site)} has a picture without a text"
+
+
+def test_every_public_name_is_described(read: dict[Path, _Reader]) -> None:
+    described = set().union(*(reader.ids for reader in read.values()))
+    assert sorted(set(public_names()) - described) == []
+
+
+def test_examples_were_run_and_their_figures_are_there(site: Path) -> None:
+    images = {path.name for path in (site / "_images").iterdir()}
+    for example in (ROOT / "docs" / "examples").glob("plot_*.py"):
+        assert f"sphx_glr_{example.stem}_001.png" in images
