@@ -56,7 +56,8 @@ SLOW = (
 SET_UP = r"(python3 -m venv \.venv|\.venv/bin/pip install -c constraints\.txt (\S+|-e \S+)|\.venv/bin/python -m pytest)"
 """What makes an environment and runs these tests. `.ci/run` does it word for word; here the names in it are checked."""
 
-LANGUAGES = {"sh", "python", "pycon", "text", "toml", "{eval-rst}", "{toctree}"}
+_PROMPT = "$ "
+LANGUAGES = {"sh", "console", "python", "pycon", "text", "toml", "{eval-rst}", "{toctree}"}
 
 _PLACEHOLDER = re.compile(r"\[|\||\.\.\.|=?\b[A-Z]+\b(?!\w)|^infoset [a-z-]+( [a-z-]+| --[a-z-]+)?$")
 """Something that stands for something else, or the mere name of a command."""
@@ -64,7 +65,10 @@ _PLACEHOLDER = re.compile(r"\[|\||\.\.\.|=?\b[A-Z]+\b(?!\w)|^infoset [a-z-]+( [a
 
 def lines_of(text: str) -> Iterator[str]:
     """Command lines of a block, continued ones joined, without comments."""
-    for line in text.replace("\\\n", " ").splitlines():
+    lines = text.replace("\\\n", " ").splitlines()
+    if any(line.startswith(_PROMPT) for line in lines):  # a session: the other lines are what it printed
+        lines = [line.removeprefix(_PROMPT) for line in lines if line.startswith(_PROMPT)]
+    for line in lines:
         for part in line.split(" && "):
             bare = re.split(r"(?:^|\s)#", part)[0]
             if bare.strip():

@@ -119,7 +119,9 @@ def test_nothing_is_loaded_from_elsewhere(site: Path, read: dict[Path, _Reader])
 
 def test_pictures_say_what_they_show(site: Path, read: dict[Path, _Reader]) -> None:
     for page, reader in read.items():
-        assert all(reader.pictures), f"{page.relative_to(site)} has a picture without a text"
+        # Small pictures of the gallery are beside their titles, which say the same.
+        beside = page == site / "gallery" / "index.html"
+        assert all(text or (text is not None and beside) for text in reader.pictures), page.relative_to(site)
 
 
 def test_every_public_name_is_described(read: dict[Path, _Reader]) -> None:
