@@ -146,17 +146,8 @@ def count_of(marks: Integers, n: int) -> int:
 
 
 @inlined
-def announce(origins: Floats, marks: Integers, n: int) -> None:
-    """Ask for the origins and marks of a section that comes soon: memory is slow."""
-    prefetch(marks, 2 * MARKS * n)
-    prefetch(marks, 2 * MARKS * n + MARKS)
-    prefetch(origins, 2 * ORIGIN * n)
-    prefetch(origins, 2 * ORIGIN * n + ORIGIN)
-
-
-@inlined
 def expect(rings: Floats, marks: Integers, n: int) -> None:
-    """Ask for the vertices of a section that a step reads: it comes next."""
+    """Ask for the vertices of a section that a step reads: it comes next, and memory is slow."""
     for side in (RIGHT, LEFT):
         prefetch(rings, place(marks, n, side, begin_of(marks, n, side)))
         prefetch(rings, place(marks, n, side, end_of(marks, n, side) - 1))

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import chains, polygon
-from infoset._compile import allocation_free, entry, inlined, prefetch, substituted
+from infoset._compile import allocation_free, entry, inlined, substituted
 from infoset.chains import REACH, RIGHT
 
 Floats = NDArray[np.float64]
@@ -34,9 +34,6 @@ ALIVE = np.iinfo(np.int64).max
 # Columns of a section's summary.
 LOWER_MISS, UPPER_MISS, Z_LEAST, Z_GREATEST = range(4)
 SUMMARY_COLUMNS = 4
-
-AHEAD = 4
-"""Sections ahead whose memory is asked for."""
 
 
 class SectionLaw(NamedTuple):
@@ -319,16 +316,6 @@ def list_rows(some: Flags, others: Flags, everyone: bool, sections: Sections) ->
     return count
 
 
-@inlined
-def look_ahead(sections: Sections, k: int, count: int) -> None:
-    """Ask memory for what the sections after number k of the list will need."""
-    if k + AHEAD < count:
-        chains.announce(sections.origins, sections.marks, sections.rows[k + AHEAD])
-        prefetch(sections.summaries, SUMMARY_COLUMNS * sections.rows[k + AHEAD])
-    if k + 1 < count:
-        chains.expect(sections.rings, sections.marks, sections.rows[k + 1])
-
-
 @entry
 def measure_all(
     behind: Flags, active: Flags, alpha: Floats, elapsed: int, event: int, sections: Sections, law: SectionLaw
@@ -343,7 +330,8 @@ def measure_all(
     for k in range(count):
         n = rows[k]
         b, s = divmod(n, labels.shape[1])
-        look_ahead(sections, k, count)
+        if k + 1 < count:
+            chains.expect(rings, marks, rows[k + 1])
         if behind[b]:
             predict_section(origins, rings, marks, n, labels[b, s], elapsed, law)
         if not active[b]:
@@ -420,7 +408,8 @@ def catch_up_all(
     for k in range(count):
         n = rows[k]
         b, s = divmod(n, labels.shape[1])
-        look_ahead(sections, k, count)
+        if k + 1 < count:
+            chains.expect(rings, marks, rows[k + 1])
         if behind[b]:
             predict_section(origins, rings, marks, n, labels[b, s], elapsed, law)
         if stale[b]:
