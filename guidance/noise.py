@@ -82,4 +82,17 @@ class MeasurementNoise(Protocol):
     """A rule that chooses the errors within their bounds."""
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
-        """Choose the measurements of a step, knowing the truth and the set before the measurement."""
+        """Choose the measurements of a step.
+
+        Parameters
+        ----------
+        sight : LineOfSight
+            The truth.
+        predicted : InformationSetView
+            The set before the measurement.
+
+        Returns
+        -------
+        Measurement
+            Within the bounds.
+        """

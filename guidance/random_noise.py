@@ -22,7 +22,7 @@ class RandomNoise:
     angle_draws, range_draws : ndarray, shape (B, steps)
         Uniform in [-1, 1]; the error is the draw times the bound.
     rate_draws : ndarray, shape (B, steps), or None
-        The same for the angular rate; None where there is no such sensor.
+        The same for the angular rate, in [-1, 1]; None where there is no such sensor.
 
     References
     ----------

@@ -18,7 +18,20 @@ class Strategy(Protocol):
     """
 
     def start(self, batch: int) -> Any:
-        """State of the strategy's own for a batch of engagements; None if it needs none."""
+        """State of the strategy's own for a `batch` of so many engagements; None if it needs none."""
 
     def decide(self, situation: Situation, state: Any) -> NDArray[np.float64]:
-        """Wanted impulses along z, m/s, shape (B,). It may change `state`."""
+        """Decide on the impulses of a step.
+
+        Parameters
+        ----------
+        situation : Situation
+            What is known on board.
+        state : object
+            What `start` returned; it may be changed.
+
+        Returns
+        -------
+        ndarray, shape (B,)
+            Wanted impulses along z, m/s.
+        """

@@ -76,7 +76,7 @@ class ConvexPolygons:
 
     @classmethod
     def box(cls, x: tuple[float, float], y: tuple[float, float]) -> ConvexPolygons:
-        """Axis-parallel box from two intervals; equal ends give a segment or a point."""
+        """Axis-parallel box from the intervals `x` and `y`; equal ends give a segment or a point."""
         if x[0] > x[1] or y[0] > y[1]:
             raise ValueError(f"an interval is reversed: x = {x}, y = {y}")
         corners = [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])]
@@ -85,7 +85,7 @@ class ConvexPolygons:
 
     @classmethod
     def empty(cls, shape: tuple[int, ...] = ()) -> ConvexPolygons:
-        """Empty sets."""
+        """Empty sets, a batch of a `shape`."""
         return cls(np.zeros((*shape, 0, 2)), np.zeros(shape, dtype=np.int64))
 
     @property
@@ -170,7 +170,7 @@ class ConvexPolygons:
         return self._make(2, _add_segment_each, self._vectors(half, "half"))
 
     def minkowski_sum(self, other: ConvexPolygons) -> ConvexPolygons:
-        """Minkowski sum with polygons of the same batch shape, or with a single one."""
+        """Minkowski sum with `other` polygons of the same batch shape, or with a single one."""
         shape = self.shape if not other.shape else np.broadcast_shapes(self.shape, other.shape)
         first, second = self._broadcast(shape), other._broadcast(shape)
         return first._make(second.vertices.shape[-2], _add_polygon_each, *second._flat())
@@ -191,11 +191,11 @@ class ConvexPolygons:
         return self._measure(_support_each, self._vectors(direction, "direction"))[:, 1:].reshape(*self.shape, 2)
 
     def margin(self, point: ArrayLike) -> Floats:
-        """Signed distance of points, shape (2,) or (..., 2), to the boundary: positive inside, -inf if empty."""
+        """Signed distance of a `point`, shape (2,) or (..., 2), to the boundary: positive inside, -inf if empty."""
         return self._measure(_margin_each, self._vectors(point, "point"))[:, 0].reshape(self.shape)
 
     def contains(self, point: ArrayLike) -> NDArray[np.bool_]:
-        """Whether points lie inside or on the boundary."""
+        """Whether a `point`, shape (2,) or (..., 2), lies inside or on the boundary."""
         return np.asarray(self.margin(point) >= 0.0)
 
     def area(self) -> Floats:

@@ -110,7 +110,7 @@ class InformationSetView:
     history : History
         What was measured and done.
     label_limits : tuple of ndarray, shape (B,)
-        Least and greatest label that may live.
+        Least and greatest label that may live, m.
     status : ndarray of int, shape (B,)
         Values of `SetStatus`.
     """
@@ -610,7 +610,7 @@ class InformationSet(InformationSetView):
         self._stack.predict(active, self._history.elapsed)
 
     def stop(self, where: ArrayLike) -> None:
-        """Follow these engagements no longer: nothing is computed for them from now on."""
+        """Follow engagements no longer: nothing is computed from now on for those `where` is true, shape () or (B,)."""
         self._status[self._active(where)] = SetStatus.STOPPED.value
 
     def _spread(self, value: ArrayLike, name: str) -> Floats:

@@ -60,7 +60,7 @@ class KeplerTargets:
             raise ValueError("each target needs a finite epoch")
 
     def states(self, which: Integers, time_s: Floats) -> Floats:
-        """States of targets, one a time, shape (k, 6)."""
+        """States, m and m/s, of the targets `which` at times `time_s`, one a time, shape (k, 6)."""
         return coast(self.initial[which], time_s - self.epoch_s[which], self.gravitational_parameter_m3_s2)
 
     def rates(self, time_s: Floats, states: Floats) -> Floats:

@@ -58,7 +58,7 @@ def best_order(
     tour : Visits
     limits : TimeLimits
     guesses : sequence of ndarray, shape (n,)
-        Times to start from, whatever the order, beside those of its own.
+        Times to start from, s, whatever the order, beside those of its own.
     progress : callable or None
         Told the share of orders that are decided.
 

@@ -110,7 +110,7 @@ class Path:
         return self
 
     def costate(self, time_s: Floats) -> Floats:
-        """Return lambda at times, those after the jump at a node.
+        """Return lambda (m/s^3, m/s^2) at times, those after the jump at a node.
 
         Parameters
         ----------

@@ -62,7 +62,7 @@ class MovingTargets(Protocol):
         """The targets, each with a name of its own."""
 
     def states(self, which: Integers, time_s: Floats) -> Floats:
-        """States of targets, one a time, shape (k, 6)."""
+        """States, m and m/s, of the targets `which` at times `time_s`, one a time, shape (k, 6)."""
 
     def rates(self, time_s: Floats, states: Floats) -> Floats:
         """Time derivatives of such states at times, shape (k, 6)."""
@@ -97,7 +97,7 @@ class DriftingTargets:
             raise ValueError("the targets' epoch is not finite")
 
     def states(self, which: Integers, time_s: Floats) -> Floats:
-        """States of targets, one a time, shape (k, 6)."""
+        """States, m and m/s, of the targets `which` at times `time_s`, one a time, shape (k, 6)."""
         epochs = np.full(time_s.shape, self.epoch_s)
         coasted = self.motion.transition(epochs, time_s) @ self.initial[which][:, :, None]
         return np.asarray(coasted[:, :, 0] + self.motion.drift(epochs, time_s))

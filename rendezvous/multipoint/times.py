@@ -182,7 +182,7 @@ def optimise_times(
         Times to start from, beside those of its own; unsound ones are left out.
     effort : Effort
     enough : float
-        An objective below which nobody asks how low it gets: the descent stops there.
+        An objective, in its own units, below which nobody asks how low it gets: the descent stops there.
     progress : callable or None
         Told the share of starts that are followed.
 

@@ -46,7 +46,7 @@ class Coalition:
     excess : float
         c(S): their weighted sum of excesses at the meeting that is best for them alone, m^2/s^3.
     regret : float
-        By how much their sum is greater at the common meeting.
+        By how much their sum is greater at the common meeting, m^2/s^3.
     """
 
     members: tuple[int, ...]
@@ -63,10 +63,10 @@ class Coalitions:
     coalitions : tuple of Coalition
         By size; single craft and all together among them.
     shapley : ndarray, shape (n,)
-        The Shapley value of the cost game c.
+        The Shapley value of the cost game c, m^2/s^3.
     transfers : ndarray, shape (n,)
-        What each craft is owed by the others so that it bears its Shapley value: its own weighted excess less that;
-        of sum zero.
+        What each craft is owed by the others so that it bears its Shapley value: its own weighted excess less that,
+        m^2/s^3; of sum zero.
     core : Core
     """
 
@@ -83,7 +83,7 @@ def analyse_coalitions(solution: EncounterSolution, point: Floats | None = None)
     ----------
     solution : EncounterSolution
     point : ndarray, shape (f,), or None
-        The common meeting; None: the best for the group.
+        The common meeting's free values; None: the best for the group.
 
     Returns
     -------

@@ -69,7 +69,7 @@ class Encounter:
     free : tuple of Component
         What of the terminal state is open; at least one, of an intercept only of the position.
     fixed : ndarray, shape (6,)
-        Values of the others; those of free components do not count.
+        Values of the others, m and m/s; those of free components do not count.
     meeting : Meeting
 
     Raises

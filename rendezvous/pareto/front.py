@@ -103,7 +103,7 @@ def distances(solution: EncounterSolution) -> Floats:
     Returns
     -------
     ndarray, shape (n, n)
-        d_ij = |p_i* - p_j*|_M.
+        d_ij = |p_i* - p_j*|_M, m/s^1.5.
 
     Raises
     ------
@@ -122,14 +122,14 @@ def front_of_two(distance: float, excess: ArrayLike) -> Floats:
     Parameters
     ----------
     distance : float
-        d_12.
+        d_12, m/s^1.5.
     excess : array_like
-        Of the first, from 0 to d_12^2.
+        Of the first, from 0 to d_12^2, m^2/s^3.
 
     Returns
     -------
     ndarray
-        sqrt(e_1) + sqrt(e_2) = d_12.
+        m^2/s^3; sqrt(e_1) + sqrt(e_2) = d_12.
     """
     return np.asarray((distance - np.sqrt(np.asarray(excess, dtype=np.float64))) ** 2)
 
@@ -140,14 +140,14 @@ def front_of_three(between: Floats, first: ArrayLike, second: ArrayLike) -> Floa
     Parameters
     ----------
     between : ndarray, shape (3, 3)
-        d_ij; the first two ideals differ.
+        d_ij, m/s^1.5; the first two ideals differ.
     first, second : array_like
-        Excesses e_1 and e_2 of a point of the triangle of the ideals.
+        Excesses e_1 and e_2 of a point of the triangle of the ideals, m^2/s^3.
 
     Returns
     -------
     ndarray
-        e_3, from the triangle with sides d_ij laid in a plane: the distances from two corners give the third.
+        e_3, m^2/s^3: sides d_ij laid in a plane, the distances from two corners give the third.
     """
     e1, e2 = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
     base = between[0, 1]

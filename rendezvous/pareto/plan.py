@@ -73,6 +73,7 @@ class Plan:
         Returns
         -------
         ndarray, shape (..., 6)
+            m and m/s.
         """
         times = np.asarray(time_s, dtype=np.float64)
         segment = self.craft.motion.segment(np.full(times.shape, self.craft.start_s), times)

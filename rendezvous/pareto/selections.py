@@ -140,7 +140,7 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
     Returns
     -------
     ndarray, shape (f,)
-        Nearest in the norm of M; of the weighted mean of the M where they differ.
+        Free values, nearest in the norm of M; of the weighted mean of the M where they differ.
 
     Notes
     -----

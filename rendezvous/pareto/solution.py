@@ -26,7 +26,7 @@ class CraftCost:
     ideal_cost_squared : float
         J*^2, m^2/s^3.
     root : ndarray, shape (f, f)
-        R, upper triangular, M = R' R.
+        R, upper triangular, M = R' R; m/s^1.5 over the units of p.
     effort_base, effort_slope : ndarray, shapes (c,) and (c, f)
         The scaled effort y(p) = base + slope p, |y|^2 = J^2.
     to_costate : ndarray, shape (6, c)
@@ -47,7 +47,7 @@ class CraftCost:
         return np.asarray(self.root.T @ self.root)
 
     def excess(self, point: Floats) -> Floats:
-        """J^2 - J*^2 at points of shape (..., f), shape (...)."""
+        """J^2 - J*^2, m^2/s^3, at a `point`, shape (..., f): shape (...)."""
         return np.asarray((((point - self.ideal) @ self.root.T) ** 2).sum(axis=-1))
 
 
@@ -96,7 +96,7 @@ class EncounterSolution:
         return np.asarray(self.encounter.base + self.encounter.opening @ chosen)
 
     def excess(self, point: Floats | None = None) -> Floats:
-        """Return J_i^2 - J_i*^2 of all craft.
+        """Return J_i^2 - J_i*^2 of all craft, m^2/s^3.
 
         Parameters
         ----------
@@ -125,7 +125,7 @@ class EncounterSolution:
         return np.asarray(self.excess(point) + np.array([each.ideal_cost_squared for each in self.costs]))
 
     def group_loss(self, point: Floats | None = None) -> Floats:
-        """Return the weighted sum of excesses, the norm (1.7).
+        """Return the weighted sum of excesses, the norm (1.7), m^2/s^3.
 
         Parameters
         ----------
@@ -159,7 +159,7 @@ class EncounterSolution:
         return Plan(cost.craft, self.encounter.meeting_s, costate)
 
     def ideal_plan(self, index: int) -> Plan:
-        """Return how one craft would fly to the meeting that is cheapest for it alone."""
+        """Return how the craft of an `index` would fly to the meeting that is cheapest for it alone."""
         return self.plan(index, self.costs[index].ideal)
 
 

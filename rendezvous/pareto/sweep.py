@@ -25,6 +25,7 @@ class DurationSweep:
     cost_squared, ideal_cost_squared : ndarray, shape (k, n)
         J_i^2 and J_i*^2, m^2/s^3.
     group_loss : ndarray, shape (k,)
+        m^2/s^3.
     """
 
     meeting_s: Floats

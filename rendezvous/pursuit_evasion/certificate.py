@@ -59,7 +59,7 @@ class Certificate:
     residual : float
         Of the start states, nondimensional.
     hamiltonian_drift : float
-        Greatest change along the paths, of a Hamiltonian that is one.
+        Greatest relative change along the paths, of a Hamiltonian that is one.
     integrator_gap_m : float
         Distance of the ends that a second integrator, another method flown forward, finds.
     closing_speed_m_s : float

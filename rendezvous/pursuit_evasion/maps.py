@@ -51,7 +51,7 @@ class CaptureMap:
     Parameters
     ----------
     columns, rows : ndarray, shape (nx,) and (ny,)
-        Values of the two parameters.
+        Values of the two parameters, in their own units.
     capture_s : masked array, shape (ny, nx)
         Masked where there is no capture, or none that is certified.
     status : ndarray of int, shape (ny, nx)
@@ -104,7 +104,9 @@ def capture_map(
     game_at : callable
         The game of a column's and a row's value; a ValueError says that there is none.
     columns : ndarray, shape (nx,)
+        Values of the first parameter, in its own units.
     rows : ndarray, shape (ny,)
+        Those of the second, in its own units.
     follow_all : bool, optional
         Whether to solve each point from nothing, with a change of branch where one folds: 20 ms to seconds each.
     progress : callable, optional

@@ -37,7 +37,7 @@ class Flight:
     controls : ndarray, shape (T, m)
         Those applied.
     expected_misses : ndarray, shape (T,)
-        The least terminal norm that each plan expected.
+        The least terminal norm that each plan expected, in the units of the states.
     relaxations : ndarray, shape (T,)
         By which fraction all constraints on states had to be relaxed to have a plan; 0 where they held.
     """

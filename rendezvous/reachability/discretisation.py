@@ -54,7 +54,9 @@ def discretised(
     Returns
     -------
     transition : ndarray, shape (periods, 6, 6)
+        Of states in m and m/s.
     control : ndarray, shape (periods, 6, 3)
+        m and m/s a unit control.
 
     Raises
     ------

@@ -22,9 +22,9 @@ class Budget:
     Parameters
     ----------
     seconds : float
-        For all blocks together; a step that is expected to go beyond is not begun.
+        Time, s, for all blocks together; a step that is expected to go beyond is not begun.
     megabytes : float
-        For one step.
+        Memory, MB, for one step.
     dimension : int
         Largest block.
     """

@@ -60,7 +60,7 @@ class OptimalControls:
         return float(np.linalg.norm([each.miss for each in self.blocks]))
 
     def at(self, point: Floats) -> Floats:
-        """Return the controls of a point z of the set.
+        """Return the controls of a point z of the set, z dimensionless.
 
         Parameters
         ----------

@@ -42,10 +42,11 @@ class ReachabilityProblem:
     Parameters
     ----------
     transition : ndarray, shape (T, n, n)
-        A(t); it may be singular.
+        A(t), of states in their own units; it may be singular.
     control : ndarray, shape (T, n, m)
         B(t).
     initial : ndarray, shape (n,)
+        The state at t = 0.
     state_bounds : ndarray, shape (n,)
         |x_i(t)| <= state_bounds_i for t = 0..T, all positive; they are also the sizes that states are compared with.
     control_bounds : ndarray, shape (m,)
@@ -54,7 +55,7 @@ class ReachabilityProblem:
     normals : ndarray, shape (k, n)
         More constraints on states: normals x(t) <= offsets(t).
     offsets : ndarray, shape (T + 1, k)
-        Infinite where a constraint does not hold.
+        In the units of normals x; infinite where a constraint does not hold.
     constraint_names : tuple of str
         What to call these k in messages.
     between : ndarray, shape (T, s, n, n + m) or None
@@ -141,7 +142,7 @@ class ReachabilityProblem:
             raise InadmissibleStartError(tuple(broken))
 
     def name_of(self, constraint: int) -> str:
-        """Return what to call one of the constraints beyond the bounds, by its place."""
+        """Return what to call a `constraint` beyond the bounds, by its place."""
         return self.constraint_names[constraint] if self.constraint_names else f"constraint {constraint + 1}"
 
     def state_name(self, state: int) -> str:

@@ -20,7 +20,12 @@ Floats = NDArray[np.float64]
 class SetCounts:
     """How many vertices and facets a set has, and of which dimension it is.
 
-    Vertices nearer to each other than 1e-7 of the bounds count once.
+    Parameters
+    ----------
+    vertices : int
+        Those nearer to each other than 1e-7 of the bounds count once.
+    facets : int
+    dimension : int
     """
 
     vertices: int
@@ -61,7 +66,7 @@ class ReachableSets:
         return result
 
     def support(self, kind: SetKind, time: int, directions: Floats) -> Floats:
-        """Return the support function of a set.
+        """Return the support function of a set, in the units of direction . x.
 
         Parameters
         ----------

@@ -120,7 +120,7 @@ class EllipticOrbit:
         return np.asarray(self.areal_rate_rad_s * (1.0 + self.eccentricity * np.cos(self.true_anomaly(time_s))) ** 2)
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
-        """Return A(t) in axes of Hill.
+        """Return A(t) in axes of Hill, for states in m and m/s.
 
         Parameters
         ----------

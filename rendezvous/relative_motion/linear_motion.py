@@ -20,7 +20,9 @@ class Segment:
     Parameters
     ----------
     transition, gramian : ndarray, shape (..., 6, 6)
+        Of states in m and m/s.
     drift : ndarray, shape (..., 6)
+        m and m/s.
     """
 
     transition: Floats

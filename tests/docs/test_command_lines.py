@@ -53,6 +53,11 @@ SLOW = (
 )
 """Lines that are run with -m slow only."""
 
+ELSEWHERE = {
+    "python benchmarks/page_speed.py": "it measures for minutes, in a browser; tests/browser opens the same pages",
+}
+"""Lines in running text, which can have no comment above them, that are not run, and why."""
+
 SET_UP = r"(python3 -m venv \.venv|\.venv/bin/pip install -c constraints\.txt (\S+|-e \S+)|\.venv/bin/python -m pytest)"
 """What makes an environment and runs these tests. `.ci/run` does it word for word; here the names in it are checked."""
 
@@ -134,7 +139,8 @@ def fenced_lines(page: Page) -> list[str]:
 
 def lines_to_run(page: Page) -> list[str]:
     """All that a reader could copy from a page, in its order, each once."""
-    return list(dict.fromkeys([*fenced_lines(page), *filter(is_complete, inline_lines(page))]))
+    lines = dict.fromkeys([*fenced_lines(page), *filter(is_complete, inline_lines(page))])
+    return [line for line in lines if line not in ELSEWHERE]
 
 
 @pytest.fixture
@@ -168,6 +174,9 @@ def test_blocks_are_in_known_languages(page: Page) -> None:
 
 def test_blocks_that_are_not_run_say_why(pages: list[Page]) -> None:
     left_out = {(block.page, block.text): block.not_run for page in pages for block in page.blocks() if block.not_run}
+    for line, reason in ELSEWHERE.items():
+        print(f"not run: {line}: {reason}")  # noqa: T201
+        assert any(line in page.text for page in pages), f"{line} is in no page any more"
     for (name, text), reason in left_out.items():
         print(f"not run: {name}: {next(lines_of(text))}: {reason}")  # noqa: T201 (listed with -s or -rA)
         assert len(reason.split()) >= 4, f"{name}: {text}"

@@ -1,0 +1,181 @@
+"""What the reference says of public things is whole: every parameter is described, every number has its unit."""
+
+from __future__ import annotations
+
+import enum
+import importlib
+import inspect
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+PACKAGES = (
+    *("infoset", "guidance", "sim", "rendezvous.relative_motion", "rendezvous.pareto", "rendezvous.multipoint"),
+    *("rendezvous.reachability", "rendezvous.pursuit_evasion", "rendezvous.polytope", "rendezvous.linear_game"),
+)
+
+WITHOUT_UNITS = (
+    *("infoset.ConvexPolygons", "rendezvous.polytope."),  # geometry, of whatever it is of
+    *(
+        "sim.Distribution",
+        "sim.QuantileEstimate",
+        "sim.empirical_distribution",
+        "sim.estimate_quantiles",
+        "sim.quantiles",
+    ),
+)
+"""Geometry and statistics: their numbers have the units of what they are given."""
+
+CONTRACTS = {"start": "guidance.Strategy", "decide": "guidance.Strategy", "measure": "guidance.MeasurementNoise"}
+"""Methods that many classes have for one contract, which describes their parameters."""
+
+_IN_NAME = re.compile(r"_(m|s|rad|km|deg|kg|n|m_s|km_s|rad_s|m_s2|m2_s3|m3_s2|kg_s|per_m|per_s|mb)$")
+_UNIT = re.compile(
+    r"(?<![\w^'’])(m|s|rad|km|deg|kg|N|MB|ms|m/s|km/s|rad/s|rad/m|m/s\^1\.5|m/s\^2|m/s\^3|m\^2/s\^3|m\^3/s\^2|kg/s|1/s)(?!\w)"
+)
+_NONE_OR_GIVEN = re.compile(
+    r"share|fraction|[Rr]elative|probability|ratio|eccentricity|weights?\b|confidence|level|direction|zonal|scaled"
+    r"|[Ii]n [\[(][-\d]|between 0 and 1|0 to 1|unit (length|vector)|Unit vectors|dimensionless|nondimensional"
+    r"|standard deviations|units? of|own units|any units|permutation|matri|costate|states?\b|Gramian"
+    r"|[Ff]ree (terminal )?values"
+)
+"""Words that say that a number has no unit, or whose unit is a convention of the reference: states are in m and m/s,
+matrices and costates in what follows from that, free values in those of their components."""
+
+
+def public_things() -> Iterator[tuple[str, Any]]:
+    """Classes, functions and methods that packages give out, by name."""
+    for package in PACKAGES:
+        module = importlib.import_module(package)
+        defined = [name for name, thing in vars(module).items() if getattr(thing, "__module__", None) == package]
+        for name in getattr(module, "__all__", [each for each in defined if not each.startswith("_")]):
+            thing = getattr(module, name)
+            thing = getattr(thing, "py_func", thing)
+            if inspect.isclass(thing) and not issubclass(thing, Exception | enum.Enum):
+                yield f"{package}.{name}", thing
+                for method_name, method in vars(thing).items():
+                    function = inspect.unwrap(getattr(method, "__func__", getattr(method, "fget", method)))
+                    if not method_name.startswith("_") and inspect.isfunction(function):
+                        yield f"{package}.{name}.{method_name}", function
+            elif inspect.isfunction(thing):
+                yield f"{package}.{name}", thing
+
+
+THINGS = dict(public_things())
+
+
+def entries(text: str, title: str) -> list[tuple[str, str]]:
+    """Heads and texts of a section of a NumPy-style docstring."""
+    found = re.search(rf"^{title}\n-+\n(.*?)(?=^\w[\w ]*\n-+$|\Z)", text, flags=re.DOTALL | re.MULTILINE)
+    listed: list[tuple[str, str]] = []
+    for line in found[1].splitlines() if found else ():
+        if line and not line[0].isspace():
+            listed.append((line, ""))
+        elif listed:
+            listed[-1] = (listed[-1][0], f"{listed[-1][1]} {line.strip()}".strip())
+    return listed
+
+
+def described(text: str) -> set[str]:
+    """Parameters that a docstring has in its section."""
+    heads = [head.split(" : ")[0] for head, _ in entries(text, "Parameters")]
+    return {name.strip().lstrip("*") for head in heads for name in head.split(",")}
+
+
+def undescribed(name: str, thing: Any) -> list[str]:
+    """Parameters of a public thing of which nothing is said."""
+    if inspect.isclass(thing) and getattr(thing, "_is_protocol", False):
+        return []
+    text = inspect.getdoc(thing) or ""
+    known = described(text)
+    contract = CONTRACTS.get(name.rsplit(".", 1)[-1])
+    if contract is not None and "Parameters\n" not in text:
+        known |= described(inspect.getdoc(THINGS[f"{contract}.{name.rsplit('.', 1)[-1]}"]) or "") | {"batch"}
+    wanted = [each for each in inspect.signature(thing).parameters if each not in {"self", "cls"}]
+    if inspect.isclass(thing) or "Parameters\n" in text:
+        return [each for each in wanted if each not in known]
+    # Described in a line or two: that names what has to be said, and a name with its unit says it all.
+    return [
+        each
+        for each in wanted
+        if each not in known and not _IN_NAME.search(each) and re.search(rf"\b{each}\b", text) is None
+    ]
+
+
+def without_unit(name: str, thing: Any) -> list[str]:
+    """Numbers in the docstring of a public thing that do not say what they are measured in."""
+    text = inspect.getdoc(thing) or ""
+    if name.startswith(WITHOUT_UNITS):
+        return []
+    summary = text.split("\n\n")[0]
+    bare = []
+    for title in ("Parameters", "Returns"):
+        for head, said in entries(text, title):
+            names, _, kind = head.partition(" : ")
+            if title == "Returns" and not kind:
+                names, kind = name.rsplit(".", 1)[-1], head
+            is_number = re.search(r"\bfloat|ndarray|array\b|array_like", kind) and not re.search(
+                r"\bbool|\bint\b", kind
+            )
+            if not is_number or all(_IN_NAME.search(each.strip()) for each in names.split(",")):
+                continue
+            told = " ".join((names, kind, said, summary))
+            if _UNIT.search(f"{kind} {said} {summary}") is None and _NONE_OR_GIVEN.search(told) is None:
+                bare.append(f"{title}: {head}")
+    return bare
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_parameter_is_described(package: str) -> None:
+    missing = {
+        name: found for name, thing in THINGS.items() if name.startswith(package) if (found := undescribed(name, thing))
+    }
+    assert missing == {}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_number_has_its_unit(package: str) -> None:
+    bare = {
+        name: found
+        for name, thing in THINGS.items()
+        if name.startswith(package)
+        if (found := without_unit(name, thing))
+    }
+    assert bare == {}
+
+
+def test_the_things_were_found() -> None:
+    assert {
+        "infoset.InformationSet.measure_angle",
+        "sim.simulate",
+        "guidance.Patient",
+        "rendezvous.pareto.pareto_set",
+    } <= set(THINGS)
+    assert len(THINGS) > 300
+
+
+def test_the_checks_see_what_is_missing() -> None:
+    def careless(first: float, second: float, third_m: float) -> float:
+        """Add.
+
+        Parameters
+        ----------
+        first : float
+            A number.
+        third_m : float
+
+        Returns
+        -------
+        float
+        """
+        return first + second + third_m
+
+    def brief(first: float, second_m: float) -> float:
+        """Add something to it."""
+        return first + second_m
+
+    assert undescribed("careless", careless) == ["second"]
+    assert without_unit("careless", careless) == ["Parameters: first : float", "Returns: float"]
+    assert undescribed("brief", brief) == ["first"]
