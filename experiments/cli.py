@@ -23,6 +23,7 @@ from experiments.commands.pursuit_map import pursuit_map
 from experiments.commands.reach import reach
 from experiments.commands.replay import replay
 from experiments.commands.report import report
+from experiments.commands.reproduce import reproduce
 from experiments.commands.scenarios import app as scenarios
 from experiments.commands.sweep import sweep
 from experiments.errors import InputError
@@ -81,6 +82,7 @@ app.command("pareto", epilog="Example: infoset pareto pareto-2008 --prefer y_m=0
 app.command("multipoint", epilog="Example: infoset multipoint service-3 --order best --times best --out figures")(
     multipoint
 )
+app.command("reproduce", epilog="Example: infoset reproduce --paper pareto --json numbers.json")(reproduce)
 app.add_typer(scenarios, name="scenarios")
 app.add_typer(problems, name="problems")
 

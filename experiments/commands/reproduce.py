@@ -1,0 +1,182 @@
+"""infoset reproduce: the numbers of the five papers beside ours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from experiments.commands._options import Json, Overwrite, Quiet, choice
+
+if TYPE_CHECKING:
+    from experiments.published.number import Band, PublishedNumber, Reproduction
+
+DISAGREED = 1
+"""Exit code where a number that should agree does not."""
+
+
+def reproduce(
+    paper: Annotated[
+        str | None,
+        typer.Option(
+            "--paper",
+            metavar="NAME",
+            help="One paper alone: interception, pareto, multipoint, reachability or pursuit.",
+        ),
+    ] = None,
+    json_: Json = None,
+    overwrite: Overwrite = False,
+    quiet: Quiet = False,
+) -> None:
+    """Compute every number of the five papers, and print it beside the published one.
+
+    Each number has its table or equation, the tolerance that its printed digits leave, and a verdict: agreed, misprint
+    (then what is right, and why), or not explained (then what was tried). Exit code 1 tells that a number that should
+    agree does not. Without --json nothing is written.
+    """
+    from experiments.output import STDOUT, checked_destinations, to_json, write_file
+    from experiments.published import PAPERS, reproduce_paper
+
+    chosen = PAPERS if paper is None else (choice("--paper", paper, PAPERS),)
+    with checked_destinations(files={"--json": json_}, overwrite=overwrite):
+        _tell_of_compiling(chosen, quiet)
+        from experiments.commands._screen import progress_bar
+
+        with progress_bar(quiet) as begin:
+            found = [reproduce_paper(name, begin(name)) for name in chosen]
+        json_text = to_json(_summary(found))
+        if json_ is not None and str(json_) == STDOUT:
+            typer.echo(json_text, nl=False)
+        elif json_ is not None:
+            write_file(json_, json_text, overwrite=overwrite)
+    if not quiet:
+        _show(found, str(json_) == STDOUT)
+    wrong = [number for each in found for number in each.numbers if _is_wrong(number)]
+    for number in wrong:
+        typer.echo(
+            f"disagreed: {number.paper}, {number.source}, {number.name}: printed {number.printed}, ours {number.ours}",
+            err=True,
+        )
+    if wrong:
+        raise typer.Exit(DISAGREED)
+
+
+def _is_wrong(number: PublishedNumber) -> bool:
+    from experiments.published.number import Verdict
+
+    return number.verdict is Verdict.DISAGREED
+
+
+def _tell_of_compiling(papers: Sequence[str], quiet: bool) -> None:
+    from experiments.commands._screen import (
+        tell_of_compiling,
+        tell_of_compiling_pursuit,
+        tell_of_compiling_rendezvous,
+    )
+
+    if "interception" in papers:
+        tell_of_compiling(quiet)
+    if "pareto" in papers or "multipoint" in papers:
+        tell_of_compiling_rendezvous(quiet, nonlinear="multipoint" in papers)
+    if "pursuit" in papers:
+        tell_of_compiling_pursuit(quiet)
+
+
+def _summary(found: Sequence[Reproduction]) -> dict[str, object]:
+    from experiments.output import library_version
+
+    return {"version": library_version(), "papers": [_paper(each) for each in found]}
+
+
+def _paper(reproduction: Reproduction) -> dict[str, object]:
+    from experiments.published.number import Verdict
+
+    return {
+        "paper": reproduction.paper,
+        "title": reproduction.title,
+        "problems": [{"name": name, "hash": fingerprint} for name, fingerprint in reproduction.problems],
+        "verdicts": {verdict.value: reproduction.count(verdict) for verdict in Verdict},
+        "remarks": list(reproduction.remarks),
+        "numbers": [_number(each) for each in reproduction.numbers],
+    }
+
+
+def _number(number: PublishedNumber) -> dict[str, object]:
+    finite = number.ours is not None and abs(number.ours) < float("inf")
+    return {
+        "source": number.source,
+        "name": number.name,
+        "printed": number.printed,
+        "corrected": number.corrected,
+        "ours": number.ours if finite else None,
+        "agrees_from": number.band.lowest,
+        "agrees_to": number.band.highest,
+        "verdict": number.verdict.value,
+        "note": number.note,
+    }
+
+
+def _show(found: Sequence[Reproduction], stdout_taken: bool) -> None:
+    from rich.text import Text
+
+    from experiments.commands._screen import table_console
+
+    console = table_console(stdout_taken)
+    for each in found:
+        notes = list(dict.fromkeys(number.note for number in each.numbers if number.note))
+        console.print(Text(each.title, style="bold"), soft_wrap=True)
+        console.print(_table(each, notes))
+        for place, note in enumerate(notes, start=1):
+            console.print(Text(f"[{place}] {note}."), soft_wrap=True)
+        for remark in each.remarks:
+            console.print(Text(f"* {remark}"), soft_wrap=True)
+        console.print()
+    for each in found:
+        console.print(Text(f"{each.paper}: {_counts(each)}"), soft_wrap=True)
+
+
+def _counts(reproduction: Reproduction) -> str:
+    from experiments.published.number import Verdict
+
+    counts = [f"{reproduction.count(verdict)} {verdict.value}" for verdict in Verdict if reproduction.count(verdict)]
+    return f"{len(reproduction.numbers)} numbers: {', '.join(counts)}"
+
+
+def _table(reproduction: Reproduction, notes: Sequence[str]) -> Any:
+    from rich.table import Table
+
+    table = Table("source", "number", box=None, pad_edge=False)
+    for title in ("printed", "ours", "tolerance"):
+        table.add_column(title, justify="right", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    source = ""
+    for number in reproduction.numbers:
+        told = "" if number.source == source else number.source
+        source = number.source
+        verdict = number.verdict.value + (f" [{notes.index(number.note) + 1}]" if number.note else "")
+        corrected = f" ({number.corrected})" if number.corrected not in {None, number.printed} else ""
+        cells = (f"{number.printed}{corrected}", _digits(number), _tolerance(number.band, number.printed), verdict)
+        table.add_row(told, number.name, *cells)
+    return table
+
+
+def _digits(number: PublishedNumber) -> str:
+    """Return ours with two digits more than are printed."""
+    from decimal import Decimal
+
+    if number.ours is None:
+        return "none"
+    digits = max(len(Decimal(each).as_tuple().digits) for each in (number.printed, number.corrected or number.printed))
+    if "e" in number.printed:
+        return f"{number.ours:.{digits + 1}e}"
+    exponent = Decimal(number.corrected or number.printed).as_tuple().exponent
+    assert isinstance(exponent, int)
+    return f"{number.ours + 0.0:.{max(0, -exponent) + 2}f}"
+
+
+def _tolerance(band: Band, printed: str) -> str:
+    below, above = float(printed) - band.lowest, band.highest - float(printed)
+    if abs(above - below) <= 1e-3 * max(above, below):
+        return f"{0.5 * (below + above):.2g}"
+    return f"{band.lowest:.4g} .. {band.highest:.4g}"
