@@ -107,6 +107,8 @@ def samples(folder: CampaignFolder, cell: int | None = None, levels: Sequence[fl
             if known.size:
                 quantiles[noise][quantity] = estimate_quantiles(known, levels)
                 worst[noise][quantity] = float(known.max())
+            del known
+        del values  # before the next is read, not after
     return [
         Sample(
             noise,
