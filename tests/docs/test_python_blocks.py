@@ -13,11 +13,8 @@ import pytest
 if TYPE_CHECKING:
     from tests.docs.conftest import Page
 
-REDUCED = ((r"\bruns=[\d_]+", "runs=4"), (r"\bprobes=\d+", "probes=2"))
+REDUCED = ((r"\bruns=[\d_]+", "runs=4"),)
 """How blocks are made smaller before they are run."""
-
-SLOW = ("docs/campaigns.md", "docs/pursuit.md", "docs/multipoint.md")
-"""Pages whose blocks are run with -m slow only."""
 
 
 def run_blocks(page: Page) -> None:
@@ -39,15 +36,6 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_blocks_run(page: Page) -> None:
-    if page.name not in SLOW:
-        run_blocks(page)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", SLOW)
-def test_slow_blocks_run(name: str, pages: list[Page]) -> None:
-    (page,) = (each for each in pages if each.name == name)
-    assert page.blocks("python")
     run_blocks(page)
 
 
