@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from experiments.commands._options import Json, Overwrite, Quiet, choice
 
 if TYPE_CHECKING:
-    from experiments.published.number import Band, PublishedNumber, Reproduction
+    from rich.table import Table
+
+    from experiments.published.number import PublishedNumber, Reproduction
 
 DISAGREED = 1
 """Exit code where a number that should agree does not."""
@@ -32,8 +34,9 @@ def reproduce(
     """Compute every number of the five papers, and print it beside the published one.
 
     Each number has its table or equation, the tolerance that its printed digits leave, and a verdict: agreed, misprint
-    (then what is right, and why), or not explained (then what was tried). Exit code 1 tells that a number that should
-    agree does not. Without --json nothing is written.
+    (with what is right, and why), or not explained (with what was tried). Exit code 1 tells that a number that should
+    agree does not. Where a paper prints no results, reference values stand in their place. Without --json nothing is
+    written.
     """
     from experiments.output import STDOUT, checked_destinations, to_json, write_file
     from experiments.published import PAPERS, reproduce_paper
@@ -112,6 +115,7 @@ def _number(number: PublishedNumber) -> dict[str, object]:
         "ours": number.ours if finite else None,
         "agrees_from": number.band.lowest,
         "agrees_to": number.band.highest,
+        "agrees_by": "ours" if number.spread is None else "printed",
         "verdict": number.verdict.value,
         "note": number.note,
     }
@@ -128,7 +132,7 @@ def _show(found: Sequence[Reproduction], stdout_taken: bool) -> None:
         console.print(Text(each.title, style="bold"), soft_wrap=True)
         console.print(_table(each, notes))
         for place, note in enumerate(notes, start=1):
-            console.print(Text(f"[{place}] {note}."), soft_wrap=True)
+            console.print(Text(f"({place}) {note}."), soft_wrap=True)
         for remark in each.remarks:
             console.print(Text(f"* {remark}"), soft_wrap=True)
         console.print()
@@ -143,40 +147,50 @@ def _counts(reproduction: Reproduction) -> str:
     return f"{len(reproduction.numbers)} numbers: {', '.join(counts)}"
 
 
-def _table(reproduction: Reproduction, notes: Sequence[str]) -> Any:
-    from rich.table import Table
+def _table(reproduction: Reproduction, notes: Sequence[str]) -> Table:
+    from itertools import groupby
 
-    table = Table("source", "number", box=None, pad_edge=False)
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False)
+    table.add_column("number", min_width=16, overflow="fold")
     for title in ("printed", "ours", "tolerance"):
         table.add_column(title, justify="right", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
-    source = ""
-    for number in reproduction.numbers:
-        told = "" if number.source == source else number.source
-        source = number.source
-        verdict = number.verdict.value + (f" [{notes.index(number.note) + 1}]" if number.note else "")
-        corrected = f" ({number.corrected})" if number.corrected not in {None, number.printed} else ""
-        cells = (f"{number.printed}{corrected}", _digits(number), _tolerance(number.band, number.printed), verdict)
-        table.add_row(told, number.name, *cells)
+    table.add_column("verdict", min_width=13)
+    for source, numbers in groupby(reproduction.numbers, lambda number: number.source):
+        table.add_row(Text(source, style="bold"))
+        for number in numbers:
+            note = f" ({notes.index(number.note) + 1})" if number.note else ""
+            mended = f"\n({number.corrected})" if number.corrected not in {None, number.printed} else ""
+            table.add_row(
+                number.name,
+                f"{number.printed}{mended}",
+                _digits(number),
+                _tolerance(number),
+                f"{number.verdict.value}{note}",
+            )
     return table
 
 
 def _digits(number: PublishedNumber) -> str:
-    """Return ours with two digits more than are printed."""
+    """Return ours with a digit or two more than are printed."""
     from decimal import Decimal
 
     if number.ours is None:
         return "none"
-    digits = max(len(Decimal(each).as_tuple().digits) for each in (number.printed, number.corrected or number.printed))
-    if "e" in number.printed:
-        return f"{number.ours:.{digits + 1}e}"
-    exponent = Decimal(number.corrected or number.printed).as_tuple().exponent
-    assert isinstance(exponent, int)
-    return f"{number.ours + 0.0:.{max(0, -exponent) + 2}f}"
+    known = Decimal(number.corrected or number.printed).as_tuple()
+    assert isinstance(known.exponent, int)
+    if "e" in number.printed and number.ours:
+        text = f"{number.ours:.{len(known.digits)}e}"
+    else:
+        text = f"{number.ours:.{max(0, -known.exponent) + 2}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
 
 
-def _tolerance(band: Band, printed: str) -> str:
-    below, above = float(printed) - band.lowest, band.highest - float(printed)
-    if abs(above - below) <= 1e-3 * max(above, below):
+def _tolerance(number: PublishedNumber) -> str:
+    band, printed = number.band, float(number.printed)
+    below, above = printed - band.lowest, band.highest - printed
+    if number.spread is None and abs(above - below) <= 1e-3 * max(above, below):
         return f"{0.5 * (below + above):.2g}"
-    return f"{band.lowest:.4g} .. {band.highest:.4g}"
+    return f"{band.lowest:.3g} .. {band.highest:.3g}"

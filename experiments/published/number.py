@@ -91,6 +91,9 @@ class PublishedNumber:
         Whether it is known to differ without a known reason.
     note : str
         Of a misprint what is right and why; of what is not explained what was tried.
+    spread : Band or None
+        Where most of ours lie, where ours is the median of many runs and the printed number is one run: that must lie
+        there then, in place of ours in the band.
     """
 
     paper: str
@@ -103,6 +106,7 @@ class PublishedNumber:
     corrected: str | None = None
     unexplained: bool = False
     note: str = ""
+    spread: Band | None = None
 
     @property
     def verdict(self) -> Verdict:
@@ -112,7 +116,7 @@ class PublishedNumber:
         known = Verdict.NOT_EXPLAINED if self.unexplained else Verdict.MISPRINT
         if self.right is not None:
             return known if self.ours in self.right else Verdict.DISAGREED
-        if self.ours in self.band:
+        if float(self.printed) in self.spread if self.spread is not None else self.ours in self.band:
             return Verdict.AGREED
         return Verdict.NOT_EXPLAINED if self.unexplained else Verdict.DISAGREED
 

@@ -254,14 +254,14 @@ def _costs(solution: EncounterSolution) -> list[PublishedNumber]:
         rest = cost.ideal_cost_squared + float(cost.excess(np.zeros(2)))
         quadratics.append([cost.matrix[1, 1], slope[1], cost.matrix[0, 0], slope[0], rest])
     numbers = [
-        _number("(3.1)", f"{craft}, coefficient of {term}", text, float(ours))
+        _number("(3.1)", f"{craft}, {term} (SI)", text, float(ours))
         for craft, texts, found in zip(_CRAFT, _QUADRATICS, quadratics, strict=True)
         for term, text, ours in zip(_TERMS, texts, found, strict=True)
     ]
     norm = np.sum(quadratics, axis=0)
     norm[-1] -= sum(cost.ideal_cost_squared for cost in solution.costs)
     numbers += [
-        _REFERENCE.number("(3.2)", f"coefficient of {term}", text, float(ours))
+        _REFERENCE.number("(3.2)", f"norm, {term} (SI)", text, float(ours))
         for term, text, ours in zip(_TERMS, _NORM, norm, strict=True)
     ]
     least = [cost.ideal_cost_squared for cost in solution.costs]

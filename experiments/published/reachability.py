@@ -41,7 +41,7 @@ _NOTES = {
     "misprint": "the states beside it follow from the other value",
     "contradicted": (
         "its states follow from 0.0000 to within what their rounding leaves open, and the printed controls lead past "
-        "zero by 11 and 18 m. That a tenth was meant fits the states no better"
+        "zero by 11 and 18 m. A tenth of them fits worse than none"
     ),
     "nonlinear": (
         "does not follow from (1). Tried: (1) integrated to 1e-12 on the orbit that the linear columns belong to, from "
