@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.multipoint_file import load_multipoint
-from experiments.published.number import Progress, PublishedNumber, Reference, Reproduction
+from experiments.published.number import COMPUTED, Progress, PublishedNumber, Reference, Reproduction
 from rendezvous.multipoint import (
     DriftingTargets,
     KeplerTargets,
@@ -37,7 +37,7 @@ REMARKS = (
     "B_2 of the elimination for N = 2 is R43(t2, t1) alone; costates between nodes have R33, R34, R43 and R44 where "
     "R32 is printed; the line on jumps has the sign that (11) has not.",
 )
-_REFERENCE = Reference(PAPER)
+_REFERENCE = Reference(PAPER, COMPUTED)
 _FLYBYS = {
     2: {
         "I (m^2/s^3)": ("0.007795510261",),

@@ -14,6 +14,9 @@ ROUNDED = 0.5
 CUT_OR_ROUNDED = 1.0
 """The same where a paper rounds some numbers and cuts others off."""
 
+COMPUTED = 1.0
+"""The same of a reference value of ten digits or more, whose own last one has the error of another computation."""
+
 
 class Verdict(Enum):
     """What a published number beside ours comes to."""

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from experiments.published.number import Progress, PublishedNumber, Reference, Reproduction
+from experiments.published.number import COMPUTED, Progress, PublishedNumber, Reference, Reproduction
 from experiments.pursuit_file import load_problem
 from rendezvous.linear_game import (
     Thruster,
@@ -25,7 +25,7 @@ REMARKS = (
     "c = 350 s is the specific impulse; the exhaust speed is 350 x 9.80665 m/s.",
     "The equation of lambda_r lost the factor (lambda_v . r), that of lambda_m lost k.",
 )
-_REFERENCE = Reference(PAPER)
+_REFERENCE = Reference(PAPER, COMPUTED)
 _MU_M3_S2 = 398600.4418e9
 _GEO_M = 42166e3
 _EXHAUST_M_S = 350.0 * 9.80665
