@@ -81,7 +81,7 @@ def _tell_of_compiling(papers: Sequence[str], quiet: bool) -> None:
     if "interception" in papers:
         tell_of_compiling(quiet)
     if "pareto" in papers or "multipoint" in papers:
-        tell_of_compiling_rendezvous(quiet, nonlinear="multipoint" in papers)
+        tell_of_compiling_rendezvous(quiet)
     if "pursuit" in papers:
         tell_of_compiling_pursuit(quiet)
 
