@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[2]
 
 REDUCED = (
+    (r"^infoset experiment\b(?!.* --runs)", "infoset experiment --runs 4"),
     (r"--runs \d+", "--runs 4"),
     (r"--single-runs \d+", "--single-runs 2"),
     (r"--engagements (\d+|N)", "--engagements 8"),
