@@ -158,6 +158,8 @@ html_title = "infoset"
 html_context = {"default_mode": "auto"}
 html_static_path = ["_static"]
 html_css_files = ["infoset.css"]
+# Pages that stand alone have nothing to list beside them.
+html_sidebars = {"index": [], "start": [], "glossary": []}
 html_copy_source = False
 html_show_sourcelink = False
 html_theme_options = {
