@@ -64,7 +64,7 @@ def short_file(short: Scenario, tmp_path: Path, infoset: Infoset) -> Path:
 
 def test_bound_into_a_folder(infoset: Infoset, short: Scenario, short_file: Path, tmp_path: Path) -> None:
     folder = tmp_path / "results"
-    code, out, err = infoset(short_file, "--out", folder, "--model", "guaranteed", "--budget", 40)
+    code, out, err = infoset(short_file, "--out", folder, "--model", "guaranteed", "--budget", 8)
     assert (code, err) == (0, "")
     assert sorted(each.name for each in folder.iterdir()) == FILES
     found = json.loads((folder / "results.json").read_text())
