@@ -3,7 +3,6 @@ from __future__ import annotations
 import json
 import os
 import random
-import re
 import signal
 import subprocess
 import sys
@@ -463,17 +462,3 @@ def _parent(process: int) -> int:
         return int((Path("/proc") / str(process) / "stat").read_text().rpartition(")")[2].split()[1])
     except OSError:
         return 0
-
-
-def test_the_python_of_the_documentation_runs(tmp_path: Path) -> None:
-    text = (Path(__file__).resolve().parents[2] / "docs" / "campaigns.md").read_text(encoding="utf-8")
-    (block,) = re.findall(r"^```python\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE)
-    assert "runs=10_000" in block
-    assert "result.to_pandas()" in block
-    kept = [line for line in block.replace("runs=10_000", "runs=8").splitlines() if "to_pandas" not in line]
-    (tmp_path / "example.py").write_text("\n".join(kept))
-    done = subprocess.run([sys.executable, "example.py"], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "miss_m: double" in done.stdout
-    assert "QuantileEstimate(level=0.99" in done.stdout
-    assert len(CampaignFolder.read(tmp_path / "runs").table()) == 8
