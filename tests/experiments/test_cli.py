@@ -464,11 +464,8 @@ def test_interrupted(infoset: Command, monkeypatch: pytest.MonkeyPatch, tmp_path
 
     monkeypatch.setattr("sim.simulate", interrupt)
     code, out, err = infoset("experiment", "--out", "out")
-    assert (code, out, err.splitlines()[-1]) == (
-        130,
-        "",
-        "interrupted",
-    )  # before it, perhaps, that kernels are compiled
+    # Before it, perhaps, that kernels are compiled.
+    assert (code, out, err.splitlines()[-1]) == (130, "", "interrupted")
     assert names_in(tmp_path) == []
 
 
