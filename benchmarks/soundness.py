@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from experiments.scenario_file import load_scenario
 from guidance import GameNoise, LineOfSight, Measurement, MeasurementNoise, NoiseKind, RandomNoise, TieRule
+from guidance.pair_noise import middle
 from infoset import InformationSetView, InitialSet, Model
 from sim import Manoeuvre, Outcome, Scenario, Target
 from sim.draws import Draws, draw
@@ -31,15 +32,13 @@ KINDS = ("random", "game, upper", "game, lower", "game, alternate", "game, rando
 
 
 @dataclass(frozen=True)
-class PairNoise:
+class BoundedPairNoise:
     """Engagements 2 k and 2 k + 1 are shown the angle between their two, as far as both bounds allow."""
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
         """Show each the middle."""
-        partner = np.arange(sight.alpha_rad.size) ^ 1
-        middle = 0.5 * (sight.alpha_rad + sight.alpha_rad[partner])
         bound = sight.angle_sensor.error_bound(sight.range_m)
-        alpha = np.clip(middle, sight.alpha_rad - bound, sight.alpha_rad + bound)
+        alpha = np.clip(middle(sight.alpha_rad), sight.alpha_rad - bound, sight.alpha_rad + bound)
         return Measurement(alpha, None if sight.range_error is None else sight.range_m.copy())
 
 
@@ -76,7 +75,7 @@ def every_noise(draws: Draws) -> MixedNoise:
             *(GameNoise(tie, draws.tie) for tie in (TieRule.UPPER, TieRule.LOWER, TieRule.ALTERNATE, TieRule.RANDOM)),
             RandomNoise(signs, range_signs),
             RandomNoise(constant, range_signs[:, :1] + np.zeros_like(signs)),
-            PairNoise(),
+            BoundedPairNoise(),
         )
     )
 

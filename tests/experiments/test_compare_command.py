@@ -216,7 +216,9 @@ def test_misses_of_zero_can_be_drawn(compared: list[Comparison]) -> None:
         )
         for each in compared
     ]
-    draw_comparison(exact).canvas.draw()
+    figure = draw_comparison(exact)
+    figure.canvas.draw()
+    assert all(np.isfinite([*axes.get_xlim(), *axes.get_ylim()]).all() for axes in figure.axes)
 
 
 def test_a_comparison_of_nothing_cannot_be_drawn() -> None:

@@ -192,7 +192,13 @@ def made_up(curve: Curve, runs: int) -> Results:
 
 def test_equal_values_are_drawn(curves: list[Curve], tmp_path: Path) -> None:
     results = replace(curves[0].results, miss_m=np.zeros(RUNS), impulse_m_s=np.full(RUNS, 5.0))
-    save_figure(draw_distributions([replace(curves[0], results=results)]), tmp_path, "equal")
+    figure = draw_distributions([replace(curves[0], results=results)])
+    files = save_figure(figure, tmp_path, "equal")
+    assert [path.name for path in files] == ["equal.pdf", "equal.png"]
+    for axes, value in zip(figure.axes, (0.0, 5.0), strict=False):
+        least, greatest = axes.get_xlim()
+        assert least <= value <= greatest
+        assert least < greatest
 
 
 def test_files_are_written_twice_the_same(curves: list[Curve], tmp_path: Path) -> None:

@@ -85,7 +85,9 @@ def test_predicted_misses_show_their_ends(model: SetModel) -> None:
     ],
 )
 def test_any_polygon_has_a_picture(polygons: ConvexPolygons) -> None:
-    parsed(polygons._repr_svg_())
+    picture = parsed(polygons._repr_svg_())
+    assert picture.tag == f"{SVG}svg"
+    assert not re.search(r"\b(nan|inf)", polygons._repr_svg_())
 
 
 def test_an_engagement_shows_its_course(record: Record) -> None:
