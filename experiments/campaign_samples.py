@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -88,52 +88,54 @@ def samples(folder: CampaignFolder, cell: int | None = None, levels: Sequence[fl
 
     Notes
     -----
-    One column is in memory at a time, 8 bytes an engagement, and a sorted copy of it.
+    One quantity of one noise is in memory at a time, 8 bytes an engagement, and a sorted copy of it.
     """
-    flags = noise_flags(folder, cell)
-    outcomes = folder.codes("outcome", OUTCOMES, cell)
-    runs = {noise: int(np.size(outcomes[rows])) for noise, rows in flags.items()}
-    counted = {noise: np.bincount(outcomes[rows], minlength=len(OUTCOMES)) for noise, rows in flags.items()}
-    quantiles: dict[str, dict[str, list[QuantileEstimate]]] = {noise: {} for noise in flags}
-    worst: dict[str, dict[str, float]] = {noise: {} for noise in flags}
-    margin = folder.numbers("truth_margin", cell)
-    kept = {noise: int((margin[rows].filled(0.0) >= 0.0).sum()) for noise, rows in flags.items()}
-    del margin
-    held = _held(folder, flags, cell)
+    noises = noises_of(folder)
+    told = {noise: _Tally() for noise in noises}
+    guarantees = folder.manifest.guarantee and folder.manifest.scenario.set_model.is_guaranteed
+    columns = ["truth_margin", *(("miss_m", "guaranteed_miss_m") if guarantees else ())]
+    for numbers, codes in folder.shards(columns, {"noise": noises, "outcome": OUTCOMES}, cell):
+        for place, tally in enumerate(told.values()):
+            rows = codes["noise"] == place
+            tally.outcomes += np.bincount(codes["outcome"][rows], minlength=len(OUTCOMES))
+            tally.truth_kept += int((numbers["truth_margin"][rows].filled(0.0) >= 0.0).sum())
+            if guarantees:
+                guaranteed = numbers["guaranteed_miss_m"][rows]
+                tally.phi_known += int(guaranteed.count())
+                tally.phi_held += int((numbers["miss_m"][rows].data <= guaranteed.filled(-np.inf)).sum())
+    quantiles: dict[str, dict[str, list[QuantileEstimate]]] = {noise: {} for noise in noises}
+    worst: dict[str, dict[str, float]] = {noise: {} for noise in noises}
     for quantity in QUANTITIES:
-        values = folder.numbers(quantity, cell)
-        for noise, rows in flags.items():
-            known = values[rows].compressed()
+        for noise in noises:
+            known = folder.sample(quantity, noise, cell)
             if known.size:
                 quantiles[noise][quantity] = estimate_quantiles(known, levels)
                 worst[noise][quantity] = float(known.max())
-            del known
-        del values  # before the next is read, not after
+            del known  # before the next is read, not after
     return [
         Sample(
             noise,
-            runs[noise],
+            int(tally.outcomes.sum()),
             quantiles[noise],
             worst[noise],
-            {name: int(count) for name, count in zip(OUTCOMES, counted[noise], strict=True) if count},
-            kept[noise],
-            *held[noise],
+            {name: int(count) for name, count in zip(OUTCOMES, tally.outcomes, strict=True) if count},
+            tally.truth_kept,
+            tally.phi_held,
+            tally.phi_known,
         )
-        for noise in flags
-        if runs[noise]
+        for noise, tally in told.items()
+        if tally.outcomes.any()
     ]
 
 
-def _held(
-    folder: CampaignFolder, flags: Mapping[str, NDArray[np.bool_] | slice], cell: int | None
-) -> dict[str, tuple[int, int]]:
-    """How many guaranteed misses held, and how many there are, by noise."""
-    if not (folder.manifest.guarantee and folder.manifest.scenario.set_model.is_guaranteed):
-        return dict.fromkeys(flags, (0, 0))
-    miss, guaranteed = folder.numbers("miss_m", cell).data, folder.numbers("guaranteed_miss_m", cell)
-    known = ~np.ma.getmaskarray(guaranteed)
-    within = known & (miss <= guaranteed.data)
-    return {noise: (int(within[rows].sum()), int(known[rows].sum())) for noise, rows in flags.items()}
+@dataclass
+class _Tally:
+    """What is counted of the rows of a noise, shard by shard."""
+
+    outcomes: NDArray[np.int64] = field(default_factory=lambda: np.zeros(len(OUTCOMES), dtype=np.int64))
+    truth_kept: int = 0
+    phi_held: int = 0
+    phi_known: int = 0
 
 
 def heading(folder: CampaignFolder) -> dict[str, Any]:

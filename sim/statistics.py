@@ -152,18 +152,18 @@ def estimate_quantiles(sample: ArrayLike, levels: Sequence[float], confidence: f
         raise ValueError("quantiles need at least one value, all finite")
     if not 0.0 < confidence < 1.0 or not all(0.0 <= level <= 1.0 for level in levels):
         raise ValueError(f"levels must lie in [0, 1], the confidence between 0 and 1: got {levels}, {confidence}")
-    found = []
-    for level, value in zip(levels, np.quantile(values, levels), strict=True):
-        lower, upper = order_statistics(values.size, level, confidence)
-        found.append(
-            QuantileEstimate(
-                level,
-                float(value),
-                float(values[lower - 1]) if lower >= 1 else None,
-                float(values[upper - 1]) if upper <= values.size else None,
-            )
+    bounds = [
+        (
+            float(values[lower - 1]) if lower >= 1 else None,
+            float(values[upper - 1]) if upper <= values.size else None,
         )
-    return found
+        for lower, upper in (order_statistics(values.size, level, confidence) for level in levels)
+    ]
+    # The copy that was sorted is spent on the quantiles: another one of a million values is memory.
+    wanted = np.quantile(values, levels, overwrite_input=True)
+    return [
+        QuantileEstimate(level, float(value), *ends) for level, value, ends in zip(levels, wanted, bounds, strict=True)
+    ]
 
 
 def order_statistics(size: int, level: float, confidence: float) -> tuple[int, int]:

@@ -22,6 +22,7 @@ from sim.storage.folder_lock import LOCK, FolderLock
 from sim.storage.manifest import MANIFEST, Manifest, need_same, read_manifest, write_manifest
 
 Numbers = np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]
+Codes = NDArray[np.int8]
 
 SHARDS = "shards"
 BEYOND = "beyond"
@@ -260,32 +261,66 @@ class CampaignFolder:
         with self._reading():
             return self._read(self._files_of(cell), columns)
 
+    def shards(
+        self, quantities: Sequence[str], texts: Mapping[str, Sequence[str]], cell: int | None = None
+    ) -> Iterator[tuple[dict[str, Numbers], dict[str, Codes]]]:
+        """Return columns shard by shard, in the order of cells and runs: one shard is in memory at a time.
+
+        Parameters
+        ----------
+        quantities : sequence of str
+            Columns of numbers.
+        texts : mapping of str to sequence of str
+            Columns of text, each with what it can say.
+        cell : int or None
+            None is all of them.
+
+        Yields
+        ------
+        tuple of dict
+            Numbers, masked where they are null; and texts as places in the list of what they can say, -1 where they say
+            none of it.
+
+        Raises
+        ------
+        DamagedError
+            If a shard has changed since the folder was opened.
+        """
+        for index in self._wanted(cell):
+            with self._reading():
+                part = self._columns_of(index, quantities, texts)
+            yield part
+
+    def sample(self, quantity: str, noise: str, cell: int | None = None) -> NDArray[np.float64]:
+        """Return what is known of a quantity under a noise, in the order of cells and runs."""
+        # Room for all rows: the pages that are never written cost nothing.
+        found, size = np.empty(sum(self._size(index) for index in self._wanted(cell))), 0
+        for numbers, codes in self.shards([quantity], {"noise": [noise]}, cell):
+            (known,) = _by_noise(numbers[quantity], codes["noise"], 1)
+            found[size : size + known.size] = known
+            size += known.size
+        return found[:size]
+
     def chunk_samples(self, index: int, quantity: str, noises: Sequence[str]) -> list[NDArray[np.float64]]:
         """Return what is known of a quantity in a finished chunk, a sample a noise."""
-        table = self._read([self._files[index]], [quantity, "noise"])
-        values, places = self._tables.numbers(table, quantity), self._tables.codes(table, "noise", noises)
-        known = ~np.ma.getmaskarray(values)
-        return [values.data[known & (places == place)] for place in range(len(noises))]
+        with self._reading():
+            numbers, codes = self._columns_of(index, [quantity], {"noise": noises})
+        return _by_noise(numbers[quantity], codes["noise"], len(noises))
 
     def numbers(self, name: str, cell: int | None = None) -> Numbers:
         """Return a column of numbers, masked where it is null."""
-        with self._reading():
-            # Shard by shard: the column is in memory once.
-            files = self._files_of(cell)
-            sizes = [self._size(index) for index in self._wanted(cell)]
-            values, unknown = np.empty(sum(sizes)), np.empty(sum(sizes), dtype=bool)
-            first = 0
-            for file, size in zip(files, sizes, strict=True):
-                part = self._tables.numbers(self._read([file], [name]), name)
-                values[first : first + size] = part.data
-                unknown[first : first + size] = np.ma.getmaskarray(part)
-                first += size
+        size = sum(self._size(index) for index in self._wanted(cell))
+        values, unknown, first = np.empty(size), np.empty(size, dtype=bool), 0
+        for numbers, _ in self.shards([name], {}, cell):
+            part = numbers[name]
+            values[first : first + part.size] = part.data
+            unknown[first : first + part.size] = np.ma.getmaskarray(part)
+            first += part.size
         return np.ma.MaskedArray(values, mask=unknown)
 
-    def codes(self, name: str, known: Sequence[str], cell: int | None = None) -> NDArray[np.int8]:
+    def codes(self, name: str, known: Sequence[str], cell: int | None = None) -> Codes:
         """Return a column of text as places in a list of what it can say; -1 where it says none of them."""
-        with self._reading():
-            parts = [self._tables.codes(self._read([file], [name]), name, known) for file in self._files_of(cell)]
+        parts = [codes[name] for _, codes in self.shards([], {name: known}, cell)]
         return np.concatenate(parts) if parts else np.zeros(0, dtype=np.int8)
 
     def at(self, places: Sequence[int], cell: int | None = None) -> list[dict[str, Any]]:
@@ -303,6 +338,15 @@ class CampaignFolder:
 
     def _files_of(self, cell: int | None) -> list[Path]:
         return [self._files[index] for index in self._wanted(cell)]
+
+    def _columns_of(
+        self, index: int, quantities: Sequence[str], texts: Mapping[str, Sequence[str]]
+    ) -> tuple[dict[str, Numbers], dict[str, Codes]]:
+        table = self._read([self._files[index]], [*quantities, *texts])
+        return (
+            {name: self._tables.numbers(table, name) for name in quantities},
+            {name: self._tables.codes(table, name, known) for name, known in texts.items()},
+        )
 
     def _read(self, files: Sequence[Path], columns: Sequence[str] | None) -> Any:
         return self._tables.read(files, columns, with_cell=bool(self.manifest.axes))
@@ -360,6 +404,12 @@ class CampaignFolder:
         if told.get("campaign") != self.manifest.identity or told.get("chunk") != str(index):
             return "belongs to another campaign"
         return None if rows == self._size(index) else f"has {rows} rows in place of {self._size(index)}"
+
+
+def _by_noise(values: Numbers, places: Codes, noises: int) -> list[NDArray[np.float64]]:
+    """What is known of the values of each noise."""
+    known = ~np.ma.getmaskarray(values)
+    return [values.data[known & (places == place)] for place in range(noises)]
 
 
 def need_arrow() -> ModuleType:
