@@ -33,6 +33,7 @@ from sim import Inconsistency, Outcome, Record, Results, Scenario, StepRecord
 FORMAT = "infoset-record"
 SCHEMA = 2
 LARGEST_FILE_BYTES = 1 << 30
+LARGEST_HEADER_BYTES = 1_000_000
 LONGEST_NAME = 200
 REMEDY = "make a record with `infoset engage --record FILE.npz`"
 
@@ -66,6 +67,8 @@ _MEMBERS: Mapping[str, tuple[str, int]] = {
     "vertex_v_m_s_z_m": (_FLOAT, _VERTICES_2),
 }
 """Type and shape of each member."""
+_LISTED_MEMBER = b"PK\x01\x02"
+"""How an entry of an archive's list of members begins."""
 
 
 class _UnsoundError(Exception):
@@ -273,6 +276,8 @@ def _pack(arrays: Arrays) -> bytes:
 
 def _unpack(content: bytes) -> Arrays:
     """Read the members of an archive, none of which can be larger than the file."""
+    if content.count(_LISTED_MEMBER) > 2 * len(_MEMBERS):  # numbers may look like one, too
+        raise _UnsoundError("it has more members than any record")
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             members = archive.infolist()
@@ -326,6 +331,8 @@ def _read_array(member: bytes, filename: str) -> NDArray[Any]:
 
 
 def _read_header(header: NDArray[Any]) -> dict[str, Any]:
+    if header.size > LARGEST_HEADER_BYTES:
+        raise _UnsoundError("its header is too long")
     try:
         found = json.loads(header.tobytes().decode())
     except (ValueError, RecursionError):

@@ -19,11 +19,10 @@ from experiments.errors import InputError
 from experiments.scenario_file import read_scenario, scenario_to_toml
 from experiments.toml_values import LARGEST, nearest, number_text, shown
 from sim.scenario import Scenario
-from sim.storage import Axis
+from sim.storage import MOST_CELLS, Axis
 
 MOST_AXES = 4
 MOST_VALUES = 1000
-MOST_CELLS = 10_000
 EXAMPLE = "--vary angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:8,thruster.greatest_impulse_m_s=2:20:7"
 
 _PLACES = Context(prec=12)

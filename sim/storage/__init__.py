@@ -9,9 +9,10 @@ from sim.storage.errors import (
     OccupiedError,
     StorageError,
 )
-from sim.storage.manifest import Axis, Manifest, read_manifest
+from sim.storage.manifest import MOST_CELLS, Axis, Manifest, read_manifest
 
 __all__ = [
+    "MOST_CELLS",
     "Axis",
     "CampaignFolder",
     "Damage",

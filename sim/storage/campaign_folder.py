@@ -386,24 +386,26 @@ class CampaignFolder:
             reason = self._unsound(file, index, int(matched[2], 16))
             if reason is None:
                 self._files[index] = file
-            elif reason is not None:
+            else:
                 self.damaged.append(Damage(file, reason))
 
     def _unsound(self, file: Path, index: int, checksum: int) -> str | None:
         """What is wrong with a shard, or None."""
+        rows = self._size(index)
         try:
+            if not file.is_file():
+                return "is no ordinary file"
+            size, most = file.stat().st_size, self._tables.largest_file(rows)
+            if size > most:
+                return f"has {size} bytes, more than any shard of {rows} rows"
             content = file.read_bytes()
         except OSError as error:
             return f"cannot be read: {error.strerror}"
         if zlib.crc32(content) != checksum:
             return f"is cut short or changed: {len(content)} bytes whose checksum is not the one of its name"
-        found = self._tables.metadata(content)
-        if found is None:
-            return "is no Parquet file"
-        told, rows = found
-        if told.get("campaign") != self.manifest.identity or told.get("chunk") != str(index):
-            return "belongs to another campaign"
-        return None if rows == self._size(index) else f"has {rows} rows in place of {self._size(index)}"
+        told = {"campaign": self.manifest.identity, "chunk": str(index)}
+        reason: str | None = self._tables.fault(content, told, rows, with_cell=bool(self.manifest.axes))
+        return reason
 
 
 def _by_noise(values: Numbers, places: Codes, noises: int) -> list[NDArray[np.float64]]:

@@ -22,6 +22,8 @@ SCHEMA = 1
 MANIFEST = "manifest.json"
 LARGEST_BYTES = 10_000_000
 MOST_DIFFERENCES = 20
+MOST_CELLS = 10_000
+MOST_RUNS_A_SHARD = 1_000_000
 
 _NOISES = ("random", "game", "mixed")
 _SCALES = ("linear", "log")
@@ -90,6 +92,12 @@ class Manifest:
     stopped_after: int | None = None
     made_by: Mapping[str, str] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        if self.chunk > MOST_RUNS_A_SHARD:
+            raise ValueError(f"chunk: must be at most {MOST_RUNS_A_SHARD} engagements a shard, found {self.chunk}")
+        if self.cells > MOST_CELLS:
+            raise ValueError(f"axes: make {self.cells} cells, and at most {MOST_CELLS} can be")
+
     @property
     def cells(self) -> int:
         """Number of scenarios flown."""
@@ -133,7 +141,7 @@ class Manifest:
     def to_json(self) -> dict[str, Any]:
         """Return everything, as it stands in the file."""
         decisive = self.decisive()
-        return {
+        value = {
             "format": decisive.pop("format"),
             "schema": decisive.pop("schema"),
             "version": self.versions.get("infoset", ""),
@@ -146,6 +154,13 @@ class Manifest:
             **decisive,
             "made_by": dict(self.made_by),
         }
+        return {**value, "sha256": checksum(value)}
+
+
+def checksum(value: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of everything in a manifest but itself."""
+    rest = {key: each for key, each in value.items() if key != "sha256"}
+    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
 
 
 def made_here() -> dict[str, str]:
@@ -187,7 +202,10 @@ def read_manifest(folder: Path) -> Manifest:
             raise ValueError(f"its format is not {FORMAT}")
         if value.get("schema") != SCHEMA:
             raise ValueError(f"schema: must be {SCHEMA}, the only one this version reads, found {value.get('schema')}")
-        return _from_json(value)
+        found = _from_json(value)
+        if value["sha256"] != checksum(value):
+            raise ValueError("it is not what was written (the checksum differs): the file is damaged")
+        return found
     except (ValueError, RecursionError, KeyError, TypeError) as error:
         said = f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)
         raise ManifestError(f"{file}: is no manifest of a campaign: {said[:300]}") from None

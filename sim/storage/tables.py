@@ -12,12 +12,16 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from guidance import NoiseKind
+from guidance import NoiseKind, TieRule
 from sim.chunk import Chunk
-from sim.results import Results
+from sim.results import Outcome, Results
+from sim.storage.parquet_pages import claimed_bytes
 
 SCHEMA_VERSION = 1
 M_PER_KM = 1e3
+MOST_BYTES_A_ROW = 120
+"""A row takes about 80, and would take 115 with its text written out."""
+BYTES_BESIDE_ROWS = 100_000
 
 _COLUMNS: tuple[tuple[str, Any, str, str], ...] = (
     ("run", pa.int64(), "", "number of the run"),
@@ -34,6 +38,12 @@ _COLUMNS: tuple[tuple[str, Any, str, str], ...] = (
     ("vz_km_s", pa.float64(), "km/s", "its speed across"),
     ("vx_km_s", pa.float64(), "km/s", "its speed along"),
 )
+_TEXTS: Mapping[str, frozenset[str | None]] = {
+    "noise": frozenset(each.value for each in NoiseKind),
+    "tie": frozenset(each.value for each in TieRule),
+    "outcome": frozenset(each.value for each in Outcome),
+}
+"""Columns of text, and all that they can say."""
 _CELL = ("cell", pa.int32(), "", "number of the cell of the sweep")
 _NULLABLE = ("tie", "guaranteed_miss_m", "truth_margin")
 
@@ -109,14 +119,65 @@ def to_bytes(table: Any, extra: Mapping[str, str]) -> bytes:
     return bytes(sink.getvalue().to_pybytes())
 
 
-def metadata(content: bytes) -> tuple[dict[str, str], int] | None:
-    """Return the metadata and the number of rows of a Parquet file; None if it is none."""
+def largest_file(rows: int) -> int:
+    """Return how many bytes a shard of so many rows may have, and may come to when it is unpacked."""
+    return BYTES_BESIDE_ROWS + MOST_BYTES_A_ROW * rows
+
+
+def fault(content: bytes, told: Mapping[str, str], rows: int, *, with_cell: bool) -> str | None:
+    """Return what is wrong with a shard, or None; nothing is unpacked.
+
+    Parameters
+    ----------
+    content : bytes
+        The file.
+    told : mapping of str to str
+        What the metadata of its schema must say.
+    rows : int
+        How many it must have.
+    with_cell : bool
+
+    Returns
+    -------
+    str or None
+    """
     try:
-        found = pq.ParquetFile(pa.BufferReader(content))
-        extra = found.schema_arrow.metadata or {}
-        return {key.decode(): value.decode() for key, value in extra.items()}, int(found.metadata.num_rows)
-    except (pa.ArrowException, OSError, UnicodeDecodeError):
-        return None
+        file = pq.ParquetFile(pa.BufferReader(content))
+        found, columns = file.metadata, file.schema_arrow
+        says = {key.decode(): value.decode() for key, value in (columns.metadata or {}).items()}
+        if any(says.get(key) != value for key, value in told.items()):
+            return "belongs to another campaign"
+        if found.num_rows != rows:
+            return f"has {found.num_rows} rows in place of {rows}"
+        if not columns.equals(schema(with_cell=with_cell)):
+            return "has other columns than a campaign"
+        return _fault_of_sizes(content, found)
+    except (pa.ArrowException, OSError, ValueError, MemoryError):
+        return "is no Parquet file"
+
+
+def _fault_of_sizes(content: bytes, found: Any) -> str | None:
+    """What columns claim to hold against what the file can: a file may say anything."""
+    groups = [found.row_group(place) for place in range(found.num_row_groups)]
+    columns = [(group.num_rows, group.column(place)) for group in groups for place in range(group.num_columns)]
+    sizes = [group.num_rows for group in groups]
+    if (
+        sum(sizes) != found.num_rows
+        or min(sizes, default=0) < 0
+        or any(each.num_values != size for size, each in columns)
+    ):
+        return "has columns of other lengths than it says"
+    if sum(max(column.total_compressed_size, 0) for _, column in columns) > len(content):
+        return "has columns that overlap"
+    claimed = 0
+    for size, column in columns:
+        first = column.data_page_offset
+        if column.has_dictionary_page:
+            first = min(first, column.dictionary_page_offset)
+        claimed += claimed_bytes(content, first, column.total_compressed_size, size)
+    if claimed > largest_file(found.num_rows):
+        return f"claims to come to {claimed} bytes, more than any of {found.num_rows} rows"
+    return None
 
 
 def read(files: Sequence[Path], columns: Sequence[str] | None, *, with_cell: bool) -> Any:
@@ -125,6 +186,7 @@ def read(files: Sequence[Path], columns: Sequence[str] | None, *, with_cell: boo
     Parameters
     ----------
     files : sequence of Path
+        Without a `fault`.
     columns : sequence of str or None
         None is all of them.
     with_cell : bool
@@ -132,12 +194,38 @@ def read(files: Sequence[Path], columns: Sequence[str] | None, *, with_cell: boo
     Returns
     -------
     pyarrow.Table
+
+    Raises
+    ------
+    ValueError
+        If one holds what no campaign writes.
+    OSError
+        If one cannot be read.
     """
     wanted = schema(with_cell=with_cell)
     names = wanted.names if columns is None else list(columns)
     whole = pa.schema([wanted.field(name) for name in names], metadata=wanted.metadata)
-    parts = [pq.ParquetFile(file).read(columns=names, use_threads=False).select(names) for file in files]
-    return pa.concat_tables([part.replace_schema_metadata(whole.metadata) for part in parts] or [whole.empty_table()])
+    try:
+        parts = [_read_one(file, whole) for file in files]
+    except (pa.ArrowException, KeyError) as error:
+        raise ValueError(str(error)) from None
+    return pa.concat_tables(parts or [whole.empty_table()])
+
+
+def _read_one(file: Path, wanted: Any) -> Any:
+    # Text stays a dictionary until that is known to be short: a long one that every row names would fill the memory.
+    texts = [name for name in wanted.names if name in _TEXTS]
+    table = pq.ParquetFile(file, read_dictionary=texts).read(columns=wanted.names, use_threads=False)
+    table = table.select(wanted.names)
+    for name in wanted.names:
+        for part in table.column(name).chunks:
+            if name in _TEXTS:
+                said = part.dictionary
+                if len(said) > len(_TEXTS[name]) or not {*said.to_pylist()} <= _TEXTS[name]:
+                    raise ValueError(f"{name} says what no campaign writes")
+            elif pa.types.is_floating(part.type) and not pc.all(pc.is_finite(part), min_count=0).as_py():
+                raise ValueError(f"{name} holds what is not a finite number")
+    return table.cast(wanted).replace_schema_metadata(wanted.metadata)
 
 
 def numbers(table: Any, name: str) -> np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]:

@@ -43,6 +43,7 @@ from sim.storage import (
     StorageError,
     read_manifest,
 )
+from sim.storage.manifest import checksum
 from sim.stored_flight import Progress
 from sim.versions import VersionError
 from sim.worker_processes import worker_processes
@@ -385,7 +386,8 @@ def test_another_version_or_schema_is_refused(brief: Scenario, tmp_path: Path) -
     mixed(brief, tmp_path, 32).run()
     file = tmp_path / "manifest.json"
     written = json.loads(file.read_text())
-    file.write_text(json.dumps({**written, "versions": {**written["versions"], "numpy": "1.0"}}))
+    other = {**written, "versions": {**written["versions"], "numpy": "1.0"}}
+    file.write_text(json.dumps({**other, "sha256": checksum(other)}))
     with pytest.raises(ManifestError, match=r'versions\.numpy: "1.0" in the folder'):
         mixed(brief, tmp_path, 32).run(resume=True)
     file.write_text(json.dumps({**written, "schema": 2}))

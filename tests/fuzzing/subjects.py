@@ -1,0 +1,181 @@
+"""What is attacked: a small sound file of every kind, and a way to read each to the end."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from experiments import record_file
+from experiments.multipoint_file import load_multipoint
+from experiments.pareto_file import load_pareto
+from experiments.problem_file import built_in_problems
+from experiments.pursuit_file import load_problem, read_problem
+from experiments.reachability_file import load_rendezvous
+from experiments.scenario_file import (
+    load_scenario,
+    read_scenario,
+    scenario_names,
+    scenario_text,
+    scenario_to_toml,
+    scenario_warnings,
+)
+from infoset import AngleSensor, StateBox
+from sim import Campaign, CampaignNoise, Record, Scenario, fly_one
+from sim.storage import CampaignFolder
+
+Found = TypeVar("Found")
+
+
+def attempted(read: Callable[[], Found], refusal: type[Exception]) -> tuple[Found | None, str]:
+    """Return what reading gives and no message, or nothing and the message that it is refused with."""
+    try:
+        return read(), ""
+    except refusal as error:
+        return None, str(error)
+
+
+@dataclass(frozen=True)
+class TextFile:
+    """A kind of file that a person writes.
+
+    Parameters
+    ----------
+    texts : tuple of str
+        The built-in ones.
+    read : callable
+        Reads a file and asks all of it that costs little.
+    """
+
+    texts: tuple[str, ...]
+    read: Callable[[str], object]
+
+
+def text_files() -> Mapping[str, TextFile]:
+    """Return the kinds of files that people write, by name."""
+    problems: dict[str, list[str]] = {}
+    for each in built_in_problems():
+        problems.setdefault(each.kind, []).append(each.text)
+    readers = {
+        "pareto-encounter": load_pareto,
+        "multipoint": lambda path: load_multipoint(path).tour,
+        "pursuit-evasion": _read_pursuit,
+        "reachable-rendezvous": load_rendezvous,
+    }
+    kinds = {kind: TextFile(tuple(texts), readers[kind]) for kind, texts in problems.items()}
+    return {"scenario": TextFile(tuple(map(scenario_text, scenario_names())), _read_scenario), **kinds}
+
+
+def _read_scenario(path: str) -> Scenario:
+    scenario = load_scenario(path)
+    assert read_scenario(scenario_to_toml(scenario), "written again") == scenario
+    scenario_warnings(scenario)
+    return scenario
+
+
+def _read_pursuit(path: str) -> object:
+    problem = load_problem(path)
+    problem.warnings()
+    assert read_problem(problem.to_toml(), "written again").tables == problem.tables
+    try:
+        return problem.game()
+    except ValueError as error:  # what the core documents
+        return error
+
+
+def small_record() -> Record:
+    """Return the beginning of an engagement."""
+    whole = fly_one(load_scenario("asteroid-1997"), 3, seed=11)
+    return dataclasses.replace(whole, steps=whole.steps[:6])
+
+
+def same_records(one: Record, other: Record) -> bool:
+    """Whether two records are equal bit for bit."""
+    header, arrays = _contents(one)
+    other_header, others = _contents(other)
+    return header == other_header and all(arrays[name].tobytes() == others[name].tobytes() for name in arrays)
+
+
+def _contents(record: Record) -> tuple[tuple[object, ...], Mapping[str, Any]]:
+    header = (
+        *(record.scenario, record.seed, record.run, record.strategy, record.noise, record.inconsistency),
+        json.dumps(record_file._result_to_json(record.result)),
+    )
+    return header, record_file._to_arrays(record)
+
+
+def remade_record(content: bytes, change: Callable[[dict[str, Any], dict[str, bytes]], None]) -> bytes:
+    """Return a record with something changed and every checksum made to fit again: what somebody hostile would do.
+
+    Parameters
+    ----------
+    content : bytes
+        A record.
+    change : callable
+        Is given the header, and the members as bytes, arrays' headers and all; may change both.
+
+    Returns
+    -------
+    bytes
+    """
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    header = json.loads(np.lib.format.read_array(io.BytesIO(members.pop("header.npy")), allow_pickle=False).tobytes())
+    change(header, members)
+    arrays = {}
+    for name, member in members.items():
+        try:
+            values = np.lib.format.read_array(io.BytesIO(member), allow_pickle=False, max_header_size=10_000)
+        except Exception:  # then there is no sum to make fit
+            continue
+        arrays[name.removesuffix(".npy")] = values
+    header["sha256"] = record_file._checksum(header, arrays)
+    text = io.BytesIO()
+    packed = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    np.lib.format.write_array(text, packed, version=(1, 0), allow_pickle=False)
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        for name, member in {"header.npy": text.getvalue(), **members}.items():
+            archive.writestr(zipfile.ZipInfo(name), member)
+    return out.getvalue()
+
+
+def small_campaign(folder: Path) -> CampaignFolder:
+    """Fly a campaign of 20 short engagements in two chunks."""
+    whole = load_scenario("asteroid-1997-single")
+    box = StateBox((-100.0, 100.0), (590e3, 600e3), (-10.0, 10.0), (-58e3, -57.5e3))
+    sensor = AngleSensor(0.5, 0.00015, 0.00023, 595e3)
+    model = replace(whole.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor)
+    brief = replace(whole, name="brief", set_model=model, dispersion=box, nominal_range_m=595e3)
+    campaign = Campaign(brief, 20, folder, seed=5, noise=CampaignNoise.MIXED, chunk=12)
+    return campaign.run(workers=1).folder
+
+
+def named_shard(index: int, content: bytes) -> str:
+    """Return the name of a shard that says what is in it."""
+    return f"chunk-{index:07d}-{zlib.crc32(content):08x}.parquet"
+
+
+def read_campaign(path: Path) -> dict[str, Any]:
+    """Return everything that a campaign's folder says."""
+    folder = CampaignFolder.read(path)
+    table = folder.table()
+    known = ("random", "game")
+    return {
+        "manifest": folder.manifest,
+        "wanted": folder.wanted_runs,
+        "finished": folder.finished_runs,
+        "damaged": len(folder.damaged),
+        "rows": table.to_pylist(),
+        "numbers": [folder.numbers(name).filled(-1.0).tobytes() for name in ("miss_m", "guaranteed_miss_m", "x_km")],
+        "codes": folder.codes("noise", known).tobytes(),
+        "first": folder.at([0]) if len(table) else None,
+    }

@@ -1,0 +1,275 @@
+"""Damaged campaigns: shards and manifests are refused in one sentence, or read as they were written."""
+
+from __future__ import annotations
+
+import json
+import random
+import shutil
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from sim.storage import CampaignFolder, ManifestError, StorageError, read_manifest
+from sim.storage.manifest import MANIFEST, checksum
+from sim.storage.parquet_pages import claimed_bytes
+
+from .measured import Measured, measured
+from .mutations import mutated_bytes
+from .subjects import attempted, named_shard, read_campaign, small_campaign
+
+ROWS = 8
+"""Of the second shard, which is the one damaged here."""
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder: Path = tmp_path_factory.mktemp("campaign") / "sound"
+    small_campaign(folder)
+    return folder
+
+
+@pytest.fixture
+def folder(sound: Path, tmp_path: Path) -> Path:
+    shutil.copytree(sound, tmp_path / "campaign")
+    return tmp_path / "campaign"
+
+
+def shard_of(folder: Path) -> Path:
+    (last,) = (folder / "shards").glob("chunk-0000001-*.parquet")
+    return last
+
+
+def attack(folder: Path, shards: int, manifests: int, seed: int) -> int:
+    """Damage one file at a time, and look at everything that the folder then says."""
+    draw, refused = random.Random(seed), 0
+    whole = read_campaign(folder)
+    beside = [row for row in whole["rows"] if row["run"] < 12]
+    for file, times in ((shard_of(folder), shards), (folder / MANIFEST, manifests)):
+        content = file.read_bytes()
+        for _ in range(times):
+            damaged = mutated_bytes(content, draw)
+            file.write_bytes(damaged)
+            found, message = attempted(lambda: read_campaign(folder), StorageError)
+            if found is None:
+                refused += 1
+                assert message.startswith(f"{file}: is no manifest of a campaign: ")
+                assert len(message) < 1000
+                assert file.name == MANIFEST
+                assert damaged != content
+            elif found["damaged"]:
+                refused += 1
+                assert file.name != MANIFEST
+                assert (found["rows"], found["finished"]) == (beside, 12)
+            else:
+                assert found == whole
+        file.write_bytes(content)
+    return refused
+
+
+def test_100_damaged_shards_and_manifests(folder: Path) -> None:
+    assert attack(folder, 50, 50, seed=1) > 80
+
+
+@pytest.mark.slow
+def test_5000_damaged_shards_and_manifests(folder: Path) -> None:
+    assert attack(folder, 2500, 2500, seed=2) > 4000
+
+
+@pytest.mark.parametrize("key", ["runs", "stopped_after", "until", "seed", "chunk", "noise", "made_by", "sha256"])
+def test_every_value_of_a_manifest_counts(key: str, folder: Path) -> None:
+    written = json.loads((folder / MANIFEST).read_text())
+    other = {"runs": 19, "stopped_after": 12, "until": "miss_m p99 ci<1", "made_by": {"a": "b"}, "noise": "game"}.get(
+        key, 13
+    )
+    assert written[key] != other
+    (folder / MANIFEST).write_text(json.dumps({**written, key: other}))
+    with pytest.raises(ManifestError, match="the checksum differs"):
+        read_manifest(folder)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"chunk": 10**7, "runs": 10**9}, "chunk: must be at most 1000000 engagements a shard"),
+        ({"kind": "sweep", "axes": [{"key": k, "scale": "log", "values": [1.0, 2.0] * 500} for k in "ab"]}, "cells"),
+    ],
+)
+def test_a_manifest_that_would_take_for_ever(change: Mapping[str, Any], reason: str, folder: Path) -> None:
+    other = {**json.loads((folder / MANIFEST).read_text()), **change}
+    (folder / MANIFEST).write_text(json.dumps({**other, "sha256": checksum(other)}))
+    with pytest.raises(ManifestError, match=reason):
+        read_manifest(folder)
+
+
+def replaced(folder: Path, write: Callable[[Any, Path], None]) -> None:
+    """Write another shard in the place of the second, under a name that says what is in it."""
+    file, new = shard_of(folder), folder / "new.parquet"
+    write(pq.read_table(file), new)
+    content = new.read_bytes()
+    new.unlink()
+    file.unlink()
+    (file.parent / named_shard(1, content)).write_bytes(content)
+
+
+def with_column(table: Any, name: str, values: Any) -> Any:
+    place = table.schema.get_field_index(name)
+    field = table.schema.field(name).with_type(values.type)
+    return table.set_column(place, field, values).replace_schema_metadata(table.schema.metadata)
+
+
+def hostile(folder: Path, rows: int) -> dict[str, str]:
+    """Make the manifest ask for shards of so many rows, and return what the one there will have to say."""
+    next((folder / "shards").glob("chunk-0000000-*.parquet")).unlink()
+    other = {**json.loads((folder / MANIFEST).read_text()), "chunk": rows, "runs": 2 * rows}
+    (folder / MANIFEST).write_text(json.dumps({**other, "sha256": checksum(other)}))
+    return {"campaign": read_manifest(folder).identity, "chunk": "1"}
+
+
+def written(table: Any, file: Path, told: Mapping[str, str], **options: Any) -> None:
+    """Write a table whose columns have the types of Parquet alone, so that a dictionary is one of text."""
+    with pq.ParquetWriter(file, table.schema, store_schema=False, write_statistics=False, **options) as writer:
+        writer.write_table(table, row_group_size=1 << 26)
+        writer.add_key_value_metadata(told)
+
+
+def long_text(folder: Path) -> None:
+    """Less than a kilobyte of text that comes to 10 GB: 10 MB, given once, and said by a thousand rows."""
+    told = hostile(folder, 1000)
+
+    def write(table: Any, file: Path) -> None:
+        table = table.take(np.zeros(1000, dtype=int))
+        text = pa.DictionaryArray.from_arrays(pa.array([0] * 1000, pa.int32()), pa.array(["x" * 10_000_000]))
+        written(with_column(table, "outcome", text), file, told, compression="zstd")
+
+    replaced(folder, write)
+
+
+def pages_of_text(folder: Path) -> None:
+    """Pages of one letter that come to 240 MB."""
+    text = pa.array(["x" * 30_000_000] * ROWS)
+    options = {"compression": "zstd", "use_dictionary": False}
+    replaced(folder, lambda table, file: pq.write_table(with_column(table, "outcome", text), file, **options))
+
+
+def many_rows(folder: Path, parts: int = 16) -> None:
+    """Run lengths: half a gigabyte of equal numbers in a hundred kilobytes."""
+    told = hostile(folder, 1_000_000)
+    part = pa.DictionaryArray.from_arrays(pa.array(np.zeros(1 << 22, dtype=np.int8)), pa.array([1.5]))
+    table = pa.table({"miss_m": pa.chunked_array([part] * parts)})
+    replaced(folder, lambda _, file: written(table, file, told))
+
+
+BOMBS: Mapping[str, tuple[Callable[[Path], None], str]] = {
+    "text": (long_text, "claims to come to 100"),
+    "pages": (pages_of_text, "claims to come to 240"),
+    "rows": (many_rows, "has 67108864 rows in place of 1000000"),
+}
+
+
+def check_refused(found: Measured, reason: str) -> None:
+    assert reason in found.message
+    assert found.seconds < 1.0
+    assert found.megabytes < 200.0
+
+
+@pytest.fixture(scope="module")
+def refusals(sound: Path, tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Measured]:
+    folder = tmp_path_factory.mktemp("bombs")
+    for name, (bomb, _) in BOMBS.items():
+        shutil.copytree(sound, folder / name)
+        bomb(folder / name)
+    return dict(zip(BOMBS, measured("campaign", *(folder / name for name in BOMBS)), strict=True))
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_a_bomb_is_refused_in_a_second_and_200_mb(name: str, refusals: Mapping[str, Measured]) -> None:
+    check_refused(refusals[name], BOMBS[name][1])
+
+
+@pytest.mark.slow
+def test_billions_of_rows_are_refused_in_a_second_and_200_mb(folder: Path) -> None:
+    """1.4e9 of them: over 10 GB."""
+    many_rows(folder, 334)
+    (found,) = measured("campaign", folder)
+    check_refused(found, "has 1400897536 rows in place of 1000000")
+
+
+def changed(name: str, value: object) -> Callable[[Any, Path], None]:
+    def write(table: Any, file: Path) -> None:
+        values = table.column(name).to_pylist()
+        table = with_column(table, name, pa.array([value, *values[1:]], type=table.schema.field(name).type))
+        pq.write_table(table, file)
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("miss_m", float("nan")), ("x_km", float("inf")), ("outcome", "won"), ("tie", "x" * 40)]
+)
+def test_a_shard_that_says_what_no_campaign_writes(name: str, value: object, folder: Path) -> None:
+    replaced(folder, changed(name, value))
+    opened = CampaignFolder.read(folder)
+    assert not opened.damaged
+    with pytest.raises(StorageError, match=f"{name} (says what no campaign writes|holds what is not a finite number)"):
+        opened.table([name])
+    kind = opened.numbers if isinstance(value, float) else lambda each: opened.codes(each, ["intercepted"])
+    with pytest.raises(StorageError, match="a shard has changed"):
+        kind(name)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda table: table.drop_columns(["miss_m"]),
+        lambda table: table.append_column("more", table.column("run")),
+        lambda table: table.select([*table.column_names[::-1]]),
+        lambda table: with_column(table, "miss_m", table.column("miss_m").cast(pa.float32())),
+        lambda table: with_column(table, "miss_m", pa.array([[1.0]] * ROWS)),
+    ],
+)
+def test_a_shard_of_other_columns(change: Callable[[Any], Any], folder: Path) -> None:
+    replaced(folder, lambda table, file: pq.write_table(change(table), file))
+    (damage,) = CampaignFolder.read(folder).damaged
+    assert damage.reason == "has other columns than a campaign"
+
+
+def test_a_shard_that_is_no_file_is_not_waited_for(folder: Path) -> None:
+    import os
+
+    os.mkfifo(folder / "shards" / "chunk-0000001-00000000.parquet")
+    (damage,) = CampaignFolder.read(folder).damaged
+    assert damage.reason == "is no ordinary file"
+
+
+def test_a_shard_written_otherwise_is_read(folder: Path) -> None:
+    """By other settings of the writer: what counts is what is in it."""
+    whole = read_campaign(folder)
+    for options in (
+        {"compression": "none"},
+        {"data_page_version": "2.0"},
+        {"row_group_size": 3},
+        {"data_page_size": 9},
+    ):
+        replaced(folder, lambda table, file, given=options: pq.write_table(table, file, **given))  # type: ignore[misc]
+        assert read_campaign(folder) == whole
+
+
+@pytest.mark.parametrize("version", ["1.0", "2.0"])
+def test_what_pages_claim(version: str, tmp_path: Path) -> None:
+    table = pa.table({"a": np.random.default_rng(0).normal(size=5000), "b": ["x", None] * 2500})
+    file = tmp_path / "x.parquet"
+    pq.write_table(table, file, data_page_version=version, data_page_size=4000, write_page_checksum=True)
+    content, group = file.read_bytes(), pq.ParquetFile(file).metadata.row_group(0)
+    for place in range(2):
+        column = group.column(place)
+        first, size = column.dictionary_page_offset or column.data_page_offset, column.total_compressed_size
+        claimed = claimed_bytes(content, first, size, 5000)
+        assert claimed <= column.total_uncompressed_size <= claimed + 5000  # the footer counts the headers too
+        for wrong in ((first, size - 1, 5000), (first + 1, size, 5000), (first, size, 4999), (first, 10**9, 5000)):
+            with pytest.raises(ValueError, match=r"column|page"):
+                claimed_bytes(content, *wrong)
