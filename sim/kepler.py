@@ -15,6 +15,7 @@ Floats = NDArray[np.float64]
 LONGEST_SUBSTEP_S = 0.5
 ARRIVAL_LEAPS = 64
 Z, X = 0, 1
+RELATIVE, SPACECRAFT = 0, 1
 
 
 @dataclass(frozen=True)
@@ -87,9 +88,9 @@ class KeplerMotion:
     """
 
     def __init__(self, position_m: Floats, velocity_m_s: Floats, sun: Sun | None) -> None:
-        # The relative motion and, below it, the spacecraft's own: shape (2, B, 2).
-        self._position = np.stack([position_m.astype(np.float64), np.zeros(position_m.shape)])
-        self._velocity = np.stack([velocity_m_s.astype(np.float64), np.zeros(position_m.shape)])
+        # By coordinate: the relative motion and, below it, the spacecraft's own, shape (2, 2, B).
+        self._position = _with_spacecraft(position_m)
+        self._velocity = _with_spacecraft(velocity_m_s)
         self._sun = sun
         self._manoeuvre: Floats | None = None
         if sun is not None:
@@ -97,34 +98,35 @@ class KeplerMotion:
             along_orbit = np.array([toward_sun[X], -toward_sun[Z]])
             if along_orbit[X] < 0.0:
                 along_orbit = -along_orbit
-            self._position[1] = -sun.distance_m * toward_sun
-            self._velocity[1] = np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m) * along_orbit
+            speed = np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m)
+            self._position[:, SPACECRAFT] = (-sun.distance_m * toward_sun)[:, None]
+            self._velocity[:, SPACECRAFT] = (speed * along_orbit)[:, None]
         self._acceleration = self._gravity()
 
     @property
     def position_m(self) -> Floats:
         """Relative (z, x), shape (B, 2)."""
-        return np.asarray(self._position[0])
+        return np.asarray(self._position[:, RELATIVE].T)
 
     @property
     def velocity_m_s(self) -> Floats:
         """Relative (V_z, V_x), shape (B, 2)."""
-        return np.asarray(self._velocity[0])
+        return np.asarray(self._velocity[:, RELATIVE].T)
 
     def sight(self) -> Sight:
         """Geometry now."""
-        z, x = self.position_m[:, Z], self.position_m[:, X]
+        (z, x), (v_z, v_x) = self._position[:, RELATIVE], self._velocity[:, RELATIVE]
         squared = z * z + x * x
         return Sight(
             alpha_rad=np.arctan2(z, x),
-            omega_rad_s=(self.velocity_m_s[:, Z] * x - self.velocity_m_s[:, X] * z) / squared,
+            omega_rad_s=(v_z * x - v_x * z) / squared,
             range_m=np.sqrt(squared),
         )
 
     def fire(self, impulse_m_s: Floats) -> None:
         """Change the spacecraft's velocity along z: V_z becomes V_z - k."""
-        self._velocity[0, :, Z] -= impulse_m_s
-        self._velocity[1, :, Z] += impulse_m_s
+        self._velocity[Z, RELATIVE] -= impulse_m_s
+        self._velocity[Z, SPACECRAFT] += impulse_m_s
 
     def arrival_s(self) -> Floats:
         """Times from now until x = 0, shape (B,), s.
@@ -135,11 +137,11 @@ class KeplerMotion:
         time by far less than a nanosecond.
         """
         free = KeplerMotion.__new__(KeplerMotion)
-        free._sun, free._position, free._velocity = self._sun, self._position.copy(), self._velocity.copy()
+        free._sun, free._position, free._velocity = self._sun, self._position, self._velocity
         free._manoeuvre, free._acceleration = None, self._acceleration
         duration = self.position_m[:, X] / -self.velocity_m_s[:, X]
         for _ in range(ARRIVAL_LEAPS):
-            free._leap((duration / ARRIVAL_LEAPS)[:, None])
+            free._leap(duration / ARRIVAL_LEAPS)
         return duration - free.position_m[:, X] / free.velocity_m_s[:, X]
 
     def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
@@ -148,43 +150,44 @@ class KeplerMotion:
             self._manoeuvre = manoeuvre_m_s2
             self._acceleration = self._gravity()
         substeps = max(1, int(np.ceil(step_s / LONGEST_SUBSTEP_S * (1.0 - 1e-12))))
-        passed = np.zeros(len(self.position_m), dtype=bool)
-        least = np.full(len(self.position_m), np.inf)
+        passed = np.zeros(self._position.shape[-1], dtype=bool)
+        least = np.full(passed.shape, np.inf)
         for _ in range(substeps):
-            before = self.position_m.copy(), self.velocity_m_s.copy(), self._acceleration[0]
+            before = self._position, self._velocity, self._acceleration
             self._leap(step_s / substeps)
-            new = (_dot(self.position_m, self.velocity_m_s) >= 0.0) & ~passed
+            new = (_dot(self._position[:, RELATIVE], self._velocity[:, RELATIVE]) >= 0.0) & ~passed
             if new.any():
-                position, velocity, acceleration = (value[new] for value in before)
+                position, velocity, acceleration = (value[:, RELATIVE, new] for value in before)
                 least[new] = closest_distance(position, velocity, acceleration, step_s / substeps)
                 passed |= new
         return Passage(passed, least)
 
     def _leap(self, duration_s: float | Floats) -> None:
+        """Move on; the arrays are new ones, so that whoever holds the old ones has the motion before."""
         half = 0.5 * duration_s
-        self._velocity += half * self._acceleration
-        self._position += duration_s * self._velocity
+        at_middle = self._velocity + half * self._acceleration
+        self._position = self._position + duration_s * at_middle
         self._acceleration = self._gravity()
-        self._velocity += half * self._acceleration
+        self._velocity = at_middle + half * self._acceleration
 
     def _gravity(self) -> Floats:
-        """Relative acceleration, manoeuvre included, and that of the spacecraft, m/s^2, shape (2, B, 2)."""
+        """Relative acceleration, manoeuvre included, and that of the spacecraft, m/s^2, shape (2, 2, B)."""
         if self._sun is None:
             acceleration = np.zeros_like(self._position)
         else:
             from_sun = self._position.copy()
-            from_sun[0] += from_sun[1]
+            from_sun[:, RELATIVE] += from_sun[:, SPACECRAFT]
             acceleration = attraction(from_sun, self._sun.gravitational_parameter_m3_s2)
-            acceleration[0] -= acceleration[1]
+            acceleration[:, RELATIVE] -= acceleration[:, SPACECRAFT]
         if self._manoeuvre is not None:
-            acceleration[0, :, Z] += self._manoeuvre
+            acceleration[Z, RELATIVE] += self._manoeuvre
         return acceleration
 
 
 def attraction(position_m: Floats, gravitational_parameter_m3_s2: float) -> Floats:
-    """Acceleration -K r / |r|^3 at positions from the Sun, shape (..., 2), m/s^2."""
+    """Acceleration -K r / |r|^3 at positions from the Sun, shape (2, ...), m/s^2."""
     squared = _dot(position_m, position_m)
-    return (-gravitational_parameter_m3_s2 / (squared * np.sqrt(squared)))[..., None] * position_m
+    return np.asarray(-gravitational_parameter_m3_s2 / (squared * np.sqrt(squared)) * position_m)
 
 
 def closest_distance(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2: Floats, duration_s: float) -> Floats:
@@ -192,7 +195,7 @@ def closest_distance(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2
 
     Parameters
     ----------
-    position_m, velocity_m_s, acceleration_m_s2 : ndarray, shape (B, 2)
+    position_m, velocity_m_s, acceleration_m_s2 : ndarray, shape (2, B)
     duration_s : float
 
     Returns
@@ -202,13 +205,20 @@ def closest_distance(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2
     """
     moment = np.clip(-_dot(position_m, velocity_m_s) / _dot(velocity_m_s, velocity_m_s), 0.0, duration_s)
     for _ in range(4):
-        at = position_m + moment[:, None] * velocity_m_s + (0.5 * moment**2)[:, None] * acceleration_m_s2
-        speed = velocity_m_s + moment[:, None] * acceleration_m_s2
+        at = position_m + moment * velocity_m_s + 0.5 * moment**2 * acceleration_m_s2
+        speed = velocity_m_s + moment * acceleration_m_s2
         slope = _dot(speed, speed) + _dot(at, acceleration_m_s2)
         moment = np.clip(moment - _dot(at, speed) / slope, 0.0, duration_s)
-    at = position_m + moment[:, None] * velocity_m_s + (0.5 * moment**2)[:, None] * acceleration_m_s2
-    return np.hypot(at[:, Z], at[:, X])
+    at = position_m + moment * velocity_m_s + 0.5 * moment**2 * acceleration_m_s2
+    return np.asarray(np.hypot(at[Z], at[X]))
 
 
 def _dot(first: Floats, second: Floats) -> Floats:
-    return first[..., Z] * second[..., Z] + first[..., X] * second[..., X]
+    return np.asarray(first[Z] * second[Z] + first[X] * second[X])
+
+
+def _with_spacecraft(relative: Floats) -> Floats:
+    """By coordinate the relative vectors, shape (B, 2), and a row of zeros for the spacecraft: shape (2, 2, B)."""
+    vectors = np.zeros((2, 2, len(relative)))
+    vectors[:, RELATIVE] = relative.T
+    return vectors

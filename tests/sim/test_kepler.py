@@ -91,12 +91,12 @@ def test_error_is_under_a_micrometre_over_120_seconds(sun_degrees: float) -> Non
 
 
 def test_least_distance_between_steps_matches_a_dense_search() -> None:
-    position = np.array([[40.0, 11_000.0]])
-    velocity = np.array([[3.0, -58_000.0]])
-    acceleration = np.array([[2.0, -5.0]])
+    position = np.array([[40.0], [11_000.0]])
+    velocity = np.array([[3.0], [-58_000.0]])
+    acceleration = np.array([[2.0], [-5.0]])
     moments = np.linspace(0.18, 0.20, 2_000_001)
-    z = position[0, 0] + velocity[0, 0] * moments + 0.5 * acceleration[0, 0] * moments**2
-    x = position[0, 1] + velocity[0, 1] * moments + 0.5 * acceleration[0, 1] * moments**2
+    z = position[0] + velocity[0] * moments + 0.5 * acceleration[0] * moments**2
+    x = position[1] + velocity[1] * moments + 0.5 * acceleration[1] * moments**2
     found = closest_distance(position, velocity, acceleration, 0.5)
     assert found[0] == pytest.approx(np.hypot(z, x).min(), rel=1e-9)
 
