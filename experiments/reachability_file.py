@@ -11,7 +11,7 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import PlainValidator
+from pydantic import Field, PlainValidator
 
 from experiments.errors import InputError
 from experiments.problem_file import problem_form, problem_hash
@@ -55,6 +55,7 @@ KIND = "reachable-rendezvous"
 MOST_PERIODS = 256
 MOST_FACES = 24
 MOST_HALFSPACES = 50
+MOST_POLYTOPES = 20
 MOST_CHECKS = 10
 _INSTANTS = 12
 _MOST_REVOLUTIONS = 100
@@ -165,7 +166,9 @@ class ReachabilityTables(Table):
     initial: InitialTable = key("the active craft at t = 0", "")
     bounds: BoundsTable = key("what no component may exceed", "")
     cone: ConeTable | None = key("an approach cone", "", default=None)
-    keep_in: tuple[KeepInTable, ...] = key("polytopes to stay in", "", default=())
+    keep_in: Annotated[tuple[KeepInTable, ...], Field(max_length=MOST_POLYTOPES)] = key(
+        "polytopes to stay in", "", default=()
+    )
     disturbance: DisturbanceTable | None = key("an unknown acceleration", "", default=None)
     navigation: NavigationTable | None = key("errors of navigation", "", default=None)
 

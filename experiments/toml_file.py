@@ -17,7 +17,7 @@ from pydantic import BaseModel, ValidationError
 from experiments.errors import InputError
 from experiments.toml_values import WRONG, DecimalPair, nearest, shown
 
-LARGEST_FILE_BYTES = 1_000_000
+LARGEST_FILE_BYTES = 100_000
 LONGEST_LINE = 1000
 MOST_PROBLEMS = 100
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,6 +22,8 @@ MOST_RUNS = 10_000
 REPLAN_S, LEAST_PLANS, MOST_PLANS = 600.0, 50, 2000
 """Time between plans, and how many a game is given at least where the time is not asked for, and at most."""
 M_PER_KM = 1e3
+LONGEST_SCRIPT = 100_000
+"""Characters; less than the longest field that a reader of CSV takes."""
 OPTIMAL, RANDOM = "optimal", "random"
 
 ProblemName = Annotated[
@@ -163,8 +166,6 @@ def problem_with(name: str, settings: Sequence[str] | None) -> PursuitProblem:
 def _check_feedback_options(
     feedback: str | None, replan: float | None, delay: float, position: float, velocity: float, runs: int
 ) -> None:
-    import math
-
     from experiments.errors import InputError
 
     if replan is not None and not (math.isfinite(replan) and replan >= 1.0):
@@ -226,12 +227,14 @@ def _script(path: str) -> Steering:
     example = "write lines as 0,coast and 3600,prograde"
     try:
         with Path(path).open(encoding="utf-8", newline="") as file:
-            text = file.read(1_000_001)
+            text = file.read(LONGEST_SCRIPT + 1)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
         raise InputError(f"--feedback: {path} cannot be read: {reason}; {example}") from None
-    if len(text) > 1_000_000:
-        raise InputError(f"--feedback: {path} is over 1 MB, far more than a script needs; {example}")
+    if len(text) > LONGEST_SCRIPT:
+        raise InputError(
+            f"--feedback: {path} is over {LONGEST_SCRIPT // 1000} kB, far more than a script needs; {example}"
+        )
     times, policies = [], []
     for number, row in enumerate(csv.reader(text.splitlines()), start=1):
         if not row or (number == 1 and row[0].strip() == "time_s"):
@@ -240,9 +243,12 @@ def _script(path: str) -> Steering:
         if len(row) != 2:
             raise InputError(f"{where}: must be a time and a policy, found {len(row)} values; {example}")
         try:
-            times.append(float(row[0]))
+            time_s = float(row[0])
         except ValueError:
-            raise InputError(f"{where}: {shown(row[0])} is no time in seconds; {example}") from None
+            time_s = math.nan
+        if not math.isfinite(time_s):
+            raise InputError(f"{where}: {shown(row[0])} is no time in seconds; {example}")
+        times.append(time_s)
         policies.append(Policy(choice(where, row[1].strip(), [each.value for each in Policy])))
     try:
         return Script(tuple(times), tuple(policies))

@@ -248,6 +248,9 @@ def test_what_is_wrong_is_said_before_the_work(
     [
         ("0,costa\n", "did you mean coast"),
         ("soon,coast\n", "is no time"),
+        ("0,coast\nnan,prograde\n", "is no time"),
+        pytest.param("0" * 99_000 + ",coast\n0,coast", "must rise, from 0", id="long"),
+        pytest.param("0" * 200_000 + ",coast\n", "is over 100 kB", id="longer"),
         ("0,coast,1\n", "found 3 values"),
         ("5,coast\n", "must rise, from 0"),
         ("", "one at least"),

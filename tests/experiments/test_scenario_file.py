@@ -564,7 +564,7 @@ def test_file_over_the_limit_is_refused_unread(tmp_path: Path, monkeypatch: pyte
     with file.open("wb") as stream:
         stream.truncate(5_000_000_000)  # sparse
     monkeypatch.setattr(scenario_file, "read_scenario", lambda *_: pytest.fail("parsed"))
-    with pytest.raises(InputError, match="over 1000 kB"):
+    with pytest.raises(InputError, match="over 100 kB"):
         load_scenario(file)
 
 
