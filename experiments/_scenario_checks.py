@@ -6,9 +6,15 @@ from collections.abc import Iterator
 from decimal import Decimal
 
 from experiments.toml_file import Known, Problem
-from experiments.toml_values import DecimalPair, shown
+from experiments.toml_values import KILO, DecimalPair, shown, si
+from infoset import AngleSensor, Model, SetModel, StateBox
+from sim.draws import MOST_STEPS
+from sim.gravity import with_gravity
+from sim.kepler import LONGEST_SUBSTEP_S
+from sim.scenario import Sun
 
-MOST_STEPS = 100_000
+MOST_LEAPS = 10_000_000
+"""Stretches that the truth of one flight may be integrated in: some minutes."""
 WHOLE_STEPS_TOLERANCE = Decimal("1e-9")
 
 
@@ -20,6 +26,7 @@ def cross_problems(known: Known) -> Iterator[Problem]:
     yield from _error_law(known)
     yield from _sections(known)
     yield from _sun(known)
+    yield from _closing_speeds(known)
 
 
 def _impulses(known: Known) -> Iterator[Problem]:
@@ -89,6 +96,15 @@ def _ranges(known: Known) -> Iterator[Problem]:
             f"{shown(greatest)} km of {where} at {shown(slowest)} km/s take {steps:.3g} steps",
             "lengthen the step",
         )
+        return
+    leaps = steps * max(Decimal(1), step / Decimal(LONGEST_SUBSTEP_S))
+    if leaps > MOST_LEAPS:
+        yield Problem(
+            ("guidance", "step_s"),
+            f"makes {steps:.3g} steps of {shown(step)} s, and the truth is integrated in stretches of at most "
+            f"{LONGEST_SUBSTEP_S:g} s: {leaps:.3g} of them, and {MOST_LEAPS:,} are allowed, some minutes of computing",
+            "start nearer, or approach faster",
+        )
 
 
 def _error_law(known: Known) -> Iterator[Problem]:
@@ -99,8 +115,15 @@ def _error_law(known: Known) -> Iterator[Problem]:
     if nominal_range is None or at_nominal is None or at_zero is None or not spans:
         return
     where, (_, greatest) = max(spans, key=lambda span: span[1][1])
-    offset = max((max(abs(end) for end in pair) for _, pair in _spans(known, "z_km")), default=Decimal(0))
+    offset, across = (
+        max((max(abs(end) for end in pair) for _, pair in _spans(known, key)), default=Decimal(0))
+        for key in ("z_km", "vz_km_s")
+    )
+    slowest = min((-pair[1] for _, pair in _spans(known, "vx_km_s")), default=None)
+    # The distance is a convex function of time: it is greatest at the start, or where the object has gone across.
     farthest = (greatest * greatest + offset * offset).sqrt()
+    if slowest is not None and offset + across * greatest / slowest > farthest:
+        farthest = offset + across * greatest / slowest
     bound = at_zero + (at_nominal - at_zero) * farthest / nominal_range
     if bound <= 0:
         yield Problem(
@@ -134,4 +157,40 @@ def _sun(known: Known) -> Iterator[Problem]:
             f"must be greater than the greatest possible range, {shown(greatest)} km of {where}, "
             f"found {shown(distance)}",
             "check the unit; for free space leave the table [sun] out",
+        )
+
+
+def _closing_speeds(known: Known) -> Iterator[Problem]:
+    """Only closing speeds above zero and below twice the nominal one have labels: a range x means x / (1 + eta)."""
+    speed, nominal_range = known.number("nominal", "closing_speed_km_s"), known.number("nominal", "range_km")
+    step = known.number("guidance", "step_s")
+    intervals = [known.pair("uncertainty", key) for key in ("z_km", "x_km", "vz_km_s", "vx_km_s")]
+    if known.value("information_set", "model") != Model.GUARANTEED.value or speed is None or None in intervals:
+        return
+    if nominal_range is None or step is None:
+        return
+    z, x, vz, vx = ((si(pair[0], KILO), si(pair[1], KILO)) for pair in intervals if pair is not None)
+    e = si(speed, KILO)
+    # Of the sensor nothing is asked here.
+    sensor = AngleSensor(si(step), 1.0, 1.0, si(nominal_range, KILO))
+    plain = SetModel(e, si(step), StateBox(z, x, vz, vx), sensor, kind=Model.GUARANTEED)
+    parameter, distance = known.number("sun", "gravitational_parameter_km3_s2"), known.number("sun", "distance_km")
+    sun = None
+    if parameter is not None and distance is not None:
+        sun = Sun(si(parameter, 3 * KILO), si(distance, KILO), 0.0)
+    least, change = (with_gravity(plain, body).gravity_speed_change for body in (None, sun))
+    if plain.speed_error + least >= 1.0:
+        yield Problem(
+            ("uncertainty", "vx_km_s"),
+            f"must differ from nominal.closing_speed_km_s, {shown(speed)}, by less than that itself in the guaranteed "
+            f"model, found closing speeds from {-vx[1] / 1000.0:g} to {-vx[0] / 1000.0:g}",
+            "write the middle of uncertainty.vx_km_s as nominal.closing_speed_km_s, or narrow uncertainty.vx_km_s",
+        )
+    elif plain.speed_error + change >= 1.0:
+        yield Problem(
+            ("sun", "distance_km"),
+            f"is so little, for so long a flight, that gravity may change the closing speed by {change:.3g} of itself: "
+            f"beside uncertainty.vx_km_s the guaranteed model has room for {1.0 - plain.speed_error:.3g}, "
+            f"found {shown(known.number('sun', 'distance_km'))}",
+            "start nearer or approach faster, move the Sun away, or leave the table [sun] out",
         )

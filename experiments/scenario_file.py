@@ -30,6 +30,8 @@ from sim.fingerprint import scenario_hash as scenario_hash  # noqa: PLC0414 (a s
 from sim.scenario import Scenario, Sun, Target
 
 DEFAULT_FEWEST_SECTIONS = 5
+SMALL_ANGLE_RAD = 0.01
+"""Greatest line-of-sight angle at which the model `paper`, which takes angles for their tangents, is good."""
 
 FORM = Form(
     noun="scenario",
@@ -152,6 +154,17 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
         )
     thruster = scenario.thruster
     target, model = scenario.target, scenario.set_model
+    steepest = max(
+        max(abs(end) for box in (uncertainty, dispersion) for end in box.z_m)
+        / min(uncertainty.x_m[0], dispersion.x_m[0]),
+        max(abs(end) for box in (uncertainty, dispersion) for end in box.vz_m_s) / speed,
+    )
+    if steepest > SMALL_ANGLE_RAD and not model.is_guaranteed:
+        lines.append(
+            f"information_set.model is paper, which takes angles for their tangents, and the line of sight may be "
+            f"{steepest:.3g} rad off the x axis: beyond {SMALL_ANGLE_RAD:g} rad the set may lose the truth; "
+            "write model = guaranteed"
+        )
     if target is not None and model.is_guaranteed and target.acceleration_m_s2 > model.disturbance_m_s2:
         lines.append(
             f"target.acceleration_m_s2, {target.acceleration_m_s2:g}, exceeds information_set.disturbance_m_s2, "

@@ -128,7 +128,9 @@ class Kalman:
         gradient = np.stack([np.ones_like(miss), to_go, velocity / speed, -velocity * to_go / speed], axis=-1)
         variance = np.einsum("bmi,bmij,bmj->bm", gradient, state.covariance, gradient)
         mean = (weight * miss).sum(axis=1)
-        deviation = np.sqrt((weight * (variance + (miss - mean[:, None]) ** 2)).sum(axis=1))
+        # Where nearly all is known, rounding may leave a variance just below zero.
+        spread = (weight * (np.maximum(variance, 0.0) + (miss - mean[:, None]) ** 2)).sum(axis=1)
+        deviation = np.sqrt(spread)
         square = (weight * to_go**2).sum(axis=1)
         best = np.divide((weight * miss * to_go).sum(axis=1), square, out=np.zeros_like(mean), where=square > 0.0)
         to_go = (weight * to_go).sum(axis=1)

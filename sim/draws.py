@@ -16,6 +16,8 @@ from sim.scenario import Scenario
 Floats = NDArray[np.float64]
 
 START, ANGLE, RANGE, TIE, RATE, EXECUTION, TARGET = range(7)
+MOST_STEPS = 100_000
+"""Steps of a flight: what is random in it is drawn before it begins."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,11 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
     Returns
     -------
     Draws
+
+    Raises
+    ------
+    ValueError
+        If a flight takes more than 100 000 steps.
     """
     steps = greatest_number_of_steps(scenario)
     box = scenario.dispersion
@@ -95,4 +102,10 @@ def greatest_number_of_steps(scenario: Scenario) -> int:
     """Steps after which every truth of the dispersion has passed its closest approach."""
     box = scenario.dispersion
     slowest = min(-box.vx_m_s[0], -box.vx_m_s[1])
+    steps = box.x_m[1] / (slowest * scenario.set_model.step_s)
+    if not 0.0 < steps <= MOST_STEPS * (1.0 + 1e-9):
+        raise ValueError(
+            f"a flight may take at most {MOST_STEPS} steps: {box.x_m[1]:g} m at {slowest:g} m/s in steps of "
+            f"{scenario.set_model.step_s:g} s are {steps:.3g}; lengthen the step"
+        )
     return math.ceil(1.01 * box.x_m[1] / (slowest * scenario.set_model.step_s)) + 2

@@ -14,9 +14,30 @@ LEAST_SPEED_CHANGE = 1e-8
 
 
 def on_board_model(scenario: Scenario) -> SetModel:
-    """The set model of a scenario with the bounds that its other tables imply: gravity and the engine's errors."""
+    """The set model of a scenario with the bounds that its other tables imply: gravity and the engine's errors.
+
+    Parameters
+    ----------
+    scenario : Scenario
+
+    Returns
+    -------
+    SetModel
+
+    Raises
+    ------
+    ValueError
+        If the closing speed of a truth may differ from the nominal one by as much as itself: the guaranteed model has
+        no labels then.
+    """
     model = replace(scenario.set_model, execution_error_relative=scenario.thruster.execution_error_relative)
-    return with_gravity(model, scenario.sun)
+    model = with_gravity(model, scenario.sun)
+    if model.speed_error >= 1.0:
+        raise ValueError(
+            f"the guaranteed model needs a closing speed known to within itself: bounds.vx_m_s and gravity let it "
+            f"differ by {model.speed_error:.3g} of the nominal {model.closing_speed_m_s:g} m/s"
+        )
+    return model
 
 
 def with_gravity(model: SetModel, sun: Sun | None) -> SetModel:

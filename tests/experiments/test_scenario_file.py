@@ -224,7 +224,11 @@ BAD_VALUES = [
     ("", "name", '""', ["must not be empty", "for example name ="]),
     ("", "name", "7", ["text in quotes", "found 7"]),
     ("", "name", '"a/b"', ["must not hold", "files are named after it"]),
+    ("", "name", '"a$b$"', ["must not hold"]),
+    ("", "name", '".."', ["must begin with a letter or a digit", "files are named after it"]),
+    ("", "name", '"-rf"', ["must begin with a letter or a digit"]),
     ("", "name", '"a\\u001bb"', ["control characters"]),
+    ("", "name", '"a\\u202eb"', ["control characters"]),
     ("", "name", f'"{"a" * 101}"', ["at most 100 characters", "shorten it"]),
     ("", "description", '"""two\nlines"""', ["one line"]),
     ("", "description", "1.5", ["text in quotes"]),
@@ -456,6 +460,45 @@ def test_threshold_is_checked_over_the_dispersion_too() -> None:
 def test_step_longer_than_the_flight() -> None:
     text = edited("guidance", "step_s", "100").replace("period_s = 0.5", "period_s = 100").replace("= 2.0", "= 100")
     assert_one_problem(text, "guidance.step_s", "more than one step", "found 100", "shorten the step")
+
+
+GUARANTEED = edited("information_set", "model", '"guaranteed"')
+
+
+def test_flight_that_would_take_hours_to_integrate() -> None:
+    text = edited("guidance", "step_s", "1e9").replace("period_s = 0.5", "period_s = 1e9").replace("= 2.0", "= 1e9")
+    for numbers in ("[5301.3, 6301.3]", "[5701.3, 5901.3]"):
+        text = text.replace(numbers, "[5e14, 6e14]")
+    text = text.replace("150.0e6", "1e15").replace("0.00015", "0.00023")
+    assert_one_problem(text, "guidance.step_s", "at most 0.5 s", "10,000,000", "start nearer")
+
+
+def test_closing_speeds_that_have_no_labels() -> None:
+    text = GUARANTEED.replace("[-59.0, -57.0]", "[-116.5, -57.0]")
+    assert_one_problem(text, "uncertainty.vx_km_s", "less than that itself", "57 to 116.5", "narrow")
+    assert read_scenario(text.replace("116.5", "115.9"), "mine.toml").set_model.is_guaranteed
+    assert read_scenario(text.replace('"guaranteed"', '"paper"'), "mine.toml")
+
+
+def test_gravity_that_leaves_no_labels() -> None:
+    text = GUARANTEED.replace("150.0e6", "6400.0")
+    assert_one_problem(text, "sun.distance_km", "change the closing speed by", "move the Sun away")
+    assert read_scenario(text.replace('"guaranteed"', '"paper"'), "mine.toml")
+
+
+def test_error_law_where_the_object_goes_across() -> None:
+    """The distance may grow on the way: the line must be above zero there too."""
+    text = edited("angle_sensor", "error_at_nominal_range_rad", "0.0001").replace("[-0.1, 0.1]", "[-200.0, 0.1]")
+    assert_one_problem(text, "angle_sensor.error_at_nominal_range_rad", "greatest possible range", "stays positive")
+
+
+def test_steep_lines_of_sight_in_the_papers_model_are_warned_of() -> None:
+    steep = read_scenario(edited("uncertainty", "z_km", "[-100.0, 10.0]"), "mine.toml")
+    (line,) = scenario_warnings(steep)
+    assert "0.0189 rad" in line
+    assert not scenario_warnings(
+        dataclasses.replace(steep, set_model=dataclasses.replace(steep.set_model, kind=Model.GUARANTEED))
+    )
 
 
 def test_step_that_would_never_end() -> None:
@@ -701,18 +744,20 @@ def _scenarios(draw: st.DrawFn) -> Scenario:
     sections = draw(st.integers(1, 10_000))
     least_impulse, greatest_impulse = sorted(draw(st.tuples(_floats(0.0, 100.0), _floats(1e-3, 100.0))))
     at_zero = draw(_floats(1e-6, 0.3))
+    bounds = draw(_boxes())
     suns = st.builds(Sun, _floats(1e18, 1e22), _floats(1e11, 1e13), _floats(-6.25, 6.25))
     periods = st.integers(1, 50).map(lambda steps: steps * step_s)
     return Scenario(
-        name=draw(st.text("abcXYZ019 ._-", min_size=1, max_size=20).filter(str.strip)),
+        name=draw(st.from_regex(r"[abcXYZ019 ][abcXYZ019 ._-]{0,19}", fullmatch=True).filter(str.strip)),
         description=draw(st.text(st.characters(codec="utf-8"), max_size=50).filter(str.isprintable)),
         sun=draw(st.none() | suns),
         nominal_range_m=nominal_range_m,
         dispersion=draw(_boxes()),
         set_model=SetModel(
-            closing_speed_m_s=draw(_floats(1e3, 9e4)),
+            # The guaranteed model needs the closing speed to be known to within itself.
+            closing_speed_m_s=draw(_floats(max(1e3, -0.51 * bounds.vx_m_s[0]), 9e4)),
             step_s=step_s,
-            bounds=draw(_boxes()),
+            bounds=bounds,
             angle_sensor=AngleSensor(draw(periods), draw(_floats(at_zero, 0.5)), at_zero, nominal_range_m),
             disturbance_m_s2=draw(_floats(0.0, 1.0)),
             range_threshold_m=draw(_floats(1.0, 1e5)),
