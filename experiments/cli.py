@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 from collections.abc import Sequence
 from typing import Annotated, Any
@@ -26,7 +27,8 @@ from experiments.commands.report import report
 from experiments.commands.reproduce import reproduce
 from experiments.commands.scenarios import app as scenarios
 from experiments.commands.sweep import sweep
-from experiments.errors import InputError
+from experiments.compile_cache import keep_kernels_somewhere
+from experiments.errors import InputError, on_a_screen
 
 INPUT_ERROR = 2
 INTERRUPTED = 130
@@ -41,8 +43,16 @@ class _Root(TyperGroup):
         except InputError as error:
             _complain(f"error: {error}")
             raise typer.Exit(INPUT_ERROR) from None
-        except KeyboardInterrupt:
-            _complain("interrupted")
+        except MemoryError as error:
+            _complain(f"error: there is not enough memory ({error}); ask for less at once, or give it more")
+            raise typer.Exit(INPUT_ERROR) from None
+        except OSError as error:
+            if error.errno == errno.EPIPE:  # a reader that leaves is no error
+                raise
+            _complain(f"error: {_what_failed(error)}; check the disk and its permissions")
+            raise typer.Exit(INPUT_ERROR) from None
+        except KeyboardInterrupt as interrupt:
+            _complain("interrupted" + "".join(map(str, interrupt.args)))
             raise typer.Exit(INTERRUPTED) from None
 
 
@@ -117,6 +127,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     SystemExit
         Always: 0 done, 2 something given is wrong, 130 interrupted.
     """
+    keep_kernels_somewhere()
     try:
         app(args=None if arguments is None else list(arguments), prog_name="infoset")
     except KeyboardInterrupt:  # before a command had begun
@@ -125,7 +136,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _complain(message: str) -> None:
-    typer.echo(message, err=True)
+    typer.echo(on_a_screen(message), err=True)
+
+
+def _what_failed(error: OSError) -> str:
+    """Where and why, of an error that nobody has made a message of: a disk that is full while kernels are stored."""
+    return ": ".join(str(each) for each in (error.filename, error.strerror or error) if each is not None)
 
 
 if __name__ == "__main__":

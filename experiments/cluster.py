@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ipaddress
 import logging
 import re
 import socket
@@ -90,6 +91,31 @@ def connected(address: str) -> Iterator[Cluster]:
     finally:
         with contextlib.suppress(OSError, RuntimeError):
             client.close(timeout=2)
+
+
+def is_open(address: str) -> bool:
+    """Whether a scheduler's address is neither encrypted nor on this machine alone.
+
+    Parameters
+    ----------
+    address : str
+        Such as tcp://host:8786.
+
+    Returns
+    -------
+    bool
+        False of what is no address.
+    """
+    found = _ADDRESS.fullmatch(address)
+    if found is None or found["protocol"] == "tls":
+        return False
+    host = found["host"].strip("[]")
+    if host == "localhost":
+        return False
+    try:
+        return not ipaddress.ip_address(host).is_loopback
+    except ValueError:  # a name, which may be anybody's
+        return True
 
 
 def _need_listener(address: str, host: str, port: int) -> None:

@@ -224,6 +224,7 @@ class Line:
     longest: int
     empty: bool
     forbidden: str = ""
+    begins_badly: str = ""
 
     def __call__(self, value: object) -> str:
         """Check and return it."""
@@ -237,6 +238,8 @@ class Line:
             raise wrong("must be one line without control characters")
         if any(character in value for character in self.forbidden):
             raise wrong(f"must not hold any of {' '.join(self.forbidden)}", "output files are named after it")
+        if value[:1] and value[0] in self.begins_badly:
+            raise wrong("must begin with a letter or a digit", "output files are named after it")
         return value
 
 
@@ -264,7 +267,7 @@ NotNegative = Annotated[Decimal, PlainValidator(Number(least=ZERO))]
 Fraction = Annotated[Decimal, PlainValidator(Number(above=ZERO, below=ONE))]
 Degrees = Annotated[Decimal, PlainValidator(Number(least=Decimal(-360), most=Decimal(360)))]
 Vector = Annotated[tuple[Decimal, ...], PlainValidator(Numbers(3, NUMBER))]
-Name = Annotated[str, PlainValidator(Line(LONGEST_NAME, empty=False, forbidden='/\\:*?"<>|'))]
+Name = Annotated[str, PlainValidator(Line(LONGEST_NAME, empty=False, forbidden='/\\:*?"<>|$', begins_badly="-."))]
 Description = Annotated[str, PlainValidator(Line(LONGEST_DESCRIPTION, empty=True))]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
@@ -12,11 +13,27 @@ from numba.extending import intrinsic
 
 F = TypeVar("F", bound=Callable[..., object])
 
+NOWHERE_TO_KEEP = (
+    "compiled kernels can be kept in no folder, neither beside their source nor in the user's, and are compiled in "
+    "every process: name one that can be written in the environment variable NUMBA_CACHE_DIR"
+)
+
 
 def _compile(function: F, **options: bool | str) -> F:
     # nrt, Numba's reference counting, has no public name.
     jit: Any = njit
-    return cast(F, jit(nogil=True, error_model="numpy", fastmath={"nnan", "nsz"}, **options)(function))
+
+    def decorated() -> F:
+        return cast(F, jit(nogil=True, error_model="numpy", fastmath={"nnan", "nsz"}, **options)(function))
+
+    try:
+        return decorated()
+    except RuntimeError as error:
+        if "no locator available" not in str(error):
+            raise
+        warnings.warn(NOWHERE_TO_KEEP, RuntimeWarning, stacklevel=1)  # of one place: it is said once
+        options["cache"] = False
+        return decorated()
 
 
 def compiled(function: F) -> F:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 from numba import njit
 
 F = TypeVar("F", bound=Callable[..., object])
+
+NOWHERE_TO_KEEP = (
+    "compiled kernels can be kept in no folder, neither beside their source nor in the user's, and are compiled in "
+    "every process: name one that can be written in the environment variable NUMBA_CACHE_DIR"
+)
 
 
 def compiled(function: F) -> F:
@@ -33,4 +39,15 @@ def allocation_free(function: F) -> F:
 
 def _compile(function: F, **options: bool) -> F:
     jit: Any = njit
-    return cast(F, jit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"}, **options)(function))
+
+    def decorated(*, cache: bool) -> F:
+        kept = jit(cache=cache, nogil=True, error_model="numpy", fastmath={"contract", "nsz"}, **options)
+        return cast(F, kept(function))
+
+    try:
+        return decorated(cache=True)
+    except RuntimeError as error:
+        if "no locator available" not in str(error):
+            raise
+        warnings.warn(NOWHERE_TO_KEEP, RuntimeWarning, stacklevel=1)  # of one place: it is said once
+        return decorated(cache=False)

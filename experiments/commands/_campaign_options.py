@@ -149,8 +149,14 @@ def crew(dask: str | None, workers: int | None, processes: int | None, quiet: bo
     if dask is None:
         yield Crew(None, workers, workers or os.cpu_count() or 1)
         return
-    from experiments.cluster import connected
+    from experiments.cluster import connected, is_open
 
+    if is_open(dask):
+        say(
+            f"warning: --dask: what is sent to {dask} is not encrypted, and whoever reaches it can run programs there: "
+            "use a network of your own, or tls:// (see the documentation, campaigns)",
+            quiet,
+        )
     with connected(dask) as cluster:
         say(f"{cluster.workers} Dask workers, {cluster.threads} threads", quiet)
         # Two chunks a thread keep all busy while results travel; workers that join later are given some too.
@@ -178,6 +184,10 @@ def campaign_errors(resume_hint: str = "") -> Iterator[None]:
 
     try:
         yield
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(resume_hint) from None
+    except MemoryError as error:
+        raise InputError(f"there is not enough memory ({error}); give it more, or --chunk less{resume_hint}") from None
     except StorageError as error:
         raise InputError(str(error)) from None
     except VersionError as error:

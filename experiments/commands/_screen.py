@@ -29,7 +29,9 @@ def figure_files(*names: str) -> list[str]:
 def say(message: str, quiet: bool) -> None:
     """Print a line beside the results, on stderr."""
     if not quiet:
-        typer.echo(message, err=True)
+        from experiments.errors import on_a_screen
+
+        typer.echo(on_a_screen(message), err=True)
 
 
 def table_console(stdout_taken: bool) -> Console:
@@ -41,50 +43,59 @@ def table_console(stdout_taken: bool) -> Console:
 
 def tell_of_compiling(quiet: bool) -> None:
     """Say that the kernels are about to be compiled, if no compiled ones of this source are stored."""
-    if not quiet and not _compiled_before():
-        typer.echo("compiling the kernels, once (about half a minute) ...", err=True)
-
-
-def _compiled_before() -> bool:
     from infoset import location, section_kernels
 
-    return all(
-        _stored(kernel, Path(module.__file__ or ""))
-        for module, kernel in ((section_kernels, section_kernels.measure_all), (location, location.refine_all))
-    )
+    kernels = ((section_kernels.__file__, section_kernels.measure_all), (location.__file__, location.refine_all))
+    _tell_of_compiling(quiet, "half a minute", kernels)
 
 
 def tell_of_compiling_pursuit(quiet: bool) -> None:
     """Say the same of the kernels of the pursuit-evasion game."""
     from rendezvous.pursuit_evasion import _extremal
 
-    if not quiet and not _stored(_extremal.flow_kernel, Path(_extremal.__file__ or "")):
-        typer.echo("compiling the kernels, once (about five seconds) ...", err=True)
+    _tell_of_compiling(quiet, "five seconds", [(_extremal.__file__, _extremal.flow_kernel)])
 
 
-def tell_of_compiling_rendezvous(quiet: bool, *, nonlinear: bool = False) -> None:
-    """Say the same of the kernels of encounters and of visits to several targets, nonlinear ones too."""
+def tell_of_compiling_rendezvous(quiet: bool, *, visits: bool = True, nonlinear: bool = False) -> None:
+    """Say the same of the kernels of encounters, and of visits to several targets, nonlinear ones too."""
     from rendezvous.multipoint import _hamiltonian, _path
     from rendezvous.relative_motion import _circular
 
-    kernels: list[tuple[str | None, object]] = [
-        (_circular.__file__, _circular.fill_gramians),
-        (_path.__file__, _path.solve_path),
-    ]
+    kernels: list[tuple[str | None, object]] = [(_circular.__file__, _circular.fill_gramians)]
+    if visits:
+        kernels.append((_path.__file__, _path.solve_path))
     if nonlinear:
         kernels.append((_hamiltonian.__file__, _hamiltonian.propagate))
-    if not quiet and not all(_stored(kernel, Path(file or "")) for file, kernel in kernels):
-        typer.echo(f"compiling the kernels, once (about {'ten' if nonlinear else 'five'} seconds) ...", err=True)
+    _tell_of_compiling(quiet, "ten seconds" if nonlinear else "five seconds", kernels)
+
+
+def _tell_of_compiling(quiet: bool, time: str, kernels: Sequence[tuple[str | None, object]]) -> None:
+    """Say it if one of some kernels, each with the file of its module, is not stored; and where, if not beside it."""
+    missing = [(Path(file or ""), kernel) for file, kernel in kernels if not _stored(kernel, Path(file or ""))]
+    if quiet or not missing:
+        return
+    source, kernel = missing[0]
+    folder = _cache_of(kernel)
+    where = ""
+    if folder is not None and folder != source.parent / "__pycache__":
+        where = f"; they are kept in {folder.parent}, not beside their source"
+    say(f"compiling the kernels, once (about {time}){where} ...", quiet)
+
+
+def _cache_of(kernel: object) -> Path | None:
+    """Where Numba keeps a kernel; None where it is not kept, or not compiled at all."""
+    folder = getattr(getattr(kernel, "stats", None), "cache_path", None)
+    return None if folder is None else Path(folder)
 
 
 def _stored(kernel: object, source: Path) -> bool:
     """Whether Numba has an index of a kernel that is no older than its source."""
     name = getattr(kernel, "__name__", "")
-    folder = getattr(getattr(kernel, "stats", None), "cache_path", None)
-    if folder is None:  # not compiled at all: switched off by NUMBA_DISABLE_JIT
+    folder = _cache_of(kernel)
+    if folder is None:  # switched off by NUMBA_DISABLE_JIT; or nothing can be kept, which Numba's user was warned of
         return True
     try:
-        made = [each.stat().st_mtime for each in Path(folder).glob(f"{source.stem}.{name}-*.nbi")]
+        made = [each.stat().st_mtime for each in folder.glob(f"{source.stem}.{name}-*.nbi")]
         return bool(made) and max(made) >= source.stat().st_mtime
     except OSError:
         return False

@@ -78,7 +78,7 @@ def pareto(
     preferred = None if prefer is None else _preferred(prefer, given)
     files = ("results.json", *figure_files(*FIGURES))
     with checked_destinations(folder=out, names=files, files={"--json": json_, "--html": html}, overwrite=overwrite):
-        tell_of_compiling_rendezvous(quiet)
+        tell_of_compiling_rendezvous(quiet, visits=False)
         with progress_bar(quiet) as begin:
             found = _find(given, preferred, samples, begin("meetings and coalitions"))
         json_text = to_json(_summary(found))

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from experiments.errors import InputError
 from experiments.figures.process import draw_predicted_miss, level_predicted_miss
 from experiments.figures.sets import choose_sections, draw_step, extent_of, level_planes
-from experiments.figures.style import INK, new_figure, place_axes, style
+from experiments.figures.style import INK, new_figure, place_axes, plain, style
 from experiments.record_titles import record_titles
 from sim import Record, StepRecord
 
@@ -84,7 +84,7 @@ def animate(records: Sequence[Record], ending: str, progress: Callable[[float], 
         above, below = place_axes(
             figure, 2, len(records), margins_mm=(18.0, 5.0, 11.0, 8.0), gaps_mm=(8.0 if len(records) > 1 else 0.0, 15.0)
         )
-        titles = record_titles(records)
+        titles = [plain(each) for each in record_titles(records)]
         for axes, record in zip(below, records, strict=True):
             draw_predicted_miss(axes, record)
             axes.set_xlabel("time t, s")

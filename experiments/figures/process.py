@@ -21,6 +21,7 @@ from experiments.figures.style import (
     TRUTH,
     new_figure,
     place_axes,
+    plain,
     style,
     width_mm,
 )
@@ -57,7 +58,8 @@ def draw_process(records: Sequence[Record]) -> Figure:
         grid = place_axes(
             figure, _ROWS, len(records), margins_mm=(19.0, 4.0, 24.0, 12.0), gaps_mm=(7.0 if len(records) > 1 else 0, 4)
         )
-        for record, title, column in zip(records, record_titles(records), zip(*grid, strict=True), strict=True):
+        titles = [plain(each) for each in record_titles(records)]
+        for record, title, column in zip(records, titles, zip(*grid, strict=True), strict=True):
             _draw_angle(column[0], record)
             _draw_rate(column[1], record)
             _draw_impulse(column[2], record)

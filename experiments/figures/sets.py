@@ -14,7 +14,7 @@ from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from experiments.figures.style import INK, new_figure, place_axes, style, width_mm
+from experiments.figures.style import INK, new_figure, place_axes, plain, style, width_mm
 from experiments.record_titles import record_titles
 from infoset import Section
 from sim import Record, StepRecord
@@ -60,7 +60,7 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
             margins_mm=(17.0, 4.0, 21.0, 11.0),
             gaps_mm=(6.0 if len(records) > 1 else 0.0, 15.5),
         )
-        titles = record_titles(records)
+        titles = [plain(each) for each in record_titles(records)]
         for time, row in zip(times_s, grid, strict=True):
             steps = [min(record.steps, key=lambda step: abs(step.time_s - time)) for record in records]
             shown = [choose_sections(step.sections, sections) for step in steps]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,8 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+
+from experiments.output import write_file
 
 WIDTH_MM = 180.0
 PNG_DPI = 200
@@ -125,6 +128,11 @@ def place_axes(
     ]
 
 
+def plain(text: str) -> str:
+    """Return a text of a file so that a figure shows it as it is: two dollars would begin a formula."""
+    return text.replace("$", r"\$")
+
+
 def width_mm(axes: Axes) -> float:
     """Return the width of placed axes, mm."""
     figure = axes.get_figure(root=True)
@@ -151,7 +159,14 @@ def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     pdf, png = folder / f"{name}.pdf", folder / f"{name}.png"
-    with style():
-        figure.savefig(pdf, format="pdf", metadata={"CreationDate": None})
-        figure.savefig(png, format="png", dpi=PNG_DPI, metadata={"Software": None})
+    # Drawn in memory first: a figure on the disk is whole, or the one before.
+    options: list[tuple[Path, dict[str, Any]]] = [
+        (pdf, {"format": "pdf", "metadata": {"CreationDate": None}}),
+        (png, {"format": "png", "metadata": {"Software": None}, "dpi": PNG_DPI}),
+    ]
+    for file, option in options:
+        content = io.BytesIO()
+        with style():
+            figure.savefig(content, **option)
+        write_file(file, content.getvalue(), overwrite=True)
     return [pdf, png]

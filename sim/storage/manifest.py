@@ -308,6 +308,8 @@ def _whole(value: Mapping[str, Any], key: str, least: int) -> int:
 def _text(value: Any, path: str) -> str:
     if not isinstance(value, str):
         raise ValueError(f"{path}: must be text")
+    if not value.isprintable():  # it is shown on terminals, which may be steered by what is not
+        raise ValueError(f"{path}: must be text without control characters")
     return value
 
 

@@ -90,6 +90,8 @@ def _typed(value: Any, wanted: Any, path: str) -> Any:
         return float(value)
     if not isinstance(value, wanted) or (wanted is int and isinstance(value, bool)):
         raise ValueError(f"{path}: must be of the type {wanted.__name__}")
+    if isinstance(value, str) and not value.isprintable():
+        raise ValueError(f"{path}: must be text without control characters")
     return value
 
 

@@ -488,7 +488,7 @@ def test_compiling_is_said_when_nothing_is_compiled(
     os.utime(source, (time.time() + 9, time.time() + 9))
     assert not _screen._stored(Kernel(), source)
 
-    monkeypatch.setattr(_screen, "_compiled_before", lambda: False)
+    monkeypatch.setattr(_screen, "_stored", lambda *_: False)
     _, out, err = infoset("experiment", "--runs", 1, "--json", "-")
     json.loads(out)
     assert err.startswith("compiling the kernels, once")
