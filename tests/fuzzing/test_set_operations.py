@@ -1,0 +1,412 @@
+"""Laws that set operations obey whatever the sets: what is shown where.
+
+`tests/infoset/test_polygon_oracle.py` holds every operation of `ConvexPolygons` to exact rationals (cut, map, shift,
+both sums, support, margin, area, centroid, outward reduction), and shows that cuts are idempotent and monotone, that
+sums commute with maps and that supports add; `test_polygon_wear.py` the same of worn and needle-thin polygons, and of
+the hull; `test_chains.py` the life of a section, cuts and reduction included, its mirror image bit for bit.
+
+Here are the laws that tie operations to one another. Polygons: cuts commute with maps, all operations are monotone and
+include what they must, hulls and boxes are idempotent, areas add, scale and obey Brunn and Minkowski, mirrors and
+powers of two are exact. Information sets, and so the chains they are made of: measuring again tells nothing new, more
+data and narrower bounds give smaller sets, the order of measurements does not matter, impulses add, prediction is a
+shear that keeps areas, sections are concave in the label, mirrors hold, powers of two are exact to the last bit.
+
+Sets of the other problems are in `test_polytope_operations.py`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from infoset import AngleSensor, ConvexPolygons, InformationSet, InitialSet, Model, SetModel, StateBox, to_shapely
+from infoset.shapes import from_shapely
+
+Floats = NDArray[np.float64]
+some = settings(max_examples=25, deadline=None)
+few = settings(max_examples=8, deadline=None)
+
+# Whole numbers up to a thousand: shifts, shears and sums of them are exact, only cuts round.
+REACH = 1000
+WHOLE = st.integers(-REACH, REACH).map(float)
+POINT = st.tuples(WHOLE, WHOLE)
+POLYGON = st.lists(POINT, min_size=1, max_size=9).map(ConvexPolygons.from_points)
+FAT = POLYGON.filter(lambda polygon: float(polygon.area()) >= 1.0)
+NORMAL = st.tuples(st.integers(-9, 9), st.integers(-9, 9)).filter(any).map(lambda n: (float(n[0]), float(n[1])))
+BAND = st.tuples(WHOLE, WHOLE).map(lambda ends: (8.0 * min(ends), 8.0 * max(ends)))
+ROUNDING = 1e-12 * 20 * REACH
+"""Of a coordinate, or of a height over a normal of length 13, several times over."""
+
+SHEAR = st.integers(-5, 5).map(lambda part: np.array([[1.0, 0.0], [float(part), 1.0]]))
+MIRROR = st.sampled_from([np.diag([-1.0, 1.0]), np.diag([1.0, -1.0]), np.array([[0.0, 1.0], [1.0, 0.0]])])
+SCALING = st.tuples(st.integers(-40, 40), st.integers(-40, 40)).map(lambda powers: np.diag(2.0 ** np.array(powers)))
+MAP = st.one_of(SHEAR, MIRROR, st.tuples(SHEAR, MIRROR).map(lambda two: two[0] @ two[1]))
+
+
+def lies_in(inner: ConvexPolygons, outer: ConvexPolygons, by: float = ROUNDING) -> bool:
+    """Whether every vertex of one is in the other, or nearer to it than rounding."""
+    return all(float(outer.margin(vertex)) >= -by for vertex in inner.polygon())
+
+
+def same(one: ConvexPolygons, other: ConvexPolygons) -> bool:
+    return lies_in(one, other) and lies_in(other, one)
+
+
+def vertices(polygon: ConvexPolygons) -> list[tuple[float, float]]:
+    return sorted((float(x), float(y)) for x, y in polygon.polygon())
+
+
+def matched(
+    polygon: ConvexPolygons, image: Callable[[tuple[float, float]], tuple[float, float]]
+) -> list[tuple[float, float]]:
+    return sorted(image(vertex) for vertex in vertices(polygon))
+
+
+# Polygons -------------------------------------------------------------------------------------------------------
+
+
+@some
+@given(POLYGON, NORMAL, BAND, MAP, POINT)
+def test_a_cut_commutes_with_shears_mirrors_and_shifts(
+    polygon: ConvexPolygons, normal: tuple[float, float], band: tuple[float, float], matrix: Floats, offset: Floats
+) -> None:
+    """Up to rounding of the band: each lies in the other, cut by a band wider by that."""
+    shifted = np.asarray(offset)
+    other = np.linalg.inv(matrix).T @ normal
+    level = float(other @ shifted)
+    moved = polygon.linear_map(matrix).translate(shifted)
+
+    def cut_then_moved(by: float) -> ConvexPolygons:
+        return polygon.clip(normal, band[0] - by, band[1] + by).linear_map(matrix).translate(shifted)
+
+    def moved_then_cut(by: float) -> ConvexPolygons:
+        return moved.clip(other, band[0] + level - by, band[1] + level + by)
+
+    wider = 1e-12 * 13 * 13 * 10 * REACH
+    assert lies_in(cut_then_moved(0.0), moved_then_cut(wider))
+    assert lies_in(moved_then_cut(0.0), cut_then_moved(wider))
+
+
+@some
+@given(POLYGON, NORMAL, BAND, SCALING)
+def test_scaling_by_powers_of_two_is_exact_in_a_cut(
+    polygon: ConvexPolygons, normal: tuple[float, float], band: tuple[float, float], scaling: Floats
+) -> None:
+    scaled = polygon.linear_map(scaling).clip(normal / np.diag(scaling), *band)
+    assert scaled.polygon().tolist() == polygon.clip(normal, *band).linear_map(scaling).polygon().tolist()
+
+
+@some
+@given(POLYGON, POLYGON, NORMAL, st.tuples(st.integers(-5, 5), st.integers(-5, 5)), MIRROR)
+def test_mirrors_are_exact(
+    polygon: ConvexPolygons, other: ConvexPolygons, normal: Floats, half: tuple[int, int], mirror: Floats
+) -> None:
+    """In sums of whole numbers; a cut that is along an axis is exact, too."""
+    image = polygon.linear_map(mirror)
+
+    def reflect(point: tuple[float, float]) -> tuple[float, float]:
+        x, y = mirror @ point
+        return float(x) + 0.0, float(y) + 0.0
+
+    assert vertices(image) == matched(polygon, reflect)
+    total = polygon.minkowski_sum(other)
+    assert set(matched(total, reflect)) == set(vertices(image.minkowski_sum(other.linear_map(mirror))))
+    stretched = polygon.add_segment(half)
+    assert same(image.add_segment(mirror @ half), stretched.linear_map(mirror))
+    assert float(image.area()) == pytest.approx(float(polygon.area()), rel=1e-12)
+    assert float(image.support(mirror @ np.asarray(normal))) == float(polygon.support(normal))
+
+
+@some
+@given(FAT, st.lists(st.floats(0.0, 1.0), min_size=9, max_size=9), POLYGON, NORMAL, BAND, MAP, st.integers(4, 9))
+def test_every_operation_is_monotone(
+    outer: ConvexPolygons,
+    parts: list[float],
+    other: ConvexPolygons,
+    normal: tuple[float, float],
+    band: tuple[float, float],
+    matrix: Floats,
+    cap: int,
+) -> None:
+    """A smaller set in, a smaller set out; outward reduction is not monotone, but always outside of what went in."""
+    middle = outer.polygon().mean(axis=0)
+    corners = outer.polygon()
+    shrunk = middle + (corners - middle) * np.resize(parts, len(corners))[:, None]
+    inner = ConvexPolygons.from_points(shrunk)
+    assert lies_in(inner, outer)
+    assert lies_in(inner.clip(normal, *band), outer.clip(normal, band[0] - 1e-9, band[1] + 1e-9))
+    assert lies_in(inner.linear_map(matrix), outer.linear_map(matrix))
+    assert lies_in(inner.translate(normal), outer.translate(normal))
+    assert lies_in(inner.add_segment(normal), outer.add_segment(normal))
+    assert lies_in(inner.minkowski_sum(other), outer.minkowski_sum(other))
+    assert lies_in(inner, outer.reduce_outward(cap))
+    assert float(inner.support(normal)) <= float(outer.support(normal)) + ROUNDING
+    assert float(inner.area()) <= float(outer.area()) * (1.0 + 1e-12)
+
+
+@some
+@given(POLYGON, NORMAL, BAND, st.integers(4, 9))
+def test_hulls_boxes_and_reductions_are_idempotent_and_outward(
+    polygon: ConvexPolygons, normal: tuple[float, float], band: tuple[float, float], cap: int
+) -> None:
+    once = ConvexPolygons.from_points(polygon.polygon())
+    assert vertices(once) == vertices(polygon)
+    reduced = polygon.reduce_outward(cap)
+    assert reduced.reduce_outward(cap).polygon().tolist() == reduced.polygon().tolist()
+    assert lies_in(polygon, reduced)
+    least, greatest = polygon.bounding_box()
+    box = ConvexPolygons.box((least[0], greatest[0]), (least[1], greatest[1]))
+    again = box.bounding_box()
+    np.testing.assert_array_equal(again, (least, greatest))
+    assert lies_in(polygon, box, 0.0)
+    assert lies_in(polygon, polygon.add_segment(normal))
+    assert lies_in(polygon.clip(normal, *band), polygon)
+    assert vertices(from_shapely(to_shapely(polygon))) == vertices(polygon)
+    assert float(polygon.margin(polygon.centroid())) >= -ROUNDING
+
+
+@some
+@given(FAT, FAT, NORMAL, st.floats(0.0, 1.0), MAP, st.integers(4, 9))
+def test_areas_add_scale_and_obey_brunn_and_minkowski(
+    first: ConvexPolygons, second: ConvexPolygons, normal: tuple[float, float], part: float, matrix: Floats, cap: int
+) -> None:
+    area, other = float(first.area()), float(second.area())
+    low, high = -float(first.support(np.negative(normal))), float(first.support(normal))
+    level = low + part * (high - low)
+    pieces = float(first.clip(normal, upper=level).area()) + float(first.clip(normal, lower=level).area())
+    assert pieces == pytest.approx(area, rel=1e-9)
+    assert float(first.linear_map(matrix).area()) == pytest.approx(area, rel=1e-12)
+    assert float(first.linear_map(3.0 * matrix).area()) == pytest.approx(9.0 * area, rel=1e-12)
+    # A segment sweeps the width across it; a sum is at least as large as Brunn and Minkowski say.
+    across = np.array([-normal[1], normal[0]])
+    width = float(first.support(across)) + float(first.support(-across))
+    assert float(first.add_segment(normal).area()) == pytest.approx(area + 2.0 * width, rel=1e-12)
+    total = float(first.minkowski_sum(second).area())
+    assert math.sqrt(total) >= (math.sqrt(area) + math.sqrt(other)) * (1.0 - 1e-12)
+    assert float(first.minkowski_sum(first).area()) == pytest.approx(4.0 * area, rel=1e-12)
+    least, greatest = first.bounding_box()
+    assert area <= float(np.prod(greatest - least)) <= 2.0 * float(np.abs(greatest - least).max()) ** 2
+    assert float(first.reduce_outward(cap).area()) >= area * (1.0 - 1e-12)
+
+
+# Information sets -----------------------------------------------------------------------------------------------
+
+E, STEP, RANGE = 1000.0, 2.0, 100e3
+BOUNDS = StateBox((-2e3, 3e3), (90e3, 110e3), (-40.0, 30.0), (-1010.0, -990.0))
+SENSOR = AngleSensor(STEP, 0.002, 0.003, RANGE)
+SOUND = SetModel(
+    E, STEP, BOUNDS, SENSOR, 0.05, 2e3, 5, 1, InitialSet.BOX, Model.GUARANTEED, execution_error_relative=0.02
+)
+PAPER = replace(SOUND, kind=Model.PAPER)
+MODEL = st.sampled_from([SOUND, PAPER])
+PART = st.floats(-1.0, 1.0)
+LABEL = st.floats(91e3, 109e3)
+
+
+def story(steps: int) -> st.SearchStrategy[list[tuple[float, float, float]]]:
+    """Steps of an error and an impulse in units of their bounds, and whether the rate is measured: above zero."""
+    return st.lists(st.tuples(PART, PART, PART), min_size=1, max_size=steps)
+
+
+STORY = story(12)
+
+
+def tell(model: SetModel, events: list[tuple[float, float, float]], *, sign: float = 1.0) -> InformationSet:
+    """A set after measurements about the motion z = 300 m + 5 m/s t, x = 100 km - e t, and impulses."""
+    information = InformationSet(model)
+    for i, (error, impulse, rate) in enumerate(events):
+        t = STEP * i
+        z, x = 300.0 + 5.0 * t, RANGE - E * t
+        information.measure_angle(sign * (z / x + error * float(model.angle_sensor.error_bound(x))))
+        if rate > 0.0:
+            information.measure_rate(sign * (5.0 + E * z / x) / x, 0.02 * E / x)
+        information.shift(sign * impulse)
+        information.predict()
+    return information
+
+
+def section(information: InformationSet, label: float) -> ConvexPolygons:
+    """In lengths, V counted as V x/e: what rounding does is alike along both axes then."""
+    found = information.section_at(label)
+    return found.polygon.linear_map([[found.range_m / E, 0.0], [0.0, 1.0]])
+
+
+HAIR = 1e-9 * 1e4
+"""Far above what rounding and the slack of some tens of ulp do to lengths of up to 10 km in a dozen steps."""
+
+
+@few
+@given(MODEL, STORY, PART, LABEL)
+def test_measuring_again_tells_nothing_new(
+    model: SetModel, events: list[tuple[float, float, float]], error: float, label: float
+) -> None:
+    information = tell(model, events)
+    t = information.time_s
+    alpha = (300.0 + 5.0 * t) / (RANGE - E * t) + 0.001 * error
+
+    def measure(what: int) -> None:
+        if what == 0:
+            information.measure_angle(alpha)
+        elif what == 1:
+            information.measure_rate(0.0, 0.01)
+        else:
+            information.measure_range(RANGE - E * t, 0.08, alpha_rad=alpha)
+
+    for what in range(3):
+        measure(what)
+        once = information.copy()
+        measure(what)
+        first, second = section(once, label), section(information, label)
+        assert first.is_empty == second.is_empty
+        assert lies_in(first, second, HAIR)
+        assert lies_in(second, first, HAIR)
+        np.testing.assert_allclose(once.living_range_interval_m(), information.living_range_interval_m(), rtol=1e-9)
+
+
+@few
+@given(MODEL, STORY, LABEL, st.floats(1.0, 1.5))
+def test_wider_bounds_give_larger_sets(
+    model: SetModel, events: list[tuple[float, float, float]], label: float, more: float
+) -> None:
+    # The measured values must be the same: errors in units of a greater bound are less.
+    within = [(error / more, impulse, rate) for error, impulse, rate in events]
+    narrow = section(tell(model, events), label)
+    sensor = replace(SENSOR, error_at_nominal_range_rad=0.002 * more, error_at_zero_range_rad=0.003 * more)
+    assert lies_in(narrow, section(tell(replace(model, angle_sensor=sensor), within), label), HAIR)
+    box = replace(BOUNDS, z_m=(-2e3 * more, 3e3 * more), vz_m_s=(-40.0 * more, 30.0 * more))
+    for larger in (
+        replace(model, bounds=box),
+        replace(model, disturbance_m_s2=model.disturbance_m_s2 * more),
+        replace(model, execution_error_relative=0.02 * more),
+        replace(model, gravity_m_s2=0.01 * (more - 1.0)),
+    ):
+        assert lies_in(narrow, section(tell(larger, events), label), HAIR)
+
+
+@few
+@given(MODEL, STORY, LABEL, PART)
+def test_more_data_give_smaller_sets_in_whatever_order(
+    model: SetModel, events: list[tuple[float, float, float]], label: float, error: float
+) -> None:
+    before = tell(model, events)
+    alpha = (300.0 + 5.0 * before.time_s) / (RANGE - E * before.time_s) + 0.001 * error
+    one, other = before.copy(), before.copy()
+    one.measure_angle(alpha)
+    one.measure_range(RANGE - E * before.time_s, 0.05)
+    other.measure_range(RANGE - E * before.time_s, 0.05)
+    other.measure_angle(alpha)
+    assume(not (one.inconsistent.any() or other.inconsistent.any()))
+    cut, same_cut = section(one, label), section(other, label)
+    assert lies_in(cut, section(before, label), HAIR)
+    assert lies_in(cut, same_cut, HAIR)
+    assert lies_in(same_cut, cut, HAIR)
+    misses = [information.predicted_miss() for information in (before, one, other)]
+    assert misses[0].lower_m[0] - HAIR <= misses[1].lower_m[0] <= misses[1].upper_m[0] <= misses[0].upper_m[0] + HAIR
+    ends = [information.living_range_interval_m() for information in (before, one)]
+    assert ends[0][0][0] * (1.0 - 1e-12) <= ends[1][0][0] <= ends[1][1][0] <= ends[0][1][0] * (1.0 + 1e-12)
+
+
+@few
+@given(STORY, LABEL, PART, PART)
+def test_impulses_add_and_move_the_predicted_miss(
+    events: list[tuple[float, float, float]], label: float, first: float, second: float
+) -> None:
+    one, other = tell(PAPER, events), tell(PAPER, events)
+    before = other.section_at(label)
+    one.shift(first)
+    one.shift(second)
+    other.shift(first + second)
+    assert lies_in(section(one, label), section(other, label), HAIR)
+    assert lies_in(section(other, label), section(one, label), HAIR)
+    after = other.section_at(label).polygon
+    assume(not before.polygon.is_empty)
+    assert float(after.area()) == pytest.approx(float(before.polygon.area()), rel=1e-9, abs=1e-9)
+    moved = before.polygon.translate((-(first + second), 0.0))
+    assert lies_in(after, moved, HAIR)
+    assert lies_in(moved, after, HAIR)
+
+
+@few
+@given(STORY, LABEL)
+def test_prediction_is_a_shear_and_a_segment(events: list[tuple[float, float, float]], label: float) -> None:
+    """It keeps areas where there is no disturbance, and adds the width across the segment where there is one."""
+    information = tell(PAPER, events)
+    before = information.section_at(label).polygon
+    assume(not before.is_empty)
+    information.predict()
+    after = information.section_at(label)
+    nu = PAPER.disturbance_m_s2
+    half = np.array([nu * STEP, 0.5 * nu * STEP**2])
+    wanted = before.linear_map([[1.0, 0.0], [STEP, 1.0]]).add_segment(half)
+    assert lies_in(after.polygon, wanted, HAIR)
+    assert lies_in(wanted, after.polygon, HAIR)
+    width = float(wanted.support((-half[1], half[0]))) + float(wanted.support((half[1], -half[0])))
+    area = float(before.area()) + 2.0 * width
+    assert float(after.polygon.area()) == pytest.approx(area, rel=1e-9, abs=HAIR)
+    assert float(after.omega_alpha.area()) * after.range_m**2 == pytest.approx(float(after.polygon.area()), rel=1e-9)
+    still = tell(replace(PAPER, disturbance_m_s2=0.0), events)
+    misses = [still.predicted_miss()]
+    still.predict()
+    misses.append(still.predicted_miss())
+    assert misses[1].upper_m == pytest.approx(misses[0].upper_m, abs=HAIR)
+    assert misses[1].lower_m == pytest.approx(misses[0].lower_m, abs=HAIR)
+
+
+@few
+@given(story(6), LABEL, LABEL)
+def test_sections_are_concave_in_the_label(events: list[tuple[float, float, float]], one: float, other: float) -> None:
+    """Half of the sum of two sections lies in the section between: the whole set is convex."""
+    information = tell(SOUND, [(error, impulse, -1.0) for error, impulse, _ in events])
+    low, high, middle = (information.section_at(label).polygon for label in (one, other, 0.5 * (one + other)))
+    assume(not (low.is_empty or high.is_empty))
+    assert lies_in(low.minkowski_sum(high).linear_map(0.5 * np.eye(2)), middle, HAIR)
+
+
+@few
+@given(MODEL, STORY, LABEL)
+def test_a_mirrored_history_gives_the_mirrored_set(
+    model: SetModel, events: list[tuple[float, float, float]], label: float
+) -> None:
+    box = replace(BOUNDS, z_m=(-3e3, 2e3), vz_m_s=(-30.0, 40.0))
+    there, back = tell(model, events), tell(replace(model, bounds=box), events, sign=-1.0)
+    image, wanted = section(back, label).linear_map(-np.eye(2)), section(there, label)
+    assert image.is_empty == wanted.is_empty
+    assert lies_in(image, wanted, ROUNDING)
+    assert lies_in(wanted, image, ROUNDING)
+    assert back.predicted_miss().lower_m == pytest.approx(-there.predicted_miss().upper_m, rel=1e-12)
+
+
+@few
+@given(MODEL, STORY, LABEL, st.integers(-30, 30))
+def test_lengths_a_power_of_two_as_long_give_the_same_digits(
+    model: SetModel, events: list[tuple[float, float, float]], label: float, power: int
+) -> None:
+    unit = 2.0**power
+    box = StateBox(*((unit * least, unit * greatest) for least, greatest in vars(BOUNDS).values()))
+    scaled = replace(
+        model,
+        closing_speed_m_s=unit * E,
+        bounds=box,
+        angle_sensor=replace(SENSOR, nominal_range_m=unit * RANGE),
+        disturbance_m_s2=unit * model.disturbance_m_s2,
+        range_threshold_m=unit * model.range_threshold_m,
+    )
+    events = [(error, impulse, -1.0) for error, impulse, _ in events]
+    plain, other = tell(model, events), InformationSet(scaled)
+    for i, (error, impulse, _) in enumerate(events):
+        z, x = 300.0 + 5.0 * STEP * i, RANGE - E * STEP * i
+        other.measure_angle(z / x + error * float(SENSOR.error_bound(x)))
+        other.shift(unit * impulse)
+        other.predict()
+    assert (unit * plain.section_at(label).polygon.polygon()).tolist() == (
+        other.section_at(unit * label).polygon.polygon().tolist()
+    )
+    assert (unit * plain.predicted_miss().upper_m).tolist() == other.predicted_miss().upper_m.tolist()
+    assert (unit * plain.ranges_m).tolist() == other.ranges_m.tolist()
