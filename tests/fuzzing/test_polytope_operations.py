@@ -1,0 +1,269 @@
+"""Laws that the sets of `rendezvous` obey: polytopes in R^n and reachable sets.
+
+Shown elsewhere: hulls and intersections are those of exact rationals, supports of sums, images and projections,
+members of intersections, flat sets, empty and unbounded ones (`tests/rendezvous/polytope`); exact and lifted reachable
+sets agree with each other and with rationals, samples and selections are members (`tests/rendezvous/reachability`). The
+other problems have no set operations: a front of points (`tests/rendezvous/pareto`), paths, or numbers.
+
+Here: hull, intersection, cut and projection are idempotent; every operation is monotone and includes what it must;
+cuts, sums, hulls and intersections commute with linear maps (shear, shift, scaling, mirror); volumes scale by
+determinants, multiply in products and obey Brunn and Minkowski. Reachable sets: the tube lies in the forward sets,
+both within their bounds and shadows; more thrust reaches more; a step is the image, the sum and the cut it is said to
+be; mirrored starts and other units of the state give the mirrored and the scaled sets.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from rendezvous.polytope import (
+    EmptyPolytopeError,
+    Polytope,
+    cut,
+    intersection,
+    linear_image,
+    minkowski_sum,
+    product,
+    projection,
+    shadow,
+)
+from rendezvous.reachability import EmptyTubeError, ReachabilityProblem, Route, SetKind, Solution, solve
+
+Floats = NDArray[np.float64]
+some = settings(max_examples=4, deadline=None)
+few = settings(max_examples=2, deadline=None)
+
+SIZE = 10.0
+ROUNDING = 1e-9 * SIZE
+SEED = st.integers(0, 10**6)
+
+
+def solid(seed: int, space: int) -> Polytope:
+    """A hull of a dozen points of the box [-10, 10]^n, neither thin nor with facets nearly in one plane."""
+    points = np.random.default_rng(seed).uniform(-SIZE, SIZE, (space + 8, space))
+    return Polytope.from_vertices(points)
+
+
+def map_of(kind: str, seed: int, space: int) -> Floats:
+    """A matrix whose inverse is as harmless as itself."""
+    generator = np.random.default_rng(seed)
+    if kind == "mirror":
+        return np.diag(generator.permutation(np.append(np.ones(space - 1), -1.0)))
+    if kind == "scaling":
+        return np.diag(generator.uniform(0.3, 3.0, space))
+    return np.eye(space) + np.triu(generator.uniform(-1.0, 1.0, (space, space)), 1)
+
+
+KIND = st.sampled_from(["shear", "mirror", "scaling"])
+SPACE = st.integers(2, 4)
+
+
+def lies_in(inner: Polytope, outer: Polytope, by: float = ROUNDING) -> bool:
+    return float(outer.excess(inner.vertices).max()) <= by
+
+
+def same(one: Polytope, other: Polytope, by: float = ROUNDING) -> bool:
+    return lies_in(one, other, by) and lies_in(other, one, by)
+
+
+# Polytopes ------------------------------------------------------------------------------------------------------
+
+
+@some
+@given(SEED, SPACE)
+def test_hulls_cuts_intersections_and_projections_are_idempotent(seed: int, space: int) -> None:
+    one = solid(seed, space)
+    again = Polytope.from_vertices(one.vertices)
+    assert (len(again.vertices), len(again.normals)) == (len(one.vertices), len(one.normals))
+    assert same(one, Polytope.from_halfspaces(one.normals, one.offsets))
+    assert same(one, intersection(one, one))
+    assert same(one, projection(one, range(space)))
+    normal = np.random.default_rng(seed).standard_normal((1, space))
+    level = 0.5 * one.support(normal)
+    once = cut(one, normal, level)
+    assert same(once, cut(once, normal, level))
+    box = Polytope.box(*one.bounds)
+    np.testing.assert_allclose(box.bounds, one.bounds, atol=ROUNDING)
+    assert lies_in(one, box)
+    assert same(box, Polytope.box(*box.bounds))
+    assert same(one, shadow(one.support_vector, space), 1e-7 * SIZE)
+
+
+@some
+@given(SEED, SPACE, KIND)
+def test_operations_commute_with_linear_maps(seed: int, space: int, kind: str) -> None:
+    one, other, matrix = solid(seed, space), solid(seed + 1, space), map_of(kind, seed, space)
+    shift = np.random.default_rng(seed).uniform(-SIZE, SIZE, space)
+
+    def moved(polytope: Polytope) -> Polytope:
+        return linear_image(polytope, matrix, shift)
+
+    inverse = np.linalg.inv(matrix)
+    normals = np.random.default_rng(seed + 2).standard_normal((2, space))
+    middle = one.vertices.mean(axis=0)
+    offsets = normals @ middle + 0.4 * (one.support(normals) - normals @ middle)
+    images = normals @ inverse
+    assert same(moved(cut(one, normals, offsets)), cut(moved(one), images, offsets + images @ shift), 1e-7 * SIZE)
+    together = minkowski_sum(one, other)
+    assert same(moved(together), minkowski_sum(moved(one), linear_image(other, matrix)), 1e-7 * SIZE)
+    try:
+        common = intersection(one, other)
+    except EmptyPolytopeError:
+        with pytest.raises(EmptyPolytopeError):
+            intersection(moved(one), moved(other))
+    else:
+        assume(common.volume() > 1e-3 and common.dimension == space)
+        assert same(moved(common), intersection(moved(one), moved(other)), 1e-7 * SIZE)
+    assert same(linear_image(moved(one), inverse, -inverse @ shift), one, 1e-7 * SIZE)
+
+
+@some
+@given(SEED, SPACE, st.floats(0.1, 1.0))
+def test_operations_are_monotone_and_include_what_they_must(seed: int, space: int, part: float) -> None:
+    outer, other = solid(seed, space), solid(seed + 1, space)
+    middle = outer.vertices.mean(axis=0)
+    inner = linear_image(outer, part * np.eye(space), (1.0 - part) * middle)
+    matrix, normal = map_of("shear", seed, space), np.ones((1, space))
+    level = normal @ middle
+    assert lies_in(inner, outer)
+    assert lies_in(linear_image(inner, matrix), linear_image(outer, matrix))
+    assert lies_in(minkowski_sum(inner, other), minkowski_sum(outer, other))
+    assert lies_in(cut(inner, normal, level), cut(outer, normal, level))
+    assert lies_in(cut(outer, normal, level), outer)
+    assert lies_in(intersection(inner, outer), inner)
+    assert lies_in(projection(inner, [0, 1]), projection(outer, [0, 1]))
+    assert lies_in(product(inner, other), product(outer, other))
+    assert (inner.support(np.eye(space)) <= outer.support(np.eye(space)) + ROUNDING).all()
+    assert inner.volume() <= outer.volume() * (1.0 + 1e-9)
+    hull = Polytope.from_vertices(np.vstack([outer.vertices, other.vertices]))
+    assert lies_in(outer, hull)
+    assert lies_in(other, hull)
+
+
+@some
+@given(SEED, SPACE, KIND, st.floats(0.0, 1.0))
+def test_volumes(seed: int, space: int, kind: str, part: float) -> None:
+    one, other, matrix = solid(seed, space), solid(seed + 1, space), map_of(kind, seed, space)
+    volume = one.volume()
+    assert linear_image(one, matrix, np.ones(space)).volume() == pytest.approx(
+        abs(float(np.linalg.det(matrix))) * volume, rel=1e-9
+    )
+    assert minkowski_sum(one, one).volume() == pytest.approx(2.0**space * volume, rel=1e-9)
+    least = volume ** (1.0 / space) + other.volume() ** (1.0 / space)
+    assert minkowski_sum(one, other).volume() ** (1.0 / space) >= least * (1.0 - 1e-9)
+    assert volume <= float(np.prod(np.subtract(*one.bounds[::-1])))
+    line = Polytope.box([-1.0], [2.0])
+    assert product(one, line).volume() == pytest.approx(3.0 * volume, rel=1e-9)
+    normal = np.random.default_rng(seed).standard_normal((1, space))
+    low, high = -float(one.support(-normal)[0]), float(one.support(normal)[0])
+    level = np.array([low + (0.05 + 0.9 * part) * (high - low)])
+    pieces = cut(one, normal, level).volume() + cut(one, -normal, -level).volume()
+    assert pieces == pytest.approx(volume, rel=1e-7)
+
+
+# Reachable sets -------------------------------------------------------------------------------------------------
+
+
+def problem(seed: int) -> ReachabilityProblem:
+    """A random plant of two or three states; what is asked of it is near enough to be reached."""
+    generator = np.random.default_rng(seed)
+    states, periods = int(generator.integers(2, 4)), int(generator.integers(2, 4))
+    return ReachabilityProblem(
+        np.eye(states) + 0.3 * generator.standard_normal((periods, states, states)),
+        np.repeat(np.eye(states)[None], periods, axis=0) + 0.1 * generator.standard_normal((periods, states, states)),
+        generator.uniform(-0.4, 0.4, states),
+        np.full(states, 2.0),
+        generator.uniform(0.5, 1.5, states),
+    )
+
+
+def solved(given_problem: ReachabilityProblem) -> Solution:
+    try:
+        return solve(given_problem, Route.EXACT)
+    except EmptyTubeError:
+        assume(False)
+        raise
+
+
+def probes(seed: int, states: int) -> Floats:
+    return np.vstack([np.eye(states), -np.eye(states), np.random.default_rng(seed).standard_normal((6, states))])
+
+
+@few
+@given(SEED)
+def test_the_tube_lies_in_the_forward_sets_and_both_in_bounds_and_shadows(seed: int) -> None:
+    asked = problem(seed)
+    sets = solved(asked).sets
+    states = asked.states
+    bounds = {kind: sets.bounds(kind) for kind in SetKind}
+    assert (bounds[SetKind.FORWARD][:, :, 0] <= bounds[SetKind.TUBE][:, :, 0] + 1e-7).all()
+    assert (bounds[SetKind.TUBE][:, :, 1] <= bounds[SetKind.FORWARD][:, :, 1] + 1e-7).all()
+    seen = probes(seed, states)
+    for time in range(asked.periods + 1):
+        supports = {kind: sets.support(kind, time, seen) for kind in SetKind}
+        assert (supports[SetKind.TUBE] <= supports[SetKind.FORWARD] + 1e-7).all()
+        for kind in SetKind:
+            np.testing.assert_allclose(supports[kind][:states], bounds[kind][time, :, 1], atol=1e-8)
+            outline = sets.shadow(kind, time, [0, 1])
+            flat = np.zeros((len(seen), states))
+            flat[:, :2] = seen[:, :2]
+            np.testing.assert_allclose((outline @ seen[:, :2].T).max(axis=0), sets.support(kind, time, flat), atol=1e-7)
+
+
+@few
+@given(SEED, st.floats(1.0, 2.0))
+def test_more_thrust_and_wider_limits_reach_more(seed: int, more: float) -> None:
+    asked = problem(seed)
+    few_sets = solved(asked).sets
+    seen = probes(seed, asked.states)
+    for wider in (
+        replace(asked, control_bounds=asked.control_bounds * more),
+        replace(asked, state_bounds=asked.state_bounds * more),
+    ):
+        many = solved(wider).sets
+        for time in range(asked.periods + 1):
+            less = few_sets.support(SetKind.FORWARD, time, seen)
+            assert (less <= many.support(SetKind.FORWARD, time, seen) + 1e-8).all()
+
+
+@few
+@given(SEED)
+def test_a_step_is_the_image_the_sum_and_the_cut(seed: int) -> None:
+    asked = problem(seed)
+    sets = solved(asked).sets
+    seen = probes(seed, asked.states)
+    reached = Polytope.from_vertices(asked.initial[None, :])
+    thrust = Polytope.box(-asked.control_bounds, asked.control_bounds)
+    limits = Polytope.box(-asked.state_bounds, asked.state_bounds)
+    for time in range(asked.periods):
+        pushed = linear_image(thrust, asked.control[time])
+        reached = intersection(minkowski_sum(linear_image(reached, asked.transition[time]), pushed), limits)
+        np.testing.assert_allclose(sets.support(SetKind.FORWARD, time + 1, seen), reached.support(seen), atol=1e-7)
+
+
+@few
+@given(SEED)
+def test_mirrored_starts_and_other_units_give_mirrored_and_scaled_sets(seed: int) -> None:
+    asked = problem(seed)
+    plain = solved(asked)
+    unit = 2.0 ** np.random.default_rng(seed).integers(-6, 7, asked.states)
+    scaled = replace(
+        asked,
+        transition=unit[:, None] * asked.transition / unit,
+        control=unit[:, None] * asked.control,
+        initial=unit * asked.initial,
+        state_bounds=unit * asked.state_bounds,
+    )
+    mirrored, other = solved(replace(asked, initial=-asked.initial)), solved(scaled)
+    seen = probes(seed, asked.states)
+    for kind in SetKind:
+        for time in range(asked.periods + 1):
+            wanted = plain.sets.support(kind, time, seen)
+            np.testing.assert_allclose(mirrored.sets.support(kind, time, -seen), wanted, atol=1e-7)
+            np.testing.assert_allclose(other.sets.support(kind, time, seen / unit), wanted, atol=1e-7)
