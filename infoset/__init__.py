@@ -5,7 +5,8 @@ Start with `InformationSet` (a batch of sets carried through measurements, impul
 """
 
 from infoset.convex_polygons import ConvexPolygons
-from infoset.information_set import InformationSet, InformationSetView, Section, SetStatus, to_omega_alpha
+from infoset.information_set import InformationSet
+from infoset.information_set_view import InformationSetView, Section, SetStatus, to_omega_alpha
 from infoset.model import InitialSet, Model, Recovery, SetModel, StateBox
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.sensors import AngleSensor, RangeSensor, RateSensor

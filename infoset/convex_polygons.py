@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from infoset import polygon as kernels
+from infoset import polygon, polygon_hull, polygon_sum
 from infoset._compile import compiled
 
 Floats = NDArray[np.float64]
@@ -71,7 +71,7 @@ class ConvexPolygons:
         if len(given) == 0:
             return cls.empty()
         vertices = np.zeros((len(given), 2))
-        count = kernels.hull(given, len(given), vertices)
+        count = polygon_hull.hull(given, len(given), vertices)
         return cls(vertices[:count], count)
 
     @classmethod
@@ -287,21 +287,21 @@ def _clip_each(
 ) -> None:
     for i in range(counts.size):
         _copy(vertices[i], counts[i], out[i])
-        made[i], _ = kernels.clip_to_band(out[i], counts[i], normal[i, 0], normal[i, 1], lower[i], upper[i])
+        made[i], _ = polygon.clip_to_band(out[i], counts[i], normal[i, 0], normal[i, 1], lower[i], upper[i])
 
 
 @compiled
 def _map_each(vertices: Floats, counts: Integers, out: Floats, made: Integers, matrix: Floats) -> None:
     for i in range(counts.size):
         m = matrix[i]
-        made[i] = kernels.map_linearly(vertices[i], counts[i], m[0, 0], m[0, 1], m[1, 0], m[1, 1], out[i])
+        made[i] = polygon.map_linearly(vertices[i], counts[i], m[0, 0], m[0, 1], m[1, 0], m[1, 1], out[i])
 
 
 @compiled
 def _add_segment_each(vertices: Floats, counts: Integers, out: Floats, made: Integers, half: Floats) -> None:
     for i in range(counts.size):
         _copy(vertices[i], counts[i], out[i])
-        made[i] = kernels.add_segment(out[i], counts[i], half[i, 0], half[i, 1])
+        made[i] = polygon_sum.add_segment(out[i], counts[i], half[i, 0], half[i, 1])
 
 
 @compiled
@@ -309,14 +309,14 @@ def _add_polygon_each(
     vertices: Floats, counts: Integers, out: Floats, made: Integers, other: Floats, other_counts: Integers
 ) -> None:
     for i in range(counts.size):
-        made[i] = kernels.add_polygon(vertices[i], counts[i], other[i], other_counts[i], out[i])
+        made[i] = polygon_sum.add_polygon(vertices[i], counts[i], other[i], other_counts[i], out[i])
 
 
 @compiled
 def _reduce_each(vertices: Floats, counts: Integers, out: Floats, made: Integers, cap: Integers) -> None:
     for i in range(counts.size):
         _copy(vertices[i], counts[i], out[i])
-        made[i] = kernels.reduce_outward(out[i], counts[i], cap[i])
+        made[i] = polygon_hull.reduce_outward(out[i], counts[i], cap[i])
 
 
 @compiled
@@ -326,7 +326,7 @@ def _support_each(vertices: Floats, counts: Integers, direction: Floats, out: Fl
             out[i, 0] = -np.inf
             continue
         x, y = direction[i]
-        at = kernels.support_index(vertices[i], counts[i], x, y)
+        at = polygon.support_index(vertices[i], counts[i], x, y)
         out[i, 1] = vertices[i, at, 0]
         out[i, 2] = vertices[i, at, 1]
         out[i, 0] = x * out[i, 1] + y * out[i, 2]
@@ -335,16 +335,16 @@ def _support_each(vertices: Floats, counts: Integers, direction: Floats, out: Fl
 @compiled
 def _margin_each(vertices: Floats, counts: Integers, point: Floats, out: Floats) -> None:
     for i in range(counts.size):
-        out[i, 0] = kernels.margin(vertices[i], counts[i], point[i, 0], point[i, 1])
+        out[i, 0] = polygon.margin(vertices[i], counts[i], point[i, 0], point[i, 1])
 
 
 @compiled
 def _area_each(vertices: Floats, counts: Integers, unused: Floats, out: Floats) -> None:
     for i in range(counts.size):
-        out[i, 0] = kernels.area(vertices[i], counts[i])
+        out[i, 0] = polygon.area(vertices[i], counts[i])
 
 
 @compiled
 def _centroid_each(vertices: Floats, counts: Integers, unused: Floats, out: Floats) -> None:
     for i in range(counts.size):
-        out[i, 0], out[i, 1] = kernels.centroid(vertices[i], counts[i])
+        out[i, 0], out[i, 1] = polygon.centroid(vertices[i], counts[i])

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from infoset import chains
+from infoset import chains, whole_chains
 from infoset._compile import allocation_free, entry
 from infoset.history import History, Tapes
 from infoset.location import LOWER, PROBE, UPPER, Workspace, keep_section, locate_end, run, tape_of, workspace
-from infoset.section_kernels import ALIVE, Flags, Floats, Integers, SectionLaw, Sections, Tape
+from infoset.section_law import SectionLaw
+from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape
+from infoset.section_passes import Sections
 from infoset.section_stack import SectionStack
 
 LABELS = 4
@@ -210,7 +212,7 @@ def bound_leaving(
             inner = 1
         labels[number] = label
         tau = (label - travelled) / law.closing_speed
-        counts[number] = chains.outline(room.origins, room.rings, room.marks, row, tau, outlines[number])
+        counts[number] = whole_chains.outline(room.origins, room.rings, room.marks, row, tau, outlines[number])
         number += 1
     if spacing == 0.0 or number < 3:
         # So few labels live that they are one to within what is located: a hair's breadth stands for the rest.

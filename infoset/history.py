@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset.section_kernels import IMPULSE, PREDICTION, RATE, Flags, Floats, Integers, Tape
+from infoset.section_life import IMPULSE, PREDICTION, RATE, Flags, Floats, Integers, Tape
 
 ROOM_AT_START = 64
 

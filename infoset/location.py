@@ -9,17 +9,9 @@ import numpy as np
 from infoset._compile import allocation_free, entry
 from infoset.chains import CAPACITY, copy_section, count_of, empty_sections, room_of, working_room
 from infoset.history import Tapes
-from infoset.section_kernels import (
-    ALIVE,
-    Flags,
-    Floats,
-    Integers,
-    SectionLaw,
-    Sections,
-    Tape,
-    replay,
-    summarise_section,
-)
+from infoset.section_law import SectionLaw
+from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape, replay, summarise_section
+from infoset.section_passes import Sections
 
 LABEL_RESOLUTION = 1e-13
 MOST_PROBES = 200

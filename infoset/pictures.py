@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from infoset.svg import ACCENT, NEAR, Plane, evenly, limits, note, shade
 
 if TYPE_CHECKING:
-    from infoset.information_set import Section
+    from infoset.information_set_view import Section
     from infoset.predicted_miss import PredictedMiss
 
 Floats = NDArray[np.float64]

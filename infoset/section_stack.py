@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset import chains
-from infoset import section_kernels as kernels
+from infoset import chains, section_life, section_passes, whole_chains
 from infoset.chains import Chains
-from infoset.section_kernels import SectionLaw, Sections
+from infoset.section_law import SectionLaw
+from infoset.section_passes import Sections
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -33,14 +33,14 @@ class SectionStack:
 
     def __init__(self, law: SectionLaw, labels: Floats, used: NDArray[np.int64]) -> None:
         self.law = law
-        self.sections = kernels.room_for_sections(labels, used.astype(np.int64))
+        self.sections = section_passes.room_for_sections(labels, used.astype(np.int64))
         self._stale = np.ones(self.batch, dtype=bool)
         self._nobody = np.zeros(self.batch, dtype=bool)
         self._behind = self._nobody
         self._is_stale, self._is_behind, self._has_heights = True, False, False
         self._spare = 0
         self._elapsed = 0
-        kernels.start_all(self.sections, law)
+        section_passes.start_all(self.sections, law)
         self.least_label = self._least_label()
 
     @property
@@ -71,12 +71,14 @@ class SectionStack:
             # Who asks for them will ask for the rest.
             self._summarise(heights_wanted=True)
         summaries = self.sections.summaries
-        return summaries[:, :, kernels.Z_LEAST], summaries[:, :, kernels.Z_GREATEST]
+        return summaries[:, :, section_life.Z_LEAST], summaries[:, :, section_life.Z_GREATEST]
 
     def _summarise(self, heights_wanted: bool = False) -> None:
         """Bring sections and summaries up to date."""
         if self._is_stale or heights_wanted:
-            kernels.catch_up_all(self._behind, self._stale, heights_wanted, self._elapsed, self.sections, self.law)
+            section_passes.catch_up_all(
+                self._behind, self._stale, heights_wanted, self._elapsed, self.sections, self.law
+            )
             self._behind = self._stale = self._nobody
             self._is_behind = self._is_stale = False
             self._has_heights |= heights_wanted
@@ -84,7 +86,7 @@ class SectionStack:
     def _catch_up(self) -> None:
         """Bring sections up to date."""
         if self._is_behind:
-            kernels.catch_up_all(self._behind, self._nobody, False, self._elapsed, self.sections, self.law)
+            section_passes.catch_up_all(self._behind, self._nobody, False, self._elapsed, self.sections, self.law)
             self._behind, self._is_behind = self._nobody, False
 
     def ranges(self, elapsed: int) -> Floats:
@@ -96,12 +98,12 @@ class SectionStack:
         self._spare -= chains.MOST_ADDED
         if self._spare >= 0:
             return
-        floats, spare = kernels.room_wanted(active, chains.ROOM_AHEAD, self.sections)
+        floats, spare = section_passes.room_wanted(active, chains.ROOM_AHEAD, self.sections)
         if floats or spare < chains.MOST_ADDED:
             self.sections = self.sections._replace(rings=chains.with_room(self.sections.rings, floats))
             room = chains.working_room()
-            kernels.make_room_all(active, chains.ROOM_AHEAD, self._elapsed, self.sections, self.law, room)
-            _, spare = kernels.room_wanted(active, 0, self.sections)
+            section_passes.make_room_all(active, chains.ROOM_AHEAD, self._elapsed, self.sections, self.law, room)
+            _, spare = section_passes.room_wanted(active, 0, self.sections)
         self._spare = spare - chains.MOST_ADDED
 
     def make_room_for_new(self, wanted: Flags, number: int) -> None:
@@ -121,7 +123,7 @@ class SectionStack:
 
     def measure_angle(self, active: Flags, alpha: Floats, elapsed: int, event: int) -> int:
         """Cut the living sections by angle measurements (rad); return how many died."""
-        deaths = kernels.measure_all(self._behind, active, alpha, elapsed, event, self.sections, self.law)
+        deaths = section_passes.measure_all(self._behind, active, alpha, elapsed, event, self.sections, self.law)
         self._behind, self._is_behind = self._nobody, False
         self._measured(active)
         return deaths
@@ -131,7 +133,7 @@ class SectionStack:
         self._catch_up()
         self._make_room(active)
         room = chains.working_room()
-        deaths = kernels.measure_rate_all(active, omega, error, elapsed, event, self.sections, self.law, room)
+        deaths = section_passes.measure_rate_all(active, omega, error, elapsed, event, self.sections, self.law, room)
         self._measured(active)
         return deaths
 
@@ -145,7 +147,7 @@ class SectionStack:
     def shift(self, active: Flags, impulse: Floats, elapsed: int) -> None:
         """Shift the living sections, and their summaries, by impulses (m/s)."""
         self._catch_up()
-        kernels.shift_all(active, impulse, elapsed, self.sections, self.law)
+        section_passes.shift_all(active, impulse, elapsed, self.sections, self.law)
 
     def predict(self, active: Flags, elapsed: int) -> None:
         """Move the living sections to step `elapsed`.
@@ -165,20 +167,20 @@ class SectionStack:
     def keep_labels(self, least: Floats, greatest: Floats, active: Flags) -> tuple[Flags, int]:
         """Remove the living sections whose labels are outside [least, greatest]; return which, and how many."""
         removed = np.zeros(self.labels.shape, dtype=bool)
-        return removed, kernels.keep_labels_all(active, least, greatest, self.sections, removed)
+        return removed, section_passes.keep_labels_all(active, least, greatest, self.sections, removed)
 
     def margins(self, v: Floats, z: Floats, elapsed: int) -> Floats:
         """Signed margin of states (V, z) in the first slot of each engagement, m."""
         self._catch_up()
         margins = np.empty(self.batch)
-        kernels.margins_all(v, z, elapsed, self.sections, self.law, margins)
+        section_passes.margins_all(v, z, elapsed, self.sections, self.law, margins)
         return margins
 
     def widest(self, elapsed: int) -> tuple[Flags, Floats]:
-        """Predicted-miss interval of each engagement, as `section_kernels.widest_all` writes it."""
+        """Predicted-miss interval of each engagement, as `section_passes.widest_all` writes it."""
         self._summarise()
         exists, ends = np.zeros(self.batch, dtype=bool), np.zeros((self.batch, 2, 4))
-        kernels.widest_all(elapsed, self.sections, self.law, exists, ends)
+        section_passes.widest_all(elapsed, self.sections, self.law, exists, ends)
         return exists, ends
 
     def polygon(self, engagement: int, slot: int, elapsed: int) -> Floats:
@@ -206,4 +208,4 @@ def outline(section: Chains, row: int, label: float, elapsed: int, law: SectionL
     """Vertices (V, z) of a section, counter-clockwise, shape (n, 2)."""
     points = chains.working_room()
     time_to_go = (label - law.closing_speed * (law.step * elapsed)) / law.closing_speed
-    return points[: chains.outline(*section, row, time_to_go, points)].copy()
+    return points[: whole_chains.outline(*section, row, time_to_go, points)].copy()

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import SetModel
-from infoset.information_set import section_law
+from infoset.section_law import section_law
 from infoset.section_stack import SectionStack
 from sim.kepler import Sight
 

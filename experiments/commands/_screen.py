@@ -43,9 +43,9 @@ def table_console(stdout_taken: bool) -> Console:
 
 def tell_of_compiling(quiet: bool) -> None:
     """Say that the kernels are about to be compiled, if no compiled ones of this source are stored."""
-    from infoset import location, section_kernels
+    from infoset import location, section_passes
 
-    kernels = ((section_kernels.__file__, section_kernels.measure_all), (location.__file__, location.refine_all))
+    kernels = ((section_passes.__file__, section_passes.measure_all), (location.__file__, location.refine_all))
     _tell_of_compiling(quiet, "half a minute", kernels)
 
 

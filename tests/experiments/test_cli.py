@@ -478,9 +478,9 @@ def test_compiling_is_said_when_nothing_is_compiled(
         class stats:  # noqa: N801
             cache_path = str(tmp_path)
 
-    source = tmp_path / "section_kernels.py"
+    source = tmp_path / "section_passes.py"
     source.write_text("")
-    index = tmp_path / "section_kernels.measure_all-7.py311.nbi"
+    index = tmp_path / "section_passes.measure_all-7.py311.nbi"
     assert not _screen._stored(Kernel(), source)
     index.write_text("")
     os.utime(source, (1, 1))

@@ -27,7 +27,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from infoset import chains
+from infoset import chain_steps, chains, whole_chains
 from infoset.chains import (
     BEGIN,
     CAPACITY,
@@ -150,27 +150,27 @@ class Section:
         self.chains = chains.empty_sections(3, room)
         self.chains.rings[FIRST_RING:] = 0.0
         self.tau = tau
-        chains.start(*self.chains, ROW, tau, bottom, top)
+        chain_steps.start(*self.chains, ROW, tau, bottom, top)
 
     def turn(self, tau: float) -> None:
         self.tau = tau
-        chains.turn(*self.chains, ROW, tau)
+        chain_steps.turn(*self.chains, ROW, tau)
 
     def spread(self, half_v: float) -> None:
-        chains.spread(self.chains.origins, ROW, self.tau, half_v)
+        chain_steps.spread(self.chains.origins, ROW, self.tau, half_v)
 
     def shift(self, v: float) -> None:
-        chains.shift(self.chains.origins, ROW, self.tau, v)
+        chain_steps.shift(self.chains.origins, ROW, self.tau, v)
 
     def cut(self, lower: float, upper: float) -> tuple[bool, float]:
-        return chains.cut(*self.chains, ROW, self.tau, lower, upper)
+        return chain_steps.cut(*self.chains, ROW, self.tau, lower, upper)
 
     def cut_misses(self, lower: float, upper: float) -> tuple[bool, float]:
         room = chains.working_room()
-        return chains.cut_misses(*self.chains, ROW, self.tau, lower, upper, room)
+        return whole_chains.cut_misses(*self.chains, ROW, self.tau, lower, upper, room)
 
     def reduce(self) -> None:
-        chains.reduce_outward(*self.chains, ROW, self.tau, chains.working_room())
+        whole_chains.reduce_outward(*self.chains, ROW, self.tau, chains.working_room())
 
     @property
     def reach(self) -> float:
@@ -181,11 +181,11 @@ class Section:
         return chains.count_of(self.chains.marks, ROW)
 
     def heights(self) -> tuple[float, float]:
-        return chains.heights(*self.chains, ROW, self.tau)
+        return chain_steps.heights(*self.chains, ROW, self.tau)
 
     def outline(self) -> Floats:
         out = chains.working_room()
-        return out[: chains.outline(*self.chains, ROW, self.tau, out)].copy()
+        return out[: whole_chains.outline(*self.chains, ROW, self.tau, out)].copy()
 
     def corners(self) -> list[Exact]:
         """The outline, as (V, m)."""
@@ -211,7 +211,7 @@ class Section:
         numbers, (origins, rings, marks) = self.numbers(side), self.chains
         ring, known = (int(marks[ROW, side, RING]), int(marks[ROW, side, MASK])), int(marks[ROW, side, PEAK])
         sign, m_origin = (1.0, -1.0)[side], float(origins[ROW, side, M_ORIGIN])
-        marks[ROW, side, PEAK] = chains.find_peak(rings, ring, numbers[0], numbers[-1], known, sign, m_origin)
+        marks[ROW, side, PEAK] = chain_steps.find_peak(rings, ring, numbers[0], numbers[-1], known, sign, m_origin)
         return int(marks[ROW, side, PEAK])
 
     def is_alone(self) -> bool:
@@ -554,7 +554,7 @@ def test_the_first_vertex_near_a_peak(start: Start, story: list[Step], part: flo
         first, peak = section.numbers(side)[0], section.peak(side)
         tolerance = part * (max(misses) - min(misses))
         ring = int(section.chains.marks[ROW, side, RING]), int(section.chains.marks[ROW, side, MASK])
-        near = chains.first_near_peak(section.chains.rings, ring, first, peak, sign, tolerance)
+        near = chain_steps.first_near_peak(section.chains.rings, ring, first, peak, sign, tolerance)
         level = misses[peak - first] - tolerance
         assert all(miss >= level for miss in misses[near - first : peak - first + 1])
         assert near == first or misses[near - first - 1] < level
@@ -612,7 +612,7 @@ def crowded(tau: float, size_v: float, size_z: float, fall: float) -> Life:
     """A section that has grown until it may have no room for another step; its exact polygon is taken from there."""
     life = Life(tau, (-size_v, 1.3 * size_v, -size_z), (-size_v, size_v, 1.3 * size_z))
     section = life.section
-    while not chains.is_crowded(section.chains.marks, ROW):
+    while not whole_chains.is_crowded(section.chains.marks, ROW):
         before = section.count
         section.turn(section.tau * fall)
         section.spread(0.01 * size_v)

@@ -17,7 +17,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from infoset import polygon as kernels
+from infoset import polygon, polygon_hull, polygon_sum
 
 Floats = NDArray[np.float64]
 Exact = tuple[Fraction, Fraction]
@@ -233,7 +233,7 @@ def written(corners: Floats, extra: int, kernel: Callable[[Floats], int]) -> Flo
 def clip(corners: Floats, normal: Floats, lower: float, upper: float) -> Floats:
     def kernel(out: Floats) -> int:
         out[: len(corners)] = corners
-        return kernels.clip_to_band(out, len(corners), normal[0], normal[1], lower, upper)[0]
+        return polygon.clip_to_band(out, len(corners), normal[0], normal[1], lower, upper)[0]
 
     return written(corners, 2, kernel)
 
@@ -241,25 +241,25 @@ def clip(corners: Floats, normal: Floats, lower: float, upper: float) -> Floats:
 def add_segment(corners: Floats, half: Floats) -> Floats:
     def kernel(out: Floats) -> int:
         out[: len(corners)] = corners
-        return kernels.add_segment(out, len(corners), half[0], half[1])
+        return polygon_sum.add_segment(out, len(corners), half[0], half[1])
 
     return written(corners, 2, kernel)
 
 
 def add_polygon(corners: Floats, other: Floats) -> Floats:
     return written(
-        corners, len(other) + 1, lambda out: kernels.add_polygon(corners, len(corners), other, len(other), out)
+        corners, len(other) + 1, lambda out: polygon_sum.add_polygon(corners, len(corners), other, len(other), out)
     )
 
 
 def map_linearly(corners: Floats, matrix: Floats) -> Floats:
     (xx, xy), (yx, yy) = matrix
-    return written(corners, 0, lambda out: kernels.map_linearly(corners, len(corners), xx, xy, yx, yy, out))
+    return written(corners, 0, lambda out: polygon.map_linearly(corners, len(corners), xx, xy, yx, yy, out))
 
 
 def reduce_outward(corners: Floats, cap: int) -> Floats:
     reduced = corners.copy()
-    return reduced[: kernels.reduce_outward(reduced, len(reduced), cap)]
+    return reduced[: polygon_hull.reduce_outward(reduced, len(reduced), cap)]
 
 
 # Cuts.
@@ -429,7 +429,7 @@ def test_a_sliver_along_the_segment_keeps_its_ends(distance: float, thickness: f
         offsets = thickness * 10.0 ** rng.uniform(-1.0, 2.0) * sides * (1.0 - parts**2)
         cloud = distance + parts[:, np.newaxis] * along + offsets[:, np.newaxis] * across
         corners = np.empty((21, 2))
-        corners = corners[: kernels.hull(cloud, len(cloud), corners)]
+        corners = corners[: polygon_hull.hull(cloud, len(cloud), corners)]
         made = add_segment(corners, 0.1 * along)
         for end in (along, -along):
             grown = np.max((made - corners[0]) @ end) - np.max((corners - corners[0]) @ end)
@@ -462,7 +462,7 @@ def probes(draw: st.DrawFn, corners: Floats) -> Floats:
 def test_the_margin_is_the_exact_signed_distance_to_the_boundary(data: st.DataObject) -> None:
     corners = data.draw(any_polygons)
     x, y = data.draw(probes(corners))
-    margin = kernels.margin(corners, len(corners), x, y)
+    margin = polygon.margin(corners, len(corners), x, y)
     whole, point = hull(exact(corners)), (Fraction(float(x)), Fraction(float(y)))
     distance = math.sqrt(squared_from_boundary(point, whole))
     tolerance = float(16 * EPS * max(reach(corners), abs(point[0]), abs(point[1])))
@@ -474,7 +474,7 @@ def test_the_margin_is_the_exact_signed_distance_to_the_boundary(data: st.DataOb
 @checked
 @given(worn_polygons())
 def test_the_area_of_a_worn_polygon_is_that_of_its_hull(corners: Floats) -> None:
-    error = abs(Fraction(kernels.area(corners, len(corners))) - exact_area(hull(exact(corners))))
+    error = abs(Fraction(polygon.area(corners, len(corners))) - exact_area(hull(exact(corners))))
     far = reach(corners)
     assert error <= 8 * len(corners) * EPS * far * (Fraction(float(np.sum(np.ptp(corners, axis=0)))) + EPS * far)
 
@@ -482,7 +482,7 @@ def test_the_area_of_a_worn_polygon_is_that_of_its_hull(corners: Floats) -> None
 @checked
 @given(any_polygons)
 def test_the_centroid_lies_in_the_hull(corners: Floats) -> None:
-    middle = exact([kernels.centroid(corners, len(corners))])
+    middle = exact([polygon.centroid(corners, len(corners))])
     assert lies_within(middle, hull(exact(corners)), 4 * EPS * reach(corners))
 
 
@@ -508,7 +508,7 @@ def test_reduction_adds_little_area() -> None:
     for cap, growth in ((32, 1.01), (8, 1.1), (4, 1.6)):
         reduced = reduce_outward(circle, cap)
         assert len(reduced) == cap
-        assert kernels.area(reduced, cap) < growth * kernels.area(circle, 64)
+        assert polygon.area(reduced, cap) < growth * polygon.area(circle, 64)
 
 
 def test_reduction_of_repeated_and_collinear_vertices_keeps_to_the_cap() -> None:
@@ -530,11 +530,11 @@ def test_reduction_of_a_set_as_thin_as_rounding_contains_it() -> None:
         reduced = reduce_outward(corners, 4)
         assert len(reduced) <= 4
         assert lies_within(exact(corners), hull(exact(reduced)), 16 * EPS * reach(reduced))
-        assert kernels.area(reduced, len(reduced)) < 1e-14
+        assert polygon.area(reduced, len(reduced)) < 1e-14
 
 
 @checked
 @given(clouds())
 def test_the_hull_is_the_exact_one(points: Floats) -> None:
-    made = written(points, 0, lambda out: kernels.hull(points, len(points), out))
+    made = written(points, 0, lambda out: polygon_hull.hull(points, len(points), out))
     assert agree(made, hull(exact(points)), 4 * EPS * reach(points))

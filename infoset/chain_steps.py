@@ -1,0 +1,411 @@
+"""Compiled operations of a step on sections, as `chains` has them: only a few vertices at the ends are looked at.
+
+A section is begun, its level turns, it is pulled apart, shifted, cut, and asked for its heights and predicted misses.
+"""
+
+from __future__ import annotations
+
+from infoset._compile import allocation_free, inlined, substituted
+from infoset.chains import (
+    BEGIN,
+    END,
+    EPSILON,
+    LEFT,
+    M_ORIGIN,
+    M_REST,
+    MASK,
+    ORIGIN,
+    PEAK,
+    REACH,
+    RIGHT,
+    RING,
+    V_ORIGIN,
+    V_REST,
+    Floats,
+    Integers,
+    begin_of,
+    end_of,
+    origin_height,
+    place,
+    put,
+    rise,
+    sign_of,
+    vertex,
+)
+
+
+@inlined
+def move_part(origins: Floats, n: int, side: int, part: int, value: float) -> None:
+    """Add to a coordinate of an origin; its rest keeps what rounding takes away."""
+    before = origins[n, side, part]
+    after = before + value
+    added = after - before
+    origins[n, side, part] = after
+    origins[n, side, part + 1] += (before - (after - added)) + (value - added)
+
+
+@substituted
+def product_error(a: float, b: float, product: float) -> float:
+    """What rounding took from a product of two floats: a b - product (Dekker)."""
+    split = 134217729.0
+    a_high = split * a - (split * a - a)
+    b_high = split * b - (split * b - b)
+    a_low = a - a_high
+    b_low = b - b_high
+    return a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
+
+
+@allocation_free
+def start(
+    origins: Floats,
+    rings: Floats,
+    marks: Integers,
+    n: int,
+    tau: float,
+    bottom: tuple[float, float, float],
+    top: tuple[float, float, float],
+) -> None:
+    """Begin with a trapezium between two levels.
+
+    Parameters
+    ----------
+    origins, rings, marks, n : section
+    tau : float
+        Time to go.
+    bottom, top : tuple of float
+        Least V, greatest V, and z, of either level.
+    """
+    reach = 0.0
+    for side in (RIGHT, LEFT):
+        for i in range(ORIGIN):
+            origins[n, side, i] = 0.0
+        for i in range(2):
+            at_top = (i == 1) == (side == RIGHT)
+            v = top[1 - side] if at_top else bottom[1 - side]
+            put(rings, marks, n, side, i, v, (top[2] if at_top else bottom[2]) + tau * v)
+            reach = max(reach, abs(v))
+        marks[n, side, BEGIN] = 0
+        marks[n, side, END] = 2
+        marks[n, side, PEAK] = 0
+    origins[n, RIGHT, REACH] = reach
+
+
+@inlined
+def hand_over(
+    rings: Floats,
+    sign: float,
+    giver: tuple[int, int],
+    first: int,
+    end: int,
+    taker: tuple[int, int],
+    front: int,
+    between: tuple[float, float, float],
+    same: float,
+    tau: float,
+) -> tuple[int, int]:
+    """Give the last vertices of a chain, past its highest now, to the front of the other chain.
+
+    Parameters
+    ----------
+    rings : ndarray
+    sign : float
+        The side from which the giver is seen to rise.
+    giver : tuple of int
+        Ring and mask of the chain that gives.
+    first, end : int
+        Its first vertex, and one past its last.
+    taker, front : tuple of int, int
+        Ring and mask of the other chain, and its first vertex.
+    between : tuple of float
+        V, m and height of the giver's origin, from the taker's.
+    same : float
+        Differences of V that are rounding.
+    tau : float
+        Time to go.
+
+    Returns
+    -------
+    end, front : int
+
+    Notes
+    -----
+    A falling time to go lifts what is on the right: only a vertex with the one before it on its outer side is passed.
+    Where the level has not turned, heights along it are equal to within rounding, and must not pass the others.
+    """
+    back = end - 1
+    at = giver[0] + 2 * (back & giver[1])
+    v, m = rings[at], rings[at + 1]
+    rise = sign * (m - tau * v)
+    at = taker[0] + 2 * (front & taker[1])
+    front_rise = sign * (rings[at + 1] - tau * rings[at])
+    while True:
+        if rise + sign * between[2] > front_rise:
+            front -= 1
+            taken_v, taken_m = v + between[0], m + between[1]
+            at = taker[0] + 2 * (front & taker[1])
+            rings[at] = taken_v
+            rings[at + 1] = taken_m
+            front_rise = sign * (taken_m - tau * taken_v)
+        if back == first:
+            break
+        at = giver[0] + 2 * ((back - 1) & giver[1])
+        before_v, before_m = rings[at], rings[at + 1]
+        before_rise = sign * (before_m - tau * before_v)
+        if before_rise < rise or sign * (v - before_v) > same:
+            break
+        back -= 1
+        v, m, rise = before_v, before_m, before_rise
+    return back + 1, front
+
+
+@inlined
+def turn(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float) -> None:
+    """Let the time to go fall to `tau`: the level turns, and each chain ends where it is highest or lowest now."""
+    right = (marks[n, RIGHT, RING], marks[n, RIGHT, MASK])
+    left = (marks[n, LEFT, RING], marks[n, LEFT, MASK])
+    right_begin, left_begin = marks[n, RIGHT, BEGIN], marks[n, LEFT, BEGIN]
+    same = 4.0 * EPSILON * origins[n, RIGHT, REACH]
+    v_rest = origins[n, RIGHT, V_REST] - origins[n, LEFT, V_REST]
+    m_rest = origins[n, RIGHT, M_REST] - origins[n, LEFT, M_REST]
+    v = (origins[n, RIGHT, V_ORIGIN] - origins[n, LEFT, V_ORIGIN]) + v_rest
+    m = (origins[n, RIGHT, M_ORIGIN] - origins[n, LEFT, M_ORIGIN]) + m_rest
+    height = origin_height(origins, n, RIGHT, tau) - origin_height(origins, n, LEFT, tau)
+    right_end, left_begin = hand_over(
+        rings, 1.0, right, right_begin, marks[n, RIGHT, END], left, left_begin, (v, m, height), same, tau
+    )
+    left_end, right_begin = hand_over(
+        rings, -1.0, left, left_begin, marks[n, LEFT, END], right, right_begin, (-v, -m, -height), same, tau
+    )
+    marks[n, RIGHT, BEGIN], marks[n, RIGHT, END] = right_begin, right_end
+    marks[n, LEFT, BEGIN], marks[n, LEFT, END] = left_begin, left_end
+
+
+@substituted
+def spread(origins: Floats, n: int, tau: float, half_v: float) -> None:
+    """Minkowski sum with the segment of V from -half_v to half_v that lies along the level of `tau`."""
+    half_m = half_v * tau
+    move_part(origins, n, RIGHT, V_ORIGIN, half_v)
+    move_part(origins, n, RIGHT, M_ORIGIN, half_m)
+    move_part(origins, n, LEFT, V_ORIGIN, -half_v)
+    move_part(origins, n, LEFT, M_ORIGIN, -half_m)
+    origins[n, RIGHT, REACH] += half_v
+
+
+@substituted
+def shift(origins: Floats, n: int, tau: float, v: float) -> None:
+    """Move by V along the level of `tau`: z stays, the predicted miss changes by V tau."""
+    m = v * tau
+    rest = product_error(v, tau, m)
+    for side in (RIGHT, LEFT):
+        move_part(origins, n, side, V_ORIGIN, v)
+        move_part(origins, n, side, M_ORIGIN, m)
+        origins[n, side, M_REST] += rest
+    origins[n, RIGHT, REACH] += abs(v)
+
+
+@substituted
+def heights(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float) -> tuple[float, float]:
+    """Least and greatest z of a section that is turned to `tau`."""
+    right, left = origin_height(origins, n, RIGHT, tau), origin_height(origins, n, LEFT, tau)
+    least = min(
+        right + rise(rings, marks, n, RIGHT, begin_of(marks, n, RIGHT), tau),
+        left - rise(rings, marks, n, LEFT, end_of(marks, n, LEFT) - 1, tau),
+    )
+    greatest = max(
+        right + rise(rings, marks, n, RIGHT, end_of(marks, n, RIGHT) - 1, tau),
+        left - rise(rings, marks, n, LEFT, begin_of(marks, n, LEFT), tau),
+    )
+    return least, greatest
+
+
+@inlined
+def cut_end(
+    rings: Floats, ring: tuple[int, int], end: int, other_end: int, way: int, up: float, tau: float, level: float
+) -> int:
+    """Cut off what is above a level at one end of a chain, and put a vertex where the level crosses it.
+
+    Parameters
+    ----------
+    rings : ndarray
+    ring : tuple of int
+        Ring and mask of the chain.
+    end, other_end : int
+        Its vertex that may be too high, and the one at its other end.
+    way : int
+        From the one to the other: 1 or -1.
+    up : float
+        1 if above is toward greater z, -1 if toward lesser.
+    tau : float
+        Time to go.
+    level : float
+        From the chain's origin, counted upward.
+
+    Returns
+    -------
+    int
+        Number of the vertex that is the end now.
+    """
+    at = ring[0] + 2 * (end & ring[1])
+    v = rings[at]
+    height = up * (rings[at + 1] - tau * v)
+    if height <= level:
+        return end
+    while end != other_end:
+        at = ring[0] + 2 * ((end + way) & ring[1])
+        inner_v = rings[at]
+        inner_height = up * (rings[at + 1] - tau * inner_v)
+        if inner_height <= level:
+            # From the nearer end of the edge: least rounding.
+            if level - inner_height <= height - level:
+                v = inner_v + (level - inner_height) / (height - inner_height) * (v - inner_v)
+            else:
+                v += (level - height) / (inner_height - height) * (inner_v - v)
+            break
+        v, height = inner_v, inner_height
+        end += way
+    at = ring[0] + 2 * (end & ring[1])
+    rings[at] = v
+    rings[at + 1] = up * level + tau * v
+    return end
+
+
+@inlined
+def cut(
+    origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, lower: float, upper: float
+) -> tuple[bool, float]:
+    """Keep the band lower <= z <= upper of a section that is turned to `tau`.
+
+    Returns
+    -------
+    living : bool
+        False if nothing is left; the section is then as it was.
+    overlap : float
+        Least overlap of the section and the band across either border; negative is the distance between them.
+    """
+    least, greatest = heights(origins, rings, marks, n, tau)
+    overlap = min(greatest - lower, upper - least)
+    if overlap < 0.0:
+        return False, overlap
+    right = (marks[n, RIGHT, RING], marks[n, RIGHT, MASK])
+    left = (marks[n, LEFT, RING], marks[n, LEFT, MASK])
+    right_first, right_last = marks[n, RIGHT, BEGIN], marks[n, RIGHT, END] - 1
+    left_first, left_last = marks[n, LEFT, BEGIN], marks[n, LEFT, END] - 1
+    right_height, left_height = origin_height(origins, n, RIGHT, tau), origin_height(origins, n, LEFT, tau)
+    if greatest > upper:
+        right_last = cut_end(rings, right, right_last, right_first, -1, 1.0, tau, upper - right_height)
+        left_first = cut_end(rings, left, left_first, left_last, 1, 1.0, tau, upper - left_height)
+        marks[n, RIGHT, END] = right_last + 1
+        marks[n, LEFT, BEGIN] = left_first
+    if least < lower:
+        left_last = cut_end(rings, left, left_last, left_first, -1, -1.0, tau, left_height - lower)
+        right_first = cut_end(rings, right, right_first, right_last, 1, -1.0, tau, right_height - lower)
+        marks[n, LEFT, END] = left_last + 1
+        marks[n, RIGHT, BEGIN] = right_first
+    return True, overlap
+
+
+@substituted
+def miss_of(rings: Floats, marks: Integers, n: int, side: int, i: int) -> float:
+    """Predicted miss of a vertex over that of its chain's origin, counted outward."""
+    return float(sign_of(side) * rings[place(marks, n, side, i) + 1])
+
+
+@inlined
+def find_peak(
+    rings: Floats, ring: tuple[int, int], first: int, last: int, peak: int, sign: float, m_origin: float
+) -> int:
+    """Number of the vertex of a chain whose predicted miss is the greatest (right) or the least (left).
+
+    Parameters
+    ----------
+    rings : ndarray
+    ring : tuple of int
+        Ring and mask of the chain.
+    first, last : int
+        Its ends.
+    peak : int
+        Where the peak was.
+    sign : float
+        The side from which the chain is seen.
+    m_origin : float
+        Predicted miss of the chain's origin.
+
+    Returns
+    -------
+    int
+
+    Notes
+    -----
+    The search starts where the peak was. It ends where the miss falls by more than rounding: vertices that repeat
+    one another, or nearly so, must not stop it.
+    """
+    peak = min(max(peak, first), last)
+    miss = sign * rings[ring[0] + 2 * (peak & ring[1]) + 1]
+    rounding = 16.0 * EPSILON * (abs(miss) + abs(m_origin))
+    start_at = peak
+    for way in (1, -1):
+        i = start_at + way
+        while first <= i <= last:
+            here = sign * rings[ring[0] + 2 * (i & ring[1]) + 1]
+            if here > miss:
+                peak, miss = i, here
+            elif here < miss - rounding:
+                break
+            i += way
+    return peak
+
+
+@inlined
+def first_near_peak(rings: Floats, ring: tuple[int, int], first: int, peak: int, sign: float, tolerance: float) -> int:
+    """First vertex of the edge through the peak along which the predicted miss is the same to within a tolerance."""
+    level = sign * rings[ring[0] + 2 * (peak & ring[1]) + 1] - tolerance
+    while peak > first and sign * rings[ring[0] + 2 * ((peak - 1) & ring[1]) + 1] >= level:
+        peak -= 1
+    return peak
+
+
+@inlined
+def greatest_and_least_miss(origins: Floats, rings: Floats, marks: Integers, n: int) -> tuple[float, float]:
+    """Greatest and least predicted miss of a section; the chains note where they are reached."""
+    right = (marks[n, RIGHT, RING], marks[n, RIGHT, MASK])
+    left = (marks[n, LEFT, RING], marks[n, LEFT, MASK])
+    right_first, left_first = marks[n, RIGHT, BEGIN], marks[n, LEFT, BEGIN]
+    right_m, left_m = origins[n, RIGHT, M_ORIGIN], origins[n, LEFT, M_ORIGIN]
+    upper_at = find_peak(rings, right, right_first, marks[n, RIGHT, END] - 1, marks[n, RIGHT, PEAK], 1.0, right_m)
+    lower_at = find_peak(rings, left, left_first, marks[n, LEFT, END] - 1, marks[n, LEFT, PEAK], -1.0, left_m)
+    marks[n, RIGHT, PEAK], marks[n, LEFT, PEAK] = upper_at, lower_at
+    _, upper = vertex(origins, rings, marks, n, RIGHT, upper_at)
+    _, lower = vertex(origins, rings, marks, n, LEFT, lower_at)
+    return upper, lower
+
+
+@allocation_free
+def extreme_points(
+    origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, relative: float, slack: float
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Points that reach the extremes of the predicted miss, as `greatest_and_least_miss` has found them.
+
+    Parameters
+    ----------
+    origins, rings, marks, n : section
+    tau : float
+        Time to go.
+    relative, slack : float
+        What is the same to within these parts of the interval and of the magnitudes is the same.
+
+    Returns
+    -------
+    upper, lower : tuple of float
+        V and m of the lowest point that reaches the greatest miss, and of the highest that reaches the least.
+    """
+    right = (marks[n, RIGHT, RING], marks[n, RIGHT, MASK])
+    left = (marks[n, LEFT, RING], marks[n, LEFT, MASK])
+    right_first, left_first = marks[n, RIGHT, BEGIN], marks[n, LEFT, BEGIN]
+    upper_at, lower_at = marks[n, RIGHT, PEAK], marks[n, LEFT, PEAK]
+    upper_v, upper = vertex(origins, rings, marks, n, RIGHT, upper_at)
+    lower_v, lower = vertex(origins, rings, marks, n, LEFT, lower_at)
+    magnitude = tau * (abs(upper_v) + abs(lower_v)) + abs(upper) + abs(lower)
+    tolerance = relative * (upper - lower) + slack * magnitude
+    upper_at = first_near_peak(rings, right, right_first, upper_at, 1.0, tolerance)
+    lower_at = first_near_peak(rings, left, left_first, lower_at, -1.0, tolerance)
+    return vertex(origins, rings, marks, n, RIGHT, upper_at), vertex(origins, rings, marks, n, LEFT, lower_at)

@@ -1,0 +1,203 @@
+"""Compiled convex hulls, and polygons with fewer vertices around a polygon, as `polygon` has them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from infoset._compile import compiled
+from infoset.polygon import ROUNDING, Points, append, close, cross
+
+
+@compiled
+def hull(points: Points, count: int, out: Points) -> int:
+    """Convex hull of any points: counter-clockwise, without repeated vertices or vertices along an edge.
+
+    Parameters
+    ----------
+    points, count : points, in any order
+    out : ndarray, shape (>= count, 2)
+
+    Returns
+    -------
+    int
+        Vertices of the hull: 2 if the points lie on a line, 1 if they coincide, 0 if there are none.
+
+    Notes
+    -----
+    Andrew's monotone chain: O(count) once the points are in order; putting them so takes O(count^2) at worst. A
+    point is dropped where it sticks out by less than rounding. The directions of the edges increase strictly,
+    rounding or not.
+
+    References
+    ----------
+    A. M. Andrew, Another efficient algorithm for convex hulls in two dimensions, Inf. Process. Lett. 9 (1979).
+    """
+    points = points[:count].copy()
+    sort_points(points, count)
+    count = drop_repeats(points, count)
+    made = 0
+    for i in range(count):
+        made = drop_turned(out, made, 1, points[i, 0], points[i, 1])
+        made = append(out, made, points[i, 0], points[i, 1])
+    lower = made
+    known = lower - 2
+    for i in range(count - 2, 0, -1):
+        x = points[i, 0]
+        y = points[i, 1]
+        if known > 0 and out[known, 0] == x and out[known, 1] == y:
+            known -= 1
+            continue
+        made = drop_turned(out, made, lower, x, y)
+        made = append(out, made, x, y)
+    if count > 0:
+        made = drop_turned(out, made, lower, points[0, 0], points[0, 1])
+    return made
+
+
+@compiled
+def sort_points(points: Points, count: int) -> None:
+    """Order points by x, then by y, in place, by insertion: O(count) if they are nearly in order."""
+    for i in range(1, count):
+        x = points[i, 0]
+        y = points[i, 1]
+        j = i
+        while j > 0 and (points[j - 1, 0] > x or (points[j - 1, 0] == x and points[j - 1, 1] > y)):
+            points[j, 0] = points[j - 1, 0]
+            points[j, 1] = points[j - 1, 1]
+            j -= 1
+        points[j, 0] = x
+        points[j, 1] = y
+
+
+@compiled
+def drop_turned(out: Points, made: int, fewest: int, x: float, y: float) -> int:
+    """Drop last vertices, down to `fewest`, at which the way to (x, y) does not turn left; return the new count."""
+    while made > fewest:
+        along_x = out[made - 1, 0] - out[made - 2, 0]
+        along_y = out[made - 1, 1] - out[made - 2, 1]
+        if cross(along_x, along_y, x - out[made - 1, 0], y - out[made - 1, 1]) > 0.0:
+            break
+        made -= 1
+    return made
+
+
+@compiled
+def drop_repeats(points: Points, count: int) -> int:
+    """Drop vertices that repeat the one before, in place; return the new count. O(count)."""
+    made = 0
+    for i in range(count):
+        made = append(points, made, points[i, 0], points[i, 1])
+    return close(points, made)
+
+
+@compiled
+def reduce_outward(points: Points, count: int, cap: int) -> int:
+    """Drop edges, in place, until at most `cap` vertices are left; the result contains the polygon.
+
+    Parameters
+    ----------
+    points, count : polygon
+    cap : int
+        At least 4: a convex polygon of five vertices always has an edge that can go.
+
+    Returns
+    -------
+    int
+        New number of vertices.
+
+    Notes
+    -----
+    The edge whose neighbours, extended until they meet, add least area goes first. O(count) an edge. Where rounding
+    has turned an edge the wrong way the hull is taken first; a hull too thin for that becomes a rectangle.
+    """
+    is_hull = False
+    while count > cap:
+        chosen, x, y = cheapest_edge(points, count, 0, count - 1)
+        if chosen >= 0:
+            points[chosen, 0] = x
+            points[chosen, 1] = y
+            gone = chosen + 1 if chosen + 1 < count else 0
+            for i in range(gone, count - 1):
+                points[i, 0] = points[i + 1, 0]
+                points[i, 1] = points[i + 1, 1]
+            count -= 1
+            is_hull = False
+        elif is_hull:
+            count = make_rectangle(points, count)
+        else:
+            count = hull(points, count, points)
+            is_hull = True
+    return count
+
+
+@compiled
+def cheapest_edge(points: Points, count: int, first: int, last: int) -> tuple[int, float, float]:
+    """First vertex of the edge that costs least area to drop, and where its neighbours meet; -1 if not convex.
+
+    Notes
+    -----
+    Only the edges whose first vertex is one of first .. last can go: all of them, or those inside a chain.
+    """
+    least = np.inf
+    chosen = -1
+    chosen_x = chosen_y = 0.0
+    before = first - 1 if first > 0 else count - 1
+    for i in range(first, last + 1):
+        j = i + 1 if i + 1 < count else 0
+        after = j + 1 if j + 1 < count else 0
+        from_x = points[i, 0] - points[before, 0]
+        from_y = points[i, 1] - points[before, 1]
+        edge_x = points[j, 0] - points[i, 0]
+        edge_y = points[j, 1] - points[i, 1]
+        to_x = points[after, 0] - points[j, 0]
+        to_y = points[after, 1] - points[j, 1]
+        before = i
+        bend = cross(from_x, from_y, edge_x, edge_y)
+        if bend <= 0.0:
+            return -1, 0.0, 0.0
+        turn = cross(from_x, from_y, to_x, to_y)
+        if turn <= ROUNDING * (abs(from_x * to_y) + abs(from_y * to_x)):
+            continue
+        reach = cross(edge_x, edge_y, to_x, to_y) / turn
+        added = reach * bend
+        x = points[i, 0] + reach * from_x
+        y = points[i, 1] + reach * from_y
+        # The new vertex must not fall short of the far end of the edge: at a sharp tip that would cut the tip off.
+        if added < least and (points[j, 0] - x) * to_x + (points[j, 1] - y) * to_y >= 0.0:
+            least = added
+            chosen = i
+            chosen_x = x
+            chosen_y = y
+    return chosen, chosen_x, chosen_y
+
+
+@compiled
+def make_rectangle(points: Points, count: int) -> int:
+    """Replace a polygon by the rectangle around it along its longest direction from vertex 0, in place. O(count)."""
+    origin_x = points[0, 0]
+    origin_y = points[0, 1]
+    length = 0.0
+    x = 1.0
+    y = 0.0
+    for i in range(1, count):
+        distance = math.hypot(points[i, 0] - origin_x, points[i, 1] - origin_y)
+        if distance > length:
+            length = distance
+            x = (points[i, 0] - origin_x) / distance
+            y = (points[i, 1] - origin_y) / distance
+    least = greatest = lowest = highest = 0.0
+    for i in range(1, count):
+        from_x = points[i, 0] - origin_x
+        from_y = points[i, 1] - origin_y
+        along = x * from_x + y * from_y
+        height = cross(x, y, from_x, from_y)
+        least = min(least, along)
+        greatest = max(greatest, along)
+        lowest = min(lowest, height)
+        highest = max(highest, height)
+    made = 0
+    for along, height in ((least, lowest), (greatest, lowest), (greatest, highest), (least, highest)):
+        made = append(points, made, origin_x + along * x - height * y, origin_y + along * y + height * x)
+    return close(points, made)

@@ -1,0 +1,91 @@
+"""The numbers of a set model that the kernels need."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from infoset.model import InitialSet, Interval, SetModel
+
+BOUND_SLACK = 1e-9
+"""Relative, of bounds that the guaranteed model computes: what rounding may take from them is far less."""
+
+
+class SectionLaw(NamedTuple):
+    """The numbers of a set model that the kernels need, SI."""
+
+    closing_speed: float
+    step: float
+    disturbance: float
+    half_v: float
+    half_v_at_start: float
+    disturbance_lead: float
+    impulse_error: float
+    error_at_zero_range: float
+    error_slope: float
+    exact_angles: bool
+    label_least: float
+    label_greatest: float
+    z_least: float
+    z_greatest: float
+    vz_least: float
+    vz_greatest: float
+    vx_least: float
+    vx_greatest: float
+    rectangle: bool
+
+
+def section_law(model: SetModel) -> SectionLaw:
+    """The numbers of a model as the kernels take them.
+
+    Notes
+    -----
+    Angles do not tell scale: a truth with closing speed e (1 + eta) looks like a motion of the model whose lengths,
+    velocities and impulses are those of the truth divided by 1 + eta. So in the guaranteed model bounds of lengths and
+    velocities grow outward by eta, an angle bound is the greatest over the ranges that a label can mean, and an
+    impulse is known to within eta and the engine's error. See docs/guarantee.md.
+    """
+    box, sensor, eta = model.bounds, model.angle_sensor, model.speed_error
+    slope, error = sensor.error_slope_rad_per_m, sensor.error_at_zero_range_rad
+    half_v = model.acceleration_m_s2 * model.step_s
+    guaranteed = model.is_guaranteed
+    if guaranteed:
+        slope *= (1.0 + math.copysign(eta, slope)) * (1.0 + BOUND_SLACK)
+        error *= 1.0 + BOUND_SLACK
+    z_least, z_greatest = _scaled_outward(box.z_m, eta)
+    vz_least, vz_greatest = _scaled_outward(box.vz_m_s, eta)
+    return SectionLaw(
+        closing_speed=float(model.closing_speed_m_s),
+        step=float(model.step_s),
+        disturbance=float(model.acceleration_m_s2),
+        half_v=float(half_v),
+        # The exact disturbance is a thin lens. The paper takes the segment between its ends; a sound set takes half of
+        # the change of V at the start of the step and half at its end, which together contain the lens.
+        half_v_at_start=0.5 * float(half_v) if guaranteed else 0.0,
+        disturbance_lead=0.0 if guaranteed else 0.5 * float(model.step_s),
+        impulse_error=(1.0 + model.execution_error_relative) / (1.0 - eta) - 1.0 if guaranteed else 0.0,
+        error_at_zero_range=float(error),
+        error_slope=float(slope),
+        exact_angles=guaranteed,
+        label_least=float(model.label_limits_m[0]),
+        label_greatest=float(model.label_limits_m[1]),
+        z_least=z_least,
+        z_greatest=z_greatest,
+        vz_least=vz_least,
+        vz_greatest=vz_greatest,
+        vx_least=float(box.vx_m_s[0]),
+        vx_greatest=float(box.vx_m_s[1]),
+        rectangle=model.initial_set is InitialSet.RECTANGLE,
+    )
+
+
+def _scaled_outward(interval: Interval, eta: float) -> Interval:
+    """Interval of all a / (1 + h) with a of the interval and |h| <= eta, an ulp or two wider if eta is not zero."""
+    least, greatest = interval
+    if eta == 0.0:
+        return float(least), float(greatest)
+    slack = 1.0 + BOUND_SLACK
+    return (
+        slack * least / (1.0 - eta) if least < 0.0 else least / (1.0 + eta) / slack,
+        slack * greatest / (1.0 - eta) if greatest > 0.0 else greatest / (1.0 + eta) / slack,
+    )

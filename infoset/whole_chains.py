@@ -1,0 +1,165 @@
+"""Compiled operations on sections, as `chains` has them, that look at every vertex: outline, reduction, cut across."""
+
+from __future__ import annotations
+
+from infoset import polygon, polygon_hull
+from infoset._compile import allocation_free, entry, substituted
+from infoset.chains import (
+    BEGIN,
+    CAPACITY,
+    END,
+    EPSILON,
+    LEFT,
+    MOST_ADDED,
+    PEAK,
+    REACH,
+    REDUCED,
+    RIGHT,
+    Floats,
+    Integers,
+    begin_of,
+    count_of,
+    end_of,
+    place,
+    put,
+    sign_of,
+    vertex,
+)
+
+
+@substituted
+def is_crowded(marks: Integers, n: int) -> bool:
+    """Whether a section may have more vertices than there is room for before the next step is over."""
+    return bool(count_of(marks, n) > CAPACITY - MOST_ADDED)
+
+
+@allocation_free
+def reduce_outward(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, points: Floats) -> None:
+    """Drop edges of the longer chain, outward, until the section has `REDUCED` vertices.
+
+    Parameters
+    ----------
+    origins, rings, marks, n : section
+    tau : float
+        Time to go.
+    points : ndarray, shape (CAPACITY, 2)
+        Room to work in.
+
+    Notes
+    -----
+    The edge whose neighbours, extended until they meet, add least area goes first. O(CAPACITY) an edge. A vertex that
+    rounding has put inside the others goes before; where no edge can be dropped, the chain becomes three sides
+    of a box around it.
+    """
+    right = marks[n, RIGHT, END] - marks[n, RIGHT, BEGIN]
+    other = min(right, count_of(marks, n) - right)
+    side = RIGHT if right > other else LEFT
+    count = 0
+    for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
+        at = place(marks, n, side, i)
+        v, m = rings[at], rings[at + 1]
+        count = polygon.append(points, polygon_hull.drop_turned(points, count, 1, v, m), v, m)
+    while count > REDUCED - other:
+        chosen, v, m = polygon_hull.cheapest_edge(points, count, 1, count - 3)
+        if chosen < 0:
+            count = box_around(points, count, sign_of(side), tau)
+            break
+        points[chosen, 0] = v
+        points[chosen, 1] = m
+        for i in range(chosen + 1, count - 1):
+            points[i, 0] = points[i + 1, 0]
+            points[i, 1] = points[i + 1, 1]
+        count -= 1
+    for i in range(count):
+        put(rings, marks, n, side, i, points[i, 0], points[i, 1])
+        # New vertices may be farther out than any that the section ever had.
+        v, _ = vertex(origins, rings, marks, n, side, i)
+        origins[n, RIGHT, REACH] = max(origins[n, RIGHT, REACH], abs(v))
+    marks[n, side, BEGIN] = 0
+    marks[n, side, END] = count
+    marks[n, side, PEAK] = 0
+
+
+@allocation_free
+def box_around(points: Floats, count: int, sign: float, tau: float) -> int:
+    """Replace a chain by its ends and their images moved out along the level as far as its outermost vertex."""
+    out = 0.0
+    for end in (0, count - 1):
+        for i in range(count):
+            along = sign * (points[i, 0] - points[end, 0])
+            out = max(out, along)
+    last_v, last_m = points[count - 1, 0], points[count - 1, 1]
+    points[1, 0] = points[0, 0] + sign * out
+    points[1, 1] = points[0, 1] + sign * out * tau
+    points[2, 0] = last_v + sign * out
+    points[2, 1] = last_m + sign * out * tau
+    points[3, 0] = last_v
+    points[3, 1] = last_m
+    return 4
+
+
+@entry
+def outline(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, out: Floats) -> int:
+    """Write the vertices (V, z), counter-clockwise; return how many: at most CAPACITY.
+
+    Notes
+    -----
+    Where the chains meet in one point they hold it twice, equal up to rounding: it is written once.
+    """
+    made = 0
+    for side in (RIGHT, LEFT):
+        first = begin_of(marks, n, side)
+        for i in range(first, end_of(marks, n, side)):
+            v, m = vertex(origins, rings, marks, n, side, i)
+            z = m - tau * v
+            if i > first or made == 0 or not meets(out, made - 1, v, z, origins[n, RIGHT, REACH], tau):
+                made = polygon.append(out, made, v, z)
+    while made > 1 and meets(out, made - 1, out[0, 0], out[0, 1], origins[n, RIGHT, REACH], tau):
+        made -= 1
+    return made
+
+
+@allocation_free
+def meets(points: Floats, i: int, v: float, z: float, reach: float, tau: float) -> bool:
+    """Whether a vertex is (V, z) up to the rounding of a change of chains."""
+    close_v = abs(points[i, 0] - v) <= 4.0 * EPSILON * reach
+    return bool(close_v and abs(points[i, 1] - z) <= 4.0 * EPSILON * (abs(z) + 2.0 * tau * reach))
+
+
+@entry
+def cut_misses(
+    origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, lower: float, upper: float, points: Floats
+) -> tuple[bool, float]:
+    """Keep the band lower <= m <= upper of predicted miss; the rest is as in `cut`.
+
+    Notes
+    -----
+    This band is not along the line of sight, so it may cut anywhere: the chains are taken apart and made anew.
+    O(vertices). `points` has room for CAPACITY + 2.
+    """
+    count = 0
+    for side in (RIGHT, LEFT):
+        for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
+            v, m = vertex(origins, rings, marks, n, side, i)
+            count = polygon.append(points, count, v, m)
+    count, overlap = polygon.clip_to_band(points, count, 0.0, 1.0, lower, upper)
+    if count == 0:
+        return False, overlap
+    for side in (RIGHT, LEFT):
+        for part in range(REACH):
+            origins[n, side, part] = 0.0
+    bottom, top = polygon.extremes(points, count, -tau, 1.0)
+    thickness = polygon.height(points, top, -tau, 1.0) - polygon.height(points, bottom, -tau, 1.0)
+    if thickness <= 16.0 * EPSILON * (abs(points[top, 1]) + abs(points[bottom, 1]) + tau * origins[n, RIGHT, REACH]):
+        # Level to within rounding: its ends are to the right and to the left, and each chain has both.
+        bottom, top = polygon.extremes(points, count, -1.0, 0.0)
+    for side in (RIGHT, LEFT):
+        first, last = (bottom, top) if side == RIGHT else (top, bottom)
+        length = (last - first) % count + 1
+        for i in range(length):
+            at = (first + i) % count
+            put(rings, marks, n, side, i, points[at, 0], points[at, 1])
+        marks[n, side, BEGIN] = 0
+        marks[n, side, END] = length
+        marks[n, side, PEAK] = 0
+    return True, overlap

@@ -1,0 +1,85 @@
+"""Memory that ends: one message, and a campaign that goes on when there is enough."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from sim import Campaign, Scenario
+from sim.storage import CampaignFolder
+from tests.faults.conftest import Infoset, Left, need_whole
+
+LIMITED = (
+    "import resource, sys\n"
+    "from experiments.cli import main\n"
+    "import numpy, pyarrow, sim.storage.tables, sim.simulate, experiments.campaign_samples, experiments.scenario_file\n"
+    "from infoset import section_passes, location\n"
+    "used = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
+    "resource.setrlimit(resource.RLIMIT_AS, (used + int(sys.argv[1]),) * 2)\n"
+    "main(sys.argv[2:])\n"
+)
+"""A process that may take so many bytes more than it has after loading, as under `ulimit -v`."""
+
+
+def with_room(room_bytes: int, *arguments: object, folder: Path) -> Left:
+    """Run the command with so much memory beyond what Python and its libraries take."""
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, str(room_bytes), *map(str, arguments)],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+        env={**os.environ, "NO_COLOR": "1"},
+    )
+    return Left(done.returncode, done.stdout, done.stderr)
+
+
+def test_no_memory_is_a_message_that_says_how_to_go_on(
+    infoset: Infoset, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flown = []
+
+    def fly(chunk: object, *_: object) -> object:
+        flown.append(chunk)
+        if len(flown) > 1:
+            raise MemoryError("Unable to allocate 7.45 GiB")
+        return whole(chunk)
+
+    from sim import chunks_in_flight
+
+    whole = chunks_in_flight.fly_chunk
+    asked = ("campaign", file, "--runs", 24, "--chunk", 8, "--out", "runs", "--workers", 1)
+    with monkeypatch.context() as patched:
+        patched.setattr(chunks_in_flight, "fly_chunk", fly)
+        left = infoset(*asked)
+    assert (left.code, left.out) == (2, "")
+    assert left.err.splitlines()[-1].startswith("error: there is not enough memory (Unable to allocate 7.45 GiB); ")
+    assert left.err.splitlines()[-1].endswith("what is stored is whole: go on with --resume")
+    need_whole(tmp_path / "runs")
+    assert infoset(*asked, "--resume", "-q").code == 0
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="how much memory is taken is told here otherwise")
+def test_a_campaign_under_a_limit_ends_and_is_resumed(brief: Scenario, file: Path, tmp_path: Path) -> None:
+    """However little there is: done, or one message; never a shard that is not whole."""
+    asked = ("campaign", file, "--runs", 4096, "--chunk", 1024, "--out", "runs", "--resume", "--workers", 2)
+    codes = []
+    for room_bytes in (1 << 20, 8 << 20, 32 << 20, 128 << 20):
+        left = with_room(room_bytes, *asked, folder=tmp_path)
+        codes.append(left.code)
+        assert left.code in (0, 2), left.err
+        assert "Traceback" not in left.err
+        if left.code:
+            assert left.err.splitlines()[-1].startswith("error: ")
+        if (tmp_path / "runs" / "manifest.json").exists():
+            need_whole(tmp_path / "runs")
+    assert 2 in codes
+    assert with_room(4 << 30, *asked, folder=tmp_path).code == 0
+    expected = Campaign(brief, 4096, tmp_path / "whole").run().table
+    assert CampaignFolder.read(tmp_path / "runs").table().equals(expected)
