@@ -37,6 +37,13 @@ INTERRUPTED = 130
 class _Root(TyperGroup):
     """Says what went wrong in one message, without a traceback."""
 
+    def make_context(self, *given: Any, **options: Any) -> Any:
+        try:
+            return super().make_context(*given, **options)
+        except KeyboardInterrupt:
+            _complain("interrupted")
+            raise typer.Exit(INTERRUPTED) from None
+
     def invoke(self, ctx: Any) -> Any:
         try:
             return super().invoke(ctx)
@@ -127,8 +134,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     SystemExit
         Always: 0 done, 2 something given is wrong, 130 interrupted.
     """
-    keep_kernels_somewhere()
     try:
+        keep_kernels_somewhere()
         app(args=None if arguments is None else list(arguments), prog_name="infoset")
     except KeyboardInterrupt:  # before a command had begun
         _complain("interrupted")

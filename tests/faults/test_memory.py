@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from sim import Campaign, Scenario
+from sim import Campaign, Results, Scenario
+from sim.chunk import Chunk, fly_chunk
 from sim.storage import CampaignFolder
 from tests.faults.conftest import Infoset, Left, need_whole
 
@@ -42,20 +43,17 @@ def with_room(room_bytes: int, *arguments: object, folder: Path) -> Left:
 def test_no_memory_is_a_message_that_says_how_to_go_on(
     infoset: Infoset, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    flown = []
+    flown: list[Chunk] = []
 
-    def fly(chunk: object, *_: object) -> object:
+    def fly(chunk: Chunk, *_: object) -> Results:
         flown.append(chunk)
         if len(flown) > 1:
             raise MemoryError("Unable to allocate 7.45 GiB")
-        return whole(chunk)
+        return fly_chunk(chunk)
 
-    from sim import chunks_in_flight
-
-    whole = chunks_in_flight.fly_chunk
     asked = ("campaign", file, "--runs", 24, "--chunk", 8, "--out", "runs", "--workers", 1)
     with monkeypatch.context() as patched:
-        patched.setattr(chunks_in_flight, "fly_chunk", fly)
+        patched.setattr("sim.chunks_in_flight.fly_chunk", fly)
         left = infoset(*asked)
     assert (left.code, left.out) == (2, "")
     assert left.err.splitlines()[-1].startswith("error: there is not enough memory (Unable to allocate 7.45 GiB); ")

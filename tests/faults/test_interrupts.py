@@ -1,0 +1,140 @@
+"""Ctrl-C at random moments: whole files or none, a message, and how to go on."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from experiments.commands._campaign_options import campaign_errors
+from sim import Campaign, CampaignNoise, Scenario
+from sim.storage import CampaignFolder
+from tests.faults.conftest import Infoset, Left, begin, ended, need_whole
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="POSIX signals")
+
+INTERRUPTED = (130, -signal.SIGINT)
+"""The second, which a shell tells as 130 too, is Python's own where it was loading modules."""
+RESUME = "interrupted; what is stored is whole: go on with --resume"
+
+
+def interrupted(*arguments: object, folder: Path, after_s: float) -> Left:
+    """Begin a command and interrupt it."""
+    process = begin(*arguments, folder=folder)
+    deadline = time.monotonic() + after_s
+    while process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    left = ended(process)
+    assert "Traceback" not in left.err
+    if left.code:
+        assert left.code in INTERRUPTED
+        assert "interrupted" in left.err.splitlines()[-1]
+    return left
+
+
+@pytest.mark.parametrize("command", ["campaign", "sweep"])
+def test_an_interrupt_says_how_to_go_on(
+    command: str, infoset: Infoset, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stored: list[int] = []
+    write = CampaignFolder.write
+
+    def write_one(folder: CampaignFolder, *given: object) -> None:
+        if stored:
+            raise KeyboardInterrupt
+        write(folder, *given)  # type: ignore[arg-type]
+        stored.append(1)
+
+    more = ["--vary", "thruster.budget_m_s=100:200:2"] if command == "sweep" else []
+    asked = (command, file, "--runs", 16, "--chunk", 8, "--out", "runs", *more)
+    monkeypatch.setattr(CampaignFolder, "write", write_one)
+    left = infoset(*asked)
+    assert (left.code, left.out) == (130, "")
+    assert left.err.splitlines()[-1] == RESUME
+    need_whole(tmp_path / "runs")
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    assert infoset(*asked, "--resume", "-q").code == 0
+    there = CampaignFolder.read(tmp_path / "runs")
+    assert there.complete
+
+
+def test_what_cannot_be_resumed_is_only_interrupted() -> None:
+    with pytest.raises(KeyboardInterrupt, match=r"^$"), campaign_errors():
+        raise KeyboardInterrupt
+
+
+COMMANDS: dict[str, list[object]] = {
+    "experiment": ["experiment", "brief.toml", "--runs", 3, "--out", "o"],
+    "compare": ["compare", "brief.toml", "--runs", 2, "--strategies", "patient,symmetric-miss", "--out", "o"],
+    "replay": ["replay", "flight.npz", "--out", "o", "--html", "page.html"],
+    "pareto": ["pareto", "--out", "o", "--html", "page.html"],
+    "multipoint": ["multipoint", "--out", "o", "--html", "page.html"],
+    "reach": ["reach", "--out", "o", "--html", "page.html"],
+    "pursuit": ["pursuit", "--out", "o", "--html", "page.html"],
+    "report": ["report", "flown", "--out", "o"],
+    "reproduce": ["reproduce", "--paper", "pareto", "--json", "o.json"],
+    "sweep": [
+        *("sweep", "brief.toml", "--vary", "thruster.budget_m_s=100:200:3", "--runs", 64, "--chunk", 8, "--out", "o")
+    ],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", COMMANDS)
+def test_interrupted_at_random_moments(name: str, infoset: Infoset, file: Path, tmp_path: Path) -> None:
+    assert infoset("engage", file, "--record", "flight.npz", "-q").code == 0
+    assert infoset("campaign", file, "--runs", 32, "--out", "flown", "-q").code == 0
+    command, chance = COMMANDS[name], random.Random(name)
+    whole = tmp_path / "whole"
+    whole.mkdir()
+    for each in (file.name, "flight.npz", "flown"):
+        (whole / each).symlink_to(tmp_path / each)
+    began_s = time.monotonic()
+    assert ended(begin(*command, folder=whole)).code == 0
+    lasts_s = time.monotonic() - began_s
+    codes = []
+    for trial in range(3):
+        folder = tmp_path / f"trial-{trial}"
+        folder.mkdir()
+        for each in (file.name, "flight.npz", "flown"):
+            (folder / each).symlink_to(tmp_path / each)
+        # Past the first moments, which are Python's own.
+        left = interrupted(*command, folder=folder, after_s=chance.uniform(min(0.5, lasts_s), lasts_s))
+        codes.append(left.code)
+        need_whole(folder)
+        if left.code and name == "sweep" and (folder / "o").exists():
+            assert left.err.splitlines()[-1] in (RESUME, "interrupted")
+            assert ended(begin(*command, "--resume", "-q", folder=folder)).code == 0
+            assert CampaignFolder.read(folder / "o").complete
+    assert any(codes)
+
+
+@pytest.mark.slow
+def test_a_campaign_interrupted_ten_times_gives_the_same_bits(brief: Scenario, file: Path, tmp_path: Path) -> None:
+    asked = ("campaign", file, "--runs", 2000, "--chunk", 8, "--noise", "mixed", "--out", "runs", "--resume", "-q")
+    chance, stored = random.Random(9), []
+    shards = tmp_path / "runs" / "shards"
+    for _ in range(10):
+        process = begin(*asked, folder=tmp_path)
+        before, deadline = len(list(shards.glob("*.parquet"))), time.monotonic() + 60.0
+        while process.poll() is None and len(list(shards.glob("*.parquet"))) == before and time.monotonic() < deadline:
+            time.sleep(0.005)
+        time.sleep(chance.uniform(0.0, 0.5))
+        process.send_signal(signal.SIGINT)
+        left = ended(process)
+        need_whole(tmp_path / "runs")
+        stored.append(CampaignFolder.read(tmp_path / "runs").finished_runs)
+        if left.code == 0:
+            break
+        assert left.code in INTERRUPTED
+        assert left.err.splitlines() == [RESUME]
+    assert stored == sorted(set(stored))
+    assert ended(begin(*asked, folder=tmp_path)).code == 0
+    expected = Campaign(brief, 2000, tmp_path / "whole", noise=CampaignNoise.MIXED).run().table
+    assert CampaignFolder.read(tmp_path / "runs").table().equals(expected)
