@@ -141,8 +141,11 @@ def _prior(situation: Situation) -> tuple[Floats, Floats]:
     """Centre and variances of what is known at the start."""
     bounds = situation.information.model.bounds
     intervals = np.array([bounds.z_m, bounds.vz_m_s, bounds.x_m, (-bounds.vx_m_s[1], -bounds.vx_m_s[0])])
-    # An exact bound would have no variance: it is given one that is nothing beside its value.
-    widths = np.maximum(np.ptp(intervals, axis=1), 1e-9 * (1.0 + np.abs(intervals).max(axis=1)))
+    # An exact bound would have no variance: it is given one that is nothing beside its value and what angles can tell.
+    sensor = situation.information.model.angle_sensor
+    angle = max(sensor.error_at_zero_range_rad, sensor.error_at_nominal_range_rad)
+    told = np.array([angle * bounds.x_m[1], angle * situation.closing_speed_m_s, 0.0, 0.0])
+    widths = np.maximum(np.ptp(intervals, axis=1), 1e-9 * np.maximum(np.abs(intervals).max(axis=1), told))
     return intervals.mean(axis=1), widths**2 / 12.0
 
 
@@ -171,9 +174,11 @@ def _improve(situation: Situation, state: LeastSquaresState, centre: Floats, var
         weighted = jacobian * (3.0 / bound**2)[..., None]
         normal += np.swapaxes(weighted, 1, 2) @ jacobian
         right += np.einsum("bni,bn->bi", weighted, residual)
-    # Scaled by the prior's deviations, whose sizes span six decades.
+    # Scaled by the prior's deviations, whose sizes span six decades, the prior is the identity: no eigenvalue is less
+    # than 1, whatever rounding says where angles tell some direction ten decades better than another.
     scale = np.sqrt(variance)
-    inverse = np.linalg.inv(normal * np.outer(scale, scale))
+    values, vectors = np.linalg.eigh(normal * np.outer(scale, scale))
+    inverse = (vectors / np.maximum(values, 1.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
     covariance = inverse * np.outer(scale, scale)
     state.start = start + np.einsum("bij,bj->bi", covariance, right)
     state.start[:, X] = np.maximum(state.start[:, X], state.start[:, SPEED] * situation.time_s + nearest)

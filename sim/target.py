@@ -11,6 +11,8 @@ from sim.scenario import Manoeuvre, Target
 
 Floats = NDArray[np.float64]
 
+ROUNDING = 1e-12
+
 
 def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, predicted_miss_m: Floats) -> Floats:
     """Acceleration of the targets of a batch along z over one step, m/s^2, shape (B,).
@@ -33,7 +35,8 @@ def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, p
     elif target.manoeuvre is Manoeuvre.CONSTANT:
         side = first
     elif target.manoeuvre is Manoeuvre.BANG_BANG:
-        side = first * (-1.0) ** math.floor(step * step_s / target.switching_period_s)
+        # A whole number of periods is one, whatever rounding makes of the quotient.
+        side = first * (-1.0) ** math.floor(step * step_s / target.switching_period_s * (1.0 + ROUNDING))
     elif target.manoeuvre is Manoeuvre.RANDOM_TELEGRAPH:
         # Switches are a Poisson process: so likely is an odd number of them within a step.
         odd = 0.5 * (1.0 - math.exp(-2.0 * step_s / target.switching_period_s))

@@ -1,0 +1,484 @@
+"""Engagements from a metre to a thousand million kilometres: each works to its tolerance, or is refused and told why.
+
+Angles of 1e-12 to 1 rad (beyond 0.01 rad in the guaranteed model only), ranges of 1 m to 1e9 km, closing speeds of
+1 m/s to 100 km/s, 1 to 500 sections, steps of 1 ms to 1000 s. `Works` means: no warning, and nothing that is not a
+finite number; in the guaranteed model the truth is in its section at every step, the set is not lost and the miss is
+not above Phi; the mirrored engagement is the mirrored one; and an engagement with lengths a times and times b times as
+long gives misses, impulses and bounds scaled by a, a/b and a, to 1e-9. (A miss is the difference of positions: it is
+known to a few ulp of the range at best, and a miss of 1e-14 of the range to no nine digits.)
+
+Powers of two change exponents only, so they must give the same digits. They do not where times are scaled and the
+truth is integrated in more or fewer substeps for it: one is at most half a second, an absolute time. Strategies that
+count the last seconds (`patient`, `kalman`, `least-squares`) have a time of their own: it must be scaled too, and
+that of `patient` cannot be.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from experiments import load_scenario
+from experiments.errors import InputError
+from experiments.scenario_file import read_scenario, scenario_to_toml
+from guidance import Kalman, LeastSquares, NoiseKind, Strategy, SymmetricMiss, Thruster, TieRule, ZeroEffortMiss
+from infoset import AngleSensor, InitialSet, Model, RangeSensor, RateSensor, SetModel, StateBox
+from infoset.model import Interval
+from sim import Manoeuvre, Outcome, Results, Scenario, Sun, Target, simulate
+from sim.draws import Draws, corners, draw, greatest_number_of_steps
+from sim.engagement import Engagements, Step
+from sim.kepler import LONGEST_SUBSTEP_S
+
+Floats = NDArray[np.float64]
+
+ANGLES_RAD = (1e-12, 1e-9, 1e-6, 1e-3, 1e-2, 0.1, 0.5, 1.0)
+RANGES_M = (1.0, 1e3, 1e6, 1e9, 1e12)
+SPEEDS_M_S = (1.0, 1e2, 1e4, 1e5)
+SECTIONS = (1, 2, 29, 500)
+STEPS_S = (1e-3, 1.0, 1e3)
+STEPS_OF_A_FLIGHT = (1.3, 5.0, 30.0)
+SMALL_ANGLE_RAD = 0.01
+FEW_STEPS = 12
+SUN = Sun(1.32712440018e20, 1.5e11, 0.9)
+EXAMPLES = settings(max_examples=8, deadline=None)
+TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What was seen of a batch, step by step, and what came of it."""
+
+    lower_m: Floats
+    upper_m: Floats
+    impulse_m_s: Floats
+    margin_m: Floats
+    results: Results
+    ended: bool
+
+    @property
+    def seen(self) -> tuple[Floats, Floats, Floats]:
+        """Bounds and misses, all lengths, and impulses."""
+        phi = self.results.guaranteed_miss_m.filled(0.0)
+        lengths = np.concatenate([self.lower_m.ravel(), self.upper_m.ravel(), phi])
+        return lengths, self.results.miss_m, self.impulse_m_s
+
+
+def engagement(
+    angle_rad: float,
+    range_m: float,
+    speed_m_s: float,
+    sections: int,
+    step_s: float,
+    model: Model = Model.GUARANTEED,
+    *,
+    error: float = 0.1,
+    speed_error: float = 1e-3,
+) -> Scenario:
+    """An engagement whose numbers are all in proportion to an angle, a range, a speed and a step."""
+    slope = math.tan(angle_rad)
+    z, v = range_m * slope, 0.2 * speed_m_s * slope
+    bounds = StateBox(
+        (-z, z),
+        (0.9 * range_m, 1.1 * range_m),
+        (-v, 0.7 * v),
+        (-speed_m_s * (1.0 + speed_error), -speed_m_s * (1.0 - speed_error)),
+    )
+    sensor = AngleSensor(step_s, error * angle_rad, 1.5 * error * angle_rad, range_m)
+    guaranteed = model is Model.GUARANTEED
+    return Scenario(
+        "stress",
+        "",
+        None,
+        range_m,
+        bounds,
+        SetModel(
+            speed_m_s,
+            step_s,
+            bounds,
+            sensor,
+            0.01 * slope * speed_m_s**2 / range_m,
+            0.02 * range_m,
+            sections,
+            min(5, sections),
+            InitialSet.BOX if guaranteed else InitialSet.RECTANGLE,
+            model,
+        ),
+        None,
+        Thruster(10.0 * v, 1e-3 * v, 0.2 * v),
+    )
+
+
+def numbers(scenario: Scenario, seed: int, batch: int = 3) -> Draws:
+    """Random numbers of which half are at their bounds: what a guarantee must allow."""
+    generator = np.random.default_rng(seed)
+    steps = greatest_number_of_steps(scenario)
+    least, greatest = corners(scenario.dispersion)
+
+    def uniform() -> Floats:
+        return np.clip(generator.uniform(-2.0, 2.0, (batch, steps)), -1.0, 1.0)
+
+    states = least + (greatest - least) * generator.uniform(size=(batch, 4))
+    return Draws(
+        states[:, :2],
+        states[:, 2:],
+        angle=uniform(),
+        range=uniform(),
+        tie=uniform(),
+        rate=uniform() if scenario.rate_sensor is not None else None,
+        target=uniform() if scenario.target is not None else None,
+    )
+
+
+def fly(scenario: Scenario, draws: Draws, strategy: Strategy | None = None, steps: int | None = None) -> Flight:
+    flight = Engagements(scenario, draws, strategy)
+    seen: list[Step] = []
+    while flight.flying and (steps is None or flight.step < steps):
+        flight.advance(seen.append)
+    return Flight(
+        np.array([step.predicted_miss.lower_m for step in seen]),
+        np.array([step.predicted_miss.upper_m for step in seen]),
+        np.array([step.impulse_m_s for step in seen]),
+        np.array([step.truth_margin_m for step in seen]),
+        flight.results(np.arange(len(draws.position_m))),
+        not flight.flying,
+    )
+
+
+def turned(interval: Interval) -> Interval:
+    return -interval[1], -interval[0]
+
+
+def mirrored(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
+    def across(box: StateBox) -> StateBox:
+        return replace(box, z_m=turned(box.z_m), vz_m_s=turned(box.vz_m_s))
+
+    swapped = {TieRule.UPPER: TieRule.LOWER, TieRule.LOWER: TieRule.UPPER}
+    sun, flip = scenario.sun, np.array([-1.0, 1.0])
+    image = replace(
+        scenario,
+        sun=None if sun is None else replace(sun, direction_rad=-sun.direction_rad),
+        dispersion=across(scenario.dispersion),
+        set_model=replace(scenario.set_model, bounds=across(scenario.set_model.bounds)),
+        tie=swapped.get(scenario.tie, scenario.tie),
+    )
+    return image, replace(
+        draws,
+        position_m=draws.position_m * flip,
+        velocity_m_s=draws.velocity_m_s * flip,
+        angle=-draws.angle,
+        tie=-draws.tie,
+        rate=None if draws.rate is None else -draws.rate,
+        target=None if draws.target is None else -draws.target,
+    )
+
+
+def scaled(scenario: Scenario, draws: Draws, length: float, time: float) -> tuple[Scenario, Draws]:
+    """The same engagement in other units, its numbers left without them."""
+    speed, acceleration = length / time, length / time**2
+
+    def box(given_box: StateBox) -> StateBox:
+        ends = {
+            name: (unit * low, unit * high)
+            for (name, (low, high)), unit in zip(vars(given_box).items(), (length, length, speed, speed), strict=True)
+        }
+        return StateBox(**ends)
+
+    model, engine, sun, target = scenario.set_model, scenario.thruster, scenario.sun, scenario.target
+    ranging, rating = scenario.range_sensor, scenario.rate_sensor
+    sensor = model.angle_sensor
+    return replace(
+        scenario,
+        nominal_range_m=length * scenario.nominal_range_m,
+        dispersion=box(scenario.dispersion),
+        set_model=replace(
+            model,
+            closing_speed_m_s=speed * model.closing_speed_m_s,
+            step_s=time * model.step_s,
+            bounds=box(model.bounds),
+            angle_sensor=replace(
+                sensor, period_s=time * sensor.period_s, nominal_range_m=length * sensor.nominal_range_m
+            ),
+            disturbance_m_s2=acceleration * model.disturbance_m_s2,
+            range_threshold_m=length * model.range_threshold_m,
+        ),
+        thruster=Thruster(
+            speed * engine.budget_m_s, speed * engine.least_impulse_m_s, speed * engine.greatest_impulse_m_s
+        ),
+        sun=None
+        if sun is None
+        else replace(
+            sun,
+            gravitational_parameter_m3_s2=length * acceleration * length * sun.gravitational_parameter_m3_s2,
+            distance_m=length * sun.distance_m,
+        ),
+        range_sensor=None if ranging is None else replace(ranging, period_s=time * ranging.period_s),
+        rate_sensor=None if rating is None else RateSensor(time * rating.period_s, rating.error_rad_s / time),
+        target=None
+        if target is None
+        else Target(target.manoeuvre, acceleration * target.acceleration_m_s2, time * target.switching_period_s),
+    ), replace(draws, position_m=length * draws.position_m, velocity_m_s=speed * draws.velocity_m_s)
+
+
+def assert_works(scenario: Scenario, draws: Draws, steps: int | None = None) -> Flight:
+    """Everything that needs no second engagement of another size."""
+    there = fly(scenario, draws, steps=steps)
+    for values in (*there.seen, there.results.truth_margin_m[there.results.truth_margin_m < np.inf]):
+        assert np.isfinite(values).all()
+    if scenario.set_model.is_guaranteed:
+        assert there.results.truth_kept.all()
+        assert Outcome.SET_LOST not in there.results.outcomes
+        assert not there.ended or there.results.phi_held.filled(True).all()
+    back = fly(*mirrored(scenario, draws), steps=steps)
+    size = TOLERANCE * np.abs(there.upper_m - there.lower_m).max()
+    np.testing.assert_allclose(back.lower_m, -there.upper_m, rtol=TOLERANCE, atol=size)
+    np.testing.assert_allclose(back.impulse_m_s, -there.impulse_m_s, rtol=TOLERANCE)
+    np.testing.assert_allclose(back.results.miss_m, there.results.miss_m, rtol=TOLERANCE)
+    assert back.results.outcomes == there.results.outcomes
+    return there
+
+
+def through_a_file(scenario: Scenario) -> Scenario | str:
+    """The scenario as its file is read, or why the file is refused."""
+    try:
+        again = read_scenario(scenario_to_toml(scenario), "stress.toml")
+    except InputError as error:
+        return str(error)
+    assert again == scenario
+    return again
+
+
+def bounded(scenario: Scenario) -> int:
+    """So few steps that the truth is integrated in a few thousand substeps."""
+    return min(FEW_STEPS, max(2, int(1e3 / scenario.set_model.step_s)))
+
+
+# The grid -------------------------------------------------------------------------------------------------------
+
+GRID = list(itertools.product(ANGLES_RAD, RANGES_M, SPEEDS_M_S, SECTIONS, STEPS_S))
+
+
+Combination = tuple[float, float, float, int, float]
+
+
+def assert_works_or_is_refused(combination: Combination, model: Model) -> bool:
+    angle_rad, range_m, speed_m_s, sections, step_s = combination
+    scenario = engagement(angle_rad, range_m, speed_m_s, sections, step_s, model)
+    steps = 1.1 * range_m / (speed_m_s * (1.0 - 1e-3)) / step_s
+    found = through_a_file(scenario)
+    if isinstance(found, str):
+        # More steps than may be flown, more substeps, or a flight shorter than a step and the threshold: nothing else.
+        assert found.startswith("stress.toml: guidance.step_s: ")
+        assert (
+            (steps > 1e5 and "at most 100000 steps" in found)
+            or (steps * step_s > 5e6 and "stretches of at most 0.5 s" in found)
+            or (steps < 2.0 and "shorten the step" in found)
+        )
+        if steps > 1e5:
+            with pytest.raises(ValueError, match="at most 100000 steps"):
+                draw(scenario, [0], 0)
+        return False
+    assert_works(found, numbers(found, sections, batch=2), bounded(found))
+    return True
+
+
+@EXAMPLES
+@given(st.sampled_from(GRID), st.sampled_from(Model))
+def test_combinations_work_or_are_refused(combination: Combination, model: Model) -> None:
+    assume(model is Model.GUARANTEED or combination[0] <= SMALL_ANGLE_RAD)
+    assert_works_or_is_refused(combination, model)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", list(Model))
+@pytest.mark.parametrize("step_s", STEPS_S)
+def test_all_combinations_work_or_are_refused(model: Model, step_s: float) -> None:
+    flown = [
+        assert_works_or_is_refused(combination, model)
+        for combination in GRID
+        if combination[-1] == step_s and (model is Model.GUARANTEED or combination[0] <= SMALL_ANGLE_RAD)
+    ]
+    assert 0 < sum(flown) < len(flown)
+
+
+WHOLE_FLIGHTS = [
+    (angle, range_m, speed, sections, range_m / speed / steps)
+    for angle, range_m, speed, sections, steps in itertools.product(
+        ANGLES_RAD, RANGES_M, SPEEDS_M_S, SECTIONS, STEPS_OF_A_FLIGHT
+    )
+    if STEPS_S[0] <= range_m / speed / steps <= STEPS_S[-1]
+]
+
+
+def assert_whole_flight_works(combination: Combination, model: Model) -> None:
+    scenario = engagement(*combination, model)
+    there = assert_works(scenario, numbers(scenario, 1, batch=2))
+    assert there.ended
+
+
+@EXAMPLES
+@given(st.sampled_from([flight for flight in WHOLE_FLIGHTS if flight[-1] <= 30.0 and flight[3] < 500]))
+def test_whole_flights_work_however_few_their_steps(combination: Combination) -> None:
+    assert_whole_flight_works(combination, Model.GUARANTEED)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("range_m", RANGES_M[:-1])
+def test_all_whole_flights_work(range_m: float) -> None:
+    """A flight from 1e9 km takes more steps of 1000 s than these, even at 100 km/s."""
+    flights = [flight for flight in WHOLE_FLIGHTS if flight[1] == range_m]
+    assert flights
+    for flight in flights:
+        assert_whole_flight_works(flight, Model.GUARANTEED)
+
+
+@pytest.mark.parametrize(("range_m", "speed_m_s", "step_s"), [(1.0, 1.0, 0.1), (1e6, 1e5, 1.0), (1e11, 1e5, 1000.0)])
+def test_a_file_on_the_disk_flies_as_its_scenario(
+    range_m: float, speed_m_s: float, step_s: float, tmp_path: Path
+) -> None:
+    scenario = engagement(0.3, range_m, speed_m_s, 5, step_s)
+    path = tmp_path / "stress.toml"
+    path.write_text(scenario_to_toml(scenario))
+    if range_m < 1e11:
+        assert simulate(load_scenario(path), 2).miss_m.tolist() == simulate(scenario, 2).miss_m.tolist()
+    assert load_scenario(path) == scenario
+
+
+# Scale ----------------------------------------------------------------------------------------------------------
+
+
+@st.composite
+def engagements(draw_value: st.DrawFn) -> Scenario:
+    """Engagements of any size and kind, of a few dozen steps, with sensors, targets and a Sun."""
+    model = draw_value(st.sampled_from(Model))
+    most = -2.0 if model is Model.PAPER else 0.0
+    angle = 10.0 ** draw_value(st.floats(-12.0, most))
+    range_m, speed = 10.0 ** draw_value(st.floats(0.0, 9.0)), 10.0 ** draw_value(st.floats(0.0, 5.0))
+    steps = 10.0 ** draw_value(st.floats(0.2, 1.5))
+    step = range_m / speed / steps
+    assume(STEPS_S[0] <= step <= STEPS_S[-1])
+    scenario = engagement(
+        angle,
+        range_m,
+        speed,
+        draw_value(st.sampled_from([1, 2, 7, 29])),
+        step,
+        model,
+        error=10.0 ** draw_value(st.floats(-3.0, -0.5)),
+        speed_error=draw_value(st.sampled_from([0.0, 1e-6, 1e-2, 0.3])),
+    )
+    rate = RateSensor(step, 0.1 * angle * speed / range_m)
+    nu = scenario.set_model.disturbance_m_s2
+    return replace(
+        scenario,
+        noise=draw_value(st.sampled_from(NoiseKind)),
+        tie=draw_value(st.sampled_from([TieRule.UPPER, TieRule.LOWER, TieRule.RANDOM])),
+        range_sensor=draw_value(st.sampled_from([None, RangeSensor(2.0 * step, 0.05)])),
+        rate_sensor=draw_value(st.sampled_from([None, rate])),
+        target=draw_value(st.sampled_from([None, Target(Manoeuvre.BANG_BANG, nu, 3.0 * step)])),
+        sun=draw_value(st.sampled_from([None, SUN])) if range_m < 1e9 else None,
+    )
+
+
+STRATEGIES = st.sampled_from([SymmetricMiss, ZeroEffortMiss, Kalman, LeastSquares])
+POWERS = st.integers(-20, 20)
+
+
+def strategy_of(kind: type[Strategy], time: float) -> Strategy:
+    """A strategy whose own time, if it has one, is scaled too."""
+    return kind(last_s=3.0 * time) if kind in (Kalman, LeastSquares) else kind()
+
+
+def assert_scales(
+    scenario: Scenario, kind: type[Strategy], length: float, time: float, tolerance: float, seed: int
+) -> None:
+    draws = numbers(scenario, seed)
+    steps = max(3, int(2e2 / scenario.set_model.step_s))
+    one = fly(scenario, draws, strategy_of(kind, 1.0), steps)
+    other = fly(*scaled(scenario, draws, length, time), strategy_of(kind, time), steps)
+    assert other.results.outcomes == one.results.outcomes
+    assert other.lower_m.shape == one.lower_m.shape
+    ulps = 8.0 * 2.0**-52 * scenario.nominal_range_m
+    units, least = (length, length, length / time), (0.0, ulps, 0.0)
+    for mine, yours, unit, rounding in zip(one.seen, other.seen, units, least, strict=True):
+        if tolerance == 0.0:
+            assert (unit * mine).tolist() == yours.tolist()
+        else:
+            size = tolerance * np.abs(mine).max() + rounding
+            np.testing.assert_allclose(yours / unit, mine, rtol=tolerance, atol=size)
+
+
+@EXAMPLES
+@given(engagements(), STRATEGIES, POWERS, st.integers(0, 99))
+def test_lengths_a_power_of_two_as_long_give_the_same_digits(
+    scenario: Scenario, kind: type[Strategy], power: int, seed: int
+) -> None:
+    assert_scales(scenario, kind, 2.0**power, 1.0, 0.0, seed)
+
+
+@EXAMPLES
+@given(engagements(), STRATEGIES, POWERS, POWERS, st.integers(0, 99))
+def test_times_a_power_of_two_as_long_give_the_same_digits(
+    scenario: Scenario, kind: type[Strategy], length: int, time: int, seed: int
+) -> None:
+    """As long as the truth is integrated in one substep a step."""
+    shortest = LONGEST_SUBSTEP_S / max(1.0, 2.0**time)
+    halved = 2.0 ** min(0, math.floor(math.log2(shortest / scenario.set_model.step_s)))
+    brief, _ = scaled(scenario, numbers(scenario, seed), 1.0, halved)
+    assert_scales(brief, kind, 2.0**length, 2.0**time, 0.0, seed)
+
+
+@EXAMPLES
+@given(engagements(), STRATEGIES, st.floats(-6.0, 6.0), st.floats(-2.0, 2.0), st.integers(0, 99))
+def test_other_units_give_the_scaled_answer(
+    scenario: Scenario, kind: type[Strategy], length: float, time: float, seed: int
+) -> None:
+    """In free space, where substeps are exact; random noise, for the game's choices jump where rounding decides."""
+    honest = replace(scenario, noise=NoiseKind.RANDOM, sun=None)
+    assert_scales(honest, kind, 10.0**length, 10.0**time, TOLERANCE, seed)
+
+
+# Degenerate knowledge, and what must be refused -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("exact", ["z_m", "x_m", "vz_m_s", "vx_m_s", "all"])
+@pytest.mark.parametrize("model", list(Model))
+@pytest.mark.parametrize("sections", [1, 5])
+def test_what_is_known_exactly_is_no_trouble(exact: str, model: Model, sections: int) -> None:
+    """Sections that are segments and points, labels that are one: the truth is in them up to rounding."""
+    scenario = engagement(1e-3, 1e6, 1e3, sections, 50.0, model)
+    box = scenario.set_model.bounds
+    names = list(vars(box)) if exact == "all" else [exact]
+    box = replace(box, **{name: (vars(box)[name][1],) * 2 for name in names})
+    scenario = replace(scenario, dispersion=box, set_model=replace(scenario.set_model, bounds=box))
+    for disturbance in (scenario.set_model.disturbance_m_s2, 0.0):
+        still = replace(scenario, set_model=replace(scenario.set_model, disturbance_m_s2=disturbance))
+        there = fly(still, numbers(still, 3))
+        assert there.ended
+        assert np.isfinite(there.results.miss_m).all()
+        if model is Model.GUARANTEED:
+            assert Outcome.SET_LOST not in there.results.outcomes
+            # Two thousand substeps of half a second round the truth's own position: two thousand ulp of 2 km.
+            assert there.results.truth_margin_m.min() >= -2200 * 2.0**-52 * 2e3
+
+
+def test_a_closing_speed_without_labels_is_refused_from_python_too() -> None:
+    scenario = engagement(1e-3, 1e6, 1e3, 5, 50.0, speed_error=0.999)
+    assert not isinstance(through_a_file(scenario), str)
+    assert_works(scenario, numbers(scenario, 0), 5)
+    far = replace(scenario.set_model.bounds, vx_m_s=(-2001.0, -999.0))
+    wide = replace(scenario, set_model=replace(scenario.set_model, bounds=far))
+    assert "by less than that itself" in str(through_a_file(wide))
+    with pytest.raises(ValueError, match="known to within itself"):
+        simulate(wide, 1)
+    near = replace(scenario, sun=replace(SUN, distance_m=2e6))
+    assert "gravity may change the closing speed" in str(through_a_file(near))
+    with pytest.raises(ValueError, match="known to within itself"):
+        simulate(near, 1)
