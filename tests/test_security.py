@@ -1,15 +1,38 @@
-"""What the code must never do, looked for in its own text."""
+"""What the code must never do, looked for in its own text, and what a file from a stranger must not bring about."""
 
 from __future__ import annotations
 
 import ast
+import dataclasses
+import json
+import sys
+from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
-ROOT = Path(__file__).parents[1]
-PACKAGES = ("infoset", "guidance", "sim", "rendezvous", "experiments", "benchmarks")
-SOURCES = sorted(file for package in PACKAGES for file in (ROOT / package).rglob("*.py"))
+from experiments import record_file
+from experiments.cli import main
+from experiments.errors import on_a_screen
+from experiments.pages.interception import interception_page
+from experiments.record_file import read_record, write_record
+from experiments.scenario_file import load_scenario, scenario_text
+from infoset import StateBox
+from sim import Campaign, Record, fly_one
+from sim.storage.manifest import checksum
+
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+PACKAGES = {
+    name: Path(spec.origin).parent
+    for name in ("infoset", "guidance", "sim", "rendezvous", "experiments")
+    if (spec := find_spec(name)) is not None and spec.origin is not None
+} | ({"benchmarks": BENCHMARKS} if BENCHMARKS.is_dir() else {})
+"""Where the packages are installed, and in a checkout the benchmarks."""
+
+SOURCES = {name: sorted(folder.rglob("*.py")) for name, folder in PACKAGES.items()}
 
 UNSAFE_MODULES = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "shelve", "yaml"}
 """What runs code that a file holds, or may."""
@@ -28,13 +51,14 @@ def name_of(call: ast.Call) -> str:
 
 
 def test_there_are_sources() -> None:
-    assert {file.relative_to(ROOT).parts[0] for file in SOURCES} == set(PACKAGES)
+    assert len(SOURCES) >= 5
+    assert all(SOURCES.values())
 
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_nothing_that_runs_what_a_file_says(package: str) -> None:
     found = []
-    for file in (each for each in SOURCES if each.relative_to(ROOT).parts[0] == package):
+    for file in SOURCES[package]:
         tree = ast.parse(file.read_text())
         for node in ast.walk(tree):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
@@ -49,7 +73,7 @@ def test_nothing_that_runs_what_a_file_says(package: str) -> None:
 
 
 def test_arrays_are_read_and_written_without_pickle() -> None:
-    for file in SOURCES:
+    for file in (file for files in SOURCES.values() for file in files):
         for call in calls(ast.parse(file.read_text())):
             of_numpy = isinstance(call.func, ast.Attribute) and ast.unparse(call.func).startswith(("np.", "numpy."))
             if of_numpy and name_of(call) in {"load", "read_array", "write_array"}:
@@ -57,3 +81,150 @@ def test_arrays_are_read_and_written_without_pickle() -> None:
                 allowed = given.get("allow_pickle")
                 assert isinstance(allowed, ast.Constant), f"{file}:{call.lineno}"
                 assert allowed.value is False, f"{file}:{call.lineno}"
+
+
+ESCAPE = "\x1b]0;owned\x07\x1b[2J"
+SCRIPT = "<script>alert(1)</script><img src=x onerror=alert(1)>"
+
+_opened: list[str] | None = None
+
+
+def _listen(event: str, arguments: tuple[Any, ...]) -> None:
+    if _opened is not None and event in ("open", "os.listdir", "os.scandir", "os.chdir", "os.mkdir", "os.remove"):
+        _opened.append(str(arguments[0]))
+
+
+sys.addaudithook(_listen)
+
+
+def opened_by(work: Callable[[], object]) -> list[str]:
+    """Every file and folder that Python opens while something is done."""
+    global _opened  # noqa: PLW0603 - an audit hook cannot be taken away
+    _opened = []
+    try:
+        work()
+    finally:
+        found, _opened = _opened, None
+    return found
+
+
+def infoset(*arguments: object) -> int:
+    """Run the command; its exit code."""
+    with pytest.raises(SystemExit) as left:
+        main([str(each) for each in arguments])
+    return int(left.value.code or 0)
+
+
+@pytest.fixture(scope="module")
+def record() -> Record:
+    whole = fly_one(load_scenario("asteroid-1997"), 3, seed=11)
+    return dataclasses.replace(whole, steps=whole.steps[:6])
+
+
+def test_no_path_from_inside_a_file_is_ever_opened(
+    record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every text that a file may hold is a path to a decoy, and nobody looks there."""
+    decoy = tmp_path / "decoy"
+    decoy.mkdir()
+    monkeypatch.chdir(tmp_path)
+    path = str(decoy / "secret.toml")
+    Path(path).write_text(scenario_text("asteroid-1997"))
+    scenario = dataclasses.replace(record.scenario, description=path)
+    write_record(dataclasses.replace(record, scenario=scenario, strategy=path, noise=path), "x.npz")
+    box = StateBox((-100.0, 100.0), (590e3, 600e3), (-10.0, 10.0), (-58e3, -57.5e3))
+    sensor = dataclasses.replace(scenario.set_model.angle_sensor, nominal_range_m=595e3)
+    model = dataclasses.replace(scenario.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor)
+    brief = dataclasses.replace(scenario, set_model=model, dispersion=box, nominal_range_m=595e3)
+    Campaign(brief, 8, "runs").run(workers=1)
+    manifest = Path("runs/manifest.json")
+    value = json.loads(manifest.read_text())
+    value |= {"made_by": {"python": path}, "name": path, "version": path}
+    value["sha256"] = checksum(value)
+    manifest.write_text(json.dumps(value))
+    Path("mine.toml").write_text(
+        scenario_text("asteroid-1997").replace('description = "', f'description = "{path} ', 1)
+    )
+
+    def read_all() -> None:
+        assert infoset("replay", "x.npz", "--html", "page.html") == 0
+        assert infoset("report", "runs", "--json", "report.json") == 0
+        assert infoset("scenarios", "check", "mine.toml") == 0
+
+    opened = opened_by(read_all)
+    assert any(each.endswith("x.npz") for each in opened)
+    assert any(each.endswith("manifest.json") for each in opened)
+    assert [each for each in opened if "decoy" in each] == []
+    assert path in capsys.readouterr().out + Path("page.html").read_text()
+
+
+@pytest.mark.parametrize("key", ["until", "strategy", "name", "description", "versions"])
+def test_a_manifest_cannot_steer_the_terminal(
+    key: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    plain = Campaign(load_scenario("asteroid-1997"), 8, "runs").manifest().to_json()
+    place = plain["scenario"] if key in ("name", "description") else plain
+    place[key] = {f"x{ESCAPE}": ESCAPE} if key == "versions" else f"x{ESCAPE}"
+    plain["sha256"] = checksum(plain)
+    Path("runs").mkdir()
+    Path("runs/manifest.json").write_text(json.dumps(plain))
+    assert infoset("report", "runs") == 2
+    told = capsys.readouterr()
+    assert "control characters" in told.err
+    assert "\x1b" not in told.out + told.err
+
+
+@pytest.mark.parametrize("key", ["strategy", "noise"])
+def test_a_record_cannot_steer_the_terminal(
+    key: str, record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_record(dataclasses.replace(record, **{key: f"x{ESCAPE}"}), "x.npz")  # type: ignore[arg-type]
+    assert infoset("replay", "x.npz") == 2
+    told = capsys.readouterr()
+    assert "cannot be printed" in told.err
+    assert "\x1b" not in told.out + told.err
+
+
+def test_keys_that_are_shown_cannot_steer_it_either(
+    record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What is wrong is shown, and may be anything: names of files, of keys, of members of an archive."""
+    monkeypatch.chdir(tmp_path)
+    content = record_file._to_arrays(record)
+    header = json.dumps({"format": record_file.FORMAT, "schema": record_file.SCHEMA, ESCAPE: 1}).encode()
+    Path(f"{ESCAPE.replace('/', '')}.npz").write_bytes(
+        record_file._pack({"header": np.frombuffer(header, dtype=np.uint8), **content})
+    )
+    Path("mine.toml").write_text('name = "x"\n"a\\u001b[2J" = 1\n["\\u001b]0;owned"]\n')
+    assert infoset("replay", f"{ESCAPE}.npz") == 2
+    assert infoset("scenarios", "check", "mine.toml") == 2
+    assert infoset("engage", f"./{ESCAPE}.toml") == 2
+    told = capsys.readouterr()
+    assert "\x1b" not in told.out + told.err
+    assert told.err.count("error: ") == 3
+
+
+def test_a_message_keeps_its_lines_and_its_letters() -> None:
+    assert on_a_screen("läuft:\n  Ü – 標\x1b[31m\r\u202e") == "läuft:\n  Ü – 標?[31m??"
+
+
+def test_pages_show_names_as_text(record: Record, tmp_path: Path) -> None:
+    scenario = dataclasses.replace(record.scenario, description=SCRIPT)
+    file = tmp_path / "x.npz"
+    write_record(dataclasses.replace(record, scenario=scenario, strategy=SCRIPT, noise=SCRIPT), file)
+    found = read_record(file)
+    assert found.strategy == SCRIPT
+    for text in (interception_page([found]), found._repr_html_(), found.result._repr_html_()):
+        assert "<script>alert" not in text
+        assert "<img src" not in text
+
+
+def test_names_in_figures_are_no_formulas(record: Record, tmp_path: Path) -> None:
+    from experiments.figures.process import draw_process
+    from experiments.figures.style import save_figure
+
+    odd = dataclasses.replace(record, noise=r"$\frac{$")
+    for file in save_figure(draw_process([odd]), tmp_path, "figure"):
+        assert file.stat().st_size > 0

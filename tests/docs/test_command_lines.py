@@ -183,9 +183,9 @@ def test_blocks_that_are_not_run_say_why(pages: list[Page]) -> None:
         assert len(reason.split()) >= 4, f"{name}: {text}"
     # Whoever leaves out another one says so here, too.
     assert sorted(name for name, _ in left_out) == [
-        *["CONTRIBUTING.md"] * 3,
+        *["CONTRIBUTING.md"] * 4,
         "benchmarks/README.md",
-        *["docs/campaigns.md"] * 3,
+        *["docs/campaigns.md"] * 5,
     ]
 
 

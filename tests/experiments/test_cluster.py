@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 import socket
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from experiments.cli import main
-from experiments.cluster import connected
+from experiments.cluster import connected, is_open
 from experiments.errors import InputError
 from experiments.scenario_file import load_scenario, scenario_to_toml
 from infoset import StateBox
@@ -130,15 +131,56 @@ def test_tls_without_certificates() -> None:
     assert after_s < 10.0
 
 
+@pytest.mark.parametrize(
+    ("address", "warned"),
+    [
+        ("tcp://127.0.0.1:8786", False),
+        ("tcp://localhost:8786", False),
+        ("tcp://[::1]:8786", False),
+        ("tls://10.0.0.1:8786", False),
+        ("tcp://10.0.0.1:8786", True),
+        ("tcp://[2001:db8::1]:8786", True),
+        ("tcp://localhost.example:8786", True),
+        ("nothing", False),
+    ],
+)
+def test_an_open_scheduler_is_warned_of(
+    address: str, warned: bool, infoset: Infoset, brief: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(given: str) -> None:
+        raise InputError(f"asked for {given}")
+
+    assert is_open(address) == warned
+    (tmp_path / "brief.toml").write_text(scenario_to_toml(brief))
+    monkeypatch.setattr("experiments.cluster.connected", refuse)
+    code, _, err = infoset("campaign", "brief.toml", "--runs", 8, "--out", "runs", "--dask", address)
+    assert code == 2
+    assert f"asked for {address}" in err
+    assert ("whoever reaches it can run programs there" in err) == warned
+
+
 class Processes:
     """A Dask scheduler and workers, each a process of its own on the loopback."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, protocol: str = "tcp") -> None:
         self.folder = folder
         self.stack = contextlib.ExitStack()
         with socket.create_server(("127.0.0.1", 0)) as server:
-            self.address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
-        self.scheduler = self.start("scheduler", "--host", "127.0.0.1", "--port", self.address.rsplit(":", 1)[1])
+            port = server.getsockname()[1]
+        self.address = f"{protocol}://127.0.0.1:{port}"
+        self.scheduler = self.start("scheduler", "--host", "127.0.0.1", "--port", str(port), "--protocol", protocol)
+
+    def wait_until_up(self) -> None:
+        """Wait until the scheduler listens."""
+        deadline = time.monotonic() + 60.0
+        while True:
+            with (
+                contextlib.suppress(OSError),
+                socket.create_connection(("127.0.0.1", int(self.address.split(":")[2]))),
+            ):
+                return
+            assert time.monotonic() < deadline, "the scheduler did not start"
+            time.sleep(0.1)
 
     def start(self, what: str, *arguments: str, **environment: str) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", "dask", what, *arguments, "--no-dashboard"]
@@ -169,15 +211,7 @@ class Processes:
 def processes(tmp_path: Path) -> Iterator[Processes]:
     found = Processes(tmp_path)
     with found.stack:
-        deadline = time.monotonic() + 60.0
-        while True:
-            with (
-                contextlib.suppress(OSError),
-                socket.create_connection(("127.0.0.1", int(found.address.split(":")[2]))),
-            ):
-                break
-            assert time.monotonic() < deadline, "the scheduler did not start"
-            time.sleep(0.1)
+        found.wait_until_up()
         yield found
 
 
@@ -261,3 +295,49 @@ def test_workers_of_another_version_and_no_workers_at_all(
     assert code == 2
     assert f"infoset {version('infoset')} here, 0.0.1 there" in err
     assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl, to make a certificate")
+def test_an_encrypted_cluster_flies_and_lets_nobody_else_in(
+    infoset: Infoset, brief: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As docs/campaigns.md says: one certificate for all, named in Dask's configuration."""
+    import dask
+
+    key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"
+    subprocess.run(
+        [
+            *("openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=infoset"),
+            *("-addext", "subjectAltName=IP:127.0.0.1", "-keyout", str(key), "-out", str(certificate)),
+        ],
+        check=True,
+        capture_output=True,
+    )
+    names = {"DASK_DISTRIBUTED__COMM__TLS__CA_FILE": certificate}
+    for who in ("SCHEDULER", "WORKER", "CLIENT"):
+        names |= {
+            f"DASK_DISTRIBUTED__COMM__TLS__{who}__CERT": certificate,
+            f"DASK_DISTRIBUTED__COMM__TLS__{who}__KEY": key,
+        }
+    for name, path in names.items():
+        monkeypatch.setenv(name, str(path))
+    monkeypatch.setenv("DASK_DISTRIBUTED__COMM__REQUIRE_ENCRYPTION", "True")
+    (tmp_path / "brief.toml").write_text(scenario_to_toml(brief))
+    asked = ("campaign", "brief.toml", "--runs", 64, "--chunk", 16, "--dask")
+    found = Processes(tmp_path, "tls")
+    with found.stack:
+        found.wait_until_up()
+        found.worker()
+        with dask.config.set(dask.config.collect_env()):
+            found.wait_for(1)
+            code, _, err = infoset(*asked, found.address, "--out", "runs")
+        assert (code, err) == (0, "1 Dask workers, 1 threads\n")
+        for address in (found.address, found.address.replace("tls", "tcp")):  # without a certificate, unencrypted
+            code, out, err = infoset(*asked, address, "--out", "others")
+            assert (code, out) == (2, "")
+            assert err.startswith("error: --dask: no Dask scheduler answers at")
+    expected = Campaign(brief, 64, tmp_path / "here").run().table
+    assert CampaignFolder.read(tmp_path / "runs").table().equals(expected)
+    assert not (tmp_path / "others").exists()

@@ -27,6 +27,8 @@ Floats = NDArray[np.float64]
 def soundness() -> ModuleType:
     """The benchmark script: its engagements are flown here too, fewer of them."""
     path = Path(__file__).parents[2] / "benchmarks" / "soundness.py"
+    if not path.exists():
+        pytest.skip("benchmarks are in a checkout only")
     spec = importlib.util.spec_from_file_location("soundness", path)
     assert spec is not None
     assert spec.loader is not None

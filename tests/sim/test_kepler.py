@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import heyoka as hy
 import numpy as np
 import pytest
 
 from sim.kepler import KeplerMotion, closest_distance
 from sim.scenario import Sun
+
+hy = pytest.importorskip("heyoka", reason="needs the extra test: the independent integrator")
 
 SUN_K = 1.324948e20
 DISTANCE = 150e9

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import itertools
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -21,6 +22,8 @@ from rendezvous.polytope import (
     shadow,
 )
 from rendezvous.reachability.exact_check import rational_hull, rational_intersection
+
+needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
 
 Floats = NDArray[np.float64]
 
@@ -78,6 +81,7 @@ def test_redundant_points_and_halfspaces_are_dropped() -> None:
     assert (len(again.vertices), len(again.normals)) == (8, 6)
 
 
+@needs_ppl
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 10**6), size=st.integers(2, 6), flat=st.integers(0, 3), extra=st.integers(1, 8))
 def test_hull_is_the_exact_one(seed: int, size: int, flat: int, extra: int) -> None:
@@ -94,6 +98,7 @@ def test_hull_is_the_exact_one(seed: int, size: int, flat: int, extra: int) -> N
         assert (len(hull.vertices), len(hull.normals)) == (len(exact.vertices), exact.facets)
 
 
+@needs_ppl
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10**6), size=st.integers(2, 6), rank=st.integers(1, 5), extra=st.integers(1, 6))
 def test_flat_hull_is_the_exact_one(seed: int, size: int, rank: int, extra: int) -> None:
@@ -105,6 +110,7 @@ def test_flat_hull_is_the_exact_one(seed: int, size: int, rank: int, extra: int)
     assert (hull.dimension, len(hull.vertices), facets) == (exact.dimension, len(exact.vertices), exact.facets)
 
 
+@needs_ppl
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 10**6), size=st.integers(2, 5), count=st.integers(1, 8))
 def test_intersection_is_the_exact_one(seed: int, size: int, count: int) -> None:

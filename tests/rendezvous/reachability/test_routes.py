@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -40,6 +41,7 @@ Floats = NDArray[np.float64]
 Paper = Callable[..., ReachabilityProblem]
 Random = Callable[[int, int], ReachabilityProblem]
 SHARED = [HealthCheck.function_scoped_fixture]
+needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
 
 
 @settings(max_examples=40, deadline=None, suppress_health_check=SHARED)
@@ -59,6 +61,7 @@ def test_routes_agree_with_each_other(random_problem: Random, seed: int, size: i
             assert np.abs(one - other).max() < 1e-9 * np.abs(seen * problem.state_bounds).sum(axis=1).max()
 
 
+@needs_ppl
 @settings(max_examples=25, deadline=None, suppress_health_check=SHARED)
 @given(seed=st.integers(0, 10**6), size=st.integers(2, 5))
 def test_exact_route_has_the_vertices_of_exact_rationals(random_problem: Random, seed: int, size: int) -> None:
