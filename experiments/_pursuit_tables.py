@@ -43,9 +43,10 @@ _NOT_NEGATIVE = Number(least=ZERO)
 
 
 def _ellipse_axis(value: object) -> Decimal:
-    if isinstance(value, int | Decimal) and not isinstance(value, bool) and Decimal(value) <= ZERO:
+    number = NUMBER(value)
+    if number <= ZERO:
         raise wrong("must be greater than 0: a hyperbola's is negative, and neither player may start on one")
-    return NUMBER(value)
+    return number
 
 
 def _ellipse_eccentricity(value: object) -> Decimal:

@@ -17,7 +17,7 @@ from typing import Any
 
 from experiments.errors import InputError
 from experiments.scenario_file import read_scenario, scenario_to_toml
-from experiments.toml_values import LARGEST, nearest, number_text, shown
+from experiments.toml_values import LARGEST, SMALLEST, nearest, number_text, shown
 from sim.scenario import Scenario
 from sim.storage import MOST_CELLS, Axis
 
@@ -184,6 +184,8 @@ def _number(text: str, key: str) -> Decimal:
         raise InputError(f"--vary: {key}: must be a number, found {shown(text)}; for example {EXAMPLE}")
     if value.copy_abs() > LARGEST:
         raise InputError(f"--vary: {key}: must be at most {LARGEST:g} in size, found {shown(text)}")
+    if 0 < value.copy_abs() < SMALLEST:
+        raise InputError(f"--vary: {key}: must be 0 or at least {SMALLEST:g} in size, found {shown(text)}")
     return value
 
 

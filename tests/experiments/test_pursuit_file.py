@@ -58,6 +58,7 @@ def test_values_can_be_set_and_are_checked_as_in_a_file() -> None:
     [
         ("eccentricity = 0.00016", "eccentricity = 1.2", ["evader.eccentricity", "hyperbola"]),
         ("semi_major_axis_km = 42166.0", "semi_major_axis_km = -42166.0", ["pursuer.semi_major_axis_km", "hyperbola"]),
+        ("semi_major_axis_km = 42166.0", "semi_major_axis_km = nan", ["pursuer.semi_major_axis_km", "finite number"]),
         ("eccentricity = 0.00013", "eccentricity = 1.0", ["pursuer.eccentricity", "fall along a line"]),
         ("eccentricity = 0.00013", "eccentricity = 0.9", ["into the planet", "4216.6 km"]),
         ("semi_major_axis_km = 42166.0", "semi_major_axis_km = 42.166", ["suspiciously small", "kilometres"]),

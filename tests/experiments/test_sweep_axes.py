@@ -104,6 +104,7 @@ def test_values_rise_evenly_between_the_ends_as_written(ends: tuple[int, int], c
         ("thruster.budget_m_s=log:0:1:3", ["greater than 0"]),
         ("thruster.budget_m_s=inf:1:3", ['must be a number, found "inf"']),
         ("thruster.budget_m_s=1:1e99:3", ["at most 1e+15"]),
+        ("information_set.sections=log:1e-400:1e15:3", ["0 or at least 1e-100"]),
         ("thruster.budget_m_s=1:2:1", ["count must be a whole number from 2 to 1000"]),
         ("thruster.budget_m_s=1:2:1001", ["count must be a whole number from 2 to 1000"]),
         ("thruster.budget_m_s=1:2:" + "9" * 5000, ["count must be"]),

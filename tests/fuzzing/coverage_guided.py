@@ -283,7 +283,7 @@ def _expressions() -> tuple[Parse, Mutate, list[bytes]]:
         return text
 
     vary = EXAMPLE.removeprefix("--vary ")
-    texts = [f"v{vary}", "vinformation_set.sections=5:50:3", "vthruster.budget_m_s=log:1:1000:4", "rmiss_m p99<10"]
+    texts = [f"v{vary}", "vinformation_set.sections=log:5:50:3", "vthruster.budget_m_s=log:1:1000:4", "rmiss_m p99<10"]
     texts += ["vuncertainty.x_km.least=5000:5300:2", "rmiss_m p99 ci<0.5", "rimpulse_m_s p50", "xphase_deg=-60:60:61"]
     return parse, mutate, [text.encode() for text in [*texts, "sevader.thrust_N=5", "spursuer.mass_kg=2e3"]]
 
