@@ -158,7 +158,8 @@ def _learn(situation: Situation, state: KalmanState) -> None:
 def _update(state: KalmanState, innovation: Floats, gradient: Floats, variance: Floats) -> None:
     """Learn one scalar measurement a filter, in Joseph's form, and weigh the filters by it."""
     spread = np.einsum("bmij,bmj->bmi", state.covariance, gradient)
-    total = np.einsum("bmi,bmi->bm", gradient, spread) + variance
+    # No variance is below zero, whatever rounding leaves of one that angles have shrunk by twenty decades.
+    total = np.maximum(np.einsum("bmi,bmi->bm", gradient, spread), 0.0) + variance
     gain = spread / total[..., None]
     state.mean = state.mean + gain * innovation[..., None]
     keep = np.eye(4) - gain[..., :, None] * gradient[..., None, :]
