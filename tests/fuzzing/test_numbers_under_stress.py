@@ -10,14 +10,17 @@ known to a few ulp of the range at best, and a miss of 1e-14 of the range to no 
 Powers of two change exponents only, so they must give the same digits. They do not where times are scaled and the
 truth is integrated in more or fewer substeps for it: one is at most half a second, an absolute time. Strategies that
 count the last seconds (`patient`, `kalman`, `least-squares`) have a time of their own: it must be scaled too, and
-that of `patient` cannot be.
+that of `patient` cannot be. `kalman` with a range meter weighs by the logarithm of a length: the last digit moves.
+
+Other factors round differently. Errors that are exactly at their bounds leave sets as thin as rounding, whose ends
+rounding decides; so there the errors keep one part in a hundred off their bounds, and are not the game's.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,13 +32,13 @@ from numpy.typing import NDArray
 from experiments import load_scenario
 from experiments.errors import InputError
 from experiments.scenario_file import read_scenario, scenario_to_toml
-from guidance import Kalman, LeastSquares, NoiseKind, Strategy, SymmetricMiss, Thruster, TieRule, ZeroEffortMiss
-from infoset import AngleSensor, InitialSet, Model, RangeSensor, RateSensor, SetModel, StateBox
-from infoset.model import Interval
-from sim import Manoeuvre, Outcome, Results, Scenario, Sun, Target, simulate
-from sim.draws import Draws, corners, draw, greatest_number_of_steps
-from sim.engagement import Engagements, Step
+from guidance import Kalman, LeastSquares, NoiseKind, Strategy, SymmetricMiss, TieRule, ZeroEffortMiss
+from infoset import Model, RangeSensor, RateSensor
+from sim import Manoeuvre, Outcome, Scenario, Sun, Target, simulate
+from sim.draws import Draws, draw
 from sim.kepler import LONGEST_SUBSTEP_S
+
+from .flights import Flight, engagement, fly, mirrored, numbers, scaled
 
 Floats = NDArray[np.float64]
 
@@ -50,181 +53,6 @@ FEW_STEPS = 12
 SUN = Sun(1.32712440018e20, 1.5e11, 0.9)
 EXAMPLES = settings(max_examples=8, deadline=None)
 TOLERANCE = 1e-9
-
-
-@dataclass(frozen=True)
-class Flight:
-    """What was seen of a batch, step by step, and what came of it."""
-
-    lower_m: Floats
-    upper_m: Floats
-    impulse_m_s: Floats
-    margin_m: Floats
-    results: Results
-    ended: bool
-
-    @property
-    def seen(self) -> tuple[Floats, Floats, Floats]:
-        """Bounds and misses, all lengths, and impulses."""
-        phi = self.results.guaranteed_miss_m.filled(0.0)
-        lengths = np.concatenate([self.lower_m.ravel(), self.upper_m.ravel(), phi])
-        return lengths, self.results.miss_m, self.impulse_m_s
-
-
-def engagement(
-    angle_rad: float,
-    range_m: float,
-    speed_m_s: float,
-    sections: int,
-    step_s: float,
-    model: Model = Model.GUARANTEED,
-    *,
-    error: float = 0.1,
-    speed_error: float = 1e-3,
-) -> Scenario:
-    """An engagement whose numbers are all in proportion to an angle, a range, a speed and a step."""
-    slope = math.tan(angle_rad)
-    z, v = range_m * slope, 0.2 * speed_m_s * slope
-    bounds = StateBox(
-        (-z, z),
-        (0.9 * range_m, 1.1 * range_m),
-        (-v, 0.7 * v),
-        (-speed_m_s * (1.0 + speed_error), -speed_m_s * (1.0 - speed_error)),
-    )
-    sensor = AngleSensor(step_s, error * angle_rad, 1.5 * error * angle_rad, range_m)
-    guaranteed = model is Model.GUARANTEED
-    return Scenario(
-        "stress",
-        "",
-        None,
-        range_m,
-        bounds,
-        SetModel(
-            speed_m_s,
-            step_s,
-            bounds,
-            sensor,
-            0.01 * slope * speed_m_s**2 / range_m,
-            0.02 * range_m,
-            sections,
-            min(5, sections),
-            InitialSet.BOX if guaranteed else InitialSet.RECTANGLE,
-            model,
-        ),
-        None,
-        Thruster(10.0 * v, 1e-3 * v, 0.2 * v),
-    )
-
-
-def numbers(scenario: Scenario, seed: int, batch: int = 3) -> Draws:
-    """Random numbers of which half are at their bounds: what a guarantee must allow."""
-    generator = np.random.default_rng(seed)
-    steps = greatest_number_of_steps(scenario)
-    least, greatest = corners(scenario.dispersion)
-
-    def uniform() -> Floats:
-        return np.clip(generator.uniform(-2.0, 2.0, (batch, steps)), -1.0, 1.0)
-
-    states = least + (greatest - least) * generator.uniform(size=(batch, 4))
-    return Draws(
-        states[:, :2],
-        states[:, 2:],
-        angle=uniform(),
-        range=uniform(),
-        tie=uniform(),
-        rate=uniform() if scenario.rate_sensor is not None else None,
-        target=uniform() if scenario.target is not None else None,
-    )
-
-
-def fly(scenario: Scenario, draws: Draws, strategy: Strategy | None = None, steps: int | None = None) -> Flight:
-    flight = Engagements(scenario, draws, strategy)
-    seen: list[Step] = []
-    while flight.flying and (steps is None or flight.step < steps):
-        flight.advance(seen.append)
-    return Flight(
-        np.array([step.predicted_miss.lower_m for step in seen]),
-        np.array([step.predicted_miss.upper_m for step in seen]),
-        np.array([step.impulse_m_s for step in seen]),
-        np.array([step.truth_margin_m for step in seen]),
-        flight.results(np.arange(len(draws.position_m))),
-        not flight.flying,
-    )
-
-
-def turned(interval: Interval) -> Interval:
-    return -interval[1], -interval[0]
-
-
-def mirrored(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
-    def across(box: StateBox) -> StateBox:
-        return replace(box, z_m=turned(box.z_m), vz_m_s=turned(box.vz_m_s))
-
-    swapped = {TieRule.UPPER: TieRule.LOWER, TieRule.LOWER: TieRule.UPPER}
-    sun, flip = scenario.sun, np.array([-1.0, 1.0])
-    image = replace(
-        scenario,
-        sun=None if sun is None else replace(sun, direction_rad=-sun.direction_rad),
-        dispersion=across(scenario.dispersion),
-        set_model=replace(scenario.set_model, bounds=across(scenario.set_model.bounds)),
-        tie=swapped.get(scenario.tie, scenario.tie),
-    )
-    return image, replace(
-        draws,
-        position_m=draws.position_m * flip,
-        velocity_m_s=draws.velocity_m_s * flip,
-        angle=-draws.angle,
-        tie=-draws.tie,
-        rate=None if draws.rate is None else -draws.rate,
-        target=None if draws.target is None else -draws.target,
-    )
-
-
-def scaled(scenario: Scenario, draws: Draws, length: float, time: float) -> tuple[Scenario, Draws]:
-    """The same engagement in other units, its numbers left without them."""
-    speed, acceleration = length / time, length / time**2
-
-    def box(given_box: StateBox) -> StateBox:
-        ends = {
-            name: (unit * low, unit * high)
-            for (name, (low, high)), unit in zip(vars(given_box).items(), (length, length, speed, speed), strict=True)
-        }
-        return StateBox(**ends)
-
-    model, engine, sun, target = scenario.set_model, scenario.thruster, scenario.sun, scenario.target
-    ranging, rating = scenario.range_sensor, scenario.rate_sensor
-    sensor = model.angle_sensor
-    return replace(
-        scenario,
-        nominal_range_m=length * scenario.nominal_range_m,
-        dispersion=box(scenario.dispersion),
-        set_model=replace(
-            model,
-            closing_speed_m_s=speed * model.closing_speed_m_s,
-            step_s=time * model.step_s,
-            bounds=box(model.bounds),
-            angle_sensor=replace(
-                sensor, period_s=time * sensor.period_s, nominal_range_m=length * sensor.nominal_range_m
-            ),
-            disturbance_m_s2=acceleration * model.disturbance_m_s2,
-            range_threshold_m=length * model.range_threshold_m,
-        ),
-        thruster=Thruster(
-            speed * engine.budget_m_s, speed * engine.least_impulse_m_s, speed * engine.greatest_impulse_m_s
-        ),
-        sun=None
-        if sun is None
-        else replace(
-            sun,
-            gravitational_parameter_m3_s2=length * acceleration * length * sun.gravitational_parameter_m3_s2,
-            distance_m=length * sun.distance_m,
-        ),
-        range_sensor=None if ranging is None else replace(ranging, period_s=time * ranging.period_s),
-        rate_sensor=None if rating is None else RateSensor(time * rating.period_s, rating.error_rad_s / time),
-        target=None
-        if target is None
-        else Target(target.manoeuvre, acceleration * target.acceleration_m_s2, time * target.switching_period_s),
-    ), replace(draws, position_m=length * draws.position_m, velocity_m_s=speed * draws.velocity_m_s)
 
 
 def assert_works(scenario: Scenario, draws: Draws, steps: int | None = None) -> Flight:
@@ -388,6 +216,7 @@ def engagements(draw_value: st.DrawFn) -> Scenario:
 
 
 STRATEGIES = st.sampled_from([SymmetricMiss, ZeroEffortMiss, Kalman, LeastSquares])
+STEADY = st.sampled_from([ZeroEffortMiss, Kalman, LeastSquares])
 POWERS = st.integers(-20, 20)
 
 
@@ -396,10 +225,18 @@ def strategy_of(kind: type[Strategy], time: float) -> Strategy:
     return kind(last_s=3.0 * time) if kind in (Kalman, LeastSquares) else kind()
 
 
+def digits(scenario: Scenario, kind: type[Strategy]) -> float:
+    """What a power of two may change: nothing, but for Kalman's logarithm of a range's variance."""
+    return TOLERANCE if kind is Kalman and scenario.range_sensor is not None else 0.0
+
+
 def assert_scales(
     scenario: Scenario, kind: type[Strategy], length: float, time: float, tolerance: float, seed: int
 ) -> None:
     draws = numbers(scenario, seed)
+    if tolerance > 0.0:
+        rate = None if draws.rate is None else 0.99 * draws.rate
+        draws = replace(draws, angle=0.99 * draws.angle, range=0.99 * draws.range, rate=rate)
     steps = max(3, int(2e2 / scenario.set_model.step_s))
     one = fly(scenario, draws, strategy_of(kind, 1.0), steps)
     other = fly(*scaled(scenario, draws, length, time), strategy_of(kind, time), steps)
@@ -420,7 +257,7 @@ def assert_scales(
 def test_lengths_a_power_of_two_as_long_give_the_same_digits(
     scenario: Scenario, kind: type[Strategy], power: int, seed: int
 ) -> None:
-    assert_scales(scenario, kind, 2.0**power, 1.0, 0.0, seed)
+    assert_scales(scenario, kind, 2.0**power, 1.0, digits(scenario, kind), seed)
 
 
 @EXAMPLES
@@ -432,17 +269,29 @@ def test_times_a_power_of_two_as_long_give_the_same_digits(
     shortest = LONGEST_SUBSTEP_S / max(1.0, 2.0**time)
     halved = 2.0 ** min(0, math.floor(math.log2(shortest / scenario.set_model.step_s)))
     brief, _ = scaled(scenario, numbers(scenario, seed), 1.0, halved)
-    assert_scales(brief, kind, 2.0**length, 2.0**time, 0.0, seed)
+    assert_scales(brief, kind, 2.0**length, 2.0**time, digits(scenario, kind), seed)
 
 
 @EXAMPLES
-@given(engagements(), STRATEGIES, st.floats(-6.0, 6.0), st.floats(-2.0, 2.0), st.integers(0, 99))
+@given(engagements(), STEADY, st.floats(-6.0, 6.0), st.floats(-2.0, 2.0), st.integers(0, 99))
 def test_other_units_give_the_scaled_answer(
     scenario: Scenario, kind: type[Strategy], length: float, time: float, seed: int
 ) -> None:
-    """In free space, where substeps are exact; random noise, for the game's choices jump where rounding decides."""
-    honest = replace(scenario, noise=NoiseKind.RANDOM, sun=None)
+    """In free space, where substeps are exact; random noise, for the game's choices jump where rounding decides.
+
+    So does U_s, where two sections reach the same extreme of the predicted miss: of which one the range counts. It is
+    flown below. Without a sensor of the rate: see `test_found_under_stress.py`.
+    """
+    honest = replace(scenario, noise=NoiseKind.RANDOM, sun=None, rate_sensor=None)
     assert_scales(honest, kind, 10.0**length, 10.0**time, TOLERANCE, seed)
+
+
+@pytest.mark.parametrize("model", list(Model))
+@pytest.mark.parametrize(("length", "time"), [(1e6, 1.0), (1.0, 0.03), (0.007, 3.0), (1e-5, 1e-2)])
+@pytest.mark.parametrize("angle_rad", [1e-9, 0.01])
+def test_symmetric_miss_in_other_units(model: Model, length: float, time: float, angle_rad: float) -> None:
+    scenario = engagement(angle_rad, 3e5, 7e3, 5, 2.0, model)
+    assert_scales(scenario, SymmetricMiss, length, time, TOLERANCE, 5)
 
 
 # Degenerate knowledge, and what must be refused -----------------------------------------------------------------

@@ -1,0 +1,193 @@
+"""Engagements in proportion to a few numbers, flown and looked at: what the tests of numbers under stress share."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance import Strategy, Thruster, TieRule
+from infoset import AngleSensor, InitialSet, Model, RateSensor, SetModel, StateBox
+from infoset.model import Interval
+from sim import Results, Scenario, Target
+from sim.draws import Draws, corners, greatest_number_of_steps
+from sim.engagement import Engagements, Step
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What was seen of a batch, step by step, and what came of it."""
+
+    lower_m: Floats
+    upper_m: Floats
+    impulse_m_s: Floats
+    margin_m: Floats
+    results: Results
+    ended: bool
+
+    @property
+    def seen(self) -> tuple[Floats, Floats, Floats]:
+        """Bounds and misses, all lengths, and impulses."""
+        phi = self.results.guaranteed_miss_m.filled(0.0)
+        lengths = np.concatenate([self.lower_m.ravel(), self.upper_m.ravel(), phi])
+        return lengths, self.results.miss_m, self.impulse_m_s
+
+
+def engagement(
+    angle_rad: float,
+    range_m: float,
+    speed_m_s: float,
+    sections: int,
+    step_s: float,
+    model: Model = Model.GUARANTEED,
+    *,
+    error: float = 0.1,
+    speed_error: float = 1e-3,
+) -> Scenario:
+    """An engagement whose numbers are all in proportion to an angle, a range, a speed and a step."""
+    slope = math.tan(angle_rad)
+    z, v = range_m * slope, 0.2 * speed_m_s * slope
+    bounds = StateBox(
+        (-z, z),
+        (0.9 * range_m, 1.1 * range_m),
+        (-v, 0.7 * v),
+        (-speed_m_s * (1.0 + speed_error), -speed_m_s * (1.0 - speed_error)),
+    )
+    sensor = AngleSensor(step_s, error * angle_rad, 1.5 * error * angle_rad, range_m)
+    guaranteed = model is Model.GUARANTEED
+    return Scenario(
+        "stress",
+        "",
+        None,
+        range_m,
+        bounds,
+        SetModel(
+            speed_m_s,
+            step_s,
+            bounds,
+            sensor,
+            0.01 * slope * speed_m_s**2 / range_m,
+            0.02 * range_m,
+            sections,
+            min(5, sections),
+            InitialSet.BOX if guaranteed else InitialSet.RECTANGLE,
+            model,
+        ),
+        None,
+        Thruster(10.0 * v, 1e-3 * v, 0.2 * v),
+    )
+
+
+def numbers(scenario: Scenario, seed: int, batch: int = 3) -> Draws:
+    """Random numbers of which half are at their bounds: what a guarantee must allow."""
+    generator = np.random.default_rng(seed)
+    steps = greatest_number_of_steps(scenario)
+    least, greatest = corners(scenario.dispersion)
+
+    def uniform() -> Floats:
+        return np.clip(generator.uniform(-2.0, 2.0, (batch, steps)), -1.0, 1.0)
+
+    states = least + (greatest - least) * generator.uniform(size=(batch, 4))
+    return Draws(
+        states[:, :2],
+        states[:, 2:],
+        angle=uniform(),
+        range=uniform(),
+        tie=uniform(),
+        rate=uniform() if scenario.rate_sensor is not None else None,
+        target=uniform() if scenario.target is not None else None,
+    )
+
+
+def fly(scenario: Scenario, draws: Draws, strategy: Strategy | None = None, steps: int | None = None) -> Flight:
+    flight = Engagements(scenario, draws, strategy)
+    seen: list[Step] = []
+    while flight.flying and (steps is None or flight.step < steps):
+        flight.advance(seen.append)
+    return Flight(
+        np.array([step.predicted_miss.lower_m for step in seen]),
+        np.array([step.predicted_miss.upper_m for step in seen]),
+        np.array([step.impulse_m_s for step in seen]),
+        np.array([step.truth_margin_m for step in seen]),
+        flight.results(np.arange(len(draws.position_m))),
+        not flight.flying,
+    )
+
+
+def turned(interval: Interval) -> Interval:
+    return -interval[1], -interval[0]
+
+
+def mirrored(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
+    def across(box: StateBox) -> StateBox:
+        return replace(box, z_m=turned(box.z_m), vz_m_s=turned(box.vz_m_s))
+
+    swapped = {TieRule.UPPER: TieRule.LOWER, TieRule.LOWER: TieRule.UPPER}
+    sun, flip = scenario.sun, np.array([-1.0, 1.0])
+    image = replace(
+        scenario,
+        sun=None if sun is None else replace(sun, direction_rad=-sun.direction_rad),
+        dispersion=across(scenario.dispersion),
+        set_model=replace(scenario.set_model, bounds=across(scenario.set_model.bounds)),
+        tie=swapped.get(scenario.tie, scenario.tie),
+    )
+    return image, replace(
+        draws,
+        position_m=draws.position_m * flip,
+        velocity_m_s=draws.velocity_m_s * flip,
+        angle=-draws.angle,
+        tie=-draws.tie,
+        rate=None if draws.rate is None else -draws.rate,
+        target=None if draws.target is None else -draws.target,
+    )
+
+
+def scaled(scenario: Scenario, draws: Draws, length: float, time: float) -> tuple[Scenario, Draws]:
+    """The same engagement in other units, its numbers left without them."""
+    speed, acceleration = length / time, length / time**2
+
+    def box(given_box: StateBox) -> StateBox:
+        ends = {
+            name: (unit * low, unit * high)
+            for (name, (low, high)), unit in zip(vars(given_box).items(), (length, length, speed, speed), strict=True)
+        }
+        return StateBox(**ends)
+
+    model, engine, sun, target = scenario.set_model, scenario.thruster, scenario.sun, scenario.target
+    ranging, rating = scenario.range_sensor, scenario.rate_sensor
+    sensor = model.angle_sensor
+    return replace(
+        scenario,
+        nominal_range_m=length * scenario.nominal_range_m,
+        dispersion=box(scenario.dispersion),
+        set_model=replace(
+            model,
+            closing_speed_m_s=speed * model.closing_speed_m_s,
+            step_s=time * model.step_s,
+            bounds=box(model.bounds),
+            angle_sensor=replace(
+                sensor, period_s=time * sensor.period_s, nominal_range_m=length * sensor.nominal_range_m
+            ),
+            disturbance_m_s2=acceleration * model.disturbance_m_s2,
+            range_threshold_m=length * model.range_threshold_m,
+        ),
+        thruster=Thruster(
+            speed * engine.budget_m_s, speed * engine.least_impulse_m_s, speed * engine.greatest_impulse_m_s
+        ),
+        sun=None
+        if sun is None
+        else replace(
+            sun,
+            gravitational_parameter_m3_s2=length * acceleration * length * sun.gravitational_parameter_m3_s2,
+            distance_m=length * sun.distance_m,
+        ),
+        range_sensor=None if ranging is None else replace(ranging, period_s=time * ranging.period_s),
+        rate_sensor=None if rating is None else RateSensor(time * rating.period_s, rating.error_rad_s / time),
+        target=None
+        if target is None
+        else Target(target.manoeuvre, acceleration * target.acceleration_m_s2, time * target.switching_period_s),
+    ), replace(draws, position_m=length * draws.position_m, velocity_m_s=speed * draws.velocity_m_s)
