@@ -150,7 +150,7 @@ def test_nowhere_to_keep_anything(installation: Path, tmp_path: Path, ordinary: 
     )
     assert done.returncode == 0
     assert abs(float(done.stdout) - 0.1585290151921035) < 1e-15  # 1 - sin 1
-    assert done.stderr.count("RuntimeWarning") == 1
+    assert done.stderr.count("RuntimeWarning: ") == 1
     assert "NUMBA_CACHE_DIR" in done.stderr
 
 

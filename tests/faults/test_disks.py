@@ -19,7 +19,7 @@ from tests.faults.conftest import Infoset, Left, begin, ended, need_whole
 COMMANDS = {
     "experiment": ("experiment", "brief.toml", "--runs", 2),
     "compare": ("compare", "brief.toml", "--runs", 2, "--strategies", "patient"),
-    "bound": ("bound", "brief.toml", "--runs", 2, "--strategies", "patient"),
+    "bound": ("bound", "brief.toml", "--strategies", "patient", "--budget", 4),
     "engage": ("engage", "brief.toml"),
     "pareto": ("pareto",),
     "multipoint": ("multipoint",),
