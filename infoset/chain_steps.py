@@ -312,7 +312,7 @@ def miss_of(rings: Floats, marks: Integers, n: int, side: int, i: int) -> float:
 
 @inlined
 def find_peak(
-    rings: Floats, ring: tuple[int, int], first: int, last: int, peak: int, sign: float, m_origin: float
+    rings: Floats, ring: tuple[int, int], first: int, last: int, peak: int, sign: float, magnitude: float
 ) -> int:
     """Number of the vertex of a chain whose predicted miss is the greatest (right) or the least (left).
 
@@ -327,8 +327,8 @@ def find_peak(
         Where the peak was.
     sign : float
         The side from which the chain is seen.
-    m_origin : float
-        Predicted miss of the chain's origin.
+    magnitude : float
+        Of what the predicted misses of the chain are made: rounding is relative to it.
 
     Returns
     -------
@@ -341,7 +341,7 @@ def find_peak(
     """
     peak = min(max(peak, first), last)
     miss = sign * rings[ring[0] + 2 * (peak & ring[1]) + 1]
-    rounding = 16.0 * EPSILON * (abs(miss) + abs(m_origin))
+    rounding = 16.0 * EPSILON * (abs(miss) + magnitude)
     start_at = peak
     for way in (1, -1):
         i = start_at + way
@@ -365,12 +365,14 @@ def first_near_peak(rings: Floats, ring: tuple[int, int], first: int, peak: int,
 
 
 @inlined
-def greatest_and_least_miss(origins: Floats, rings: Floats, marks: Integers, n: int) -> tuple[float, float]:
+def greatest_and_least_miss(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float) -> tuple[float, float]:
     """Greatest and least predicted miss of a section; the chains note where they are reached."""
     right = (marks[n, RIGHT, RING], marks[n, RIGHT, MASK])
     left = (marks[n, LEFT, RING], marks[n, LEFT, MASK])
     right_first, left_first = marks[n, RIGHT, BEGIN], marks[n, LEFT, BEGIN]
-    right_m, left_m = origins[n, RIGHT, M_ORIGIN], origins[n, LEFT, M_ORIGIN]
+    # A miss is z + V tau, and both may be far greater than the sum.
+    reach = tau * origins[n, RIGHT, REACH]
+    right_m, left_m = abs(origins[n, RIGHT, M_ORIGIN]) + reach, abs(origins[n, LEFT, M_ORIGIN]) + reach
     upper_at = find_peak(rings, right, right_first, marks[n, RIGHT, END] - 1, marks[n, RIGHT, PEAK], 1.0, right_m)
     lower_at = find_peak(rings, left, left_first, marks[n, LEFT, END] - 1, marks[n, LEFT, PEAK], -1.0, left_m)
     marks[n, RIGHT, PEAK], marks[n, LEFT, PEAK] = upper_at, lower_at

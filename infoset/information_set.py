@@ -12,6 +12,7 @@ from infoset.information_set_view import Flags, Floats, InformationSetView, SetS
 from infoset.location import refine_all, workspace
 from infoset.model import InitialSet, Recovery, SetModel
 from infoset.section_law import BOUND_SLACK, section_law
+from infoset.section_life import steepest_angle
 from infoset.section_stack import SectionStack
 
 
@@ -133,12 +134,13 @@ class InformationSet(InformationSetView):
 
     def _greatest_alpha(self, measured_rad: ArrayLike | None) -> Floats:
         """Bound of |alpha| now, rad, shape (B,): from a measured one, or from the fastest the object can go."""
-        travelled = self.model.closing_speed_m_s * self.time_s
+        law, travelled = self._stack.law, self.model.closing_speed_m_s * self.time_s
         if measured_rad is not None:
-            sensor, farthest = self.model.angle_sensor, self.model.bounds.x_m[1]
-            bound = max(sensor.error_bound(0.0), sensor.error_bound(farthest)) * (1.0 + BOUND_SLACK)
-            return np.minimum(np.abs(self._spread(measured_rad, "alpha_rad")) + bound, 0.5 * np.pi)
-        box, law = self.model.bounds, self._stack.law
+            farthest = law.label_greatest - travelled
+            return np.array(
+                [steepest_angle(alpha, farthest, law) for alpha in self._spread(measured_rad, "alpha_rad").tolist()]
+            )
+        box = self.model.bounds
         impulses = self._history.total_impulse() * (1.0 + self.model.execution_error_relative)
         fastest = impulses + max(abs(v) for v in box.vz_m_s) + law.disturbance * self.time_s
         offset = max(abs(z) for z in box.z_m) + fastest * self.time_s

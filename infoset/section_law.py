@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import sys
 from typing import NamedTuple
 
 from infoset.model import InitialSet, Interval, SetModel
 
 BOUND_SLACK = 1e-9
 """Relative, of bounds that the guaranteed model computes: what rounding may take from them is far less."""
+ROUNDING = 16.0 * sys.float_info.epsilon
 
 
 class SectionLaw(NamedTuple):
@@ -54,6 +56,16 @@ def section_law(model: SetModel) -> SectionLaw:
         error *= 1.0 + BOUND_SLACK
     z_least, z_greatest = _scaled_outward(box.z_m, eta)
     vz_least, vz_greatest = _scaled_outward(box.vz_m_s, eta)
+    least_label, greatest_label = model.label_limits_m
+    if guaranteed:
+        offset, speed = max(abs(z) for z in box.z_m), max(abs(v) for v in box.vz_m_s)
+        rate = model.closing_speed_m_s / least_label
+        # Gravity turns the scale, 1/(1 + eta), which moves V where z is not zero; and a coordinate known exactly
+        # must not be lost to rounding.
+        slack = rate * offset * model.gravity_speed_change + ROUNDING * (speed + rate * offset)
+        vz_least, vz_greatest = vz_least - slack, vz_greatest + slack
+        slack = ROUNDING * (offset + speed * greatest_label / model.closing_speed_m_s)
+        z_least, z_greatest = z_least - slack, z_greatest + slack
     return SectionLaw(
         closing_speed=float(model.closing_speed_m_s),
         step=float(model.step_s),
@@ -67,8 +79,8 @@ def section_law(model: SetModel) -> SectionLaw:
         error_at_zero_range=float(error),
         error_slope=float(slope),
         exact_angles=guaranteed,
-        label_least=float(model.label_limits_m[0]),
-        label_greatest=float(model.label_limits_m[1]),
+        label_least=float(least_label),
+        label_greatest=float(greatest_label),
         z_least=z_least,
         z_greatest=z_greatest,
         vz_least=vz_least,

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import chain_steps, chains, whole_chains
-from infoset._compile import allocation_free, entry, inlined, substituted
+from infoset._compile import allocation_free, compiled, entry, inlined, substituted
 from infoset.chains import REACH, RIGHT
 from infoset.section_law import SectionLaw
 
@@ -27,6 +27,7 @@ Flags = NDArray[np.bool_]
 CUT_SLACK = 16.0 * chains.EPSILON
 SUM_SLACK = 8.0 * chains.EPSILON
 RIGHT_ANGLE = 0.5 * math.pi
+ANGLE_SLACK = 1e-12
 
 ANGLE, IMPULSE, PREDICTION, RATE, WIDENING = range(5)
 ALIVE = np.iinfo(np.int64).max
@@ -99,6 +100,27 @@ def start_section(origins: Floats, rings: Floats, marks: Integers, n: int, label
         chain_steps.spread(origins, n, tau, law.half_v_at_start)
 
 
+@compiled
+def steepest_angle(alpha: float, range_m: float, law: SectionLaw) -> float:
+    """Greatest |alpha| that a measured angle admits up to a range, rad; a right angle where there is no such bound.
+
+    Notes
+    -----
+    An error that grows with the distance r = x/cos(alpha) grows with the angle: what is admitted ends at the first s
+    with s = |alpha_m| + a + h(x/cos(s)). Three steps toward it from below, and one more as long as the last, which is
+    past it if s does not become less there.
+    """
+    growth = max(law.error_slope, 0.0) * range_m
+    least = abs(alpha) + law.error_at_zero_range
+    before = angle = least + growth
+    for _ in range(3):
+        if angle >= RIGHT_ANGLE:
+            return RIGHT_ANGLE
+        before, angle = angle, least + growth / math.cos(angle)
+    angle += (angle - before) + ANGLE_SLACK
+    return angle if angle < RIGHT_ANGLE and least + growth / math.cos(angle) <= angle else RIGHT_ANGLE
+
+
 @inlined
 def measure_section(
     origins: Floats, rings: Floats, marks: Integers, n: int, label: float, elapsed: int, alpha: float, law: SectionLaw
@@ -123,8 +145,10 @@ def measure_section(
         # x h(x) is convex then. What is claimed over all labels needs it concave: a chord and a tangent lie above it.
         travelled = label - x
         near, far = max(law.label_least - travelled, 0.0), law.label_greatest - travelled
-        steepest = abs(alpha) + law.error_at_zero_range + law.error_slope * far
-        half = law.error_at_zero_range + law.error_slope * (near + far - near * far / x)
+        steepest = steepest_angle(alpha, far, law)
+        # The error is that of the true distance, x/cos(alpha).
+        longest = (near + far - near * far / x) / math.cos(steepest) if steepest < RIGHT_ANGLE else np.inf
+        half = law.error_at_zero_range + law.error_slope * longest
         half = half / math.cos(steepest) ** 2 if steepest < RIGHT_ANGLE else np.inf
         lower, upper = math.tan(alpha) - half, math.tan(alpha) + half
     elif law.exact_angles:
@@ -164,6 +188,8 @@ def measure_rate_section(
         lower *= widest if lower < 0.0 else 1.0
         upper *= widest if upper > 0.0 else 1.0
     slack = CUT_SLACK * (label * (abs(omega) + error) + origins[n, RIGHT, REACH]) * (label / law.closing_speed)
+    # The next step's half of the disturbance is in the section already, and it does not commute with this band.
+    slack += tau * law.half_v_at_start
     return whole_chains.cut_misses(
         origins, rings, marks, n, tau, tau * x * lower - slack, tau * x * upper + slack, points
     )
@@ -212,7 +238,7 @@ def summarise_section(
 ) -> None:
     """Write the extremes of the predicted miss (13), (14) of a section: those of z + V x/e -+ nu/2 (x/e)^2."""
     tau = time_to_go(label, elapsed, law)
-    upper, lower = chain_steps.greatest_and_least_miss(origins, rings, marks, n)
+    upper, lower = chain_steps.greatest_and_least_miss(origins, rings, marks, n, tau)
     drift = 0.5 * law.disturbance * tau * tau
     summaries[b, s, UPPER_MISS] = upper + drift
     summaries[b, s, LOWER_MISS] = lower - drift

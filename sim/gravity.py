@@ -31,7 +31,7 @@ def on_board_model(scenario: Scenario) -> SetModel:
         no labels then.
     """
     model = replace(scenario.set_model, execution_error_relative=scenario.thruster.execution_error_relative)
-    model = with_gravity(model, scenario.sun)
+    model = with_gravity(model, scenario.sun, scenario.thruster.budget_m_s)
     if model.speed_error >= 1.0:
         raise ValueError(
             f"the guaranteed model needs a closing speed known to within itself: bounds.vx_m_s and gravity let it "
@@ -40,7 +40,7 @@ def on_board_model(scenario: Scenario) -> SetModel:
     return model
 
 
-def with_gravity(model: SetModel, sun: Sun | None) -> SetModel:
+def with_gravity(model: SetModel, sun: Sun | None, budget_m_s: float = 0.0) -> SetModel:
     """The same model with the bounds of gravity's doings under a Sun.
 
     Parameters
@@ -48,6 +48,8 @@ def with_gravity(model: SetModel, sun: Sun | None) -> SetModel:
     model : SetModel
     sun : Sun or None
         None is free space.
+    budget_m_s : float
+        Sum of the impulses that the spacecraft can give: they carry it across.
 
     Returns
     -------
@@ -57,21 +59,26 @@ def with_gravity(model: SetModel, sun: Sun | None) -> SetModel:
     Notes
     -----
     To first order the difference of the Sun's attraction at two points r apart is (K/R^3)(3 (n . r) n - r), n the
-    direction of the Sun. Across the line r it is at most 1.5 K/R^3 |r|, where n is 45 degrees off the line; along it at
-    most 2 K/R^3 |r|. The Sun comes nearer by no more than the range and the way flown, and a margin of 5 % stands for
-    what is left out: the second order, the offset across, the change of n. docs/guarantee.md has the derivation.
+    direction of the Sun. Along z it is at most (K/R^3)(1.5 |r| + 0.5 |z|), and at most 2 K/R^3 |r| in any direction.
+    The set sees the truth in units that change as gravity changes V_x: that adds 0.7 |z| and 2 (|r| + |z|) |V_z|/|V_x|.
+    The Sun comes nearer by no more than the range and the way flown, and a margin of 5 % stands for what is left out:
+    the second order, the change of n. docs/guarantee.md has the derivation.
     """
     if sun is None:
         return replace(model, gravity_m_s2=0.0, gravity_speed_change=LEAST_SPEED_CHANGE)
     box = model.bounds
-    greatest_range = float(np.hypot(box.x_m[1], max(abs(z) for z in box.z_m)))
     slowest = -box.vx_m_s[1]
     flight_s = box.x_m[1] / slowest
+    across_m_s = max(abs(v) for v in box.vz_m_s) + budget_m_s + model.disturbance_m_s2 * flight_s
+    across = max(abs(z) for z in box.z_m) + across_m_s * flight_s
+    greatest_range = float(np.hypot(box.x_m[1], across))
     orbital_speed = np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m)
     nearest = sun.distance_m - greatest_range - 0.5 * (orbital_speed * flight_s) ** 2 / sun.distance_m
     gradient = MARGIN * sun.gravitational_parameter_m3_s2 / max(nearest, 0.1 * sun.distance_m) ** 3
     return replace(
         model,
-        gravity_m_s2=float(1.5 * gradient * greatest_range),
+        gravity_m_s2=float(
+            gradient * (1.5 * greatest_range + 1.2 * across + 2.0 * (greatest_range + across) * across_m_s / slowest)
+        ),
         gravity_speed_change=float(max(LEAST_SPEED_CHANGE, 2.0 * gradient * greatest_range * flight_s / slowest)),
     )

@@ -28,11 +28,15 @@ class Sight:
         Line-of-sight angle and rate, equation (12) of the paper.
     range_m : ndarray, shape (B,)
         Distance between the centres of mass.
+    slope, slope_rate_per_s : ndarray, shape (B,)
+        z/x, which is tan(alpha) without the rounding of the angle, and its rate.
     """
 
     alpha_rad: Floats
     omega_rad_s: Floats
     range_m: Floats
+    slope: Floats
+    slope_rate_per_s: Floats
 
 
 @dataclass(frozen=True)
@@ -91,6 +95,7 @@ class KeplerMotion:
         # By coordinate: the relative motion and, below it, the spacecraft's own, shape (2, 2, B).
         self._position = _with_spacecraft(position_m)
         self._velocity = _with_spacecraft(velocity_m_s)
+        self._lost = np.zeros(self._position.shape)
         self._sun = sun
         self._manoeuvre: Floats | None = None
         if sun is not None:
@@ -116,11 +121,13 @@ class KeplerMotion:
     def sight(self) -> Sight:
         """Geometry now."""
         (z, x), (v_z, v_x) = self._position[:, RELATIVE], self._velocity[:, RELATIVE]
-        squared = z * z + x * x
+        squared, slope = z * z + x * x, z / x
         return Sight(
             alpha_rad=np.arctan2(z, x),
             omega_rad_s=(v_z * x - v_x * z) / squared,
             range_m=np.sqrt(squared),
+            slope=slope,
+            slope_rate_per_s=(v_z - v_x * slope) / x,
         )
 
     def fire(self, impulse_m_s: Floats) -> None:
@@ -138,7 +145,7 @@ class KeplerMotion:
         """
         free = KeplerMotion.__new__(KeplerMotion)
         free._sun, free._position, free._velocity = self._sun, self._position, self._velocity
-        free._manoeuvre, free._acceleration = None, self._acceleration
+        free._manoeuvre, free._acceleration, free._lost = None, self._acceleration, self._lost
         duration = self.position_m[:, X] / -self.velocity_m_s[:, X]
         for _ in range(ARRIVAL_LEAPS):
             free._leap(duration / ARRIVAL_LEAPS)
@@ -149,7 +156,8 @@ class KeplerMotion:
         if manoeuvre_m_s2 is not None:
             self._manoeuvre = manoeuvre_m_s2
             self._acceleration = self._gravity()
-        substeps = max(1, int(np.ceil(step_s / LONGEST_SUBSTEP_S * (1.0 - 1e-12))))
+        # In free space the motion over a step is a parabola, which one leap has exactly.
+        substeps = 1 if self._sun is None else max(1, int(np.ceil(step_s / LONGEST_SUBSTEP_S * (1.0 - 1e-12))))
         passed = np.zeros(self._position.shape[-1], dtype=bool)
         least = np.full(passed.shape, np.inf)
         for _ in range(substeps):
@@ -166,7 +174,11 @@ class KeplerMotion:
         """Move on; the arrays are new ones, so that whoever holds the old ones has the motion before."""
         half = 0.5 * duration_s
         at_middle = self._velocity + half * self._acceleration
-        self._position = self._position + duration_s * at_middle
+        # Rounding would add up over the steps; the set allows for that of one: what each sum loses goes into the next.
+        way = duration_s * at_middle + self._lost
+        after = self._position + way
+        self._lost = way - (after - self._position)
+        self._position = after
         self._acceleration = self._gravity()
         self._velocity = at_middle + half * self._acceleration
 

@@ -6,12 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import SetModel
-from infoset.section_law import section_law
+from infoset.section_law import BOUND_SLACK, section_law
 from infoset.section_stack import SectionStack
 from sim.kepler import Sight
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+
+LABEL_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
 
 
 class TruthSection:
@@ -49,15 +51,17 @@ class TruthSection:
         if alpha_rad is not None:
             self._stack.measure_angle(where, alpha_rad, self._elapsed, self._elapsed)
         if omega_rad_s is not None:
-            self._stack.measure_rate(where, omega_rad_s, rate_error_rad_s, self._elapsed, self._elapsed)
+            error = rate_error_rad_s * (1.0 + BOUND_SLACK)
+            self._stack.measure_rate(where, omega_rad_s, error, self._elapsed, self._elapsed)
         slope, rate = sight.alpha_rad, sight.omega_rad_s
         if self._exact_angles:
-            slope = np.tan(slope)
-            rate = rate * (1.0 + slope * slope)
+            slope, rate = sight.slope, sight.slope_rate_per_s
         z = slope * ranges
         v = rate * ranges - self._stack.law.closing_speed * slope
         margin = self._stack.margins(v, z, self._elapsed)
         margin = np.where(self._stack.living[:, 0], margin, self._stack.sections.overlaps[:, 0])
+        # The truth's own label is known to half an ulp, and its z and V as well as that.
+        margin += LABEL_ROUNDING * self._stack.labels[:, 0] * np.abs(slope)
         self.margin_m = np.where(where, margin, self.margin_m)
         self.least_margin_m = np.minimum(self.least_margin_m, self.margin_m)
 

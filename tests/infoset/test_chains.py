@@ -211,7 +211,7 @@ class Section:
         numbers, (origins, rings, marks) = self.numbers(side), self.chains
         ring, known = (int(marks[ROW, side, RING]), int(marks[ROW, side, MASK])), int(marks[ROW, side, PEAK])
         sign, m_origin = (1.0, -1.0)[side], float(origins[ROW, side, M_ORIGIN])
-        marks[ROW, side, PEAK] = chain_steps.find_peak(rings, ring, numbers[0], numbers[-1], known, sign, m_origin)
+        marks[ROW, side, PEAK] = chain_steps.find_peak(rings, ring, numbers[0], numbers[-1], known, sign, abs(m_origin))
         return int(marks[ROW, side, PEAK])
 
     def is_alone(self) -> bool:

@@ -83,7 +83,8 @@ class ModelMotion:
 
     def sight(self) -> Sight:
         alpha = self._z / self._x
-        return Sight(alpha, (self._v + self._e * alpha) / self._x, self._x)
+        omega, slope = (self._v + self._e * alpha) / self._x, np.tan(alpha)
+        return Sight(alpha, omega, self._x, slope, omega * (1.0 + slope * slope))
 
     def fire(self, impulse_m_s: Floats) -> None:
         self._v = self._v - impulse_m_s

@@ -110,7 +110,8 @@ def test_gravity_is_bounded_by_what_the_theory_derives(asteroid: Scenario) -> No
     model = on_board_model(guaranteed(asteroid))
     plain = MARGIN * 1.5 * 1.324948e20 / 150e9**3 * 6301.3e3
     assert plain == pytest.approx(3.9e-7, rel=0.01)
-    assert plain <= model.gravity_m_s2 <= 1.001 * plain
+    # On top of that: the impulses' way across, and units that change as gravity changes V_x.
+    assert 1.01 * plain <= model.gravity_m_s2 <= 1.05 * plain
     assert on_board_model(replace(asteroid, sun=None)).gravity_m_s2 == 0.0
 
 
