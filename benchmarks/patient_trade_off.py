@@ -8,7 +8,6 @@ figures, so that the default may be chosen from what is printed here.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,10 +15,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments import load_scenario
-from experiments.scenario_file import default_initial_set
+from benchmarks.asked_scenario import asked_scenario, title
 from guidance import NoiseKind, Patient, Strategy, SymmetricMiss, TieRule
-from infoset import Model
 from sim import Scenario, simulate
 
 SHARES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -42,31 +39,16 @@ def figures(scenario: Scenario, strategy: Strategy, runs: int, seed: int) -> lis
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the curve."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenario", nargs="?", default="asteroid-1997")
-    parser.add_argument("--model", choices=[each.value for each in Model], default=Model.GUARANTEED.value)
-    parser.add_argument("--no-range-meter", action="store_true")
-    parser.add_argument("--runs", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=100)
-    given = parser.parse_args(arguments)
-
-    scenario = load_scenario(given.scenario)
-    kind = Model(given.model)
-    if kind is not scenario.set_model.kind:
-        set_model = replace(scenario.set_model, kind=kind, initial_set=default_initial_set(kind))
-        scenario = replace(scenario, set_model=set_model)
-    if given.no_range_meter:
-        scenario = replace(scenario, range_sensor=None)
-    meter = "with" if scenario.range_sensor is not None else "without"
+    scenario, runs, seed = asked_scenario(__doc__, arguments, runs=200, seed=100)
     line = sys.stdout.write
-    line(f"{scenario.name}, {meter} range meter, model {kind.value}, {given.runs} runs, seed {given.seed}\n")
+    line(f"{title(scenario)}, {runs} runs, seed {seed}\n")
     line(f"{'':15}{'random noise':^48}{'game noise, worst tie rule':^48}\n")
     line(f"{'share':15}" + 2 * f"{'miss, m':^24}{'impulse, m/s':^24}" + "\n")
     line(f"{'':15}" + 4 * f"{'50 %':>7}{'90 %':>7}{'worst':>7}   " + "\n")
     strategies: list[tuple[str, Strategy]] = [("symmetric-miss", SymmetricMiss())]
     strategies += [(f"{share:g}", Patient(share)) for share in SHARES]
     for name, strategy in strategies:
-        found = figures(scenario, strategy, given.runs, given.seed)
+        found = figures(scenario, strategy, runs, seed)
         cells = [f"{value:7.1f}" + ("   " if index % 3 == 2 else "") for index, value in enumerate(found)]
         line(f"{name:15}{''.join(cells)}\n")
         sys.stdout.flush()

@@ -9,19 +9,15 @@ measures without error.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments import load_scenario
-from experiments.scenario_file import default_initial_set
+from benchmarks.asked_scenario import asked_scenario, title
 from guidance import make_strategy, strategy_names
 from guidance.scripted_noise import ScriptedNoise
-from infoset import Model
 from sim import Scenario
 from sim.draws import draw
 from sim.engagement import Engagements
@@ -50,28 +46,13 @@ def worst(scenario: Scenario, name: str, runs: int, seed: int) -> tuple[NDArray[
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print a row a strategy."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenario", nargs="?", default="asteroid-1997")
-    parser.add_argument("--model", choices=[each.value for each in Model], default=Model.GUARANTEED.value)
-    parser.add_argument("--no-range-meter", action="store_true")
-    parser.add_argument("--runs", type=int, default=50)
-    parser.add_argument("--seed", type=int, default=0)
-    given = parser.parse_args(arguments)
-
-    scenario = load_scenario(given.scenario)
-    kind = Model(given.model)
-    if kind is not scenario.set_model.kind:
-        set_model = replace(scenario.set_model, kind=kind, initial_set=default_initial_set(kind))
-        scenario = replace(scenario, set_model=set_model)
-    if given.no_range_meter:
-        scenario = replace(scenario, range_sensor=None)
-    meter = "with" if scenario.range_sensor is not None else "without"
-    sys.stdout.write(f"{scenario.name}, {meter} range meter, model {kind.value}, {given.runs} starts, ")
-    sys.stdout.write(f"seed {given.seed}: the worst of {2 * len(HALF_PERIODS)} square waves\n")
+    scenario, runs, seed = asked_scenario(__doc__, arguments, runs=50, seed=0)
+    sys.stdout.write(f"{title(scenario)}, {runs} starts, ")
+    sys.stdout.write(f"seed {seed}: the worst of {2 * len(HALF_PERIODS)} square waves\n")
     sys.stdout.write(f"{'':18}{'miss, m':^20}{'impulse, m/s':^20}\n")
     sys.stdout.write(f"{'strategy':18}{'median':>10}{'worst':>10}{'median':>10}{'worst':>10}\n")
     for name in strategy_names():
-        miss, impulse = worst(scenario, name, given.runs, given.seed)
+        miss, impulse = worst(scenario, name, runs, seed)
         values = (np.median(miss), miss.max(), np.median(impulse), impulse.max())
         sys.stdout.write(f"{name:18}{''.join(f'{value:10.1f}' for value in values)}\n")
         sys.stdout.flush()

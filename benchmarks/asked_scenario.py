@@ -1,0 +1,39 @@
+"""The options that the tables of strategies share: which scenario, how many runs of it."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+
+from experiments import load_scenario
+from experiments.scenario_file import default_initial_set
+from infoset import Model
+from sim import Scenario
+
+
+def asked_scenario(
+    description: str | None, arguments: Sequence[str] | None, *, runs: int, seed: int
+) -> tuple[Scenario, int, int]:
+    """Return the scenario that a command line asks for, how many runs, and their seed."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenario", nargs="?", default="asteroid-1997")
+    parser.add_argument("--model", choices=[each.value for each in Model], default=Model.GUARANTEED.value)
+    parser.add_argument("--no-range-meter", action="store_true")
+    parser.add_argument("--runs", type=int, default=runs)
+    parser.add_argument("--seed", type=int, default=seed)
+    given = parser.parse_args(arguments)
+    scenario = load_scenario(given.scenario)
+    kind = Model(given.model)
+    if kind is not scenario.set_model.kind:
+        set_model = replace(scenario.set_model, kind=kind, initial_set=default_initial_set(kind))
+        scenario = replace(scenario, set_model=set_model)
+    if given.no_range_meter:
+        scenario = replace(scenario, range_sensor=None)
+    return scenario, given.runs, given.seed
+
+
+def title(scenario: Scenario) -> str:
+    """Say in a line which scenario is flown."""
+    meter = "with" if scenario.range_sensor is not None else "without"
+    return f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}"
