@@ -28,6 +28,7 @@ class Flight:
     margin_m: Floats
     results: Results
     ended: bool
+    steps_before_a_new_grid: int
 
     @property
     def seen(self) -> tuple[Floats, Floats, Floats]:
@@ -106,8 +107,15 @@ def numbers(scenario: Scenario, seed: int, batch: int = 3) -> Draws:
 def fly(scenario: Scenario, draws: Draws, strategy: Strategy | None = None, steps: int | None = None) -> Flight:
     flight = Engagements(scenario, draws, strategy)
     seen: list[Step] = []
+    labels: list[Floats] = []
+
+    def look(step: Step) -> None:
+        seen.append(step)
+        labels.append(step.information.labels_m.copy())
+
     while flight.flying and (steps is None or flight.step < steps):
-        flight.advance(seen.append)
+        flight.advance(look)
+    first_new = next((i for i, here in enumerate(labels) if not np.array_equal(here, labels[0])), len(labels))
     return Flight(
         np.array([step.predicted_miss.lower_m for step in seen]),
         np.array([step.predicted_miss.upper_m for step in seen]),
@@ -115,6 +123,7 @@ def fly(scenario: Scenario, draws: Draws, strategy: Strategy | None = None, step
         np.array([step.truth_margin_m for step in seen]),
         flight.results(np.arange(len(draws.position_m))),
         not flight.flying,
+        first_new,
     )
 
 
