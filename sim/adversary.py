@@ -7,24 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from guidance import GameNoise, LineOfSight, Measurement, Strategy, TieRule, make_strategy
-from guidance.scripted_noise import ScriptedNoise, errors_made, measure_with_errors
-from guidance.switching_noise import SwitchingNoise
-from infoset import InformationSetView, StateBox
+from guidance import Strategy, TieRule, make_strategy
+from guidance.scripted_noise import ScriptedNoise
+from infoset import StateBox
 from sim.draws import corners, draw
 from sim.engagement import Engagements
+from sim.planned_flights import ANGLE, RANGE, RATE, Floats, Flown, PlannedNoise, Plans
 from sim.record import Record, fly_one
 from sim.results import Outcome
 from sim.scenario import Scenario
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Counts = NDArray[np.int64]
 
 CHUNK = 50
 """Engagements flown together."""
@@ -44,7 +39,6 @@ LATE_STEPS = 12.0
 """Mean distance from the end, in steps, of those changes that prefer the end."""
 
 UPPER, LOWER = 1.0, -1.0
-ANGLE, RANGE, RATE = range(3)
 
 
 class NothingCountsError(ValueError):
@@ -113,80 +107,6 @@ class WorstEngagement:
             None is the scenario's own. Another one than that of the search has another miss.
         """
         return fly_one(self.scenario, seed=self.seed, strategy=strategy, noise=self.noise())
-
-
-@dataclass(frozen=True)
-class _Plans:
-    """What nature intends in each of n engagements.
-
-    In a step that is `given`, the errors of angle, range and rate are the elements of the sequence, in units of the
-    bounds. Elsewhere the upper extreme of the predicted miss is kept where the element of the angle is not negative,
-    the lower one where it is.
-    """
-
-    start: Floats  # (n, 4): z, x, V_z, V_x
-    sequence: Floats  # (n, 3, steps)
-    given: Flags  # (n, steps)
-    lineage: Counts  # (n,)
-    changes: Counts  # (n,)
-
-    def __len__(self) -> int:
-        return len(self.start)
-
-    def take(self, which: Counts | slice) -> _Plans:
-        """Copies of some of them."""
-        return _Plans(*(getattr(self, each.name)[which].copy() for each in fields(self)))
-
-    def join(self, other: _Plans) -> _Plans:
-        """These and others."""
-        return _Plans(*(np.concatenate([getattr(each, of.name) for each in (self, other)]) for of in fields(self)))
-
-
-@dataclass
-class _PlannedNoise:
-    """Measures as planned, and notes the errors made: what is measured is what the noted error gives."""
-
-    plans: _Plans
-    tie: TieRule | None
-    errors: Floats = field(init=False)  # (n, 3, steps)
-
-    def __post_init__(self) -> None:
-        sequence = self.plans.sequence
-        self.errors = np.zeros_like(sequence)
-        tie = TieRule.RANDOM if self.tie is None else self.tie
-        self._keeping = (SwitchingNoise if self.tie is None else GameNoise)(tie, sequence[:, ANGLE])
-
-    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
-        step = sight.step
-        kept = np.stack(errors_made(sight, self._keeping.measure(sight, predicted)), axis=1)
-        errors = np.where(self.plans.given[:, None, step], self.plans.sequence[:, :, step], kept)
-        # What is not measured in this step has no error, whatever was planned.
-        if sight.range_error is None:
-            errors[:, RANGE] = 0.0
-        if sight.rate_error_rad_s is None:
-            errors[:, RATE] = 0.0
-        self.errors[:, :, step] = errors
-        return measure_with_errors(sight, errors[:, ANGLE], errors[:, RANGE], errors[:, RATE])
-
-
-@dataclass(frozen=True)
-class _Flown:
-    """Plans with what came of them."""
-
-    plans: _Plans
-    value: Floats  # (n,): the miss, or -inf where the engagement does not count
-    errors: Floats  # (n, 3, steps)
-    outcomes: NDArray[np.object_]
-    truth_kept: Flags
-
-    def take(self, which: Counts | slice) -> _Flown:
-        """Some of them."""
-        return _Flown(self.plans.take(which), *(getattr(self, each.name)[which] for each in fields(self)[1:]))
-
-    def join(self, other: _Flown) -> _Flown:
-        """These and others."""
-        both = (np.concatenate([getattr(each, of.name) for each in (self, other)]) for of in fields(self)[1:])
-        return _Flown(self.plans.join(other.plans), *both)
 
 
 def find_worst(
@@ -273,7 +193,7 @@ class _Search:
         self._draws = draw(self.scenario, [0], seed)
         self._steps: int = self._draws.angle.shape[1]
         self._constructions: list[str] = []
-        self._elite: _Flown | None = None
+        self._elite: Flown | None = None
 
     def run(self, budget: int, pool: ThreadPoolExecutor, progress: Callable[[float], None] | None) -> None:
         flights = self._first_plans(max(1, round(FIRST_SHARE * budget)))
@@ -309,7 +229,7 @@ class _Search:
             history=tuple(self.history),
         )
 
-    def _fly(self, plans: _Plans, tie: TieRule | None) -> _Flown:
+    def _fly(self, plans: Plans, tie: TieRule | None) -> Flown:
         size = len(plans)
         alike = {
             each.name: np.repeat(value, size, axis=0)
@@ -318,7 +238,7 @@ class _Search:
         }
         alike |= {"position_m": plans.start[:, :2].copy(), "velocity_m_s": plans.start[:, 2:].copy()}
         draws = replace(self._draws, **alike)
-        noise = _PlannedNoise(plans, tie)
+        noise = PlannedNoise(plans, tie)
         flight = Engagements(self.scenario, draws, self._strategy, noise=noise, guarantee=False)
         while flight.flying:
             flight.advance()
@@ -330,9 +250,9 @@ class _Search:
         if tie is not None:  # what the game did, as a plan
             plans.sequence[:], plans.given[:] = noise.errors, True
         value = np.where(counts, results.miss_m, -np.inf)
-        return _Flown(plans, value, noise.errors, outcomes, results.truth_kept)
+        return Flown(plans, value, noise.errors, outcomes, results.truth_kept)
 
-    def _select(self, flown: _Flown, young: bool) -> None:
+    def _select(self, flown: Flown, young: bool) -> None:
         """Note what has been flown, and keep the worst."""
         self.evaluations += len(flown.value)
         rivals = flown if self._elite is None else self._elite.join(flown)
@@ -353,7 +273,7 @@ class _Search:
         if np.isfinite(greatest) and (not self.history or greatest > self.history[-1][1]):
             self.history.append((self.evaluations, greatest))
 
-    def _first_plans(self, count: int) -> list[tuple[_Plans, TieRule | None]]:
+    def _first_plans(self, count: int) -> list[tuple[Plans, TieRule | None]]:
         """First plans, `count` in all, of every construction as many."""
         makers: list[tuple[str, TieRule | None, Callable[[int, Floats], tuple[Floats, bool]]]] = [
             *((f"game noise, tie {tie.value}", tie, self._coins) for tie in TieRule),
@@ -364,7 +284,7 @@ class _Search:
             ("middle of a pair", None, self._pair),
         ]
         shares = [len(part) for part in np.array_split(np.arange(count), len(makers))]
-        plans: list[tuple[_Plans, TieRule | None]] = []
+        plans: list[tuple[Plans, TieRule | None]] = []
         for (name, tie, maker), share in zip(makers, shares, strict=True):
             if share == 0:
                 continue
@@ -375,7 +295,7 @@ class _Search:
             lineage = len(self._constructions) + np.arange(share)
             self._constructions += [name] * share
             none = np.zeros(share, dtype=np.int64)
-            plans += _in_chunks(_Plans(start, sequence, np.full(angle.shape, given), lineage, none), tie)
+            plans += _in_chunks(Plans(start, sequence, np.full(angle.shape, given), lineage, none), tie)
         return plans
 
     def _starts(self, count: int) -> Floats:
@@ -415,7 +335,7 @@ class _Search:
         errors = np.divide(half, bound, out=np.zeros_like(half), where=bound > 0.0)
         return np.where(np.arange(self._steps) <= apart_at, np.clip(errors, -1.0, 1.0), 0.0), True
 
-    def _children(self, count: int) -> _Plans:
+    def _children(self, count: int) -> Plans:
         """Plans changed from the elite; the worse a plan, the more often."""
         elite = self._elite
         if elite is None:
@@ -429,30 +349,30 @@ class _Search:
         plans.changes[:] += 1
         return plans
 
-    def _last_step(self, plans: _Plans, i: int) -> int:
+    def _last_step(self, plans: Plans, i: int) -> int:
         """The last step before the closest approach of a start, with a step to spare."""
         x, vx = float(plans.start[i, 1]), float(plans.start[i, 3])
         return min(self._steps - 1, int(x / (-vx * self.scenario.set_model.step_s)) + 1)
 
-    def _step(self, plans: _Plans, i: int) -> int:
+    def _step(self, plans: Plans, i: int) -> int:
         """A step at random: anywhere or, as often, late."""
         last = self._last_step(plans, i)
         if self._random.random() < 0.5:
             return int(self._random.integers(last + 1))
         return max(0, last - int(self._random.exponential(LATE_STEPS)))
 
-    def _span(self, plans: _Plans, i: int) -> slice:
+    def _span(self, plans: Plans, i: int) -> slice:
         """A block of steps at random, short more often than long."""
         begin = self._step(plans, i)
         return slice(begin, begin + 1 + int(10.0 ** self._random.uniform(0.0, 2.0)))
 
-    def _flip_step(self, plans: _Plans, i: int) -> None:
+    def _flip_step(self, plans: Plans, i: int) -> None:
         plans.sequence[i, ANGLE, self._step(plans, i)] *= -1.0
 
-    def _flip_block(self, plans: _Plans, i: int) -> None:
+    def _flip_block(self, plans: Plans, i: int) -> None:
         plans.sequence[i, ANGLE, self._span(plans, i)] *= -1.0
 
-    def _move_switch(self, plans: _Plans, i: int) -> None:
+    def _move_switch(self, plans: Plans, i: int) -> None:
         """Move one switching time by a few steps."""
         signs = np.sign(plans.sequence[i, ANGLE, : self._last_step(plans, i) + 1])
         switches = np.flatnonzero(np.diff(signs))
@@ -463,13 +383,13 @@ class _Search:
             else:
                 plans.sequence[i, ANGLE, max(0, at + 1 - by) : at + 1] *= -1.0
 
-    def _roll(self, plans: _Plans, i: int) -> None:
+    def _roll(self, plans: Plans, i: int) -> None:
         """Move the whole plan by a few steps."""
         by = int(self._random.choice([-3, -2, -1, 1, 2, 3]))
         plans.sequence[i] = np.roll(plans.sequence[i], by, axis=-1)
         plans.given[i] = np.roll(plans.given[i], by)
 
-    def _give_block(self, plans: _Plans, i: int) -> None:
+    def _give_block(self, plans: Plans, i: int) -> None:
         """Give the errors of a block, or leave it to the extremes."""
         span = self._span(plans, i)
         if plans.given[i, span].all():
@@ -479,14 +399,14 @@ class _Search:
             anything = self._random.uniform(-1.0, 1.0)
             plans.sequence[i, :, span] = self._random.choice([-1.0, 0.0, 1.0, anything], (3, 1))
 
-    def _move_error(self, plans: _Plans, i: int) -> None:
+    def _move_error(self, plans: Plans, i: int) -> None:
         """Change the size of the given errors of a block."""
         span = self._span(plans, i)
         moved = plans.sequence[i, :, span] + 10.0 ** self._random.uniform(-2.0, 0.0) * self._random.normal(size=(3, 1))
         given = plans.given[i, span]
         plans.sequence[i, :, span] = np.where(given, np.clip(moved, -1.0, 1.0), plans.sequence[i, :, span])
 
-    def _cross(self, plans: _Plans, i: int) -> None:
+    def _cross(self, plans: Plans, i: int) -> None:
         """Take the end of the plan from another of the elite."""
         elite = self._elite
         if elite is not None:
@@ -494,7 +414,7 @@ class _Search:
             plans.sequence[i, :, begin:] = elite.plans.sequence[other, :, begin:]
             plans.given[i, begin:] = elite.plans.given[other, begin:]
 
-    def _move_start(self, plans: _Plans, i: int) -> None:
+    def _move_start(self, plans: Plans, i: int) -> None:
         """Move the start by little or much, in one coordinate or in all, or one coordinate to an end."""
         which = self._random.random(4) < self._random.choice([0.25, 1.0])
         width = self._upper - self._lower
@@ -517,7 +437,7 @@ class _Search:
     )
 
 
-def _in_chunks(plans: _Plans, tie: TieRule | None) -> list[tuple[_Plans, TieRule | None]]:
+def _in_chunks(plans: Plans, tie: TieRule | None) -> list[tuple[Plans, TieRule | None]]:
     """Plans in parts as even as can be, none larger than a chunk."""
     parts = np.array_split(np.arange(len(plans)), -(-len(plans) // CHUNK))
     return [(plans.take(part), tie) for part in parts]
