@@ -61,7 +61,7 @@ class PlannedNoise:
     ----------
     plans : Plans
     tie : TieRule or None
-        How equals are told apart where an extreme is kept; None is the sequence's sign alone.
+        How equals are told apart where an extreme is kept; None lets every step choose its side (`SwitchingNoise`).
 
     Attributes
     ----------
