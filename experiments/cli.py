@@ -140,6 +140,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except KeyboardInterrupt:  # before a command had begun
         _complain("interrupted")
         sys.exit(INTERRUPTED)
+    except MemoryError:
+        _complain("error: there is not enough memory to begin with; give it more")
+        sys.exit(INPUT_ERROR)
 
 
 def _complain(message: str) -> None:

@@ -206,6 +206,10 @@ def campaign_errors(resume_hint: str = "") -> Iterator[None]:
             f"what flies the chunks has gone, a cluster, its scheduler or a process{said}{resume_hint}"
         ) from None
     except Exception as error:
+        if "can't start new thread" in str(error):
+            raise InputError(
+                f"there is no memory for another thread; give it more, or --workers 1{resume_hint}"
+            ) from None
         # What a cluster raises is known only where Dask is installed.
         if not type(error).__module__.startswith(("distributed.", "dask.")):
             raise
