@@ -13,8 +13,9 @@ count the last seconds (`patient`, `kalman`, `least-squares`) have a time of the
 that of `patient` cannot be. `kalman` with a range meter weighs by the logarithm of a length: the last digit moves.
 
 Other factors round differently, so what rounding decides is left out there: U_s where two sections tie, and all after a
-grid of labels is made anew, for it has sections that are points. Errors that are exactly at their bounds leave sets as thin as rounding, whose ends
-rounding decides; so there the errors keep one part in a hundred off their bounds, and are not the game's.
+grid of labels is made anew, for it has sections that are points. Errors that are exactly at their bounds leave sets as
+thin as rounding, whose ends rounding decides: there the errors keep one part in a hundred off their bounds, and are
+not the game's.
 """
 
 from __future__ import annotations
