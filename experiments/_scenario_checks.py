@@ -98,12 +98,13 @@ def _ranges(known: Known) -> Iterator[Problem]:
         )
         return
     leaps = steps * max(Decimal(1), step / Decimal(LONGEST_SUBSTEP_S))
-    if leaps > MOST_LEAPS:
+    # In free space a step is one stretch, however long.
+    if leaps > MOST_LEAPS and known.value("sun") is not None:
         yield Problem(
             ("guidance", "step_s"),
             f"makes {steps:.3g} steps of {shown(step)} s, and the truth is integrated in stretches of at most "
             f"{LONGEST_SUBSTEP_S:g} s: {leaps:.3g} of them, and {MOST_LEAPS:,} are allowed, some minutes of computing",
-            "start nearer, or approach faster",
+            "start nearer, approach faster, or leave the table [sun] out",
         )
 
 
