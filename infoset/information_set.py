@@ -219,9 +219,10 @@ class InformationSet(InformationSetView):
         if self._phi is not None:
             leaving_below = np.minimum(self._upper_label, least_label)
             self._phi.leave(active, self._lower_label, leaving_below, self._stack, self._history)
+        if self.model.is_guaranteed:
+            # A label may have left though none that is stored has; what is flown must not depend on whether Phi is kept.
+            self._some_left |= active & (self._lower_label < least_label)
         np.maximum(self._lower_label, least_label, out=self._lower_label, where=active)
-        if self._phi is not None:
-            self._some_left |= self._phi.exists
         if self._stack.least_label >= least_label:
             return np.zeros(self._stack.labels.shape, dtype=bool)
         left, removed = self._stack.keep_labels(self._lower_label, self._upper_label, active)
