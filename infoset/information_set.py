@@ -220,7 +220,7 @@ class InformationSet(InformationSetView):
             leaving_below = np.minimum(self._upper_label, least_label)
             self._phi.leave(active, self._lower_label, leaving_below, self._stack, self._history)
         if self.model.is_guaranteed:
-            # A label may have left though none that is stored has. What is flown does not depend on whether Phi is kept.
+            # A label may have left though none that is stored has; whether Phi is kept must not change what is flown.
             self._some_left |= active & (self._lower_label < least_label)
         np.maximum(self._lower_label, least_label, out=self._lower_label, where=active)
         if self._stack.least_label >= least_label:
