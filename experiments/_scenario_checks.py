@@ -7,9 +7,10 @@ from decimal import Decimal
 
 from experiments.toml_file import Known, Problem
 from experiments.toml_values import KILO, DecimalPair, shown, si
+from guidance import Thruster
 from infoset import AngleSensor, Model, SetModel, StateBox
 from sim.draws import MOST_STEPS
-from sim.gravity import with_gravity
+from sim.gravity import greatest_impulses_m_s, with_gravity
 from sim.kepler import LONGEST_SUBSTEP_S
 from sim.scenario import Sun
 
@@ -174,12 +175,13 @@ def _closing_speeds(known: Known) -> Iterator[Problem]:
     e = si(speed, KILO)
     # Of the sensor nothing is asked here.
     sensor = AngleSensor(si(step), 1.0, 1.0, si(nominal_range, KILO))
-    plain = SetModel(e, si(step), StateBox(z, x, vz, vx), sensor, kind=Model.GUARANTEED)
+    disturbance = si(known.number("information_set", "disturbance_m_s2") or Decimal(0))
+    plain = SetModel(e, si(step), StateBox(z, x, vz, vx), sensor, disturbance, kind=Model.GUARANTEED)
     parameter, distance = known.number("sun", "gravitational_parameter_km3_s2"), known.number("sun", "distance_km")
     sun = None
     if parameter is not None and distance is not None:
         sun = Sun(si(parameter, 3 * KILO), si(distance, KILO), 0.0)
-    least, change = (with_gravity(plain, body).gravity_speed_change for body in (None, sun))
+    least, change = (with_gravity(plain, body, 0.0).gravity_speed_change for body in (None, sun))
     if plain.speed_error + least >= 1.0:
         yield Problem(
             ("uncertainty", "vx_km_s"),
@@ -194,4 +196,25 @@ def _closing_speeds(known: Known) -> Iterator[Problem]:
             f"beside uncertainty.vx_km_s the guaranteed model has room for {1.0 - plain.speed_error:.3g}, "
             f"found {shown(known.number('sun', 'distance_km'))}",
             "start nearer or approach faster, move the Sun away, or leave the table [sun] out",
+        )
+    else:
+        yield from _impulses_across(known, plain, sun)
+
+
+def _impulses_across(known: Known, plain: SetModel, sun: Sun | None) -> Iterator[Problem]:
+    """Impulses may lead so far across that gravity does there what the guaranteed model has no room for."""
+    budget, greatest, execution = (
+        known.number("thruster", key) for key in ("budget_m_s", "greatest_impulse_m_s", "execution_error_relative")
+    )
+    if budget is None or greatest is None:
+        return
+    thruster = Thruster(si(budget), 0.0, si(greatest), si(execution or Decimal(0)))
+    change = with_gravity(plain, sun, greatest_impulses_m_s(plain, thruster)).gravity_speed_change
+    if plain.speed_error + change >= 1.0:
+        yield Problem(
+            ("thruster", "budget_m_s"),
+            f"lets the spacecraft go so far across that gravity may change the closing speed by {change:.3g} of "
+            f"itself: the guaranteed model has room for {1.0 - plain.speed_error:.3g}, found {shown(budget)} in "
+            f"impulses of up to {shown(greatest)}",
+            "write the budget or the greatest impulse that the engine has, or leave the table [sun] out",
         )

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from guidance import Thruster
 from infoset import SetModel
 from sim.scenario import Scenario, Sun
 
@@ -31,16 +32,34 @@ def on_board_model(scenario: Scenario) -> SetModel:
         no labels then.
     """
     model = replace(scenario.set_model, execution_error_relative=scenario.thruster.execution_error_relative)
-    model = with_gravity(model, scenario.sun, scenario.thruster.budget_m_s)
+    model = with_gravity(model, scenario.sun, greatest_impulses_m_s(model, scenario.thruster))
     if model.speed_error >= 1.0:
         raise ValueError(
-            f"the guaranteed model needs a closing speed known to within itself: bounds.vx_m_s and gravity let it "
-            f"differ by {model.speed_error:.3g} of the nominal {model.closing_speed_m_s:g} m/s"
+            f"the guaranteed model needs a closing speed known to within itself: bounds.vx_m_s, gravity and how far "
+            f"impulses lead across let it differ by {model.speed_error:.3g} of the nominal "
+            f"{model.closing_speed_m_s:g} m/s"
         )
     return model
 
 
-def with_gravity(model: SetModel, sun: Sun | None, budget_m_s: float = 0.0) -> SetModel:
+def greatest_impulses_m_s(model: SetModel, thruster: Thruster) -> float:
+    """Greatest sum of the impulses of a flight, m/s: the budget, or as many as there are steps.
+
+    Parameters
+    ----------
+    model : SetModel
+    thruster : Thruster
+
+    Returns
+    -------
+    float
+    """
+    steps = model.bounds.x_m[1] / (-model.bounds.vx_m_s[1] * model.step_s) + 1.0
+    most = min(thruster.budget_m_s, thruster.greatest_impulse_m_s * steps)
+    return most * (1.0 + thruster.execution_error_relative)
+
+
+def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetModel:
     """The same model with the bounds of gravity's doings under a Sun.
 
     Parameters
@@ -48,8 +67,8 @@ def with_gravity(model: SetModel, sun: Sun | None, budget_m_s: float = 0.0) -> S
     model : SetModel
     sun : Sun or None
         None is free space.
-    budget_m_s : float
-        Sum of the impulses that the spacecraft can give: they carry it across.
+    impulses_m_s : float
+        Greatest sum of the impulses: they carry the spacecraft across.
 
     Returns
     -------
@@ -69,7 +88,7 @@ def with_gravity(model: SetModel, sun: Sun | None, budget_m_s: float = 0.0) -> S
     box = model.bounds
     slowest = -box.vx_m_s[1]
     flight_s = box.x_m[1] / slowest
-    across_m_s = max(abs(v) for v in box.vz_m_s) + budget_m_s + model.disturbance_m_s2 * flight_s
+    across_m_s = max(abs(v) for v in box.vz_m_s) + impulses_m_s + model.disturbance_m_s2 * flight_s
     across = max(abs(z) for z in box.z_m) + across_m_s * flight_s
     greatest_range = float(np.hypot(box.x_m[1], across))
     orbital_speed = np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m)

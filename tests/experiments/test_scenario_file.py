@@ -3,6 +3,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -29,6 +30,7 @@ from guidance.noise import NoiseKind, TieRule
 from guidance.thruster import Thruster
 from infoset.model import InitialSet, Model, SetModel, StateBox
 from infoset.sensors import AngleSensor, RangeSensor
+from sim.gravity import on_board_model
 from sim.scenario import Scenario, Sun
 
 BUILT_IN = ("asteroid-1997", "asteroid-1997-single", "comet-fast")
@@ -483,6 +485,16 @@ def test_closing_speeds_that_have_no_labels() -> None:
 def test_gravity_that_leaves_no_labels() -> None:
     text = GUARANTEED.replace("150.0e6", "6400.0")
     assert_one_problem(text, "sun.distance_km", "change the closing speed by", "move the Sun away")
+    assert read_scenario(text.replace('"guaranteed"', '"paper"'), "mine.toml")
+
+
+def test_impulses_that_lead_to_where_gravity_leaves_no_labels() -> None:
+    """A budget without end is spent in impulses that the engine can give."""
+    endless = GUARANTEED.replace("budget_m_s = 1000.0", "budget_m_s = 1e12")
+    assert endless != GUARANTEED
+    assert on_board_model(read_scenario(endless, "mine.toml")).speed_error < 0.02
+    text = re.sub(r"greatest_impulse_m_s = \S+", "greatest_impulse_m_s = 1e12", endless)
+    assert_one_problem(text, "thruster.budget_m_s", "go so far across", "that the engine has")
     assert read_scenario(text.replace('"guaranteed"', '"paper"'), "mine.toml")
 
 
