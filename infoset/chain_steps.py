@@ -27,10 +27,13 @@ from infoset.chains import (
     end_of,
     origin_height,
     place,
+    place_in,
     put,
+    read,
     rise,
     sign_of,
     vertex,
+    write,
 )
 
 
@@ -100,7 +103,7 @@ def hand_over(
     taker: tuple[int, int],
     front: int,
     between: tuple[float, float, float],
-    same: float,
+    same: tuple[float, float],
     tau: float,
 ) -> tuple[int, int]:
     """Give the last vertices of a chain, past its highest now, to the front of the other chain.
@@ -118,8 +121,8 @@ def hand_over(
         Ring and mask of the other chain, and its first vertex.
     between : tuple of float
         V, m and height of the giver's origin, from the taker's.
-    same : float
-        Differences of V that are rounding.
+    same : tuple of float
+        Differences of V, and of height, that are rounding.
     tau : float
         Time to go.
 
@@ -130,28 +133,26 @@ def hand_over(
     Notes
     -----
     A falling time to go lifts what is on the right: only a vertex with the one before it on its outer side is passed.
-    Where the level has not turned, heights along it are equal to within rounding, and must not pass the others.
+    Where the level has not turned, heights along it are equal to within rounding, and must not pass the others. Where
+    both chains end in one vertex, rounding alone tells them apart: to give it again would be a vertex more at every
+    second step, and a branch that no processor can foretell.
     """
     back = end - 1
-    at = giver[0] + 2 * (back & giver[1])
-    v, m = rings[at], rings[at + 1]
+    v, m = read(rings, place_in(giver, back))
     rise = sign * (m - tau * v)
-    at = taker[0] + 2 * (front & taker[1])
-    front_rise = sign * (rings[at + 1] - tau * rings[at])
+    front_v, front_m = read(rings, place_in(taker, front))
+    front_rise = sign * (front_m - tau * front_v)
     while True:
-        if rise + sign * between[2] > front_rise:
+        if rise + sign * between[2] > front_rise + same[1]:
             front -= 1
-            taken_v, taken_m = v + between[0], m + between[1]
-            at = taker[0] + 2 * (front & taker[1])
-            rings[at] = taken_v
-            rings[at + 1] = taken_m
-            front_rise = sign * (taken_m - tau * taken_v)
+            front_v, front_m = v + between[0], m + between[1]
+            write(rings, place_in(taker, front), front_v, front_m)
+            front_rise = sign * (front_m - tau * front_v)
         if back == first:
             break
-        at = giver[0] + 2 * ((back - 1) & giver[1])
-        before_v, before_m = rings[at], rings[at + 1]
+        before_v, before_m = read(rings, place_in(giver, back - 1))
         before_rise = sign * (before_m - tau * before_v)
-        if before_rise < rise or sign * (v - before_v) > same:
+        if before_rise < rise or sign * (v - before_v) > same[0]:
             break
         back -= 1
         v, m, rise = before_v, before_m, before_rise
@@ -164,7 +165,9 @@ def turn(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float) ->
     right = (marks[n, RIGHT, RING], marks[n, RIGHT, MASK])
     left = (marks[n, LEFT, RING], marks[n, LEFT, MASK])
     right_begin, left_begin = marks[n, RIGHT, BEGIN], marks[n, LEFT, BEGIN]
-    same = 4.0 * EPSILON * origins[n, RIGHT, REACH]
+    same_v = 4.0 * EPSILON * origins[n, RIGHT, REACH]
+    same_m = 2.0 * EPSILON * (abs(origins[n, RIGHT, M_ORIGIN]) + abs(origins[n, LEFT, M_ORIGIN]))
+    same = (same_v, same_m + tau * same_v)
     v_rest = origins[n, RIGHT, V_REST] - origins[n, LEFT, V_REST]
     m_rest = origins[n, RIGHT, M_REST] - origins[n, LEFT, M_REST]
     v = (origins[n, RIGHT, V_ORIGIN] - origins[n, LEFT, V_ORIGIN]) + v_rest
@@ -245,15 +248,13 @@ def cut_end(
     int
         Number of the vertex that is the end now.
     """
-    at = ring[0] + 2 * (end & ring[1])
-    v = rings[at]
-    height = up * (rings[at + 1] - tau * v)
+    v, m = read(rings, place_in(ring, end))
+    height = up * (m - tau * v)
     if height <= level:
         return end
     while end != other_end:
-        at = ring[0] + 2 * ((end + way) & ring[1])
-        inner_v = rings[at]
-        inner_height = up * (rings[at + 1] - tau * inner_v)
+        inner_v, inner_m = read(rings, place_in(ring, end + way))
+        inner_height = up * (inner_m - tau * inner_v)
         if inner_height <= level:
             # From the nearer end of the edge: least rounding.
             if level - inner_height <= height - level:
@@ -263,9 +264,7 @@ def cut_end(
             break
         v, height = inner_v, inner_height
         end += way
-    at = ring[0] + 2 * (end & ring[1])
-    rings[at] = v
-    rings[at + 1] = up * level + tau * v
+    write(rings, place_in(ring, end), v, up * level + tau * v)
     return end
 
 
@@ -307,7 +306,7 @@ def cut(
 @substituted
 def miss_of(rings: Floats, marks: Integers, n: int, side: int, i: int) -> float:
     """Predicted miss of a vertex over that of its chain's origin, counted outward."""
-    return float(sign_of(side) * rings[place(marks, n, side, i) + 1])
+    return float(sign_of(side) * read(rings, place(marks, n, side, i))[1])
 
 
 @inlined
@@ -340,13 +339,13 @@ def find_peak(
     one another, or nearly so, must not stop it.
     """
     peak = min(max(peak, first), last)
-    miss = sign * rings[ring[0] + 2 * (peak & ring[1]) + 1]
+    miss = sign * read(rings, place_in(ring, peak))[1]
     rounding = 16.0 * EPSILON * (abs(miss) + magnitude)
     start_at = peak
     for way in (1, -1):
         i = start_at + way
         while first <= i <= last:
-            here = sign * rings[ring[0] + 2 * (i & ring[1]) + 1]
+            here = sign * read(rings, place_in(ring, i))[1]
             if here > miss:
                 peak, miss = i, here
             elif here < miss - rounding:
@@ -358,8 +357,8 @@ def find_peak(
 @inlined
 def first_near_peak(rings: Floats, ring: tuple[int, int], first: int, peak: int, sign: float, tolerance: float) -> int:
     """First vertex of the edge through the peak along which the predicted miss is the same to within a tolerance."""
-    level = sign * rings[ring[0] + 2 * (peak & ring[1]) + 1] - tolerance
-    while peak > first and sign * rings[ring[0] + 2 * ((peak - 1) & ring[1]) + 1] >= level:
+    level = sign * read(rings, place_in(ring, peak))[1] - tolerance
+    while peak > first and sign * read(rings, place_in(ring, peak - 1))[1] >= level:
         peak -= 1
     return peak
 

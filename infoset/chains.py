@@ -120,9 +120,31 @@ def working_room() -> Floats:
 
 
 @substituted
+def place_in(ring: tuple[int, int], i: int) -> int:
+    """Where a ring, of which the first place and the mask are given, has a vertex."""
+    return ring[0] + 2 * (i & ring[1])
+
+
+@substituted
 def place(marks: Integers, n: int, side: int, i: int) -> int:
     """Where the rings have a vertex of a chain."""
     return int(marks[n, side, RING] + 2 * (i & marks[n, side, MASK]))
+
+
+@inlined
+def read(rings: Floats, at: int) -> tuple[float, float]:
+    """V and m at a place of the rings, from the origin of the chain.
+
+    Places are unsigned: a signed index may count from the end, and to find out takes longer than to read.
+    """
+    return rings[np.uint64(at)], rings[np.uint64(at + 1)]
+
+
+@inlined
+def write(rings: Floats, at: int, v: float, m: float) -> None:
+    """Write V and m at a place of the rings."""
+    rings[np.uint64(at)] = v
+    rings[np.uint64(at + 1)] = m
 
 
 @substituted
@@ -166,9 +188,8 @@ def widen_rings(rings: Floats, marks: Integers, n: int, room: int) -> None:
         first = int(rings[TAKEN])
         rings[TAKEN] = first + floats_of(room)
         for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
-            old, new = place(marks, n, side, i), first + 2 * (i & (room - 1))
-            rings[new] = rings[old]
-            rings[new + 1] = rings[old + 1]
+            v, m = read(rings, place(marks, n, side, i))
+            write(rings, place_in((first, room - 1), i), v, m)
         marks[n, side, RING] = first
         marks[n, side, MASK] = room - 1
 
@@ -196,8 +217,8 @@ def sign_of(side: int) -> float:
 @inlined
 def rise(rings: Floats, marks: Integers, n: int, side: int, i: int, tau: float) -> float:
     """Height of a vertex over the origin of its chain, seen from the chain's own side: it rises along the chain."""
-    at = place(marks, n, side, i)
-    return float(sign_of(side) * (rings[at + 1] - tau * rings[at]))
+    v, m = read(rings, place(marks, n, side, i))
+    return float(sign_of(side) * (m - tau * v))
 
 
 @inlined
@@ -210,27 +231,16 @@ def origin_height(origins: Floats, n: int, side: int, tau: float) -> float:
 @inlined
 def vertex(origins: Floats, rings: Floats, marks: Integers, n: int, side: int, i: int) -> tuple[float, float]:
     """A vertex: V and m."""
-    at = place(marks, n, side, i)
-    v = (rings[at] + origins[n, side, V_REST]) + origins[n, side, V_ORIGIN]
-    m = (rings[at + 1] + origins[n, side, M_REST]) + origins[n, side, M_ORIGIN]
+    v, m = read(rings, place(marks, n, side, i))
+    v = (v + origins[n, side, V_REST]) + origins[n, side, V_ORIGIN]
+    m = (m + origins[n, side, M_REST]) + origins[n, side, M_ORIGIN]
     return v, m
-
-
-@inlined
-def scaled_vertex(
-    origins: Floats, rings: Floats, marks: Integers, n: int, side: int, i: int, tau: float
-) -> tuple[float, float]:
-    """A vertex: V tau and z, both of which are lengths."""
-    v, m = vertex(origins, rings, marks, n, side, i)
-    return tau * v, m - tau * v
 
 
 @substituted
 def put(rings: Floats, marks: Integers, n: int, side: int, i: int, v: float, m: float) -> None:
     """Write a vertex, from the origin of its chain."""
-    at = place(marks, n, side, i)
-    rings[at] = v
-    rings[at + 1] = m
+    write(rings, place(marks, n, side, i), v, m)
 
 
 @allocation_free
@@ -256,5 +266,5 @@ def copy_section(
         for part in (BEGIN, END, PEAK):
             to_marks[to, side, part] = marks[n, side, part]
         for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
-            at = place(marks, n, side, i)
-            put(to_rings, to_marks, to, side, i, rings[at], rings[at + 1])
+            v, m = read(rings, place(marks, n, side, i))
+            put(to_rings, to_marks, to, side, i, v, m)

@@ -24,6 +24,8 @@ Points = NDArray[np.float64]
 # A difference of heights below this, relative to the products it is made of, may be rounding.
 ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
 
+SMALLEST = float(np.finfo(np.float64).tiny)
+
 
 @inlined
 def cross(ax: float, ay: float, bx: float, by: float) -> float:
@@ -333,24 +335,21 @@ def pass_edge(
 
     Notes
     -----
-    Only an edge whose line is nearer than what was found is looked at closely: dividing would be most of the work.
+    Without a branch: which edges are near cannot be foretold, and a wrong guess costs more than a division.
     """
     edge_x, edge_y = end[0] - start[0], end[1] - start[1]
     from_x, from_y = x - start[0], y - start[1]
+    to_x, to_y = x - end[0], y - end[1]
     beside = cross(edge_x, edge_y, from_x, from_y)
     squared_length = edge_x * edge_x + edge_y * edge_y
-    if not beside * beside > nearest * squared_length:
-        along = from_x * edge_x + from_y * edge_y
-        if along <= 0.0:
-            squared = from_x * from_x + from_y * from_y
-        elif along >= squared_length:
-            squared = (x - end[0]) ** 2 + (y - end[1]) ** 2
-        else:
-            squared = beside * beside / squared_length
-        nearest = min(nearest, squared)
-    if (end[1] > y) != (start[1] > y) and (beside > 0.0) == (end[1] > start[1]):
-        inside = not inside
-    return nearest, inside
+    along = from_x * edge_x + from_y * edge_y
+    off_line = beside * beside / max(squared_length, SMALLEST)
+    off_start, off_end = from_x * from_x + from_y * from_y, to_x * to_x + to_y * to_y
+    squared = off_line if along < squared_length else off_end
+    squared = squared if along > 0.0 else off_start
+    rises = end[1] > start[1]
+    inside ^= ((end[1] > y) != (start[1] > y)) & ((beside > 0.0) == rises)
+    return min(nearest, squared), inside
 
 
 @compiled

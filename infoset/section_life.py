@@ -220,7 +220,8 @@ def predict_section(
     tau = time_to_go(label, elapsed, law)
     chain_steps.turn(origins, rings, marks, n, tau + law.disturbance_lead)
     chain_steps.spread(origins, n, tau + law.disturbance_lead, law.half_v + SUM_SLACK * origins[n, RIGHT, REACH])
-    chain_steps.turn(origins, rings, marks, n, tau)
+    if law.disturbance_lead > 0.0:
+        chain_steps.turn(origins, rings, marks, n, tau)
 
 
 @inlined

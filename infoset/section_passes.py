@@ -51,8 +51,8 @@ class Sections(NamedTuple):
     origins, rings, marks : ndarray
         The sections themselves, as `chains` has them: slot s of engagement b is row b S + s.
     summaries : ndarray, shape (B, S, columns)
-    rows : ndarray of int, shape (B S,)
-        Room for a list of sections.
+    rows : ndarray of int, shape (B S, 3)
+        Room for a list of sections: row, engagement and slot. (To divide takes longer than to read.)
     """
 
     labels: Floats
@@ -81,7 +81,7 @@ def room_for_sections(labels: Floats, used: Integers) -> Sections:
         rings=rings,
         marks=marks,
         summaries=np.zeros((*shape, SUMMARY_COLUMNS)),
-        rows=np.empty(labels.size, dtype=np.int64),
+        rows=np.empty((labels.size, 3), dtype=np.int64),
     )
 
 
@@ -105,7 +105,7 @@ def list_rows(some: Flags, others: Flags, everyone: bool, sections: Sections) ->
         if some[b] or others[b] or everyone:
             for s in range(used[b]):
                 if living[b, s]:
-                    rows[count] = b * living.shape[1] + s
+                    rows[count, 0], rows[count, 1], rows[count, 2] = b * living.shape[1] + s, b, s
                     count += 1
     return count
 
@@ -122,10 +122,9 @@ def measure_all(
     labels, _, living, died, overlaps, origins, rings, marks, summaries, rows = sections
     count = list_rows(behind, active, False, sections)
     for k in range(count):
-        n = rows[k]
-        b, s = divmod(n, labels.shape[1])
+        n, b, s = rows[k, 0], rows[k, 1], rows[k, 2]
         if k + 1 < count:
-            chains.expect(rings, marks, rows[k + 1])
+            chains.expect(rings, marks, rows[k + 1, 0])
         if behind[b]:
             predict_section(origins, rings, marks, n, labels[b, s], elapsed, law)
         if not active[b]:
@@ -200,10 +199,9 @@ def catch_up_all(
     labels, _, _, _, _, origins, rings, marks, summaries, rows = sections
     count = list_rows(behind, stale, heights_wanted, sections)
     for k in range(count):
-        n = rows[k]
-        b, s = divmod(n, labels.shape[1])
+        n, b, s = rows[k, 0], rows[k, 1], rows[k, 2]
         if k + 1 < count:
-            chains.expect(rings, marks, rows[k + 1])
+            chains.expect(rings, marks, rows[k + 1, 0])
         if behind[b]:
             predict_section(origins, rings, marks, n, labels[b, s], elapsed, law)
         if stale[b]:
@@ -341,10 +339,15 @@ def margins_all(v: Floats, z: Floats, elapsed: int, sections: Sections, law: Sec
 def margin_in(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, v: float, z: float) -> float:
     """Signed margin of a state (V, z), m: distances are taken with V counted as V x/e, the miss that it is worth."""
     nearest, inside = np.inf, False
-    last = chains.scaled_vertex(origins, rings, marks, n, chains.LEFT, chains.end_of(marks, n, chains.LEFT) - 1, tau)
+    last_v, last_m = chains.vertex(origins, rings, marks, n, chains.LEFT, chains.end_of(marks, n, chains.LEFT) - 1)
+    last = (tau * (last_v - v), (last_m - tau * last_v) - z)
     for side in (chains.RIGHT, chains.LEFT):
+        # What the origin of the chain is from the state is added once to each vertex.
+        from_v = tau * (origins[n, side, chains.V_ORIGIN] - v + origins[n, side, chains.V_REST])
+        from_z = chains.origin_height(origins, n, side, tau) - z
         for i in range(chains.begin_of(marks, n, side), chains.end_of(marks, n, side)):
-            vertex = chains.scaled_vertex(origins, rings, marks, n, side, i, tau)
-            nearest, inside = polygon.pass_edge(nearest, inside, last, vertex, v * tau, z)
+            own_v, own_m = chains.read(rings, chains.place(marks, n, side, i))
+            vertex = (tau * own_v + from_v, (own_m - tau * own_v) + from_z)
+            nearest, inside = polygon.pass_edge(nearest, inside, last, vertex, 0.0, 0.0)
             last = vertex
     return math.sqrt(nearest) if inside else -math.sqrt(nearest)

@@ -22,6 +22,7 @@ from infoset.chains import (
     end_of,
     place,
     put,
+    read,
     sign_of,
     vertex,
 )
@@ -56,8 +57,7 @@ def reduce_outward(origins: Floats, rings: Floats, marks: Integers, n: int, tau:
     side = RIGHT if right > other else LEFT
     count = 0
     for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
-        at = place(marks, n, side, i)
-        v, m = rings[at], rings[at + 1]
+        v, m = read(rings, place(marks, n, side, i))
         count = polygon.append(points, polygon_hull.drop_turned(points, count, 1, v, m), v, m)
     while count > REDUCED - other:
         chosen, v, m = polygon_hull.cheapest_edge(points, count, 1, count - 3)

@@ -773,6 +773,17 @@ def test_two_borders_on_one_edge_are_mirrored_up_to_rounding() -> None:
 # Wear.
 
 
+@pytest.mark.parametrize("lead", [0.0, 0.25])
+def test_a_vertex_that_both_chains_end_in_is_handed_over_once(lead: float) -> None:
+    """A segment adds two vertices to a polygon; both chains hold its highest and its lowest."""
+    section = Section(103.7, (-97.1, 99.3, -10123.7), (-98.9, 101.1, 10017.3))
+    for step in range(1, 61):
+        section.turn(103.7 - 0.5 * step + lead)
+        section.spread(0.00123)
+        section.turn(103.7 - 0.5 * step)
+        assert section.count <= 4 + 2 * step + 2
+
+
 def test_ten_thousand_moves_do_not_wear_a_section() -> None:
     """Origins a thousand times as far out as the section is wide, and back: it is exact to 4 ulp, not to 10 000."""
     rng = np.random.default_rng(3)
