@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import sys
 from collections.abc import Sequence
+from functools import cache
 from typing import Annotated, Any
 
 import typer
@@ -121,6 +122,12 @@ def infoset(
     """Fly interceptions guided by information sets: all states that agree with everything measured and done."""
 
 
+@cache
+def commands() -> Any:
+    """Return all commands as they are run; built once a process, which takes a twentieth of a second."""
+    return typer.main.get_command(app)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command `infoset`, and leave with its exit code.
 
@@ -136,7 +143,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     try:
         keep_kernels_somewhere()
-        app(args=None if arguments is None else list(arguments), prog_name="infoset")
+        commands()(args=None if arguments is None else list(arguments), prog_name="infoset")
     except KeyboardInterrupt:  # before a command had begun
         _complain("interrupted")
         sys.exit(INTERRUPTED)

@@ -1,13 +1,19 @@
-"""How many examples Hypothesis tries: few by default, twenty times as many under the profile `thorough`."""
+"""How many examples Hypothesis tries, few by default and more under the profile `thorough`, and what many tests fly."""
 
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import is_hypothesis_test, settings
+
+if TYPE_CHECKING:
+    from sim import Scenario
 
 OF_THE_CHECKOUT = ["docs", "test_architecture.py", "test_readme.py"]
 """Tests of files that no wheel holds: left out where there are none, so that the others can run against a wheel."""
@@ -15,10 +21,16 @@ IN_A_CHECKOUT = (Path(__file__).parents[1] / "README.md").exists()
 collect_ignore = [] if IN_A_CHECKOUT else OF_THE_CHECKOUT
 
 PROFILE = os.environ.get("INFOSET_HYPOTHESIS_PROFILE", "default")
-TIMES = 20
+TIMES = 32
 
 settings.register_profile("thorough", max_examples=TIMES * settings().max_examples, deadline=None)
 settings.load_profile(PROFILE)
+
+
+def pytest_configure() -> None:
+    """Let tests interrupt what they began: what a script begins in the background, and its children, ignore it."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_report_header() -> str | None:
@@ -37,3 +49,26 @@ def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
         own: settings = test._hypothesis_internal_use_settings
         if own.max_examples != settings().max_examples:
             test._hypothesis_internal_use_settings = settings(own, max_examples=TIMES * own.max_examples)
+
+
+@pytest.fixture(scope="session")
+def brief() -> Scenario:
+    """The last ten seconds of an approach whose range is known, in few sections: for what is no matter of numbers."""
+    from experiments.scenario_file import load_scenario
+    from infoset import StateBox
+
+    published = load_scenario("asteroid-1997")
+    box = StateBox((-100.0, 100.0), (590e3, 600e3), (-10.0, 10.0), (-58e3, -57.5e3))
+    sensor = replace(published.set_model.angle_sensor, nominal_range_m=595e3)
+    model = replace(published.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor)
+    return replace(published, name="brief", set_model=model, dispersion=box, nominal_range_m=595e3)
+
+
+@pytest.fixture(scope="session")
+def brief_file(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The file of that scenario, in no folder that a test looks at."""
+    from experiments.scenario_file import scenario_to_toml
+
+    file = tmp_path_factory.mktemp("scenario") / "brief.toml"
+    file.write_text(scenario_to_toml(brief))
+    return file

@@ -147,7 +147,8 @@ def test_nothing_is_replaced_unless_told(infoset: Infoset, short_file: Path, tmp
     assert code == 2
     assert "--overwrite" in err
     assert precious.read_text() == "precious"
-    assert infoset(short_file, "--strategies", "patient", "--json", precious, "--overwrite", "-q")[0] == 0
+    asked = (short_file, "--strategies", "patient", "--budget", 0)
+    assert infoset(*asked, "--json", precious, "--overwrite", "-q")[0] == 0
     assert json.loads(precious.read_text())["scenario"] == "short"
 
 

@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -20,23 +19,12 @@ from experiments.cli import main
 from experiments.commands._campaign_screen import duration, size
 from experiments.scenario_file import load_scenario, scenario_hash, scenario_to_toml
 from guidance import NoiseKind
-from infoset import StateBox
 from sim import Campaign, CampaignNoise, Scenario, fly_one
 from sim.plan import chunk_size
 from sim.storage import CampaignFolder
 
 Infoset = Callable[..., tuple[int, str, str]]
 FILES = [".lock", "manifest.json", "scenario.toml", "shards", "summary.json"]
-
-
-@pytest.fixture(scope="module")
-def brief() -> Scenario:
-    """The last ten seconds of an approach whose range is known, in few sections."""
-    published = load_scenario("asteroid-1997")
-    box = StateBox((-100.0, 100.0), (590e3, 600e3), (-10.0, 10.0), (-58e3, -57.5e3))
-    sensor = replace(published.set_model.angle_sensor, nominal_range_m=595e3)
-    model = replace(published.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor)
-    return replace(published, name="brief", set_model=model, dispersion=box, nominal_range_m=595e3)
 
 
 @pytest.fixture

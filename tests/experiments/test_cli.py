@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from importlib.metadata import version
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -133,15 +134,15 @@ def test_experiment_as_json(infoset: Command, tmp_path: Path) -> None:
     assert names_in(tmp_path) == []
 
 
-def test_experiment_prints_json_alone_and_the_table_beside_it(infoset: Command) -> None:
-    code, out, err = infoset("experiment", "--runs", 1, "--json", "-")
+def test_experiment_prints_json_alone_and_the_table_beside_it(infoset: Command, brief_file: Path) -> None:
+    code, out, err = infoset("experiment", brief_file, "--runs", 1, "--json", "-")
     assert code == 0
     json.loads(out)
     assert "miss, m" in err
-    assert infoset("experiment", "--runs", 1, "--json", "-", "--quiet")[2] == ""
+    assert infoset("experiment", brief_file, "--runs", 1, "--json", "-", "--quiet")[2] == ""
 
 
-def test_table_of_the_experiment(infoset: Command, tmp_path: Path) -> None:
+def test_table_of_the_experiment(infoset: Command, brief_file: Path, tmp_path: Path) -> None:
     code, out, _ = infoset("experiment", "--runs", 2)
     assert code == 0
     for part in ("10%", "50%", "90%", "99%", "impulse, m/s", "published Phi, no guarantee, m", "  + range meter"):
@@ -150,11 +151,11 @@ def test_table_of_the_experiment(infoset: Command, tmp_path: Path) -> None:
     assert "Phi held" not in out
     assert "paper, one run from z = -8 km, no range meter: random 4.3 m for 244.7 m/s, game 9.5 m for 521.7 m/s" in out
     assert names_in(tmp_path) == []
-    assert "paper" not in infoset("experiment", "comet-fast", "--runs", 1)[1]
+    assert "paper" not in infoset("experiment", brief_file, "--runs", 1)[1]
 
 
-def test_quiet_experiment_prints_nothing(infoset: Command) -> None:
-    assert infoset("experiment", "--runs", 1, "-q") == (0, "", "")
+def test_quiet_experiment_prints_nothing(infoset: Command, brief_file: Path) -> None:
+    assert infoset("experiment", brief_file, "--runs", 1, "-q") == (0, "", "")
 
 
 def test_without_a_range_sensor_there_are_two_curves_and_it_is_said(infoset: Command) -> None:
@@ -200,17 +201,14 @@ def test_experiment_into_a_folder(infoset: Command, tmp_path: Path) -> None:
     assert {row["start_x_m"] for row in rows[0::2]} == {rows[0]["start_x_m"]}
 
 
-@pytest.mark.parametrize(
-    ("noise", "meter", "curve"),
-    [("random", False, 1), ("random", True, 2), ("game", False, 3), ("game", True, 4)],
-)
-def test_a_run_of_the_experiment_is_the_same_engagement(noise: str, meter: bool, curve: int, infoset: Command) -> None:
+def test_a_run_of_the_experiment_is_the_same_engagement(infoset: Command) -> None:
     curves = infoset.json("experiment", "--runs", 3, "--seed", 7, "--tie", "random")["curves"]
-    switch = "--range-meter" if meter else "--no-range-meter"
-    one = infoset.json("engage", "--noise", noise, switch, "--seed", 7, "--run", 2, "--tie", "random")
-    assert {key: one[key] for key in CURVE_KEYS} == {
-        key: value[2] if isinstance(value, list) else value for key, value in curves[curve - 1].items()
-    }
+    cases = product(("random", "game"), ("--no-range-meter", "--range-meter"))
+    for curve, (noise, switch) in zip(curves, cases, strict=True):
+        one = infoset.json("engage", "--noise", noise, switch, "--seed", 7, "--run", 2, "--tie", "random")
+        assert {key: one[key] for key in CURVE_KEYS} == {
+            key: value[2] if isinstance(value, list) else value for key, value in curve.items()
+        }
 
 
 def test_the_guaranteed_model_shows_its_certificate(infoset: Command) -> None:
@@ -303,10 +301,13 @@ def test_engage_under_both_noises(infoset: Command, tmp_path: Path) -> None:
     assert rows[0]["measured_range_m"] == ""
     assert (tmp_path / "flight-random.npz").read_bytes() == (folder / "record-random.npz").read_bytes()
 
-    again = tmp_path / "again"
-    code, _, _ = infoset("replay", tmp_path / "flight-random.npz", tmp_path / "flight-game.npz", "--out", again, "-q")
-    assert code == 0
-    assert names_in(again) == names_in(folder)[:4]
+
+def test_figures_of_a_record_are_those_of_its_flight(infoset: Command, brief_file: Path, tmp_path: Path) -> None:
+    folder, again = tmp_path / "figures", tmp_path / "again"
+    assert infoset("engage", brief_file, "--out", folder, "-q")[0] == 0
+    assert infoset("replay", folder / "record-random.npz", "--out", again, "-q")[0] == 0
+    drawn = [name for name in names_in(folder) if name.startswith("figure-")]
+    assert names_in(again) == drawn
     assert (again / "figure-3-sets.png").read_bytes() == (folder / "figure-3-sets.png").read_bytes()
 
 
@@ -372,17 +373,19 @@ def test_what_is_wrong_is_said_before_the_work(
 @pytest.mark.parametrize(
     ("option", "name"), [("--json", "x.json"), ("--csv", "x.csv"), ("--record", "x.npz"), ("--out", "x")]
 )
-def test_nothing_is_replaced_unless_told(option: str, name: str, infoset: Command, tmp_path: Path) -> None:
+def test_nothing_is_replaced_unless_told(
+    option: str, name: str, infoset: Command, brief_file: Path, tmp_path: Path
+) -> None:
     target = tmp_path / name
     precious = target
     if option == "--out":
         target.mkdir()
         precious = target / "results.json"
     precious.write_text("precious")
-    message = infoset.refused("engage", option, target)
+    message = infoset.refused("engage", brief_file, option, target)
     assert "--overwrite" in message
     assert precious.read_text() == "precious"
-    assert infoset("engage", option, target, "--overwrite", "-q")[0] == 0
+    assert infoset("engage", brief_file, option, target, "--overwrite", "-q")[0] == 0
     assert precious.read_bytes() != b"precious"
     assert names_in(tmp_path) == [name]
 
@@ -470,7 +473,7 @@ def test_interrupted(infoset: Command, monkeypatch: pytest.MonkeyPatch, tmp_path
 
 
 def test_compiling_is_said_when_nothing_is_compiled(
-    infoset: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    infoset: Command, brief_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Kernel:
         __name__ = "measure_all"
@@ -489,10 +492,10 @@ def test_compiling_is_said_when_nothing_is_compiled(
     assert not _screen._stored(Kernel(), source)
 
     monkeypatch.setattr(_screen, "_stored", lambda *_: False)
-    _, out, err = infoset("experiment", "--runs", 1, "--json", "-")
+    _, out, err = infoset("experiment", brief_file, "--runs", 1, "--json", "-")
     json.loads(out)
     assert err.startswith("compiling the kernels, once")
-    assert infoset("experiment", "--runs", 1, "-q") == (0, "", "")
+    assert infoset("experiment", brief_file, "--runs", 1, "-q") == (0, "", "")
 
 
 def test_a_reader_that_leaves_is_no_error() -> None:

@@ -9,7 +9,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -18,22 +17,11 @@ import pytest
 from experiments.cli import main
 from experiments.cluster import connected, is_open
 from experiments.errors import InputError
-from experiments.scenario_file import load_scenario, scenario_to_toml
-from infoset import StateBox
+from experiments.scenario_file import scenario_to_toml
 from sim import Campaign, CampaignNoise, Scenario
 from sim.storage import CampaignFolder
 
 Infoset = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture(scope="module")
-def brief() -> Scenario:
-    """The last ten seconds of an approach whose range is known, in few sections."""
-    published = load_scenario("asteroid-1997")
-    box = StateBox((-100.0, 100.0), (590e3, 600e3), (-10.0, 10.0), (-58e3, -57.5e3))
-    sensor = replace(published.set_model.angle_sensor, nominal_range_m=595e3)
-    model = replace(published.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor)
-    return replace(published, name="brief", set_model=model, dispersion=box, nominal_range_m=595e3)
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from experiments.comparison import Comparison, flights, gather, summary
 from experiments.figures.comparison import draw_comparison
 from experiments.scenario_file import load_scenario, scenario_hash
 from guidance import NoiseKind, TieRule, strategy_names
-from sim import simulate
+from sim import Scenario, simulate
 
 TWO = ("--strategies", "symmetric-miss,patient")
 LEVELS = ["p10", "p50", "p90", "p99", "max"]
@@ -50,11 +50,10 @@ def as_json(infoset: Infoset, *arguments: object) -> Any:
     return json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
 
 
-def test_compare_as_json(infoset: Infoset, tmp_path: Path) -> None:
-    found = as_json(infoset, *TWO, "--runs", 4, "--seed", 3)
-    scenario = load_scenario("asteroid-1997")
+def test_compare_as_json(infoset: Infoset, brief: Scenario, brief_file: Path, tmp_path: Path) -> None:
+    found = as_json(infoset, brief_file, *TWO, "--runs", 4, "--seed", 3)
     assert found["version"] == version("infoset")
-    assert (found["scenario"], found["scenario_hash"]) == ("asteroid-1997", scenario_hash(scenario))
+    assert (found["scenario"], found["scenario_hash"]) == ("brief", scenario_hash(brief))
     assert (found["seed"], found["runs"], found["model"], found["range_meter"]) == (3, 4, "paper", True)
     strategies = found["strategies"]
     assert [(each["name"], each["noise"]) for each in strategies] == [
@@ -74,27 +73,28 @@ def test_compare_as_json(infoset: Infoset, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_guaranteed_model_keeps_the_truth_and_its_word(infoset: Infoset) -> None:
-    for each in as_json(infoset, *TWO, "--runs", 3, "--model", "guaranteed")["strategies"]:
+def test_the_guaranteed_model_keeps_the_truth_and_its_word(infoset: Infoset, brief_file: Path) -> None:
+    for each in as_json(infoset, brief_file, *TWO, "--runs", 3, "--model", "guaranteed")["strategies"]:
         assert (each["truth_kept"], each["phi_held"]) == (3, 3)
 
 
-def test_the_figures_are_those_of_the_simulator_and_the_worst_tie_rule_counts(infoset: Infoset) -> None:
-    found = as_json(infoset, "--strategies", "symmetric-miss", "--runs", 5, "--seed", 2)["strategies"]
-    scenario = load_scenario("asteroid-1997")
-    assert found[0]["miss_m"] == summary(simulate(scenario, 5, seed=2).miss_m)
-    game = [simulate(replace(scenario, noise=NoiseKind.GAME, tie=tie), 5, seed=2) for tie in TieRule]
+def test_the_figures_are_those_of_the_simulator_and_the_worst_tie_rule_counts(
+    infoset: Infoset, brief: Scenario, brief_file: Path
+) -> None:
+    found = as_json(infoset, brief_file, "--strategies", "symmetric-miss", "--runs", 5, "--seed", 2)["strategies"]
+    assert found[0]["miss_m"] == summary(simulate(brief, 5, seed=2).miss_m)
+    game = [simulate(replace(brief, noise=NoiseKind.GAME, tie=tie), 5, seed=2) for tie in TieRule]
     assert found[1]["miss_m"] == summary(np.max([each.miss_m for each in game], axis=0))
     assert found[1]["impulse_m_s"]["max"] == max(each.impulse_m_s.max() for each in game)
     assert found[1]["ties"]["lower"]["miss_m"] == summary(game[1].miss_m)
 
 
-def test_what_is_said_is_told_apart_from_what_is_piped(infoset: Infoset) -> None:
-    code, out, err = infoset(*TWO, "--runs", 1, "--json", "-")
+def test_what_is_said_is_told_apart_from_what_is_piped(infoset: Infoset, brief_file: Path) -> None:
+    code, out, err = infoset(brief_file, *TWO, "--runs", 1, "--json", "-")
     assert code == 0
     json.loads(out)
     assert "impulse, m/s" in err
-    assert infoset(*TWO, "--runs", 1, "--quiet") == (0, "", "")
+    assert infoset(brief_file, *TWO, "--runs", 1, "--quiet") == (0, "", "")
 
 
 def test_the_table(infoset: Infoset) -> None:
@@ -106,8 +106,9 @@ def test_the_table(infoset: Infoset) -> None:
     assert max(len(line.rstrip()) for line in out.splitlines()[1:]) <= 80
 
 
-def test_compare_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
-    assert infoset(*TWO, "--runs", 3, "--out", "out", "--csv", "beside.csv", "--no-range-meter")[0] == 0
+def test_compare_into_a_folder(infoset: Infoset, brief_file: Path, tmp_path: Path) -> None:
+    asked = (brief_file, *TWO)
+    assert infoset(*asked, "--runs", 3, "--out", "out", "--csv", "beside.csv", "--no-range-meter")[0] == 0
     assert sorted(each.name for each in (tmp_path / "out").iterdir()) == FILES
     text = (tmp_path / "out" / "results.csv").read_text()
     assert text == (tmp_path / "beside.csv").read_text()
@@ -121,11 +122,11 @@ def test_compare_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
     worst = max(float(row["miss_m"]) for row in rows if (row["strategy"], row["noise"]) == ("patient", "game"))
     assert found["strategies"][3]["miss_m"]["max"] == worst
 
-    code, _, err = infoset(*TWO, "--runs", 1, "--out", "out")
+    code, _, err = infoset(*asked, "--runs", 1, "--out", "out")
     assert code == 2
     assert "--overwrite" in err
     assert (tmp_path / "out" / "results.csv").read_text() == text
-    assert infoset(*TWO, "--runs", 1, "--out", "out", "--overwrite", "-q")[0] == 0
+    assert infoset(*asked, "--runs", 1, "--out", "out", "--overwrite", "-q")[0] == 0
     assert (tmp_path / "out" / "results.csv").read_text() != text
 
 
@@ -181,10 +182,9 @@ def test_interrupted(infoset: Infoset, monkeypatch: pytest.MonkeyPatch, tmp_path
 
 
 @pytest.fixture(scope="module")
-def compared() -> list[Comparison]:
-    scenario = load_scenario("asteroid-1997")
+def compared(brief: Scenario) -> list[Comparison]:
     names = ["symmetric-miss", "patient"]
-    return gather([(name, tie, simulate(flown, 6)) for name, tie, flown in flights(scenario, names)])
+    return gather([(name, tie, simulate(flown, 6)) for name, tie, flown in flights(brief, names)])
 
 
 def axes_of(figure: Figure) -> dict[str, Any]:

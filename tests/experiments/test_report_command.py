@@ -21,23 +21,12 @@ from experiments.figures.campaign import (
     draw_dispersion,
 )
 from experiments.scenario_file import load_scenario
-from infoset import StateBox
 from sim import Campaign, CampaignNoise, Scenario
 
 Infoset = Callable[..., tuple[int, str, str]]
 FIGURES = [
     f"figure-{name}.{kind}" for name in ("convergence", "dispersion", "distributions") for kind in ("pdf", "png")
 ]
-
-
-@pytest.fixture(scope="module")
-def brief() -> Scenario:
-    """The last ten seconds of an approach whose range is known, in few sections."""
-    published = load_scenario("asteroid-1997")
-    box = StateBox((-100.0, 100.0), (590e3, 600e3), (-10.0, 10.0), (-58e3, -57.5e3))
-    sensor = replace(published.set_model.angle_sensor, nominal_range_m=595e3)
-    model = replace(published.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor)
-    return replace(published, name="brief", set_model=model, dispersion=box, nominal_range_m=595e3)
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,6 @@ from experiments.figures.sweep import draw_sweep
 from experiments.scenario_file import load_scenario, scenario_hash, scenario_to_toml
 from experiments.sweep_axes import sweep_axes, sweep_cells
 from experiments.sweep_table import SHOWN, crossings, key_label, sweep_table, unit_of, where_met
-from infoset import StateBox
 from sim import CampaignNoise, QuantileName, Requirement, Scenario, Sweep, quantiles, simulate
 from sim.storage import Axis, CampaignFolder
 
@@ -30,16 +29,6 @@ FILES = [
     "sweep.parquet",
 ]
 TWO = "angle_sensor.error_at_zero_range_rad=1e-4:4e-4:3,thruster.greatest_impulse_m_s=log:2:8:2"
-
-
-@pytest.fixture(scope="module")
-def brief() -> Scenario:
-    """The last ten seconds of an approach whose range is known, in few sections."""
-    published = load_scenario("asteroid-1997")
-    box = StateBox((-100.0, 100.0), (590e3, 600e3), (-10.0, 10.0), (-58e3, -57.5e3))
-    sensor = replace(published.set_model.angle_sensor, nominal_range_m=595e3)
-    model = replace(published.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor)
-    return replace(published, name="brief", set_model=model, dispersion=box, nominal_range_m=595e3)
 
 
 @pytest.fixture

@@ -6,15 +6,14 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from experiments.cli import main
 from experiments.record_file import read_record
-from experiments.scenario_file import load_scenario, scenario_to_toml
-from infoset import StateBox
+from experiments.scenario_file import scenario_to_toml
 from sim import Scenario
 from sim.storage import CampaignFolder
 
@@ -29,16 +28,6 @@ class Left:
 
 
 Infoset = Callable[..., Left]
-
-
-@pytest.fixture(scope="session")
-def brief() -> Scenario:
-    """The last ten seconds of an approach whose range is known, in few sections."""
-    published = load_scenario("asteroid-1997")
-    box = StateBox((-100.0, 100.0), (590e3, 600e3), (-10.0, 10.0), (-58e3, -57.5e3))
-    sensor = replace(published.set_model.angle_sensor, nominal_range_m=595e3)
-    model = replace(published.set_model, bounds=box, sections=5, fewest_sections=3, angle_sensor=sensor)
-    return replace(published, name="brief", set_model=model, dispersion=box, nominal_range_m=595e3)
 
 
 @pytest.fixture

@@ -62,7 +62,7 @@ def test_a_mirrored_engagement_is_mirrored(
     if model is Model.GUARANTEED:
         box = replace(scenario.set_model, kind=model, initial_set=InitialSet.BOX)
         scenario = replace(scenario, set_model=box)
-    draws = draw(scenario, range(20), 3)
+    draws = draw(scenario, range(8), 3)
     there, back = fly(scenario, draws), fly(*mirror(scenario, draws))
     np.testing.assert_allclose(back.miss_m, there.miss_m, rtol=1e-9)
     np.testing.assert_allclose(back.impulse_m_s, there.impulse_m_s, rtol=1e-9)
@@ -111,7 +111,7 @@ def fly_in_the_model(scenario: Scenario, engagements: int, seed: int) -> Results
 
 @pytest.mark.parametrize("noise", [NoiseKind.RANDOM, NoiseKind.GAME])
 def test_the_truth_stays_in_its_section_in_the_models_own_dynamics(asteroid: Scenario, noise: NoiseKind) -> None:
-    results = fly_in_the_model(replace(asteroid, noise=noise), 300, 5)
+    results = fly_in_the_model(replace(asteroid, noise=noise), 160, 5)
     assert results.truth_margin_m.min() >= 0.0
     assert Outcome.SET_LOST not in results.outcomes
 
