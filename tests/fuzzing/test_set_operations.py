@@ -30,8 +30,8 @@ from infoset import AngleSensor, ConvexPolygons, InformationSet, InitialSet, Mod
 from infoset.shapes import from_shapely
 
 Floats = NDArray[np.float64]
-some = settings(max_examples=15, deadline=None)
-few = settings(max_examples=5, deadline=None)
+some = settings(max_examples=10, deadline=None)
+few = settings(max_examples=3, deadline=None)
 
 # Whole numbers up to a thousand: shifts, shears and sums of them are exact, only cuts round.
 REACH = 1000

@@ -50,8 +50,8 @@ Level = tuple[float, float, float]
 
 U = Fraction(1, 2**53)
 ROW = 1  # of three: what is done to one section must leave its neighbours alone
-checked = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-briefly = settings(checked, max_examples=20)
+checked = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+briefly = settings(checked, max_examples=12)
 
 
 # The oracle: convex polygons with rational vertices (V, m), counter-clockwise, no three of them on a line.

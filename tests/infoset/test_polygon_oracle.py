@@ -27,9 +27,9 @@ LEAST = Fraction(1, 2**1074)  # what underflow may take from a product
 Exact = tuple[Fraction, Fraction]
 Vertices = list[tuple[float, float]]
 SOME = settings(
-    max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
+    max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
 )
-FEWER = settings(SOME, max_examples=30)
+FEWER = settings(SOME, max_examples=20)
 
 
 # The oracle -----------------------------------------------------------------------------------------------------

@@ -25,7 +25,7 @@ Exact = tuple[Fraction, Fraction]
 EPS = Fraction(1, 2**52)
 GUARD = -7.25e77
 
-checked = settings(max_examples=50, deadline=None)
+checked = settings(max_examples=30, deadline=None)
 
 
 # The oracle: convex polygons with rational vertices, counter-clockwise, no three of them on a line.
