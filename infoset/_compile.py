@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
+import numpy as np
 from llvmlite import ir
 from numba import config, njit, types
 from numba.core import cgutils
@@ -71,6 +72,20 @@ def inlined(function: F) -> F:
 def substituted(function: F) -> F:
     """Compile an expression of a line or two by writing it out where it is used: quicker to compile, and leaner."""
     return _compile(function, inline="always", _nrt=False)
+
+
+def constants(number: int) -> tuple[int, ...]:
+    """Return the numbers 0, 1, ... to be handed from kernel to kernel: rows, sides, parts.
+
+    Notes
+    -----
+    A kernel that is handed a Python constant is compiled for that very number, and all that it calls with it.
+    """
+    return tuple(cast(int, np.int64(value)) for value in range(number))
+
+
+(ZERO,) = constants(1)
+"""Where a count begins that is handed from kernel to kernel."""
 
 
 def _prefetch(_context: Any, array: Any, index: Any) -> Any:

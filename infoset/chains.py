@@ -30,7 +30,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset._compile import allocation_free, inlined, prefetch, substituted
+from infoset._compile import allocation_free, constants, inlined, prefetch, substituted
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -38,7 +38,7 @@ Flags = NDArray[np.bool_]
 
 EPSILON = float(np.finfo(np.float64).eps)
 
-RIGHT, LEFT = 0, 1
+RIGHT, LEFT = constants(2)
 
 CAPACITY = 256
 """Vertices a section may have: a power of two."""
@@ -59,7 +59,7 @@ MARKS = 5
 
 # An origin moves at every step and must not wear, so it is a sum of two floats. The right chain's holds a bound on |V|
 # too, over all that the section ever was: rounding is relative to it. The rest makes it a line of the cache.
-V_ORIGIN, V_REST, M_ORIGIN, M_REST, REACH = range(5)
+V_ORIGIN, V_REST, M_ORIGIN, M_REST, REACH = constants(5)
 ORIGIN = 8
 
 TAKEN = 0

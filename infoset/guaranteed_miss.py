@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from infoset import chains, whole_chains
-from infoset._compile import allocation_free, entry
+from infoset._compile import ZERO, allocation_free, entry
 from infoset.history import History, Tapes
 from infoset.location import LOWER, PROBE, UPPER, Workspace, keep_section, locate_end, run, tape_of, workspace
 from infoset.section_law import SectionLaw
@@ -192,8 +192,7 @@ def bound_leaving(
         )
     spacing = (last - first) / (LABELS - 1)
     travelled = law.closing_speed * (law.step * elapsed)
-    number = 0
-    inner = 0
+    number = inner = ZERO
     if spacing <= resolution:
         spacing = 0.0
     for k in range(-1, LABELS + 1):
@@ -232,8 +231,7 @@ def bound_leaving(
         q = last_dead if piece == LABELS else labels[at]
         if q <= p:
             continue
-        before = at
-        least, greatest = bound_piece(labels, outlines, counts, number, before, p, q, travelled, law, values)
+        least, greatest = bound_piece(labels, outlines, counts, number, at, p, q, travelled, law, values)
         pieces[made, LEAST], pieces[made, GREATEST], pieces[made, NEAREST], pieces[made, FARTHEST] = (
             least,
             greatest,

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset._compile import allocation_free, entry
+from infoset._compile import allocation_free, constants, entry
 from infoset.chains import CAPACITY, copy_section, count_of, empty_sections, room_of, working_room
 from infoset.history import Tapes
 from infoset.section_law import SectionLaw
@@ -16,7 +16,7 @@ from infoset.section_passes import Sections
 LABEL_RESOLUTION = 1e-13
 MOST_PROBES = 200
 
-PROBE, LOWER, UPPER = range(3)
+PROBE, LOWER, UPPER = constants(3)
 """Rows of the workspace: the section of the last replay, and those at the ends of the living labels."""
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import chain_steps, chains, whole_chains
-from infoset._compile import allocation_free, compiled, entry, inlined, substituted
+from infoset._compile import ZERO, allocation_free, compiled, entry, inlined, substituted
 from infoset.chains import REACH, RIGHT
 from infoset.section_law import SectionLaw
 
@@ -289,7 +289,7 @@ def replay(
     """
     kinds, values, applies, events = tape
     start_section(origins, rings, marks, n, label, law)
-    elapsed = 0
+    elapsed = ZERO
     for event in range(events):
         if kinds[event] == PREDICTION:
             if whole_chains.is_crowded(marks, n):

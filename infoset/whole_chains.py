@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from infoset import polygon, polygon_hull
-from infoset._compile import allocation_free, entry, substituted
+from infoset._compile import ZERO, allocation_free, entry, substituted
 from infoset.chains import (
     BEGIN,
     CAPACITY,
@@ -55,7 +55,7 @@ def reduce_outward(origins: Floats, rings: Floats, marks: Integers, n: int, tau:
     right = marks[n, RIGHT, END] - marks[n, RIGHT, BEGIN]
     other = min(right, count_of(marks, n) - right)
     side = RIGHT if right > other else LEFT
-    count = 0
+    count = ZERO
     for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
         v, m = read(rings, place(marks, n, side, i))
         count = polygon.append(points, polygon_hull.drop_turned(points, count, 1, v, m), v, m)
