@@ -64,8 +64,3 @@ class Situation:
     angle_is_new: bool = True
     range_is_new: bool = False
     range_sensor: RangeSensor | None = None
-
-    @property
-    def possible_ranges_m(self) -> tuple[Floats, Floats]:
-        """Least and greatest range that may be, over the stored sections, m, each of shape (B,)."""
-        return self.information.stored_range_interval_m()

@@ -158,10 +158,6 @@ class EncounterSolution:
         costate = cost.to_costate @ (cost.effort_base + cost.effort_slope @ chosen)
         return Plan(cost.craft, self.encounter.meeting_s, costate)
 
-    def ideal_plan(self, index: int) -> Plan:
-        """Return how the craft of an `index` would fly to the meeting that is cheapest for it alone."""
-        return self.plan(index, self.costs[index].ideal)
-
 
 def solve_encounter(encounter: Encounter) -> EncounterSolution:
     """Solve an encounter.

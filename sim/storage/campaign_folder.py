@@ -19,7 +19,7 @@ from sim.results import Results
 from sim.storage.atomic_file import clear_leftovers, is_leftover, reporting, write_whole
 from sim.storage.errors import DamagedError, ManifestError, MissingLibraryError, OccupiedError
 from sim.storage.folder_lock import LOCK, FolderLock
-from sim.storage.manifest import MANIFEST, Manifest, need_same, read_manifest, write_manifest
+from sim.storage.manifest import MANIFEST, Manifest, made_here, need_same, read_manifest, write_manifest
 
 Numbers = np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]
 Codes = NDArray[np.int8]
@@ -106,7 +106,8 @@ class CampaignFolder:
             need_free(path, resume=resume)
             clear_leftovers(path)
             found = read_manifest(path) if (path / MANIFEST).is_file() else None
-            folder_manifest = manifest if found is None else _continued(found, manifest, path)
+            begun = replace(manifest, made_by=made_here())
+            folder_manifest = begun if found is None else _continued(found, manifest, path)
             if found is not None and found.runs < folder_manifest.runs:
                 _drop_partial_shard(path, found)
             if found != folder_manifest:

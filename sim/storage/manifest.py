@@ -75,7 +75,7 @@ class Manifest:
     stopped_after : int or None
         Runs after which the rule stopped it.
     made_by : mapping of str to str
-        Version and machine that began it: told, not compared.
+        Version of Python and machine that began it: told, not compared.
     """
 
     scenario: Scenario

@@ -3,6 +3,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import platform
 import subprocess
 import sys
 import threading
@@ -352,6 +353,17 @@ def test_a_disk_that_fails_otherwise(brief: Scenario, tmp_path: Path, monkeypatc
     monkeypatch.setattr(os, "fsync", fail)
     with pytest.raises(StorageError, match="Input/output error"):
         mixed(brief, tmp_path).run()
+
+
+def test_who_began_it_is_told_and_not_compared(
+    brief: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mixed(brief, tmp_path, 16).run()
+    begun = read_manifest(tmp_path).made_by
+    assert begun == {"python": platform.python_version(), "machine": platform.machine(), "system": platform.system()}
+    monkeypatch.setattr(platform, "machine", lambda: "another")
+    assert mixed(brief, tmp_path, 32).run(resume=True).complete
+    assert read_manifest(tmp_path).made_by == begun
 
 
 def test_another_campaign_is_refused_and_every_difference_shown(brief: Scenario, tmp_path: Path) -> None:
