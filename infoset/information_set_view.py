@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset import section_life
+from infoset import section_life, section_passes
 from infoset.chains import empty_sections, working_room
 from infoset.convex_polygons import ConvexPolygons
 from infoset.guaranteed_miss import GuaranteedMiss
@@ -180,7 +180,9 @@ class InformationSetView:
     @property
     def section_counts(self) -> NDArray[np.int64]:
         """Number of living sections, shape (B,)."""
-        return np.asarray(self.living.sum(axis=1))
+        counts = np.empty(self.batch, dtype=np.int64)
+        section_passes.count_living_all(self.living, counts)
+        return counts
 
     def stored_range_interval_m(self) -> tuple[Floats, Floats]:
         """Least and greatest range of the living stored sections, m; zeros where there is none."""

@@ -279,6 +279,15 @@ def keep_labels_all(active: Flags, least: Floats, greatest: Floats, sections: Se
 
 
 @entry
+def count_living_all(living: Flags, counts: Integers) -> None:
+    """Write how many sections of each engagement live."""
+    for b in range(living.shape[0]):
+        counts[b] = 0
+        for s in range(living.shape[1]):
+            counts[b] += living[b, s]
+
+
+@entry
 def widest_all(elapsed: int, sections: Sections, law: SectionLaw, exists: Flags, ends: Floats) -> None:
     """Write the predicted-miss interval of each engagement, over its living sections.
 

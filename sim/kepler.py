@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from infoset._compile import entry, inlined
 from sim.scenario import Sun
 
 Floats = NDArray[np.float64]
@@ -16,6 +18,8 @@ LONGEST_SUBSTEP_S = 0.5
 ARRIVAL_LEAPS = 64
 Z, X = 0, 1
 RELATIVE, SPACECRAFT = 0, 1
+POSITION, VELOCITY, ACCELERATION, LOST = range(4)
+"""What a motion consists of. The last is what rounding took from the position, and goes into the next step."""
 
 
 @dataclass(frozen=True)
@@ -92,35 +96,36 @@ class KeplerMotion:
     """
 
     def __init__(self, position_m: Floats, velocity_m_s: Floats, sun: Sun | None) -> None:
-        # By coordinate: the relative motion and, below it, the spacecraft's own, shape (2, 2, B).
-        self._position = _with_spacecraft(position_m)
-        self._velocity = _with_spacecraft(velocity_m_s)
-        self._lost = np.zeros(self._position.shape)
-        self._sun = sun
-        self._manoeuvre: Floats | None = None
+        # By coordinate the relative motion and, beside it, the spacecraft's own.
+        self._motion = np.zeros((4, 2, 2, len(position_m)))
+        self._motion[POSITION, :, RELATIVE] = position_m.T
+        self._motion[VELOCITY, :, RELATIVE] = velocity_m_s.T
+        self._manoeuvre = np.zeros(len(position_m))
+        self._gravitational_parameter = 0.0
         if sun is not None:
             toward_sun = np.array([np.sin(sun.direction_rad), np.cos(sun.direction_rad)])
             along_orbit = np.array([toward_sun[X], -toward_sun[Z]])
             if along_orbit[X] < 0.0:
                 along_orbit = -along_orbit
             speed = np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m)
-            self._position[:, SPACECRAFT] = (-sun.distance_m * toward_sun)[:, None]
-            self._velocity[:, SPACECRAFT] = (speed * along_orbit)[:, None]
-        self._acceleration = self._gravity()
+            self._motion[POSITION, :, SPACECRAFT] = (-sun.distance_m * toward_sun)[:, None]
+            self._motion[VELOCITY, :, SPACECRAFT] = (speed * along_orbit)[:, None]
+            self._gravitational_parameter = float(sun.gravitational_parameter_m3_s2)
+        accelerate_all(self._motion, self._manoeuvre, self._gravitational_parameter)
 
     @property
     def position_m(self) -> Floats:
         """Relative (z, x), shape (B, 2)."""
-        return np.asarray(self._position[:, RELATIVE].T)
+        return np.asarray(self._motion[POSITION, :, RELATIVE].T)
 
     @property
     def velocity_m_s(self) -> Floats:
         """Relative (V_z, V_x), shape (B, 2)."""
-        return np.asarray(self._velocity[:, RELATIVE].T)
+        return np.asarray(self._motion[VELOCITY, :, RELATIVE].T)
 
     def sight(self) -> Sight:
         """Geometry now."""
-        (z, x), (v_z, v_x) = self._position[:, RELATIVE], self._velocity[:, RELATIVE]
+        (z, x), (v_z, v_x) = self._motion[POSITION, :, RELATIVE], self._motion[VELOCITY, :, RELATIVE]
         squared, slope = z * z + x * x, z / x
         return Sight(
             alpha_rad=np.arctan2(z, x),
@@ -132,8 +137,8 @@ class KeplerMotion:
 
     def fire(self, impulse_m_s: Floats) -> None:
         """Change the spacecraft's velocity along z: V_z becomes V_z - k."""
-        self._velocity[Z, RELATIVE] -= impulse_m_s
-        self._velocity[Z, SPACECRAFT] += impulse_m_s
+        self._motion[VELOCITY, Z, RELATIVE] -= impulse_m_s
+        self._motion[VELOCITY, Z, SPACECRAFT] += impulse_m_s
 
     def arrival_s(self) -> Floats:
         """Times from now until x = 0, shape (B,), s.
@@ -143,63 +148,97 @@ class KeplerMotion:
         The motion without impulses, in 64 leaps and a last straight stretch: impulses are along z, and shift this
         time by far less than a nanosecond.
         """
-        free = KeplerMotion.__new__(KeplerMotion)
-        free._sun, free._position, free._velocity = self._sun, self._position, self._velocity
-        free._manoeuvre, free._acceleration, free._lost = None, self._acceleration, self._lost
+        free = self._motion
         duration = self.position_m[:, X] / -self.velocity_m_s[:, X]
         for _ in range(ARRIVAL_LEAPS):
-            free._leap(duration / ARRIVAL_LEAPS)
-        return duration - free.position_m[:, X] / free.velocity_m_s[:, X]
+            free = self._leap(free, duration / ARRIVAL_LEAPS)
+        return np.asarray(duration - free[POSITION, X, RELATIVE] / free[VELOCITY, X, RELATIVE])
 
     def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
         """Move one step on, the object accelerating along z, shape (B,), if it manoeuvres."""
         if manoeuvre_m_s2 is not None:
             self._manoeuvre = manoeuvre_m_s2
-            self._acceleration = self._gravity()
+            accelerate_all(self._motion, self._manoeuvre, self._gravitational_parameter)
         # In free space the motion over a step is a parabola, which one leap has exactly.
-        substeps = 1 if self._sun is None else max(1, int(np.ceil(step_s / LONGEST_SUBSTEP_S * (1.0 - 1e-12))))
-        passed = np.zeros(self._position.shape[-1], dtype=bool)
+        free_space = self._gravitational_parameter == 0.0
+        substeps = 1 if free_space else max(1, int(np.ceil(step_s / LONGEST_SUBSTEP_S * (1.0 - 1e-12))))
+        duration = np.full(self._motion.shape[-1], step_s / substeps)
+        passed = np.zeros(self._motion.shape[-1], dtype=bool)
         least = np.full(passed.shape, np.inf)
         for _ in range(substeps):
-            before = self._position, self._velocity, self._acceleration
-            self._leap(step_s / substeps)
-            new = (_dot(self._position[:, RELATIVE], self._velocity[:, RELATIVE]) >= 0.0) & ~passed
+            before, self._motion = self._motion, self._leap(self._motion, duration)
+            new = (_dot(self._motion[POSITION, :, RELATIVE], self._motion[VELOCITY, :, RELATIVE]) >= 0.0) & ~passed
             if new.any():
-                position, velocity, acceleration = (value[:, RELATIVE, new] for value in before)
+                position, velocity, acceleration = before[:LOST, :, RELATIVE, new]
                 least[new] = closest_distance(position, velocity, acceleration, step_s / substeps)
                 passed |= new
         return Passage(passed, least)
 
-    def _leap(self, duration_s: float | Floats) -> None:
-        """Move on; the arrays are new ones, so that whoever holds the old ones has the motion before."""
-        half = 0.5 * duration_s
-        at_middle = self._velocity + half * self._acceleration
-        # Rounding would add up over the steps; the set allows for that of one: what each sum loses goes into the next.
-        way = duration_s * at_middle + self._lost
-        after = self._position + way
-        self._lost = way - (after - self._position)
-        self._position = after
-        self._acceleration = self._gravity()
-        self._velocity = at_middle + half * self._acceleration
-
-    def _gravity(self) -> Floats:
-        """Relative acceleration, manoeuvre included, and that of the spacecraft, m/s^2, shape (2, 2, B)."""
-        if self._sun is None:
-            acceleration = np.zeros_like(self._position)
-        else:
-            from_sun = self._position.copy()
-            from_sun[:, RELATIVE] += from_sun[:, SPACECRAFT]
-            acceleration = attraction(from_sun, self._sun.gravitational_parameter_m3_s2)
-            acceleration[:, RELATIVE] -= acceleration[:, SPACECRAFT]
-        if self._manoeuvre is not None:
-            acceleration[Z, RELATIVE] += self._manoeuvre
-        return acceleration
+    def _leap(self, motion: Floats, duration_s: Floats) -> Floats:
+        """Return the motion some time on, in memory of its own."""
+        after = np.empty_like(motion)
+        leap_all(motion, duration_s, self._manoeuvre, self._gravitational_parameter, after)
+        return after
 
 
-def attraction(position_m: Floats, gravitational_parameter_m3_s2: float) -> Floats:
-    """Acceleration -K r / |r|^3 at positions from the Sun, shape (2, ...), m/s^2."""
-    squared = _dot(position_m, position_m)
-    return np.asarray(-gravitational_parameter_m3_s2 / (squared * np.sqrt(squared)) * position_m)
+@inlined
+def attraction(z: float, x: float, gravitational_parameter_m3_s2: float) -> tuple[float, float]:
+    """Acceleration -K r / |r|^3 at a position from the Sun, along z and x, m/s^2."""
+    squared = z * z + x * x
+    share = -gravitational_parameter_m3_s2 / (squared * math.sqrt(squared))
+    return share * z, share * x
+
+
+@entry
+def accelerate_all(motion: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3_s2: float) -> None:
+    """Write the accelerations of a motion: of the spacecraft, and of the object about it, which manoeuvres.
+
+    Parameters
+    ----------
+    motion : ndarray, shape (4, 2, 2, B)
+        Position, velocity, acceleration and what rounding took; along z and x; relative, and the spacecraft's.
+    manoeuvre_m_s2 : ndarray, shape (B,)
+        Acceleration of the object along z.
+    gravitational_parameter_m3_s2 : float
+        Of the Sun; zero is free space.
+    """
+    for b in range(motion.shape[3]):
+        for axis in (Z, X):
+            for craft in (RELATIVE, SPACECRAFT):
+                motion[ACCELERATION, axis, craft, b] = 0.0
+        if gravitational_parameter_m3_s2 > 0.0:
+            own_z, own_x = motion[POSITION, Z, SPACECRAFT, b], motion[POSITION, X, SPACECRAFT, b]
+            z, x = motion[POSITION, Z, RELATIVE, b] + own_z, motion[POSITION, X, RELATIVE, b] + own_x
+            object_z, object_x = attraction(z, x, gravitational_parameter_m3_s2)
+            own_z, own_x = attraction(own_z, own_x, gravitational_parameter_m3_s2)
+            motion[ACCELERATION, Z, SPACECRAFT, b], motion[ACCELERATION, X, SPACECRAFT, b] = own_z, own_x
+            motion[ACCELERATION, Z, RELATIVE, b] = object_z - own_z
+            motion[ACCELERATION, X, RELATIVE, b] = object_x - own_x
+        motion[ACCELERATION, Z, RELATIVE, b] += manoeuvre_m_s2[b]
+
+
+@entry
+def leap_all(
+    motion: Floats, duration_s: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3_s2: float, after: Floats
+) -> None:
+    """Write a motion some time on, shape (B,), as `accelerate_all` has it: one step of velocity Verlet."""
+    for axis in (Z, X):
+        for craft in (RELATIVE, SPACECRAFT):
+            for b in range(motion.shape[3]):
+                before = motion[POSITION, axis, craft, b]
+                half = 0.5 * duration_s[b] * motion[ACCELERATION, axis, craft, b]
+                at_middle = motion[VELOCITY, axis, craft, b] + half
+                # Rounding would add up over the steps, and the set allows for that of one.
+                way = duration_s[b] * at_middle + motion[LOST, axis, craft, b]
+                position = before + way
+                after[POSITION, axis, craft, b] = position
+                after[LOST, axis, craft, b] = way - (position - before)
+                after[VELOCITY, axis, craft, b] = at_middle
+    accelerate_all(after, manoeuvre_m_s2, gravitational_parameter_m3_s2)
+    for axis in (Z, X):
+        for craft in (RELATIVE, SPACECRAFT):
+            for b in range(motion.shape[3]):
+                after[VELOCITY, axis, craft, b] += 0.5 * duration_s[b] * after[ACCELERATION, axis, craft, b]
 
 
 def closest_distance(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2: Floats, duration_s: float) -> Floats:
@@ -227,10 +266,3 @@ def closest_distance(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2
 
 def _dot(first: Floats, second: Floats) -> Floats:
     return np.asarray(first[Z] * second[Z] + first[X] * second[X])
-
-
-def _with_spacecraft(relative: Floats) -> Floats:
-    """By coordinate the relative vectors, shape (B, 2), and a row of zeros for the spacecraft: shape (2, 2, B)."""
-    vectors = np.zeros((2, 2, len(relative)))
-    vectors[:, RELATIVE] = relative.T
-    return vectors
