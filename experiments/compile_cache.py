@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 VARIABLE = "NUMBA_CACHE_DIR"
-PACKAGES = ("infoset", "rendezvous")
+PACKAGES = ("infoset", "sim", "rendezvous")
 """The packages that have kernels."""
 
 
