@@ -122,7 +122,7 @@ def hand_over(
     between : tuple of float
         V, m and height of the giver's origin, from the taker's.
     same : tuple of float
-        Differences of V, and of height, that are rounding.
+        Differences of V, and of heights between the origins, that are rounding.
     tau : float
         Time to go.
 
@@ -140,10 +140,11 @@ def hand_over(
     back = end - 1
     v, m = read(rings, place_in(giver, back))
     rise = sign * (m - tau * v)
+    same_v, same_rise = same[0], same[1] + 4.0 * EPSILON * abs(m)
     front_v, front_m = read(rings, place_in(taker, front))
     front_rise = sign * (front_m - tau * front_v)
     while True:
-        if rise + sign * between[2] > front_rise + same[1]:
+        if rise + sign * between[2] > front_rise + same_rise:
             front -= 1
             front_v, front_m = v + between[0], m + between[1]
             write(rings, place_in(taker, front), front_v, front_m)
@@ -152,7 +153,10 @@ def hand_over(
             break
         before_v, before_m = read(rings, place_in(giver, back - 1))
         before_rise = sign * (before_m - tau * before_v)
-        if before_rise < rise or sign * (v - before_v) > same[0]:
+        if before_rise < rise - same_rise or sign * (v - before_v) > same_v:
+            break
+        # Vertices that are the same to within rounding tell nothing: they must not hide those before them.
+        if before_rise < rise and abs(v - before_v) > same_v:
             break
         back -= 1
         v, m, rise = before_v, before_m, before_rise

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 from numba import types
 from numpy.typing import NDArray
@@ -544,6 +544,16 @@ def test_extremal_bands_never_lose_the_truth(corner: int, story: list[tuple[Step
 
 
 @briefly
+@example(  # two vertices that rounding told apart hid that the one before them had become the highest
+    start=Start(0.7, (0.0, 1e-9, 2.4500059225829315e-16), (1.8189894035458566e-21, 5e-10, 3.5e-10)),
+    story=[
+        Step((1.0, 1.0), 0.0, 0.0, None),
+        Step((1.0, 0.01), 2.0**-40, 0.0, None),
+        Step((0.7, 0.01), 0.0, 0.0, Band("parts", (0.0, 0.5), 0, True)),
+        Step((1.0, 0.01), 0.0, 0.0, None),
+    ],
+    part=0.0,
+)
 @given(starts(), st.lists(steps(st.one_of(st.none(), BANDS)), max_size=6), UNIT.map(abs))
 def test_the_first_vertex_near_a_peak(start: Start, story: list[Step], part: float) -> None:
     life = Life(*start)
