@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import errno
+import os
 import sys
+import threading
+import time
 from collections.abc import Sequence
 from functools import cache
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
@@ -33,6 +36,8 @@ from experiments.errors import InputError, on_a_screen
 
 INPUT_ERROR = 2
 INTERRUPTED = 130
+PATIENCE_S = 5.0
+"""How long threads may take to end after an error."""
 
 
 class _Root(TyperGroup):
@@ -150,6 +155,28 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except MemoryError:
         _complain("error: there is not enough memory to begin with; give it more")
         sys.exit(INPUT_ERROR)
+    except (SystemError, ImportError) as error:  # of Python itself, where memory ends and it does not say so
+        _complain(f"error: there is not enough memory, or the installation is damaged ({error}); give it more")
+        _leave(INPUT_ERROR)
+    except SystemExit as left:
+        if left.code == INPUT_ERROR:
+            _leave(INPUT_ERROR)
+        raise
+
+
+def _leave(code: int) -> NoReturn:
+    """Leave, without threads that memory's end has left waiting for a lock which nobody holds any more."""
+    flights = sys.modules.get("sim.chunks_in_flight")
+    if flights is not None:
+        threads = [each for each in threading.enumerate() if each.name.startswith(flights.THREADS)]
+        last_s = time.monotonic() + PATIENCE_S
+        for thread in threads:
+            thread.join(max(0.0, last_s - time.monotonic()))
+        if any(thread.is_alive() for thread in threads):
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(code)
+    sys.exit(code)
 
 
 def _complain(message: str) -> None:

@@ -5,10 +5,16 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from dataclasses import replace
 from threading import Event
 
 from sim.chunk import Chunk, fly_chunk
 from sim.results import Results
+
+THREADS = "infoset-flight"
+"""What the names of the threads begin with."""
+FLOWN_FOR_KERNELS = 16
+"""Engagements of which some are sure to be given a new grid of sections."""
 
 
 def fly_on(executor: Executor, chunks: Iterable[Chunk], at_once: int) -> Generator[tuple[Chunk, Results], None, None]:
@@ -49,19 +55,32 @@ def fly_on_threads(workers: int, chunks: Iterable[Chunk]) -> Generator[tuple[Chu
 
     Notes
     -----
-    Closed early, or broken by an error or an interrupt, it breaks off the chunks under way.
+    Closed early, or broken by an error or an interrupt, it breaks off the chunks under way. A few engagements of the
+    first chunk are flown before the threads begin, for the kernels: where memory ends while one is compiled or loaded,
+    Numba does not let go of its lock, and the other threads would wait for it for ever.
     """
     stopped = Event()
+    waiting = iter(chunks)
+    ahead = list(itertools.islice(waiting, 1))
+    if workers > 1:
+        for chunk in ahead:
+            fly_chunk(replace(chunk, runs=min(chunk.runs, FLOWN_FOR_KERNELS)))
 
     def check() -> None:
         if stopped.is_set():
             raise InterruptedError
 
-    with ThreadPoolExecutor(workers) as pool:
-        try:
-            yield from _flying(pool, chunks, workers + 1, check)
-        finally:
-            stopped.set()
+    pool = ThreadPoolExecutor(workers, thread_name_prefix=THREADS)
+    enough_memory = True
+    try:
+        yield from _flying(pool, itertools.chain(ahead, waiting), workers + 1, check)
+    except (MemoryError, SystemError, ImportError, OSError):
+        # Of memory that ended, in all its forms: a lock that the thread held may be locked for ever. Nobody waits.
+        enough_memory = False
+        raise
+    finally:
+        stopped.set()
+        pool.shutdown(wait=enough_memory, cancel_futures=True)
 
 
 def _flying(
