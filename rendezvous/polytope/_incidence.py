@@ -126,7 +126,8 @@ def _widest_gap(gaps: Floats) -> float:
 
 def together(points: Floats, within: float) -> Places:
     """Label points that are nearer to each other than a distance, in every coordinate, with the same number."""
-    pairs = cKDTree(points).query_pairs(within, p=np.inf, output_type="ndarray")
+    # Scipy 1.11.0 looks for components among indices of 32 bits only.
+    pairs = cKDTree(points).query_pairs(within, p=np.inf, output_type="ndarray").astype(np.int32)
     graph = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
