@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from experiments.__main__ import main as beginning
 from experiments.commands._campaign_options import campaign_errors
 from sim import Campaign, CampaignNoise, Scenario
 from sim.storage import CampaignFolder
@@ -140,3 +141,25 @@ def test_a_campaign_interrupted_ten_times_gives_the_same_bits(brief: Scenario, f
     assert ended(begin(*asked, folder=tmp_path)).code == 0
     expected = Campaign(brief, 2000, tmp_path / "whole", noise=CampaignNoise.MIXED).run().table
     assert CampaignFolder.read(tmp_path / "runs").table().equals(expected)
+
+
+def test_an_interrupt_that_python_wraps_is_one_message(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run() -> None:
+        raise RuntimeError("Error calling __set_name__") from KeyboardInterrupt()
+
+    monkeypatch.setattr("experiments.cli.main", run)
+    with pytest.raises(SystemExit) as left:
+        beginning()
+    assert left.value.code == 130
+    assert capsys.readouterr().err == "interrupted\n"
+
+
+def test_other_errors_are_not_taken_for_interrupts(monkeypatch: pytest.MonkeyPatch) -> None:
+    def run() -> None:
+        raise RuntimeError("a defect") from ValueError()
+
+    monkeypatch.setattr("experiments.cli.main", run)
+    with pytest.raises(RuntimeError, match="a defect"):
+        beginning()
