@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -49,6 +49,17 @@ def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
         own: settings = test._hypothesis_internal_use_settings
         if own.max_examples != settings().max_examples:
             test._hypothesis_internal_use_settings = settings(own, max_examples=TIMES * own.max_examples)
+
+
+@pytest.fixture(autouse=True)
+def environment_is_put_back() -> Iterator[None]:
+    """Find the test that leaves a variable behind, not the later one that it makes fail or slow."""
+    before = dict(os.environ)
+    yield
+    after = dict(os.environ)
+    for each in (before, after):
+        each.pop("PYTEST_CURRENT_TEST", None)
+    assert after == before
 
 
 @pytest.fixture(scope="session")

@@ -24,7 +24,8 @@ PACKAGES = ("infoset", "guidance", "sim", "rendezvous", "experiments")
 @pytest.fixture
 def nowhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """A machine where neither the installation nor the home can be written; returns the folder for temporary files."""
-    monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.setenv(VARIABLE, "put back afterwards as it was, even if it was not there")
+    monkeypatch.delenv(VARIABLE)
     monkeypatch.setattr(compile_cache, "_written_beside_sources", lambda: False)
     monkeypatch.setenv("HOME", "/dev/null/nobody")
     monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null/nobody")
@@ -143,6 +144,7 @@ def test_nowhere_to_keep_anything(installation: Path, tmp_path: Path, ordinary: 
     sealed.mkdir(mode=0o500)
     done = subprocess.run(
         [*ordinary, sys.executable, "-c", code],
+        cwd=tmp_path,  # in a checkout Python would take the packages from there
         env={**os.environ, **environment_of(installation, tmp_path, sealed)},
         capture_output=True,
         text=True,
