@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
-from dataclasses import replace
 from threading import Event
 
 from sim.chunk import Chunk, fly_chunk
@@ -13,8 +12,6 @@ from sim.results import Results
 
 THREADS = "infoset-flight"
 """What the names of the threads begin with."""
-FLOWN_FOR_KERNELS = 16
-"""Engagements of which some are sure to be given a new grid of sections."""
 
 
 def fly_on(executor: Executor, chunks: Iterable[Chunk], at_once: int) -> Generator[tuple[Chunk, Results], None, None]:
@@ -55,16 +52,10 @@ def fly_on_threads(workers: int, chunks: Iterable[Chunk]) -> Generator[tuple[Chu
 
     Notes
     -----
-    Closed early, or broken by an error or an interrupt, it breaks off the chunks under way. A few engagements of the
-    first chunk are flown before the threads begin, for the kernels: where memory ends while one is compiled or loaded,
-    Numba does not let go of its lock, and the other threads would wait for it for ever.
+    Closed early, or broken by an error or an interrupt, it breaks off the chunks under way. Where memory ends in one,
+    the others are not waited for: Numba does not let go of its lock if it ends while a kernel is compiled or loaded.
     """
     stopped = Event()
-    waiting = iter(chunks)
-    ahead = list(itertools.islice(waiting, 1))
-    if workers > 1:
-        for chunk in ahead:
-            fly_chunk(replace(chunk, runs=min(chunk.runs, FLOWN_FOR_KERNELS)))
 
     def check() -> None:
         if stopped.is_set():
@@ -73,7 +64,7 @@ def fly_on_threads(workers: int, chunks: Iterable[Chunk]) -> Generator[tuple[Chu
     pool = ThreadPoolExecutor(workers, thread_name_prefix=THREADS)
     enough_memory = True
     try:
-        yield from _flying(pool, itertools.chain(ahead, waiting), workers + 1, check)
+        yield from _flying(pool, chunks, workers + 1, check)
     except (MemoryError, SystemError, ImportError, OSError):
         # Of memory that ended, in all its forms: a lock that the thread held may be locked for ever. Nobody waits.
         enough_memory = False
