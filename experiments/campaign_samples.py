@@ -93,12 +93,12 @@ def samples(folder: CampaignFolder, cell: int | None = None, levels: Sequence[fl
     noises = noises_of(folder)
     told = {noise: _Tally() for noise in noises}
     guarantees = folder.manifest.guarantee and folder.manifest.scenario.set_model.is_guaranteed
-    columns = ["truth_margin", *(("miss_m", "guaranteed_miss_m") if guarantees else ())]
+    columns = ["truth_margin_m", *(("miss_m", "guaranteed_miss_m") if guarantees else ())]
     for numbers, codes in folder.shards(columns, {"noise": noises, "outcome": OUTCOMES}, cell):
         for place, tally in enumerate(told.values()):
             rows = codes["noise"] == place
             tally.outcomes += np.bincount(codes["outcome"][rows], minlength=len(OUTCOMES))
-            tally.truth_kept += int((numbers["truth_margin"][rows].filled(0.0) >= 0.0).sum())
+            tally.truth_kept += int((numbers["truth_margin_m"][rows].filled(0.0) >= 0.0).sum())
             if guarantees:
                 guaranteed = numbers["guaranteed_miss_m"][rows]
                 tally.phi_known += int(guaranteed.count())

@@ -200,8 +200,7 @@ def _to_arrays(record: Record) -> Arrays:
     range_measured, measured_range = optional([step.measured_range_m for step in steps])
     rate_measured, measured_rate = optional([step.measured_rate_rad_s for step in steps])
     miss_exists = np.array([step.predicted_miss_m is not None for step in steps], dtype=bool)
-    margin = _floats(step.truth_margin_m for step in steps)
-    margin_known = np.isfinite(margin)
+    margin_known, margin = optional([step.truth_margin_m for step in steps])
     return {
         "time_s": _floats(step.time_s for step in steps),
         "angle_measured": angle_measured,
@@ -219,7 +218,7 @@ def _to_arrays(record: Record) -> Arrays:
             -1, 2
         ),
         "truth_margin_known": margin_known,
-        "truth_margin_m": np.where(margin_known, margin, 0.0),
+        "truth_margin_m": margin,
         "section_offsets": _offsets([len(step.sections) for step in steps]),
         "section_label_m": _floats(section.label_m for section in sections),
         "section_range_m": _floats(section.range_m for section in sections),
@@ -239,14 +238,13 @@ def _offsets(counts: list[int]) -> NDArray[np.int64]:
 def _result_to_json(result: Results) -> dict[str, object]:
     if len(result) != 1:
         raise ValueError(f"the result of a record is a batch of one: got {len(result)}")
-    guaranteed, margin = result.guaranteed_miss_m, float(result.truth_margin_m[0])
     return {
         "miss_m": float(result.miss_m[0]),
         "impulse_m_s": float(result.impulse_m_s[0]),
-        "guaranteed_miss_m": None if np.ma.getmaskarray(guaranteed)[0] else float(guaranteed.data[0]),
+        "guaranteed_miss_m": result.guaranteed_miss_m.tolist()[0],
         "outcome": result.outcomes[0].value,
         "truth_kept": bool(result.truth_kept[0]),
-        "truth_margin_m": margin if np.isfinite(margin) else None,
+        "truth_margin_m": result.truth_margin_m.tolist()[0],
         "position_m": result.position_m[0].tolist(),
         "velocity_m_s": result.velocity_m_s[0].tolist(),
     }
@@ -441,7 +439,7 @@ def _result_from_json(found: object, run: int, guarantees: bool) -> Results:
         guaranteed_miss_m=np.ma.MaskedArray([guaranteed or 0.0], mask=[guaranteed is None]),
         outcomes=(Outcome(outcome),),
         truth_kept=np.array([kept]),
-        truth_margin_m=np.array([np.inf if margin is None else margin]),
+        truth_margin_m=np.ma.MaskedArray([margin or 0.0], mask=[margin is None]),
         position_m=np.array([pairs[0]]),
         velocity_m_s=np.array([pairs[1]]),
         guarantees=guarantees,
@@ -476,7 +474,7 @@ def _to_steps(arrays: Arrays, scenario: Scenario) -> tuple[StepRecord, ...]:
         arrays["true_range_m"].tolist(),
         arrays["impulse_m_s"].tolist(),
         [miss and (miss[0], miss[1]) for miss in optional("predicted_miss_exists", "predicted_miss_m")],
-        [np.inf if margin is None else margin for margin in optional("truth_margin_known", "truth_margin_m")],
+        optional("truth_margin_known", "truth_margin_m"),
         [tuple(sections[first:last]) for first, last in pairwise(ends)],
         strict=True,
     )

@@ -45,7 +45,8 @@ class InformationSet(InformationSetView):
 
     Notes
     -----
-    The order inside one step: `measure_range`, `measure_angle`, `shift`, `drop_below_threshold`, `predict`.
+    The order inside one step: `measure_range`, `measure_angle`, `measure_rate`, `shift`, `drop_below_threshold`,
+    `predict`.
     """
 
     def __init__(self, model: SetModel, batch: int = 1, *, guarantee: bool = True) -> None:
@@ -87,6 +88,8 @@ class InformationSet(InformationSetView):
         """A read-only view of this set: it follows the set and cannot change it."""
         limits = self._lower_label, self._upper_label
         view = InformationSetView(self.model, self._stack, self._history, limits, self._status)
+        # All of these are only ever changed in place.
+        view._some_left, view._phi = self._some_left, self._phi
         view._lost_step, view._lost_label = self._lost_step, self._lost_label
         return view
 
@@ -296,11 +299,8 @@ class InformationSet(InformationSetView):
             return
         history = self._history
         for b in np.flatnonzero(empty & (self._lost_step < 0)):
-            # The label that came nearest to living through it.
-            died, overlaps = self._stack.sections.died[b], self._stack.sections.overlaps[b]
-            last = event is not None and (died == event).any()
-            nearest = np.where(died == event, overlaps, -np.inf).argmax() if last else len(died) // 2
-            self._lost_step[b], self._lost_label[b] = history.elapsed, self._stack.labels[b, nearest]
+            self._lost_step[b] = history.elapsed
+            self._lost_label[b] = self._nearest_to_living(int(b), event, lower[b], upper[b])
         if self.model.recovery is Recovery.NONE:
             return
         if event is not None:
@@ -315,6 +315,16 @@ class InformationSet(InformationSetView):
         self._status[empty] = SetStatus.TRACKING.value
         self._regrid(empty, 2 * self.model.fewest_sections + 1)
         self._status[empty & (self.section_counts == 0)] = SetStatus.EMPTY.value
+
+    def _nearest_to_living(self, b: int, event: int | None, lower: float, upper: float) -> float:
+        """Label that came nearest to living through a measurement, within the limits of labels before it."""
+        used = self._stack.sections.used[b]
+        killed = self._stack.sections.died[b, :used] == event
+        if event is not None and killed.any():
+            overlaps = np.where(killed, self._stack.sections.overlaps[b, :used], -np.inf)
+            return float(self._stack.labels[b, overlaps.argmax()])
+        middle = 0.5 * (self._lower_label[b] + self._upper_label[b])
+        return float(min(max(middle, lower), upper))
 
     def _regrid(self, wanted: Flags, sections: int) -> None:
         tape, stack = self._history, self._stack

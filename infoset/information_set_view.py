@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+MaskedFloats = np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]
+MaskedIntegers = np.ma.MaskedArray[tuple[int], np.dtype[np.int64]]
 
 
 class SetStatus(Enum):
@@ -156,14 +158,20 @@ class InformationSetView:
         return np.asarray(self._lost_step >= 0)
 
     @property
-    def inconsistency(self) -> tuple[NDArray[np.int64], Floats]:
-        """Step at which each set emptied first (-1: never), and the label (m) that came nearest to living on."""
-        return self._lost_step.copy(), self._lost_label.copy()
+    def inconsistency(self) -> tuple[MaskedIntegers, MaskedFloats]:
+        """Step at which each set emptied first, and the label (m) that came nearest to living on; masked: never."""
+        never = ~self.inconsistent
+        return (
+            np.ma.MaskedArray(self._lost_step.copy(), mask=never),
+            np.ma.MaskedArray(self._lost_label.copy(), mask=never),
+        )
 
     @property
     def living(self) -> Flags:
         """Which stored sections live, shape (B, S)."""
-        return self._stack.living
+        living = self._stack.living.view()
+        living.flags.writeable = False
+        return living
 
     @property
     def labels_m(self) -> Floats:
@@ -181,7 +189,7 @@ class InformationSetView:
     def section_counts(self) -> NDArray[np.int64]:
         """Number of living sections, shape (B,)."""
         counts = np.empty(self.batch, dtype=np.int64)
-        section_passes.count_living_all(self.living, counts)
+        section_passes.count_living_all(self._stack.living, counts)
         return counts
 
     def stored_range_interval_m(self) -> tuple[Floats, Floats]:

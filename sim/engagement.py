@@ -19,6 +19,7 @@ from guidance import (
     make_strategy,
 )
 from infoset import InformationSet, InformationSetView, PredictedMiss
+from infoset.information_set_view import MaskedFloats, MaskedIntegers
 from sim.draws import Draws
 from sim.gravity import on_board_model
 from sim.kepler import KeplerMotion, Sight, TrueMotion
@@ -51,8 +52,8 @@ class Step:
         After the measurement, before the impulse.
     impulse_m_s : ndarray, shape (B,)
         What the thruster gives.
-    truth_margin_m : ndarray, shape (B,)
-        Signed margin of the truth in its own section.
+    truth_margin_m : masked array, shape (B,)
+        Signed margin of the truth in its own section; masked where nothing was measured yet.
     information : InformationSetView
         The set after the measurement.
     """
@@ -67,7 +68,7 @@ class Step:
     measured_rate_rad_s: Floats | None
     predicted_miss: PredictedMiss
     impulse_m_s: Floats
-    truth_margin_m: Floats
+    truth_margin_m: MaskedFloats
     information: InformationSetView
 
 
@@ -139,8 +140,8 @@ class Engagements:
         return bool(self._flying.any()) and self.step < self._draws.angle.shape[1]
 
     @property
-    def inconsistency(self) -> tuple[NDArray[np.int64], Floats]:
-        """Step at which each set emptied first (-1: never), and the label (m) that came nearest to living on."""
+    def inconsistency(self) -> tuple[MaskedIntegers, MaskedFloats]:
+        """Step at which each set emptied first, and the label (m) that came nearest to living on; masked: never."""
         return self._information.inconsistency
 
     def advance(self, observe: Callable[[Step], None] | None = None) -> None:
@@ -173,7 +174,7 @@ class Engagements:
                     measured_rate,
                     miss,
                     self._impulse,
-                    self._truth_section.margin_m.copy(),
+                    self._truth_section.margin_m,
                     self._view,
                 )
             )
@@ -310,7 +311,7 @@ class Engagements:
             outcomes=tuple(
                 _outcome(*flags) for flags in zip(miss > self.scenario.nominal_range_m, lost, self._spent, strict=True)
             ),
-            truth_kept=margin >= 0.0,
+            truth_kept=margin.filled(0.0) >= 0.0,
             truth_margin_m=margin,
             position_m=self._draws.position_m,
             velocity_m_s=self._draws.velocity_m_s,

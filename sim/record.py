@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from guidance import MeasurementNoise, Strategy
 from infoset import Section
+from infoset.information_set_view import MaskedFloats
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.results import Results
@@ -33,8 +34,8 @@ class StepRecord:
         Impulse k given in this step.
     predicted_miss_m : tuple of float, or None
         (pi_*, pi^*) after the measurement and before the impulse; None where no set is left.
-    truth_margin_m : float
-        Signed margin of the truth in its own section, as of the last measurement.
+    truth_margin_m : float or None
+        Signed margin of the truth in its own section, as of the last measurement; None before the first.
     sections : tuple of Section
         The living sections after the measurement, in rising order of range.
     """
@@ -48,7 +49,7 @@ class StepRecord:
     true_range_m: float
     impulse_m_s: float
     predicted_miss_m: tuple[float, float] | None
-    truth_margin_m: float
+    truth_margin_m: float | None
     sections: tuple[Section, ...]
 
 
@@ -113,27 +114,26 @@ class _Recorder:
     steps: list[StepRecord] = field(default_factory=list)
 
     def __call__(self, step: Step) -> None:
-        measured = bool(step.tracking[0]) or bool(step.measured_angle_rad is not None)
         miss = step.predicted_miss
         self.steps.append(
             StepRecord(
                 time_s=step.time_s,
-                measured_angle_rad=_first(step.measured_angle_rad) if measured else None,
-                measured_range_m=_first(step.measured_range_m) if measured else None,
-                measured_rate_rad_s=_first(step.measured_rate_rad_s) if measured else None,
+                measured_angle_rad=_first(step.measured_angle_rad),
+                measured_range_m=_first(step.measured_range_m),
+                measured_rate_rad_s=_first(step.measured_rate_rad_s),
                 true_angle_rad=float(step.sight.alpha_rad[0]),
                 true_rate_rad_s=float(step.sight.omega_rad_s[0]),
                 true_range_m=float(step.sight.range_m[0]),
                 impulse_m_s=float(step.impulse_m_s[0]),
                 predicted_miss_m=(float(miss.lower_m[0]), float(miss.upper_m[0])) if miss.exists[0] else None,
-                truth_margin_m=float(step.truth_margin_m[0]),
+                truth_margin_m=_first(step.truth_margin_m),
                 sections=tuple(step.information.sections()),
             )
         )
 
 
-def _first(values: Floats | None) -> float | None:
-    return None if values is None else float(values[0])
+def _first(values: Floats | MaskedFloats | None) -> float | None:
+    return None if values is None else values[:1].tolist()[0]
 
 
 def fly_one(
@@ -174,6 +174,6 @@ def fly_one(
             progress(min(1.0, flight.step / draws.angle.shape[1]))
     name = scenario.strategy if strategy is None else type(strategy).__name__
     own = None if noise is None else getattr(noise, "name", type(noise).__name__)
-    (step,), (label,) = flight.inconsistency
-    found = Inconsistency(int(step), float(label)) if step >= 0 else None
+    step, label = flight.inconsistency
+    found = Inconsistency(int(step[0]), float(label[0])) if step.count() else None
     return Record(scenario, seed, run, name, flight.results(np.array([run])), tuple(recorder.steps), own, found)

@@ -9,6 +9,8 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from infoset.information_set_view import MaskedFloats
+
 Floats = NDArray[np.float64]
 
 
@@ -18,7 +20,10 @@ class Outcome(Enum):
     INTERCEPTED = "intercepted"
     """Flown to the closest approach with a set, or with none needed any more."""
     SET_LOST = "set-lost"
-    """The set emptied while no hypothesis had left it: measurements and model disagree; no impulse after that."""
+    """The set emptied while no hypothesis had left it: measurements and model disagree.
+
+    With recovery the engagement goes on from the last consistent set, widened; without it no impulse is given after.
+    """
     BUDGET_SPENT = "budget-spent"
     """Less than the least impulse was left while the strategy wanted more."""
     DIVERGED = "diverged"
@@ -44,8 +49,8 @@ class Results:
     outcomes : tuple of Outcome
     truth_kept : ndarray of bool, shape (B,)
         Whether the truth was inside its own section after every measurement.
-    truth_margin_m : ndarray, shape (B,)
-        Least signed margin of the truth in its section, m.
+    truth_margin_m : masked array, shape (B,)
+        Least signed margin of the truth in its section, m; masked where nothing was measured.
     position_m, velocity_m_s : ndarray, shape (B, 2)
         Where the truth started: (z, x) and (V_z, V_x).
     guarantees : bool
@@ -55,10 +60,10 @@ class Results:
     runs: NDArray[np.int64]
     miss_m: Floats
     impulse_m_s: Floats
-    guaranteed_miss_m: np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]
+    guaranteed_miss_m: MaskedFloats
     outcomes: tuple[Outcome, ...]
     truth_kept: NDArray[np.bool_]
-    truth_margin_m: Floats
+    truth_margin_m: MaskedFloats
     position_m: Floats
     velocity_m_s: Floats
     guarantees: bool = False
@@ -88,14 +93,17 @@ def join(parts: Sequence[Results]) -> Results:
         np.concatenate([part.runs for part in parts]),
         np.concatenate([part.miss_m for part in parts]),
         np.concatenate([part.impulse_m_s for part in parts]),
-        np.ma.MaskedArray(
-            np.concatenate([part.guaranteed_miss_m.data for part in parts]),
-            mask=np.concatenate([part.guaranteed_miss_m.mask for part in parts]),
-        ),
+        _joined([part.guaranteed_miss_m for part in parts]),
         tuple(outcome for part in parts for outcome in part.outcomes),
         np.concatenate([part.truth_kept for part in parts]),
-        np.concatenate([part.truth_margin_m for part in parts]),
+        _joined([part.truth_margin_m for part in parts]),
         np.concatenate([part.position_m for part in parts]),
         np.concatenate([part.velocity_m_s for part in parts]),
         all(part.guarantees for part in parts),
+    )
+
+
+def _joined(parts: Sequence[MaskedFloats]) -> MaskedFloats:
+    return np.ma.MaskedArray(
+        np.concatenate([part.data for part in parts]), mask=np.concatenate([np.ma.getmaskarray(part) for part in parts])
     )

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import SetModel
+from infoset.information_set_view import MaskedFloats
 from infoset.section_law import BOUND_SLACK, section_law
 from infoset.section_stack import SectionStack
 from sim.kepler import Sight
@@ -39,8 +40,18 @@ class TruthSection:
         self._stack = SectionStack(law, labels[:, None], np.ones(len(labels), dtype=np.int64))
         self._elapsed = 0
         self._everywhere = np.ones(len(labels), dtype=bool)
-        self.margin_m = np.full(len(labels), np.inf)
-        self.least_margin_m = np.full(len(labels), np.inf)
+        self._margin = np.full(len(labels), np.inf)
+        self._least_margin = np.full(len(labels), np.inf)
+
+    @property
+    def margin_m(self) -> MaskedFloats:
+        """Signed margin of each truth as of its last measurement, m; masked where nothing was measured yet."""
+        return _if_measured(self._margin)
+
+    @property
+    def least_margin_m(self) -> MaskedFloats:
+        """Least of the signed margins so far, m; masked where nothing was measured yet."""
+        return _if_measured(self._least_margin)
 
     def measure(
         self, alpha_rad: Floats | None, omega_rad_s: Floats | None, rate_error_rad_s: float, where: Flags, sight: Sight
@@ -62,8 +73,8 @@ class TruthSection:
         margin = np.where(self._stack.living[:, 0], margin, self._stack.sections.overlaps[:, 0])
         # The truth's own label is known to half an ulp, and its z and V as well as that.
         margin += LABEL_ROUNDING * self._stack.labels[:, 0] * np.abs(slope)
-        self.margin_m = np.where(where, margin, self.margin_m)
-        self.least_margin_m = np.minimum(self.least_margin_m, self.margin_m)
+        self._margin = np.where(where, margin, self._margin)
+        self._least_margin = np.minimum(self._least_margin, self._margin)
 
     def shift(self, impulse_m_s: Floats) -> None:
         """Shift by an impulse."""
@@ -73,3 +84,8 @@ class TruthSection:
         """Move one step on."""
         self._elapsed += 1
         self._stack.predict(self._everywhere, self._elapsed)
+
+
+def _if_measured(margin: Floats) -> MaskedFloats:
+    never = np.isinf(margin)
+    return np.ma.MaskedArray(np.where(never, 0.0, margin), mask=never)

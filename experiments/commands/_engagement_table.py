@@ -46,7 +46,7 @@ def show_engagements(records: Sequence[Record], stdout_taken: bool) -> None:
                 number(payoffs(result)[0]),
                 _outcome(record),
                 certificate(result),
-                number(float(result.truth_margin_m[0])),
+                number(result.truth_margin_m.tolist()[0]),
                 str(len(record.steps)),
                 f"{record.seed}, {record.run}",
                 record.strategy,

@@ -220,7 +220,7 @@ def _summary(record: Record, elapsed_s: float, warnings: Sequence[str]) -> dict[
         "guaranteed_miss_m": payoffs(result)[0],
         "outcome": result.outcomes[0].value,
         "truth_kept": bool(result.truth_kept[0]),
-        "truth_margin_m": _finite(float(result.truth_margin_m[0])),
+        "truth_margin_m": result.truth_margin_m.tolist()[0],
         "phi_held": held(result)[0],
         "inconsistency": None if record.inconsistency is None else _where(record, record.inconsistency),
         "steps": [
@@ -234,7 +234,7 @@ def _summary(record: Record, elapsed_s: float, warnings: Sequence[str]) -> dict[
                 "impulse_m_s": step.impulse_m_s,
                 "predicted_miss_m": None if step.predicted_miss_m is None else list(step.predicted_miss_m),
                 "sections": len(step.sections),
-                "truth_margin_m": _finite(step.truth_margin_m),
+                "truth_margin_m": step.truth_margin_m,
             }
             for step in record.steps
         ],
@@ -244,10 +244,6 @@ def _summary(record: Record, elapsed_s: float, warnings: Sequence[str]) -> dict[
 def _where(record: Record, found: Inconsistency) -> dict[str, object]:
     """Say at which step, and at which hypothesis, the data contradicted the model."""
     return {"step": found.step, "t_s": record.steps[found.step].time_s, "label_km": found.label_m / 1e3}
-
-
-def _finite(value: float) -> float | None:
-    return value if abs(value) < float("inf") else None
 
 
 def _rows(records: Sequence[Record]) -> list[list[Cell]]:
@@ -269,7 +265,7 @@ def _rows(records: Sequence[Record]) -> list[list[Cell]]:
                     step.impulse_m_s,
                     lower,
                     upper,
-                    _finite(step.truth_margin_m),
+                    step.truth_margin_m,
                     len(step.sections),
                 ]
             )

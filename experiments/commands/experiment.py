@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from experiments.curves import Curve
     from experiments.output import Cell
-    from sim import Results, Scenario
+    from sim import Scenario
 
 FIGURE = "figure-4-distributions"
 LEVELS = (0.1, 0.5, 0.9, 0.99)
@@ -173,16 +173,12 @@ def _summary(
                 "guaranteed_miss_m": payoffs(curve.results),
                 "outcome": [outcome.value for outcome in curve.results.outcomes],
                 "truth_kept": curve.results.truth_kept.tolist(),
-                "truth_margin_m": _margins(curve.results),
+                "truth_margin_m": curve.results.truth_margin_m.tolist(),
                 "phi_held": held(curve.results),
             }
             for curve in curves
         ],
     }
-
-
-def _margins(results: Results) -> list[float | None]:
-    return [margin if abs(margin) < float("inf") else None for margin in results.truth_margin_m.tolist()]
 
 
 def _rows(curves: Sequence[Curve]) -> list[list[Cell]]:
@@ -191,7 +187,7 @@ def _rows(curves: Sequence[Curve]) -> list[list[Cell]]:
     rows: list[list[Cell]] = []
     for curve in curves:
         results, guaranteed = curve.results, payoffs(curve.results)
-        margins, phi_held = _margins(results), held(results)
+        margins, phi_held = results.truth_margin_m.tolist(), held(results)
         for i in range(len(results)):
             rows.append(
                 [

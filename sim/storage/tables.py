@@ -17,7 +17,7 @@ from sim.chunk import Chunk
 from sim.results import Outcome, Results
 from sim.storage.parquet_pages import claimed_bytes
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 M_PER_KM = 1e3
 MOST_BYTES_A_ROW = 120
 """A row takes about 80, and would take 115 with its text written out."""
@@ -32,7 +32,7 @@ _COLUMNS: tuple[tuple[str, Any, str, str], ...] = (
     ("impulse_m_s", pa.float64(), "m/s", "sum of the sizes of the impulses"),
     ("guaranteed_miss_m", pa.float64(), "m", "Phi; null where it is not known or was not kept"),
     ("outcome", pa.string(), "", "how the engagement ended"),
-    ("truth_margin", pa.float64(), "m", "least margin of the truth in its section; null where nothing was measured"),
+    ("truth_margin_m", pa.float64(), "m", "least margin of the truth in its section; null where nothing was measured"),
     ("z_km", pa.float64(), "km", "where the truth started, across"),
     ("x_km", pa.float64(), "km", "where the truth started, along"),
     ("vz_km_s", pa.float64(), "km/s", "its speed across"),
@@ -45,7 +45,7 @@ _TEXTS: Mapping[str, frozenset[str | None]] = {
 }
 """Columns of text, and all that they can say."""
 _CELL = ("cell", pa.int32(), "", "number of the cell of the sweep")
-_NULLABLE = ("tie", "guaranteed_miss_m", "truth_margin")
+_NULLABLE = ("tie", "guaranteed_miss_m", "truth_margin_m")
 
 
 def schema(*, with_cell: bool) -> Any:
@@ -95,7 +95,7 @@ def rows(chunk: Chunk, results: Results, *, with_cell: bool) -> Any:
         "impulse_m_s": results.impulse_m_s,
         "guaranteed_miss_m": pa.array(guaranteed.filled(0.0), mask=np.ma.getmaskarray(guaranteed)),
         "outcome": [outcome.value for outcome in results.outcomes],
-        "truth_margin": pa.array(np.where(np.isfinite(margin), margin, 0.0), mask=~np.isfinite(margin)),
+        "truth_margin_m": pa.array(margin.filled(0.0), mask=np.ma.getmaskarray(margin)),
         "z_km": results.position_m[:, 0] / M_PER_KM,
         "x_km": results.position_m[:, 1] / M_PER_KM,
         "vz_km_s": results.velocity_m_s[:, 0] / M_PER_KM,

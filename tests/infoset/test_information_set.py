@@ -8,7 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from infoset import AngleSensor, ConvexPolygons, InformationSet, InitialSet, Recovery, SetModel, SetStatus, StateBox
+from infoset import (
+    AngleSensor,
+    ConvexPolygons,
+    InformationSet,
+    InitialSet,
+    Model,
+    Recovery,
+    SetModel,
+    SetStatus,
+    StateBox,
+)
 
 E, STEP = 58e3, 0.5
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)
@@ -162,7 +172,7 @@ def test_inconsistent_measurements_are_told_and_the_set_goes_on_from_the_last_co
     information.measure_angle([0.0012, -0.0012])
     assert information.inconsistent.tolist() == [False, True]
     step, label = information.inconsistency
-    assert step.tolist() == [-1, 0]
+    assert step.tolist() == [None, 0]
     assert MODEL.bounds.x_m[0] <= label[1] <= MODEL.bounds.x_m[1]
     assert information.status == [SetStatus.TRACKING, SetStatus.TRACKING]
     # As before the measurement, and wider by what one measurement may err: e b in V, which is x b of miss.
@@ -184,7 +194,7 @@ def test_without_recovery_an_inconsistent_set_stays_empty() -> None:
     information.measure_angle([0.0012, -0.0012])
     assert information.status == [SetStatus.TRACKING, SetStatus.EMPTY]
     assert information.inconsistent.tolist() == [False, True]
-    assert information.inconsistency[0].tolist() == [-1, 0]
+    assert information.inconsistency[0].tolist() == [None, 0]
     for _ in range(3):
         information.predict()
         information.measure_angle(0.001)
@@ -234,6 +244,38 @@ def test_a_view_follows_the_set_and_a_copy_does_not() -> None:
     assert not hasattr(view, "measure_angle")
     with pytest.raises(ValueError, match="read-only"):
         view.labels_m[0, 0] = 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        view.living[0, 0] = False
+
+
+@pytest.mark.parametrize("recovery", list(Recovery))
+def test_a_copy_of_a_view_goes_on_as_the_set_does(recovery: Recovery) -> None:
+    """Labels have left, then comes a contradiction: what has left decides what becomes of the set."""
+    information = InformationSet(replace(MODEL, kind=Model.GUARANTEED, initial_set=InitialSet.BOX, recovery=recovery))
+    while not information.guaranteed_miss()[1].any():
+        information.drop_below_threshold()
+        information.predict()
+    information.measure_angle(0.0)
+    copies = information.copy(), information.view().copy()
+    for each in copies:
+        each.measure_angle(1.2)
+    straight, by_view = copies
+    assert by_view.status == straight.status == [SetStatus.REFUTED]
+    assert by_view.inconsistent.tolist() == straight.inconsistent.tolist() == [False]
+    np.testing.assert_array_equal(by_view.guaranteed_miss(), straight.guaranteed_miss())
+
+
+@pytest.mark.parametrize(("range_m", "nearest"), [(5.0e6, "least"), (6.5e6, "greatest")])
+def test_a_range_that_contradicts_names_the_living_label_nearest_to_it(range_m: float, nearest: str) -> None:
+    information = InformationSet(MODEL)
+    information.measure_range(5.5e6, 1e-3)
+    living = information.labels_m[information.living]
+    information.measure_range(range_m, 1e-3)
+    (step,), (label,) = information.inconsistency
+    assert step == 0
+    # The limits stand a little outside the outermost sections' labels.
+    wanted = living.min() if nearest == "least" else living.max()
+    assert label == pytest.approx(wanted, rel=1e-3)
 
 
 def test_shapely_and_margin_agree_on_what_is_inside() -> None:

@@ -50,7 +50,7 @@ from sim.versions import VersionError
 from sim.worker_processes import worker_processes
 
 COLUMNS = [
-    *("run", "noise", "tie", "range_meter", "miss_m", "impulse_m_s", "guaranteed_miss_m", "outcome", "truth_margin"),
+    *("run", "noise", "tie", "range_meter", "miss_m", "impulse_m_s", "guaranteed_miss_m", "outcome", "truth_margin_m"),
     *("z_km", "x_km", "vz_km_s", "vx_km_s"),
 ]
 
@@ -104,7 +104,7 @@ def test_rows_are_those_of_simulate(brief: Scenario, reference: Any) -> None:
         assert rows.column("miss_m").to_pylist() == flown.miss_m[first::2].tolist()
         assert rows.column("impulse_m_s").to_pylist() == flown.impulse_m_s[first::2].tolist()
         assert rows.column("outcome").to_pylist() == [each.value for each in flown.outcomes[first::2]]
-        assert rows.column("truth_margin").to_pylist() == flown.truth_margin_m[first::2].tolist()
+        assert rows.column("truth_margin_m").to_pylist() == flown.truth_margin_m[first::2].tolist()
         guaranteed = flown.guaranteed_miss_m[first::2]
         assert rows.column("guaranteed_miss_m").to_pylist() == guaranteed.tolist()
         for place, column in enumerate(("z_km", "x_km")):
@@ -115,10 +115,10 @@ def test_rows_are_those_of_simulate(brief: Scenario, reference: Any) -> None:
 
 def test_columns_carry_their_units(reference: Any) -> None:
     units = {field.name: field.metadata[b"unit"].decode() for field in reference.schema}
-    assert units["miss_m"] == units["truth_margin"] == "m"
+    assert units["miss_m"] == units["truth_margin_m"] == "m"
     assert units["impulse_m_s"] == "m/s"
     assert (units["x_km"], units["vx_km_s"]) == ("km", "km/s")
-    assert reference.schema.metadata[b"infoset_schema"] == b"1"
+    assert reference.schema.metadata[b"infoset_schema"] == b"2"
     assert all(field.metadata[b"meaning"] for field in reference.schema)
 
 

@@ -1,0 +1,26 @@
+"""What the record of one engagement keeps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from guidance import LineOfSight, Measurement
+from infoset import InformationSetView, RangeSensor, Recovery
+from sim import Outcome, Scenario, fly_one
+
+
+class RangeAlone:
+    """Gives no angle, and a range that no hypothesis allows."""
+
+    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
+        return Measurement(None, 10.0 * sight.range_m)
+
+
+def test_the_measurement_that_empties_the_set_for_good_is_kept(brief: Scenario) -> None:
+    model = replace(brief.set_model, recovery=Recovery.NONE)
+    ranging = replace(brief, set_model=model, range_sensor=RangeSensor(model.step_s, 1e-3))
+    record = fly_one(ranging, noise=RangeAlone())
+    first, later = record.steps[0], record.steps[1]
+    assert record.result.outcomes == (Outcome.SET_LOST,)
+    assert (first.measured_angle_rad, first.measured_range_m) == (None, 10.0 * first.true_range_m)
+    assert (later.measured_angle_rad, later.measured_range_m) == (None, None)
