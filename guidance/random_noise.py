@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.noise import LineOfSight, Measurement
+from guidance.scripted_noise import measure_with_errors
 from infoset import InformationSetView
 
 Floats = NDArray[np.float64]
@@ -22,7 +23,7 @@ class RandomNoise:
     angle_draws, range_draws : ndarray, shape (B, steps)
         Uniform in [-1, 1]; the error is the draw times the bound.
     rate_draws : ndarray, shape (B, steps), or None
-        The same for the angular rate, in [-1, 1]; None where there is no such sensor.
+        The same for the angular rate, in [-1, 1]; None is no error.
 
     References
     ----------
@@ -35,11 +36,6 @@ class RandomNoise:
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
         """Draw the measurements of a step; the set is not looked at."""
-        bound = sight.angle_sensor.error_bound(sight.range_m)
-        alpha = sight.alpha_rad + bound * self.angle_draws[:, sight.step]
-        distance = omega = None
-        if sight.range_error is not None:
-            distance = sight.range_m * (1.0 + sight.range_error * self.range_draws[:, sight.step])
-        if sight.rate_error_rad_s is not None and sight.omega_rad_s is not None and self.rate_draws is not None:
-            omega = sight.omega_rad_s + sight.rate_error_rad_s * self.rate_draws[:, sight.step]
-        return Measurement(alpha, distance, omega)
+        step = sight.step
+        rate = None if self.rate_draws is None else self.rate_draws[:, step]
+        return measure_with_errors(sight, self.angle_draws[:, step], self.range_draws[:, step], rate)

@@ -26,12 +26,10 @@ from infoset.chains import (
     begin_of,
     end_of,
     origin_height,
-    place,
     place_in,
     put,
     read,
     rise,
-    sign_of,
     vertex,
     write,
 )
@@ -305,12 +303,6 @@ def cut(
         marks[n, LEFT, END] = left_last + 1
         marks[n, RIGHT, BEGIN] = right_first
     return True, overlap
-
-
-@substituted
-def miss_of(rings: Floats, marks: Integers, n: int, side: int, i: int) -> float:
-    """Predicted miss of a vertex over that of its chain's origin, counted outward."""
-    return float(sign_of(side) * read(rings, place(marks, n, side, i))[1])
 
 
 @inlined

@@ -139,6 +139,10 @@ class SetModel:
             return self.disturbance_m_s2
         return (self.disturbance_m_s2 + self.gravity_m_s2) / (1.0 - self.speed_error)
 
+    def steps_in(self, period_s: float) -> int:
+        """Number of steps from one measurement to the next, at least one."""
+        return max(1, round(period_s / self.step_s))
+
     @property
     def label_limits_m(self) -> Interval:
         """Least and greatest label of a truth, m: its range at t = 0 divided by 1 + eta."""

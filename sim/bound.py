@@ -138,23 +138,9 @@ class LowerBound:
         return np.array([each.label_m for each in found]), np.array([each.bound_m for each in found])
 
 
-def possible_acceleration_m_s2(scenario: Scenario) -> float:
-    """Acceleration along z that tells a truth of a scenario from another, m/s^2: the target's manoeuvre.
-
-    Notes
-    -----
-    Gravity is no choice of the truth's: at one label it acts on both truths of a pair alike but for about K/R^3 times
-    their distance, 1e-11 m/s^2 here. Were it as free as the set takes it to be (up to 1.5 K/R^3 times the range,
-    4e-7 m/s^2), the published scenario's bound would be higher by 4e-5 m, and the pair flown under gravity as it is
-    would not be admissible.
-    """
-    return scenario.set_model.disturbance_m_s2
-
-
 def lower_bound(
     scenario: Scenario,
     *,
-    disturbance_m_s2: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> LowerBound:
     """Find the greatest miss that no strategy can guarantee to stay below.
@@ -163,8 +149,6 @@ def lower_bound(
     ----------
     scenario : Scenario
         Its range meter does not matter: the two truths have the same range.
-    disturbance_m_s2 : float or None
-        Acceleration along z that a truth may have, m/s^2; None is what the scenario says.
     progress : callable or None
         Is told the fraction done, from 0 to 1.
 
@@ -190,8 +174,10 @@ def lower_bound(
     along z of the two at x = 0 is thus at least |dz(T)| - 2 mu2 sum_{j > s} x_j / |V_x|, and one of them misses by at
     least half of it. Of impulses the budget allows, the earliest count: they move the miss most.
     """
-    allowed = possible_acceleration_m_s2(scenario) if disturbance_m_s2 is None else disturbance_m_s2
     model = scenario.set_model
+    # The target's manoeuvre is what tells one truth from another. Gravity is no choice of theirs: at one label it acts
+    # on both of a pair alike but for about K/R^3 times their distance, 1e-11 m/s^2 here.
+    allowed = model.disturbance_m_s2
     slow, fast = max(model.bounds.vx_m_s), min(model.bounds.vx_m_s)
     speeds = sorted({fast, min(max(-model.closing_speed_m_s, fast), slow), slow})
     grids = [label_grid(scenario, speed) for speed in speeds]
@@ -240,7 +226,7 @@ def label_grid(scenario: Scenario, vx_m_s: float) -> Floats:
         m, in rising order; all periods where they are few.
     """
     lower, upper = scenario.set_model.bounds.x_m
-    period = -vx_m_s * scenario.set_model.step_s * _every(scenario.set_model.angle_sensor.period_s, scenario)
+    period = -vx_m_s * scenario.set_model.step_s * scenario.set_model.steps_in(scenario.set_model.angle_sensor.period_s)
     whole = max(1, int(np.ceil((upper - lower) / period)))
     if whole <= PERIODS_LOOKED_AT:
         return np.unique(np.linspace(lower, upper, whole * LABELS_A_PERIOD + 1))
@@ -332,13 +318,13 @@ class _Approach:
         self.times_s = np.append(np.arange(self.steps) * model.step_s, self.arrival_s)
         self.ranges_m = np.maximum(label_m + vx_m_s * self.times_s[:-1], 0.0)
         self.limits_m = np.full(self.steps, np.inf)
-        looked = np.arange(0, self.steps, _every(model.angle_sensor.period_s, scenario))
+        looked = np.arange(0, self.steps, scenario.set_model.steps_in(model.angle_sensor.period_s))
         self.limits_m[looked] = (
             2.0 * (1.0 - MARGIN) * model.angle_sensor.error_bound(self.ranges_m[looked]) * self.ranges_m[looked]
         )
         self.rate_limits_m = np.full(self.steps, np.inf)
         if scenario.rate_sensor is not None:
-            rated = np.arange(0, self.steps, _every(scenario.rate_sensor.period_s, scenario))
+            rated = np.arange(0, self.steps, scenario.set_model.steps_in(scenario.rate_sensor.period_s))
             error_m_s = (1.0 - MARGIN) * scenario.rate_sensor.error_rad_s * self.ranges_m[rated]
             self.rate_limits_m[rated] = 2.0 * error_m_s * self.ranges_m[rated] / -vx_m_s
 
@@ -481,7 +467,3 @@ def _sparse(shape: tuple[int, int], *entries: tuple[Integers, Integers, Floats |
     columns = np.concatenate([each[1] for each in entries])
     values = np.concatenate([np.broadcast_to(each[2], each[0].shape) for each in entries])
     return csc_array((values, (rows, columns)), shape=shape)
-
-
-def _every(period_s: float, scenario: Scenario) -> int:
-    return max(1, round(period_s / scenario.set_model.step_s))

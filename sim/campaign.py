@@ -10,7 +10,7 @@ from typing import Any
 
 from guidance import Strategy
 from sim.plan import CampaignNoise, Plan, chunk_size, with_noise
-from sim.scenario import Scenario
+from sim.scenario import Scenario, strategy_name
 from sim.statistics import QuantileEstimate, estimate_quantiles
 from sim.stopping_rule import StoppingRule
 from sim.storage import CampaignFolder, Damage, Manifest, StorageError, read_manifest
@@ -46,20 +46,21 @@ class CampaignResult:
         """All rows as a pandas.DataFrame; pandas must be installed, and nothing else here needs it."""
         return self.table.to_pandas()
 
-    def quantile(self, quantity: str, level: float, confidence: float = 0.95) -> QuantileEstimate:
+    def quantile(self, quantity: str, level: float) -> QuantileEstimate:
         """Return a quantile of a quantity over all rows where it is known.
 
         Parameters
         ----------
         quantity : str
             Name of a column of numbers.
-        level, confidence : float
+        level : float
+            In (0, 1).
 
         Returns
         -------
         QuantileEstimate
         """
-        (found,) = estimate_quantiles(self.folder.numbers(quantity).compressed(), [level], confidence)
+        (found,) = estimate_quantiles(self.folder.numbers(quantity).compressed(), [level])
         return found
 
     def __len__(self) -> int:
@@ -198,10 +199,3 @@ def chunk_of(folder: Path, chunk: int | None, runs: int) -> int:
         return read_manifest(folder).chunk
     except StorageError:
         return chunk_size(runs)
-
-
-def strategy_name(scenario: Scenario, own: Strategy | None) -> str:
-    """Return what a manifest calls the strategy flown."""
-    if own is None:
-        return scenario.strategy
-    return f"{type(own).__module__}.{type(own).__qualname__}"

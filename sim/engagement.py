@@ -119,9 +119,9 @@ class Engagements:
         self._view = self._information.view()
         self._truth_section = TruthSection(model, arrival_s)
         self._arrival_s = arrival_s
-        self._angle_every = _steps_in(scenario.set_model.angle_sensor.period_s, scenario)
-        self._range_every = _steps_in(scenario.range_sensor.period_s, scenario) if scenario.range_sensor else 0
-        self._rate_every = _steps_in(scenario.rate_sensor.period_s, scenario) if scenario.rate_sensor else 0
+        self._angle_every = scenario.set_model.steps_in(scenario.set_model.angle_sensor.period_s)
+        self._range_every = scenario.set_model.steps_in(scenario.range_sensor.period_s) if scenario.range_sensor else 0
+        self._rate_every = scenario.set_model.steps_in(scenario.rate_sensor.period_s) if scenario.rate_sensor else 0
         self._flying = np.ones(batch, dtype=bool)
         self._tracking = np.ones(batch, dtype=bool)
         self._miss = np.full(batch, np.inf)
@@ -331,7 +331,3 @@ def _make_noise(scenario: Scenario, draws: Draws) -> MeasurementNoise:
     if scenario.noise is NoiseKind.GAME:
         return GameNoise(scenario.tie, draws.tie)
     return RandomNoise(draws.angle, draws.range, draws.rate)
-
-
-def _steps_in(period_s: float, scenario: Scenario) -> int:
-    return max(1, round(period_s / scenario.set_model.step_s))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,8 +76,6 @@ def fly_pair(
     scenario: Scenario,
     pair: TruthPair,
     strategy: Strategy | None = None,
-    *,
-    progress: Callable[[float], None] | None = None,
 ) -> PairFlight:
     """Fly two truths that cannot be told apart until it is late.
 
@@ -89,8 +86,6 @@ def fly_pair(
     pair : TruthPair
     strategy : Strategy or None
         None is the scenario's own.
-    progress : callable or None
-        Is told the fraction done, from 0 to 1.
 
     Returns
     -------
@@ -107,12 +102,10 @@ def fly_pair(
     nothing = np.zeros((2, steps))
     draws = Draws(pair.position_m, pair.velocity_m_s, nothing, nothing, nothing)
     model = scenario.set_model
-    noise = PairNoise(pair.last_common_step, max(1, round(model.angle_sensor.period_s / model.step_s)))
+    noise = PairNoise(pair.last_common_step, model.steps_in(model.angle_sensor.period_s))
     truth = ScheduledMotion(pair.position_m, pair.velocity_m_s, scenario.sun, pair.acceleration_m_s2)
     flight = Engagements(scenario, draws, strategy, truth, noise)
     impulses: list[Floats] = []
     while flight.flying:
         flight.advance(lambda step: impulses.append(np.where(step.tracking, step.impulse_m_s, 0.0)))
-        if progress is not None:
-            progress(min(1.0, flight.step / steps))
     return PairFlight(flight.results(np.arange(2)), np.array(impulses), noise.greatest_share)

@@ -14,7 +14,7 @@ from infoset.information_set_view import MaskedFloats
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.results import Results
-from sim.scenario import Scenario
+from sim.scenario import Scenario, strategy_name
 
 Floats = NDArray[np.float64]
 
@@ -172,7 +172,7 @@ def fly_one(
         flight.advance(recorder)
         if progress is not None:
             progress(min(1.0, flight.step / draws.angle.shape[1]))
-    name = scenario.strategy if strategy is None else type(strategy).__name__
+    name = strategy_name(scenario, strategy)
     own = None if noise is None else getattr(noise, "name", type(noise).__name__)
     step, label = flight.inconsistency
     found = Inconsistency(int(step[0]), float(label[0])) if step.count() else None

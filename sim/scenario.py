@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from guidance.noise import NoiseKind, TieRule
+from guidance.strategy import Strategy
 from guidance.thruster import Thruster
 from infoset.model import SetModel, StateBox
 from infoset.sensors import RangeSensor, RateSensor
@@ -107,3 +108,10 @@ class Scenario:
     tie: TieRule = TieRule.UPPER
     rate_sensor: RateSensor | None = None
     target: Target | None = None
+
+
+def strategy_name(scenario: Scenario, own: Strategy | None) -> str:
+    """Return what files call the strategy flown: its registered name, or module and class of one's own."""
+    if own is None:
+        return scenario.strategy
+    return f"{type(own).__module__}.{type(own).__qualname__}"

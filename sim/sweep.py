@@ -9,10 +9,10 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 
-from sim.campaign import CampaignResult, chunk_of, strategy_name
+from sim.campaign import CampaignResult, chunk_of
 from sim.fingerprint import scenario_hash
 from sim.plan import CampaignNoise, Plan, with_noise
-from sim.scenario import Scenario
+from sim.scenario import Scenario, strategy_name
 from sim.storage import Axis, CampaignFolder, Manifest
 from sim.stored_flight import Progress, fly_into
 from sim.versions import calculating_versions

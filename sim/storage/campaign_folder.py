@@ -108,16 +108,16 @@ class CampaignFolder:
             found = read_manifest(path) if (path / MANIFEST).is_file() else None
             begun = replace(manifest, made_by=made_here())
             folder_manifest = begun if found is None else _continued(found, manifest, path)
-            if found is not None and found.runs < folder_manifest.runs:
-                _drop_partial_shard(path, found)
+            if found is not None:
+                _take_back(path / SHARDS)
+                if found.runs < folder_manifest.runs:
+                    _drop_partial_shard(path, found)
             if found != folder_manifest:
                 write_manifest(path, folder_manifest)
             for name, text in (beside or {}).items():
                 write_whole(path / name, text.encode())
             with reporting(path):
                 (path / SHARDS / BEYOND).mkdir(parents=True, exist_ok=True)
-                for kept in (path / SHARDS / BEYOND).iterdir():
-                    kept.replace(path / SHARDS / kept.name)
             clear_leftovers(path / SHARDS)
             yield cls(path, folder_manifest)
 
@@ -142,13 +142,13 @@ class CampaignFolder:
         return cls(path, read_manifest(path))
 
     @property
-    def chunks_a_cell(self) -> int:
+    def wanted_chunks_a_cell(self) -> int:
         """Shards that the wanted runs of a cell make."""
         return -(-self.manifest.wanted_runs // self.manifest.chunk)
 
     @property
-    def stride(self) -> int:
-        """Numbers of chunks from one cell to the next."""
+    def chunks_a_cell(self) -> int:
+        """How many chunks all runs of a cell make: from the number of one cell's first to that of the next."""
         return -(-self.manifest.runs // self.manifest.chunk)
 
     @property
@@ -217,13 +217,12 @@ class CampaignFolder:
         )
         return content
 
-    def discard_damaged(self) -> list[Damage]:
-        """Take the damaged shards away, so that their chunks are flown again, and say which they were."""
+    def discard_damaged(self) -> None:
+        """Take the damaged shards away, so that their chunks are flown again."""
         for damage in self.damaged:
             with reporting(damage.file):
                 damage.file.unlink(missing_ok=True)
-        gone, self.damaged = self.damaged, []
-        return gone
+        self.damaged = []
 
     def stop_after(self, runs: int) -> None:
         """Note after how many runs a rule has stopped the campaign, and put aside what was flown beyond.
@@ -362,15 +361,16 @@ class CampaignFolder:
             ) from None
 
     def _size(self, index: int) -> int:
-        first = index % self.stride * self.manifest.chunk
+        first = index % self.chunks_a_cell * self.manifest.chunk
         return min(self.manifest.chunk, self.manifest.runs - first)
 
     def _is_wanted(self, index: int) -> bool:
-        return index % self.stride < self.chunks_a_cell and index < self.stride * self.manifest.cells
+        cell, place = divmod(index, self.chunks_a_cell)
+        return place < self.wanted_chunks_a_cell and cell < self.manifest.cells
 
     def _wanted(self, cell: int | None = None) -> list[int]:
         found: Iterable[int] = sorted(self._files)
-        return [each for each in found if self._is_wanted(each) and (cell is None or each // self.stride == cell)]
+        return [each for each in found if self._is_wanted(each) and cell in (None, each // self.chunks_a_cell)]
 
     def _scan(self) -> None:
         """Find the sound shards, and those that are not."""
@@ -480,6 +480,13 @@ def _continued(found: Manifest, given: Manifest, path: Path) -> Manifest:
             "as many, or choose another folder"
         )
     return replace(found, runs=given.runs, until=given.until, stopped_after=None)
+
+
+def _take_back(shards: Path) -> None:
+    """Put back what a rule put aside: it may be wanted now, and the shard that is not full may be among it."""
+    with reporting(shards):
+        for kept in (shards / BEYOND).glob("*"):
+            kept.replace(shards / kept.name)
 
 
 def _drop_partial_shard(path: Path, found: Manifest) -> None:

@@ -108,7 +108,7 @@ def test_a_record_of_ones_own_strategy(tmp_path: Path) -> None:
     flown = fly_one(load_scenario("asteroid-1997-single"), strategy=Idle())
     write_record(flown, tmp_path / "x.npz")
     found = read_record(tmp_path / "x.npz")
-    assert (found.strategy, found.scenario.strategy) == ("Idle", "symmetric-miss")
+    assert (found.strategy, found.scenario.strategy) == (f"{Idle.__module__}.Idle", "symmetric-miss")
     assert_same(found, flown)
 
 

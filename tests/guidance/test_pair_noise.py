@@ -9,7 +9,7 @@ from guidance.situation import Situation
 from infoset import AngleSensor, InformationSet, InformationSetView, RangeSensor, RateSensor, SetModel, StateBox
 from infoset.model import InitialSet, Model
 from sim import Scenario, Sun
-from sim.bound import TruthPair, lower_bound, possible_acceleration_m_s2
+from sim.bound import TruthPair, lower_bound
 from sim.pair import PairFlight, ScheduledMotion, fly_pair
 
 QUICK = 4
@@ -133,7 +133,7 @@ def left_out_m(scenario: Scenario, pair: TruthPair, flight: PairFlight) -> float
     shifts, and the difference of gravity between the two truths.
     """
     sideways = max(abs(each) for each in scenario.set_model.bounds.vz_m_s) + float(flight.results.impulse_m_s.max())
-    sideways += possible_acceleration_m_s2(scenario) * pair.arrival_s
+    sideways += scenario.set_model.disturbance_m_s2 * pair.arrival_s
     return (0.5 * (sideways / pair.vx_m_s) ** 2 + 1e-6) * pair.bound_m
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from guidance import Thruster
 from infoset import AngleSensor, RateSensor, SetModel, StateBox
 from sim import Scenario
-from sim.bound import TruthPair, label_grid, lower_bound, pair_at, possible_acceleration_m_s2
+from sim.bound import TruthPair, label_grid, lower_bound, pair_at
 
 NOMINAL_LABEL_M = 5801.3e3
 
@@ -147,11 +147,6 @@ def test_fewer_measurements_raise_the_bound(asteroid: Scenario) -> None:
     often, seldom = (pair_at(each, NOMINAL_LABEL_M, -58e3, 0.005) for each in (asteroid, slow))
     assert seldom.bound_m > often.bound_m
     assert (seldom.last_common_step + 1) % 4 == 0 or seldom.last_common_step == 200
-
-
-def test_what_a_truth_can_do(asteroid: Scenario) -> None:
-    assert possible_acceleration_m_s2(asteroid) == 0.005
-    assert possible_acceleration_m_s2(replace(asteroid, sun=None)) == 0.005
 
 
 def test_gravity_as_a_free_choice_would_hardly_matter(asteroid: Scenario) -> None:

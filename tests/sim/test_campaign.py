@@ -542,6 +542,16 @@ def test_a_rule_that_comes_later_takes_nothing_away(
     assert told[-1].flown == 0
 
 
+def test_a_shard_put_aside_that_is_not_full_is_no_damage_when_more_runs_are_asked(
+    brief: Scenario, rule: StoppingRule, stopped: Any, tmp_path: Path
+) -> None:
+    plain = replace(mixed(brief, tmp_path / "plain", 200), noise=None)
+    plain.run()
+    assert replace(plain, until=rule).run(resume=True).table.equals(stopped)
+    longer = replace(plain, runs=216).run(resume=True)
+    assert (len(longer), longer.redone) == (216, ())
+
+
 def test_a_rule_that_is_never_met_lets_all_runs_fly(brief: Scenario, tmp_path: Path) -> None:
     rule = StoppingRule(QuantileName("miss_m", 0.999), 1e-6)
     result = replace(mixed(brief, tmp_path, 64), until=rule).run()
