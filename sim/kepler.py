@@ -33,7 +33,7 @@ class Sight:
     range_m : ndarray, shape (B,)
         Distance between the centres of mass.
     slope, slope_rate_per_s : ndarray, shape (B,)
-        z/x, which is tan(alpha) without the rounding of the angle, and its rate.
+        z/x, which is tan(alpha) without the rounding of the angle, and its rate; zero where x is zero.
     """
 
     alpha_rad: Floats
@@ -126,13 +126,13 @@ class KeplerMotion:
     def sight(self) -> Sight:
         """Geometry now."""
         (z, x), (v_z, v_x) = self._motion[POSITION, :, RELATIVE], self._motion[VELOCITY, :, RELATIVE]
-        squared, slope = z * z + x * x, z / x
+        squared, slope = z * z + x * x, _ratio(z, x)
         return Sight(
             alpha_rad=np.arctan2(z, x),
-            omega_rad_s=(v_z * x - v_x * z) / squared,
+            omega_rad_s=_ratio(v_z * x - v_x * z, squared),
             range_m=np.sqrt(squared),
             slope=slope,
-            slope_rate_per_s=(v_z - v_x * slope) / x,
+            slope_rate_per_s=_ratio(v_z - v_x * slope, x),
         )
 
     def fire(self, impulse_m_s: Floats) -> None:
@@ -262,6 +262,11 @@ def closest_distance(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2
         moment = np.clip(moment - _dot(at, speed) / slope, 0.0, duration_s)
     at = position_m + moment * velocity_m_s + 0.5 * moment**2 * acceleration_m_s2
     return np.asarray(np.hypot(at[Z], at[X]))
+
+
+def _ratio(over: Floats, under: Floats) -> Floats:
+    """Quotient; zero where the divisor is: the object is just there, and no section has a range of zero."""
+    return np.divide(over, under, out=np.zeros_like(over), where=under != 0.0)
 
 
 def _dot(first: Floats, second: Floats) -> Floats:

@@ -112,3 +112,14 @@ def test_free_passage_in_free_space_is_the_distance_of_a_straight_line() -> None
     assert passage.passed[0]
     expected = abs(position[0, 0] * velocity[0, 1] - position[0, 1] * velocity[0, 0]) / np.hypot(*velocity[0])
     assert least == pytest.approx(expected, rel=1e-12)
+
+
+def test_an_object_that_is_just_beside_or_just_there_is_seen_without_a_warning() -> None:
+    """Round numbers bring it there at the end of a step: 29 km at 58 km/s in half a second."""
+    flight = KeplerMotion(np.array([[7.0, 29e3], [0.0, 29e3]]), np.array([[0.0, -58e3], [0.0, -58e3]]), None)
+    flight.advance(0.5)
+    sight = flight.sight()
+    assert sight.range_m.tolist() == [7.0, 0.0]
+    assert sight.alpha_rad.tolist() == [np.pi / 2, 0.0]
+    assert sight.omega_rad_s.tolist() == [58e3 / 7.0, 0.0]
+    assert sight.slope.tolist() == sight.slope_rate_per_s.tolist() == [0.0, 0.0]
