@@ -8,8 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rendezvous.relative_motion._circular import NODES, WEIGHTS, fill_gramians, fill_held_inputs, fill_transitions
-from rendezvous.relative_motion.frames import HILL, Frame, StateOrder
-from rendezvous.relative_motion.linear_motion import Segment, checked_durations, checked_rate, velocity_input
+from rendezvous.relative_motion.frames import HILL, Frame
+from rendezvous.relative_motion.linear_motion import (
+    Segment,
+    checked_durations,
+    checked_frame,
+    checked_rate,
+    velocity_input,
+)
 
 Floats = NDArray[np.float64]
 
@@ -41,8 +47,7 @@ class ClohessyWiltshire:
 
     def __post_init__(self) -> None:
         checked_rate(self.rate_rad_s)
-        if self.frame.order is not StateOrder.POSITION_THEN_VELOCITY:
-            raise ValueError(f"frame {self.frame.name}: motions have position before velocity; convert their results")
+        checked_frame(self.frame)
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A, the same at all times, shape (..., 6, 6)."""

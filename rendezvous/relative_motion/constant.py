@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import expm
 
 from rendezvous.relative_motion.frames import HILL, Frame
-from rendezvous.relative_motion.linear_motion import Segment, checked_durations, velocity_input
+from rendezvous.relative_motion.linear_motion import Segment, checked_durations, checked_frame, velocity_input
 
 Floats = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ class ConstantMotion:
     Raises
     ------
     ValueError
-        If A has another shape or is not finite.
+        If A has another shape or is not finite, or the frame interleaves positions and velocities.
 
     Notes
     -----
@@ -42,6 +42,7 @@ class ConstantMotion:
     def __post_init__(self) -> None:
         if np.shape(self.matrix) != (6, 6) or not np.isfinite(self.matrix).all():
             raise ValueError("A must be a finite matrix of shape (6, 6)")
+        checked_frame(self.frame)
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A, the same at all times, shape (..., 6, 6)."""

@@ -151,10 +151,16 @@ class EllipticOrbit:
         ----------
         time_s : float
         frame : Frame
+            Of states and controls; position before velocity.
 
         Returns
         -------
         ConstantMotion
+
+        Raises
+        ------
+        ValueError
+            If the frame interleaves positions and velocities.
         """
         return ConstantMotion(HILL.matrices_to(frame, self.dynamics(time_s)), frame)
 

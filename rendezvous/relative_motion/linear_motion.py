@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rendezvous.relative_motion.frames import Frame
+from rendezvous.relative_motion.frames import Frame, StateOrder
 
 Floats = NDArray[np.float64]
 
@@ -105,6 +105,22 @@ def checked_rate(rate_rad_s: float) -> None:
     """
     if not (np.isfinite(rate_rad_s) and rate_rad_s > 0.0):
         raise ValueError(f"the orbit rate must be positive and finite, found {rate_rad_s!r} rad/s")
+
+
+def checked_frame(frame: Frame) -> None:
+    """Refuse a frame whose states have no position before velocity.
+
+    Parameters
+    ----------
+    frame : Frame
+
+    Raises
+    ------
+    ValueError
+        If the frame interleaves positions and velocities.
+    """
+    if frame.order is not StateOrder.POSITION_THEN_VELOCITY:
+        raise ValueError(f"frame {frame.name}: motions have position before velocity; convert their results")
 
 
 def velocity_input(shape: tuple[int, ...]) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rendezvous.relative_motion.frames import HILL, Frame
-from rendezvous.relative_motion.linear_motion import Segment, checked_durations, velocity_input
+from rendezvous.relative_motion.linear_motion import Segment, checked_durations, checked_frame, velocity_input
 
 Floats = NDArray[np.float64]
 OfTime = Callable[[Floats], Floats]
@@ -47,6 +47,11 @@ class TimeVaryingMotion:
     drift_at : callable or None
         w, shape (k, 6); None is zero.
 
+    Raises
+    ------
+    ValueError
+        If the frame interleaves positions and velocities.
+
     Notes
     -----
     The adjoint Psi' = -A' Psi, Psi(end) = 1, is collocated backwards at 8 Gauss points a panel (order 16); Phi(end, t)
@@ -58,6 +63,9 @@ class TimeVaryingMotion:
     frame: Frame = HILL
     input_at: OfTime | None = None
     drift_at: OfTime | None = None
+
+    def __post_init__(self) -> None:
+        checked_frame(self.frame)
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A(t), shape (..., 6, 6)."""

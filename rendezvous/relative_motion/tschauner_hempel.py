@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rendezvous.relative_motion.elliptic_orbit import EllipticOrbit
-from rendezvous.relative_motion.frames import HILL, Frame, StateOrder
-from rendezvous.relative_motion.linear_motion import Segment, checked_durations, velocity_input
+from rendezvous.relative_motion.frames import HILL, Frame
+from rendezvous.relative_motion.linear_motion import Segment, checked_durations, checked_frame, velocity_input
 from rendezvous.relative_motion.time_varying import TimeVaryingMotion
 
 Floats = NDArray[np.float64]
@@ -43,8 +43,7 @@ class TschaunerHempel:
     frame: Frame = HILL
 
     def __post_init__(self) -> None:
-        if self.frame.order is not StateOrder.POSITION_THEN_VELOCITY:
-            raise ValueError(f"frame {self.frame.name}: motions have position before velocity; convert their results")
+        checked_frame(self.frame)
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A(t), shape (..., 6, 6)."""

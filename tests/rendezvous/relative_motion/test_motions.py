@@ -197,7 +197,21 @@ def test_unsound_times_and_frames_are_refused() -> None:
         ClohessyWiltshire(RATE).gramian(10.0, 5.0)
     with pytest.raises(ValueError, match="a time is not finite"):
         TschaunerHempel(EllipticOrbit(RATE, 0.2)).transition(0.0, np.nan)
-    with pytest.raises(ValueError, match="position before velocity"):
-        ClohessyWiltshire(RATE, ORBITAL_INTERLEAVED)
     with pytest.raises(ValueError, match="shape"):
         ConstantMotion(np.eye(5))
+
+
+INTERLEAVED: dict[str, Callable[[], LinearMotion]] = {
+    "circular": lambda: ClohessyWiltshire(RATE, ORBITAL_INTERLEAVED),
+    "elliptic": lambda: TschaunerHempel(EllipticOrbit(RATE, 0.3), ORBITAL_INTERLEAVED),
+    "frozen": lambda: EllipticOrbit(RATE, 0.1).frozen(0.0, ORBITAL_INTERLEAVED),
+    "constant": lambda: ConstantMotion(np.zeros((6, 6)), ORBITAL_INTERLEAVED),
+    "any": lambda: TimeVaryingMotion(EllipticOrbit(RATE, 0.3).dynamics, ORBITAL_INTERLEAVED),
+}
+
+
+@pytest.mark.parametrize("motion", INTERLEAVED)
+def test_no_motion_takes_interleaved_states(motion: str) -> None:
+    # B = (0, 1)' and Van Loan's scales would be of the wrong rows, and nothing would say so.
+    with pytest.raises(ValueError, match="position before velocity"):
+        INTERLEAVED[motion]()
