@@ -55,7 +55,7 @@ class NonlinearMotion:
         given, push = np.atleast_2d(np.asarray(states, float)), np.atleast_2d(np.asarray(accelerations, float))
         times = np.asarray(times_s, dtype=float)
         count = len(given)
-        e, k2 = self.orbit.eccentricity, self.orbit.areal_rate_rad_s
+        e, k2 = self.orbit.eccentricity, self.orbit.semi_latus_rate_rad_s
         parameter = self.semi_major_axis_m * (1.0 - e * e)
         gravity = k2 * k2 * parameter**3
 

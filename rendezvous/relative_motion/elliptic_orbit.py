@@ -71,8 +71,11 @@ class EllipticOrbit:
         return cls(rate, eccentricity, true_anomaly_rad)
 
     @property
-    def areal_rate_rad_s(self) -> float:
-        """sqrt(mu / p^3) = h / p^2, which Yamanaka and Ankersen call k^2, rad/s."""
+    def semi_latus_rate_rad_s(self) -> float:
+        """Mean motion of a circular orbit at the semi-latus rectum p: sqrt(mu / p^3) = h / p^2, rad/s.
+
+        Yamanaka and Ankersen (2002) call it k^2.
+        """
         return float(self.mean_motion_rad_s / (1.0 - self.eccentricity**2) ** 1.5)
 
     def eccentric_anomaly(self, time_s: ArrayLike) -> Floats:
@@ -117,7 +120,9 @@ class EllipticOrbit:
 
     def rate(self, time_s: ArrayLike) -> Floats:
         """Return the angular rate w of the radius vector, rad/s: k^2 (1 + e cos nu)^2."""
-        return np.asarray(self.areal_rate_rad_s * (1.0 + self.eccentricity * np.cos(self.true_anomaly(time_s))) ** 2)
+        return np.asarray(
+            self.semi_latus_rate_rad_s * (1.0 + self.eccentricity * np.cos(self.true_anomaly(time_s))) ** 2
+        )
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """Return A(t) in axes of Hill, for states in m and m/s.
@@ -134,7 +139,7 @@ class EllipticOrbit:
         -----
         Equation (2) of Shorikov and Goranov (2021) in other axes; mu / r^3 = w^2 r / p.
         """
-        anomaly, e, k2 = self.true_anomaly(time_s), self.eccentricity, self.areal_rate_rad_s
+        anomaly, e, k2 = self.true_anomaly(time_s), self.eccentricity, self.semi_latus_rate_rad_s
         rho = 1.0 + e * np.cos(anomaly)
         w, w_dot, gravity = k2 * rho**2, -2.0 * k2**2 * e * np.sin(anomaly) * rho**3, k2**2 * rho**3
         matrix = np.zeros((*anomaly.shape, 6, 6))

@@ -144,7 +144,7 @@ def _pairs(start_s: ArrayLike, end_s: ArrayLike) -> tuple[Floats, Floats]:
 
 def _closed(orbit: EllipticOrbit, starts: Floats, ends: Floats) -> Floats:
     """Phi(end, start) in axes of Hill, shape (n, 6, 6): their equations (79) to (88)."""
-    e, k2 = orbit.eccentricity, orbit.areal_rate_rad_s
+    e, k2 = orbit.eccentricity, orbit.semi_latus_rate_rad_s
     at_start, at_end = orbit.true_anomaly(starts), orbit.true_anomaly(ends)
     in_plane = np.zeros((len(starts), 6, 6))
     rho = 1.0 + e * np.cos(at_start)
