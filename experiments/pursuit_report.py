@@ -70,6 +70,7 @@ def report_json(
         "looked_at_s": solution.looked_at_s,
         "propellant_exhausted_by": solution.exhausted,
         "fallback_capture_time_s": None if solution.fallback is None else solution.fallback.time_s,
+        "fallback_route": None if solution.fallback_route is None else solution.fallback_route.value,
         "units": {"length_km": solution.units.length_m / M_PER_KM, "time_s": solution.units.time_s},
         "certificate": None if certificate is None else _certified(certificate),
         "distance_curve": {

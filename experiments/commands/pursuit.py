@@ -393,8 +393,10 @@ def _verdict(solution: Solution) -> str:
     if solution.looked_at_s == 0.0:
         return "branch-not-certified: not even a short game can be followed; is everything in the units of its key?"
     text = f"branch-not-certified: the extremals are a saddle up to a duration of {until}; nothing is claimed beyond"
-    if solution.fallback is not None:
-        text += f" (another route finds an extremal at {solution.fallback.time_s:.3f} s)"
+    if solution.fallback is not None and solution.fallback_route is not None:
+        text += (
+            f" (another route, {solution.fallback_route.value}, finds an extremal at {solution.fallback.time_s:.3f} s)"
+        )
     return text
 
 

@@ -35,7 +35,6 @@ class Route(Enum):
     SWITCHED = "continuation, with a change to a branch that keeps the evader farther away"
     HOMOTOPY = "homotopy in the evader's thrust"
     LINEAR_GAME = "linear game as a first guess"
-    NEIGHBOUR = "a neighbour's solution as a first guess"
 
 
 @dataclass(frozen=True)
@@ -122,6 +121,7 @@ class Solution:
     capture : Capture or None
         Where the verdict is captured.
     route : Route
+        Continuation, or that with a change of branch.
     curve : DistanceCurve
     looked_at_s : float
         How long a game was followed.
@@ -129,6 +129,8 @@ class Solution:
         Whose propellant is spent at that time: pursuer or evader.
     fallback : Capture or None
         Where the branch is not certified: what another route found, without a claim.
+    fallback_route : Route or None
+        Which one.
     """
 
     game: Game
@@ -140,3 +142,4 @@ class Solution:
     looked_at_s: float
     exhausted: str | None = None
     fallback: Capture | None = None
+    fallback_route: Route | None = None

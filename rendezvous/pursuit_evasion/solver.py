@@ -75,8 +75,8 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
         verdict, exhausted = _uncaptured(game)
         return Solution(game, units, verdict, None, route, curve, looked_at_s, exhausted)
     asked = change_branch and branch.ending is Ending.FOLD
-    fallback = (solve_by_homotopy(game) or solve_by_linear_game(game)) if asked else None
-    return Solution(game, units, Verdict.BRANCH_NOT_CERTIFIED, None, route, curve, looked_at_s, None, fallback)
+    fallback, other = _by_another_route(game) if asked else (None, None)
+    return Solution(game, units, Verdict.BRANCH_NOT_CERTIFIED, None, route, curve, looked_at_s, None, fallback, other)
 
 
 def solve_near(game: Game, units: Units, guess: Node) -> Capture | None:
@@ -100,6 +100,15 @@ def solve_near(game: Game, units: Units, guess: Node) -> Capture | None:
     """
     found = near(game, units, guess)
     return None if found is None else capture_of(game, units, found)
+
+
+def _by_another_route(game: Game) -> tuple[Capture | None, Route | None]:
+    """Return what the first route that leads anywhere finds, and which one it is."""
+    for route, solved_by in ((Route.HOMOTOPY, solve_by_homotopy), (Route.LINEAR_GAME, solve_by_linear_game)):
+        capture = solved_by(game)
+        if capture is not None:
+            return capture, route
+    return None, None
 
 
 def _uncaptured(game: Game) -> tuple[Verdict, str | None]:

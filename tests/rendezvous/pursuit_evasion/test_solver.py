@@ -229,6 +229,21 @@ def test_where_the_branch_folds_another_one_keeps_the_evader_farther(slides: Mak
     assert (changed.curve.distance_m[:-1] > 0.0).all()
 
 
+def test_what_another_route_finds_is_told_with_the_route(slides: MakeGame, monkeypatch: pytest.MonkeyPatch) -> None:
+    game, solver = slides(18.0, anomaly_deg=330.0), "rendezvous.pursuit_evasion.solver."
+    # As if no branch were found that keeps the evader farther away.
+    monkeypatch.setattr(solver + "greater", lambda _pair, _node: None)
+    first = solve(game)
+    assert first.verdict is Verdict.BRANCH_NOT_CERTIFIED
+    assert first.fallback is not None
+    assert first.fallback_route is Route.HOMOTOPY
+    monkeypatch.setattr(solver + "solve_by_homotopy", lambda _game: None)
+    monkeypatch.setattr(solver + "solve_by_linear_game", lambda _game: first.fallback)
+    assert solve(game).fallback_route is Route.LINEAR_GAME
+    monkeypatch.setattr(solver + "solve_by_linear_game", lambda _game: None)
+    assert (solve(game).fallback, solve(game).fallback_route) == (None, None)
+
+
 def test_polishing_what_is_no_guess_gives_nothing(slides: MakeGame, solved: Solution) -> None:
     node = captured(solved).extremal
     pair = scaled_pair(slides(), solved.units)
