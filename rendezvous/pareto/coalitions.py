@@ -76,14 +76,13 @@ class Coalitions:
     core: Core
 
 
-def analyse_coalitions(solution: EncounterSolution, point: Floats | None = None) -> Coalitions:
+def analyse_coalitions(solution: EncounterSolution) -> Coalitions:
     """Look at every coalition.
 
     Parameters
     ----------
     solution : EncounterSolution
-    point : ndarray, shape (f,), or None
-        The common meeting's free values; None: the best for the group.
+        The common meeting is the best one for the group.
 
     Returns
     -------
@@ -103,7 +102,7 @@ def analyse_coalitions(solution: EncounterSolution, point: Floats | None = None)
     if count > MOST_CRAFT:
         raise ValueError(f"{count} craft have {2**count - 1} coalitions; at most {MOST_CRAFT} craft are analysed")
     weights = solution.encounter.weights
-    common = weights * solution.excess(point)
+    common = weights * solution.excess()
     worth: dict[tuple[int, ...], float] = {(): 0.0}
     found = []
     for size in range(1, count + 1):

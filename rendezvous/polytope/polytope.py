@@ -14,6 +14,8 @@ from rendezvous.polytope._qhull import Description, hull_of_points, intersection
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+_TOGETHER = 1e-7
+
 
 @dataclass(frozen=True)
 class Polytope:
@@ -174,19 +176,14 @@ class Polytope:
         """Least and greatest coordinates, each of shape (n,)."""
         return self.vertices.min(axis=0), self.vertices.max(axis=0)
 
-    def essential_vertices(self, within: float = 1e-7) -> int:
-        """Return the number of vertices, those that lie together counted once.
-
-        Parameters
-        ----------
-        within : float
-            How near, in every coordinate.
+    def essential_vertices(self) -> int:
+        """Return the number of vertices, those that lie within 1e-7 in every coordinate counted once.
 
         Returns
         -------
         int
         """
-        return int(together(self.vertices, within).max()) + 1
+        return int(together(self.vertices, _TOGETHER).max()) + 1
 
     def support(self, directions: ArrayLike) -> Floats:
         """Return the support function: the maximum of direction . x over the set.

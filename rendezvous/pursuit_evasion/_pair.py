@@ -169,7 +169,6 @@ class Pair:
         tolerance: float,
         linear_tolerance: float = COARSE,
         close: float = CLOSE,
-        most_iterations: int = _MOST_ITERATIONS,
         latest: float = math.inf,
     ) -> Node | None:
         """Find the extremal near a guess, for a given duration, or for a given distance with the time free.
@@ -187,7 +186,6 @@ class Pair:
             Of the propagation of derivatives, where that is less fine.
         close : float
             How small the last correction must be.
-        most_iterations : int
         latest : float
             Longest duration that can be propagated.
 
@@ -204,7 +202,7 @@ class Pair:
         state = np.concatenate([guess[:12], guess[12:] / np.sqrt(guess[12:] @ guess[12:]), [duration, distance]])
         before, uses = math.inf, 0
         linear: _Linear | None = None
-        for _ in range(most_iterations):
+        for _ in range(_MOST_ITERATIONS):
             fresh = linear is None
             linear = linear or self._linearised(state, max(tolerance, linear_tolerance), time_free)
             if linear is None:

@@ -22,23 +22,26 @@ Floats = NDArray[np.float64]
 
 _REACH_STEP, _MOST_REACH_STEPS, _REACHED = 0.1, 400, 1e-6
 _MOST_ITERATIONS = 8
+_THRUST_STEP, _LEAST_THRUST_STEP = 0.25, 1e-3
 _LONGEST = 40.0
 """Radians that the linear game is looked at: more would take many seconds."""
 
 
-def solve_by_homotopy(game: Game, steps: int = 4) -> Capture | None:
+def solve_by_homotopy(game: Game) -> Capture | None:
     """Solve a game by raising the evader's thrust from zero.
 
     Parameters
     ----------
     game : Game
-    steps : int, optional
-        Of the thrust, to begin with; halved where Newton's method fails.
 
     Returns
     -------
     Capture or None
         A local saddle, whose time says nothing of earlier captures.
+
+    Notes
+    -----
+    Quarters of the thrust, halved where Newton's method fails.
     """
     units = units_of(game)
     still = _with_thrust(game, 0.0)
@@ -50,8 +53,8 @@ def solve_by_homotopy(game: Game, steps: int = 4) -> Capture | None:
     if branch.ending is not Ending.CAPTURE:
         return None
     node: Node = branch.last
-    done, step = 0.0, 1.0 / steps
-    while done < 1.0 and step > 1e-3:
+    done, step = 0.0, _THRUST_STEP
+    while done < 1.0 and step > _LEAST_THRUST_STEP:
         to = min(1.0, done + step)
         found = near(_with_thrust(game, to), units, node)
         if found is None:

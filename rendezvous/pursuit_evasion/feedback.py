@@ -29,6 +29,7 @@ HIT_M = 100.0
 _LOOKS = 65
 _PAST, _WIDE, _PATIENCE = 1.05, 2.0, 1.0
 _MOST_PLANS, _LONGEST = 10_000, 1e3
+_QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
 
 
 @dataclass(frozen=True)
@@ -222,20 +223,20 @@ def fly_many(
     return flights
 
 
-def capture_quantiles_s(flights: Sequence[Flight], levels: Sequence[float] = (0.0, 0.1, 0.5, 0.9, 1.0)) -> list[float]:
+def capture_quantiles_s(flights: Sequence[Flight]) -> list[float]:
     """Return quantiles of the capture times of those that captured, s; empty where none did.
 
     Parameters
     ----------
     flights : sequence of Flight
-    levels : sequence of float, optional
 
     Returns
     -------
     list of float
+        The least, the quantiles 0.1, 0.5 and 0.9, the greatest.
     """
     times = [flight.time_s for flight in flights if flight.ended is Ended.CAPTURED]
-    return [float(each) for each in np.quantile(times, levels)] if times else []
+    return [float(each) for each in np.quantile(times, _QUANTILES)] if times else []
 
 
 class _Pursuit:

@@ -95,15 +95,13 @@ def rational_intersection(normals: Floats, offsets: Floats) -> RationalSet:
     return _told(found, normals.shape[1])
 
 
-def rational_sets(block: Block, target: Floats | None = None) -> tuple[list[RationalSet], list[RationalSet]]:
-    """Return the forward sets of a block and its tube to a terminal state, exactly.
+def rational_sets(block: Block) -> tuple[list[RationalSet], list[RationalSet]]:
+    """Return the forward sets of a block and its tube to zero, exactly.
 
     Parameters
     ----------
     block : Block
         With thrust in a box and constraints at whole periods; its floats are taken as the rationals they are.
-    target : ndarray, shape (n,), optional
-        The terminal state; zero by default.
 
     Returns
     -------
@@ -123,7 +121,6 @@ def rational_sets(block: Block, target: Floats | None = None) -> tuple[list[Rati
     import ppl
 
     size, group = block.size, len(block.controls)
-    aim = np.zeros(size) if target is None else target
     current = ppl.C_Polyhedron(size, "universe")
     _fix(current, block.initial, range(size))
     forward = [current]
@@ -134,7 +131,7 @@ def rational_sets(block: Block, target: Floats | None = None) -> tuple[list[Rati
         _cut(step, block.normals, block.offsets[t + 1], range(size))
         forward.append(step)
     backward = ppl.C_Polyhedron(size, "universe")
-    _fix(backward, aim, range(size))
+    _fix(backward, np.zeros(size), range(size))
     tube = [ppl.C_Polyhedron(backward)]
     for t in range(block.periods - 1, -1, -1):
         step = _step(block, t, before=0, after=size + group)
