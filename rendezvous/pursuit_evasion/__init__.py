@@ -1,6 +1,6 @@
 """The orbital pursuit-evasion game with free final time: solution, certificate, feedback and maps."""
 
-from rendezvous.pursuit_evasion.certificate import Certificate, Deviation, best_answer_s, certify
+from rendezvous.pursuit_evasion.certificate import Certificate, Deviation, certify
 from rendezvous.pursuit_evasion.fallbacks import solve_by_homotopy, solve_by_linear_game
 from rendezvous.pursuit_evasion.feedback import Ended, Flight, Observation, capture_quantiles_s, fly, fly_many
 from rendezvous.pursuit_evasion.game import Game, Gravity, Player
@@ -38,7 +38,6 @@ __all__ = [
     "Steering",
     "Units",
     "Verdict",
-    "best_answer_s",
     "capture_map",
     "capture_quantiles_s",
     "certify",

@@ -13,8 +13,8 @@ from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
 from rendezvous.pursuit_evasion._pair import Node, Pair
 from rendezvous.pursuit_evasion._scan import greater, scan
 from rendezvous.pursuit_evasion._side import Craft, KnownPath, Side
-from rendezvous.pursuit_evasion.paths import ExtremalPath, PathError, Policy, SteeredPath, extremal_paths, steered_path
-from rendezvous.pursuit_evasion.solution import Capture, Route, Solution
+from rendezvous.pursuit_evasion.paths import ExtremalPath, PathError, Policy, extremal_paths, steered_path
+from rendezvous.pursuit_evasion.solution import Capture, Solution
 from rendezvous.pursuit_evasion.units import scaled_craft
 
 Floats = NDArray[np.float64]
@@ -202,34 +202,9 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
     )
 
 
-def best_answer_s(solution: Solution, path: SteeredPath, latest_s: float) -> float | None:
-    """Return the earliest capture of an evader on a known path.
-
-    Parameters
-    ----------
-    solution : Solution
-        For its game and units.
-    path : SteeredPath
-        Nondimensional, in the units of the solution.
-    latest_s : float
-        The path must reach as far.
-
-    Returns
-    -------
-    float or None
-        None where there is none by then, or it cannot be followed.
-    """
-    units = solution.units
-    pursuer = scaled_craft(solution.game.pursuer, solution.game.gravity, units)
-    radius = solution.game.capture_radius_m / units.length_m
-    found, _, _ = _followed(pursuer, KnownPath(path.state_at), radius, latest_s / units.time_s, _MOST_WORK)
-    return None if found is None else found * units.time_s
-
-
 def _stayed_above(solution: Solution, capture: Capture) -> bool:
     before = solution.curve.duration_s < capture.time_s * (1.0 - 1e-9)
-    followed = solution.route in (Route.CONTINUATION, Route.SWITCHED) and bool(before.any())
-    return followed and bool((solution.curve.distance_m[before] > solution.game.capture_radius_m).all())
+    return bool(before.any()) and bool((solution.curve.distance_m[before] > solution.game.capture_radius_m).all())
 
 
 def _followed(
