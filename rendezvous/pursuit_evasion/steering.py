@@ -70,4 +70,6 @@ class RandomSteering:
 def _drawn(seed: int, run: int, draw: int) -> Floats:
     stream = np.random.SeedSequence(entropy=seed, spawn_key=(run, 1, draw))
     vector = np.random.default_rng(stream).standard_normal(3)
-    return np.asarray(vector / np.linalg.norm(vector), dtype=np.float64)
+    direction = np.asarray(vector / np.linalg.norm(vector), dtype=np.float64)
+    direction.flags.writeable = False
+    return direction

@@ -128,6 +128,8 @@ def test_random_steering_is_the_same_however_often_it_is_asked() -> None:
     np.testing.assert_array_equal(first, steering(99.0, state))
     assert not np.array_equal(first, steering(100.0, state))
     assert not np.array_equal(first, RandomSteering(1, 1, 100.0)(50.0, state))
+    with pytest.raises(ValueError, match="read-only"):  # it is drawn once, and told to whoever asks
+        first[0] = 0.0
 
 
 def test_a_game_without_a_capture_has_no_plan(slides: MakeGame) -> None:
