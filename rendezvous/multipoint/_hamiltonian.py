@@ -18,6 +18,7 @@ ROWS = 13
 STEP_RAD = 0.1
 MOST_STEPS = 50_000
 LEAST_RADIUS = 0.02
+"""Nearer to the centre than this share of where it starts a trajectory counts as falling into it."""
 _STAGES = int(DOP853.n_stages)
 _TABLE = np.ascontiguousarray(DOP853.A[:_STAGES, :_STAGES], dtype=np.float64)
 _WEIGHTS = np.ascontiguousarray(DOP853.B, dtype=np.float64)

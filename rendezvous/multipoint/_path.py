@@ -10,9 +10,6 @@ from rendezvous._compile import compiled
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-SINGULAR = -1.0
-"""What stands for a cost where a Gramian or a block is not positive definite."""
-
 
 @compiled
 def factor(matrix: Floats, lower: Floats) -> bool:
@@ -65,8 +62,8 @@ def solve_path(
     pinned: Flags,
     before: Floats,
     at_start: Floats,
-) -> float:
-    """Fill in the velocities at flybys and the costates, and return the cost, or `SINGULAR`.
+) -> tuple[bool, float]:
+    """Fill in the velocities at flybys and the costates.
 
     Parameters
     ----------
@@ -83,7 +80,9 @@ def solve_path(
 
     Returns
     -------
-    float
+    solved : bool
+        False where a Gramian or a block is not positive definite: nothing that was filled in then counts.
+    cost : float
 
     Notes
     -----
@@ -111,13 +110,13 @@ def solve_path(
         for axis in range(3):
             ahead[k, 3 + axis, axis] = 1.0
         if not factor(scaled, lower[k]):
-            return SINGULAR
+            return False, 0.0
         whiten(lower[k], effort[k])
         whiten(lower[k], ahead[k])
         whiten(lower[k], behind[k])
     velocities = np.zeros((count, 3))
     if not _eliminate(ahead, behind, effort, pinned, velocities):
-        return SINGULAR
+        return False, 0.0
     cost = 0.0
     for k in range(count):
         for row in range(6):
@@ -141,7 +140,7 @@ def solve_path(
                 arrive[k, 3 + axis] = velocities[k, axis]
                 if k + 1 < count:
                     begin[k + 1, 3 + axis] = velocities[k, axis]
-    return cost
+    return True, cost
 
 
 @compiled

@@ -16,6 +16,7 @@ Floats = NDArray[np.float64]
 TOLERANCE = 1e-11
 ON_THE_WAY = 1e-4
 ROUNDING = 1e-8
+"""What is left and falls no more is rounding, if it is less than this."""
 LEAST_STEP = 1.0 / 64.0
 LEAST_STEP_FROM_NEAR = 1.0 / 8.0
 _ROUNDS = 12

@@ -9,8 +9,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rendezvous.multipoint._hamiltonian import LEAST_RADIUS
 from rendezvous.multipoint._reference import Mixture, Reference, TracedPath, panels_of
-from rendezvous.multipoint._shooting import blocks_of, shoot, unknowns_of
+from rendezvous.multipoint._shooting import ROUNDING, blocks_of, shoot, unknowns_of
 from rendezvous.multipoint._shot_path import ShotPath
 from rendezvous.multipoint.segments import Flown, Nodes, NotSettledError, Path, check_times, solve_segments
 from rendezvous.multipoint.targets import Integers, Target, check_targets, dwells
@@ -21,14 +22,12 @@ from rendezvous.two_body import coast, coasting_rates, gravity_gradient
 Floats = NDArray[np.float64]
 
 SETTLED = 1e-11
-ROUNDING = 1e-8
 MOST_ROUNDS = 30
 FEW_ROUNDS = 8
 MOST_KNOWN = 64
 RUGGED = 3.0
 REMEDY = "give visits more time, visit nearer targets first, or check units"
 GREATEST_CHANGE = 2.0
-LEAST_RADIUS = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +75,7 @@ class KeplerTour:
     ----------
     targets : KeplerTargets
     start_state : ndarray, shape (6,)
-        The chaser's, inertial, on an ellipse, m and m/s.
-    start_s : float
+        The chaser's at t = 0, inertial, on an ellipse, m and m/s.
 
     Raises
     ------
@@ -94,7 +92,6 @@ class KeplerTour:
 
     targets: KeplerTargets
     start_state: Floats
-    start_s: float = 0.0
 
     def __post_init__(self) -> None:
         mu = self.targets.gravitational_parameter_m3_s2
@@ -102,6 +99,11 @@ class KeplerTour:
             raise ValueError(f"the gravitational parameter must be positive and finite, found {mu!r} m^3/s^2")
         check_start(self.start_state, self.start_s)
         coast(self.start_state, 0.0, mu)
+
+    @property
+    def start_s(self) -> float:
+        """When the chaser starts: at zero, to which the targets' epochs refer."""
+        return 0.0
 
     @property
     def dwell_s(self) -> Floats:
@@ -178,26 +180,7 @@ class KeplerTour:
 
         return fly
 
-    def rounds(self, order: Sequence[int], time_s: ArrayLike) -> list[float]:
-        """Return the energy after each round of the combined method, m^2/s^3.
-
-        Parameters
-        ----------
-        order : sequence of int
-        time_s : array_like, shape (N,)
-
-        Returns
-        -------
-        list of float
-        """
-        nodes = nodes_of(self.targets, order, time_s)
-        costs: list[float] = []
-        self._relinearise(nodes, self._coasting(nodes), costs=costs)
-        return costs
-
-    def _relinearise(
-        self, nodes: Nodes, reference: Reference, *, rounds: int = MOST_ROUNDS, costs: list[float] | None = None
-    ) -> Path:
+    def _relinearise(self, nodes: Nodes, reference: Reference, *, rounds: int = MOST_ROUNDS) -> Path:
         """Solve linear problems about one trajectory after another until they agree."""
         mu = self.targets.gravitational_parameter_m3_s2
         change = np.inf
@@ -208,8 +191,6 @@ class KeplerTour:
                 path = solve_segments(self._motion_about(reference), self.start_s, self.start_state, nodes)
             except ValueError as error:
                 raise NotSettledError(f"re-linearising leads to no trajectory: {error}; {REMEDY}") from None
-            if costs is not None:
-                costs.append(path.cost)
             found = Reference.of_path(path, mu, reference, keep=each > 1)
             before, change = change, found.change_from(reference)
             hopeless = rounds == FEW_ROUNDS and change > 0.5 * before
@@ -231,9 +212,7 @@ class KeplerTour:
     def _coasting(self, nodes: Nodes) -> Reference:
         mu = self.targets.gravitational_parameter_m3_s2
         begin = self.start_state
-        return self._reference(
-            nodes, lambda times: coast(np.broadcast_to(begin, (len(times), 6)), times - self.start_s, mu)
-        )
+        return self._reference(nodes, lambda times: coast(np.broadcast_to(begin, (len(times), 6)), times, mu))
 
     def _reference(self, nodes: Nodes, states: Callable[[Floats], Floats]) -> Reference:
         starts = np.concatenate([[self.start_s], nodes.leave_s[:-1]])

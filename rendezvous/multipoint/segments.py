@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.multipoint._path import SINGULAR, solve_path
+from rendezvous.multipoint._path import solve_path
 from rendezvous.relative_motion import LinearMotion, TimeVaryingMotion
 
 Floats = NDArray[np.float64]
@@ -237,7 +237,7 @@ def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, no
     segment = motion.segment(starts, nodes.arrive_s)
     arrive, begin = nodes.arrive.copy(), np.concatenate([start_state[None], nodes.leave[:-1]])
     before, at_start, after = np.empty_like(arrive), np.empty_like(arrive), np.zeros_like(arrive)
-    cost = solve_path(
+    solved, cost = solve_path(
         segment.transition,
         segment.gramian,
         segment.drift,
@@ -248,7 +248,7 @@ def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, no
         before,
         at_start,
     )
-    if cost == SINGULAR or not np.isfinite(cost):
+    if not solved or not np.isfinite(cost):
         raise ValueError(
             "the numbers of the path overflow, or a segment is too short or too long for its Gramian; check the units"
         )

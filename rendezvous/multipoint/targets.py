@@ -77,8 +77,7 @@ class DriftingTargets:
     targets : tuple of Target
     motion : LinearMotion
     initial : ndarray, shape (n, 6)
-        Their states at the epoch, m and m/s.
-    epoch_s : float
+        Their states at t = 0, m and m/s.
 
     Raises
     ------
@@ -89,18 +88,15 @@ class DriftingTargets:
     targets: tuple[Target, ...]
     motion: LinearMotion
     initial: Floats
-    epoch_s: float = 0.0
 
     def __post_init__(self) -> None:
         check_targets(self.targets, self.initial)
-        if not np.isfinite(self.epoch_s):
-            raise ValueError("the targets' epoch is not finite")
 
     def states(self, which: Integers, time_s: Floats) -> Floats:
         """States, m and m/s, of the targets `which` at times `time_s`, one a time, shape (k, 6)."""
-        epochs = np.full(time_s.shape, self.epoch_s)
-        coasted = self.motion.transition(epochs, time_s) @ self.initial[which][:, :, None]
-        return np.asarray(coasted[:, :, 0] + self.motion.drift(epochs, time_s))
+        zero = np.zeros(time_s.shape)
+        coasted = self.motion.transition(zero, time_s) @ self.initial[which][:, :, None]
+        return np.asarray(coasted[:, :, 0] + self.motion.drift(zero, time_s))
 
     def rates(self, time_s: Floats, states: Floats) -> Floats:
         """Time derivatives of such states at times, shape (k, 6)."""
