@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 FIGURES = ("figure-path", "figure-control", "figure-costates", "figure-times")
 GIVEN, BEST = "given", "best"
-PEAK_SAMPLES = 4001
 
 ProblemName = Annotated[
     str, typer.Argument(metavar="[PROBLEM]", help="A built-in problem (see: infoset problems list), or a problem file.")
@@ -175,17 +174,11 @@ def _find(problem: MultipointProblem, best_order: bool, best_times: bool, quiet:
 
 
 def _peak(path: FlightPath) -> float:
-    """Return the greatest |u|: of samples, and of samples denser by far around the greatest."""
-    import numpy as np
+    """Return the greatest |u|, leg by leg: it jumps from one to the next."""
+    from rendezvous.greatest_control import greatest_control
 
-    low, high, peak = float(path.starts_s[0]), float(path.nodes.arrive_s[-1]), 0.0
-    for _ in range(2):
-        times = np.linspace(low, high, PEAK_SAMPLES)
-        sizes = np.linalg.norm(path.control(times), axis=1)
-        top = int(sizes.argmax())
-        peak = max(peak, float(sizes[top]))
-        low, high = times[max(top - 1, 0)], times[min(top + 1, PEAK_SAMPLES - 1)]
-    return peak
+    legs = zip(path.starts_s, path.nodes.arrive_s, strict=True)
+    return max(greatest_control(path.control, float(start), float(end)) for start, end in legs)
 
 
 def _summary(found: Found) -> dict[str, object]:

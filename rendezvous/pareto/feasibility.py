@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from rendezvous.greatest_control import greatest_control
 from rendezvous.pareto.plan import Plan
 
 Floats = NDArray[np.float64]
 
-SAMPLES = 257
 _NODES, _WEIGHTS = (each.astype(np.float64) for each in np.polynomial.legendre.leggauss(12))
 _AGREEMENT = 1e-11
 _MOST_PANELS = 4096
@@ -59,20 +59,8 @@ def peak_control(plan: Plan) -> float:
     Returns
     -------
     float
-
-    Notes
-    -----
-    The greatest of 257 samples, then of samples 128 times as dense around it, twice.
     """
-    low, high = plan.craft.start_s, plan.meeting_s
-    best = 0.0
-    for _ in range(3):
-        times = np.linspace(low, high, SAMPLES)
-        sizes = np.linalg.norm(plan.control(times), axis=1)
-        top = int(sizes.argmax())
-        best = max(best, float(sizes[top]))
-        low, high = times[max(top - 1, 0)], times[min(top + 1, SAMPLES - 1)]
-    return best
+    return greatest_control(plan.control, plan.craft.start_s, plan.meeting_s)
 
 
 def total_impulse(plan: Plan) -> float:

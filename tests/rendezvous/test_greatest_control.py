@@ -1,0 +1,22 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rendezvous.greatest_control import greatest_control
+
+Floats = NDArray[np.float64]
+
+
+@pytest.mark.parametrize("at", [0.0, 0.3, 1.7, 7.123456, 10.0])
+def test_the_top_of_a_hump_is_found_between_samples_and_at_both_ends(at: float) -> None:
+    def control(time_s: Floats) -> Floats:
+        size = 3.0 / (1.0 + 9.0 * (time_s - at) ** 2)
+        return np.stack([0.6 * size, np.zeros_like(size), -0.8 * size], axis=1)
+
+    assert greatest_control(control, 0.0, 10.0) == pytest.approx(3.0, rel=1e-11)
+
+
+def test_a_control_that_is_zero_has_no_size() -> None:
+    assert greatest_control(lambda time_s: np.zeros((len(time_s), 3)), 5.0, 6.0) == 0.0
