@@ -1,4 +1,11 @@
-"""The one way this package compiles its kernels."""
+"""The one way this package compiles its kernels.
+
+The interception has its own, for neither of the two imports the other, and the two take different liberties. Here a
+product and a sum may be one operation (`contract`): quicker, and rounded once; nothing here has to come out the same
+bit for bit whichever way round it is computed, as cut edges of an information set do. And nothing is promised about NaN
+(no `nnan`): these kernels meet it where numbers overflow or a matrix is singular, and tell it by comparisons that fail,
+such as `not value > 0.0`.
+"""
 
 from __future__ import annotations
 
