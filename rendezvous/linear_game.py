@@ -1,6 +1,9 @@
 """Pursuit-evasion games that are linear, solved nearly in closed form: free space, loss of mass, a circular orbit.
 
-In each the pursuer hastens and the evader delays the time at which they meet; both thrust fully all the time.
+In each the pursuer hastens and the evader delays the time at which they meet; both thrust fully all the time. It is the
+game of Wang's slides (Bauman University), after Shen and Casalino, Journal of Guidance, Control, and Dynamics 41(8),
+2018, p. 1823, with gravity left out or linear: in free space lambda_v = (t_f - t) lambda_r, and both hold their
+direction. The answers are not from there; the orbital game is checked against them.
 """
 
 from __future__ import annotations
@@ -33,6 +36,11 @@ class Thruster:
     thrust_n, mass_kg : float
     exhaust_speed_m_s : float
         Specific impulse times standard gravity.
+
+    Raises
+    ------
+    ValueError
+        If the thrust is negative, or mass or exhaust speed is not positive.
     """
 
     thrust_n: float
@@ -55,6 +63,11 @@ class Thruster:
         Returns
         -------
         float
+
+        Raises
+        ------
+        ValueError
+            If all the mass would be burnt by then.
 
         Notes
         -----
@@ -105,6 +118,11 @@ def free_space_capture(
     LinearCapture or None
         None where the evader gets away: its acceleration is not the lesser.
 
+    Raises
+    ------
+    ValueError
+        If position or velocity are not three finite numbers, or the position is zero.
+
     Notes
     -----
     The first root of |r + v t| = (a_P - a_E) t^2 / 2, of degree four; nu is along r + v t.
@@ -141,6 +159,11 @@ def mass_loss_capture(
     -------
     LinearCapture or None
         None where there is no capture before a craft has burnt all its mass.
+
+    Raises
+    ------
+    ValueError
+        If position or velocity are not three finite numbers, or the position is zero.
 
     Notes
     -----
@@ -185,6 +208,11 @@ def circular_orbit_capture(
     -------
     LinearCapture or None
         None where there is no capture by then.
+
+    Raises
+    ------
+    ValueError
+        If position or velocity are not three finite numbers, or the position is zero.
 
     Notes
     -----

@@ -1,4 +1,9 @@
-"""The orbital pursuit-evasion game with free final time: solution, certificate, feedback and maps."""
+"""The orbital pursuit-evasion game with free final time: solution, certificate, feedback and maps.
+
+Game and conditions are those of Wang Yanxin's slides (Bauman University), after Shen and Casalino, Journal of Guidance,
+Control, and Dynamics 41(8), 2018, p. 1823, with misprints mended; how they are solved and what certifies the answer is
+not from there.
+"""
 
 from rendezvous.pursuit_evasion.certificate import Certificate, Deviation, certify
 from rendezvous.pursuit_evasion.fallbacks import solve_by_homotopy, solve_by_linear_game

@@ -2,6 +2,8 @@
 
 At T -> 0 nu is the line of sight and l the distance, so no guess is needed. Capture is where l has fallen to the
 capture radius: l above it on the way says that there was none before, on this branch. Nondimensional.
+
+This is not the way of Wang's slides, which shoot forward from a guess.
 """
 
 from __future__ import annotations

@@ -3,6 +3,10 @@
 An extremal carries its craft as far along `nu` as it can by the time of the end. There its costate is (nu, 0), and
 going back it is the same flow for pursuer and evader: thrust along p_v, where p is the costate of the pursuer and the
 costate of the evader with its sign turned. So close to the end p_v / |p_v| is nu, and the flow is smooth to its end.
+
+Wang's slides, "Optimal control", with k = +1 for the pursuer and -1 for the evader: u = k lambda_v / |lambda_v|,
+lambda_r' = (mu / r^3) lambda_v - 3 mu (lambda_v . r) r / r^5 (they lose '. r'), lambda_v' = -lambda_r; p = k lambda.
+That of the mass, lambda_m' = k |lambda_v| T / m^2 (they lose k), is not needed: both thrust fully all the time.
 """
 
 from __future__ import annotations

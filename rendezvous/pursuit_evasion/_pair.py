@@ -1,6 +1,8 @@
 """The extremals of both sides together, by Newton's method: at a duration T, or at a distance l. Nondimensional.
 
-At each duration T the evader strives along nu, the pursuer too, and r_E - r_P = l nu.
+At each duration T the evader strives along nu, the pursuer too, and r_E - r_P = l nu. At l = 0 these are the conditions
+at the end of Wang's slides ("Optimal control"): r_P = r_E, lambda_rP + lambda_rE = 0, lambda_v = 0. Their last one,
+lambda_rP . (v_P - v_E) = 1, only fixes the scale of costates: here |nu| = 1, and the closing speed must be positive.
 """
 
 from __future__ import annotations

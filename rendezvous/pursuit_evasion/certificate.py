@@ -1,4 +1,8 @@
-"""What speaks for a capture being a saddle point: checks that share as little as they can with the way it was found."""
+"""What speaks for a capture being a saddle point: checks that share as little as they can with the way it was found.
+
+The Hamiltonian is that of Wang's slides, "Optimal control": H_P + H_E, constant, and one in their scale. The other
+checks are not from there.
+"""
 
 from __future__ import annotations
 

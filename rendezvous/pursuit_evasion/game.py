@@ -1,4 +1,8 @@
-"""The game: two craft with thrust, in a planet's gravity, and the distance that counts as capture."""
+"""The game: two craft with thrust, in a planet's gravity, and the distance that counts as capture.
+
+It is that of Wang's slides (Bauman University), after Shen and Casalino, Journal of Guidance, Control, and Dynamics
+41(8), 2018, p. 1823.
+"""
 
 from __future__ import annotations
 
@@ -30,6 +34,15 @@ class Gravity:
         Second zonal harmonic, about the z axis; zero for a sphere.
     equatorial_radius_m : float
         That J2 refers to.
+
+    Raises
+    ------
+    ValueError
+        If the gravitational parameter is not positive, a radius negative, J2 not small, or without its radius.
+
+    Notes
+    -----
+    J2 is not in the slides: without it gravity is that of their first equation, -mu r / |r|^3.
     """
 
     parameter_m3_s2: float
@@ -64,6 +77,17 @@ class Player:
         Zero for a craft that coasts.
     specific_impulse_s : float
         Infinite for a craft whose mass stays.
+
+    Raises
+    ------
+    ValueError
+        If position or velocity is not finite, mass or specific impulse not positive, the dry mass negative or not below
+        the mass, or the thrust negative.
+
+    Notes
+    -----
+    r' = v, v' = g + (T/m) u, m' = -T/c (Wang's slides, "Modelling of the motion"), c the specific impulse times
+    standard gravity: the slides write the former for c.
     """
 
     position_m: Vector
@@ -110,6 +134,16 @@ class Game:
         Distance that counts as capture; zero for a point.
     longest_s : float
         How long the game is looked at, at most; infinite for 15 revolutions of the pursuer.
+
+    Raises
+    ------
+    ValueError
+        If the pursuer has no thrust, an orbit is no ellipse or reaches into the planet, the two are within the capture
+        radius at the start, or that radius or the time looked at is out of range.
+
+    Notes
+    -----
+    Wang's slides, "Modelling of the motion": the payoff is t_f, at which r_P = r_E; the capture radius is ours.
     """
 
     gravity: Gravity

@@ -25,7 +25,8 @@ class PlayerHistory:
     thrust_direction : ndarray, shape (n, 3)
         Unit vectors; zero for a craft without thrust.
     switching : ndarray, shape (n,)
-        |lambda_v| / m - k lambda_m / c over its value at the start: full thrust is best while it is positive.
+        |lambda_v| / m - k lambda_m / c over its value at the start: full thrust is best while it is positive. It is
+        what k T is multiplied by in the Hamiltonian of Wang's slides, "Optimal control".
     """
 
     position_m: Floats

@@ -47,7 +47,8 @@ class PlayerEnd:
         Spent.
     position_m, velocity_m_s : ndarray, shape (3,)
     costate_at_start : ndarray, shape (6,)
-        lambda_r, lambda_v at t = 0 in the units of the solution, scaled so that the Hamiltonian is one.
+        lambda_r, lambda_v at t = 0 in the units of the solution, scaled so that the Hamiltonian is one: H_f = 1 of
+        Wang's slides, "Optimal control".
     """
 
     propellant_kg: float
@@ -82,7 +83,8 @@ class Capture:
     position_m : ndarray, shape (3,)
         Of the evader then.
     direction : ndarray, shape (3,)
-        nu, toward which both strive; where there is a capture radius, from the pursuer to the evader.
+        nu, toward which both strive; where there is a capture radius, from the pursuer to the evader. Along lambda_rP
+        at the end, which is -lambda_rE.
     closing_speed_m_s : float
     curvature : ndarray, shape (2,)
         Eigenvalues of the Hessian of h_P - h_E on the plane normal to nu, in units of length, ascending.
@@ -91,6 +93,11 @@ class Capture:
         Of the start states, in units of length and speed.
     extremal : Node
         The same, nondimensional; a first guess for games near by.
+
+    Notes
+    -----
+    The conditions at the end of Wang's slides, "Optimal control", after Shen and Casalino (2018); the curvature is not
+    from there.
     """
 
     time_s: float

@@ -36,6 +36,7 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
 
     Notes
     -----
+    The game of Wang's slides, after Shen and Casalino (2018); they shoot forward from a guess, which is not done here.
     At each duration the evader takes the branch with the greatest distance l; capture is the first time at which that
     is the capture radius. 20 to 40 ms a revolution.
     """
