@@ -22,6 +22,11 @@ class OrbitalElements:
         From 0, below 1.
     inclination_rad, raan_rad, argument_of_perigee_rad, true_anomaly_rad : float
         `raan` is the right ascension of the ascending node.
+
+    Raises
+    ------
+    ValueError
+        If the semi-major axis is not positive, or the eccentricity outside [0, 1).
     """
 
     semi_major_axis_m: float

@@ -154,6 +154,12 @@ class KeplerTour:
         -------
         callable
             The path of times of shape (N,), shot; it is re-linearised about when it settles.
+
+        Raises
+        ------
+        NotSettledError
+            By what is returned, where the targets cannot be followed from the coasting orbit; a ValueError for times
+            that do not increase.
         """
         mu = self.targets.gravitational_parameter_m3_s2
         known: list[tuple[Floats, list[Floats]]] = []

@@ -148,6 +148,11 @@ def front_of_three(between: Floats, first: ArrayLike, second: ArrayLike) -> Floa
     -------
     ndarray
         e_3, m^2/s^3: sides d_ij laid in a plane, the distances from two corners give the third.
+
+    Raises
+    ------
+    ValueError
+        If the first two ideals coincide.
     """
     e1, e2 = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
     base = between[0, 1]

@@ -130,6 +130,11 @@ def chebyshev_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
     radius : float
         Negative where the set is empty: by so much the rows must be relaxed.
 
+    Raises
+    ------
+    UncertainHullError
+        If the program was not solved: the set has balls of any size, for one.
+
     Notes
     -----
     A linear program (HiGHS).

@@ -42,6 +42,11 @@ class Observation:
         Age of what it sees; it assumes that the evader has played its best since.
     position_error_m, velocity_error_m_s : float, optional
         Standard deviations, a component.
+
+    Raises
+    ------
+    ValueError
+        If one is negative or not finite.
     """
 
     delay_s: float = 0.0

@@ -27,6 +27,11 @@ class Script:
     begin_s : tuple of float
         When each begins, rising, the first at zero.
     policies : tuple of Policy
+
+    Raises
+    ------
+    ValueError
+        If there is no policy, not one for each time, or the times do not rise from 0.
     """
 
     begin_s: tuple[float, ...]

@@ -51,6 +51,11 @@ class NonlinearMotion:
         Returns
         -------
         ndarray, shape (k, s, 6)
+
+        Raises
+        ------
+        ArithmeticError
+            If a path cannot be integrated, as one that comes too near the centre.
         """
         given, push = np.atleast_2d(np.asarray(states, float)), np.atleast_2d(np.asarray(accelerations, float))
         times = np.asarray(times_s, dtype=float)
@@ -101,6 +106,11 @@ class NonlinearMotion:
         Returns
         -------
         ndarray, shape (k, T points + 1, 6)
+
+        Raises
+        ------
+        ArithmeticError
+            If a path cannot be integrated.
         """
         push = np.asarray(accelerations, dtype=float)
         state = np.broadcast_to(np.asarray(start, dtype=float), (len(push), 6))

@@ -156,6 +156,11 @@ def least_relaxation(lifted: Lifted) -> tuple[float, Floats]:
         Not below -1, which is where the search stops; not positive where the set is not empty.
     point : ndarray, shape (p,)
 
+    Raises
+    ------
+    NoSolutionError
+        If the program was not solved.
+
     Notes
     -----
     One linear program, or one with cones for thrust in a ball. Bounds on controls are not relaxed.
@@ -228,6 +233,11 @@ def least_sum_of_norms(lifted: Lifted, scale: Floats, group: int) -> Floats:
     -------
     ndarray, shape (p,)
 
+    Raises
+    ------
+    NoSolutionError
+        If the program was not solved.
+
     Notes
     -----
     A second-order cone a period (Clarabel).
@@ -274,6 +284,11 @@ def least_peak(lifted: Lifted, scale: Floats, group: int) -> tuple[float, Floats
     point : ndarray, shape (p,)
         Where it is kept.
 
+    Raises
+    ------
+    NoSolutionError
+        If the program was not solved.
+
     Notes
     -----
     A linear program (HiGHS), or one with cones (Clarabel).
@@ -318,6 +333,11 @@ def least_l1(lifted: Lifted, scale: Floats) -> Floats:
     -------
     ndarray, shape (p,)
 
+    Raises
+    ------
+    NoSolutionError
+        If the program was not solved.
+
     Notes
     -----
     A linear program (HiGHS), or one with cones (Clarabel) for thrust in a ball.
@@ -354,6 +374,11 @@ def deep_point(lifted: Lifted) -> tuple[Floats, float]:
     -------
     point : ndarray, shape (p,)
     radius : float
+
+    Raises
+    ------
+    NoSolutionError
+        If the program was not solved.
 
     Notes
     -----

@@ -222,6 +222,11 @@ def analytic_point(space: Lifted, start: Floats) -> tuple[Floats, Floats]:
     point : ndarray, shape (d,)
     hessian : ndarray, shape (d, d)
 
+    Raises
+    ------
+    NoSolutionError
+        If Newton's method does not reach it.
+
     Notes
     -----
     Newton's method with halved steps on - sum log(slack) - sum log(1 - |u(t)|^2), which is self-concordant.

@@ -41,6 +41,11 @@ class Frame:
         What the axes point along.
     order : StateOrder
         (x, y, z, vx, vy, vz), or (x, vx, y, vy, z, vz).
+
+    Raises
+    ------
+    ValueError
+        If the axes are not right-handed.
     """
 
     name: str

@@ -58,7 +58,13 @@ class TschaunerHempel:
         return np.zeros((*np.shape(time_s), 6))
 
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
+        """Phi(end, start), shape (..., 6, 6); the end may be before the start.
+
+        Raises
+        ------
+        ValueError
+            If a time is not finite.
+        """
         starts, ends = _pairs(start_s, end_s)
         if not (np.isfinite(starts).all() and np.isfinite(ends).all()):
             raise ValueError("a time is not finite")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import enum
 import importlib
 import inspect
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,6 +17,9 @@ PACKAGES = (
     *("infoset", "guidance", "sim", "rendezvous.relative_motion", "rendezvous.pareto", "rendezvous.multipoint"),
     *("rendezvous.reachability", "rendezvous.pursuit_evasion", "rendezvous.polytope", "rendezvous.linear_game"),
 )
+
+RAISES_CHECKED = ("rendezvous",)
+"""Packages in which whatever public raises has to say so."""
 
 WITHOUT_UNITS = (
     *("infoset.ConvexPolygons", "rendezvous.polytope."),  # geometry, of whatever it is of
@@ -127,6 +132,48 @@ def without_unit(name: str, thing: Any) -> list[str]:
     return bare
 
 
+Definition = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+def public_definitions(tree: ast.Module) -> Iterator[tuple[str, Definition, str]]:
+    """Functions and methods of a module that are public, by name, with the docstring that has to speak for them."""
+    for node in tree.body:
+        if isinstance(node, Definition) and not node.name.startswith("_"):
+            yield node.name, node, ast.get_docstring(node) or ""
+        elif isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+            for method in node.body:
+                if not isinstance(method, Definition):
+                    continue
+                if method.name in {"__init__", "__post_init__"}:
+                    yield f"{node.name}.{method.name}", method, ast.get_docstring(node) or ""
+                elif method.name == "__call__" or not method.name.startswith("_"):
+                    yield f"{node.name}.{method.name}", method, ast.get_docstring(method) or ""
+
+
+def silent_raises(source: str) -> list[str]:
+    """Public things in a module's text that raise, without a section Raises."""
+    return [
+        name
+        for name, body, text in public_definitions(ast.parse(source))
+        if any(isinstance(each, ast.Raise) and each.exc is not None for each in ast.walk(body))
+        and not entries(text, "Raises")
+    ]
+
+
+@pytest.mark.parametrize("package", RAISES_CHECKED)
+def test_what_is_raised_is_said(package: str) -> None:
+    folder = Path(str(importlib.import_module(package).__file__)).parent
+    modules = [each.relative_to(folder) for each in sorted(folder.rglob("*.py"))]
+    assert modules
+    silent = {
+        str(each): found
+        for each in modules
+        if not any(part.startswith("_") and part != "__init__.py" for part in each.parts)
+        if (found := silent_raises((folder / each).read_text(encoding="utf-8")))
+    }
+    assert silent == {}
+
+
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_parameter_is_described(package: str) -> None:
     missing = {
@@ -179,3 +226,56 @@ def test_the_checks_see_what_is_missing() -> None:
     assert undescribed("careless", careless) == ["second"]
     assert without_unit("careless", careless) == ["Parameters: first : float", "Returns: float"]
     assert undescribed("brief", brief) == ["first"]
+
+
+def test_the_check_of_what_is_raised_sees_what_is_missing() -> None:
+    source = '''
+class Sound:
+    """Hold.
+
+    Raises
+    ------
+    ValueError
+        Always.
+    """
+
+    def __post_init__(self) -> None:
+        raise ValueError
+
+    def passed_on(self) -> None:
+        """Try."""
+        try:
+            pass
+        except ValueError:
+            raise
+
+    def silent(self) -> None:
+        """Return what raises."""
+
+        def inner() -> None:
+            raise ValueError
+
+
+def told() -> None:
+    """Raise.
+
+    Raises
+    ------
+    ValueError
+        Always.
+    """
+    raise ValueError
+
+
+def _private() -> None:
+    raise ValueError
+
+
+class Silent:
+    """Hold."""
+
+    def __post_init__(self) -> None:
+        """Raises."""
+        raise ValueError
+'''
+    assert silent_raises(source) == ["Sound.silent", "Silent.__post_init__"]
