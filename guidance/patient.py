@@ -22,6 +22,11 @@ class Patient:
         How much of what the remaining impulses can do is relied upon, from 0 to 1. At 0 every end of the interval is
         beyond it and the strategy is U_s; at 1 it corrects nothing before it must.
 
+    Raises
+    ------
+    ValueError
+        If the share is not from 0 to 1.
+
     Notes
     -----
     Every hypothesis of the set has a predicted miss. Where the whole interval of them is on one side of zero, its

@@ -64,6 +64,11 @@ class ConvexPolygons:
         -------
         ConvexPolygons
             A batch of shape ().
+
+        Raises
+        ------
+        ValueError
+            If a point is not finite.
         """
         given = np.asarray(points, dtype=np.float64).reshape(-1, 2)
         if not np.isfinite(given).all():
@@ -76,7 +81,13 @@ class ConvexPolygons:
 
     @classmethod
     def box(cls, x: tuple[float, float], y: tuple[float, float]) -> ConvexPolygons:
-        """Axis-parallel box from the intervals `x` and `y`; equal ends give a segment or a point."""
+        """Axis-parallel box from the intervals `x` and `y`; equal ends give a segment or a point.
+
+        Raises
+        ------
+        ValueError
+            If an interval is reversed.
+        """
         if x[0] > x[1] or y[0] > y[1]:
             raise ValueError(f"an interval is reversed: x = {x}, y = {y}")
         corners = [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])]
@@ -133,7 +144,13 @@ class ConvexPolygons:
         return f"<{name}, area {self.area():.3g}>"
 
     def polygon(self) -> Floats:
-        """Vertices of a single polygon, shape (count, 2)."""
+        """Vertices of a single polygon, shape (count, 2).
+
+        Raises
+        ------
+        ValueError
+            If this is a batch.
+        """
         if self.shape:
             raise ValueError(f"this is a batch of shape {self.shape}: choose one with an index first")
         return self.vertices[: int(self.counts)].copy()
@@ -147,6 +164,11 @@ class ConvexPolygons:
             Not zero; of any length.
         lower, upper : array_like, shape () or (...)
             Bounds; infinite ones give half-planes, a reversed pair the empty set.
+
+        Raises
+        ------
+        ValueError
+            If the normal is zero.
         """
         normals = self._vectors(normal, "normal")
         if (np.abs(normals).max(axis=-1, initial=0.0) == 0.0).any():
@@ -154,7 +176,13 @@ class ConvexPolygons:
         return self._make(2, _clip_each, normals, self._scalars(lower, "lower"), self._scalars(upper, "upper"))
 
     def linear_map(self, matrix: ArrayLike) -> ConvexPolygons:
-        """Image under a matrix, shape (2, 2) or (..., 2, 2); a singular one gives segments or points."""
+        """Image under a matrix, shape (2, 2) or (..., 2, 2); a singular one gives segments or points.
+
+        Raises
+        ------
+        ValueError
+            If the matrix is not finite.
+        """
         matrices = np.broadcast_to(np.asarray(matrix, dtype=np.float64), (*self.shape, 2, 2)).reshape(-1, 2, 2)
         if not np.isfinite(matrices).all():
             raise ValueError("matrix must be finite")
@@ -226,7 +254,13 @@ class ConvexPolygons:
         return np.stack((-ends[0], -ends[1]), axis=-1), np.stack(ends[2:], axis=-1)
 
     def reduce_outward(self, cap: int) -> ConvexPolygons:
-        """Polygons of at most `cap` (>= 4) vertices that contain these, by dropping edges of least added area."""
+        """Polygons of at most `cap` (>= 4) vertices that contain these, by dropping edges of least added area.
+
+        Raises
+        ------
+        ValueError
+            If `cap` is less than 4.
+        """
         if cap < 4:
             raise ValueError(f"cap must be at least 4: got {cap}")
         return self._make(0, _reduce_each, np.full(self.counts.size, cap))

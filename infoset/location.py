@@ -21,7 +21,21 @@ PROBE, LOWER, UPPER = constants(3)
 
 
 class Workspace(NamedTuple):
-    """Room for replays."""
+    """Room for replays of E events and a search among K labels.
+
+    Parameters
+    ----------
+    values, applies : ndarray, shape (E,)
+        The history of one engagement, in one piece: angles, rates and impulses (SI), and which events are its own.
+    origins, rings, marks : ndarray
+        Three sections, `PROBE`, `LOWER` and `UPPER`, as `chains.empty_sections` makes them.
+    overlaps, living_overlaps : ndarray, shape (E,)
+        Overlap of section and band at each measurement, of the last replay and of the last label that lived; m.
+    points : ndarray, shape (n, 2)
+        Room for the outline of a section.
+    labels, died, label_overlaps : ndarray, shape (K,)
+        Labels that are known, m; the event at which each died, or `ALIVE`; its overlap there.
+    """
 
     values: Floats
     applies: Flags
@@ -40,6 +54,13 @@ class Living(NamedTuple):
     """The interval of living labels [lower, upper], each end bracketed by a label known to be dead.
 
     Where an end is the limit of the search itself, the bracket is that limit.
+
+    Parameters
+    ----------
+    found : bool
+        Whether any label lives.
+    below, lower, upper, above : float
+        In rising order, m; those in the middle live, the outer two are dead.
     """
 
     found: bool

@@ -14,7 +14,36 @@ ROUNDING = 16.0 * sys.float_info.epsilon
 
 
 class SectionLaw(NamedTuple):
-    """The numbers of a set model that the kernels need, SI."""
+    """The numbers of a set model that the kernels need.
+
+    Parameters
+    ----------
+    closing_speed : float
+        Nominal e, m/s.
+    step : float
+        s.
+    disturbance : float
+        Bound nu of the acceleration along z, m/s^2.
+    half_v : float
+        What the disturbance does to V in a step, nu times the step, m/s; either way.
+    half_v_at_start : float
+        What is added at t = 0, m/s: where the model guarantees, a step's half stands at its start and half at its end,
+        so that all that follow are added in pairs.
+    disturbance_lead : float
+        How long before the end of a step its disturbance is added, s: half a step as published, else none.
+    impulse_error : float
+        Relative error of an impulse as the set sees it.
+    error_at_zero_range, error_slope : float
+        Angle's error bound: rad, and rad/m of range.
+    exact_angles : bool
+        Whether an angle is told as its tangent; else as the angle itself, as published.
+    label_least, label_greatest : float
+        Labels that a truth can have, m.
+    z_least, z_greatest, vz_least, vz_greatest, vx_least, vx_greatest : float
+        The box of the start, m and m/s, grown by the error of the scale where the model guarantees.
+    rectangle : bool
+        Whether the start is the paper's rectangle in (omega, alpha) in place of the box.
+    """
 
     closing_speed: float
     step: float

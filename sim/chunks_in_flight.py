@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from functools import partial
 from threading import Event
 
 from sim.chunk import Chunk, fly_chunk
@@ -56,15 +57,10 @@ def fly_on_threads(workers: int, chunks: Iterable[Chunk]) -> Generator[tuple[Chu
     the others are not waited for: Numba does not let go of its lock if it ends while a kernel is compiled or loaded.
     """
     stopped = Event()
-
-    def check() -> None:
-        if stopped.is_set():
-            raise InterruptedError
-
     pool = ThreadPoolExecutor(workers, thread_name_prefix=THREADS)
     enough_memory = True
     try:
-        yield from _flying(pool, chunks, workers + 1, check)
+        yield from _flying(pool, chunks, workers + 1, partial(_leave_if, stopped))
     except (MemoryError, SystemError, ImportError, OSError):
         # Of memory that ended, in all its forms: a lock that the thread held may be locked for ever. Nobody waits.
         enough_memory = False
@@ -72,6 +68,12 @@ def fly_on_threads(workers: int, chunks: Iterable[Chunk]) -> Generator[tuple[Chu
     finally:
         stopped.set()
         pool.shutdown(wait=enough_memory, cancel_futures=True)
+
+
+def _leave_if(stopped: Event) -> None:
+    """Break off a chunk between its steps, in the thread that flies it."""
+    if stopped.is_set():
+        raise InterruptedError
 
 
 def _flying(

@@ -99,7 +99,13 @@ def generator(seed: int, run: int, stream: int) -> np.random.Generator:
 
 
 def greatest_number_of_steps(scenario: Scenario) -> int:
-    """Steps after which every truth of the dispersion has passed its closest approach."""
+    """Steps after which every truth of the dispersion has passed its closest approach.
+
+    Raises
+    ------
+    ValueError
+        If they are more than `MOST_STEPS`.
+    """
     box = scenario.dispersion
     slowest = min(-box.vx_m_s[0], -box.vx_m_s[1])
     steps = box.x_m[1] / (slowest * scenario.set_model.step_s)

@@ -40,6 +40,11 @@ class Plan:
         Whether the guaranteed model keeps its guaranteed miss.
     strategy : Strategy or None
         A strategy of one's own; None is the scenarios'.
+
+    Raises
+    ------
+    ValueError
+        If the numbers make no campaign.
     """
 
     scenarios: tuple[Scenario, ...]

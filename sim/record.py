@@ -162,6 +162,11 @@ def fly_one(
     Returns
     -------
     Record
+
+    Raises
+    ------
+    ValueError
+        If `run` or `seed` is negative.
     """
     if run < 0 or seed < 0:
         raise ValueError(f"run and seed must not be negative: got run={run}, seed={seed}")

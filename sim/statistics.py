@@ -73,7 +73,13 @@ def empirical_distribution(sample: ArrayLike, confidence: float = 0.95) -> Distr
 
 
 def band_half_width(size: int, confidence: float) -> float:
-    """Half-width of the Dvoretzky-Kiefer-Wolfowitz band at `size` n, `confidence` c: sqrt(ln(2 / (1 - c)) / (2 n))."""
+    """Half-width of the Dvoretzky-Kiefer-Wolfowitz band at `size` n, `confidence` c: sqrt(ln(2 / (1 - c)) / (2 n)).
+
+    Raises
+    ------
+    ValueError
+        If the confidence is not between 0 and 1.
+    """
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"confidence must lie between 0 and 1: got {confidence}")
     return math.sqrt(math.log(2.0 / (1.0 - confidence)) / (2.0 * size))

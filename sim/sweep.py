@@ -40,6 +40,11 @@ class Sweep:
         Whether the guaranteed model keeps its guaranteed miss, which costs time.
     chunk : int or None
         Engagements a shard; None suits the number of runs.
+
+    Raises
+    ------
+    ValueError
+        If there is no axis, or not a scenario for each combination of values.
     """
 
     scenario: Scenario

@@ -26,6 +26,11 @@ def worker_processes(count: int) -> Iterator[Executor]:
     ------
     Executor
 
+    Raises
+    ------
+    ValueError
+        If `count` is not at least one.
+
     Notes
     -----
     They are spawned, never forked: a forked process would hold the lock of a campaign's folder beyond its parent.

@@ -73,6 +73,11 @@ def reporting(where: Path) -> Iterator[None]:
     Yields
     ------
     None
+
+    Raises
+    ------
+    StorageError
+        For every `OSError`; a `DiskFullError` where the disk is full.
     """
     try:
         yield

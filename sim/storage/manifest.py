@@ -76,6 +76,11 @@ class Manifest:
         Runs after which the rule stopped it.
     made_by : mapping of str to str
         Version of Python and machine that began it: told, not compared.
+
+    Raises
+    ------
+    ValueError
+        If a shard would have too many engagements, or a sweep too many cells.
     """
 
     scenario: Scenario
