@@ -12,6 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
+import typer
+
 from experiments.errors import InputError
 
 STDOUT = "-"
@@ -125,6 +127,30 @@ def write_file(file: Path, content: str | bytes, *, overwrite: bool = False) -> 
         finally:
             with contextlib.suppress(OSError, ValueError):
                 temporary.unlink(missing_ok=True)
+
+
+def deliver(destination: Path | None, text: str, *, overwrite: bool) -> None:
+    """Give a text to whoever asked for it: print it on stdout, or write a file.
+
+    Parameters
+    ----------
+    destination : Path or None
+        ``-`` is stdout; None is nobody.
+    text : str
+    overwrite : bool
+        Whether a file may be there already.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written, or is there already and may not be replaced.
+    """
+    if destination is None:
+        return
+    if str(destination) == STDOUT:
+        typer.echo(text, nl=False)
+    else:
+        write_file(destination, text, overwrite=overwrite)
 
 
 @contextlib.contextmanager

@@ -25,12 +25,6 @@ NoiseName = Annotated[
         help="Measurement noise, in place of the scenario's; mixed: random in even runs, game in odd ones.",
     ),
 ]
-RangeMeter = Annotated[
-    bool | None,
-    typer.Option(
-        "--range-meter/--no-range-meter", help="Fly with it or without; by default as the scenario's file has it."
-    ),
-]
 Chunk = Annotated[
     int | None,
     typer.Option("--chunk", metavar="N", help="Engagements a shard; it changes no number. Suits the runs by default."),
@@ -178,6 +172,7 @@ def campaign_errors(resume_hint: str = "") -> Iterator[None]:
     """
     from concurrent.futures import BrokenExecutor, CancelledError
 
+    from experiments.commands._screen import NOT_FINITE
     from experiments.errors import InputError
     from sim.storage import StorageError
     from sim.versions import VersionError
@@ -196,10 +191,7 @@ def campaign_errors(resume_hint: str = "") -> Iterator[None]:
             f"there{resume_hint}"
         ) from None
     except FloatingPointError:
-        raise InputError(
-            "the numbers of the scenario are so large or so small that the results are not finite; "
-            "check its units with: infoset scenarios check FILE"
-        ) from None
+        raise InputError(NOT_FINITE) from None
     except (CancelledError, BrokenExecutor) as error:
         said = f" ({str(error)[:200]})" if str(error) else ""
         raise InputError(

@@ -18,9 +18,16 @@ ScenarioName = Annotated[
     str,
     typer.Argument(metavar="[SCENARIO]", help="A built-in scenario (see: infoset scenarios), or a scenario file."),
 ]
+ProblemName = Annotated[
+    str, typer.Argument(metavar="[PROBLEM]", help="A built-in problem (see: infoset problems list), or a problem file.")
+]
 Seed = Annotated[int, typer.Option("--seed", metavar="N", help="Root seed: the same seed draws the same engagements.")]
 StrategyName = Annotated[
     str | None, typer.Option("--strategy", metavar="NAME", help="Guidance strategy, in place of the scenario's.")
+]
+Strategies = Annotated[
+    str | None,
+    typer.Option("--strategies", metavar="A,B,C", help="Which, separated by commas; all there are by default."),
 ]
 ModelName = Annotated[
     str | None,
@@ -34,6 +41,12 @@ TieName = Annotated[
     str | None,
     typer.Option(
         "--tie", metavar="RULE", help="What game noise does between equals: upper, lower, alternate or random."
+    ),
+]
+RangeMeter = Annotated[
+    bool | None,
+    typer.Option(
+        "--range-meter/--no-range-meter", help="Fly with it or without; by default as the scenario's file has it."
     ),
 ]
 Out = Annotated[
@@ -107,6 +120,33 @@ def scenario_with(
             )
         set_model = replace(set_model, sections=sections)
     return replace(scenario, set_model=set_model)
+
+
+def with_range_meter(scenario: Scenario, range_meter: bool | None) -> Scenario:
+    """Return a scenario with its range meter, or without; as it is where nothing is said.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    range_meter : bool or None
+
+    Returns
+    -------
+    Scenario
+
+    Raises
+    ------
+    InputError
+        If it has none.
+    """
+    from experiments.errors import InputError
+
+    if range_meter and scenario.range_sensor is None:
+        raise InputError(
+            f"--range-meter: the scenario {scenario.name} has no [range_sensor]; add that table to its file, for "
+            "example period_s = 2.0 and relative_error = 0.05, or leave --range-meter out"
+        )
+    return replace(scenario, range_sensor=None) if range_meter is False else scenario
 
 
 def choice(option: str, name: str, valid: Sequence[str]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 
     from sim import Results, Scenario
 
+NOT_FINITE = (
+    "the numbers of the scenario are so large or so small that the results are not finite; "
+    "check its units with: infoset scenarios check FILE"
+)
 PUBLISHED_PHI = "published Phi, no guarantee"
 PAPER_SCENARIOS = ("asteroid-1997", "asteroid-1997-single")
 PAPER_SINGLE_RUN = {"random": (4.3, 244.7), "game": (9.5, 521.7)}
@@ -32,6 +36,12 @@ def say(message: str, quiet: bool) -> None:
         from experiments.errors import on_a_screen
 
         typer.echo(on_a_screen(message), err=True)
+
+
+def say_warnings(warnings: Iterable[str], quiet: bool) -> None:
+    """Print warnings beside the results, a line each."""
+    for warning in warnings:
+        say(f"warning: {warning}", quiet)
 
 
 def table_console(stdout_taken: bool) -> Console:
@@ -156,10 +166,7 @@ def need_finite(results: Results) -> None:
     if not np.isfinite(values).all():
         from experiments.errors import InputError
 
-        raise InputError(
-            "the numbers of the scenario are so large or so small that the results are not finite; "
-            "check its units with: infoset scenarios check FILE"
-        )
+        raise InputError(NOT_FINITE)
 
 
 def payoff_name(model: str) -> str:

@@ -13,11 +13,13 @@ from experiments.commands._options import (
     ModelName,
     Overwrite,
     Quiet,
+    RangeMeter,
     ScenarioName,
     Seed,
     StrategyName,
     scenario_with,
     whole_number,
+    with_range_meter,
 )
 
 if TYPE_CHECKING:
@@ -32,12 +34,7 @@ def adversary(
     scenario: ScenarioName = "asteroid-1997",
     strategy: StrategyName = None,
     model: ModelName = None,
-    range_meter: Annotated[
-        bool | None,
-        typer.Option(
-            "--range-meter/--no-range-meter", help="Fly with it or without; by default as the scenario's file has it."
-        ),
-    ] = None,
+    range_meter: RangeMeter = None,
     budget: Annotated[int, typer.Option("--budget", metavar="N", help="Engagements to fly.")] = DEFAULT_BUDGET,
     keep_set: Annotated[
         bool, typer.Option("--keep-set", help="Count only engagements in which the set was never lost.")
@@ -56,9 +53,8 @@ def adversary(
     miss, so no guarantee of the strategy can be below it; there may be worse ones. The same seed and budget find the
     same. Without --json or --record nothing is written.
     """
-    from experiments.commands._screen import say, tell_of_compiling
-    from experiments.commands.engage import with_range_meter
-    from experiments.output import STDOUT, checked_destinations, to_json, write_file
+    from experiments.commands._screen import say_warnings, tell_of_compiling
+    from experiments.output import STDOUT, checked_destinations, deliver, to_json
     from experiments.record_file import record_path, write_record
     from experiments.scenario_file import scenario_warnings
 
@@ -69,18 +65,14 @@ def adversary(
     given = with_range_meter(scenario_with(scenario, strategy=strategy, model=model), range_meter)
     with checked_destinations(files={"--json": json_, "--record": record}, overwrite=overwrite):
         warnings = scenario_warnings(given)
-        for warning in warnings:
-            say(f"warning: {warning}", quiet)
+        say_warnings(warnings, quiet)
         tell_of_compiling(quiet)
         worst, elapsed_s = _search(given, budget, seed, keep_set, quiet)
         if record is not None:
             write_record(worst.record(), record, overwrite=overwrite)
         if json_ is not None:
             text = to_json(_summary(given, worst, keep_set, record, elapsed_s, warnings))
-            if str(json_) == STDOUT:
-                typer.echo(text, nl=False)
-            else:
-                write_file(json_, text, overwrite=overwrite)
+            deliver(json_, text, overwrite=overwrite)
     if not quiet:
         _show(given, worst, keep_set, record, elapsed_s, str(json_) == STDOUT)
 

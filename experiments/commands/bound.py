@@ -16,6 +16,7 @@ from experiments.commands._options import (
     Quiet,
     ScenarioName,
     Seed,
+    Strategies,
     chosen_strategies,
     scenario_with,
     whole_number,
@@ -74,10 +75,7 @@ class Found:
 
 def bound(
     scenario: ScenarioName = "asteroid-1997",
-    strategies: Annotated[
-        str | None,
-        typer.Option("--strategies", metavar="A,B,C", help="Which, separated by commas; all there are by default."),
-    ] = None,
+    strategies: Strategies = None,
     model: ModelName = None,
     budget: Annotated[
         int, typer.Option("--budget", metavar="N", help="Engagements to search for the worst, a strategy; 0: none.")
@@ -94,8 +92,8 @@ def bound(
     miss. The bound is the most that this shows; each strategy is flown against such pairs. Without --out or --json
     nothing is written.
     """
-    from experiments.commands._screen import figure_files, say, tell_of_compiling
-    from experiments.output import STDOUT, checked_destinations, to_json, write_file
+    from experiments.commands._screen import figure_files, say_warnings, tell_of_compiling
+    from experiments.output import STDOUT, checked_destinations, deliver, to_json
     from experiments.scenario_file import scenario_warnings
 
     whole_number("--budget", budget, 0, MOST_EVALUATIONS, 500)
@@ -105,15 +103,11 @@ def bound(
     files = ("scenario.toml", "results.json", *figure_files(FIGURE))
     with checked_destinations(folder=out, names=files, files={"--json": json_}, overwrite=overwrite):
         warnings = scenario_warnings(given)
-        for warning in warnings:
-            say(f"warning: {warning}", quiet)
+        say_warnings(warnings, quiet)
         tell_of_compiling(quiet)
         lower, found, elapsed_s = _find(given, names, budget, seed, quiet)
         json_text = to_json(_summary(given, lower, found, elapsed_s, warnings))
-        if json_ is not None and str(json_) == STDOUT:
-            typer.echo(json_text, nl=False)
-        elif json_ is not None:
-            write_file(json_, json_text, overwrite=overwrite)
+        deliver(json_, json_text, overwrite=overwrite)
         if out is not None:
             _fill(out, given, lower, json_text, overwrite)
     if not quiet:

@@ -12,7 +12,6 @@ from experiments.commands._campaign_options import (
     Dask,
     NoiseName,
     Processes,
-    RangeMeter,
     Resume,
     Workers,
 )
@@ -22,12 +21,14 @@ from experiments.commands._options import (
     ModelName,
     Overwrite,
     Quiet,
+    RangeMeter,
     ScenarioName,
     Seed,
     StrategyName,
     TieName,
     scenario_with,
     whole_number,
+    with_range_meter,
 )
 
 if TYPE_CHECKING:
@@ -89,9 +90,8 @@ def campaign(
         crew,
         need_campaign_extra,
     )
-    from experiments.commands._screen import say, tell_of_compiling
-    from experiments.commands.engage import with_range_meter
-    from experiments.output import STDOUT, checked_destinations, to_json, write_file
+    from experiments.commands._screen import say_warnings, tell_of_compiling
+    from experiments.output import STDOUT, checked_destinations, deliver, to_json
 
     whole_number("--runs", runs, 1, MOST_RUNS, 10_000)
     whole_number("--seed", seed, 0, None, 0)
@@ -119,8 +119,7 @@ def campaign(
     with checked_destinations(files={"--json": json_}, overwrite=overwrite), campaign_errors(hint):
         need_free(out, resume=resume)
         warnings = scenario_warnings(given)
-        for warning in warnings:
-            say(f"warning: {warning}", quiet)
+        say_warnings(warnings, quiet)
         with crew(dask, workers, processes, quiet) as flying:
             tell_of_compiling(quiet)
             _tell_estimate(asked, flying.cores, quiet)
@@ -128,10 +127,7 @@ def campaign(
         found = samples(result.folder)
         summary = _summary(result, found, elapsed_s, warnings)
         result.folder.write_beside(SUMMARY, to_json(summary).encode())
-        if json_ is not None and str(json_) == STDOUT:
-            typer.echo(to_json(summary), nl=False)
-        elif json_ is not None:
-            write_file(json_, to_json(summary), overwrite=overwrite)
+        deliver(json_, to_json(summary), overwrite=overwrite)
     if not quiet:
         _show(result, found, elapsed_s, str(json_) == STDOUT)
 

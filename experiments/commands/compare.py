@@ -16,11 +16,14 @@ from experiments.commands._options import (
     Out,
     Overwrite,
     Quiet,
+    RangeMeter,
     ScenarioName,
     Seed,
+    Strategies,
     chosen_strategies,
     scenario_with,
     whole_number,
+    with_range_meter,
 )
 
 if TYPE_CHECKING:
@@ -37,19 +40,11 @@ COLUMNS = ("strategy", "noise", "tie", "run", "miss_m", "impulse_m_s", "outcome"
 
 def compare(
     scenario: ScenarioName = "asteroid-1997",
-    strategies: Annotated[
-        str | None,
-        typer.Option("--strategies", metavar="A,B,C", help="Which, separated by commas; all there are by default."),
-    ] = None,
+    strategies: Strategies = None,
     runs: Annotated[int, typer.Option("--runs", metavar="N", help="Engagements a strategy and noise.")] = 50,
     seed: Seed = 0,
     model: ModelName = None,
-    range_meter: Annotated[
-        bool | None,
-        typer.Option(
-            "--range-meter/--no-range-meter", help="Fly with it or without; by default as the scenario's file has it."
-        ),
-    ] = None,
+    range_meter: RangeMeter = None,
     out: Out = None,
     json_: Json = None,
     csv: Csv = None,
@@ -62,9 +57,8 @@ def compare(
     and each run counts with the worst of them. Run K is the same engagement as: infoset engage --run K.
     Without --out, --json or --csv nothing is written.
     """
-    from experiments.commands._screen import figure_files, say, tell_of_compiling
-    from experiments.commands.engage import with_range_meter
-    from experiments.output import STDOUT, checked_destinations, to_csv, to_json, write_file
+    from experiments.commands._screen import figure_files, say_warnings, tell_of_compiling
+    from experiments.output import STDOUT, checked_destinations, deliver, to_csv, to_json
     from experiments.scenario_file import scenario_warnings
 
     whole_number("--runs", runs, 1, MOST_RUNS, 50)
@@ -74,17 +68,13 @@ def compare(
     files = ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE))
     with checked_destinations(folder=out, names=files, files={"--json": json_, "--csv": csv}, overwrite=overwrite):
         warnings = scenario_warnings(given)
-        for warning in warnings:
-            say(f"warning: {warning}", quiet)
+        say_warnings(warnings, quiet)
         tell_of_compiling(quiet)
         compared, elapsed_s = _fly(given, names, runs, seed, quiet)
         json_text = to_json(_summary(given, runs, seed, elapsed_s, compared, warnings))
         csv_text = to_csv(COLUMNS, _rows(compared)) if csv is not None or out is not None else ""
-        for path, text in ((json_, json_text), (csv, csv_text)):
-            if path is not None and str(path) == STDOUT:
-                typer.echo(text, nl=False)
-            elif path is not None:
-                write_file(path, text, overwrite=overwrite)
+        deliver(json_, json_text, overwrite=overwrite)
+        deliver(csv, csv_text, overwrite=overwrite)
         if out is not None:
             _fill(out, given, compared, json_text, csv_text, overwrite)
     if not quiet:

@@ -16,6 +16,7 @@ from experiments.commands._options import (
     Out,
     Overwrite,
     Quiet,
+    RangeMeter,
     ScenarioName,
     Seed,
     StrategyName,
@@ -23,6 +24,7 @@ from experiments.commands._options import (
     choice,
     scenario_with,
     whole_number,
+    with_range_meter,
 )
 
 if TYPE_CHECKING:
@@ -54,12 +56,7 @@ def engage(
         str | None,
         typer.Option("--noise", metavar="random|game|both", help="Measurement noise, in place of the scenario's."),
     ] = None,
-    range_meter: Annotated[
-        bool | None,
-        typer.Option(
-            "--range-meter/--no-range-meter", help="Fly with it or without; by default as the scenario's file has it."
-        ),
-    ] = None,
+    range_meter: RangeMeter = None,
     strategy: StrategyName = None,
     model: ModelName = None,
     tie: TieName = None,
@@ -80,8 +77,8 @@ def engage(
     Run K is the same engagement, number for number, as run K of: infoset experiment with the same seed.
     Without --out, --json, --csv or --record nothing is written.
     """
-    from experiments.commands._screen import say, tell_of_compiling
-    from experiments.output import STDOUT, checked_destinations, library_version, to_csv, to_json, write_file
+    from experiments.commands._screen import say_warnings, tell_of_compiling
+    from experiments.output import STDOUT, checked_destinations, deliver, library_version, to_csv, to_json
     from experiments.scenario_file import scenario_hash, scenario_warnings
 
     whole_number("--seed", seed, 0, None, 0)
@@ -92,8 +89,7 @@ def engage(
     files = {"--json": json_, "--csv": csv} | {f"--record ({each.name})": each for each in records_at}
     with checked_destinations(folder=out, names=_names(flown), files=files, overwrite=overwrite):
         warnings = scenario_warnings(given)
-        for warning in warnings:
-            say(f"warning: {warning}", quiet)
+        say_warnings(warnings, quiet)
         tell_of_compiling(quiet)
         flights = _fly(flown, seed, run, quiet)
         summaries = {each.scenario.noise.value: _summary(each, took_s, warnings) for each, took_s in flights}
@@ -107,11 +103,8 @@ def engage(
             (whole,) = summaries.values()
         records = [each for each, _ in flights]
         json_text, csv_text = to_json(whole), to_csv(COLUMNS, _rows(records))
-        for path, text in ((json_, json_text), (csv, csv_text)):
-            if path is not None and str(path) == STDOUT:
-                typer.echo(text, nl=False)
-            elif path is not None:
-                write_file(path, text, overwrite=overwrite)
+        deliver(json_, json_text, overwrite=overwrite)
+        deliver(csv, csv_text, overwrite=overwrite)
         _write_records(records, records_at, overwrite)
         if out is not None:
             _fill(out, flown[0] if len(flown) == 1 else given, records, json_text, csv_text, overwrite)
@@ -119,35 +112,6 @@ def engage(
         from experiments.commands._engagement_table import show_engagements
 
         show_engagements(records, STDOUT in (str(json_), str(csv)))
-
-
-def with_range_meter(scenario: Scenario, range_meter: bool | None) -> Scenario:
-    """Return a scenario with its range meter, or without; as it is where nothing is said.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    range_meter : bool or None
-
-    Returns
-    -------
-    Scenario
-
-    Raises
-    ------
-    InputError
-        If it has none.
-    """
-    from dataclasses import replace
-
-    from experiments.errors import InputError
-
-    if range_meter and scenario.range_sensor is None:
-        raise InputError(
-            f"--range-meter: the scenario {scenario.name} has no [range_sensor]; add that table to its file, for "
-            "example period_s = 2.0 and relative_error = 0.05, or leave --range-meter out"
-        )
-    return replace(scenario, range_sensor=None) if range_meter is False else scenario
 
 
 def _with_noise(scenario: Scenario, noise: str | None) -> list[Scenario]:

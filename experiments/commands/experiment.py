@@ -85,15 +85,12 @@ def experiment(
         warnings = _warn(given, quiet)
         tell_of_compiling(quiet)
         curves, elapsed_s = _fly(given, runs, seed, quiet)
-        from experiments.output import STDOUT, to_csv, to_json, write_file
+        from experiments.output import STDOUT, deliver, to_csv, to_json
 
         json_text = to_json(_summary(given, runs, seed, elapsed_s, curves, warnings))
         csv_text = to_csv(COLUMNS, _rows(curves)) if csv is not None or out is not None else ""
-        for path, text in ((json_, json_text), (csv, csv_text)):
-            if path is not None and str(path) == STDOUT:
-                typer.echo(text, nl=False)
-            elif path is not None:
-                write_file(path, text, overwrite=overwrite)
+        deliver(json_, json_text, overwrite=overwrite)
+        deliver(csv, csv_text, overwrite=overwrite)
         if out is not None:
             _fill(out, given, curves, json_text, csv_text, overwrite)
     if not quiet:
@@ -101,12 +98,11 @@ def experiment(
 
 
 def _warn(scenario: Scenario, quiet: bool) -> list[str]:
-    from experiments.commands._screen import say
+    from experiments.commands._screen import say, say_warnings
     from experiments.scenario_file import scenario_warnings
 
     warnings = scenario_warnings(scenario)
-    for warning in warnings:
-        say(f"warning: {warning}", quiet)
+    say_warnings(warnings, quiet)
     if scenario.range_sensor is None:
         say(f"{scenario.name} has no [range_sensor]: there are curves 1 and 3 only", quiet)
     return warnings

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.commands._options import Html, Json, Out, Overwrite, Quiet, choice
+from experiments.commands._options import Html, Json, Out, Overwrite, ProblemName, Quiet, choice
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,10 +20,6 @@ if TYPE_CHECKING:
 
 FIGURES = ("figure-path", "figure-control", "figure-costates", "figure-times")
 GIVEN, BEST = "given", "best"
-
-ProblemName = Annotated[
-    str, typer.Argument(metavar="[PROBLEM]", help="A built-in problem (see: infoset problems list), or a problem file.")
-]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +61,7 @@ def multipoint(
     from experiments._multipoint_tables import Axes
     from experiments.commands._screen import figure_files, tell_of_compiling_rendezvous
     from experiments.multipoint_file import load_multipoint
-    from experiments.output import STDOUT, checked_destinations, to_json, write_file
+    from experiments.output import STDOUT, checked_destinations, deliver, to_json, write_file
     from experiments.pages.document import page_path
 
     page_path("--html", html)
@@ -79,10 +75,7 @@ def multipoint(
         tell_of_compiling_rendezvous(quiet, nonlinear=given.axes is Axes.INERTIAL)
         found = _find(given, best_order, best_times, quiet)
         json_text = to_json(_summary(found))
-        if json_ is not None and str(json_) == STDOUT:
-            typer.echo(json_text, nl=False)
-        elif json_ is not None:
-            write_file(json_, json_text, overwrite=overwrite)
+        deliver(json_, json_text, overwrite=overwrite)
         if html is not None:
             from experiments.pages.multipoint import multipoint_page
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.commands._options import Html, Json, Out, Overwrite, Quiet
+from experiments.commands._options import Html, Json, Out, Overwrite, ProblemName, Quiet
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,10 +22,6 @@ FIGURES = ("figure-trajectories", "figure-controls", "figure-front", "figure-cos
 MOST_SAMPLES = 10_001
 SWEEP = (0.5, 2.0, 31)
 """Durations looked at, from the least to the greatest in parts of the given one, and how many."""
-
-ProblemName = Annotated[
-    str, typer.Argument(metavar="[PROBLEM]", help="A built-in problem (see: infoset problems list), or a problem file.")
-]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +64,7 @@ def pareto(
     """
     from experiments.commands._options import whole_number
     from experiments.commands._screen import figure_files, progress_bar, tell_of_compiling_rendezvous
-    from experiments.output import STDOUT, checked_destinations, to_json, write_file
+    from experiments.output import STDOUT, checked_destinations, deliver, to_json, write_file
     from experiments.pages.document import page_path
     from experiments.pareto_file import load_pareto
 
@@ -82,10 +78,7 @@ def pareto(
         with progress_bar(quiet) as begin:
             found = _find(given, preferred, samples, begin("meetings and coalitions"))
         json_text = to_json(_summary(found))
-        if json_ is not None and str(json_) == STDOUT:
-            typer.echo(json_text, nl=False)
-        elif json_ is not None:
-            write_file(json_, json_text, overwrite=overwrite)
+        deliver(json_, json_text, overwrite=overwrite)
         if html is not None:
             from experiments.pages.pareto import pareto_page
 

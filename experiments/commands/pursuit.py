@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.commands._options import Html, Json, Out, Overwrite, Quiet, Seed, whole_number
+from experiments.commands._options import Html, Json, Out, Overwrite, ProblemName, Quiet, Seed, whole_number
 
 if TYPE_CHECKING:
     from experiments.pursuit_file import PursuitProblem
@@ -26,9 +26,6 @@ LONGEST_SCRIPT = 100_000
 """Characters; less than the longest field that a reader of CSV takes."""
 OPTIMAL, RANDOM = "optimal", "random"
 
-ProblemName = Annotated[
-    str, typer.Argument(metavar="[PROBLEM]", help="A built-in problem (see: infoset problems list), or a problem file.")
-]
 Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="A value in place of the file's: evader.thrust_N=5; repeatable."),
@@ -79,8 +76,8 @@ def pursuit(
     Every capture comes with a certificate; a saddle point is claimed only where all its checks hold. Without --out,
     --json or --html nothing is written.
     """
-    from experiments.commands._screen import figure_files, say, tell_of_compiling_pursuit
-    from experiments.output import STDOUT, checked_destinations, to_json, write_file
+    from experiments.commands._screen import figure_files, say_warnings, tell_of_compiling_pursuit
+    from experiments.output import STDOUT, checked_destinations, deliver, to_json
     from experiments.pages.document import page_path
     from experiments.pursuit_report import report_json
 
@@ -93,8 +90,7 @@ def pursuit(
     names = [*FIGURES, FEEDBACK_FIGURE] if feedback is not None else [*FIGURES]
     files = ("problem.toml", "results.json", *figure_files(*names))
     with checked_destinations(folder=out, names=files, files={"--json": json_, "--html": html}, overwrite=overwrite):
-        for warning in given.warnings():
-            say(f"warning: {warning}", quiet)
+        say_warnings(given.warnings(), quiet)
         tell_of_compiling_pursuit(quiet)
         solution, certificate, elapsed_s = _solve(given, certify, quiet)
         flown = None
@@ -106,10 +102,7 @@ def pursuit(
         json_text = to_json(report_json(given, solution, certificate, flown, elapsed_s))
         if html is not None:
             _write_page(html, given, solution, overwrite)
-        if json_ is not None and str(json_) == STDOUT:
-            typer.echo(json_text, nl=False)
-        elif json_ is not None:
-            write_file(json_, json_text, overwrite=overwrite)
+        deliver(json_, json_text, overwrite=overwrite)
         if out is not None:
             _fill(out, given, solution, flown, json_text, overwrite)
     if not quiet:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from experiments.commands._options import Csv, Json, Out, Overwrite, Quiet
-from experiments.commands.pursuit import ProblemName, Settings, problem_with
+from experiments.commands._options import Csv, Json, Out, Overwrite, ProblemName, Quiet
+from experiments.commands.pursuit import Settings, problem_with
 
 if TYPE_CHECKING:
     import numpy as np
@@ -56,9 +56,9 @@ def pursuit_map(
     A point starts from its neighbours; some are solved from nothing and the rest are checked against them. What is not
     certified has no capture time and is shown as such. Without --out, --json or --csv nothing is written.
     """
-    from experiments.commands._screen import figure_files, say, tell_of_compiling_pursuit
+    from experiments.commands._screen import figure_files, say_warnings, tell_of_compiling_pursuit
     from experiments.errors import InputError
-    from experiments.output import STDOUT, checked_destinations, to_csv, to_json, write_file
+    from experiments.output import STDOUT, checked_destinations, deliver, to_csv, to_json
 
     given = problem_with(problem, settings)
     x, y = _axis("--x", _columns(given) if columns is None else columns), _axis("--y", rows)
@@ -68,17 +68,13 @@ def pursuit_map(
         raise InputError(f"--x and --y: {len(x[1]) * len(y[1])} points are over {MOST_POINTS}; ask for fewer")
     files = ("problem.toml", "results.json", "map.csv", *figure_files(FIGURE))
     with checked_destinations(folder=out, names=files, files={"--json": json_, "--csv": csv}, overwrite=overwrite):
-        for warning in given.warnings():
-            say(f"warning: {warning}", quiet)
+        say_warnings(given.warnings(), quiet)
         tell_of_compiling_pursuit(quiet)
         found, elapsed_s = _solve(given, x, y, certify, quiet)
         json_text = to_json(_summary(given, x, y, found, elapsed_s))
         csv_text = to_csv(*_table(x, y, found))
-        for option, text in ((json_, json_text), (csv, csv_text)):
-            if option is not None and str(option) == STDOUT:
-                typer.echo(text, nl=False)
-            elif option is not None:
-                write_file(option, text, overwrite=overwrite)
+        deliver(json_, json_text, overwrite=overwrite)
+        deliver(csv, csv_text, overwrite=overwrite)
         if out is not None:
             _fill(out, given, x, y, found, json_text, csv_text, overwrite)
     if not quiet:

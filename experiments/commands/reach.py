@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from experiments.commands._options import Html, Json, Out, Overwrite, Quiet, Seed, choice, whole_number
+from experiments.commands._options import Html, Json, Out, Overwrite, ProblemName, Quiet, Seed, choice, whole_number
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,10 +22,7 @@ MOST_NOISY_FLIGHTS = 1000
 
 
 def reach(
-    problem: Annotated[
-        str,
-        typer.Argument(metavar="[PROBLEM]", help="A built-in problem (see: infoset problems list), or a problem file."),
-    ] = "rendezvous-2021",
+    problem: ProblemName = "rendezvous-2021",
     select: Annotated[
         str,
         typer.Option(
@@ -59,7 +56,7 @@ def reach(
     written.
     """
     from experiments.commands._screen import figure_files, progress_bar, say
-    from experiments.output import STDOUT, checked_destinations, to_csv, to_json, write_file
+    from experiments.output import STDOUT, checked_destinations, deliver, to_csv, to_json, write_file
     from experiments.pages.document import page_path
     from experiments.reachability_file import load_rendezvous
     from experiments.reachability_published import COLUMNS, compare_published, comparison_rows, is_published
@@ -90,10 +87,7 @@ def reach(
         )
         comparisons = compare_published(given, report.solution) if published else ()
         json_text = to_json(report_json(report))
-        if json_ is not None and str(json_) == STDOUT:
-            typer.echo(json_text, nl=False)
-        elif json_ is not None:
-            write_file(json_, json_text, overwrite=overwrite)
+        deliver(json_, json_text, overwrite=overwrite)
         if html is not None:
             from experiments.pages.reachability import reachability_page
 

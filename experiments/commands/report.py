@@ -141,13 +141,10 @@ def _scenario_file(found: CampaignFolder, out: Path | None) -> Path:
 
 
 def _write(found: CampaignFolder, text: str, out: Path | None, json_: Path | None, overwrite: bool) -> None:
-    from experiments.output import STDOUT, write_file
+    from experiments.output import deliver, write_file
     from experiments.scenario_file import scenario_to_toml
 
-    if json_ is not None and str(json_) == STDOUT:
-        typer.echo(text, nl=False)
-    elif json_ is not None:
-        write_file(json_, text, overwrite=overwrite)
+    deliver(json_, text, overwrite=overwrite)
     if out is not None:
         write_file(out / "report.json", text, overwrite=overwrite)
         write_file(out / SCENARIO_FILE, scenario_to_toml(found.manifest.scenario), overwrite=overwrite)

@@ -38,7 +38,7 @@ def reproduce(
     agree does not. Where a paper prints no results, reference values stand in their place. Without --json nothing is
     written.
     """
-    from experiments.output import STDOUT, checked_destinations, to_json, write_file
+    from experiments.output import STDOUT, checked_destinations, deliver, to_json
     from experiments.published import PAPERS, reproduce_paper
 
     chosen = PAPERS if paper is None else (choice("--paper", paper, PAPERS),)
@@ -49,10 +49,7 @@ def reproduce(
         with progress_bar(quiet) as begin:
             found = [reproduce_paper(name, begin(name)) for name in chosen]
         json_text = to_json(_summary(found))
-        if json_ is not None and str(json_) == STDOUT:
-            typer.echo(json_text, nl=False)
-        elif json_ is not None:
-            write_file(json_, json_text, overwrite=overwrite)
+        deliver(json_, json_text, overwrite=overwrite)
     if not quiet:
         _show(found, str(json_) == STDOUT)
     wrong = [number for each in found for number in each.numbers if _is_wrong(number)]

@@ -14,7 +14,6 @@ from experiments.commands._campaign_options import (
     Dask,
     NoiseName,
     Processes,
-    RangeMeter,
     Resume,
     Workers,
 )
@@ -24,12 +23,14 @@ from experiments.commands._options import (
     ModelName,
     Overwrite,
     Quiet,
+    RangeMeter,
     ScenarioName,
     Seed,
     StrategyName,
     TieName,
     scenario_with,
     whole_number,
+    with_range_meter,
 )
 
 if TYPE_CHECKING:
@@ -114,9 +115,8 @@ def sweep(
         crew,
         need_campaign_extra,
     )
-    from experiments.commands._screen import figure_files, say, tell_of_compiling
-    from experiments.commands.engage import with_range_meter
-    from experiments.output import STDOUT, checked_destinations, to_json, write_file
+    from experiments.commands._screen import figure_files, say, say_warnings, tell_of_compiling
+    from experiments.output import STDOUT, checked_destinations, deliver, to_json
 
     whole_number("--runs", runs, 1, MOST_RUNS, 200)
     whole_number("--seed", seed, 0, None, 0)
@@ -151,8 +151,7 @@ def sweep(
         if not yes:
             _ask(asked)
         warnings = list(dict.fromkeys(line for cell in asked.cells for line in scenario_warnings(cell)))
-        for warning in warnings[:5]:
-            say(f"warning: {warning}", quiet)
+        say_warnings(warnings[:5], quiet)
         with crew(dask, workers, processes, quiet) as flying:
             tell_of_compiling(quiet)
             result, elapsed_s = _fly(asked, flying, resume, quiet)
@@ -161,10 +160,7 @@ def sweep(
         summary = to_json(sweep_summary(result.folder, table, required, elapsed_s))
         result.folder.write_beside("summary.json", summary.encode())
         draw_into(table, shown, required, out)
-        if json_ is not None and str(json_) == STDOUT:
-            typer.echo(summary, nl=False)
-        elif json_ is not None:
-            write_file(json_, summary, overwrite=overwrite)
+        deliver(json_, summary, overwrite=overwrite)
     if not quiet:
         from experiments.commands._screen import table_console
 
