@@ -12,9 +12,8 @@ from experiments.commands._screen import (
     PAPER_SINGLE_RUN,
     allowance,
     certificate,
+    guaranteed_miss_name,
     number,
-    payoff_name,
-    payoffs,
     table_console,
 )
 from sim import Record
@@ -43,7 +42,7 @@ def show_engagements(records: Sequence[Record], stdout_taken: bool) -> None:
             [
                 number(float(result.miss_m[0])),
                 number(float(result.impulse_m_s[0])),
-                number(payoffs(result)[0]),
+                number(result.guaranteed_miss_m.tolist()[0]),
                 _outcome(record),
                 certificate(result),
                 number(result.truth_margin_m.tolist()[0]),
@@ -56,7 +55,7 @@ def show_engagements(records: Sequence[Record], stdout_taken: bool) -> None:
         if scenario.name == PAPER_SCENARIO and scenario.range_sensor is None and paper is not None:
             table.add_column("paper", justify="right")
             columns.append([number(paper[0]), number(paper[1]), *[""] * 7])
-    names = {payoff_name(record.scenario.set_model.kind.value) for record in records}
+    names = {guaranteed_miss_name(record.scenario.set_model.kind.value) for record in records}
     titles = [
         "miss, m",
         "impulse, m/s",

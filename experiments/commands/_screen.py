@@ -169,7 +169,7 @@ def need_finite(results: Results) -> None:
         raise InputError(NOT_FINITE)
 
 
-def payoff_name(model: str) -> str:
+def guaranteed_miss_name(model: str) -> str:
     """Return what to call `guaranteed_miss_m` of a model: the paper's model guarantees nothing."""
     return PUBLISHED_PHI if model == "paper" else "guaranteed miss"
 
@@ -188,35 +188,11 @@ def allowance(scenario: Scenario) -> str | None:
     )
 
 
-def held(results: Results) -> list[bool | None]:
-    """Return whether each miss stayed within its guaranteed one; None where nothing was guaranteed."""
-    import numpy as np
-
-    flags = results.phi_held
-    return [
-        None if unknown else bool(flag) for flag, unknown in zip(flags.data, np.ma.getmaskarray(flags), strict=True)
-    ]
-
-
 def certificate(results: Results) -> str:
     """Return the certificate of a batch as a line: how often the truth was kept, and how often Phi held."""
     kept = f"truth kept {int(results.truth_kept.sum())}/{len(results)}"
-    known = [each for each in held(results) if each is not None]
+    known = [each for each in results.phi_held.tolist() if each is not None]
     if not known:
         return kept
     missing = f" ({len(results) - len(known)} without Phi)" if len(known) < len(results) else ""
     return f"{kept}, Phi held {sum(known)}/{len(known)}{missing}"
-
-
-def payoffs(results: Results) -> list[float | None]:
-    """Return the guaranteed misses, m; None where no label finished."""
-    values, masked = results.guaranteed_miss_m.filled(0.0), results.guaranteed_miss_m.mask
-    return [
-        None if missing else float(value) for value, missing in zip(values, _spread(masked, len(results)), strict=True)
-    ]
-
-
-def _spread(mask: object, size: int) -> Sequence[bool]:
-    import numpy as np
-
-    return [bool(each) for each in np.broadcast_to(np.asarray(mask), (size,))]

@@ -65,12 +65,10 @@ class Found:
 
     def guaranteed_m(self, scenario: Scenario) -> float | None:
         """Return the greatest guaranteed miss of all flights, m; None where the model guarantees nothing."""
-        from experiments.commands._screen import payoffs
-
         if not scenario.set_model.is_guaranteed:
             return None
-        known = [payoff for results in self.all_results for payoff in payoffs(results)]
-        return None if None in known else max(payoff for payoff in known if payoff is not None)
+        misses = [miss for results in self.all_results for miss in results.guaranteed_miss_m.tolist()]
+        return None if None in misses else max(misses)
 
 
 def bound(

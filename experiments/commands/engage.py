@@ -161,7 +161,6 @@ def _fly(flown: Sequence[Scenario], seed: int, run: int, quiet: bool) -> list[tu
 
 
 def _summary(record: Record, elapsed_s: float, warnings: Sequence[str]) -> dict[str, object]:
-    from experiments.commands._screen import held, payoffs
     from experiments.output import library_version
     from experiments.scenario_file import scenario_hash
     from guidance import NoiseKind
@@ -181,11 +180,11 @@ def _summary(record: Record, elapsed_s: float, warnings: Sequence[str]) -> dict[
         "range_meter": scenario.range_sensor is not None,
         "miss_m": float(result.miss_m[0]),
         "impulse_m_s": float(result.impulse_m_s[0]),
-        "guaranteed_miss_m": payoffs(result)[0],
+        "guaranteed_miss_m": result.guaranteed_miss_m.tolist()[0],
         "outcome": result.outcomes[0].value,
         "truth_kept": bool(result.truth_kept[0]),
         "truth_margin_m": result.truth_margin_m.tolist()[0],
-        "phi_held": held(result)[0],
+        "phi_held": result.phi_held.tolist()[0],
         "inconsistency": None if record.inconsistency is None else _where(record, record.inconsistency),
         "steps": [
             {

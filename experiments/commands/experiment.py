@@ -147,7 +147,6 @@ def _fly(scenario: Scenario, runs: int, seed: int, quiet: bool) -> tuple[list[Cu
 def _summary(
     scenario: Scenario, runs: int, seed: int, elapsed_s: float, curves: Sequence[Curve], warnings: Sequence[str]
 ) -> dict[str, object]:
-    from experiments.commands._screen import held, payoffs
     from experiments.output import library_version
     from experiments.scenario_file import scenario_hash
 
@@ -166,11 +165,11 @@ def _summary(
                 "range_meter": curve.range_meter,
                 "miss_m": curve.results.miss_m.tolist(),
                 "impulse_m_s": curve.results.impulse_m_s.tolist(),
-                "guaranteed_miss_m": payoffs(curve.results),
+                "guaranteed_miss_m": curve.results.guaranteed_miss_m.tolist(),
                 "outcome": [outcome.value for outcome in curve.results.outcomes],
                 "truth_kept": curve.results.truth_kept.tolist(),
                 "truth_margin_m": curve.results.truth_margin_m.tolist(),
-                "phi_held": held(curve.results),
+                "phi_held": curve.results.phi_held.tolist(),
             }
             for curve in curves
         ],
@@ -178,12 +177,10 @@ def _summary(
 
 
 def _rows(curves: Sequence[Curve]) -> list[list[Cell]]:
-    from experiments.commands._screen import held, payoffs
-
     rows: list[list[Cell]] = []
     for curve in curves:
-        results, guaranteed = curve.results, payoffs(curve.results)
-        margins, phi_held = results.truth_margin_m.tolist(), held(results)
+        results, guaranteed = curve.results, curve.results.guaranteed_miss_m.tolist()
+        margins, phi_held = results.truth_margin_m.tolist(), results.phi_held.tolist()
         for i in range(len(results)):
             rows.append(
                 [
@@ -231,9 +228,8 @@ def _show(scenario: Scenario, curves: Sequence[Curve], stdout_taken: bool) -> No
         PAPER_SINGLE_RUN,
         allowance,
         certificate,
+        guaranteed_miss_name,
         number,
-        payoff_name,
-        payoffs,
         table_console,
     )
     from sim import Outcome, quantiles
@@ -245,14 +241,14 @@ def _show(scenario: Scenario, curves: Sequence[Curve], stdout_taken: bool) -> No
     for curve in curves:
         results = curve.results
         name, meter = f"{curve.number} {curve.noise.value}", "  + range meter" if curve.range_meter else ""
-        finished = [value for value in payoffs(results) if value is not None]
-        median = number(float(quantiles(finished, 0.5))) if finished else "-"
+        finished = results.guaranteed_miss_m.compressed()
+        median = number(float(quantiles(finished, 0.5))) if len(finished) else "-"
         for first, quantity, values in (
             (name, "miss, m", results.miss_m),
             (meter, "impulse, m/s", results.impulse_m_s),
         ):
             table.add_row(first, quantity, *(number(float(each)) for each in quantiles(values, LEVELS)))
-        table.add_row("", f"{payoff_name(scenario.set_model.kind.value)}, m", "", median)
+        table.add_row("", f"{guaranteed_miss_name(scenario.set_model.kind.value)}, m", "", median)
         others = Counter(each.value for each in results.outcomes if each is not Outcome.INTERCEPTED)
         said = ", ".join(f"{count} {outcome}" for outcome, count in others.items()) or "none"
         notes.append(f"curve {curve.number}: {certificate(results)}; not intercepted: {said}")
