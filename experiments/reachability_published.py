@@ -17,7 +17,7 @@ from rendezvous.reachability.selection import minimum_energy, minimum_l1, neares
 Floats = NDArray[np.float64]
 
 PROBLEM = "rendezvous-2021"
-COLUMNS = ("table", "ours", "quantity", "t", "printed", "corrected", "computed")
+COLUMNS = ("table", "ours", "quantity", "period", "printed", "corrected", "computed")
 
 
 @dataclass(frozen=True)

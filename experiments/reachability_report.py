@@ -242,7 +242,7 @@ def report_json(report: Report) -> dict[str, object]:
     Returns
     -------
     dict
-        `optimal_miss` is the Euclidean norm of six components, in m and m/s, as in the paper.
+        Beside lists of states, misses and controls, which have no one unit, it has `units`.
     """
     from experiments.output import library_version
 
@@ -252,6 +252,13 @@ def report_json(report: Report) -> dict[str, object]:
         "kind": KIND,
         "problem": report.rendezvous.name,
         "problem_hash": report.rendezvous.hash,
+        "units": {
+            "period_s": report.rendezvous.period_s,
+            "states": "x, y, z in m and their rates in m/s",
+            "misses": "Euclidean norm of six components, in m and m/s",
+            "controls": "parts of acceleration_m_s2, along x, y, z",
+            "acceleration_m_s2": report.rendezvous.acceleration_m_s2,
+        },
         "elapsed_s": report.elapsed_s,
         "route": solution.route.value,
         "route_reason": solution.reason,
@@ -261,7 +268,7 @@ def report_json(report: Report) -> dict[str, object]:
         "least_periods_searched": report.searched_periods,
         "sets": [
             {
-                "t": t,
+                "period": t,
                 "forward": _set_json(solution, SetKind.FORWARD, t, report.forward[t]),
                 "tube": _set_json(solution, SetKind.TUBE, t, report.tube[t]),
             }

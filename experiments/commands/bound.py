@@ -177,8 +177,8 @@ def _summary(
         "reached_at": _where(lower.pair, scenario),
         "by_label": [
             {
-                "label_km": each.label_m / M_PER_KM,
-                "closing_speed_km_s": -each.vx_m_s / M_PER_KM,
+                "label_m": each.label_m,
+                "closing_speed_m_s": -each.vx_m_s,
                 "last_common_step": each.last_common_step,
                 "bound_m": each.bound_m,
             }
@@ -189,7 +189,7 @@ def _summary(
                 "name": each.name,
                 "worst_found_m": each.worst_miss_m,
                 "guaranteed_m": each.guaranteed_m(scenario),
-                "gap": _gap(each, lower),
+                "worst_over_bound": _worst_over_bound(each, lower),
                 "outcome": each.worst_outcome,
                 "worst_of_search_m": None if each.searched is None else float(each.searched.result.miss_m[0]),
                 "flights": [
@@ -197,7 +197,7 @@ def _summary(
                         **_where(pair, scenario),
                         "bound_m": pair.bound_m,
                         "miss_m": flight.results.miss_m.tolist(),
-                        "spent_m_s": flight.results.impulse_m_s.tolist(),
+                        "impulse_m_s": flight.results.impulse_m_s.tolist(),
                         "outcomes": [outcome.value for outcome in flight.results.outcomes],
                         "truth_kept": flight.results.truth_kept.tolist(),
                     }
@@ -209,15 +209,15 @@ def _summary(
     }
 
 
-def _gap(found: Found, lower: LowerBound) -> float | None:
+def _worst_over_bound(found: Found, lower: LowerBound) -> float | None:
     """How many times the bound the worst is; None where the bound is zero."""
     return found.worst_miss_m / lower.bound_m if lower.bound_m > 0.0 else None
 
 
 def _where(pair: TruthPair, scenario: Scenario) -> dict[str, object]:
     return {
-        "label_km": pair.label_m / M_PER_KM,
-        "closing_speed_km_s": -pair.vx_m_s / M_PER_KM,
+        "label_m": pair.label_m,
+        "closing_speed_m_s": -pair.vx_m_s,
         "last_common_step": pair.last_common_step,
         "alike_until_before_arrival_s": pair.arrival_s - pair.last_common_step * scenario.set_model.step_s,
     }
@@ -259,7 +259,7 @@ def _show(scenario: Scenario, lower: LowerBound, found: Sequence[Found], stdout_
         table.add_row(
             each.name,
             number(each.worst_miss_m),
-            number(_gap(each, lower)),
+            number(_worst_over_bound(each, lower)),
             number(each.guaranteed_m(scenario)),
             each.worst_outcome,
         )

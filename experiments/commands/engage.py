@@ -35,7 +35,7 @@ BOTH = "both"
 COLUMNS = (
     "noise",
     "step",
-    "t_s",
+    "time_s",
     "measured_angle_rad",
     "measured_range_m",
     "measured_rate_rad_s",
@@ -175,7 +175,7 @@ def _summary(record: Record, elapsed_s: float, warnings: Sequence[str]) -> dict[
         "run": record.run,
         "runs": 1,
         "elapsed_s": elapsed_s,
-        "number": 1 + (scenario.range_sensor is not None) + 2 * (scenario.noise is NoiseKind.GAME),
+        "published_curve": 1 + (scenario.range_sensor is not None) + 2 * (scenario.noise is NoiseKind.GAME),
         "noise": scenario.noise.value,
         "range_meter": scenario.range_sensor is not None,
         "miss_m": float(result.miss_m[0]),
@@ -188,7 +188,7 @@ def _summary(record: Record, elapsed_s: float, warnings: Sequence[str]) -> dict[
         "inconsistency": None if record.inconsistency is None else _where(record, record.inconsistency),
         "steps": [
             {
-                "t_s": step.time_s,
+                "time_s": step.time_s,
                 "measured_angle_rad": step.measured_angle_rad,
                 "measured_range_m": step.measured_range_m,
                 "measured_rate_rad_s": step.measured_rate_rad_s,
@@ -206,7 +206,7 @@ def _summary(record: Record, elapsed_s: float, warnings: Sequence[str]) -> dict[
 
 def _where(record: Record, found: Inconsistency) -> dict[str, object]:
     """Say at which step, and at which hypothesis, the data contradicted the model."""
-    return {"step": found.step, "t_s": record.steps[found.step].time_s, "label_km": found.label_m / 1e3}
+    return {"step": found.step, "time_s": record.steps[found.step].time_s, "label_m": found.label_m}
 
 
 def _rows(records: Sequence[Record]) -> list[list[Cell]]:

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 FIGURE = "figure-4-distributions"
 LEVELS = (0.1, 0.5, 0.9, 0.99)
 COLUMNS = (
-    "curve",
+    "published_curve",
     "noise",
     "range_meter",
     "run",
@@ -160,7 +160,7 @@ def _summary(
         "elapsed_s": elapsed_s,
         "curves": [
             {
-                "number": curve.number,
+                "published_curve": curve.number,
                 "noise": curve.noise.value,
                 "range_meter": curve.range_meter,
                 "miss_m": curve.results.miss_m.tolist(),

@@ -188,13 +188,16 @@ def _summary(found: Found) -> dict[str, object]:
         "units": "m, s; " + ("x radial, y along the motion, z along the orbit's normal" if hill else "inertial axes"),
         "order_chosen": BEST if found.best_order else GIVEN,
         "times_chosen": BEST if found.best_times else GIVEN,
-        "cost": path.cost,
-        **({"cost_with_price": found.objective} if problem.price_per_s > 0.0 else {}),
+        "cost_m2_s3": path.cost,
+        **({"cost_with_price_m2_s3": found.objective} if problem.price_per_s > 0.0 else {}),
         "order": names,
         "times_s": path.nodes.arrive_s.tolist(),
-        "time_gradient": path.time_gradient.tolist(),
+        "time_gradient_m2_s4": path.time_gradient.tolist(),
         "nodes": [_node(found, index, name) for index, name in enumerate(names)],
-        "costate0": {"position": path.costate_start[:3].tolist(), "velocity": path.costate_start[3:].tolist()},
+        "costate0": {
+            "position_m_s3": path.costate_start[:3].tolist(),
+            "velocity_m_s2": path.costate_start[3:].tolist(),
+        },
         "peak_control_m_s2": found.peak_m_s2,
         "evaluations": found.evaluations,
         "orders_begun": found.searched,
@@ -213,8 +216,8 @@ def _node(found: Found, index: int, name: str) -> dict[str, object]:
         "velocity_m_s": state[3:].tolist(),
         "target_velocity_m_s": nodes.arrive[index, 3:].tolist(),
         "leave_s": float(nodes.leave_s[index]),
-        "jump": jumps[index, :3].tolist(),
-        **({"velocity_jump": jumps[index, 3:].tolist()} if met else {}),
+        "jump_m_s3": jumps[index, :3].tolist(),
+        **({"velocity_jump_m_s2": jumps[index, 3:].tolist()} if met else {}),
     }
 
 

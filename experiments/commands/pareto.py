@@ -204,7 +204,12 @@ def _summary(found: Found) -> dict[str, object]:
         "version": library_version(),
         "problem": found.problem.name,
         "problem_hash": found.problem.hash,
-        "units": "m, s; x against the motion, y radially outward, z along the orbit's normal",
+        "units": {
+            "axes": "x against the motion, y radially outward, z along the orbit's normal",
+            "costate_at_meeting": "m/s^3 of the position's three, m/s^2 of the velocity's",
+            "matrix": "m^2/s^3 over the units of two free components",
+            "distances": "m/s^1.5",
+        },
         "meeting_time_s": encounter.meeting_s,
         "meet": encounter.meeting.value,
         "free": [each.name.lower() for each in encounter.free],
@@ -214,9 +219,9 @@ def _summary(found: Found) -> dict[str, object]:
                 "name": each.craft.name,
                 "weight": each.craft.weight,
                 "ideal": _named_state(solution, each.ideal),
-                "ideal_cost_squared": each.ideal_cost_squared,
-                "cost_squared": float(cost[index]),
-                "excess": float(excess[index]),
+                "ideal_cost_squared_m2_s3": each.ideal_cost_squared,
+                "cost_squared_m2_s3": float(cost[index]),
+                "excess_m2_s3": float(excess[index]),
                 "impulse_m_s": found.impulses_m_s[index],
                 "peak_control_m_s2": found.peaks_m_s2[index],
                 "costate_at_meeting": solution.plan(index).costate.tolist(),
@@ -224,24 +229,24 @@ def _summary(found: Found) -> dict[str, object]:
             }
             for index, each in enumerate(solution.costs)
         ],
-        "group_loss": float(solution.group_loss()),
+        "group_loss_m2_s3": float(solution.group_loss()),
         "matrix": [each.matrix.tolist() for each in solution.costs[: 1 if solution.same_matrix else None]],
         **({"distances": distances(solution).tolist()} if solution.same_matrix else {}),
         "selections": {
             name: {
                 "meeting": _named_state(solution, point),
-                "cost_squared": solution.cost_squared(point).tolist(),
-                "excess": solution.excess(point).tolist(),
-                "group_loss": float(solution.group_loss(point)),
+                "cost_squared_m2_s3": solution.cost_squared(point).tolist(),
+                "excess_m2_s3": solution.excess(point).tolist(),
+                "group_loss_m2_s3": float(solution.group_loss(point)),
             }
             for name, point in found.selections.items()
         },
         **_coalition_summary(found),
         "sweep": {
             "meeting_time_s": found.sweep.meeting_s.tolist(),
-            "group_loss": found.sweep.group_loss.tolist(),
-            "cost_squared": found.sweep.cost_squared.tolist(),
-            "ideal_cost_squared": found.sweep.ideal_cost_squared.tolist(),
+            "group_loss_m2_s3": found.sweep.group_loss.tolist(),
+            "cost_squared_m2_s3": found.sweep.cost_squared.tolist(),
+            "ideal_cost_squared_m2_s3": found.sweep.ideal_cost_squared.tolist(),
         },
         "samples": [_sampled(found, index) for index in range(len(encounter.craft))],
     }
@@ -267,15 +272,18 @@ def _bound_summary(found: Found, index: int) -> dict[str, object]:
 def _coalition_summary(found: Found) -> dict[str, object]:
     coalitions = found.coalitions
     if coalitions is None:
-        return {"coalitions": {}, "shapley": [], "transfers": [], "core": None}
+        return {"coalitions": {}, "shapley_m2_s3": [], "transfers_m2_s3": [], "core": None}
     names = [each.craft.name for each in found.solution.costs]
     return {
         "coalitions": {
-            "+".join(names[member] for member in each.members): {"excess": each.excess, "regret": each.regret}
+            "+".join(names[member] for member in each.members): {
+                "excess_m2_s3": each.excess,
+                "regret_m2_s3": each.regret,
+            }
             for each in coalitions.coalitions
         },
-        "shapley": coalitions.shapley.tolist(),
-        "transfers": coalitions.transfers.tolist(),
+        "shapley_m2_s3": coalitions.shapley.tolist(),
+        "transfers_m2_s3": coalitions.transfers.tolist(),
         "core": {"verdict": coalitions.core.value, "reason": coalitions.core.reason},
     }
 

@@ -193,7 +193,7 @@ def _show(report: Report, comparisons: Sequence[Comparison], stdout_taken: bool)
 def _sets_table(report: Report) -> object:
     from rich.table import Table
 
-    table = Table("t", box=None, pad_edge=False)
+    table = Table("period", box=None, pad_edge=False)
     for title in ("forward\nvertices", "\nfacets", "tube\nvertices", "\nfacets", "tube\nx, m", "\ny, m", "\nz, m"):
         table.add_column(title, justify="right")
     from rendezvous.reachability import SetKind

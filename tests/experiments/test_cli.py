@@ -24,7 +24,7 @@ from experiments.scenario_file import load_scenario, scenario_hash, scenario_tex
 from sim import Scenario, simulate
 
 CURVE_KEYS = [
-    "number",
+    "published_curve",
     "noise",
     "range_meter",
     "miss_m",
@@ -118,7 +118,7 @@ def test_experiment_as_json(infoset: Command, tmp_path: Path) -> None:
     assert found["elapsed_s"] > 0.0
     curves = found["curves"]
     assert [list(curve) for curve in curves] == [CURVE_KEYS] * 4
-    assert [(curve["number"], curve["noise"], curve["range_meter"]) for curve in curves] == [
+    assert [(curve["published_curve"], curve["noise"], curve["range_meter"]) for curve in curves] == [
         (1, "random", False),
         (2, "random", True),
         (3, "game", False),
@@ -161,7 +161,7 @@ def test_quiet_experiment_prints_nothing(infoset: Command, brief_file: Path) -> 
 def test_without_a_range_sensor_there_are_two_curves_and_it_is_said(infoset: Command) -> None:
     code, out, err = infoset("experiment", "asteroid-1997-single", "--runs", 1, "--json", "-")
     assert code == 0
-    assert [curve["number"] for curve in json.loads(out)["curves"]] == [1, 3]
+    assert [curve["published_curve"] for curve in json.loads(out)["curves"]] == [1, 3]
     assert "no [range_sensor]: there are curves 1 and 3 only" in err
 
 
@@ -195,7 +195,7 @@ def test_experiment_into_a_folder(infoset: Command, tmp_path: Path) -> None:
     assert text == beside.read_text()
     rows = list(csv.DictReader(io.StringIO(text)))
     assert len(rows) == 8
-    assert [(row["curve"], row["run"]) for row in rows[:3]] == [("1", "0"), ("1", "1"), ("2", "0")]
+    assert [(row["published_curve"], row["run"]) for row in rows[:3]] == [("1", "0"), ("1", "1"), ("2", "0")]
     assert [float(row["miss_m"]) for row in rows[4:6]] == found["curves"][2]["miss_m"]
     assert {row["range_meter"] for row in rows} == {"true", "false"}
     assert {row["start_x_m"] for row in rows[0::2]} == {rows[0]["start_x_m"]}
@@ -238,7 +238,7 @@ def test_engage_as_json(infoset: Command, tmp_path: Path) -> None:
         list(step)
         == [
             *(
-                "t_s",
+                "time_s",
                 "measured_angle_rad",
                 "measured_range_m",
                 "measured_rate_rad_s",
@@ -249,13 +249,13 @@ def test_engage_as_json(infoset: Command, tmp_path: Path) -> None:
         ]
         for step in steps
     )
-    assert [step["t_s"] for step in steps[:3]] == [0.0, 0.5, 1.0]
+    assert [step["time_s"] for step in steps[:3]] == [0.0, 0.5, 1.0]
     first, last = steps[0], steps[-1]
     lower, upper = first["predicted_miss_m"]
     assert lower < upper
     assert isinstance(first["measured_angle_rad"], float)
     assert isinstance(first["sections"], int)
-    assert last["t_s"] == 0.5 * (len(steps) - 1)
+    assert last["time_s"] == 0.5 * (len(steps) - 1)
     assert all((step["predicted_miss_m"] is None) == (step["sections"] == 0) for step in steps)
     assert math.isclose(sum(abs(step["impulse_m_s"]) for step in steps), found["impulse_m_s"])
     assert names_in(tmp_path) == []

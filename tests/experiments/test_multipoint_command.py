@@ -18,10 +18,18 @@ from experiments.problem_file import built_in_problems, problem_text
 
 FIGURES = ["figure-control", "figure-costates", "figure-path", "figure-times"]
 KEYS = [
-    *("version", "problem", "problem_hash", "units", "order_chosen", "times_chosen", "cost", "order", "times_s"),
-    *("time_gradient", "nodes", "costate0", "peak_control_m_s2", "evaluations", "orders_begun", "orders_left_out"),
+    *("version", "problem", "problem_hash", "units", "order_chosen", "times_chosen", "cost_m2_s3", "order", "times_s"),
+    *(
+        "time_gradient_m2_s4",
+        "nodes",
+        "costate0",
+        "peak_control_m_s2",
+        "evaluations",
+        "orders_begun",
+        "orders_left_out",
+    ),
 ]
-NODE_KEYS = ["name", "meet", "position_m", "velocity_m_s", "target_velocity_m_s", "leave_s", "jump"]
+NODE_KEYS = ["name", "meet", "position_m", "velocity_m_s", "target_velocity_m_s", "leave_s", "jump_m_s3"]
 TWO, THREE, FIVE, TOUR = (problem_text(name) for name in ("service-2", "service-3", "service-5", "asteroid-tour"))
 HEAD = THREE.split("[[target]]")[0]
 
@@ -90,21 +98,21 @@ def test_three_targets_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
     assert found["problem_hash"] == load_multipoint("service-3").hash
     assert (found["order_chosen"], found["times_chosen"], found["evaluations"]) == ("given", "given", 1)
     # The acceptance, N = 3.
-    assert found["cost"] == pytest.approx(0.021142280110555873, rel=1e-9)
+    assert found["cost_m2_s3"] == pytest.approx(0.021142280110555873, rel=1e-9)
     assert found["order"] == ["T1", "T2", "T3"]
     assert found["times_s"] == [1200.0, 2600.0, 4000.0]
     gradient = [-7.836556601890862e-06, -7.232202376944674e-06, -3.2601679492735453e-06]
-    np.testing.assert_allclose(found["time_gradient"], gradient, rtol=1e-9)
+    np.testing.assert_allclose(found["time_gradient_m2_s4"], gradient, rtol=1e-9)
     assert [list(each) for each in found["nodes"]] == [NODE_KEYS] * 3
     second = found["nodes"][1]
     np.testing.assert_allclose(
         second["position_m"], [129.00913664506174, 3910.983539171972, 87.2941398534269], rtol=1e-9
     )
     np.testing.assert_allclose(second["velocity_m_s"][0], 0.3308297971586566, rtol=1e-9)
-    np.testing.assert_allclose(second["jump"][0], 1.3547481759700994e-05, rtol=1e-9)
-    assert list(found["costate0"]) == ["position", "velocity"]
-    np.testing.assert_allclose(found["costate0"]["position"][1], 1.0260057565247972e-05, rtol=1e-9)
-    np.testing.assert_allclose(found["costate0"]["velocity"][0], -0.003951812093324485, rtol=1e-9)
+    np.testing.assert_allclose(second["jump_m_s3"][0], 1.3547481759700994e-05, rtol=1e-9)
+    assert list(found["costate0"]) == ["position_m_s3", "velocity_m_s2"]
+    np.testing.assert_allclose(found["costate0"]["position_m_s3"][1], 1.0260057565247972e-05, rtol=1e-9)
+    np.testing.assert_allclose(found["costate0"]["velocity_m_s2"][0], -0.003951812093324485, rtol=1e-9)
     for piece in ("I = 0.02114228", "T1", "flyby", "dI/dt", "|jump|"):
         assert piece in out
 
@@ -112,43 +120,43 @@ def test_three_targets_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
 def test_order_and_times_override_the_file(infoset: Infoset, mine: Callable[[str], Path]) -> None:
     best = told(infoset, "service-3", "--times", "best")
     assert best["times_chosen"] == "best"
-    assert best["cost"] == pytest.approx(0.01835844971766454, rel=1e-9)
+    assert best["cost_m2_s3"] == pytest.approx(0.01835844971766454, rel=1e-9)
     np.testing.assert_allclose(best["times_s"], [1521.3233432870954, 3015.0416119664947, 4000.0], rtol=1e-9)
     both = told(infoset, "service-3", "--order", "best", "--times", "best")
     assert both["order"] == ["T3", "T2", "T1"]
-    assert both["cost"] == pytest.approx(0.008734876263, rel=1e-9)
+    assert both["cost_m2_s3"] == pytest.approx(0.008734876263, rel=1e-9)
     assert both["orders_begun"] <= 15
     slots = told(infoset, "service-3", "--order", "best")
     assert slots["times_s"] == [1200.0, 2600.0, 4000.0]
-    assert slots["cost"] <= 0.0211422802
+    assert slots["cost_m2_s3"] <= 0.0211422802
     asked = mine(changed("optimise = false", "optimise = true"))
-    assert told(infoset, asked)["cost"] == pytest.approx(best["cost"], rel=1e-12)
+    assert told(infoset, asked)["cost_m2_s3"] == pytest.approx(best["cost_m2_s3"], rel=1e-12)
     assert told(infoset, asked, "--times", "given")["times_chosen"] == "given"
-    assert told(infoset, asked, "--times", "given")["cost"] == pytest.approx(0.021142280110555873, rel=1e-9)
+    assert told(infoset, asked, "--times", "given")["cost_m2_s3"] == pytest.approx(0.021142280110555873, rel=1e-9)
 
 
 def test_rendezvous_stays_prices_and_eccentric_orbits(infoset: Infoset, mine: Callable[[str], Path]) -> None:
     met = told(infoset, mine(changed('4000.0\nmeet = "flyby"', '4000.0\nmeet = "rendezvous"')))
-    assert met["cost"] == pytest.approx(0.023815941208960852, rel=1e-9)
+    assert met["cost_m2_s3"] == pytest.approx(0.023815941208960852, rel=1e-9)
     last = met["nodes"][-1]
-    assert list(last) == [*NODE_KEYS, "velocity_jump"]
+    assert list(last) == [*NODE_KEYS, "velocity_jump_m_s2"]
     assert last["velocity_m_s"] == last["target_velocity_m_s"]
     # A free last time with a price: the acceptance of the theory.
     free = changed("latest_s = 3000.0", "price_per_s = 1e-6", changed("optimise = false", "optimise = true", TWO))
     priced = told(infoset, mine(free))
     np.testing.assert_allclose(priced["times_s"], [2905.083078, 4690.157388], rtol=1e-9)
-    assert priced["cost"] == pytest.approx(0.0008170807218, rel=1e-9)
-    assert priced["cost_with_price"] == pytest.approx(priced["cost"] + 1e-6 * priced["times_s"][-1])
+    assert priced["cost_m2_s3"] == pytest.approx(0.0008170807218, rel=1e-9)
+    assert priced["cost_with_price_m2_s3"] == pytest.approx(priced["cost_m2_s3"] + 1e-6 * priced["times_s"][-1])
     # A nearly circular orbit is nearly the circular one, wherever the craft is on it.
     for anomaly in ("0.0", "200.0"):
         orbit = f"eccentricity = 1e-7\ntrue_anomaly_deg = {anomaly}\norbit_rate_rad_s"
         near = told(infoset, mine(changed("orbit_rate_rad_s", orbit)))
-        assert near["cost"] == pytest.approx(0.021142280110555873, rel=1e-4)
+        assert near["cost_m2_s3"] == pytest.approx(0.021142280110555873, rel=1e-4)
     costs = [
         told(
             infoset,
             mine(changed("orbit_rate_rad_s", f"eccentricity = 0.3\ntrue_anomaly_deg = {anomaly}\norbit_rate_rad_s")),
-        )["cost"]
+        )["cost_m2_s3"]
         for anomaly in ("0.0", "180.0")
     ]
     assert costs[0] != pytest.approx(costs[1], rel=0.05)
@@ -166,7 +174,7 @@ def test_keys_that_may_be_left_out(infoset: Infoset, mine: Callable[[str], Path]
         )
     found = told(infoset, mine(text))
     assert found["problem"] == "tour"
-    assert found["cost"] == pytest.approx(0.021142280110555873, rel=1e-9)
+    assert found["cost_m2_s3"] == pytest.approx(0.021142280110555873, rel=1e-9)
 
 
 def test_the_asteroid_tour(infoset: Infoset, mine: Callable[[str], Path]) -> None:
@@ -185,7 +193,7 @@ def test_the_asteroid_tour(infoset: Infoset, mine: Callable[[str], Path]) -> Non
     problem_start = load_multipoint("asteroid-tour").tour.start_state / 1e3  # type: ignore[attr-defined]
     position, velocity = ([float(each) for each in part] for part in np.split(problem_start, 2))
     lines[place] = f"position_km = {position}\nvelocity_km_s = {velocity}"
-    assert told(infoset, mine("\n".join(lines)))["cost"] == pytest.approx(found["cost"], rel=1e-9)
+    assert told(infoset, mine("\n".join(lines)))["cost_m2_s3"] == pytest.approx(found["cost_m2_s3"], rel=1e-9)
 
 
 def test_five_targets_as_listed(infoset: Infoset) -> None:
@@ -194,7 +202,7 @@ def test_five_targets_as_listed(infoset: Infoset) -> None:
     leave = [each["leave_s"] for each in found["nodes"]]
     assert leave[2] == pytest.approx(found["times_s"][2] + 300.0)
     assert (np.array(found["times_s"]) - np.array([0.0, *leave[:-1]]) >= 600.0 * (1.0 - 1e-9)).all()
-    assert max(abs(each) for each in found["time_gradient"][:-1]) < 1e-6 * abs(found["time_gradient"][-1])
+    assert max(abs(each) for each in found["time_gradient_m2_s4"][:-1]) < 1e-6 * abs(found["time_gradient_m2_s4"][-1])
 
 
 def test_json_alone_and_nothing_written(infoset: Infoset, tmp_path: Path) -> None:

@@ -19,7 +19,17 @@ from rendezvous.pareto import analyse_coalitions, solve_encounter, sweep_meeting
 FIGURES = ["figure-controls", "figure-costs", "figure-front", "figure-trajectories"]
 KEYS = [
     *("version", "problem", "problem_hash", "units", "meeting_time_s", "meet", "free", "meeting", "craft"),
-    *("group_loss", "matrix", "distances", "selections", "coalitions", "shapley", "transfers", "core", "sweep"),
+    *(
+        "group_loss_m2_s3",
+        "matrix",
+        "distances",
+        "selections",
+        "coalitions",
+        "shapley_m2_s3",
+        "transfers_m2_s3",
+        "core",
+        "sweep",
+    ),
     "samples",
 ]
 STATE = ["x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s"]
@@ -84,23 +94,25 @@ def test_the_published_example_into_a_folder(infoset: Infoset, tmp_path: Path) -
     np.testing.assert_allclose(list(found["meeting"].values()), meeting, rtol=1e-9)
     assert [each["name"] for each in found["craft"]] == ["first", "second", "third"]
     for key, expected in (
-        ("ideal_cost_squared", [0.7901642781355673, 8.534913129850537, 5.9364085496591095]),
-        ("cost_squared", [2.3220013947895253, 13.953153416863753, 17.573235512747196]),
+        ("ideal_cost_squared_m2_s3", [0.7901642781355673, 8.534913129850537, 5.9364085496591095]),
+        ("cost_squared_m2_s3", [2.3220013947895253, 13.953153416863753, 17.573235512747196]),
     ):
         np.testing.assert_allclose([each[key] for each in found["craft"]], expected, rtol=1e-9)
     assert found["craft"][0]["ideal"]["z_m"] == pytest.approx(80.55360965382751, rel=1e-9)
-    excess = [each["cost_squared"] - each["ideal_cost_squared"] for each in found["craft"]]
-    np.testing.assert_allclose([each["excess"] for each in found["craft"]], excess, rtol=1e-12)
-    assert found["group_loss"] == pytest.approx(18.58690436675526, rel=1e-9)
-    assert found["group_loss"] == pytest.approx(sum(each["weight"] * each["excess"] for each in found["craft"]))
-    assert found["coalitions"]["first+third"]["excess"] == pytest.approx(10.45954394, rel=1e-9)
-    assert found["coalitions"]["first+second+third"]["regret"] == pytest.approx(0.0, abs=1e-12)
-    np.testing.assert_allclose(found["shapley"], [2.697786535, 5.612588912, 10.27652892], rtol=1e-9)
-    assert sum(found["transfers"]) == pytest.approx(0.0, abs=1e-12)
+    excess = [each["cost_squared_m2_s3"] - each["ideal_cost_squared_m2_s3"] for each in found["craft"]]
+    np.testing.assert_allclose([each["excess_m2_s3"] for each in found["craft"]], excess, rtol=1e-12)
+    assert found["group_loss_m2_s3"] == pytest.approx(18.58690436675526, rel=1e-9)
+    assert found["group_loss_m2_s3"] == pytest.approx(
+        sum(each["weight"] * each["excess_m2_s3"] for each in found["craft"])
+    )
+    assert found["coalitions"]["first+third"]["excess_m2_s3"] == pytest.approx(10.45954394, rel=1e-9)
+    assert found["coalitions"]["first+second+third"]["regret_m2_s3"] == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose(found["shapley_m2_s3"], [2.697786535, 5.612588912, 10.27652892], rtol=1e-9)
+    assert sum(found["transfers_m2_s3"]) == pytest.approx(0.0, abs=1e-12)
     assert found["core"]["verdict"] == "empty"
     assert "the core is empty: alone each craft has no excess" in found["core"]["reason"]
     assert set(found["selections"]) == {"least_group_loss", "least_sum_of_costs", "least_greatest_excess", "preferred"}
-    assert len(found["sweep"]["group_loss"]) == len(found["sweep"]["meeting_time_s"])
+    assert len(found["sweep"]["group_loss_m2_s3"]) == len(found["sweep"]["meeting_time_s"])
     assert [each["name"] for each in found["samples"]] == ["first", "second", "third"]
     for each in found["samples"]:
         assert each["time_s"] == [0.0, 10.0, 20.0, 30.0]
@@ -150,7 +162,7 @@ def test_an_intercept_and_craft_that_start_later(infoset: Infoset, mine: Callabl
     assert code == 0
     found = strict(out)
     assert list(found["meeting"]) == STATE[:3]  # each arrives with a velocity of its own
-    assert all(each["ideal_cost_squared"] < 1e-20 for each in found["craft"])
+    assert all(each["ideal_cost_squared_m2_s3"] < 1e-20 for each in found["craft"])
     assert "distances" not in found  # durations differ, and so do the matrices
     assert len(found["matrix"]) == 3
     assert found["samples"][0]["time_s"][0] == 5.0
@@ -289,7 +301,7 @@ def test_many_craft_have_no_list_of_coalitions(infoset: Infoset, mine: Callable[
     assert code == 0
     assert "too many" in out
     found = strict(Path("found.json").read_text())
-    assert (found["coalitions"], found["shapley"], found["core"]) == ({}, [], None)
+    assert (found["coalitions"], found["shapley_m2_s3"], found["core"]) == ({}, [], None)
 
 
 def test_nothing_is_replaced_unless_told(infoset: Infoset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,8 +20,16 @@ from rendezvous.reachability import solve
 
 FIGURES = ["figure-controls", "figure-planes", "figure-positions", "figure-velocities"]
 KEYS = [
-    *("version", "kind", "problem", "problem_hash", "elapsed_s", "route", "route_reason", "optimal_miss"),
-    *("optimal_dimension", "least_periods", "least_periods_searched", "sets", "controls", "control_ranges"),
+    *("version", "kind", "problem", "problem_hash", "units", "elapsed_s", "route", "route_reason"),
+    *(
+        "optimal_miss",
+        "optimal_dimension",
+        "least_periods",
+        "least_periods_searched",
+        "sets",
+        "controls",
+        "control_ranges",
+    ),
     *("replan", "robust"),
 ]
 
@@ -68,11 +76,11 @@ def test_reach_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
     assert found["problem_hash"] == load_rendezvous("rendezvous-2021").hash
     assert (found["optimal_miss"], found["least_periods"], found["optimal_dimension"]) == (0.0, 3, 6)
     second = found["sets"][1]
-    assert second["t"] == 2
+    assert second["period"] == 2
     assert [second["forward"][key] for key in ("vertices", "facets", "dimension")] == [130, 15, 6]
     assert [second["tube"][key] for key in ("vertices", "facets", "dimension")] == [27, 9, 6]
     assert second["tube"]["max"][0] == pytest.approx(2032.6346647262549, rel=1e-9)
-    assert [each["t"] for each in found["sets"]] == [1, 2, 3, 4]
+    assert [each["period"] for each in found["sets"]] == [1, 2, 3, 4]
     names = [each["name"] for each in found["controls"]]
     assert names == ["energy", "l1", *(f"vertex {k}" for k in range(1, 28)), *(f"sample {k}" for k in range(1, 4))]
     energy = found["controls"][0]
