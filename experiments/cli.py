@@ -32,10 +32,9 @@ from experiments.commands.reproduce import reproduce
 from experiments.commands.scenarios import app as scenarios
 from experiments.commands.sweep import sweep
 from experiments.compile_cache import keep_kernels_somewhere
-from experiments.errors import InputError, on_a_screen
+from experiments.errors import INTERRUPTED, InputError, on_a_screen
 
 INPUT_ERROR = 2
-INTERRUPTED = 130
 PATIENCE_S = 5.0
 """How long threads may take to end after an error."""
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+INTERRUPTED = 130
+"""Exit code, as of a program that Ctrl-C ends."""
+
 
 def on_a_screen(message: str) -> str:
     """Return a message without what would steer the terminal: parts of it may come from somebody else's file.

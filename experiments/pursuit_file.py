@@ -237,7 +237,7 @@ def _orbit_problem(start: tuple[Any, Any], mu_si: float, planet_m: float) -> str
 FORM = problem_form(KIND, PursuitTables, _checks)
 
 
-def load_problem(name_or_path: str) -> PursuitProblem:
+def load_pursuit(name_or_path: str) -> PursuitProblem:
     """Read a built-in problem or a file.
 
     Parameters

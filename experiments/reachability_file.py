@@ -46,13 +46,13 @@ from rendezvous.reachability import (
     discretised,
     motion_of,
 )
+from rendezvous.reachability.problem import MOST_PERIODS
 from rendezvous.relative_motion import ConstantMotion, EllipticOrbit, TschaunerHempel
 
 Floats = NDArray[np.float64]
 Rows = tuple[tuple[Decimal, ...], ...]
 
 KIND = "reachable-rendezvous"
-MOST_PERIODS = 256
 MOST_FACES = 24
 MOST_HALFSPACES = 50
 MOST_POLYTOPES = 20
@@ -146,7 +146,7 @@ class NavigationTable(Table):
 class ReachabilityTables(Table):
     """A problem file of kind `reachable-rendezvous`."""
 
-    schema_: int = key("the form of this file", "1", default=1, alias="schema")
+    schema_number: int = key("the form of this file", "1", default=1, alias="schema")
     kind: str = key("the kind of problem", f'"{KIND}"')
     name: Name = key("what to call it", '"rendezvous-2021"')
     description: Description = key("a line about it", '"..."', default="")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from experiments.reachability_file import KIND, MOST_PERIODS, Rendezvous
+from experiments.reachability_file import KIND, Rendezvous
 from rendezvous.reachability import (
     EmptyTubeError,
     Flight,
@@ -22,6 +22,7 @@ from rendezvous.reachability import (
     replan,
     solve,
 )
+from rendezvous.reachability.problem import MOST_PERIODS
 from rendezvous.reachability.robust import FeedbackPlan, NoRobustPlanError, feedback_plan, tightened
 from rendezvous.reachability.sampling import samples
 from rendezvous.reachability.selection import (

@@ -11,6 +11,8 @@ from typing import Annotated
 
 import typer
 
+SCENARIO_FILE = "scenario.toml"
+"""Of a campaign's folder."""
 MOST_WORKERS = 1024
 MOST_AT_ONCE = 1_000_000
 

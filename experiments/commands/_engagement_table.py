@@ -9,18 +9,17 @@ from rich.table import Table
 from rich.text import Text
 
 from experiments.commands._screen import (
-    PAPER_SINGLE_RUN,
     allowance,
     certificate,
     guaranteed_miss_name,
     number,
     table_console,
 )
+from experiments.published.interception import PRINTED_SINGLE_RUN, SINGLE
 from sim import Record
 
 FIGURE_2 = "figure-2-process"
 FIGURE_3 = "figure-3-sets"
-PAPER_SCENARIO = "asteroid-1997-single"
 
 
 def show_engagements(records: Sequence[Record], stdout_taken: bool) -> None:
@@ -51,8 +50,8 @@ def show_engagements(records: Sequence[Record], stdout_taken: bool) -> None:
                 record.strategy,
             ]
         )
-        paper = PAPER_SINGLE_RUN.get(record.noise_name)
-        if scenario.name == PAPER_SCENARIO and scenario.range_sensor is None and paper is not None:
+        paper = PRINTED_SINGLE_RUN.get(record.noise_name)
+        if scenario.name == SINGLE and scenario.range_sensor is None and paper is not None:
             table.add_column("paper", justify="right")
             columns.append([number(paper[0]), number(paper[1]), *[""] * 7])
     names = {guaranteed_miss_name(record.scenario.set_model.kind.value) for record in records}

@@ -20,9 +20,6 @@ NOT_FINITE = (
     "check its units with: infoset scenarios check FILE"
 )
 PUBLISHED_PHI = "published Phi, no guarantee"
-PAPER_SCENARIOS = ("asteroid-1997", "asteroid-1997-single")
-PAPER_SINGLE_RUN = {"random": (4.3, 244.7), "game": (9.5, 521.7)}
-"""Miss (m) and impulse (m/s) of the paper's two engagements from z = -8 km, without a range meter."""
 
 
 def figure_files(*names: str) -> list[str]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from experiments.commands._campaign_options import (
+    SCENARIO_FILE,
     CampaignOut,
     Chunk,
     Dask,
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from experiments.commands._campaign_options import Crew
     from sim import Campaign, CampaignResult, StoppingRule
 
-SCENARIO_FILE = "scenario.toml"
 SUMMARY = "summary.json"
 
 

@@ -224,14 +224,13 @@ def _show(scenario: Scenario, curves: Sequence[Curve], stdout_taken: bool) -> No
     from rich.text import Text
 
     from experiments.commands._screen import (
-        PAPER_SCENARIOS,
-        PAPER_SINGLE_RUN,
         allowance,
         certificate,
         guaranteed_miss_name,
         number,
         table_console,
     )
+    from experiments.published.interception import MANY, PRINTED_SINGLE_RUN, SINGLE
     from sim import Outcome, quantiles
 
     table = Table("curve", "quantity", box=None, pad_edge=False)
@@ -258,6 +257,6 @@ def _show(scenario: Scenario, curves: Sequence[Curve], stdout_taken: bool) -> No
     allowed = allowance(scenario)
     for note in [*notes, *([allowed] if allowed else [])]:
         console.print(Text(note), soft_wrap=True)
-    if scenario.name in PAPER_SCENARIOS:
-        figures = ", ".join(f"{noise} {miss} m for {fuel} m/s" for noise, (miss, fuel) in PAPER_SINGLE_RUN.items())
+    if scenario.name in (MANY, SINGLE):
+        figures = ", ".join(f"{noise} {miss} m for {fuel} m/s" for noise, (miss, fuel) in PRINTED_SINGLE_RUN.items())
         console.print(Text(f"paper, one run from z = -8 km, no range meter: {figures}"), soft_wrap=True)

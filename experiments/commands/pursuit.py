@@ -142,7 +142,7 @@ def problem_with(name: str, settings: Sequence[str] | None) -> PursuitProblem:
         If there is no such problem or key, or it is not sound.
     """
     from experiments.errors import InputError
-    from experiments.pursuit_file import load_problem
+    from experiments.pursuit_file import load_pursuit
     from experiments.toml_values import shown
 
     values: dict[str, str] = {}
@@ -153,7 +153,7 @@ def problem_with(name: str, settings: Sequence[str] | None) -> PursuitProblem:
         if key.strip() in values:
             raise InputError(f"--set: {key.strip()} is set twice; set each key once")
         values[key.strip()] = value.strip()
-    return load_problem(name).with_values(values)
+    return load_pursuit(name).with_values(values)
 
 
 def _check_feedback_options(

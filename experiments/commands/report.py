@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from experiments.commands._campaign_options import SCENARIO_FILE
 from experiments.commands._options import Json, Out, Overwrite, Quiet
 from experiments.commands.sweep import Required, ShownQuantiles
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from sim.storage import CampaignFolder
 
 FIGURES = ("figure-distributions", "figure-convergence", "figure-dispersion")
-SCENARIO_FILE = "scenario.toml"
 
 
 def report(

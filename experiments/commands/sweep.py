@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from experiments.commands._campaign_options import (
+    SCENARIO_FILE,
     CampaignOut,
     Chunk,
     Dask,
@@ -248,7 +249,6 @@ def _fly(asked: Sweep, flying: Crew, resume: bool, quiet: bool) -> tuple[Campaig
 
     from experiments.commands._campaign_screen import ESTIMATED_FROM, campaign_progress, estimate
     from experiments.commands._screen import say
-    from experiments.commands.campaign import SCENARIO_FILE
     from experiments.scenario_file import scenario_to_toml
 
     plan = asked.plan()

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from experiments.figures.style import IMPULSE, LIMIT, TRUTH, new_figure, place_axes, style
-from rendezvous.pursuit_evasion import Flight, History, PlayerHistory, Solution, Verdict
+from rendezvous.pursuit_evasion import Ended, Flight, History, PlayerHistory, Solution, Verdict
 from rendezvous.pursuit_evasion.history import orbital_axes
 
 Floats = NDArray[np.float64]
@@ -235,7 +235,7 @@ def draw_feedback(solution: Solution, flights: Sequence[Flight]) -> Figure:
             right.set_ylim(bottom=0.0)
             right.set_title(f"(b) {flight.ended.value} at {flight.time_s:.1f} s")
         else:
-            times = np.sort([flight.time_s for flight in flights if flight.ended.value == "captured"]) / scale
+            times = np.sort([flight.time_s for flight in flights if flight.ended is Ended.CAPTURED]) / scale
             if len(times):
                 right.step(times, np.arange(1, len(times) + 1) / len(flights), where="post", color=TRUTH)
             right.set_ylim(0.0, 1.02)

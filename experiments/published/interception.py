@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.commands._screen import PAPER_SINGLE_RUN
 from experiments.curves import curve_scenarios
 from experiments.published.number import Band, Progress, PublishedNumber, Reproduction
 from experiments.scenario_file import load_scenario, scenario_hash
@@ -18,6 +17,8 @@ from sim import Results, Scenario, simulate
 PAPER = "interception"
 TITLE = "Kumkov and Patsko (1997), interception under unknown but bounded errors"
 SINGLE, MANY = "asteroid-1997-single", "asteroid-1997"
+PRINTED_SINGLE_RUN = {"random": (4.3, 244.7), "game": (9.5, 521.7)}
+"""Miss (m) and impulse (m/s) of the two engagements from z = -8 km, without a range meter."""
 RUNS = 200
 """A curve of figure 4."""
 SINGLE_RUNS = 200
@@ -58,8 +59,8 @@ _FIGURE_4: dict[int, tuple[tuple[str, float, str, Band], ...]] = {
         ("impulse", 0.5, "308", Band(246.4, 369.6)),
     ),
 }
-"""By curve: quantity, quantile, reference value and its band; 20 % with the range meter, of which few runs were "
-"made."""
+"""By curve: quantity, quantile, reference value and its band; 20 % with the range meter, of which few runs were
+made."""
 _CURVES = {1: "random", 2: "random, range meter", 3: "game", 4: "game, range meter"}
 _UNITS = {"miss": "m", "impulse": "m/s"}
 
@@ -98,7 +99,7 @@ def _single(scenario: Scenario, progress: Progress) -> list[PublishedNumber]:
     progress(1.0)
     numbers = []
     for noise, results in flown.items():
-        for quantity, printed in zip(_UNITS, PAPER_SINGLE_RUN[noise], strict=True):
+        for quantity, printed in zip(_UNITS, PRINTED_SINGLE_RUN[noise], strict=True):
             ends = [np.quantile(_values(each, quantity), (0.05, 0.95)) for each in results]
             low, high = min(float(each[0]) for each in ends), max(float(each[1]) for each in ends)
             ours = float(np.median([np.median(_values(each, quantity)) for each in results]))

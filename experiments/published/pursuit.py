@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from experiments.published.number import COMPUTED, Progress, PublishedNumber, Reference, Reproduction
-from experiments.pursuit_file import load_problem
+from experiments.pursuit_file import load_pursuit
 from rendezvous.linear_game import (
     Thruster,
     circular_orbit_capture,
@@ -60,7 +60,7 @@ def reproduce(progress: Progress) -> Reproduction:
     -------
     Reproduction
     """
-    problem = load_problem(PROBLEM)
+    problem = load_pursuit(PROBLEM)
     numbers: list[PublishedNumber] = []
     for done, (thrust_n, printed) in enumerate(_TABLE.items(), start=1):
         capture = solve(problem.game({"evader.thrust_N": thrust_n})).capture

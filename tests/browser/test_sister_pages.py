@@ -16,7 +16,7 @@ from experiments.pages.pareto import pareto_page
 from experiments.pages.pursuit import pursuit_page
 from experiments.pages.reachability import reachability_page
 from experiments.pareto_file import load_pareto
-from experiments.pursuit_file import load_problem
+from experiments.pursuit_file import load_pursuit
 from experiments.reachability_file import load_rendezvous
 from experiments.reachability_report import Report, make_report
 from rendezvous.multipoint import Path as FlightPath
@@ -63,7 +63,7 @@ class Solved:
 def solved() -> Solved:
     visits = load_multipoint("service-3")
     assert visits.times_s is not None
-    game = solve(load_problem("leo-pursuit").game())
+    game = solve(load_pursuit("leo-pursuit").game())
     return Solved(
         solve_encounter(load_pareto("pareto-2008").encounter),
         visits.tour,

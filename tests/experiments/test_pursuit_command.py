@@ -14,7 +14,7 @@ import pytest
 from experiments.cli import main
 from experiments.figures.pursuit import draw_control, draw_distance, draw_feedback, draw_orbits, draw_relative
 from experiments.figures.pursuit_map import axis_name
-from experiments.pursuit_file import load_problem
+from experiments.pursuit_file import load_pursuit
 from rendezvous.pursuit_evasion import Policy, Solution, fly, history, solve
 from rendezvous.pursuit_evasion._branch import follow
 
@@ -44,7 +44,7 @@ def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
 
 @pytest.fixture(scope="module")
 def geo() -> Solution:
-    return solve(load_problem("geo-pursuit").game())
+    return solve(load_pursuit("geo-pursuit").game())
 
 
 def test_the_slides_case_as_json(infoset: Infoset, tmp_path: Path) -> None:
@@ -54,7 +54,7 @@ def test_the_slides_case_as_json(infoset: Infoset, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
     assert found["version"] == version("infoset")
     assert found["problem"] == "geo-pursuit"
-    assert found["problem_hash"] == load_problem("geo-pursuit").hash
+    assert found["problem_hash"] == load_pursuit("geo-pursuit").hash
     assert found["verdict"] == "captured"
     assert found["capture_time_s"] == pytest.approx(45343.620266, rel=1e-8)
     assert found["capture_position_km"] == pytest.approx([-39420.497090, -19052.538637, 604.130676], abs=1e-6)

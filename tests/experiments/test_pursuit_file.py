@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from experiments.errors import InputError
-from experiments.pursuit_file import PursuitProblem, load_problem, parameter_names, read_problem
+from experiments.pursuit_file import PursuitProblem, load_pursuit, parameter_names, read_problem
 from rendezvous.pursuit_evasion import Game
 
 BUILT_IN = ["geo-pursuit", "leo-pursuit"]
@@ -11,7 +11,7 @@ BUILT_IN = ["geo-pursuit", "leo-pursuit"]
 
 @pytest.fixture(scope="module")
 def text() -> str:
-    return load_problem("geo-pursuit").to_toml()
+    return load_pursuit("geo-pursuit").to_toml()
 
 
 def complaint(text: str) -> str:
@@ -22,7 +22,7 @@ def complaint(text: str) -> str:
 
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_built_in_problems_read_back_as_they_are_written(name: str) -> None:
-    problem = load_problem(name)
+    problem = load_pursuit(name)
     again = read_problem(problem.to_toml(), "again")
     assert again.tables == problem.tables
     assert again.hash == problem.hash
@@ -31,14 +31,14 @@ def test_built_in_problems_read_back_as_they_are_written(name: str) -> None:
 
 
 def test_the_slides_case_is_what_the_slides_say() -> None:
-    game = load_problem("geo-pursuit").game()
+    game = load_pursuit("geo-pursuit").game()
     assert (game.pursuer.thrust_n, game.evader.thrust_n) == (20.0, 10.0)
     assert (game.pursuer.mass_kg, game.pursuer.specific_impulse_s) == (2000.0, 350.0)
     assert game.distance_m == pytest.approx(6621.8e3, rel=1e-5)
 
 
 def test_values_can_be_set_and_are_checked_as_in_a_file() -> None:
-    problem = load_problem("geo-pursuit")
+    problem = load_pursuit("geo-pursuit")
     changed = problem.with_values({"evader.thrust_N": "5", "capture_radius_km": "1e1"})
     assert changed.game().evader.thrust_n == 5.0
     assert changed.game().capture_radius_m == 10e3

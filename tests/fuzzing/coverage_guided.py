@@ -244,7 +244,7 @@ def _expressions() -> tuple[Parse, Mutate, list[bytes]]:
     """Give the small languages of the command line: --vary, --until, --require, --x, --set."""
     from experiments.commands.pursuit_map import _axis
     from experiments.errors import InputError
-    from experiments.pursuit_file import load_problem
+    from experiments.pursuit_file import load_pursuit
     from experiments.scenario_file import load_scenario
     from experiments.sweep_axes import EXAMPLE, sweep_axes, sweep_cells
     from sim.stopping_rule import QuantileName, Requirement, StoppingRule
@@ -252,7 +252,7 @@ def _expressions() -> tuple[Parse, Mutate, list[bytes]]:
     from .mutations import mutated_bytes
     from .subjects import attempted
 
-    scenario, game = load_scenario("asteroid-1997"), load_problem("geo-pursuit")
+    scenario, game = load_scenario("asteroid-1997"), load_pursuit("geo-pursuit")
 
     def parse(content: bytes) -> None:
         text = content[1:].decode(errors="surrogateescape")

@@ -18,7 +18,7 @@ from experiments import record_file
 from experiments.multipoint_file import load_multipoint
 from experiments.pareto_file import load_pareto
 from experiments.problem_file import built_in_problems
-from experiments.pursuit_file import load_problem, read_problem
+from experiments.pursuit_file import load_pursuit, read_problem
 from experiments.reachability_file import load_rendezvous
 from experiments.scenario_file import (
     load_scenario,
@@ -82,7 +82,7 @@ def _read_scenario(path: str) -> Scenario:
 
 
 def _read_pursuit(path: str) -> object:
-    problem = load_problem(path)
+    problem = load_pursuit(path)
     problem.warnings()
     assert read_problem(problem.to_toml(), "written again").tables == problem.tables
     try:
