@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from experiments.display_units import M_PER_KM
 from experiments.output import library_version
 from experiments.pursuit_file import PursuitProblem
 from rendezvous.pursuit_evasion import Capture, Certificate, Ended, Flight, PlayerEnd, Solution, capture_quantiles_s
-
-M_PER_KM = 1e3
 
 
 @dataclass(frozen=True)

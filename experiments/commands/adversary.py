@@ -21,13 +21,13 @@ from experiments.commands._options import (
     whole_number,
     with_range_meter,
 )
+from experiments.display_units import M_PER_KM
 
 if TYPE_CHECKING:
     from sim import Scenario
     from sim.adversary import WorstEngagement
 
 DEFAULT_BUDGET = 2000
-M_PER_KM = 1e3
 
 
 def adversary(

@@ -21,6 +21,7 @@ from experiments.commands._options import (
     scenario_with,
     whole_number,
 )
+from experiments.display_units import M_PER_KM
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
 
 FIGURE = "figure-bound"
 MOST_EVALUATIONS = 10_000_000
-M_PER_KM = 1e3
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from experiments.commands._options import Html, Json, Out, Overwrite, ProblemName, Quiet, Seed, whole_number
+from experiments.display_units import M_PER_KM
 
 if TYPE_CHECKING:
     from experiments.pursuit_file import PursuitProblem
@@ -21,7 +22,6 @@ FEEDBACK_FIGURE = "figure-feedback"
 MOST_RUNS = 10_000
 REPLAN_S, LEAST_PLANS, MOST_PLANS = 600.0, 50, 2000
 """Time between plans, and how many a game is given at least where the time is not asked for, and at most."""
-M_PER_KM = 1e3
 LONGEST_SCRIPT = 100_000
 """Characters; less than the longest field that a reader of CSV takes."""
 OPTIMAL, RANDOM = "optimal", "random"
@@ -326,8 +326,8 @@ def _fill(
     figures = {}
     if solution.capture is not None:
         sampled = history(solution)
-        figures["figure-orbits"] = draw_orbits(solution, sampled)
-        figures["figure-relative"] = draw_relative(solution, sampled)
+        figures["figure-orbits"] = draw_orbits(sampled)
+        figures["figure-relative"] = draw_relative(sampled)
         figures["figure-control"] = draw_control(sampled)
     if len(solution.curve.duration_s) > 1:
         figures["figure-distance"] = draw_distance(solution)

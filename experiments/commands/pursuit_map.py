@@ -10,6 +10,7 @@ import typer
 
 from experiments.commands._options import Csv, Json, Out, Overwrite, ProblemName, Quiet
 from experiments.commands.pursuit import Settings, problem_with
+from experiments.display_units import M_PER_KM
 
 if TYPE_CHECKING:
     import numpy as np
@@ -24,7 +25,6 @@ COLUMNS, ROWS = "phase_deg=-30:30:61", "thrust_ratio=0:0.8:17"
 COLUMNS_OF_STATES = "mass_ratio=0.5:1.5:21"
 PHASE_BY_THRUST = 12.0
 """Half of the columns' span in radians over thrust by gravity: about what a revolution changes the phase by."""
-M_PER_KM = 1e3
 
 Axis = tuple[str, "NDArray[np.float64]"]
 

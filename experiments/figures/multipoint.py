@@ -14,6 +14,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from experiments._multipoint_tables import Axes as FrameAxes
+from experiments.display_units import Unit, length_unit, time_unit
 from experiments.figures.style import IMPULSE, INK, LIMIT, MEASURED, SET_EDGE, TRUTH, new_figure, place_axes, style
 from rendezvous.multipoint import Path, Visits
 
@@ -32,8 +33,6 @@ _COMPONENTS: tuple[dict[str, Any], ...] = (
 )
 _MOST_NAMED = 12
 _MOST_CURVES = 9
-_DAY_S, _HOUR_S = 86400.0, 3600.0
-_AU_M = 149_597_870_700.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,20 +71,9 @@ class Scene:
         return np.unique(np.concatenate([even, nodes, np.nextafter(nodes, -np.inf), self.path.nodes.leave_s[:-1]]))
 
     @property
-    def time_unit(self) -> tuple[float, str]:
-        """Seconds in the unit that times are drawn in, and its name."""
-        span = self.end_s - self.tour.start_s
-        if span > 10.0 * _DAY_S:
-            return _DAY_S, "days"
-        return (_HOUR_S, "h") if span > 10.0 * _HOUR_S else (1.0, "s")
-
-    @property
-    def length_unit(self) -> tuple[float, str]:
-        """Metres in the unit that positions are drawn in, and its name."""
-        if self.axes is FrameAxes.INERTIAL:
-            size = float(np.abs(self.path.arrival_states[:, :3]).max())
-            return (_AU_M, "au") if size > 0.05 * _AU_M else (1e3, "km")
-        return (1e3, "km") if float(np.abs(self.path.arrival_states[:, :3]).max()) > 3e3 else (1.0, "m")
+    def time_unit(self) -> Unit:
+        """The unit that times are drawn in."""
+        return time_unit(self.end_s - self.tour.start_s)
 
 
 @dataclass(frozen=True)
@@ -161,9 +149,9 @@ def draw_path(scene: Scene) -> Figure:
     Figure
         Two axes.
     """
-    unit, name = scene.length_unit
-    times = scene.times(_POINTS)
-    flown = scene.path.state(times)[:, :3] / unit
+    flown = scene.path.state(scene.times(_POINTS))[:, :3]
+    name, per_m = length_unit(float(np.abs(flown).max()))
+    flown = flown * per_m
     hill = scene.axes is FrameAxes.HILL
     planes = ((1, 0), (1, 2)) if hill else ((0, 1), (0, 2))
     labels = ("x (radial)", "y (along the motion)", "z (normal)") if hill else ("x", "y", "z")
@@ -172,7 +160,7 @@ def draw_path(scene: Scene) -> Figure:
         (panels,) = place_axes(figure, 1, 2, margins_mm=(14.0, 4.0, 12.0, 7.0), gaps_mm=(17.0, 0.0))
         for panel, (across, up), letter in zip(panels, planes, "ab", strict=True):
             for place, target in enumerate(scene.order):
-                track = _track(scene, place, target) / unit
+                track = _track(scene, place, target) * per_m
                 panel.plot(track[:, across], track[:, up], color=LIMIT, linewidth=0.7, linestyle=(0, (3, 2)),
                            label="targets until they are met" if place == 0 else None)  # fmt: skip
                 panel.plot(track[0, across], track[0, up], marker=".", color=LIMIT, markersize=4.0)
@@ -181,7 +169,7 @@ def draw_path(scene: Scene) -> Figure:
             if not hill and across == 0 and up == 1:
                 panel.plot(0.0, 0.0, marker="*", color=MEASURED, markersize=8.0, linestyle="none")
             panel.margins(0.1)
-            _mark_nodes(panel, scene, across, up, unit)
+            _mark_nodes(panel, scene, across, up, per_m)
             panel.set_xlabel(f"{labels[across]}, {name}")
             panel.set_ylabel(f"{labels[up]}, {name}")
             panel.set_title(f"({letter})", loc="left")
@@ -268,7 +256,7 @@ def draw_times(scene: Scene, curves: list[CostCurve]) -> Figure:
     Figure
         One axes a visit.
     """
-    unit, name = scene.time_unit
+    name, per_s = scene.time_unit
     columns = min(len(curves), 3)
     rows = -(-len(curves) // columns)
     with style():
@@ -280,12 +268,12 @@ def draw_times(scene: Scene, curves: list[CostCurve]) -> Figure:
                 panel.remove()
                 continue
             curve, now = curves[index], float(scene.path.nodes.arrive_s[index])
-            panel.plot(curve.time_s / unit, curve.cost, color=SET_EDGE)
-            panel.plot(now / unit, scene.path.cost, marker="o", color=INK, markersize=4.0)
+            panel.plot(curve.time_s * per_s, curve.cost, color=SET_EDGE)
+            panel.plot(now * per_s, scene.path.cost, marker="o", color=INK, markersize=4.0)
             reach = 0.12 * float(np.ptp(curve.time_s))
             ends = np.array([-reach, reach])
             panel.plot(
-                (now + ends) / unit, scene.path.cost + scene.path.time_gradient[index] * ends, color=MEASURED,
+                (now + ends) * per_s, scene.path.cost + scene.path.time_gradient[index] * ends, color=MEASURED,
                 linewidth=0.9, label="slope $dI/dt$",
             )  # fmt: skip
             if curve.cost.max() > 20.0 * max(curve.cost.min(), 1e-300):
@@ -313,9 +301,9 @@ def _track(scene: Scene, place: int, target: int) -> Floats:
     return scene.tour.targets.states(np.full(len(times), target), times)[:, :3]
 
 
-def _mark_nodes(panel: Axes, scene: Scene, across: int, up: int, unit: float) -> None:
+def _mark_nodes(panel: Axes, scene: Scene, across: int, up: int, per_m: float) -> None:
     for place, name in enumerate(scene.names):
-        where = scene.path.arrival_states[place, :3] / unit
+        where = scene.path.arrival_states[place, :3] * per_m
         met = bool(scene.path.nodes.rendezvous[place])
         panel.plot(where[across], where[up], marker="D" if met else "o", markersize=5.0, color="white",
                    markeredgecolor=INK, linestyle="none", zorder=5)  # fmt: skip
@@ -331,24 +319,24 @@ def _mark_nodes(panel: Axes, scene: Scene, across: int, up: int, unit: float) ->
 
 def _line(panel: Axes, scene: Scene, times: Floats, values: Floats, **look: Any) -> None:
     """A line that breaks where it jumps: where a target is met, and where it is left."""
-    unit, _ = scene.time_unit
+    _, per_s = scene.time_unit
     nodes = scene.path.nodes
     stays = nodes.leave_s[:-1][nodes.leave_s[:-1] > nodes.arrive_s[:-1]]
     cuts = np.searchsorted(times, np.sort(np.concatenate([nodes.arrive_s[:-1], stays])), side="left")
     label = look.pop("label", None)
     for piece, (one, other) in enumerate(zip(np.split(times, cuts), np.split(values, cuts), strict=True)):
-        panel.plot(one / unit, other, label=label if piece == 0 else None, **look)
+        panel.plot(one * per_s, other, label=label if piece == 0 else None, **look)
 
 
 def _mark_times(scene: Scene, above: Axes, below: Axes) -> None:
-    unit, name = scene.time_unit
+    name, per_s = scene.time_unit
     for panel, letter in ((above, "a"), (below, "b")):
         for when in scene.path.nodes.arrive_s:
-            panel.axvline(when / unit, color=LIMIT, linewidth=0.7, linestyle=(0, (2, 2)), zorder=0)
-        panel.set_xlim(scene.tour.start_s / unit, scene.end_s / unit)
+            panel.axvline(when * per_s, color=LIMIT, linewidth=0.7, linestyle=(0, (2, 2)), zorder=0)
+        panel.set_xlim(scene.tour.start_s * per_s, scene.end_s * per_s)
         panel.annotate(f"({letter})", (0.0, 1.0), xycoords="axes fraction", xytext=(-24, 2), textcoords="offset points")
     if len(scene.order) <= _MOST_NAMED:
         for when, target in zip(scene.path.nodes.arrive_s, scene.names, strict=True):
-            above.annotate(target, (when / unit, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 3),
+            above.annotate(target, (when * per_s, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 3),
                            textcoords="offset points", ha="center", fontsize=7.0)  # fmt: skip
     below.set_xlabel(f"time, {name}")

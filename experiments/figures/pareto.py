@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from experiments.display_units import length_unit
 from experiments.figures.style import INK, LIMIT, SET_EDGE, SET_FILL, new_figure, place_axes, style
 from rendezvous.pareto import (
     Coalitions,
@@ -32,7 +33,7 @@ LOOKS: tuple[dict[str, Any], ...] = (
     {"color": "#5a9bd4", "linestyle": (0, (5, 1, 1, 1)), "marker": "D"},
     {"color": "#4d4d4d", "linestyle": (0, (3, 1, 1, 1, 1, 1)), "marker": "v"},
 )
-_AXES = ("x (against the motion), m", "y (outward), m", "z (normal), m")
+_AXES = ("x (against the motion)", "y (outward)", "z (normal)")
 _PLANES = ((0, 1), (0, 2), (1, 2))
 _POINTS = 241
 _MARKS = 4
@@ -63,27 +64,28 @@ def draw_trajectories(solution: EncounterSolution) -> Figure:
         axes = place_axes(figure, 2, 2, margins_mm=(14.0, 4.0, 12.0, 6.0), gaps_mm=(17.0, 15.0))
         space: Any = figure.add_axes(_grown(axes[0][0].get_position().bounds), projection="3d")
         axes[0][0].remove()
-        flights = [solution.plan(index).sample(_POINTS).state for index in range(len(solution.costs))]
+        flights = [solution.plan(index).sample(_POINTS).state[:, :3] for index in range(len(solution.costs))]
+        unit, per_m = length_unit(max(float(np.abs(flight).max()) for flight in flights))
+        flights, meeting = [flight * per_m for flight in flights], solution.meeting_state()[:3] * per_m
         planes = (axes[0][1], axes[1][0], axes[1][1])
-        meeting = solution.meeting_state()[:3]
         for index, flight in enumerate(flights):
             look, every = _look(index), (_POINTS - 1) // (_MARKS - 1)
             label = solution.costs[index].craft.name
-            space.plot(*flight[:, :3].T, markevery=every, markersize=3.0, **look)
+            space.plot(*flight.T, markevery=every, markersize=3.0, **look)
             for plane, (first, second) in zip(planes, _PLANES, strict=True):
                 plane.plot(flight[:, first], flight[:, second], markevery=every, markersize=3.0, label=label, **look)
         space.plot(*([value] for value in meeting), marker="*", markersize=9.0, color=INK, linestyle="none")
-        space.set_xlabel("x, m", labelpad=-4.0)
-        space.set_ylabel("y, m", labelpad=-3.0)
-        space.set_zlabel("z, m", labelpad=-2.0)
+        space.set_xlabel(f"x, {unit}", labelpad=-4.0)
+        space.set_ylabel(f"y, {unit}", labelpad=-3.0)
+        space.set_zlabel(f"z, {unit}", labelpad=-2.0)
         space.tick_params(pad=-2.0, labelsize=6.5)
         for axis in (space.xaxis, space.yaxis, space.zaxis):
             axis.set_major_locator(MaxNLocator(4))
         figure.text(0.012, 0.975, "(a) in space; marks at equal times", fontsize=8.5)
         for plane, (first, second), letter in zip(planes, _PLANES, "bcd", strict=True):
             plane.plot(meeting[first], meeting[second], marker="*", markersize=9.0, color=INK, linestyle="none")
-            plane.set_xlabel(_AXES[first])
-            plane.set_ylabel(_AXES[second])
+            plane.set_xlabel(f"{_AXES[first]}, {unit}")
+            plane.set_ylabel(f"{_AXES[second]}, {unit}")
             plane.set_title(f"({letter})", loc="left")
             plane.margins(0.08)
         if len(flights) <= _MOST_NAMED:

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from experiments.display_units import M_PER_KM, length_unit, time_unit
 from experiments.figures.style import IMPULSE, LIMIT, TRUTH, new_figure, place_axes, style
 from rendezvous.pursuit_evasion import Ended, Flight, History, PlayerHistory, Solution, Verdict
 from rendezvous.pursuit_evasion.history import orbital_axes
@@ -20,19 +21,14 @@ Floats = NDArray[np.float64]
 PURSUER: dict[str, Any] = {"color": TRUTH, "linestyle": "-"}
 EVADER: dict[str, Any] = {"color": "#e6842a", "linestyle": (0, (5, 1.5))}
 
-_M_PER_KM = 1e3
-_S_PER_HOUR = 3600.0
 _ARROWS, _ARROW_LENGTH, _LEAST_HEIGHT = 14, 0.17, 0.15
-_THOUSANDS_FROM_M = 2e6
-_HOURS_FROM_S = 4 * _S_PER_HOUR
 
 
-def draw_orbits(solution: Solution, sampled: History) -> Figure:
+def draw_orbits(sampled: History) -> Figure:
     """Draw both paths in space with arrows of thrust, and seen along the planet's axis.
 
     Parameters
     ----------
-    solution : Solution
     sampled : History
 
     Returns
@@ -40,15 +36,15 @@ def draw_orbits(solution: Solution, sampled: History) -> Figure:
     Figure
         Two axes, the first in three dimensions.
     """
-    unit, scale = _length_unit(solution)
+    unit, per_m = length_unit(float(np.abs(sampled.pursuer.position_m).max()))
     with style():
         figure = new_figure(height_mm=88.0)
         space: Any = figure.add_axes((-0.02, 0.0, 0.54, 1.0), projection="3d")
         flat = figure.add_axes((0.63, 0.13, 0.35, 0.78))
         for player, look, name in _players(sampled):
-            r = player.position_m / scale
+            r = player.position_m * per_m
             _draw_path(space, flat, r, player.thrust_direction, look, name)
-        end = sampled.evader.position_m[-1] / scale
+        end = sampled.evader.position_m[-1] * per_m
         for axes, point in ((space, end), (flat, end[:2])):
             axes.plot(
                 *(np.array([each]) for each in point),
@@ -58,7 +54,7 @@ def draw_orbits(solution: Solution, sampled: History) -> Figure:
                 linestyle="none",
                 label="capture",
             )
-        across = float(np.abs(sampled.pursuer.position_m / scale).max())
+        across = float(np.abs(sampled.pursuer.position_m).max()) * per_m
         low, high = space.get_zlim()
         middle, half = 0.5 * (low + high), max(0.5 * (high - low), _LEAST_HEIGHT * across)
         space.set_zlim(middle - half, middle + half)
@@ -82,12 +78,11 @@ def draw_orbits(solution: Solution, sampled: History) -> Figure:
     return figure
 
 
-def draw_relative(solution: Solution, sampled: History) -> Figure:
+def draw_relative(sampled: History) -> Figure:
     """Draw the pursuer's way in the evader's orbital frame.
 
     Parameters
     ----------
-    solution : Solution
     sampled : History
 
     Returns
@@ -97,26 +92,28 @@ def draw_relative(solution: Solution, sampled: History) -> Figure:
     """
     evader = sampled.evader
     axes_of_evader = orbital_axes(evader.position_m, evader.velocity_m_s)
-    offset = (sampled.pursuer.position_m - evader.position_m) / _M_PER_KM
+    offset = sampled.pursuer.position_m - evader.position_m
     relative = np.einsum("nij,nj->ni", axes_of_evader, offset)
+    length, per_m = length_unit(float(np.abs(relative).max()))
+    offset, relative = offset * per_m, relative * per_m
     with style():
         figure = new_figure(height_mm=66.0)
         ((plane, side, distance),) = place_axes(figure, 1, 3, margins_mm=(15.0, 4.0, 12.0, 8.0), gaps_mm=(17.0, 0.0))
         for axes, column, name, title in (
-            (plane, 0, "radial, km", "(a) in the evader's plane"),
-            (side, 2, "normal, km", "(b) out of the plane"),
+            (plane, 0, f"radial, {length}", "(a) in the evader's plane"),
+            (side, 2, f"normal, {length}", "(b) out of the plane"),
         ):
             axes.plot(relative[:, 1], relative[:, column], **PURSUER)
             axes.plot(relative[0, 1], relative[0, column], marker="o", markersize=4.0, color=TRUTH)
             axes.plot(0.0, 0.0, marker="*", markersize=9.0, color=IMPULSE, linestyle="none")
-            axes.set_xlabel("along the motion, km")
+            axes.set_xlabel(f"along the motion, {length}")
             axes.set_ylabel(name)
             axes.set_title(title)
             axes.xaxis.set_major_locator(_few())
         time, unit = _times(sampled.time_s)
         distance.plot(time, np.linalg.norm(offset, axis=1), **PURSUER)
         distance.set_xlabel(f"time, {unit}")
-        distance.set_ylabel("distance, km")
+        distance.set_ylabel(f"distance, {length}")
         distance.set_title("(c) distance")
         distance.set_ylim(bottom=0.0)
     return figure
@@ -176,11 +173,11 @@ def draw_distance(solution: Solution) -> Figure:
     """
     curve = solution.curve
     time, unit = _times(curve.duration_s)
-    radius = solution.game.capture_radius_m / _M_PER_KM
+    radius = solution.game.capture_radius_m / M_PER_KM
     with style():
         figure = new_figure(height_mm=66.0)
         ((left, right),) = place_axes(figure, 1, 2, margins_mm=(15.0, 4.0, 12.0, 8.0), gaps_mm=(20.0, 0.0))
-        left.plot(time, curve.distance_m / _M_PER_KM, marker="o", markersize=2.2, color=TRUTH)
+        left.plot(time, curve.distance_m / M_PER_KM, marker="o", markersize=2.2, color=TRUTH)
         left.axhline(radius, color=LIMIT, linewidth=0.8, linestyle="--")
         if solution.verdict is Verdict.CAPTURED:
             left.plot(
@@ -216,26 +213,25 @@ def draw_feedback(solution: Solution, flights: Sequence[Flight]) -> Figure:
         figure = new_figure(height_mm=66.0)
         ((left, right),) = place_axes(figure, 1, 2, margins_mm=(15.0, 4.0, 12.0, 8.0), gaps_mm=(18.0, 0.0))
         faint = {"linewidth": 0.6, "alpha": 0.5} if len(flights) > 1 else {"marker": "o", "markersize": 2.0}
-        _, unit = _times(flights[0].planned_s)
-        scale = _S_PER_HOUR if unit == "h" else 1.0
+        unit, per_s = time_unit(float(np.ptp(flights[0].planned_s)))
         for flight in flights[:100]:
-            left.plot(flight.planned_s / scale, flight.predicted_s / scale, color=TRUTH, **faint)
+            left.plot(flight.planned_s * per_s, flight.predicted_s * per_s, color=TRUTH, **faint)
         if optimal_s is not None:
-            left.axhline(optimal_s / scale, color=LIMIT, linewidth=0.8, linestyle="--", label="both play their best")
+            left.axhline(optimal_s * per_s, color=LIMIT, linewidth=0.8, linestyle="--", label="both play their best")
             left.legend(loc="best")
         left.set_xlabel(f"time of the plan, {unit}")
         left.set_ylabel(f"predicted capture, {unit}")
         left.set_title("(a) what the plans predict")
         if len(flights) == 1:
             (flight,) = flights
-            at = np.append(flight.planned_s, flight.time_s) / scale
-            right.plot(at, np.append(flight.distances_m, flight.distance_m) / _M_PER_KM, **PURSUER)
+            at = np.append(flight.planned_s, flight.time_s) * per_s
+            right.plot(at, np.append(flight.distances_m, flight.distance_m) / M_PER_KM, **PURSUER)
             right.set_xlabel(f"time, {unit}")
             right.set_ylabel("distance, km")
             right.set_ylim(bottom=0.0)
             right.set_title(f"(b) {flight.ended.value} at {flight.time_s:.1f} s")
         else:
-            times = np.sort([flight.time_s for flight in flights if flight.ended is Ended.CAPTURED]) / scale
+            times = np.sort([flight.time_s for flight in flights if flight.ended is Ended.CAPTURED]) * per_s
             if len(times):
                 right.step(times, np.arange(1, len(times) + 1) / len(flights), where="post", color=TRUTH)
             right.set_ylim(0.0, 1.02)
@@ -277,14 +273,8 @@ def _players(sampled: History) -> tuple[tuple[PlayerHistory, dict[str, Any], str
 
 
 def _times(seconds: Floats) -> tuple[Floats, str]:
-    if len(seconds) and seconds[-1] > _HOURS_FROM_S:
-        return seconds / _S_PER_HOUR, "h"
-    return seconds, "s"
-
-
-def _length_unit(solution: Solution) -> tuple[str, float]:
-    """Return the unit that positions are drawn in, and its metres."""
-    return ("10$^3$ km", 1e6) if solution.units.length_m > _THOUSANDS_FROM_M else ("km", _M_PER_KM)
+    unit, per_s = time_unit(float(np.ptp(seconds)) if len(seconds) else 0.0)
+    return seconds * per_s, unit
 
 
 def _few() -> MaxNLocator:

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from experiments.display_units import Unit, time_unit
 from experiments.pages.document import page
 
 Floats = NDArray[np.float64]
-Unit = tuple[str, float]
-"""Its name, and how many of it make one of SI."""
 
 _SPEEDS = (5, 30, 60, 120)
 _FLAT = np.cos(np.radians(4.0))
@@ -193,21 +192,6 @@ def motion_data(
         "choices_name": choices.name,
         "choices": list(choices.names),
     }
-
-
-def time_unit(span_s: float) -> Unit:
-    """Return the unit in which so long a time reads best."""
-    if span_s > 10.0 * 86400.0:
-        return "days", 1.0 / 86400.0
-    return ("h", 1.0 / 3600.0) if span_s > 4.0 * 3600.0 else ("s", 1.0)
-
-
-def length_unit(size_m: float) -> Unit:
-    """Return the unit in which so great a length reads best."""
-    for name, metres, least in (("au", 149_597_870_700.0, 7.5e9), ("Mm", 1e6, 2e6), ("km", 1e3, 3e3)):
-        if size_m > least:
-            return name, 1.0 / metres
-    return "m", 1.0
 
 
 def faces_of(points: Floats) -> list[Floats]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from experiments._multipoint_tables import Axes
-from experiments.pages.motion import Curve, Graph, Mark, Track, View, length_unit, motion_page, time_unit
+from experiments.display_units import length_unit, time_unit
+from experiments.pages.motion import Curve, Graph, Mark, Track, View, motion_page
 from rendezvous.multipoint import Path, Visits
 
 MOMENTS = 401

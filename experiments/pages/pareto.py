@@ -7,8 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.display_units import length_unit
 from experiments.pages.document import page
-from experiments.pages.motion import Mark, Track, View, faces_of, length_unit, motion_data
+from experiments.pages.motion import Mark, Track, View, faces_of, motion_data
 from rendezvous.pareto import EncounterSolution, pareto_set, simplex_weights
 
 Floats = NDArray[np.float64]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.pages.motion import Curve, Graph, Mark, Track, View, length_unit, motion_page
+from experiments.display_units import length_unit
+from experiments.pages.motion import Curve, Graph, Mark, Track, View, motion_page
 from rendezvous.pursuit_evasion import Solution, history
 from rendezvous.pursuit_evasion.history import orbital_axes
 

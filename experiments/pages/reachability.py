@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.pages.motion import Choices, Curve, Graph, Mark, Sets, Track, View, faces_of, length_unit, motion_page
+from experiments.display_units import length_unit
+from experiments.pages.motion import Choices, Curve, Graph, Mark, Sets, Track, View, faces_of, motion_page
 from experiments.reachability_report import Member, Report
 from rendezvous.reachability import SetKind
 

@@ -311,13 +311,13 @@ def test_a_map_that_is_wrong(arguments: list[str], parts: list[str], infoset: In
 
 def test_figures(geo: Solution) -> None:
     sampled = history(geo)
-    space: Any = draw_orbits(geo, sampled).axes[0]
-    assert space.get_zlabel() == "$z$, 10$^3$ km"
-    plane, *_ = draw_relative(geo, sampled).axes
-    assert plane.get_xlabel() == "along the motion, km"
+    space: Any = draw_orbits(sampled).axes[0]
+    assert space.get_zlabel() == "$z$, Mm"
+    plane, *_ = draw_relative(sampled).axes
+    assert plane.get_xlabel() == "along the motion, Mm"
     x, y = plane.get_lines()[0].get_xydata().T  # type: ignore[union-attr]
-    assert abs(x[-1]) < 1e-3
-    assert abs(y[-1]) < 1e-3
+    assert abs(x[-1]) < 1e-6
+    assert abs(y[-1]) < 1e-6
     *_, switching = draw_control(sampled).axes
     for line in switching.get_lines():
         assert np.all(np.asarray(line.get_ydata())[:-1] > 0.0)
