@@ -180,7 +180,10 @@ def _show(
     console.print(table)
     notes = ["a true miss: no guarantee of this strategy can be below it; there may be worse ones"]
     if worst.outcome is Outcome.SET_LOST and not keep_set:
-        notes.append("set-lost: the model lost its set and guidance ended; --keep-set counts only those that keep it")
+        notes.append(
+            "set-lost: some measurement left the model without a state; --keep-set counts only engagements in which "
+            "that never happened"
+        )
     if record is not None:
         notes.append(f"draw it with: infoset replay {record} --out DIR")
     for note in notes:

@@ -277,5 +277,7 @@ def _show(scenario: Scenario, lower: LowerBound, found: Sequence[Found], stdout_
         Text("worst found: by flying the pairs above, and by the search of: infoset adversary"), soft_wrap=True
     )
     if any(each.worst_outcome == Outcome.SET_LOST.value for each in found):
-        said = "set-lost: the model lost a truth it should keep; try --model guaranteed"
+        said = "set-lost: some measurement left the model without a state"
+        if not scenario.set_model.is_guaranteed:
+            said += "; try --model guaranteed"
         console.print(Text(said), soft_wrap=True)
