@@ -61,12 +61,12 @@ def noises_of(folder: CampaignFolder) -> list[str]:
     return [folder.manifest.noise] if folder.manifest.noise in NOISES else list(NOISES)
 
 
-def noise_flags(folder: CampaignFolder, cell: int | None = None) -> dict[str, NDArray[np.bool_] | slice]:
+def noise_flags(folder: CampaignFolder) -> dict[str, NDArray[np.bool_] | slice]:
     """Return which rows are of which noise; a slice where all are."""
     noises = noises_of(folder)
     if len(noises) == 1:
         return {noises[0]: slice(None)}
-    codes = folder.codes("noise", noises, cell)
+    codes = folder.codes("noise", noises)
     return {noise: codes == place for place, noise in enumerate(noises)}
 
 
@@ -180,7 +180,7 @@ class WorstRun:
     replay: str
 
 
-def worst_runs(folder: CampaignFolder, scenario_file: Path, count: int = WORST) -> list[WorstRun]:
+def worst_runs(folder: CampaignFolder, scenario_file: Path) -> list[WorstRun]:
     """Return the runs of a campaign that missed by most, the worst first, each with how to fly it again.
 
     Parameters
@@ -188,15 +188,13 @@ def worst_runs(folder: CampaignFolder, scenario_file: Path, count: int = WORST) 
     folder : CampaignFolder
     scenario_file : Path
         Of the campaign's scenario.
-    count : int
-        How many, if there are as many.
 
     Returns
     -------
     list of WorstRun
     """
     miss = folder.numbers("miss_m").data
-    count = min(count, miss.size)
+    count = min(WORST, miss.size)
     places = np.argpartition(-miss, count - 1)[:count] if count else np.zeros(0, dtype=np.int64)
     places = places[np.lexsort((places, -miss[places]))]
     return [
