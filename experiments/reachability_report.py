@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from time import perf_counter
 
 import numpy as np
@@ -51,7 +52,10 @@ SINGLE = {
 """Choices that are one control each: least sum of squares, of absolute values, of Euclidean norms, and so on."""
 VERTICES, SAMPLES = "vertices", "samples"
 MOST_SAMPLES = 1000
+POINTS = 24
+"""Of a flight that is shown, a period."""
 _LONGER = 4
+_MOST_SHOWN, _ALIKE = 5, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +139,21 @@ class Report:
     noisy: tuple[Flight, ...]
     robustness: Robustness | None
     elapsed_s: float
+
+    @cached_property
+    def shown(self) -> tuple[tuple[Member, Floats], ...]:
+        """The first few members that differ from each other, each with its nonlinear flight, shape (points, 6)."""
+        chosen: list[Member] = []
+        for each in self.members:
+            if all(np.abs(each.controls - other.controls).max() > _ALIKE for other in chosen):
+                chosen.append(each)
+        return tuple((each, self._flown(each)) for each in chosen[:_MOST_SHOWN])
+
+    def _flown(self, member: Member) -> Floats:
+        rendezvous = self.rendezvous
+        push = rendezvous.acceleration_m_s2 * member.controls[None]
+        path = rendezvous.truth.fly(rendezvous.problem.initial, push, rendezvous.period_s, POINTS)[0]
+        return np.asarray(path)
 
 
 def make_report(

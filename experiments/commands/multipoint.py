@@ -223,14 +223,15 @@ def _node(found: Found, index: int, name: str) -> dict[str, object]:
 
 def _fill(folder: Path, found: Found, json_text: str, overwrite: bool, quiet: bool) -> None:
     from experiments.commands._screen import progress_bar
-    from experiments.figures.multipoint import Scene, cost_curves, draw_control, draw_costates, draw_path, draw_times
+    from experiments.figures.multipoint import Scene, draw_control, draw_costates, draw_path, draw_times
     from experiments.figures.style import save_figure
+    from experiments.multipoint_curves import cost_curves
     from experiments.output import reporting_failures, write_file
 
     write_file(folder / "results.json", json_text, overwrite=overwrite)
     with progress_bar(quiet) as begin, reporting_failures(folder):
         scene = Scene(found.problem.axes, found.problem.tour, found.order, found.path)
-        curves = cost_curves(scene, begin("cost against times"))
+        curves = cost_curves(scene.tour, scene.order, scene.path, begin("cost against times"))
         report = begin("figures")
         drawings: tuple[Callable[[], Figure], ...] = (
             lambda: draw_path(scene),

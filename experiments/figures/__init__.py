@@ -1,1 +1,1 @@
-"""Pictures made from results; nothing here computes."""
+"""Pictures made from results: what was found is sampled here, and nothing is looked for."""

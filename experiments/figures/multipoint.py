@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,23 +15,19 @@ from numpy.typing import NDArray
 from experiments._multipoint_tables import Axes as FrameAxes
 from experiments.display_units import Unit, length_unit, time_unit
 from experiments.figures.style import IMPULSE, INK, LIMIT, MEASURED, SET_EDGE, TRUTH, new_figure, place_axes, style
+from experiments.multipoint_curves import CostCurve
 from rendezvous.multipoint import Path, Visits
 
 Floats = NDArray[np.float64]
-Progress = Callable[[float], None]
 
 _POINTS = 1601
 _TRACK_POINTS = 241
-_CURVE_POINTS = 41
-_NEAREST = 0.12
-_JUMP = 0.3
 _COMPONENTS: tuple[dict[str, Any], ...] = (
     {"color": TRUTH, "linestyle": "-"},
     {"color": MEASURED, "linestyle": (0, (5, 1.5))},
     {"color": IMPULSE, "linestyle": (0, (1.2, 1.0))},
 )
 _MOST_NAMED = 12
-_MOST_CURVES = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,67 +69,6 @@ class Scene:
     def time_unit(self) -> Unit:
         """The unit that times are drawn in."""
         return time_unit(self.end_s - self.tour.start_s)
-
-
-@dataclass(frozen=True)
-class CostCurve:
-    """The cost against one time, the others as they are.
-
-    Parameters
-    ----------
-    time_s, cost : ndarray, shape (k,)
-    """
-
-    time_s: Floats
-    cost: Floats
-
-
-def cost_curves(scene: Scene, progress: Progress = lambda _done: None) -> list[CostCurve]:
-    """Compute the cost against each time between its neighbours.
-
-    Parameters
-    ----------
-    scene : Scene
-    progress : callable
-        Told the fraction done.
-
-    Returns
-    -------
-    list of CostCurve
-        One a visit, of the first nine; each ends where paths do, or where they jump to another local minimum.
-    """
-    nodes, curves = scene.path.nodes, []
-    count = min(len(scene.order), _MOST_CURVES)
-    for index in range(count):
-        low = scene.tour.start_s if index == 0 else float(nodes.leave_s[index - 1])
-        stay = float(nodes.leave_s[index] - nodes.arrive_s[index])
-        last = index == len(scene.order) - 1
-        now = float(nodes.arrive_s[index])
-        high = now + 0.5 * (now - low) if last else float(nodes.arrive_s[index + 1]) - stay
-        width = high - low
-        times = np.linspace(low + _NEAREST * width, high if last else high - _NEAREST * width, _CURVE_POINTS)
-        times = np.unique(np.append(times, now))
-        # From the time as it is outward, so that each path begins from a near one.
-        found = {now: scene.path.cost}
-        for side in (times[times > now], times[times < now][::-1]):
-            fly = scene.tour.flyer(scene.order, scene.path)
-            reached, cost, slope = now, scene.path.cost, float(scene.path.time_gradient[index])
-            for time in side:
-                varied = nodes.arrive_s.copy()
-                varied[index] = time
-                try:
-                    flown = fly(varied)
-                except ValueError:
-                    break
-                expected = cost + 0.5 * (time - reached) * (slope + float(flown.time_gradient[index]))
-                if abs(flown.cost - expected) > _JUMP * max(flown.cost, cost):
-                    break
-                reached, cost, slope = float(time), flown.cost, float(flown.time_gradient[index])
-                found[reached] = cost
-        known = np.array(sorted(found))
-        curves.append(CostCurve(known, np.array([found[time] for time in known])))
-        progress((index + 1) / count)
-    return curves
 
 
 def draw_path(scene: Scene) -> Figure:

@@ -20,6 +20,8 @@ from rendezvous.reachability import SetKind
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
+Shown = Sequence[tuple[Member, Floats]]
+"""Members and their flights."""
 
 _TOLERANCE, _TOLERANCE_IN_SPACE = 2e-3, 1e-2
 """By how much of their size sets may be drawn too small."""
@@ -36,7 +38,6 @@ _NAMES = {
     "analytic": "analytic centre",
 }
 _MOST_MEMBERS = 4
-_POINTS = 24
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": "#08306b", "linestyle": "-", "marker": "o"},
     {"color": "#e6842a", "linestyle": (0, (4, 1.5)), "marker": "s"},
@@ -61,14 +62,14 @@ def draw_reach(report: Report, progress: Progress = lambda _done: None) -> Itera
     Figure
         Four of them.
     """
-    members = _distinct(report.members)
+    shown = report.shown[:_MOST_MEMBERS]
     with style():
         for part in (0, 1):
-            yield _space(report, members, part)
+            yield _space(report, shown, part)
             progress(0.25 * (part + 1))
-        yield _planes(report, members)
+        yield _planes(report, shown)
         progress(0.8)
-        yield _controls(report, members)
+        yield _controls(report, [member for member, _ in shown])
 
 
 def shown_times(periods: int, most: int = _MOST_TIMES) -> list[int]:
@@ -88,16 +89,7 @@ def shown_times(periods: int, most: int = _MOST_TIMES) -> list[int]:
     return sorted({round(each) for each in np.linspace(1, periods - 1, most)})
 
 
-def _distinct(members: Sequence[Member]) -> list[Member]:
-    """The first few that differ from each other; vertices and samples are too many to tell apart."""
-    chosen: list[Member] = []
-    for each in members:
-        if all(np.abs(each.controls - other.controls).max() > 1e-4 for other in chosen):
-            chosen.append(each)
-    return chosen[:_MOST_MEMBERS]
-
-
-def _space(report: Report, members: Sequence[Member], part: int) -> Figure:
+def _space(report: Report, shown: Shown, part: int) -> Figure:
     """Positions (0) or velocities (1)."""
     figure = new_figure(height_mm=112.0)
     axes: Any = figure.add_axes((-0.03, 0.0, 0.74, 1.0), projection="3d", computed_zorder=False)
@@ -111,8 +103,8 @@ def _space(report: Report, members: Sequence[Member], part: int) -> Figure:
         labels.append((t, points[points[:, 2].argmax()]))
     for text, place in _joined(labels, report.tube[:, places]):
         axes.text(*place, text, fontsize=7.0, color=SET_EDGE, ha="center", va="bottom", zorder=4)
-    for look, member in zip(_LOOKS, members, strict=False):
-        path, name = _path(report, member), title(member)
+    for look, (member, path) in zip(_LOOKS, shown, strict=False):
+        name = title(member)
         line = {"color": look["color"], "linestyle": look["linestyle"], "zorder": 5}
         axes.plot(*path[:, places].T, label=f"{name}, nonlinear", **line)
         marks = {"color": look["color"], "marker": look["marker"], "markersize": 3.5, "linestyle": "none", "zorder": 6}
@@ -184,18 +176,10 @@ def _outline(points: Floats) -> Floats:
     return np.asarray(points[np.argsort(np.arctan2(centred @ second, centred @ first))])
 
 
-def _path(report: Report, member: Member) -> Floats:
-    """The nonlinear flight, shape (points, 6)."""
-    rendezvous = report.rendezvous
-    push = rendezvous.acceleration_m_s2 * member.controls[None]
-    return np.asarray(rendezvous.truth.fly(rendezvous.problem.initial, push, rendezvous.period_s, _POINTS)[0])
-
-
-def _planes(report: Report, members: Sequence[Member]) -> Figure:
+def _planes(report: Report, shown: Shown) -> Figure:
     figure = new_figure(height_mm=150.0)
     grid = place_axes(figure, 2, 2, margins_mm=(16.0, 3.0, 12.0, 12.0), gaps_mm=(18.0, 14.0))
     labels = [each for part in _AXES for each in part]
-    paths = [_path(report, each) for each in members]
     for axes, plane in zip([each for row in grid for each in row], _PLANES, strict=True):
         names = []
         for t in shown_times(report.solution.problem.periods):
@@ -207,7 +191,7 @@ def _planes(report: Report, members: Sequence[Member]) -> Figure:
             axes.annotate(
                 text, (float(place[0]), float(place[1])), fontsize=6.5, color=SET_EDGE, ha="center", va="bottom"
             )
-        for look, member, path in zip(_LOOKS, members, paths, strict=False):
+        for look, (member, path) in zip(_LOOKS, shown, strict=False):
             axes.plot(*path[:, plane].T, color=look["color"], linestyle=look["linestyle"], linewidth=1.0)
             marks = {"marker": look["marker"], "markersize": 3.2, "linestyle": "none", "color": look["color"]}
             axes.plot(*member.linear[:, plane].T, label=title(member), **marks)

@@ -7,13 +7,11 @@ from numpy.typing import NDArray
 
 from experiments.display_units import length_unit
 from experiments.pages.motion import Choices, Curve, Graph, Mark, Sets, Track, View, faces_of, motion_page
-from experiments.reachability_report import Member, Report
+from experiments.reachability_report import POINTS, Report
 from rendezvous.reachability import SetKind
 
 Floats = NDArray[np.float64]
 
-_POINTS = 24
-_MOST_MEMBERS = 5
 _TOLERANCE = 1e-2
 _MOST_SETS = 24
 _NOTHING = 1e-10
@@ -33,9 +31,8 @@ def reachability_page(report: Report) -> str:
     """
     rendezvous, sets = report.rendezvous, report.solution.sets
     periods, period_s = rendezvous.problem.periods, rendezvous.period_s
-    members = _distinct(report)
-    paths = [_flown(report, each) for each in members]
-    count = len(paths[0]) if paths else periods * _POINTS + 1
+    members, paths = [member for member, _ in report.shown], [path for _, path in report.shown]
+    count = len(paths[0]) if paths else periods * POINTS + 1
     time_s = np.linspace(0.0, periods * period_s, count)
     times = sorted({round(each) for each in np.linspace(0, periods, min(periods, _MOST_SETS) + 1)})
     nearest = [int(np.abs(np.array(times) - each / period_s).argmin()) for each in time_s]
@@ -88,22 +85,6 @@ def reachability_page(report: Report) -> str:
         graphs,
         Choices("Control", tuple(each.name for each in members)),
     )
-
-
-def _distinct(report: Report) -> list[Member]:
-    """The first few controls that differ from each other."""
-    chosen: list[Member] = []
-    for each in report.members:
-        if all(np.abs(each.controls - other.controls).max() > 1e-4 for other in chosen):
-            chosen.append(each)
-    return chosen[:_MOST_MEMBERS]
-
-
-def _flown(report: Report, member: Member) -> Floats:
-    """The nonlinear flight, shape (points, 6)."""
-    rendezvous = report.rendezvous
-    push = rendezvous.acceleration_m_s2 * member.controls[None]
-    return np.asarray(rendezvous.truth.fly(rendezvous.problem.initial, push, rendezvous.period_s, _POINTS)[0])
 
 
 def _clean(controls: Floats) -> Floats:

@@ -12,7 +12,8 @@ import pytest
 
 from experiments._multipoint_tables import KIND, Axes
 from experiments.cli import main
-from experiments.figures.multipoint import Scene, cost_curves, draw_control, draw_costates, draw_path, draw_times
+from experiments.figures.multipoint import Scene, draw_control, draw_costates, draw_path, draw_times
+from experiments.multipoint_curves import cost_curves
 from experiments.multipoint_file import load_multipoint
 from experiments.problem_file import built_in_problems, problem_text
 
@@ -367,7 +368,7 @@ def test_figures_say_what_they_show() -> None:
     assert problem.times_s is not None
     path = problem.tour.fly((0, 1, 2), problem.times_s)
     scene = Scene(problem.axes, problem.tour, (0, 1, 2), path)
-    curves = cost_curves(scene)
+    curves = cost_curves(problem.tour, (0, 1, 2), path)
     assert len(curves) == 3
     for index, curve in enumerate(curves):
         at = int(np.flatnonzero(curve.time_s == problem.times_s[index])[0])
