@@ -14,6 +14,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from experiments.display_units import length_unit
 from experiments.figures.style import INK, LIMIT, SET_EDGE, SET_FILL, new_figure, place_axes, style
 from experiments.reachability_report import Member, Report
 from rendezvous.reachability import SetKind
@@ -44,7 +45,7 @@ _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": "#7f2704", "linestyle": (0, (1, 1)), "marker": "^"},
     {"color": "#2f6b3a", "linestyle": (0, (5, 1, 1, 1)), "marker": "D"},
 )
-_AXES = (("x, m", "y, m", "z, m"), ("$v_x$, m/s", "$v_y$, m/s", "$v_z$, m/s"))
+_AXES = ("x", "y", "z", "$v_x$", "$v_y$", "$v_z$")
 _PLANES = ((0, 1), (0, 2), (3, 4), (3, 5))
 
 
@@ -95,23 +96,23 @@ def _space(report: Report, shown: Shown, part: int) -> Figure:
     axes: Any = figure.add_axes((-0.03, 0.0, 0.74, 1.0), projection="3d", computed_zorder=False)
     first = 3 * part
     places = slice(first, first + 3)
-    sets = report.solution.sets
-    labels = []
+    sets, (titles, per_si) = report.solution.sets, _units(report)
+    factors, labels = per_si[places], []
     for t in shown_times(sets.problem.periods, _MOST_TIMES_IN_SPACE):
-        points = sets.shadow(SetKind.TUBE, t, range(first, first + 3), _TOLERANCE_IN_SPACE)
+        points = sets.shadow(SetKind.TUBE, t, range(first, first + 3), _TOLERANCE_IN_SPACE) * factors
         _solid(axes, points)
         labels.append((t, points[points[:, 2].argmax()]))
-    for text, place in _joined(labels, report.tube[:, places]):
+    for text, place in _joined(labels, report.tube[:, places] * factors[:, None]):
         axes.text(*place, text, fontsize=7.0, color=SET_EDGE, ha="center", va="bottom", zorder=4)
     for look, (member, path) in zip(_LOOKS, shown, strict=False):
         name = title(member)
         line = {"color": look["color"], "linestyle": look["linestyle"], "zorder": 5}
-        axes.plot(*path[:, places].T, label=f"{name}, nonlinear", **line)
+        axes.plot(*(path[:, places] * factors).T, label=f"{name}, nonlinear", **line)
         marks = {"color": look["color"], "marker": look["marker"], "markersize": 3.5, "linestyle": "none", "zorder": 6}
-        axes.plot(*member.linear[:, places].T, label=f"{name}, linear", **marks)
+        axes.plot(*(member.linear[:, places] * factors).T, label=f"{name}, linear", **marks)
     star = {"color": INK, "marker": "*", "markersize": 9.0, "linestyle": "none", "zorder": 7}
-    axes.plot(*member_end(report)[places][:, None], label="least terminal state", **star)
-    for name, label in zip("xyz", _AXES[part], strict=True):
+    axes.plot(*(member_end(report)[places] * factors)[:, None], label="least terminal state", **star)
+    for name, label in zip("xyz", titles[places], strict=True):
         getattr(axes, f"set_{name}label")(label, labelpad=3.0)
         getattr(axes, f"{name}axis").set_tick_params(labelsize=6.5, pad=0.0)
         getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(6))
@@ -119,6 +120,13 @@ def _space(report: Report, shown: Shown, part: int) -> Figure:
     axes.set_box_aspect((1.0, 1.0, 0.85), zoom=1.0)
     figure.legend(*axes.get_legend_handles_labels(), loc="center left", bbox_to_anchor=(0.705, 0.5))
     return figure
+
+
+def _units(report: Report) -> tuple[list[str], Floats]:
+    """Return the six axes' titles, and how many of their units make those of the states."""
+    unit, per_m = length_unit(float(np.abs(report.tube[:, :3]).max()))
+    names = [f"{name}, {unit if place < 3 else 'm/s'}" for place, name in enumerate(_AXES)]
+    return names, np.array([per_m] * 3 + [1.0] * 3)
 
 
 def title(member: Member) -> str:
@@ -179,25 +187,26 @@ def _outline(points: Floats) -> Floats:
 def _planes(report: Report, shown: Shown) -> Figure:
     figure = new_figure(height_mm=150.0)
     grid = place_axes(figure, 2, 2, margins_mm=(16.0, 3.0, 12.0, 12.0), gaps_mm=(18.0, 14.0))
-    labels = [each for part in _AXES for each in part]
+    titles, per_si = _units(report)
     for axes, plane in zip([each for row in grid for each in row], _PLANES, strict=True):
-        names = []
+        names, factors = [], per_si[list(plane)]
         for t in shown_times(report.solution.problem.periods):
-            points = report.solution.sets.shadow(SetKind.TUBE, t, plane, _TOLERANCE)
+            points = report.solution.sets.shadow(SetKind.TUBE, t, plane, _TOLERANCE) * factors
             _flat(axes, points)
             highest = points[points[:, 1] >= points[:, 1].max() - 0.01 * np.ptp(points[:, 1])]
             names.append((t, np.array([highest[:, 0].mean(), points[:, 1].max()])))
-        for text, place in _joined(names, report.tube[:, list(plane)]):
+        for text, place in _joined(names, report.tube[:, list(plane)] * factors[:, None]):
             axes.annotate(
                 text, (float(place[0]), float(place[1])), fontsize=6.5, color=SET_EDGE, ha="center", va="bottom"
             )
         for look, (member, path) in zip(_LOOKS, shown, strict=False):
-            axes.plot(*path[:, plane].T, color=look["color"], linestyle=look["linestyle"], linewidth=1.0)
+            axes.plot(*(path[:, plane] * factors).T, color=look["color"], linestyle=look["linestyle"], linewidth=1.0)
             marks = {"marker": look["marker"], "markersize": 3.2, "linestyle": "none", "color": look["color"]}
-            axes.plot(*member.linear[:, plane].T, label=title(member), **marks)
-        axes.plot(*member_end(report)[list(plane)], color=INK, marker="*", markersize=8.0, linestyle="none", zorder=6)
-        axes.set_xlabel(labels[plane[0]])
-        axes.set_ylabel(labels[plane[1]])
+            axes.plot(*(member.linear[:, plane] * factors).T, label=title(member), **marks)
+        end = member_end(report)[list(plane)] * factors
+        axes.plot(*end, color=INK, marker="*", markersize=8.0, linestyle="none", zorder=6)
+        axes.set_xlabel(titles[plane[0]])
+        axes.set_ylabel(titles[plane[1]])
         axes.margins(0.07)
         axes.xaxis.set_major_locator(MaxNLocator(6))
     handles, labels = grid[0][0].get_legend_handles_labels()
