@@ -104,5 +104,10 @@ def test_with_figures(tmp_path: Path, under: Check) -> None:
     under("peak memory with figures", max(run.peak_mb for run in runs), 400.0, "MB")
 
 
+def test_bound(under: Check) -> None:
+    run = infoset("bound", "asteroid-1997", "--model", "guaranteed")
+    under("infoset bound of the published scenario", run.elapsed_s, 20.0, "s")
+
+
 def test_help(under: Check) -> None:
     under("infoset --help", min(infoset("--help").elapsed_s for _ in range(ROUNDS)), 0.7, "s")
