@@ -78,7 +78,7 @@ def tell_of_compiling_rendezvous(quiet: bool, *, visits: bool = True, nonlinear:
 
 def _tell_of_compiling(quiet: bool, time: str, kernels: Sequence[tuple[str | None, object]]) -> None:
     """Say it if one of some kernels, each with the file of its module, is not stored; and where, if not beside it."""
-    missing = [(Path(file or ""), kernel) for file, kernel in kernels if not _stored(kernel, Path(file or ""))]
+    missing = [(Path(file or ""), kernel) for file, kernel in kernels if not _stored(kernel)]
     if quiet or not missing:
         return
     source, kernel = missing[0]
@@ -95,16 +95,18 @@ def _cache_of(kernel: object) -> Path | None:
     return None if folder is None else Path(folder)
 
 
-def _stored(kernel: object, source: Path) -> bool:
-    """Whether Numba has an index of a kernel that is no older than its source."""
-    name = getattr(kernel, "__name__", "")
-    folder = _cache_of(kernel)
-    if folder is None:  # switched off by NUMBA_DISABLE_JIT; or nothing can be kept, which Numba's user was warned of
+def _stored(kernel: object) -> bool:
+    """Whether Numba has a compiled kernel of this very source: asked of its own index, whose stamp it will look at."""
+    if _cache_of(kernel) is None:
+        # Switched off by NUMBA_DISABLE_JIT; or nothing can be kept, which Numba's user was warned of.
+        return True
+    index = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
+    read = getattr(index, "_load_index", None)
+    if read is None:  # another Numba, that keeps its index elsewhere: nothing is said rather than something wrong
         return True
     try:
-        made = [each.stat().st_mtime for each in folder.glob(f"{source.stem}.{name}-*.nbi")]
-        return bool(made) and max(made) >= source.stat().st_mtime
-    except OSError:
+        return bool(read())
+    except (OSError, EOFError):
         return False
 
 

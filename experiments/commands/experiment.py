@@ -231,11 +231,18 @@ def _show(scenario: Scenario, curves: Sequence[Curve], stdout_taken: bool) -> No
         table_console,
     )
     from experiments.published.interception import MANY, PRINTED_SINGLE_RUN, SINGLE
+    from infoset import Recovery
     from sim import Outcome, quantiles
 
     table = Table("curve", "quantity", box=None, pad_edge=False)
     for level in LEVELS:
         table.add_column(f"{level:.0%}", justify="right")
+    went_on = scenario.set_model.recovery is Recovery.WIDENED
+    others_say = {
+        Outcome.SET_LOST: f"with a set that emptied{' and went on widened' if went_on else ''} (set-lost)",
+        Outcome.BUDGET_SPENT: "with too little left to correct (budget-spent)",
+        Outcome.DIVERGED: "farther at the closest approach than the nominal range (diverged)",
+    }
     notes = []
     for curve in curves:
         results = curve.results
@@ -248,9 +255,9 @@ def _show(scenario: Scenario, curves: Sequence[Curve], stdout_taken: bool) -> No
         ):
             table.add_row(first, quantity, *(number(float(each)) for each in quantiles(values, LEVELS)))
         table.add_row("", f"{guaranteed_miss_name(scenario.set_model.kind.value)}, m", "", median)
-        others = Counter(each.value for each in results.outcomes if each is not Outcome.INTERCEPTED)
-        said = ", ".join(f"{count} {outcome}" for outcome, count in others.items()) or "none"
-        notes.append(f"curve {curve.number}: {certificate(results)}; not intercepted: {said}")
+        others = Counter(each for each in results.outcomes if each is not Outcome.INTERCEPTED)
+        said = [f"{count} {others_say[outcome]}" for outcome, count in others.items()]
+        notes.append(f"curve {curve.number}: " + "; ".join([certificate(results), *said]))
     console = table_console(stdout_taken)
     console.print(Text(f"{scenario.name}, {len(curves[0].results)} runs a curve; quantiles"), soft_wrap=True)
     console.print(table)
