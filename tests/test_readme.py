@@ -30,7 +30,7 @@ def command(name: str) -> str:
 @pytest.mark.parametrize("block", blocks("python"))
 def test_python_blocks_run(block: str, tmp_path: Path) -> None:
     script = tmp_path / "quickstart.py"
-    script.write_text(block.replace("runs=50", "runs=3"), encoding="utf-8")
+    script.write_text(block.replace("runs=200", "runs=3"), encoding="utf-8")
     done = subprocess.run([sys.executable, script], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     published, own = done.stdout.splitlines()
