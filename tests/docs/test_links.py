@@ -50,6 +50,13 @@ def test_links_lead_somewhere(page: Page) -> None:
             assert anchor in anchors(source), f"{page.name}: {link}: no such heading"
 
 
+def test_links_into_the_gallery_say_that_it_needs_the_site(page: Page) -> None:
+    # A clone has no docs/gallery: who reads the files there would be sent to nothing.
+    for paragraph in page.prose().split("\n\n"):
+        if any("gallery/" in link for link in _LINK.findall(paragraph)):
+            assert re.search(r"\bsite\s+is\s+built\b", paragraph), f"{page.name}: {paragraph}"
+
+
 def test_tables_of_contents_name_pages_that_exist(page: Page) -> None:
     for block in page.blocks("{toctree}"):
         for line in block.text.splitlines():
