@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
-from experiments.figures.distributions import axis_limit
+from experiments.figures.distributions import axis_limit, draw_band, scale_axis
 from experiments.figures.style import CURVE_LOOKS, INK, LIMIT, new_figure, place_axes, style
 from sim import band_half_width, estimate_quantiles
 from sim.stopping_rule import level_name
@@ -27,6 +28,7 @@ MOST_POINTS = 2000
 
 _CONFIDENCE = 0.95
 _LOOKS = 28
+_DOTTED: dict[str, Any] = {"linestyle": (0, (1, 1.2)), "linewidth": 0.9}
 _BINS = 24
 _START_LABELS = {
     "z_km": "start z, km",
@@ -84,31 +86,19 @@ def draw_campaign_distributions(columns: Sequence[CampaignColumns]) -> Figure:
     with style():
         figure = new_figure(height_mm=95.0)
         (row,) = place_axes(figure, 1, 2, margins_mm=(14.0, 4.0, 27.0, 7.0), gaps_mm=(7.0, 0.0))
-        for axes, title, label, name in zip(
-            row,
-            ("(a) miss", "(b) impulse spent"),
-            ("miss, m", "impulse spent, m/s"),
-            ("miss_m", "impulse_m_s"),
-            strict=True,
-        ):
-            samples = [np.asarray(getattr(each, name)) for each in columns]
-            limit = axis_limit(samples)
-            least = 0.0 if name == "miss_m" else min(float(each.min()) for each in samples)
-            right = limit + (0.04 * (limit - least) or 0.5)
-            left = 0.0 if name == "miss_m" else max(0.0, least - 0.08 * (limit - least))
-            for each, sample in zip(columns, samples, strict=True):
-                _distribution(axes, sample, (left, right), each.look, band=True)
-                if name == "miss_m" and each.guaranteed_miss_m.size:
-                    dotted = {**each.look, "linestyle": (0, (1, 1.2)), "linewidth": 0.9}
-                    _distribution(axes, each.guaranteed_miss_m, (left, right), dotted, band=False)
-            beyond = [f"{int((each > right).sum())} of {each.size}" for each in samples if (each > right).any()]
-            axes.set_title(title)
-            axes.set_xlabel(f"{label}\nruns beyond the axis: {', '.join(beyond)}" if beyond else label)
-            axes.set_xlim(left, right)
-            axes.set_ylim(-0.02, 1.02)
+        _draw_miss(row[0], columns)
+        _draw_impulse(row[1], columns)
         row[0].set_ylabel("distribution function (share of runs)")
         row[1].tick_params(labelleft=False)
-        figure.legend(handles=_handles(columns), loc="lower center", ncols=2, columnspacing=2.5)
+        handles, labels = _handles(columns)
+        figure.legend(
+            handles,
+            labels,
+            loc="lower center",
+            ncols=2,
+            columnspacing=2.5,
+            handler_map={tuple: HandlerTuple(ndivide=None, pad=0.15)},
+        )
     return figure
 
 
@@ -217,6 +207,35 @@ def _ranks(values: Floats) -> Floats:
     return np.asarray((first + 0.5 * (counts - 1))[places], dtype=np.float64)
 
 
+def _draw_miss(axes: Axes, columns: Sequence[CampaignColumns]) -> None:
+    """Draw the misses, and dotted what was guaranteed of them; the axis has room for both."""
+    samples = [each.miss_m for each in columns]
+    guaranteed = [each.guaranteed_miss_m for each in columns]
+    ends = scale_axis(axes, [*samples, *(each for each in guaranteed if each.size)], from_zero=True)
+    for each in columns:
+        _distribution(axes, each.miss_m, ends, each.look, band=True)
+        if each.guaranteed_miss_m.size:
+            _distribution(axes, each.guaranteed_miss_m, ends, each.look | _DOTTED, band=False)
+    notes = [_beyond("runs", samples, ends[1]), _beyond(_guarantee_name(columns), guaranteed, ends[1])]
+    axes.set_title("(a) miss")
+    axes.set_xlabel("\n".join(["miss, m", *filter(None, notes)]))
+
+
+def _draw_impulse(axes: Axes, columns: Sequence[CampaignColumns]) -> None:
+    samples = [each.impulse_m_s for each in columns]
+    ends = scale_axis(axes, samples, from_zero=False)
+    for each in columns:
+        _distribution(axes, each.impulse_m_s, ends, each.look, band=True)
+    axes.set_title("(b) impulse spent")
+    axes.set_xlabel("\n".join(["impulse spent, m/s", *filter(None, [_beyond("runs", samples, ends[1])])]))
+
+
+def _beyond(name: str, samples: Sequence[Floats], right: float) -> str:
+    """What is to be said of the values that do not fit; nothing where all do."""
+    told = [f"{int((each > right).sum())} of {each.size}" for each in samples if (each > right).any()]
+    return f"{name} beyond the axis: {', '.join(told)}" if told else ""
+
+
 def _distribution(
     axes: Axes, sample: Floats, ends: tuple[float, float], look: Mapping[str, Any], *, band: bool
 ) -> None:
@@ -225,16 +244,12 @@ def _distribution(
     if values.size > MOST_POINTS:
         kept = np.unique(np.linspace(0, values.size - 1, MOST_POINTS).astype(np.int64))
         values, share = values[kept], share[kept]
-    right = max(ends[1], float(values[-1]))
-    values = np.concatenate([[ends[0]], values, [right]])
-    share = np.concatenate([[0.0], share, [1.0]])
-    axes.plot(values, share, drawstyle="steps-post", zorder=3.0, **look)
     if band:
         half = band_half_width(sample.size, _CONFIDENCE)
         lower, upper = np.clip(share - half, 0.0, 1.0), np.clip(share + half, 0.0, 1.0)
-        axes.fill_between(
-            values, lower, upper, step="post", facecolor=look["color"], alpha=0.15, linewidth=0.0, zorder=1.5
-        )
+        draw_band(axes, values, lower, upper, look["color"])
+    values = np.concatenate([[min(ends[0], float(values[0]))], values, [max(ends[1], float(values[-1]))]])
+    axes.plot(values, np.concatenate([[0.0], share, [1.0]]), drawstyle="steps-post", zorder=3.0, **look)
 
 
 def _convergence(axes: Axes, sample: Floats, colour: str) -> None:
@@ -293,15 +308,21 @@ def _line(place: int) -> Any:
     return ("-", (0, (5, 1.5)), (0, (1.5, 1.2)))[place]
 
 
-def _handles(columns: Sequence[CampaignColumns]) -> list[Line2D | Patch]:
-    handles: list[Line2D | Patch] = []
+def _guarantee_name(columns: Sequence[CampaignColumns]) -> str:
+    return "guaranteed miss" if columns[0].guarantees else "published $\\Phi$, no guarantee,"
+
+
+def _handles(columns: Sequence[CampaignColumns]) -> tuple[list[Any], list[str]]:
+    """What the legend shows, and what it says: a line a noise, dotted its guarantee, and the band in all colours."""
+    handles: list[Any] = []
+    labels = []
     for each in columns:
         meter = "with" if each.range_meter else "no"
-        handles.append(
-            Line2D([], [], label=f"{each.noise} noise, {meter} range meter, {each.miss_m.size} runs", **each.look)
-        )
-    if any(each.guaranteed_miss_m.size for each in columns):
-        said = "guaranteed miss" if columns[0].guarantees else "published $\\Phi$, no guarantee"
-        handles.append(Line2D([], [], color=INK, linestyle=(0, (1, 1.2)), linewidth=0.9, label=f"dotted: {said}"))
-    handles.append(Patch(facecolor=LIMIT, alpha=0.3, label="95 % confidence band (Dvoretzky-Kiefer-Wolfowitz)"))
-    return handles
+        handles.append(Line2D([], [], **each.look))
+        labels.append(f"{each.noise} noise, {meter} range meter, {each.miss_m.size} runs")
+        if each.guaranteed_miss_m.size:
+            handles.append(Line2D([], [], **(each.look | _DOTTED)))
+            labels.append(f"{each.noise} noise: {_guarantee_name(columns).rstrip(',')}")
+    handles.append(tuple(Line2D([], [], color=each.look["color"], linewidth=0.7) for each in columns))
+    labels.append("thin: 95 % confidence band (Dvoretzky-Kiefer-Wolfowitz)")
+    return handles, labels

@@ -2,13 +2,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
@@ -159,12 +157,14 @@ def test_distributions_draw_the_band_of_the_half_width(curves: list[Curve]) -> N
             share = np.arange(1, RUNS + 1) / RUNS
             drawn = line(axes, f"curve {curve.number}").get_xydata()
             np.testing.assert_array_equal(np.asarray(drawn)[1:-1], np.column_stack([sample, share]))
-            (band,) = [each for each in axes.collections if each.get_label() == f"band {curve.number}"]
-            assert isinstance(band, PolyCollection)
-            outline = np.asarray(band.get_paths()[0].vertices)
-            middle = 0.5 * (sample[2] + sample[3])
-            crossed = [float(a[1]) for a, b in pairwise(outline) if (a[0] - middle) * (b[0] - middle) < 0]
-            assert sorted(crossed) == pytest.approx([max(0.0, 0.5 - half), min(1.0, 0.5 + half)])
+            lower, upper = (
+                np.asarray(each.get_xydata()) for each in axes.lines if each.get_label() == f"band {curve.number}"
+            )
+            for edge, expected in ((lower, np.maximum(share - half, 0.0)), (upper, np.minimum(share + half, 1.0))):
+                np.testing.assert_array_equal(edge[:, 0], sample)
+                free = np.isfinite(edge[:, 1])
+                np.testing.assert_allclose(edge[free, 1], expected[free])
+                np.testing.assert_array_equal(free, (expected > 0.0) & (expected < 1.0))
         assert {text.get_text() for text in axes.texts} == {"1", "2", "3", "4"}
     (legend,) = figure.legends
     assert "90 % confidence band" in " ".join(text.get_text() for text in legend.get_texts())
@@ -181,6 +181,25 @@ def test_a_few_huge_misses_leave_the_axis_legible(curves: list[Curve]) -> None:
     (axes, _) = draw_distributions([wide]).axes
     assert axes.get_xlim()[1] < 3.0
     assert axes.get_xlabel() == "miss, m\nruns beyond the axis: 1 of 40 of curve 1"
+
+
+def test_curves_decades_apart_get_a_logarithmic_axis_and_keep_their_numbers(curves: list[Curve]) -> None:
+    far = [
+        replace(curve, results=replace(curve.results, miss_m=curve.results.miss_m + 5e3)) if curve.number > 2 else curve
+        for curve in curves
+    ]
+    (miss, impulse) = draw_distributions(far).axes
+    assert (miss.get_xscale(), impulse.get_xscale()) == ("log", "linear")
+    for axes in (miss, impulse):
+        assert {text.get_text() for text in axes.texts} == {"1", "2", "3", "4"}
+        assert all(0.0 < text.get_position()[0] < 1.0 for text in axes.texts)
+    assert miss.get_xlim()[1] > max(float(curve.results.miss_m.max()) for curve in far)
+
+
+def test_a_curve_on_the_edge_keeps_its_number(curves: list[Curve]) -> None:
+    still = replace(curves[0], results=replace(curves[0].results, miss_m=np.zeros(RUNS)))
+    (axes, _) = draw_distributions([still, curves[1]]).axes
+    assert {text.get_text() for text in axes.texts} == {"1", "2"}
 
 
 def made_up(curve: Curve, runs: int) -> Results:
