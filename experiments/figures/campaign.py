@@ -84,8 +84,8 @@ def draw_campaign_distributions(columns: Sequence[CampaignColumns]) -> Figure:
         The guaranteed miss beside the miss, dotted, where there is one.
     """
     with style():
-        figure = new_figure(height_mm=95.0)
-        (row,) = place_axes(figure, 1, 2, margins_mm=(14.0, 4.0, 27.0, 7.0), gaps_mm=(7.0, 0.0))
+        figure = new_figure(height_mm=99.0)
+        (row,) = place_axes(figure, 1, 2, margins_mm=(14.0, 4.0, 31.0, 7.0), gaps_mm=(7.0, 0.0))
         _draw_miss(row[0], columns)
         _draw_impulse(row[1], columns)
         row[0].set_ylabel("distribution function (share of runs)")
@@ -124,7 +124,7 @@ def draw_convergence(columns: Sequence[CampaignColumns]) -> Figure:
                 row, ("miss, m", "impulse spent, m/s"), (each.miss_m, each.impulse_m_s), strict=True
             ):
                 _convergence(axes, sample, str(each.look["color"]))
-                axes.set_title(f"({next(letter)}) {each.noise} noise")
+                axes.set_title(f"({next(letter)}) {label.split(',')[0]}, {each.noise} noise")
                 axes.set_xlabel("runs")
                 axes.set_ylabel(label)
         handles: list[Line2D | Patch] = [
@@ -151,7 +151,8 @@ def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
     """
     with style():
         figure = new_figure(height_mm=44.0 * len(columns) + 15.0 * len(columns) + 6.0)
-        rows = place_axes(figure, len(columns), 4, margins_mm=(14.0, 4.0, 20.0, 7.0), gaps_mm=(5.0, 15.0))
+        rows = place_axes(figure, len(columns), 4, margins_mm=(14.0, 6.0, 20.0, 7.0), gaps_mm=(9.0, 15.0))
+        letter = iter("abcdefghijkl")
         for row, each in zip(rows, columns, strict=True):
             limit = axis_limit([each.miss_m])
             for axes, name in zip(row, _START_LABELS, strict=True):
@@ -160,8 +161,8 @@ def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
                 axes.set_ylim(0.0, 1.04 * limit or 1.0)
                 axes.locator_params(axis="x", nbins=3)
                 axes.tick_params(labelleft=axes is row[0])
+                axes.set_title(f"({next(letter)}) {each.noise} noise")
             row[0].set_ylabel("miss, m")
-            row[0].set_title(f"{each.noise} noise", loc="left")
         handles = [
             Line2D([], [], linestyle="", marker=".", color=LIMIT, label=f"runs (at most {MOST_POINTS} drawn)"),
             Line2D([], [], color=INK, label="median"),
@@ -216,7 +217,7 @@ def _draw_miss(axes: Axes, columns: Sequence[CampaignColumns]) -> None:
         _distribution(axes, each.miss_m, ends, each.look, band=True)
         if each.guaranteed_miss_m.size:
             _distribution(axes, each.guaranteed_miss_m, ends, each.look | _DOTTED, band=False)
-    notes = [_beyond("runs", samples, ends[1]), _beyond(_guarantee_name(columns), guaranteed, ends[1])]
+    notes = [_beyond("runs", samples, ends[1]), _beyond("dotted", guaranteed, ends[1])]
     axes.set_title("(a) miss")
     axes.set_xlabel("\n".join(["miss, m", *filter(None, notes)]))
 
@@ -309,7 +310,7 @@ def _line(place: int) -> Any:
 
 
 def _guarantee_name(columns: Sequence[CampaignColumns]) -> str:
-    return "guaranteed miss" if columns[0].guarantees else "published $\\Phi$, no guarantee,"
+    return "guaranteed miss" if columns[0].guarantees else "published $\\Phi$, no guarantee"
 
 
 def _handles(columns: Sequence[CampaignColumns]) -> tuple[list[Any], list[str]]:
@@ -322,7 +323,7 @@ def _handles(columns: Sequence[CampaignColumns]) -> tuple[list[Any], list[str]]:
         labels.append(f"{each.noise} noise, {meter} range meter, {each.miss_m.size} runs")
         if each.guaranteed_miss_m.size:
             handles.append(Line2D([], [], **(each.look | _DOTTED)))
-            labels.append(f"{each.noise} noise: {_guarantee_name(columns).rstrip(',')}")
+            labels.append(f"{each.noise} noise: {_guarantee_name(columns)}")
     handles.append(tuple(Line2D([], [], color=each.look["color"], linewidth=0.7) for each in columns))
     labels.append("thin: 95 % confidence band (Dvoretzky-Kiefer-Wolfowitz)")
     return handles, labels

@@ -119,6 +119,19 @@ def columns(noise: str, size: int) -> CampaignColumns:
     )
 
 
+def test_the_axis_has_room_for_the_guarantee_or_says_what_is_beyond() -> None:
+    drawn = replace(columns("random", 40), guaranteed_miss_m=np.linspace(10.0, 20.0, 40), guarantees=True)
+    figure = draw_campaign_distributions([drawn])
+    (miss, _) = figure.axes
+    assert miss.get_xlim()[1] > 20.0
+    assert miss.get_xlabel() == "miss, m"
+    (legend,) = figure.legends
+    assert "random noise: guaranteed miss" in [text.get_text() for text in legend.get_texts()]
+    tailed = replace(drawn, guaranteed_miss_m=np.append(np.linspace(10.0, 20.0, 39), 9e4))
+    (miss, _) = draw_campaign_distributions([tailed]).axes
+    assert miss.get_xlabel().split("\n")[1:] == ["dotted beyond the axis: 1 of 40"]
+
+
 @pytest.mark.parametrize("size", [1, 2, 30, 20_000])
 def test_figures_of_few_runs_and_of_many(size: int) -> None:
     both = [columns("random", size), columns("game", size)]
@@ -127,10 +140,10 @@ def test_figures_of_few_runs_and_of_many(size: int) -> None:
     assert max(len(np.asarray(line.get_xdata())) for line in left.get_lines()) <= MOST_POINTS + 2
     panels = draw_convergence(both).axes
     assert [each.get_title() for each in panels] == [
-        "(a) random noise",
-        "(b) random noise",
-        "(c) game noise",
-        "(d) game noise",
+        "(a) miss, random noise",
+        "(b) impulse spent, random noise",
+        "(c) miss, game noise",
+        "(d) impulse spent, game noise",
     ]
     assert all(each.get_xlabel() == "runs" for each in panels)
     clouds = draw_dispersion(both).axes
