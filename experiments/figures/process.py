@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,6 +20,7 @@ from experiments.figures.style import (
     SET_EDGE,
     SET_FILL,
     TRUTH,
+    WIDTH_MM,
     new_figure,
     place_axes,
     plain,
@@ -35,6 +37,12 @@ RATE_RANGE_SHARE = 0.1
 """The axes cover what is seen above this share of the first range: nearer, angle and rate blow up as 1/x and 1/x^2."""
 
 _ROWS = 4
+_LETTER_MM, _LINE_MM = 1.8, 4.0
+"""Mean width of a letter of a title, and the height of its lines."""
+
+_MOST_DECADES = 4
+"""Decades up to which each is labelled."""
+
 _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -54,17 +62,21 @@ def draw_process(records: Sequence[Record]) -> Figure:
     if not records:
         raise ValueError("at least one record is needed")
     with style():
-        figure = new_figure(height_mm=196.0)
-        grid = place_axes(
-            figure, _ROWS, len(records), margins_mm=(19.0, 4.0, 24.0, 12.0), gaps_mm=(7.0 if len(records) > 1 else 0, 4)
-        )
-        titles = [plain(each) for each in record_titles(records)]
+        gap = 7.0 if len(records) > 1 else 0.0
+        letters = int((WIDTH_MM - 25.0 - gap * (len(records) - 1)) / len(records) / _LETTER_MM)
+        titles = [
+            "\n".join([*textwrap.wrap(title, letters), *textwrap.wrap(outcome_title(record), letters)])
+            for title, record in zip(map(plain, record_titles(records)), records, strict=True)
+        ]
+        top = 4.0 + _LINE_MM * max(title.count("\n") + 1 for title in titles)
+        figure = new_figure(height_mm=184.0 + top)
+        grid = place_axes(figure, _ROWS, len(records), margins_mm=(21.0, 4.0, 24.0, top), gaps_mm=(gap, 4.0))
         for record, title, column in zip(records, titles, zip(*grid, strict=True), strict=True):
             _draw_angle(column[0], record)
             _draw_rate(column[1], record)
             _draw_impulse(column[2], record)
             draw_predicted_miss(column[3], record)
-            column[0].set_title(f"{title}\n{outcome_title(record)}", linespacing=1.3)
+            column[0].set_title(title, linespacing=1.3)
             column[-1].set_xlabel("time t, s")
         _level(grid[0], [_angle_extent(record) for record in records], scale=1e3)
         _level(grid[1], [_rate_extent(record) for record in records], scale=1e6)
@@ -105,8 +117,14 @@ def _draw_impulse(axes: Axes, record: Record) -> None:
     axes.axhline(0.0, color=LIMIT, linewidth=0.6)
     for limit in (-greatest, greatest):
         axes.axhline(limit, color=LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
-    axes.text(
-        0.985, greatest, f"limit ±μ₂ = ±{greatest:g} m/s", transform=axes.get_yaxis_transform(), ha="right", va="bottom"
+    axes.annotate(
+        f"greatest impulse ±{greatest:g} m/s",
+        (0.985, greatest),
+        xycoords=axes.get_yaxis_transform(),
+        xytext=(0.0, 2.5),
+        textcoords="offset points",
+        ha="right",
+        va="bottom",
     )
     given = impulses != 0.0
     axes.vlines(times[given], 0.0, impulses[given], color=IMPULSE, linewidth=0.9)
@@ -153,14 +171,17 @@ def level_predicted_miss(row: Sequence[Axes], records: Sequence[Record]) -> None
     bounds = np.concatenate([np.concatenate(_predicted_miss(record)[1:]) for record in records])
     greatest = float(np.abs(bounds).max(initial=10.0))
     decades = int(np.log10(greatest) + 1e-9)
-    powers = range(decades, 0, -2)
-    names = ["10" + str(power).translate(_RAISED) for power in powers]
-    ticks = [-(10.0**power) for power in powers] + [0.0] + [10.0**power for power in powers]
-    labels = ["\N{MINUS SIGN}" + name for name in names] + ["0", *names]
+    powers = range(1, decades + 1) if decades <= _MOST_DECADES else range(1, decades + 1, 2)
+    names = ["10" + (str(power).translate(_RAISED) if power > 1 else "") for power in powers]
+    sizes = [10.0**power for power in powers]
+    between = [10.0**power for power in range(decades + 1) if power not in powers]
     for axes in row:
         axes.set_yscale("symlog", linthresh=10.0, linscale=1.0)
-        axes.set_yticks(ticks, labels)
-        axes.set_yticks([], minor=True)
+        axes.set_yticks(
+            [*(-size for size in reversed(sizes)), 0.0, *sizes],
+            [*("\N{MINUS SIGN}" + name for name in reversed(names)), "0", *names],
+        )
+        axes.set_yticks([*(-size for size in between), *between], minor=True)
         axes.set_ylim(-2.0 * greatest, 2.0 * greatest)
 
 
@@ -171,7 +192,10 @@ def _note_exit(axes: Axes, values: Floats, record: Record, scale: float, unit: s
     worst = int(beyond.argmax())
     if beyond[worst] <= 0.0:
         return
-    text = f"to {_signed(values[worst] * scale)} {unit} at {record.steps[worst].time_s:g} s"
+    value = float(values[worst]) * scale
+    if abs(value) >= 1e3:
+        value, unit = 1e-3 * value, unit.removeprefix("m")
+    text = f"to {_signed(value)} {unit} at {record.steps[worst].time_s:g} s"
     down = values[worst] < low
     axes.annotate(
         text,
@@ -188,7 +212,7 @@ def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], records: Sequence[Re
         "line-of-sight angle α, mrad",
         "line-of-sight rate ω, µrad/s",
         "impulse k, m/s",
-        "predicted miss π, m",
+        "predicted miss π, m\n(linear within ±10 m)",
     )
     end = max(record.steps[-1].time_s for record in records)
     start = min(record.steps[0].time_s for record in records)
@@ -199,14 +223,14 @@ def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], records: Sequence[Re
             axes.tick_params(labelbottom=row is grid[-1], labelleft=axes is row[0])
             axes.set_ylabel(label)
             axes.yaxis.label.set_visible(axes is row[0])
-        row[0].yaxis.set_label_coords(-13.0 / width_mm(row[0]), 0.5)
+        row[0].yaxis.set_label_coords(-12.5 / width_mm(row[0]), 0.5)
     rated = any(step.measured_rate_rad_s is not None for record in records for step in record.steps)
     measured = "measured angle and rate" if rated else "measured angle"
     handles = [
         Line2D([], [], color=TRUTH, label="true angle and rate"),
         Line2D([], [], color=MEASURED, marker=".", markersize=7, linestyle="none", label=measured),
         Line2D([], [], color=IMPULSE, linewidth=1.2, label="impulse given"),
-        Line2D([], [], color=LIMIT, linewidth=0.8, linestyle=(0, (4, 2)), label="limit of an impulse"),
+        Line2D([], [], color=LIMIT, linewidth=0.8, linestyle=(0, (4, 2)), label="greatest impulse"),
         Patch(facecolor=SET_FILL, edgecolor=SET_EDGE, label="predicted-miss interval"),
     ]
     figure.legend(handles=handles, loc="lower center", ncols=3, columnspacing=2.5, labelcolor=INK)

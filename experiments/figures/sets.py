@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
+from string import ascii_lowercase
 from typing import Any
 
 import numpy as np
@@ -10,11 +12,11 @@ from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Polygon
+from matplotlib.patches import Patch, Polygon
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from experiments.figures.style import INK, new_figure, place_axes, plain, style, width_mm
+from experiments.figures.style import INK, MEASURED, new_figure, place_axes, plain, style, width_mm
 from experiments.record_titles import record_titles
 from infoset import Section
 from sim import Record, StepRecord
@@ -52,32 +54,40 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
     if sections < 1:
         raise ValueError(f"at least one section must be shown: got {sections}")
     with style():
-        figure = new_figure(height_mm=20.0 + 63.0 * len(times_s))
+        figure = new_figure(height_mm=25.0 + 63.0 * len(times_s))
         grid = place_axes(
             figure,
             len(times_s),
             len(records),
-            margins_mm=(17.0, 4.0, 21.0, 11.0),
+            margins_mm=(17.0, 4.0, 26.0, 11.0),
             gaps_mm=(6.0 if len(records) > 1 else 0.0, 15.5),
         )
         titles = [plain(each) for each in record_titles(records)]
+        if len(records) > 1:
+            titles = [
+                title.removeprefix(f"({letter}) ") for title, letter in zip(titles, ascii_lowercase, strict=False)
+            ]
+        count = len(times_s) * len(records)
+        letters = iter([f"({each}) " for each in ascii_lowercase[:count]] if 1 < count <= 26 else [""] * count)
         for time, row in zip(times_s, grid, strict=True):
             steps = [min(record.steps, key=lambda step: abs(step.time_s - time)) for record in records]
             shown = [choose_sections(step.sections, sections) for step in steps]
             level_planes(row, [extent_of(step, chosen) for step, chosen in zip(steps, shown, strict=True)])
-            for axes, step, chosen, title in zip(row, steps, shown, titles, strict=True):
+            for axes, record, step, chosen, title in zip(row, records, steps, shown, titles, strict=True):
+                _shade_allowed(axes, record, step, chosen)
                 draw_step(axes, step, chosen)
-                axes.set_title(f"{title}, t = {step.time_s:g} s")
+                axes.set_title(f"{next(letters)}{title}, t = {step.time_s:g} s")
                 axes.set_xlabel("line-of-sight rate ω, µrad/s", labelpad=2.0)
                 axes.set_ylabel("line-of-sight angle α, mrad")
                 axes.yaxis.label.set_visible(axes is row[0])
                 axes.tick_params(labelleft=axes is row[0])
-        handles = [
+        handles: list[Line2D | Patch] = [
             Line2D([], [], label=TRUTH_MARK, **_TRUTH_LOOK),
             Line2D([], [], label=MEASUREMENT_MARK, **_MEASUREMENT_LOOK),
             Line2D([], [], color=_colour(0, 2), label="section of the set, with its range in km"),
+            Patch(facecolor=MEASURED, alpha=0.22, label="angles that the measurement allows at these ranges"),
         ]
-        figure.legend(handles=handles, loc="lower center", ncols=len(handles))
+        figure.legend(handles=handles, loc="lower center", ncols=2, columnspacing=2.5)
     return figure
 
 
@@ -143,6 +153,16 @@ def draw_step(axes: Axes, step: StepRecord, chosen: Sequence[Section]) -> None:
         axes.text(0.5, 0.94, "no section is left", transform=axes.transAxes, ha="center", va="top")
 
 
+def _shade_allowed(axes: Axes, record: Record, step: StepRecord, chosen: Sequence[Section]) -> None:
+    """Shade the angles that the measurement allows at the nearest and at the farthest section drawn."""
+    if step.measured_angle_rad is None or not chosen:
+        return
+    for section in (chosen[0], chosen[-1]):
+        error = float(record.scenario.set_model.angle_sensor.error_bound(section.range_m))
+        low, high = ((step.measured_angle_rad + sign * error) * 1e3 for sign in (-1.0, 1.0))
+        axes.axhspan(low, high, color=MEASURED, alpha=0.09, linewidth=0.0, zorder=0.4)
+
+
 def _draw_outline(axes: Axes, outline: Floats, colour: Colour, zorder: float) -> None:
     """Draw a section; a point becomes a dot and a segment a thick line with dots at its ends."""
     if len(outline) > 2:
@@ -154,16 +174,15 @@ def _draw_outline(axes: Axes, outline: Floats, colour: Colour, zorder: float) ->
 
 
 def _label(axes: Axes, chosen: Sequence[Section], outlines: Sequence[Floats]) -> None:
-    """Put the ranges in a column to the right of the sets, joined to them by thin lines that do not cross."""
+    """Put the ranges in a column to the right of the sets, in the order that crosses the fewer of their lines."""
     anchors = [(*_right_top(outline), index) for index, outline in enumerate(outlines) if len(outline)]
     if not anchors:
         return
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
-    anchors.sort(key=lambda anchor: anchor[1])
     spacing = 0.085 * (high - low)
-    heights = _spread([anchor[1] for anchor in anchors], spacing, low + 0.6 * spacing, high - 0.6 * spacing)
+    heights = _spread(sorted(y for _, y, _ in anchors), spacing, low + 0.6 * spacing, high - 0.6 * spacing)
     start = right - _LABEL_MM / width_mm(axes) * (right - left)
-    _uncross(anchors, heights, start)
+    anchors = min(anchors, anchors[::-1], key=lambda order: _crossings(order, heights, start))
     for (x, y, index), height in zip(anchors, heights, strict=True):
         axes.annotate(
             f"{chosen[index].range_m / 1e3:.{0 if chosen[index].range_m >= 1e6 else 1}f} km",
@@ -183,17 +202,14 @@ def _label(axes: Axes, chosen: Sequence[Section], outlines: Sequence[Floats]) ->
         )
 
 
-def _uncross(anchors: list[tuple[float, float, int]], heights: Floats, start: float) -> None:
-    """Swap neighbouring labels whose lines cross on the way from their anchors to the column at `start`."""
-    for _ in anchors:
-        for i in range(len(anchors) - 1):
-            at = max(anchors[i][0], anchors[i + 1][0])
-            lower, upper = (
-                y + (height - y) * (at - x) / (start - x)
-                for (x, y, _), height in zip(anchors[i : i + 2], heights[i : i + 2], strict=True)
-            )
-            if lower > upper:
-                anchors[i], anchors[i + 1] = anchors[i + 1], anchors[i]
+def _crossings(anchors: Sequence[tuple[float, float, int]], heights: Floats, start: float) -> int:
+    """Count the lines that cross on the way from their anchors to the column at `start`, its heights rising."""
+    count = 0
+    for (lower, low_end), (upper, high_end) in combinations(zip(anchors, heights, strict=True), 2):
+        at = max(lower[0], upper[0])
+        low, high = (y + (end - y) * (at - x) / (start - x) for (x, y, _), end in ((lower, low_end), (upper, high_end)))
+        count += low > high
+    return count
 
 
 def _right_top(outline: Floats) -> tuple[float, float]:

@@ -90,6 +90,19 @@ def test_process_says_where_a_curve_leaves_the_axes(records: list[Record]) -> No
     assert texts == [f"to −{abs(last.true_rate_rad_s) * 1e3:.3g} mrad/s at {last.time_s:g} s"]
 
 
+def test_process_gives_a_fast_rate_in_whole_units_and_breaks_a_long_title(records: list[Record]) -> None:
+    last = replace(records[1].steps[-1], true_rate_rad_s=-2.074)
+    text = "a description so long that it would run over the edge of the page"
+    scenario = replace(records[1].scenario, name=text)
+    fast = replace(records[1], scenario=scenario, steps=(*records[1].steps[:-1], last))
+    figure = draw_process([records[1], fast])
+    assert [each.get_text() for each in figure.axes[3].texts] == [f"to −2.07 rad/s at {last.time_s:g} s"]
+    title = figure.axes[1].get_title().splitlines()
+    assert text in " ".join(title)
+    assert max(map(len, title)) <= 45
+    assert "(linear within ±10 m)" in figure.axes[6].get_ylabel()
+
+
 def test_same_noise_is_told_apart_by_the_run(records: list[Record]) -> None:
     figure = draw_process([records[0], replace(records[0], run=7)])
     titles = [axes.get_title().splitlines()[0] for axes in figure.axes if axes.get_title()]
@@ -112,7 +125,11 @@ def test_sets_show_truth_measurement_and_labelled_sections(records: list[Record]
         labels = {text.get_text() for text in axes.texts}
         assert {f"{step.sections[end].range_m / 1e3:.0f} km" for end in (0, -1)} <= labels
         assert len(labels) == 5
+        assert axes.get_title().startswith(f"({'abcdef'[position]}) {('random', 'game')[position % 2]} noise, t = ")
         assert axes.get_title().endswith(f"t = {step.time_s:g} s")
+        column = sorted(axes.texts, key=lambda text: float(text.get_position()[1]))
+        ranges = [int(text.get_text().split()[0]) for text in column]
+        assert ranges in (sorted(ranges), sorted(ranges, reverse=True))
     for first, second in zip(figure.axes[::2], figure.axes[1::2], strict=True):
         assert first.get_xlim() == second.get_xlim()
         assert first.get_ylim() == second.get_ylim()
