@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.colors import Colormap, LinearSegmentedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -42,6 +43,8 @@ _DASHES: tuple[tuple[float, Sequence[float]] | None, ...] = (
 """Of the greatest quantile, the next, and so on; None is a whole line."""
 
 _MOST_TICKS = 8
+_HEAD_ROOM = 1.06
+"""For the arrow of the topmost point."""
 
 
 def draw_sweep(table: SweepTable, shown: Sequence[QuantileName], requirement: Requirement | None) -> Figure:
@@ -131,16 +134,19 @@ def _line_panel(
             axes.axhline(requirement.bound, color=IMPULSE, linewidth=0.9, zorder=2.5)
             for crossing in crossings(places, values, requirement.bound, axis.scale):
                 axes.plot([crossing], [requirement.bound], marker="D", markersize=4.5, color=IMPULSE, zorder=5.0)
+                axes.vlines(crossing, 0.0, requirement.bound, color=IMPULSE, linewidth=0.7, linestyle=":", zorder=2.5)
                 axes.annotate(
-                    f"{crossing:.3g}",
-                    (crossing, requirement.bound),
-                    xytext=(5.0, 5.0),
+                    f"{crossing / 10.0 ** _power(axis):.3g}",
+                    (crossing, 0.0),
+                    xycoords=axes.get_xaxis_transform(),
+                    xytext=(0.0, 3.0),
                     textcoords="offset points",
+                    ha="center",
                     color=IMPULSE,
-                    bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.8},
+                    bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8},
                     zorder=6.0,
                 )
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, _HEAD_ROOM * axes.get_ylim()[1])
     _scale(axes, axis, "x")
 
 
@@ -188,13 +194,49 @@ def _map_panel(
         _write_numbers(axes, across, up, values, norm)
     if requirement is None or requirement.quantile != quantile:
         return
-    low, high = float(values.min()), float(values.max())
-    if low < requirement.bound < high:
-        contour = axes.contour(across.values, up.values, values, levels=[requirement.bound], colors=IMPULSE, zorder=4.0)
-        contour.set(path_effects=[Stroke(linewidth=3.2, foreground="white"), Stroke(linewidth=1.5, foreground=IMPULSE)])
+    met = values < requirement.bound
+    if met.any() and not met.all():
+        limit = LineCollection(
+            between(_edges(across), _edges(up), met), colors=IMPULSE, capstyle="projecting", zorder=4.0
+        )
+        limit.set_path_effects([Stroke(linewidth=3.2, foreground="white"), Stroke(linewidth=1.5, foreground=IMPULSE)])
+        axes.add_collection(limit, autolim=False)
     else:
-        met = "everywhere" if high < requirement.bound else "nowhere"
-        axes.set_xlabel(f"{axes.get_xlabel()}\n{_words(requirement)}: {met}")
+        said = "everywhere" if met.all() else "nowhere"
+        axes.set_xlabel(f"{axes.get_xlabel()}\n{_words(requirement)}: {said}")
+
+
+def between(across: Floats, up: Floats, met: np.ma.MaskedArray[Any, Any]) -> list[list[tuple[float, float]]]:
+    """Return the edges between a cell that meets the requirement and a neighbour that does not.
+
+    Parameters
+    ----------
+    across, up : ndarray, shape (n + 1,) and (m + 1,)
+        Edges of the columns and of the rows.
+    met : masked array of bool, shape (m, n)
+        None beside a masked cell.
+
+    Returns
+    -------
+    list of list of tuple of float
+        The ends of each.
+    """
+    rows, columns = met.shape
+    beside = np.ma.filled(met[:, 1:] != met[:, :-1], fill_value=False)
+    above = np.ma.filled(met[1:, :] != met[:-1, :], fill_value=False)
+    upright = [
+        [(float(across[column + 1]), float(up[row])), (float(across[column + 1]), float(up[row + 1]))]
+        for row in range(rows)
+        for column in range(columns - 1)
+        if beside[row, column]
+    ]
+    level = [
+        [(float(across[column]), float(up[row + 1])), (float(across[column + 1]), float(up[row + 1]))]
+        for row in range(rows - 1)
+        for column in range(columns)
+        if above[row, column]
+    ]
+    return upright + level
 
 
 def _write_numbers(axes: Axes, across: Axis, up: Axis, values: Grid, norm: Normalize) -> None:
@@ -249,8 +291,7 @@ def _scale(axes: Axes, axis: Axis, which: str) -> None:
     if len(axis.values) <= _MOST_TICKS:
         one.set_major_locator(FixedLocator(axis.values))
         one.set_minor_locator(NullLocator())
-    greatest = max(abs(each) for each in axis.values)
-    power = 0 if 0.01 <= greatest < 1e5 else math.floor(math.log10(greatest))
+    power = _power(axis)
     one.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick / 10.0**power:.3g}"))
     one.set_minor_formatter(NullFormatter())
     one.set_tick_params(length=2.0)
@@ -258,6 +299,12 @@ def _scale(axes: Axes, axis: Axis, which: str) -> None:
     scaled = f"$10^{{{power}}}$ {unit}".strip() if power else unit
     name = key_label(axis.key).removesuffix(f", {unit}") if unit else key_label(axis.key)
     one.set_label_text(f"{name}, {scaled}" if scaled else name)
+
+
+def _power(axis: Axis) -> int:
+    """The power of ten in which an axis is labelled."""
+    greatest = max(abs(each) for each in axis.values)
+    return 0 if 0.01 <= greatest < 1e5 else math.floor(math.log10(greatest))
 
 
 def _look(levels: Sequence[float], level: float) -> Any:

@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments.cli import main
-from experiments.figures.sweep import draw_sweep
+from experiments.figures.sweep import between, draw_sweep
 from experiments.scenario_file import load_scenario, scenario_hash, scenario_to_toml
 from experiments.sweep_axes import sweep_axes, sweep_cells
 from experiments.sweep_table import SHOWN, crossings, key_label, sweep_table, unit_of, where_met
@@ -278,3 +278,10 @@ def test_an_unfinished_sweep_is_reported_as_far_as_it_is(infoset: Infoset, swept
     assert pq.read_table(tmp_path / "report" / "sweep.parquet").column("miss_m_p50").null_count == 4
     assert math.isfinite(found["cells"][0]["samples"][0]["miss_m"]["p50"]["value"])
     assert QuantileName("miss_m", 0.5) == SHOWN[0]
+
+
+def test_the_limit_runs_along_edges_of_cells_and_not_beside_unknown_ones() -> None:
+    met = np.ma.masked_array(
+        [[True, True, False], [True, False, False]], mask=[[False, False, False], [False, True, False]]
+    )
+    assert between(np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 1.0, 2.0]), met) == [[(2.0, 0.0), (2.0, 1.0)]]
