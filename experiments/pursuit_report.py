@@ -7,7 +7,17 @@ from dataclasses import dataclass
 from experiments.display_units import M_PER_KM
 from experiments.output import library_version
 from experiments.pursuit_file import PursuitProblem
-from rendezvous.pursuit_evasion import Capture, Certificate, Ended, Flight, PlayerEnd, Solution, capture_quantiles_s
+from rendezvous.pursuit_evasion import (
+    Capture,
+    CaptureMap,
+    Certificate,
+    Ended,
+    Flight,
+    PlayerEnd,
+    PointStatus,
+    Solution,
+    capture_quantiles_s,
+)
 
 
 @dataclass(frozen=True)
@@ -31,6 +41,20 @@ class Feedback:
     velocity_noise_m_s: float
     seed: int
     flights: tuple[Flight, ...]
+
+
+def counted(found: CaptureMap) -> str:
+    """Return how many points of a map came out how, the words of a terminal and of a figure.
+
+    Parameters
+    ----------
+    found : CaptureMap
+
+    Returns
+    -------
+    str
+    """
+    return ", ".join(f"{found.count(status)} {status.value}" for status in PointStatus if found.count(status))
 
 
 def report_json(

@@ -195,13 +195,12 @@ def _show(problem: PursuitProblem, found: CaptureMap, elapsed_s: float, stdout_t
     from rich.text import Text
 
     from experiments.commands._screen import table_console
+    from experiments.pursuit_report import counted
     from rendezvous.pursuit_evasion import PointStatus
 
     console = table_console(stdout_taken)
-    counts = [f"{found.count(status)} {status.value}" for status in PointStatus if found.count(status)]
-    console.print(
-        Text(f"{problem.name}: {found.status.size} points in {elapsed_s:.1f} s: {', '.join(counts)}"), soft_wrap=True
-    )
+    said = f"{problem.name}: {found.status.size} points in {elapsed_s:.1f} s: {counted(found)}"
+    console.print(Text(said), soft_wrap=True)
     if found.capture_s.count():
         low, high = float(found.capture_s.min()), float(found.capture_s.max())
         console.print(Text(f"capture times from {low:.1f} to {high:.1f} s"), soft_wrap=True)

@@ -8,21 +8,31 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from experiments.figures.style import INK, LIMIT, new_figure, style
+from experiments.pursuit_report import counted
 from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus
 
 Floats = NDArray[np.float64]
 
 _S_PER_HOUR = 3600.0
-_BOTTOM, _BOTTOM_WITH_LEGEND, _TOP = 0.13, 0.22, 0.93
-_SHADES = LinearSegmentedColormap.from_list("blues", ["#f4f8fc", "#b4d0e8", "#5b93c4"])
-_UNKNOWN: dict[PointStatus, tuple[str, str, str]] = {
-    PointStatus.NOT_CERTIFIED: ("#f6d9bd", "////", "not certified"),
-    PointStatus.ESCAPES: ("#e4e4e4", "....", "escapes"),
-    PointStatus.PROPELLANT_EXHAUSTED: ("#d2d2d2", "\\\\\\\\", "propellant exhausted"),
-    PointStatus.NO_GAME: ("#ffffff", "xxxx", "no game"),
+_BOTTOM, _BOTTOM_WITH_LEGEND, _TOP = 0.18, 0.25, 0.93
+_SHADES = LinearSegmentedColormap.from_list("blues", ["#f4f8fc", "#b4d0e8", "#4f8bbf", "#0b3c74"])
+_DARK = 0.6
+"""Of the scale: lines on darker shades are white."""
+_LEVELS = 8
+_UNKNOWN: dict[PointStatus, tuple[str, str]] = {
+    PointStatus.NOT_CERTIFIED: ("#f6d9bd", "////"),
+    PointStatus.ESCAPES: ("#e4e4e4", "...."),
+    PointStatus.PROPELLANT_EXHAUSTED: ("#d2d2d2", "\\\\\\\\"),
+    PointStatus.NO_GAME: ("#ffffff", "xxxx"),
+}
+_RATIOS = {
+    "phase_deg": "lead of the evader, deg",
+    "thrust_ratio": "thrust of the evader over that of the pursuer",
+    "mass_ratio": "mass of the evader over that of the pursuer",
 }
 _UNITS = {"km3_s2": "km$^3$/s$^2$", "deg": "deg", "km": "km", "kg": "kg", "N": "N", "s": "s"}
 
@@ -49,26 +59,22 @@ def draw_map(found: CaptureMap, column: str, row: str) -> Figure:
         axes = figure.add_axes((0.12, bottom, 0.71, _TOP - bottom))
         if hours.count():
             mesh = axes.pcolormesh(found.columns, found.rows, hours, cmap=_SHADES, shading="nearest", rasterized=True)
-            scale = figure.colorbar(mesh, cax=figure.add_axes((0.86, bottom, 0.025, _TOP - bottom)))
-            scale.set_label("capture time, h")
+            figure.colorbar(mesh, cax=figure.add_axes((0.86, bottom, 0.025, _TOP - bottom)))
             if hours.count() > 3 and min(hours.shape) > 1 and float(np.ptp(hours.compressed())) > 0.0:
-                lines = axes.contour(found.columns, found.rows, hours, levels=8, colors=INK, linewidths=0.6)
-                for label in axes.clabel(lines, fontsize=6.5, fmt="%g"):
-                    # Upright: a 6 on its side may be a 9.
-                    label.set_rotation(0.0)
+                _draw_levels(axes, found, hours)
         handles = _hatch_unknown(axes, found)
         axes.set_xlim(*_edges(found.columns)[[0, -1]])
         axes.set_ylim(*_edges(found.rows)[[0, -1]])
         axes.set_xlabel(axis_name(column))
         axes.set_ylabel(axis_name(row))
-        followed, seeded = found.count(PointStatus.FOLLOWED), found.count(PointStatus.NEIGHBOUR)
-        axes.set_title(f"captures: {followed} solved from nothing, {seeded} from neighbours")
+        axes.set_title("capture time, h")
+        figure.text(0.475, 0.025, f"{found.status.size} points: {counted(found)}", ha="center", fontsize=7.5)
         axes.grid(visible=False)
         if handles:
             axes.legend(
                 handles=handles,
                 loc="upper center",
-                bbox_to_anchor=(0.5, -0.17),
+                bbox_to_anchor=(0.5, -0.18),
                 ncols=len(handles),
                 handlelength=2.2,
                 handleheight=1.2,
@@ -88,7 +94,7 @@ def axis_name(parameter: str) -> str:
     str
     """
     owner, _, key = parameter.rpartition(".")
-    words = "lead of the evader, deg" if key == "phase_deg" else None
+    words = _RATIOS.get(key)
     for ending, unit in _UNITS.items():
         if words is None and key.endswith(f"_{ending}"):
             words = f"{key.removesuffix(f'_{ending}').replace('_', ' ')}, {unit}"
@@ -96,11 +102,26 @@ def axis_name(parameter: str) -> str:
     return f"{owner}: {words}" if owner else words
 
 
+def _draw_levels(axes: Any, found: CaptureMap, hours: Any) -> None:
+    """Draw lines of equal capture time, none within a cell that has a corner without one."""
+    low, high = float(hours.min()), float(hours.max())
+    levels = [float(each) for each in MaxNLocator(_LEVELS).tick_values(low, high) if low < each < high]
+    inks = ["white" if each > low + _DARK * (high - low) else INK for each in levels]
+    if not levels:
+        return
+    lines = axes.contour(
+        found.columns, found.rows, hours, levels=levels, colors=inks, linewidths=0.7, corner_mask=False
+    )
+    for label in axes.clabel(lines, fontsize=6.5, fmt="%g"):
+        # Upright: a 6 on its side may be a 9.
+        label.set_rotation(0.0)
+
+
 def _hatch_unknown(axes: Any, found: CaptureMap) -> list[Patch]:
     """Hatch the points without a capture time, and return what the legend shows."""
     across, up = _edges(found.columns), _edges(found.rows)
     handles = []
-    for status, (colour, hatch, name) in _UNKNOWN.items():
+    for status, (colour, hatch) in _UNKNOWN.items():
         where = np.argwhere(found.status == STATUSES.index(status))
         if not len(where):
             continue
@@ -109,7 +130,7 @@ def _hatch_unknown(axes: Any, found: CaptureMap) -> list[Patch]:
             corners = [(across[first], up[j]), (across[last + 1], up[j + 1])]
             (left, bottom), (right, top) = corners
             axes.fill([left, right, right, left], [bottom, bottom, top, top], **look)
-        handles.append(Patch(label=f"{name}: {len(where)}", **look))
+        handles.append(Patch(label=status.value, **look))
     return handles
 
 

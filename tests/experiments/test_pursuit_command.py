@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.contour import ContourSet
 
 from experiments.cli import main
 from experiments.figures.pursuit import draw_control, draw_distance, draw_feedback, draw_orbits, draw_relative
-from experiments.figures.pursuit_map import axis_name
+from experiments.figures.pursuit_map import axis_name, draw_map
 from experiments.pursuit_file import load_pursuit
-from rendezvous.pursuit_evasion import Policy, Solution, fly, history, solve
+from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus, Policy, Solution, fly, history, solve
 from rendezvous.pursuit_evasion._branch import follow
 
 FIGURES = ["figure-control", "figure-distance", "figure-feedback", "figure-orbits", "figure-relative"]
@@ -338,10 +339,26 @@ def test_columns_of_a_map_suit_the_thrust(infoset: Infoset) -> None:
         assert (found["values"][0], found["values"][-1]) == (-half, half)
 
 
+def test_a_map_says_below_it_what_the_terminal_said() -> None:
+    times = np.ma.masked_array(np.arange(20.0).reshape(4, 5) * 3600.0, mask=np.zeros((4, 5), dtype=bool))
+    times[1, 2] = np.ma.masked
+    status = np.where(times.mask, STATUSES.index(PointStatus.NOT_CERTIFIED), STATUSES.index(PointStatus.FOLLOWED))
+    found = CaptureMap(np.arange(5.0), np.arange(4.0), times, status, times, 19)
+    figure = draw_map(found, "phase_deg", "thrust_ratio")
+    assert [each.get_text() for each in figure.texts] == ["20 points: 19 followed, 1 not-certified"]
+    axes = figure.axes[0]
+    assert axes.get_title() == "capture time, h"
+    # No line ends beside the point that has no time: its four cells are empty.
+    (lines,) = (each for each in axes.collections if isinstance(each, ContourSet))
+    ends = np.concatenate([each.vertices for each in lines.get_paths()])
+    assert len(ends)
+    assert not ((np.abs(ends[:, 0] - 2.0) < 0.999) & (np.abs(ends[:, 1] - 1.0) < 0.999)).any()
+
+
 def test_axes_of_a_map_have_words_and_units() -> None:
     assert axis_name("evader.inclination_deg") == "evader: inclination, deg"
     assert axis_name("phase_deg") == "lead of the evader, deg"
-    assert axis_name("thrust_ratio") == "thrust ratio"
+    assert axis_name("thrust_ratio") == "thrust of the evader over that of the pursuer"
     assert axis_name("evader.thrust_N") == "evader: thrust, N"
 
 
