@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Polygon
+from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 from numpy.typing import NDArray
@@ -45,6 +48,18 @@ _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": "#7f2704", "linestyle": (0, (1, 1)), "marker": "^"},
     {"color": "#2f6b3a", "linestyle": (0, (5, 1, 1, 1)), "marker": "D"},
 )
+_HALO = [Stroke(linewidth=2.2, foreground="white"), Normal()]
+_START: dict[str, Any] = {
+    "color": INK,
+    "marker": "o",
+    "markerfacecolor": "none",
+    "markersize": 7.5,
+    "linestyle": "none",
+    "zorder": 7,
+    "label": "start",
+}
+_END = "least terminal state"
+_TUBE = Patch(facecolor=SET_FILL, edgecolor=SET_EDGE, linewidth=0.7, label="tube at t")
 _AXES = ("x", "y", "z", "$v_x$", "$v_y$", "$v_z$")
 _PLANES = ((0, 1), (0, 2), (3, 4), (3, 5))
 
@@ -97,13 +112,18 @@ def _space(report: Report, shown: Shown, part: int) -> Figure:
     first = 3 * part
     places = slice(first, first + 3)
     sets, (titles, per_si) = report.solution.sets, _units(report)
-    factors, labels = per_si[places], []
-    for t in shown_times(sets.problem.periods, _MOST_TIMES_IN_SPACE):
-        points = sets.shadow(SetKind.TUBE, t, range(first, first + 3), _TOLERANCE_IN_SPACE) * factors
+    factors = per_si[places]
+    shadows = [
+        (t, sets.shadow(SetKind.TUBE, t, range(first, first + 3), _TOLERANCE_IN_SPACE) * factors)
+        for t in shown_times(sets.problem.periods, _MOST_TIMES_IN_SPACE)
+    ]
+    labels = []
+    for times, points in _equal(shadows, _TOLERANCE_IN_SPACE):
         _solid(axes, points)
-        labels.append((t, points[points[:, 2].argmax()]))
-    for text, place in _joined(labels, report.tube[:, places] * factors[:, None]):
-        axes.text(*place, text, fontsize=7.0, color=SET_EDGE, ha="center", va="bottom", zorder=4)
+        labels.append((times, points[points[:, 2].argmax()]))
+    for text, place in _stacked(labels, report.tube[:, places] * factors[:, None]):
+        label = axes.text(*place, text, fontsize=7.0, color=SET_EDGE, ha="center", va="bottom", zorder=8)
+        label.set_path_effects(_HALO)
     for look, (member, path) in zip(_LOOKS, shown, strict=False):
         name = title(member)
         line = {"color": look["color"], "linestyle": look["linestyle"], "zorder": 5}
@@ -111,14 +131,16 @@ def _space(report: Report, shown: Shown, part: int) -> Figure:
         marks = {"color": look["color"], "marker": look["marker"], "markersize": 3.5, "linestyle": "none", "zorder": 6}
         axes.plot(*(member.linear[:, places] * factors).T, label=f"{name}, linear", **marks)
     star = {"color": INK, "marker": "*", "markersize": 9.0, "linestyle": "none", "zorder": 7}
-    axes.plot(*(member_end(report)[places] * factors)[:, None], label="least terminal state", **star)
+    axes.plot(*(report.tube[0].mean(axis=1)[places] * factors)[:, None], **_START)
+    axes.plot(*(member_end(report)[places] * factors)[:, None], label=_END, **star)
     for name, label in zip("xyz", titles[places], strict=True):
         getattr(axes, f"set_{name}label")(label, labelpad=3.0)
         getattr(axes, f"{name}axis").set_tick_params(labelsize=6.5, pad=0.0)
         getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(6))
     axes.view_init(elev=22.0, azim=-58.0)
     axes.set_box_aspect((1.0, 1.0, 0.85), zoom=1.0)
-    figure.legend(*axes.get_legend_handles_labels(), loc="center left", bbox_to_anchor=(0.705, 0.5))
+    handles, _ = axes.get_legend_handles_labels()
+    figure.legend(handles=[*handles, _TUBE], loc="center left", bbox_to_anchor=(0.705, 0.5))
     return figure
 
 
@@ -134,17 +156,30 @@ def title(member: Member) -> str:
     return _NAMES.get(member.name, member.name)
 
 
-def _joined(labels: Sequence[tuple[int, Floats]], bounds: Floats) -> list[tuple[str, Floats]]:
-    """Labels of times, those whose places lie together in one."""
-    size = np.maximum(np.ptp(bounds, axis=(0, 2)), 1e-12)
+def _equal(shadows: Sequence[tuple[int, Floats]], tolerance: float) -> list[tuple[list[int], Floats]]:
+    """Join the times whose sets are one, to twice by how much each may be drawn too small: each is drawn once."""
     groups: list[tuple[list[int], Floats]] = []
-    for t, place in labels:
-        near = next((each for each in groups if np.abs((each[1] - place) / size).max() < _TOGETHER), None)
-        if near is None:
-            groups.append(([t], place))
+    for t, points in shadows:
+        signs = np.array(list(product((-1.0, 0.0, 1.0), repeat=points.shape[1])))
+        towards = signs / np.maximum(np.ptp(points, axis=0), 1e-12)
+        reach = (towards @ points.T).max(axis=1)
+        same = (each for each in groups if np.abs((towards @ each[1].T).max(axis=1) - reach).max() < 2.0 * tolerance)
+        group = next(same, None)
+        if group is None:
+            groups.append(([t], points))
         else:
-            near[0].append(t)
-    return [(f"t = {', '.join(str(t) for t in times)}", place) for times, place in groups]
+            group[0].append(t)
+    return groups
+
+
+def _stacked(labels: Sequence[tuple[list[int], Floats]], bounds: Floats) -> list[tuple[str, Floats]]:
+    """Labels of sets, one above the other where their places lie together."""
+    size = np.maximum(np.ptp(bounds, axis=(0, 2)), 1e-12)
+    out: list[tuple[str, Floats]] = []
+    for times, place in labels:
+        below = sum(float(np.abs((each - place) / size).max()) < _TOGETHER for _, each in out)
+        out.append((f"t = {', '.join(str(t) for t in times)}" + "\n" * below, place))
+    return out
 
 
 def member_end(report: Report) -> Floats:
@@ -185,33 +220,43 @@ def _outline(points: Floats) -> Floats:
 
 
 def _planes(report: Report, shown: Shown) -> Figure:
-    figure = new_figure(height_mm=150.0)
-    grid = place_axes(figure, 2, 2, margins_mm=(16.0, 3.0, 12.0, 12.0), gaps_mm=(18.0, 14.0))
+    figure = new_figure(height_mm=162.0)
+    grid = place_axes(figure, 2, 2, margins_mm=(16.0, 3.0, 12.0, 22.0), gaps_mm=(18.0, 16.0))
     titles, per_si = _units(report)
-    for axes, plane in zip([each for row in grid for each in row], _PLANES, strict=True):
+    for axes, plane, letter in zip([each for row in grid for each in row], _PLANES, "abcd", strict=True):
         names, factors = [], per_si[list(plane)]
-        for t in shown_times(report.solution.problem.periods):
-            points = report.solution.sets.shadow(SetKind.TUBE, t, plane, _TOLERANCE) * factors
+        shadows = [
+            (t, report.solution.sets.shadow(SetKind.TUBE, t, plane, _TOLERANCE) * factors)
+            for t in shown_times(report.solution.problem.periods)
+        ]
+        for times, points in _equal(shadows, _TOLERANCE):
             _flat(axes, points)
             highest = points[points[:, 1] >= points[:, 1].max() - 0.01 * np.ptp(points[:, 1])]
-            names.append((t, np.array([highest[:, 0].mean(), points[:, 1].max()])))
-        for text, place in _joined(names, report.tube[:, list(plane)] * factors[:, None]):
+            names.append((times, np.array([highest[:, 0].mean(), points[:, 1].max()])))
+        for text, place in _stacked(names, report.tube[:, list(plane)] * factors[:, None]):
             axes.annotate(
-                text, (float(place[0]), float(place[1])), fontsize=6.5, color=SET_EDGE, ha="center", va="bottom"
-            )
+                text, (float(place[0]), float(place[1])), fontsize=6.5, color=SET_EDGE, ha="center", va="bottom",
+                zorder=8, path_effects=_HALO,
+            )  # fmt: skip
         for look, (member, path) in zip(_LOOKS, shown, strict=False):
             axes.plot(*(path[:, plane] * factors).T, color=look["color"], linestyle=look["linestyle"], linewidth=1.0)
             marks = {"marker": look["marker"], "markersize": 3.2, "linestyle": "none", "color": look["color"]}
             axes.plot(*(member.linear[:, plane] * factors).T, label=title(member), **marks)
         end = member_end(report)[list(plane)] * factors
-        axes.plot(*end, color=INK, marker="*", markersize=8.0, linestyle="none", zorder=6)
+        axes.plot(*(report.tube[0].mean(axis=1)[list(plane)] * factors), **_START)
+        axes.plot(*end, color=INK, marker="*", markersize=8.0, linestyle="none", zorder=6, label=_END)
+        axes.set_title(f"({letter})", loc="left")
         axes.set_xlabel(titles[plane[0]])
         axes.set_ylabel(titles[plane[1]])
         axes.margins(0.07)
         axes.xaxis.set_major_locator(MaxNLocator(6))
-    handles, labels = grid[0][0].get_legend_handles_labels()
-    if handles:
-        figure.legend(handles, labels, loc="upper center", ncols=len(labels))
+    both = [Line2D([], [], markersize=3.2, linewidth=1.0, label=title(each), **look)
+            for look, (each, _) in zip(_LOOKS, shown, strict=False)]  # fmt: skip
+    named = dict(zip(*grid[0][0].get_legend_handles_labels()[::-1], strict=True))
+    figure.legend(
+        handles=[*both, named["start"], named[_END], _TUBE], loc="upper center", ncols=4,
+        title="lines: nonlinear motion; marks: linear, at the instants" if both else None, title_fontsize=7.5,
+    )  # fmt: skip
     return figure
 
 
@@ -252,7 +297,7 @@ def _controls(report: Report, members: Sequence[Member]) -> Figure:
             for sign in (-1.0, 1.0):
                 axes.axhline(sign * bounds[j], color=LIMIT, linewidth=0.7, linestyle=(0, (2, 2)))
         axes.set_xlabel(f"time, periods of {report.rendezvous.period_s:g} s")
-        axes.set_ylabel(f"$u_{'xyz'[j]}$, of {report.rendezvous.acceleration_m_s2:g} m/s²")
+        axes.set_ylabel(f"$u_{'xyz'[j]}$ / ({report.rendezvous.acceleration_m_s2:g} m/s²)")
         axes.set_xlim(0, periods)
         axes.use_sticky_edges = False
         axes.margins(x=0.0, y=0.08)

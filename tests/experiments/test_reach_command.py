@@ -335,7 +335,11 @@ def test_figures_show_sets_members_and_ranges() -> None:
     assert velocities.axes[0].get_xlabel() == "$v_x$, m/s"
     assert [each.get_xlabel() for each in planes.axes] == ["x, m", "x, m", "$v_x$, m/s", "$v_x$, m/s"]
     # The least sum of norms is the least L1 here, and is drawn once.
-    assert len(planes.legends[0].get_texts()) == 2
+    assert [each.get_text() for each in planes.legends[0].get_texts()][2:] == [
+        "start",
+        "least terminal state",
+        "tube at t",
+    ]
     assert len(controls.axes) == 3
     assert shown_times(4) == [1, 2, 3]
     assert shown_times(64) == [1, 13, 26, 38, 51, 63]
