@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 FIGURES = ("figure-trajectories", "figure-controls", "figure-front", "figure-costs")
 MOST_SAMPLES = 10_001
+NOTHING = 1e-9
+"""Of the greatest component of a choice: less than that is told as zero."""
 SWEEP = (0.5, 2.0, 31)
 """Durations looked at, from the least to the greatest in parts of the given one, and how many."""
 
@@ -354,10 +356,11 @@ def _show(found: Found, stdout_taken: bool) -> None:
     console.print()
     chosen = Table("choice", box=None, pad_edge=False)
     for name in (each.name.lower() for each in encounter.free):
-        chosen.add_column(name, justify="right")
+        chosen.add_column(f"{name}, {'m' if len(name) == 1 else 'm/s'}", justify="right")
+    scale = max(float(abs(point).max()) for point in found.selections.values())
     chosen.add_column("group loss\nm^2/s^3", justify="right")
     for name, point in found.selections.items():
-        values = (f"{value:.6g}" for value in point)
+        values = (f"{value if abs(value) > NOTHING * scale else 0.0:.6g}" for value in point)
         chosen.add_row(name.replace("_", " "), *values, number(float(solution.group_loss(point))))
     console.print(chosen)
     if found.coalitions is not None:

@@ -37,6 +37,7 @@ _AXES = ("x (against the motion)", "y (outward)", "z (normal)")
 _PLANES = ((0, 1), (0, 2), (1, 2))
 _POINTS = 241
 _MARKS = 4
+_LEAST_WEIGHT = 1e-9
 _SET_POINTS = 1200
 _CHOICES = {
     "least_group_loss": ("*", "least group loss"),
@@ -74,16 +75,24 @@ def draw_trajectories(solution: EncounterSolution) -> Figure:
             space.plot(*flight.T, markevery=every, markersize=3.0, **look)
             for plane, (first, second) in zip(planes, _PLANES, strict=True):
                 plane.plot(flight[:, first], flight[:, second], markevery=every, markersize=3.0, label=label, **look)
-        space.plot(*([value] for value in meeting), marker="*", markersize=9.0, color=INK, linestyle="none")
+        space.plot(
+            *([value] for value in meeting),
+            label="the meeting",
+            marker="*",
+            markersize=9.0,
+            color=INK,
+            linestyle="none",
+        )
         space.set_xlabel(f"x, {unit}", labelpad=-4.0)
         space.set_ylabel(f"y, {unit}", labelpad=-3.0)
         space.set_zlabel(f"z, {unit}", labelpad=-2.0)
         space.tick_params(pad=-2.0, labelsize=6.5)
         for axis in (space.xaxis, space.yaxis, space.zaxis):
             axis.set_major_locator(MaxNLocator(4))
-        figure.text(0.012, 0.975, "(a) in space; marks at equal times", fontsize=8.5)
+        figure.text(0.012, 0.975, f"(a) in space; {_marks(solution)}", fontsize=8.5)
         for plane, (first, second), letter in zip(planes, _PLANES, "bcd", strict=True):
-            plane.plot(meeting[first], meeting[second], marker="*", markersize=9.0, color=INK, linestyle="none")
+            plane.plot(meeting[first], meeting[second], marker="*", markersize=9.0, color=INK, linestyle="none",
+                       label="the meeting")  # fmt: skip
             plane.set_xlabel(f"{_AXES[first]}, {unit}")
             plane.set_ylabel(f"{_AXES[second]}, {unit}")
             plane.set_title(f"({letter})", loc="left")
@@ -153,7 +162,7 @@ def draw_front(solution: EncounterSolution, selections: Mapping[str, Floats], sw
     """
     with style():
         figure = new_figure(height_mm=78.0)
-        ((left, middle, right),) = place_axes(figure, 1, 3, margins_mm=(16.0, 3.0, 23.0, 6.0), gaps_mm=(16.0, 0.0))
+        ((left, middle, right),) = place_axes(figure, 1, 3, margins_mm=(16.0, 3.0, 23.0, 6.0), gaps_mm=(19.0, 0.0))
         sampled = pareto_set(solution, simplex_weights(len(solution.costs), _SET_POINTS))
         _draw_set(left, solution, sampled.points, selections)
         _draw_excesses(middle, solution, sampled.excess, selections)
@@ -285,12 +294,13 @@ def _draw_excesses(axes: Axes, solution: EncounterSolution, excess: Floats, sele
         first, second = _widest_pair(excess)
         if len(names) == 3:
             third = 3 - first - second
+            for edge in _edges(solution):
+                axes.plot(edge[:, first], edge[:, second], color=LIMIT, linewidth=0.6, zorder=1)
             shade = axes.scatter(excess[:, first], excess[:, second], c=excess[:, third], s=4.0, cmap="cividis")
-            low, high = axes.get_ylim()
-            axes.set_ylim(low, high + 0.25 * (high - low))  # room for the bar
-            inset = axes.inset_axes((0.40, 0.86, 0.54, 0.04))
-            bar = axes.figure.colorbar(shade, cax=inset, orientation="horizontal")
-            bar.ax.set_title(f"$e$ of {names[third]}, m$^2$/s$^3$", fontsize=7.0, pad=2.0)
+            left, bottom, width, height = axes.get_position().bounds
+            axes.set_position((left, bottom, 0.86 * width, height))
+            bar = axes.figure.colorbar(shade, cax=axes.inset_axes((1.04, 0.0, 0.05, 1.0)))
+            bar.set_label(f"$e$ of {names[third]}, m$^2$/s$^3$", fontsize=7.0, labelpad=2.0)
             bar.ax.tick_params(labelsize=6.5, pad=1.0, length=2.0)
         elif not solution.same_matrix:
             axes.plot(excess[:, 0], excess[:, 1], color=SET_EDGE)
@@ -310,6 +320,24 @@ def _draw_excesses(axes: Axes, solution: EncounterSolution, excess: Floats, sele
     axes.set_title("(b) the front", loc="left")
 
 
+def _edges(solution: EncounterSolution) -> list[Floats]:
+    """Excesses on the edges of the set of three, where a craft has next to no weight: they bound the front."""
+    share = np.linspace(0.0, 1.0, _POINTS)
+    out = []
+    for without in range(3):
+        weights = np.insert(np.column_stack([share, 1.0 - share]), without, 0.0, axis=1)
+        out.append(np.asarray(pareto_set(solution, np.clip(weights, _LEAST_WEIGHT, None)).excess))
+    return out
+
+
+def _marks(solution: EncounterSolution) -> str:
+    """Return how far apart in time the marks on flights are."""
+    spans = [solution.encounter.meeting_s - each.craft.start_s for each in solution.costs]
+    if np.ptp(spans) > 1e-9 * max(spans):
+        return "marks at each third of a craft's time"
+    return f"marks every {spans[0] / (_MARKS - 1):.4g} s"
+
+
 def _widest_pair(excess: Floats) -> tuple[int, int]:
     """Which two excesses show the front best: those that are least one another's shadow."""
     count = excess.shape[1]
@@ -325,10 +353,15 @@ def _draw_sweep(axes: Axes, solution: EncounterSolution, sweep: DurationSweep) -
         look = {**_look(index), "marker": "none"}
         axes.plot(sweep.meeting_s, sweep.cost_squared[:, index], label=f"$J^2$ of {cost.craft.name}", **look)
     axes.plot(sweep.meeting_s, sweep.group_loss, color=LIMIT, linewidth=2.0, label="group loss")
-    axes.axvline(solution.encounter.meeting_s, color=LIMIT, linewidth=0.7, linestyle=(0, (2, 2)))
+    meeting_s = solution.encounter.meeting_s
+    axes.axvline(meeting_s, color=LIMIT, linewidth=0.7, linestyle=(0, (2, 2)))
+    axes.annotate(
+        f"at {meeting_s:g} s: (a), (b)", (meeting_s, 0.03), xycoords=("data", "axes fraction"), xytext=(-2, 0),
+        textcoords="offset points", rotation=90.0, ha="right", va="bottom", fontsize=6.0, color=LIMIT,
+    )  # fmt: skip
     axes.set_yscale("log")
     axes.set_xlabel("time of the meeting, s")
-    axes.set_ylabel("m$^2$/s$^3$")
+    axes.set_ylabel("$J^2$ and group loss, m$^2$/s$^3$")
     axes.margins(x=0.0)
     if len(solution.costs) <= _MOST_NAMED:
         axes.legend(loc="best", fontsize=6.5)
