@@ -412,10 +412,13 @@ def _show_certificate(console: Any, certificate: Certificate) -> None:
         lines.append(f"evader deviates, pursuer answers: {', '.join(answers)}")
     if certificate.directions_tried:
         excess = certificate.greatest_excess_m
-        told = "none found" if excess is None else f"{excess:.2g} m at most"
+        told = "nothing found" if excess is None else f"{excess:.2g} m beyond the capture radius at most"
         lines.append(
-            f"directions: {certificate.directions_found} of {certificate.directions_tried} found, excess {told}"
+            f"directions: {certificate.directions_found} of {certificate.directions_tried} compared, {told}, "
+            f"tolerance {certificate.excess_tolerance_m:.2g} m"
         )
+        if missing := certificate.directions_tried - certificate.directions_found:
+            lines.append(f"the other {missing} say nothing: no farthest extremal of both craft was found along them")
     against = "; ".join(certificate.failures)
     lines.append(f"saddle point: {f'not claimed: {against}' if against else 'all checks hold'}")
     for line in lines:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
@@ -18,6 +19,8 @@ from rendezvous.pursuit_evasion.history import orbital_axes
 
 Floats = NDArray[np.float64]
 
+_UNDER: dict[str, Any] = {"linewidth": 2.8}
+"""The pursuer's path shows beside the evader's dashes where the two run together."""
 PURSUER: dict[str, Any] = {"color": TRUTH, "linestyle": "-"}
 EVADER: dict[str, Any] = {"color": "#e6842a", "linestyle": (0, (5, 1.5))}
 
@@ -40,10 +43,10 @@ def draw_orbits(sampled: History) -> Figure:
     with style():
         figure = new_figure(height_mm=88.0)
         space: Any = figure.add_axes((-0.02, 0.0, 0.54, 1.0), projection="3d")
-        flat = figure.add_axes((0.63, 0.13, 0.35, 0.78))
+        flat = figure.add_axes((0.63, 0.18, 0.35, 0.74))
         for player, look, name in _players(sampled):
             r = player.position_m * per_m
-            _draw_path(space, flat, r, player.thrust_direction, look, name)
+            _draw_path(space, flat, r, player.thrust_direction, {**_UNDER, **look} if name == "pursuer" else look, name)
         end = sampled.evader.position_m[-1] * per_m
         for axes, point in ((space, end), (flat, end[:2])):
             axes.plot(
@@ -67,14 +70,19 @@ def draw_orbits(sampled: History) -> Figure:
         space.set_title("(a) paths and thrust", y=0.91)
         for axis in (space.xaxis, space.yaxis, space.zaxis):
             axis.set_major_locator(_few())
-        flat.plot([0.0], [0.0], marker="+", color=LIMIT, markersize=7.0, linestyle="none")
+        flat.plot([0.0], [0.0], marker="+", color=LIMIT, markersize=7.0, linestyle="none", label="planet's centre")
         flat.margins(0.12)
         flat.set_aspect("equal", adjustable="box", anchor="C")
         flat.xaxis.set_major_locator(_few())
         flat.set_xlabel(f"$x$, {unit}")
         flat.set_ylabel(f"$y$, {unit}")
         flat.set_title("(b) seen along the planet's axis")
-        flat.legend(loc="lower right")
+        handles, _ = flat.get_legend_handles_labels()
+        handles[2:2] = [Line2D([], [], color=LIMIT, marker="o", markersize=4.0, linestyle="none", label="start")]
+        if sampled.pursuer.thrust_direction.any() or sampled.evader.thrust_direction.any():
+            arrow: dict[str, Any] = {"marker": r"$\rightarrow$", "markersize": 11.0, "linestyle": "none"}
+            handles[2:2] = [Line2D([], [], color=LIMIT, markeredgewidth=0.3, label="thrust", **arrow)]
+        figure.legend(handles=handles, loc="lower center", ncols=len(handles))
     return figure
 
 
@@ -100,16 +108,25 @@ def draw_relative(sampled: History) -> Figure:
         figure = new_figure(height_mm=66.0)
         ((plane, side, distance),) = place_axes(figure, 1, 3, margins_mm=(15.0, 4.0, 12.0, 8.0), gaps_mm=(17.0, 0.0))
         for axes, column, name, title in (
-            (plane, 0, f"radial, {length}", "(a) in the evader's plane"),
-            (side, 2, f"normal, {length}", "(b) out of the plane"),
+            (plane, 0, f"radial, {length}", "(a) pursuer, seen from the evader"),
+            (side, 2, f"normal, {length}", "(b) the same, out of the plane"),
         ):
             axes.plot(relative[:, 1], relative[:, column], **PURSUER)
-            axes.plot(relative[0, 1], relative[0, column], marker="o", markersize=4.0, color=TRUTH)
-            axes.plot(0.0, 0.0, marker="*", markersize=9.0, color=IMPULSE, linestyle="none")
+            axes.plot(
+                relative[0, 1],
+                relative[0, column],
+                marker="o",
+                markersize=4.0,
+                color=TRUTH,
+                linestyle="none",
+                label="start",
+            )
+            axes.plot(0.0, 0.0, marker="*", markersize=9.0, color=IMPULSE, linestyle="none", label="evader")
             axes.set_xlabel(f"along the motion, {length}")
             axes.set_ylabel(name)
             axes.set_title(title)
             axes.xaxis.set_major_locator(_few())
+        plane.legend(loc="best")
         time, unit = _times(sampled.time_s)
         distance.plot(time, np.linalg.norm(offset, axis=1), **PURSUER)
         distance.set_xlabel(f"time, {unit}")

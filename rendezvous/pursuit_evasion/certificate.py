@@ -135,9 +135,14 @@ class Certificate:
                 found.append(f"the answer to {each.name} could not be followed")
             elif each.capture_s is None or each.capture_s > self.capture_s + MOST_GAIN_S:
                 found.append(f"the evader gains by {each.name}")
-        if self.greatest_excess_m is not None and self.greatest_excess_m > MOST_EXCESS * self.unit_length_m:
+        if self.greatest_excess_m is not None and self.greatest_excess_m > self.excess_tolerance_m:
             found.append(f"another direction keeps the evader {self.greatest_excess_m:.3g} m away")
         return tuple(found)
+
+    @property
+    def excess_tolerance_m(self) -> float:
+        """Of `greatest_excess_m`: the scan finds maxima, the game's own among them, less exactly than the game does."""
+        return MOST_EXCESS * self.unit_length_m
 
     @property
     def claims_saddle_point(self) -> bool:
