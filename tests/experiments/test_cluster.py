@@ -318,7 +318,8 @@ def test_an_encrypted_cluster_flies_and_lets_nobody_else_in(
     with found.stack:
         found.wait_until_up()
         found.worker()
-        with dask.config.set(dask.config.collect_env()):
+        # What stands in the environment is put into the configuration, beside the defaults, not in their place.
+        with dask.config.set(dask.config.merge(dask.config.config, dask.config.collect_env())):
             found.wait_for(1)
             code, _, err = infoset(*asked, found.address, "--out", "runs")
         assert (code, err) == (0, "1 Dask workers, 1 threads\n")

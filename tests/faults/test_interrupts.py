@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import random
 import signal
+import sys
 import time
+import weakref
 from pathlib import Path
 
 import pytest
@@ -149,6 +151,7 @@ def test_an_interrupt_that_python_wraps_is_one_message(
     def run() -> None:
         raise RuntimeError("Error calling __set_name__") from KeyboardInterrupt()
 
+    monkeypatch.setattr("sys.unraisablehook", sys.unraisablehook)  # put back afterwards
     monkeypatch.setattr("experiments.cli.main", run)
     with pytest.raises(SystemExit) as left:
         beginning()
@@ -160,6 +163,31 @@ def test_other_errors_are_not_taken_for_interrupts(monkeypatch: pytest.MonkeyPat
     def run() -> None:
         raise RuntimeError("a defect") from ValueError()
 
+    monkeypatch.setattr("sys.unraisablehook", sys.unraisablehook)
     monkeypatch.setattr("experiments.cli.main", run)
     with pytest.raises(RuntimeError, match="a defect"):
         beginning()
+
+
+def test_an_interrupt_that_falls_into_a_callback_is_not_lost(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Thing:
+        pass
+
+    def interrupt(_: object) -> None:
+        raise KeyboardInterrupt
+
+    def run() -> None:
+        thing = Thing()
+        watched = weakref.ref(thing, interrupt)
+        del thing
+        time.sleep(5.0)
+        assert watched() is None
+
+    monkeypatch.setattr("sys.unraisablehook", sys.unraisablehook)  # put back afterwards
+    monkeypatch.setattr("experiments.cli.main", run)
+    with pytest.raises(SystemExit) as left:
+        beginning()
+    assert left.value.code == 130
+    assert capsys.readouterr().err == "interrupted\n"
