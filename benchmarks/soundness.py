@@ -1,10 +1,13 @@
 """Does the guaranteed model keep its word? Fly every kind of noise from everywhere in B x D, and count what breaks.
 
-    python benchmarks/soundness.py --engagements 200000
-    python benchmarks/soundness.py --engagements 200000 --hostile      # execution errors of 2 %, a manoeuvring target
+    python -m benchmarks.soundness --engagements 200000
+    python -m benchmarks.soundness --engagements 200000 --hostile      # execution errors of 2 %, a manoeuvring target
+    python -m benchmarks.soundness --engagements 200000 --random rate  # random scenarios, each with a rate sensor
+    python -m benchmarks.soundness --engagements 100000 --random       # random scenarios without one
 
-Counted are engagements whose truth left its own section (by any amount), whose set was lost, and whose true miss
-exceeded Phi. All must be zero. Engagements of one batch have noise of every kind, real Kepler truth, V_x anywhere in D.
+Counted are engagements whose truth left its own section (by any amount), whose set was lost, whose true miss exceeded
+Phi, and those without a Phi. All must be zero; a warning ends the run. Engagements of one batch have noise of every
+kind, real Kepler truth, V_x anywhere in D.
 """
 
 from __future__ import annotations
@@ -12,12 +15,14 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.random_scenarios import random_scenario
 from experiments.scenario_file import load_scenario
 from guidance import GameNoise, LineOfSight, Measurement, MeasurementNoise, NoiseKind, RandomNoise, TieRule
 from guidance.pair_noise import middle
@@ -39,7 +44,11 @@ class BoundedPairNoise:
         """Show each the middle."""
         bound = sight.angle_sensor.error_bound(sight.range_m)
         alpha = np.clip(middle(sight.alpha_rad), sight.alpha_rad - bound, sight.alpha_rad + bound)
-        return Measurement(alpha, None if sight.range_error is None else sight.range_m.copy())
+        omega = None
+        if sight.omega_rad_s is not None and sight.rate_error_rad_s is not None:
+            error = sight.rate_error_rad_s
+            omega = np.clip(middle(sight.omega_rad_s), sight.omega_rad_s - error, sight.omega_rad_s + error)
+        return Measurement(alpha, None if sight.range_error is None else sight.range_m.copy(), omega)
 
 
 @dataclass(frozen=True)
@@ -54,7 +63,8 @@ class MixedNoise:
         given = [part.measure(sight, predicted) for part in self.parts]
         alpha = np.choose(kind, [each.alpha_rad for each in given])
         ranges = None if sight.range_error is None else np.choose(kind, [each.range_m for each in given])
-        return Measurement(alpha, ranges)
+        omega = None if sight.rate_error_rad_s is None else np.choose(kind, [each.omega_rad_s for each in given])
+        return Measurement(alpha, ranges, omega)
 
 
 def kind_of(batch: int) -> NDArray[np.int64]:
@@ -69,12 +79,14 @@ def every_noise(draws: Draws) -> MixedNoise:
     bias = np.where(np.arange(len(signs)) % 4 < 2, signs[:, 0], draws.tie[:, 0])
     constant = np.broadcast_to(bias[:, None], signs.shape)
     range_signs = np.where(draws.range >= 0.0, 1.0, -1.0)
+    rate = np.zeros(signs.shape) if draws.rate is None else draws.rate
+    rate_signs = np.where(rate >= 0.0, 1.0, -1.0)
     return MixedNoise(
         (
-            RandomNoise(draws.angle, draws.range),
+            RandomNoise(draws.angle, draws.range, rate),
             *(GameNoise(tie, draws.tie) for tie in (TieRule.UPPER, TieRule.LOWER, TieRule.ALTERNATE, TieRule.RANDOM)),
-            RandomNoise(signs, range_signs),
-            RandomNoise(constant, range_signs[:, :1] + np.zeros_like(signs)),
+            RandomNoise(signs, range_signs, rate_signs),
+            RandomNoise(constant, range_signs[:, :1] + np.zeros_like(signs), rate_signs[:, :1] + np.zeros_like(signs)),
             BoundedPairNoise(),
         )
     )
@@ -143,23 +155,35 @@ def fly_batch(number: int, hostile: bool, seed: int) -> Count:
     return fly(chosen, number * BATCH, BATCH, seed)
 
 
+def fly_random_batch(number: int, rate_sensor: bool, seed: int) -> Count:
+    """Fly batch `number` of a random scenario of its own."""
+    return fly(random_scenario(seed * 1_000_000 + number, rate_sensor=rate_sensor), number * BATCH, BATCH, seed)
+
+
 def main() -> None:
     """Fly, count and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--engagements", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--hostile", action="store_true", help="execution errors of 2 %% and a manoeuvring target")
+    parser.add_argument("--random", nargs="?", const="plain", choices=("plain", "rate"), help="random scenarios")
+    parser.add_argument("--first", type=int, default=0, metavar="BATCH", help="number of the first batch")
     parser.add_argument("--workers", type=int, default=1)
     given = parser.parse_args()
+    warnings.simplefilter("error")
     began = time.perf_counter()
     total = Count()
     with ThreadPoolExecutor(given.workers) as pool:
-        jobs = [
-            pool.submit(fly_batch, number, given.hostile, given.seed)
-            for number in range(-(-given.engagements // BATCH))
-        ]
+        numbers = range(given.first, given.first - (-given.engagements // BATCH))
+        if given.random is None:
+            jobs = [pool.submit(fly_batch, number, given.hostile, given.seed) for number in numbers]
+        else:
+            jobs = [pool.submit(fly_random_batch, number, given.random == "rate", given.seed) for number in numbers]
         for number, job in enumerate(jobs):
-            total += job.result()
+            count = job.result()
+            if count != Count(count.engagements):
+                sys.stdout.write(f"batch {numbers[number]}: {count}\n")
+            total += count
             if number % 50 == 49 or number == len(jobs) - 1:
                 sys.stdout.write(f"{total} {time.perf_counter() - began:.0f} s\n")
                 sys.stdout.flush()

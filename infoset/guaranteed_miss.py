@@ -11,17 +11,33 @@ import numpy as np
 
 from infoset import chains, whole_chains
 from infoset._compile import ZERO, allocation_free, entry
+from infoset.concave_bounds import bound_between
 from infoset.history import History, Tapes
-from infoset.location import LOWER, PROBE, UPPER, Workspace, keep_section, locate_end, run, tape_of, workspace
+from infoset.location import (
+    LABEL_RESOLUTION,
+    LOWER,
+    PROBE,
+    UPPER,
+    Workspace,
+    keep_section,
+    locate_end,
+    run,
+    search_window,
+    workspace,
+)
 from infoset.section_law import SectionLaw
 from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape
-from infoset.section_passes import Sections
+from infoset.section_passes import Sections, tape_of
 from infoset.section_stack import SectionStack
 
 LABELS = 4
 """Labels replayed in what leaves at one step; with one more on either side for extrapolation."""
 MOST_LABELS = LABELS + 2
 PIECES = LABELS + 1
+MOST_WINDOWS = 16
+"""Windows that what leaves at one step may be bounded in, where rates were measured: a power of two."""
+LOOSE = 1.25
+"""A bound of a window that is greater than what is known to be reached by so much has the window halved."""
 LEAST, GREATEST, NEAREST, FARTHEST = range(4)
 """Columns of a piece: bounds of its predicted miss, and its ends as labels, all in m."""
 RESOLUTION = 1e-10
@@ -37,54 +53,6 @@ def extremes_along(points: Floats, count: int, tau: float) -> tuple[float, float
         least = min(least, value)
         greatest = max(greatest, value)
     return least, greatest
-
-
-@allocation_free
-def line_at(x: float, x0: float, y0: float, x1: float, y1: float) -> float:
-    """Value at x of the line through two points."""
-    return y0 + (y1 - y0) * ((x - x0) / (x1 - x0))
-
-
-@allocation_free
-def bound_between(
-    labels: Floats, values: Floats, number: int, first: int, p: float, q: float, slope: float, centre: float
-) -> float:
-    """Greatest value on [p, q] that a concave function with these values may have, plus slope (x - centre).
-
-    Parameters
-    ----------
-    labels, values : ndarray
-        Rising arguments, and the function there.
-    number : int
-        How many of them.
-    first : int
-        How many of the arguments are at most p; the others are at least q.
-    p, q : float
-        Ends of the stretch.
-    slope, centre : float
-        What is added.
-
-    Notes
-    -----
-    Beyond two of its points a concave function stays below the line through them. `number` is at least 3.
-    """
-    has_left, has_right = first >= 2, number - first >= 2
-    best = -np.inf
-    left_p = left_q = right_p = right_q = np.inf
-    if has_left:
-        a, b = first - 2, first - 1
-        left_p = line_at(p, labels[a], values[a], labels[b], values[b])
-        left_q = line_at(q, labels[a], values[a], labels[b], values[b])
-    if has_right:
-        a, b = first, first + 1
-        right_p = line_at(p, labels[a], values[a], labels[b], values[b])
-        right_q = line_at(q, labels[a], values[a], labels[b], values[b])
-    best = max(min(left_p, right_p) + slope * (p - centre), min(left_q, right_q) + slope * (q - centre))
-    if has_left and has_right and (left_p < right_p) != (left_q < right_q):
-        share = (right_p - left_p) / ((right_p - left_p) - (right_q - left_q))
-        x = p + share * (q - p)
-        best = max(best, left_p + share * (left_q - left_p) + slope * (x - centre))
-    return best
 
 
 @allocation_free
@@ -147,6 +115,8 @@ def bound_leaving(
 ) -> int:
     """Bound the predicted miss of all labels that live between two limits; return the number of pieces written.
 
+    Where rates were measured the tape has these limits for its window.
+
     Parameters
     ----------
     lower, upper : float
@@ -158,20 +128,26 @@ def bound_leaving(
         Room for replays.
     labels, outlines, counts, values : ndarray
         Room for the replayed labels, their outlines, and supports.
-    pieces : ndarray, shape (PIECES, 4)
+    pieces : ndarray, shape (>= PIECES, 4)
         Receives the pieces.
 
     Returns
     -------
     int
     """
+    living = known
+    if errors is not None:
+        # Labels beyond the window need not form an interval with those in it, so that it must be searched.
+        probe = known if known >= lower else 0.5 * (lower + upper)
+        if not search_window(lower, upper, probe, LABEL_RESOLUTION * upper, tape, errors, law, room):
+            return 0
+        living = room.labels[1]
     lower_died, lower_overlap = run(lower, tape, errors, law, room)
     if lower_died == ALIVE:
         keep_section(room, LOWER)
     upper_died, upper_overlap = run(upper, tape, errors, law, room)
     if upper_died == ALIVE:
         keep_section(room, UPPER)
-    living = known
     if lower_died == ALIVE:
         living = lower
     elif upper_died == ALIVE:
@@ -192,12 +168,15 @@ def bound_leaving(
         )
     spacing = (last - first) / (LABELS - 1)
     travelled = law.closing_speed * (law.step * elapsed)
-    number = inner = ZERO
+    number = inner = outer = ZERO
     if spacing <= resolution:
         spacing = 0.0
     for k in range(-1, LABELS + 1):
         outside = k < 0 or k == LABELS
         if (spacing == 0.0 and k != 0) or (k < 0 and lower_died != ALIVE) or (k == LABELS and upper_died != ALIVE):
+            continue
+        if outside and errors is not None:
+            # The window is where the bands are convex.
             continue
         label = last if k == LABELS - 1 and spacing > 0.0 else first + k * spacing
         row = PROBE
@@ -209,6 +188,8 @@ def bound_leaving(
             continue
         if outside and k < 0:
             inner = 1
+        elif outside:
+            outer = 1
         labels[number] = label
         tau = (label - travelled) / law.closing_speed
         counts[number] = whole_chains.outline(room.origins, room.rings, room.marks, row, tau, outlines[number])
@@ -224,11 +205,12 @@ def bound_leaving(
         pieces[0, NEAREST], pieces[0, FARTHEST] = first_dead, last_dead
         return 1
     made = 0
-    for piece in range(LABELS + 1):
+    inside = number - inner - outer
+    for piece in range(inside + 1):
         # Piece 0 ends at the first living label, the last begins at the last one.
         at = inner + piece
         p = first_dead if piece == 0 else labels[at - 1]
-        q = last_dead if piece == LABELS else labels[at]
+        q = last_dead if piece == inside else labels[at]
         if q <= p:
             continue
         least, greatest = bound_piece(labels, outlines, counts, number, at, p, q, travelled, law, values)
@@ -247,6 +229,7 @@ def bound_leaving_all(
     active: Flags,
     lower: Floats,
     upper: Floats,
+    floor: Floats,
     elapsed: int,
     tapes: Tapes,
     errors: Floats | None,
@@ -260,20 +243,68 @@ def bound_leaving_all(
     pieces: Floats,
     made: Integers,
 ) -> None:
-    """Write the pieces of every active engagement, and how many there are."""
+    """Write the pieces of every active engagement, and how many there are.
+
+    Notes
+    -----
+    Where rates were measured a window of labels is halved while its bound is loose: the bands that are convex over it
+    are the wider the wider it is. Much less than `floor`, a bound of labels that have arrived, would not lessen Phi.
+    """
     stored, used, living, _, _, _, _, _, _, _ = sections
     for b in range(active.shape[0]):
         made[b] = 0
         if not active[b] or lower[b] >= upper[b]:
             continue
-        known = lower[b] - 1.0
-        for s in range(used[b]):
-            if living[b, s] and lower[b] <= stored[b, s] <= upper[b]:
-                known = stored[b, s]
-        tape = tape_of(tapes, b, room)
-        made[b] = bound_leaving(
-            lower[b], upper[b], known, elapsed, tape, errors, law, room, labels, outlines, counts, supports, pieces[b]
-        )
+        tape = tape_of(tapes, b, room.values, room.applies)
+        reached = 0.5 * floor[b]
+        room.windows[0, 0], room.windows[0, 1] = lower[b], upper[b]
+        count = 1
+        while count > 0:
+            count -= 1
+            near, far = room.windows[count, 0], room.windows[count, 1]
+            known = near - 1.0
+            for s in range(used[b]):
+                if living[b, s] and near <= stored[b, s] <= far:
+                    known = stored[b, s]
+            window, middle = tape, 0.5 * (near + far)
+            may_halve = errors is not None and MOST_WINDOWS * (far - near) > 1.5 * (upper[b] - lower[b])
+            if errors is not None:
+                window = Tape(tape.kinds, tape.values, tape.applies, tape.events, near, far)
+            spread = 0.0
+            if may_halve:
+                spread = spread_at(middle, elapsed, window, errors, law, room, outlines[0])
+                if spread > LOOSE * reached:
+                    reached = max(reached, spread_at(middle, elapsed, tape, errors, law, room, outlines[0]))
+            number = ZERO
+            own = pieces[b, made[b] :]
+            if spread <= LOOSE * reached:
+                number = bound_leaving(
+                    near, far, known, elapsed, window, errors, law, room, labels, outlines, counts, supports, own
+                )
+                least, greatest = np.inf, -np.inf
+                for piece in range(number):
+                    least, greatest = min(least, own[piece, LEAST]), max(greatest, own[piece, GREATEST])
+                spread = 0.5 * (greatest - least) if number > 0 else 0.0
+            # Impulses still to come may centre an interval, so that its width is what counts.
+            if may_halve and spread > LOOSE * reached:
+                room.windows[count, 0], room.windows[count, 1] = near, middle
+                room.windows[count + 1, 0], room.windows[count + 1, 1] = middle, far
+                count += 2
+                continue
+            made[b] += number
+
+
+@allocation_free
+def spread_at(
+    label: float, elapsed: int, tape: Tape, errors: Floats | None, law: SectionLaw, room: Workspace, outline: Floats
+) -> float:
+    """Half the interval of the predicted miss at one label, by the bands of the tape, m; zero if it is dead."""
+    if run(label, tape, errors, law, room)[0] != ALIVE:
+        return 0.0
+    tau = (label - law.closing_speed * (law.step * elapsed)) / law.closing_speed
+    count = whole_chains.outline(room.origins, room.rings, room.marks, PROBE, tau, outline)
+    least, greatest = extremes_along(outline, count, tau)
+    return 0.5 * (greatest - least) + 0.5 * law.disturbance * tau * tau
 
 
 class GuaranteedMiss:
@@ -331,14 +362,17 @@ class GuaranteedMiss:
     def leave(self, active: Flags, lower: Floats, upper: Floats, stack: SectionStack, history: History) -> None:
         """Bound the labels that leave now: those that live from `lower` to `upper`."""
         batch = len(active)
-        pieces, made = np.zeros((batch, PIECES, 4)), np.zeros(batch, dtype=np.int64)
+        errors = history.errors_if_any
+        most = PIECES if errors is None else PIECES * MOST_WINDOWS
+        pieces, made = np.zeros((batch, most, 4)), np.zeros(batch, dtype=np.int64)
         bound_leaving_all(
             active,
             lower,
             upper,
+            self._settled,
             history.elapsed,
             history.tapes,
-            history.errors_if_any,
+            errors,
             stack.sections,
             self._law,
             workspace(history.events, 1),
@@ -349,7 +383,7 @@ class GuaranteedMiss:
             pieces,
             made,
         )
-        real = np.arange(PIECES) < made[:, None]
+        real = np.arange(most) < made[:, None]
         if real.any():
             self.exists |= real.any(axis=1)
             self._pending.append((pieces, real))

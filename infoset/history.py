@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset.section_life import IMPULSE, PREDICTION, RATE, Flags, Floats, Integers, Tape
+from infoset.section_life import IMPULSE, NO_WINDOW, PREDICTION, RATE, Flags, Floats, Integers, Tape
 
 ROOM_AT_START = 64
 
@@ -88,7 +88,7 @@ class History:
     def tape(self, engagement: int) -> Tape:
         """The history of one engagement."""
         values, applies = self.values[:, engagement].copy(), self.applies[:, engagement].copy()
-        return Tape(self.kinds, values, applies, self.events)
+        return Tape(self.kinds, values, applies, self.events, *NO_WINDOW)
 
     @property
     def errors_if_any(self) -> Floats | None:

@@ -189,7 +189,7 @@ class InformationSet(InformationSetView):
         error = error_rad_s * (1.0 + BOUND_SLACK)
         event = self._history.record(section_life.RATE, measured, active, error)
         before = self._lower_label.copy(), self._upper_label.copy()
-        if self._stack.measure_rate(active, measured, error, self._history.elapsed, event):
+        if self._stack.measure_rate(active, measured, error, self._history.elapsed, event, self._history):
             emptied = self._keep_enough(active, emptied=SetStatus.EMPTY)
             self._recover(emptied, event, *before)
 
@@ -219,13 +219,15 @@ class InformationSet(InformationSetView):
             Which stored sections left.
         """
         active, least_label = self.tracking, self._least_label_next()
+        # Phi covers what the search for living labels may have missed, so it does not end with it.
+        followed = (self._status != SetStatus.STOPPED.value) & (self._status != SetStatus.EMPTY.value)
         if self._phi is not None:
             leaving_below = np.minimum(self._upper_label, least_label)
-            self._phi.leave(active, self._lower_label, leaving_below, self._stack, self._history)
+            self._phi.leave(followed, self._lower_label, leaving_below, self._stack, self._history)
         if self.model.is_guaranteed:
             # A label may have left though none that is stored has; whether Phi is kept must not change what is flown.
             self._some_left |= active & (self._lower_label < least_label)
-        np.maximum(self._lower_label, least_label, out=self._lower_label, where=active)
+        np.maximum(self._lower_label, least_label, out=self._lower_label, where=followed)
         if self._stack.least_label >= least_label:
             return np.zeros(self._stack.labels.shape, dtype=bool)
         left, removed = self._stack.keep_labels(self._lower_label, self._upper_label, active)

@@ -1,4 +1,10 @@
-"""Where the living labels are: they form an interval, found exactly by replaying the history at chosen labels."""
+"""Where the living labels are, found exactly by replaying the history at chosen labels.
+
+Where the sets are convex in (z, V, label) the living labels form one interval: in the guaranteed model that starts
+from a box and measures no rates. Elsewhere they need not. The search then finds one interval of them, and the limits
+within which labels may live are not narrowed to it; before it says that none lives, it looks through every window of
+labels with bands that are convex there.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +14,16 @@ import numpy as np
 
 from infoset._compile import allocation_free, constants, entry
 from infoset.chains import CAPACITY, copy_section, count_of, empty_sections, room_of, working_room
+from infoset.concave_bounds import is_dead_between
 from infoset.history import Tapes
 from infoset.section_law import SectionLaw
 from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape, replay, summarise_section
-from infoset.section_passes import Sections
+from infoset.section_passes import Sections, tape_of
 
 LABEL_RESOLUTION = 1e-13
 MOST_PROBES = 200
+MOST_WINDOWS = 4096
+HALVINGS = 64
 
 PROBE, LOWER, UPPER = constants(3)
 """Rows of the workspace: the section of the last replay, and those at the ends of the living labels."""
@@ -35,6 +44,12 @@ class Workspace(NamedTuple):
         Room for the outline of a section.
     labels, died, label_overlaps : ndarray, shape (K,)
         Labels that are known, m; the event at which each died, or `ALIVE`; its overlap there.
+    four_labels, four_died, four_overlaps : ndarray, shape (4,)
+        The same of a bracket and the label probed in it.
+    latest : ndarray, shape (2, 4)
+        Labels and overlaps of those of them that died last.
+    windows : ndarray, shape (HALVINGS, 2)
+        Windows of labels still to be searched.
     """
 
     values: Floats
@@ -48,6 +63,11 @@ class Workspace(NamedTuple):
     labels: Floats
     died: Integers
     label_overlaps: Floats
+    four_labels: Floats
+    four_died: Integers
+    four_overlaps: Floats
+    latest: Floats
+    windows: Floats
 
 
 class Living(NamedTuple):
@@ -83,16 +103,12 @@ def workspace(events: int, slots: int) -> Workspace:
         labels=np.empty(known),
         died=np.empty(known, dtype=np.int64),
         label_overlaps=np.empty(known),
+        four_labels=np.empty(4),
+        four_died=np.empty(4, dtype=np.int64),
+        four_overlaps=np.empty(4),
+        latest=np.empty((2, 4)),
+        windows=np.empty((HALVINGS, 2)),
     )
-
-
-@allocation_free
-def tape_of(tapes: Tapes, b: int, room: Workspace) -> Tape:
-    """Lay the history of one engagement out in one piece: replays read it many times."""
-    for event in range(tapes.events):
-        room.values[event] = tapes.values[event, b]
-        room.applies[event] = tapes.applies[event, b]
-    return Tape(tapes.kinds, room.values, room.applies, tapes.events)
 
 
 @allocation_free
@@ -199,7 +215,8 @@ def search_living(
 
     Notes
     -----
-    (time of death, overlap) is unimodal in the label: the larger half of the bracket is probed in its middle.
+    (time of death, overlap) is unimodal in the label: the larger half of the bracket is probed in its middle. It ends
+    where the bracket closes, or where no label in it can live.
     """
     for _ in range(MOST_PROBES):
         if labels[2] - labels[0] <= resolution:
@@ -208,6 +225,15 @@ def search_living(
         outer = 0 if lower_half else 2
         label = 0.5 * (labels[1] + labels[outer])
         probe_died, probe_overlap = run(label, tape, errors, law, room)
+        at = 1 if lower_half else 2
+        for i in range(3):
+            k = i if i < at else i + 1
+            room.four_labels[k], room.four_died[k], room.four_overlaps[k] = labels[i], died[i], overlaps[i]
+        room.four_labels[at], room.four_died[at], room.four_overlaps[at] = label, probe_died, probe_overlap
+        if probe_died != ALIVE and is_dead_between(
+            room.four_labels, room.four_died, room.four_overlaps, 4, room.latest
+        ):
+            return 0
         if probe_died == ALIVE or outlives(probe_died, probe_overlap, died[1], overlaps[1]):
             other = 2 - outer
             labels[other], died[other], overlaps[other] = labels[1], died[1], overlaps[1]
@@ -217,6 +243,78 @@ def search_living(
         else:
             labels[outer], died[outer], overlaps[outer] = label, probe_died, probe_overlap
     return 0
+
+
+@allocation_free
+def search_window(
+    lower: float,
+    upper: float,
+    probe: float,
+    resolution: float,
+    tape: Tape,
+    errors: Floats | None,
+    law: SectionLaw,
+    room: Workspace,
+) -> bool:
+    """Whether a label of the tape's window lives, by the bands that are convex there; the first found is put second.
+
+    `probe` is tried before any but the ends. The labels of the bracket are left in the workspace.
+    """
+    known, died, overlaps = room.labels, room.died, room.label_overlaps
+    known[0], known[1], known[2] = lower, probe, upper
+    for i in (1, 0, 2):
+        died[i], overlaps[i] = run(known[i], tape, errors, law, room)
+        if died[i] == ALIVE:
+            known[1], died[1] = known[i], ALIVE
+            return True
+    for end in (0, 2):
+        if outlives(died[end], overlaps[end], died[1], overlaps[1]):
+            other = 2 - end
+            known[other], died[other], overlaps[other] = known[1], died[1], overlaps[1]
+            known[1], died[1], overlaps[1] = known[end], died[end], overlaps[end]
+            break
+    return search_living(known, died, overlaps, resolution, tape, errors, law, room) == 1
+
+
+@allocation_free
+def search_everywhere(
+    lower: float,
+    upper: float,
+    resolution: float,
+    tape: Tape,
+    errors: Floats | None,
+    law: SectionLaw,
+    room: Workspace,
+) -> tuple[bool, float]:
+    """Find a living label within limits, where they need not form an interval, or make sure that there is none.
+
+    Notes
+    -----
+    A window in which none lives by the bands that are convex there is done with; another is halved, as far as it is
+    wider than the resolution.
+    """
+    windows = room.windows
+    windows[0, 0], windows[0, 1] = lower, upper
+    count = 1
+    for _ in range(MOST_WINDOWS):
+        if count == 0:
+            break
+        count -= 1
+        near, far = windows[count, 0], windows[count, 1]
+        middle = 0.5 * (near + far)
+        window = Tape(tape.kinds, tape.values, tape.applies, tape.events, near, far)
+        if not search_window(near, far, middle, resolution, window, errors, law, room):
+            continue
+        label = room.labels[1]
+        if run(label, tape, errors, law, room)[0] == ALIVE:
+            return True, label
+        if far - near > resolution and count + 2 <= windows.shape[0]:
+            # The half with the label that lived there comes first.
+            first = count + 1 if label <= middle else count
+            windows[first, 0], windows[first, 1] = near, middle
+            windows[2 * count + 1 - first, 0], windows[2 * count + 1 - first, 1] = middle, far
+            count += 2
+    return False, lower
 
 
 @allocation_free
@@ -278,9 +376,28 @@ def locate_living(
         middle, middle_died, middle_overlap = known[best], known_died[best], known_overlap[best]
         known[2], known_died[2], known_overlap[2] = known[last], known_died[last], known_overlap[last]
         known[1], known_died[1], known_overlap[1] = middle, middle_died, middle_overlap
-        if search_living(known, known_died, known_overlap, resolution, tape, errors, law, room) == 0:
-            return nothing
+        alive_now = search_living(known, known_died, known_overlap, resolution, tape, errors, law, room) == 1
         first, last, end = 1, 1, 2
+        if not alive_now:
+            if errors is None:
+                return nothing
+            alive_now, label = search_everywhere(limit_below, limit_above, resolution, tape, errors, law, room)
+            if not alive_now:
+                return nothing
+            known[0], known[1], known[2] = limit_below, label, limit_above
+            for s in range(labels.shape[0]):
+                if known[0] < labels[s] < label:
+                    known[0] = labels[s]
+                elif label < labels[s] < known[2]:
+                    known[2] = labels[s]
+            known_died[0], known_overlap[0] = run(known[0], tape, errors, law, room)
+            if known_died[0] == ALIVE:
+                keep_section(room, LOWER)
+                first = 0
+            known_died[2], known_overlap[2] = run(known[2], tape, errors, law, room)
+            if known_died[2] == ALIVE:
+                keep_section(room, UPPER)
+                last = 2
     below = lower = known[first]
     if first > 0:
         below, lower = locate_end(
@@ -329,15 +446,16 @@ def refine_all(
 
     Notes
     -----
-    `limit_below` and `limit_above` are narrowed to labels known to be dead. Where nothing lives, the engagement is
-    left with no living section. Returned is how many vertices the fullest of the new sections may gain.
+    `limit_below` and `limit_above` are narrowed to labels known to be dead, unless rates were measured: then others may
+    live beyond. Where nothing lives, the engagement is left with no living section. Returned is how many vertices
+    the fullest of the new sections may gain.
     """
     spare = CAPACITY
     labels, used, alive, died, overlaps, origins, rings, marks, summaries, _ = sections
     for b in range(labels.shape[0]):
         if not wanted[b]:
             continue
-        tape = tape_of(tapes, b, room)
+        tape = tape_of(tapes, b, room.values, room.applies)
         stored = used[b]
         living = locate_living(
             limit_below[b],
@@ -354,8 +472,9 @@ def refine_all(
         alive[b, :stored] = False
         if not living.found:
             continue
-        limit_below[b] = living.below
-        limit_above[b] = living.above
+        if errors is None:
+            limit_below[b] = living.below
+            limit_above[b] = living.above
         used[b] = number
         for s in range(number):
             share = s / (number - 1) if number > 1 else 0.5

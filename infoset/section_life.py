@@ -47,12 +47,46 @@ class Tape(NamedTuple):
     applies : ndarray of bool, shape (>= events,)
     events : int
         Number of events.
+    nearest, farthest : float
+        Window of labels, m, over which the bands of measured rates are made convex; an empty one, from infinity to
+        minus infinity, is that of each label alone.
     """
 
     kinds: Integers
     values: Floats
     applies: Flags
     events: int
+    nearest: float
+    farthest: float
+
+
+NO_WINDOW = (np.inf, -np.inf)
+"""Of labels: each label has the bands of measured rates for itself."""
+
+
+class LastSight(NamedTuple):
+    """The last angle measurement of a replayed history, and what has happened since.
+
+    Parameters
+    ----------
+    known : bool
+        Whether an angle was measured; without one the box of the start stands for it.
+    alpha : float
+        The measured angle, rad.
+    steps : int
+        Steps since then.
+    moved, doubt : float
+        Sum of the impulses since, each times the time from the measurement to it, m, and the bound of its error.
+    fired : float
+        Sum of the moduli of all impulses so far, m/s.
+    """
+
+    known: bool
+    alpha: float
+    steps: int
+    moved: float
+    doubt: float
+    fired: float
 
 
 @substituted
@@ -122,6 +156,27 @@ def steepest_angle(alpha: float, range_m: float, law: SectionLaw) -> float:
 
 
 @inlined
+def slope_band(alpha: float, label: float, x: float, law: SectionLaw) -> tuple[float, float]:
+    """Least and greatest slope z/x that a measured angle admits for a label at range x."""
+    bound = law.error_at_zero_range + law.error_slope * x
+    lower, upper = alpha - bound, alpha + bound
+    if law.exact_angles and law.error_slope > 0.0:
+        # x h(x) is convex then. What is claimed over all labels needs it concave: a chord and a tangent lie above it.
+        travelled = label - x
+        near, far = max(law.label_least - travelled, 0.0), law.label_greatest - travelled
+        steepest = steepest_angle(alpha, far, law)
+        # The error is that of the true distance, x/cos(alpha).
+        longest = (near + far - near * far / x) / math.cos(steepest) if steepest < RIGHT_ANGLE else np.inf
+        half = law.error_at_zero_range + law.error_slope * longest
+        half = half / math.cos(steepest) ** 2 if steepest < RIGHT_ANGLE else np.inf
+        lower, upper = math.tan(alpha) - half, math.tan(alpha) + half
+    elif law.exact_angles:
+        lower = math.tan(lower) if lower > -RIGHT_ANGLE else -np.inf
+        upper = math.tan(upper) if upper < RIGHT_ANGLE else np.inf
+    return lower, upper
+
+
+@inlined
 def measure_section(
     origins: Floats, rings: Floats, marks: Integers, n: int, label: float, elapsed: int, alpha: float, law: SectionLaw
 ) -> tuple[bool, float]:
@@ -140,22 +195,113 @@ def measure_section(
     """
     x = range_of(label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x
-    lower, upper = alpha - bound, alpha + bound
-    if law.exact_angles and law.error_slope > 0.0:
-        # x h(x) is convex then. What is claimed over all labels needs it concave: a chord and a tangent lie above it.
-        travelled = label - x
-        near, far = max(law.label_least - travelled, 0.0), law.label_greatest - travelled
-        steepest = steepest_angle(alpha, far, law)
-        # The error is that of the true distance, x/cos(alpha).
-        longest = (near + far - near * far / x) / math.cos(steepest) if steepest < RIGHT_ANGLE else np.inf
-        half = law.error_at_zero_range + law.error_slope * longest
-        half = half / math.cos(steepest) ** 2 if steepest < RIGHT_ANGLE else np.inf
-        lower, upper = math.tan(alpha) - half, math.tan(alpha) + half
-    elif law.exact_angles:
-        lower = math.tan(lower) if lower > -RIGHT_ANGLE else -np.inf
-        upper = math.tan(upper) if upper < RIGHT_ANGLE else np.inf
+    lower, upper = slope_band(alpha, label, x, law)
     slack = CUT_SLACK * (label * (abs(alpha) + bound) + origins[n, RIGHT, REACH] * (label / law.closing_speed))
     return chain_steps.cut(origins, rings, marks, n, x / law.closing_speed, x * lower - slack, x * upper + slack)
+
+
+NO_SIGHT = LastSight(False, 0.0, 0, 0.0, 0.0, 0.0)
+
+
+@inlined
+def sight_after(sight: LastSight, kind: int, value: float, applies: bool, law: SectionLaw) -> LastSight:
+    """What is known of the last sight after one more event of the history."""
+    known, alpha, steps, moved, doubt, fired = sight
+    if kind == PREDICTION:
+        steps += 1
+    elif applies and kind == ANGLE:
+        known, alpha, steps, moved, doubt = True, value, 0, 0.0, 0.0
+    elif applies and kind == IMPULSE:
+        lever, size = law.step * steps, abs(value)
+        moved += value * lever
+        doubt += size * law.impulse_error * lever
+        fired += size
+    return LastSight(known, alpha, steps, moved, doubt, fired)
+
+
+@allocation_free
+def last_sight(tape: Tape, law: SectionLaw) -> LastSight:
+    """What is known of the last sight after a whole history."""
+    sight = NO_SIGHT
+    for event in range(tape.events):
+        sight = sight_after(sight, tape.kinds[event], tape.values[event], tape.applies[event], law)
+    return sight
+
+
+@allocation_free
+def rate_band(
+    label: float,
+    near_label: float,
+    far_label: float,
+    elapsed: int,
+    omega: float,
+    error: float,
+    sight: LastSight,
+    law: SectionLaw,
+) -> tuple[float, float]:
+    """Bounds of z + V x_c/e that a measured rate admits, x_c the middle of a window of labels, m.
+
+    On the window the lower bound is convex in the label and the upper one concave: sets that are cut by it are convex
+    in (z, V, label) there, which those cut by the bands of single labels are not.
+
+    Notes
+    -----
+    What is measured is (V_z x - V_x z)/(x^2 + z^2), less than the model's V/x + e z/x^2 by the square of cos(alpha).
+    With z_j = alpha_j x_j at the last measured angle, and what was fired since, the predicted miss m = z + V x/e
+    gives V = (e/x_j)(m - alpha_j x_j - moved), so that
+
+        z + V x_c/e = m x_jc/x_j + (x - x_c) (alpha_j + moved/x_j).
+
+    m x_jc/x_j is within omega -+ error times x^2 x_jc/(e x_j), a convex function of x: where it bounds on the wrong
+    side its chord does. alpha_j is known to within its band, which bounds the second term. See docs/guarantee.md.
+    """
+    e = law.closing_speed
+    travelled = label - range_of(label, elapsed, law)
+    x, near, far = label - travelled, near_label - travelled, far_label - travelled
+    ago = law.step * sight.steps
+    then = e * ago
+    near_then, far_then = near + then, far + then
+    if sight.known:
+        least_near, greatest_near = slope_band(sight.alpha, near_label, near_then, law)
+        least_far, greatest_far = slope_band(sight.alpha, far_label, far_then, law)
+    else:
+        least_near, greatest_near = law.z_least / near_then, law.z_greatest / near_then
+        least_far, greatest_far = law.z_least / far_then, law.z_greatest / far_then
+    least, greatest = min(least_near, least_far), max(greatest_near, greatest_far)
+    if not (least > -np.inf and greatest < np.inf):
+        return -np.inf, np.inf
+    steepest = max(abs(least), abs(greatest))
+    if sight.steps > 0:
+        fastest = max(abs(law.vz_least), abs(law.vz_greatest)) + sight.fired * (1.0 + law.impulse_error)
+        fastest += law.disturbance * (law.step * elapsed)
+        if near <= 0.0:
+            return -np.inf, np.inf
+        steepest = (steepest * far_then + fastest * ago) / near
+        doubt = sight.doubt + 0.5 * law.disturbance * ago * ago
+        least += min((sight.moved - doubt) / near_then, (sight.moved - doubt) / far_then)
+        greatest += max((sight.moved + doubt) / near_then, (sight.moved + doubt) / far_then)
+    widest = 1.0 + steepest * steepest if law.exact_angles else 1.0
+    lower, upper = omega - error, omega + error
+    lower *= widest if lower < 0.0 else 1.0
+    upper *= widest if upper > 0.0 else 1.0
+    middle = 0.5 * (near + far)
+    curve = scaled_square(x, middle, then) / e
+    chord = curve
+    if far > near:
+        at_near, at_far = scaled_square(near, middle, then) / e, scaled_square(far, middle, then) / e
+        chord = at_near + (at_far - at_near) * ((x - near) / (far - near))
+    turn = 0.5 * (least + greatest) * (x - middle)
+    room = 0.5 * (greatest - least) * (0.5 * (far - near))
+    return (
+        lower * (chord if lower < 0.0 else curve) + turn - room,
+        upper * (chord if upper > 0.0 else curve) + turn + room,
+    )
+
+
+@inlined
+def scaled_square(x: float, middle: float, then: float) -> float:
+    """Square of a range x times x_jc/x_j: as `then` was added to both since."""
+    return x * (middle + then) * (x / (x + then) if then > 0.0 else 1.0)
 
 
 @allocation_free
@@ -168,31 +314,29 @@ def measure_rate_section(
     elapsed: int,
     omega: float,
     error: float,
+    sight: LastSight,
+    window: tuple[float, float],
     law: SectionLaw,
     points: Floats,
 ) -> tuple[bool, float]:
     """Cut a section by a measurement of the line of sight's rate: a band of the predicted miss, omega x^2 / e.
 
-    Notes
-    -----
-    What is measured is (V_z x - V_x z)/(x^2 + z^2), less than the model's V/x + e z/x^2 by the square of cos(alpha).
+    Returns
+    -------
+    living : bool
+    overlap : float
+        As `measure_section` returns it, in metres of predicted miss.
     """
     if whole_chains.is_crowded(marks, n):
         whole_chains.reduce_outward(origins, rings, marks, n, time_to_go(label, elapsed, law), points)
-    x = range_of(label, elapsed, law)
-    tau = x / law.closing_speed
-    lower, upper = omega - error, omega + error
-    if law.exact_angles:
-        least, greatest = chain_steps.heights(origins, rings, marks, n, tau)
-        widest = 1.0 + (max(abs(least), abs(greatest)) / x) ** 2
-        lower *= widest if lower < 0.0 else 1.0
-        upper *= widest if upper > 0.0 else 1.0
+    near, far = min(label, window[0]), max(label, window[1])
+    lower, upper = rate_band(label, near, far, elapsed, omega, error, sight, law)
+    # The band is one of the predicted miss that there would be so much later, at the middle of the window.
+    tau, tilt = time_to_go(label, elapsed, law), (0.5 * (near + far) - label) / law.closing_speed
     slack = CUT_SLACK * (label * (abs(omega) + error) + origins[n, RIGHT, REACH]) * (label / law.closing_speed)
     # The next step's half of the disturbance is in the section already, and it does not commute with this band.
-    slack += tau * law.half_v_at_start
-    return whole_chains.cut_misses(
-        origins, rings, marks, n, tau, tau * x * lower - slack, tau * x * upper + slack, points
-    )
+    slack += (tau + tilt) * law.half_v_at_start
+    return whole_chains.cut_misses(origins, rings, marks, n, tau, tilt, lower - slack, upper + slack, points)
 
 
 @inlined
@@ -287,9 +431,11 @@ def replay(
     -----
     Some 30 ns an event.
     """
-    kinds, values, applies, events = tape
+    kinds, values, applies, events, nearest, farthest = tape
+    window = nearest, farthest
     start_section(origins, rings, marks, n, label, law)
     elapsed = ZERO
+    sight = NO_SIGHT
     for event in range(events):
         if kinds[event] == PREDICTION:
             if whole_chains.is_crowded(marks, n):
@@ -309,8 +455,10 @@ def replay(
         elif errors is not None:
             # Compiled only for a history that has rates: this branch would be the greater part of the work.
             living, overlaps[event] = measure_rate_section(
-                origins, rings, marks, n, label, elapsed, values[event], errors[event], law, points
+                origins, rings, marks, n, label, elapsed, values[event], errors[event], sight, window, law, points
             )
             if not living:
                 return event
+        if errors is not None:
+            sight = sight_after(sight, kinds[event], values[event], applies[event], law)
     return ALIVE

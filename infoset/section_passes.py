@@ -9,6 +9,7 @@ import numpy as np
 
 from infoset import chain_steps, chains, polygon, whole_chains
 from infoset._compile import allocation_free, entry
+from infoset.history import Tapes
 from infoset.section_law import SectionLaw
 from infoset.section_life import (
     ALIVE,
@@ -21,6 +22,8 @@ from infoset.section_life import (
     Flags,
     Floats,
     Integers,
+    Tape,
+    last_sight,
     measure_rate_section,
     measure_section,
     predict_section,
@@ -139,6 +142,15 @@ def measure_all(
     return deaths
 
 
+@allocation_free
+def tape_of(tapes: Tapes, b: int, values: Floats, applies: Flags) -> Tape:
+    """Lay the history of one engagement out in one piece: it is read many times."""
+    for event in range(tapes.events):
+        values[event] = tapes.values[event, b]
+        applies[event] = tapes.applies[event, b]
+    return Tape(tapes.kinds, values, applies, tapes.events, np.inf, -np.inf)
+
+
 @entry
 def measure_rate_all(
     active: Flags,
@@ -146,22 +158,29 @@ def measure_rate_all(
     error: float,
     elapsed: int,
     event: int,
+    tapes: Tapes,
+    values: Floats,
+    applies: Flags,
     sections: Sections,
     law: SectionLaw,
     points: Floats,
 ) -> int:
-    """Cut every living section of the active engagements by measured rates, and summarise it; return how many died."""
+    """Cut every living section of the active engagements by measured rates, and summarise it; return how many died.
+
+    `values` and `applies` are room for the history of one engagement.
+    """
     deaths = 0
     labels, used, living, died, overlaps, origins, rings, marks, summaries, _ = sections
     for b in range(labels.shape[0]):
         if not active[b]:
             continue
+        sight = last_sight(tape_of(tapes, b, values, applies), law)
         for s in range(used[b]):
             if not living[b, s]:
                 continue
-            n = b * labels.shape[1] + s
+            n, label = b * labels.shape[1] + s, labels[b, s]
             living[b, s], overlap = measure_rate_section(
-                origins, rings, marks, n, labels[b, s], elapsed, omega[b], error, law, points
+                origins, rings, marks, n, label, elapsed, omega[b], error, sight, (label, label), law, points
             )
             if living[b, s]:
                 summarise_section(origins, rings, marks, n, labels[b, s], elapsed, law, summaries, b, s)

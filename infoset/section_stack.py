@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from infoset import chains, section_life, section_passes, whole_chains
 from infoset.chains import Chains
+from infoset.history import History
 from infoset.section_law import SectionLaw
 from infoset.section_passes import Sections
 
@@ -128,12 +129,16 @@ class SectionStack:
         self._measured(active)
         return deaths
 
-    def measure_rate(self, active: Flags, omega: Floats, error: float, elapsed: int, event: int) -> int:
+    def measure_rate(
+        self, active: Flags, omega: Floats, error: float, elapsed: int, event: int, history: History
+    ) -> int:
         """Cut the living sections by measured rates of the line of sight (rad/s); return how many died."""
         self._catch_up()
         self._make_room(active)
-        room = chains.working_room()
-        deaths = section_passes.measure_rate_all(active, omega, error, elapsed, event, self.sections, self.law, room)
+        room, values, applies = chains.working_room(), np.empty(history.events), np.empty(history.events, dtype=bool)
+        deaths = section_passes.measure_rate_all(
+            active, omega, error, elapsed, event, history.tapes, values, applies, self.sections, self.law, room
+        )
         self._measured(active)
         return deaths
 

@@ -128,9 +128,17 @@ def meets(points: Floats, i: int, v: float, z: float, reach: float, tau: float) 
 
 @entry
 def cut_misses(
-    origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, lower: float, upper: float, points: Floats
+    origins: Floats,
+    rings: Floats,
+    marks: Integers,
+    n: int,
+    tau: float,
+    tilt: float,
+    lower: float,
+    upper: float,
+    points: Floats,
 ) -> tuple[bool, float]:
-    """Keep the band lower <= m <= upper of predicted miss; the rest is as in `cut`.
+    """Keep the band lower <= m + V tilt <= upper of predicted miss; the rest is as in `cut`.
 
     Notes
     -----
@@ -142,7 +150,7 @@ def cut_misses(
         for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
             v, m = vertex(origins, rings, marks, n, side, i)
             count = polygon.append(points, count, v, m)
-    count, overlap = polygon.clip_to_band(points, count, 0.0, 1.0, lower, upper)
+    count, overlap = polygon.clip_to_band(points, count, tilt, 1.0, lower, upper)
     if count == 0:
         return False, overlap
     for side in (RIGHT, LEFT):

@@ -52,8 +52,6 @@ class Step:
         After the measurement, before the impulse.
     impulse_m_s : ndarray, shape (B,)
         What the thruster gives.
-    truth_margin_m : masked array, shape (B,)
-        Signed margin of the truth in its own section; masked where nothing was measured yet.
     information : InformationSetView
         The set after the measurement.
     """
@@ -68,7 +66,6 @@ class Step:
     measured_rate_rad_s: Floats | None
     predicted_miss: PredictedMiss
     impulse_m_s: Floats
-    truth_margin_m: MaskedFloats
     information: InformationSetView
 
 
@@ -117,7 +114,8 @@ class Engagements:
         arrival_s = self._truth.arrival_s()
         self._information = InformationSet(model, batch, guarantee=guarantee)
         self._view = self._information.view()
-        self._truth_section = TruthSection(model, arrival_s)
+        rate_error = scenario.rate_sensor.error_rad_s if scenario.rate_sensor is not None else 0.0
+        self._truth_section = TruthSection(model, rate_error)
         self._arrival_s = arrival_s
         self._angle_every = scenario.set_model.steps_in(scenario.set_model.angle_sensor.period_s)
         self._range_every = scenario.set_model.steps_in(scenario.range_sensor.period_s) if scenario.range_sensor else 0
@@ -174,7 +172,6 @@ class Engagements:
                     measured_rate,
                     miss,
                     self._impulse,
-                    self._truth_section.margin_m,
                     self._view,
                 )
             )
@@ -187,9 +184,19 @@ class Engagements:
         self._truth_section.predict()
         passage = self._truth.advance(model.step_s, self._manoeuvre(sight))
         np.minimum(self._miss, passage.least_distance_m, out=self._miss, where=self._flying)
+        arrived = self._flying & passage.passed
+        self._arrival_s = np.where(arrived, self.step * model.step_s + passage.arrival_s, self._arrival_s)
         self._flying &= ~passage.passed
         self._information.stop(passage.passed)
         self.step += 1
+
+    def truth_margins_m(self) -> list[MaskedFloats]:
+        """Signed margins of the truths in their own sections after each step's measurement, one array (B,) a step, m.
+
+        They are masked where nothing was measured yet. The truth's section is known when it has arrived: before that
+        they are of the section where it would arrive without further impulses.
+        """
+        return self._truth_section.margins_m(self._arrival_s)[: self.step]
 
     def _measure(self, sight: Sight) -> tuple[Floats | None, Floats | None, Floats | None]:
         """Measure what is due, cut the sets by it, and return angle, range and rate."""
@@ -230,7 +237,6 @@ class Engagements:
         self._truth_section.measure(
             measurement.alpha_rad if looking else None,
             measurement.omega_rad_s,
-            rate_sensor.error_rad_s if rate_sensor is not None else 0.0,
             self._tracking,
             sight,
         )
@@ -297,7 +303,7 @@ class Engagements:
     def results(self, runs: NDArray[np.int64]) -> Results:
         """Results so far, under these run numbers."""
         lost = self._information.inconsistent
-        margin = self._truth_section.least_margin_m
+        margin = self._truth_section.least_margin_m(self._arrival_s)
         payoff, known = self._guaranteed, self._finished_label
         if self._model.is_guaranteed:
             payoff, known = self._information.guaranteed_miss()

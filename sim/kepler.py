@@ -16,6 +16,7 @@ Floats = NDArray[np.float64]
 
 LONGEST_SUBSTEP_S = 0.5
 ARRIVAL_LEAPS = 64
+PASSAGE_LEAPS = 8
 Z, X = 0, 1
 RELATIVE, SPACECRAFT = 0, 1
 POSITION, VELOCITY, ACCELERATION, LOST = range(4)
@@ -53,10 +54,13 @@ class Passage:
         Whether the closest approach lies within the step.
     least_distance_m : ndarray, shape (B,)
         The least distance of those that have passed; infinite for the others, which are still coming nearer.
+    arrival_s : ndarray, shape (B,)
+        Time from the beginning of the step until x = 0, of those that have passed in it; zero for the others.
     """
 
     passed: NDArray[np.bool_]
     least_distance_m: Floats
+    arrival_s: Floats
 
 
 class TrueMotion(Protocol):
@@ -145,14 +149,17 @@ class KeplerMotion:
 
         Notes
         -----
-        The motion without impulses, in 64 leaps and a last straight stretch: impulses are along z, and shift this
-        time by far less than a nanosecond.
+        The motion without impulses, in 64 leaps and a last straight stretch. Impulses, which are along z, shift this
+        time by some nanoseconds, by the gravity where they lead.
         """
-        free = self._motion
-        duration = self.position_m[:, X] / -self.velocity_m_s[:, X]
-        for _ in range(ARRIVAL_LEAPS):
-            free = self._leap(free, duration / ARRIVAL_LEAPS)
-        return np.asarray(duration - free[POSITION, X, RELATIVE] / free[VELOCITY, X, RELATIVE])
+        return self._time_to_zero(self._motion, self._manoeuvre, ARRIVAL_LEAPS)
+
+    def _time_to_zero(self, motion: Floats, manoeuvre_m_s2: Floats, leaps: int) -> Floats:
+        """Times until x = 0 of some motions without impulses, s."""
+        duration = motion[POSITION, X, RELATIVE] / -motion[VELOCITY, X, RELATIVE]
+        for _ in range(leaps):
+            motion = self._leap(motion, duration / leaps, manoeuvre_m_s2)
+        return np.asarray(duration - motion[POSITION, X, RELATIVE] / motion[VELOCITY, X, RELATIVE])
 
     def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
         """Move one step on, the object accelerating along z, shape (B,), if it manoeuvres."""
@@ -164,20 +171,24 @@ class KeplerMotion:
         substeps = 1 if free_space else max(1, int(np.ceil(step_s / LONGEST_SUBSTEP_S * (1.0 - 1e-12))))
         duration = np.full(self._motion.shape[-1], step_s / substeps)
         passed = np.zeros(self._motion.shape[-1], dtype=bool)
-        least = np.full(passed.shape, np.inf)
-        for _ in range(substeps):
-            before, self._motion = self._motion, self._leap(self._motion, duration)
+        least, arrival = np.full(passed.shape, np.inf), np.zeros(passed.shape)
+        for substep in range(substeps):
+            before, self._motion = self._motion, self._leap(self._motion, duration, self._manoeuvre)
             new = (_dot(self._motion[POSITION, :, RELATIVE], self._motion[VELOCITY, :, RELATIVE]) >= 0.0) & ~passed
             if new.any():
                 position, velocity, acceleration = before[:LOST, :, RELATIVE, new]
                 least[new] = closest_distance(position, velocity, acceleration, step_s / substeps)
+                to_zero = self._time_to_zero(
+                    np.ascontiguousarray(before[..., new]), self._manoeuvre[new], PASSAGE_LEAPS
+                )
+                arrival[new] = substep * (step_s / substeps) + to_zero
                 passed |= new
-        return Passage(passed, least)
+        return Passage(passed, least, arrival)
 
-    def _leap(self, motion: Floats, duration_s: Floats) -> Floats:
-        """Return the motion some time on, in memory of its own."""
+    def _leap(self, motion: Floats, duration_s: Floats, manoeuvre_m_s2: Floats) -> Floats:
+        """Return a motion some time on, in memory of its own."""
         after = np.empty_like(motion)
-        leap_all(motion, duration_s, self._manoeuvre, self._gravitational_parameter, after)
+        leap_all(motion, duration_s, manoeuvre_m_s2, self._gravitational_parameter, after)
         return after
 
 

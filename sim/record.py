@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,7 +126,7 @@ class _Recorder:
                 true_range_m=float(step.sight.range_m[0]),
                 impulse_m_s=float(step.impulse_m_s[0]),
                 predicted_miss_m=(float(miss.lower_m[0]), float(miss.upper_m[0])) if miss.exists[0] else None,
-                truth_margin_m=_first(step.truth_margin_m),
+                truth_margin_m=None,
                 sections=tuple(step.information.sections()),
             )
         )
@@ -181,4 +181,8 @@ def fly_one(
     own = None if noise is None else getattr(noise, "name", type(noise).__name__)
     step, label = flight.inconsistency
     found = Inconsistency(int(step[0]), float(label[0])) if step.count() else None
-    return Record(scenario, seed, run, name, flight.results(np.array([run])), tuple(recorder.steps), own, found)
+    margins = flight.truth_margins_m()
+    steps = tuple(
+        replace(each, truth_margin_m=_first(margin)) for each, margin in zip(recorder.steps, margins, strict=True)
+    )
+    return Record(scenario, seed, run, name, flight.results(np.array([run])), steps, own, found)

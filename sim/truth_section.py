@@ -1,13 +1,21 @@
-"""The section at the truth's own label: does the information set keep the truth?"""
+"""The section at the truth's own label: does the information set keep the truth?
+
+The label is known when the truth has arrived, and not before: impulses move it, through gravity, by some nanoseconds
+of time. So what happens is noted in flight, and judged afterwards.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from infoset import SetModel
+from infoset.history import History
 from infoset.information_set_view import MaskedFloats
 from infoset.section_law import BOUND_SLACK, section_law
+from infoset.section_life import ANGLE, IMPULSE, PREDICTION
 from infoset.section_stack import SectionStack
 from sim.kepler import Sight
 
@@ -17,14 +25,26 @@ Flags = NDArray[np.bool_]
 LABEL_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
 
 
+@dataclass
+class _Step:
+    """What one step did to the sections, and where the truth was when it measured; None where it did not."""
+
+    where: Flags | None = None
+    alpha_rad: Floats | None = None
+    omega_rad_s: Floats | None = None
+    slope: Floats | None = None
+    slope_rate_per_s: Floats | None = None
+    impulse_m_s: Floats | None = None
+
+
 class TruthSection:
-    """The section whose label is the truth's, one an engagement, carried beside the set that is on board.
+    """What was measured and fired in a batch of flights, to judge whether the truths stayed in their sections.
 
     Parameters
     ----------
     model : SetModel
-    arrival_s : ndarray, shape (B,)
-        Time T when the truth's x is zero.
+    rate_error_rad_s : float
+        Error bound of a measured rate, rad/s; zero where there is no such sensor.
 
     Notes
     -----
@@ -32,58 +52,76 @@ class TruthSection:
     x / (1 + eta), so its label is e T with T the time when x = 0.
     """
 
-    def __init__(self, model: SetModel, arrival_s: Floats) -> None:
-        law = section_law(model)
-        labels = model.closing_speed_m_s * arrival_s
+    def __init__(self, model: SetModel, rate_error_rad_s: float) -> None:
+        self._law = section_law(model)
         self._exact_angles = model.is_guaranteed
         self._threshold_m = model.range_threshold_m
-        self._stack = SectionStack(law, labels[:, None], np.ones(len(labels), dtype=np.int64))
-        self._elapsed = 0
-        self._everywhere = np.ones(len(labels), dtype=bool)
-        self._margin = np.full(len(labels), np.inf)
-        self._least_margin = np.full(len(labels), np.inf)
+        self._rate_error = rate_error_rad_s * (1.0 + BOUND_SLACK)
+        self._steps = [_Step()]
 
-    @property
-    def margin_m(self) -> MaskedFloats:
-        """Signed margin of each truth as of its last measurement, m; masked where nothing was measured yet."""
-        return _if_measured(self._margin)
-
-    @property
-    def least_margin_m(self) -> MaskedFloats:
-        """Least of the signed margins so far, m; masked where nothing was measured yet."""
-        return _if_measured(self._least_margin)
-
-    def measure(
-        self, alpha_rad: Floats | None, omega_rad_s: Floats | None, rate_error_rad_s: float, where: Flags, sight: Sight
-    ) -> None:
-        """Cut by what was measured, and see how deep inside the truth is then."""
-        ranges = self._stack.ranges(self._elapsed)[:, 0]
-        where = where & (ranges >= self._threshold_m)
-        if alpha_rad is not None:
-            self._stack.measure_angle(where, alpha_rad, self._elapsed, self._elapsed)
-        if omega_rad_s is not None:
-            error = rate_error_rad_s * (1.0 + BOUND_SLACK)
-            self._stack.measure_rate(where, omega_rad_s, error, self._elapsed, self._elapsed)
+    def measure(self, alpha_rad: Floats | None, omega_rad_s: Floats | None, where: Flags, sight: Sight) -> None:
+        """Note what was measured, of which flights, and where the truth was."""
         slope, rate = sight.alpha_rad, sight.omega_rad_s
         if self._exact_angles:
             slope, rate = sight.slope, sight.slope_rate_per_s
-        z = slope * ranges
-        v = rate * ranges - self._stack.law.closing_speed * slope
-        margin = self._stack.margins(v, z, self._elapsed)
-        margin = np.where(self._stack.living[:, 0], margin, self._stack.sections.overlaps[:, 0])
-        # The truth's own label is known to half an ulp, and its z and V as well as that.
-        margin += LABEL_ROUNDING * self._stack.labels[:, 0] * np.abs(slope)
-        self._margin = np.where(where, margin, self._margin)
-        self._least_margin = np.minimum(self._least_margin, self._margin)
+        self._steps[-1] = _Step(where.copy(), alpha_rad, omega_rad_s, slope, rate)
 
     def shift(self, impulse_m_s: Floats) -> None:
-        """Shift by an impulse."""
-        self._stack.shift(self._everywhere, impulse_m_s, self._elapsed)
+        """Note an impulse."""
+        self._steps[-1].impulse_m_s = impulse_m_s
 
     def predict(self) -> None:
-        """Move one step on."""
-        self._elapsed += 1
-        self._stack.predict(self._everywhere, self._elapsed)
+        """Note that a step has ended."""
+        self._steps.append(_Step())
+
+    def margins_m(self, arrival_s: Floats) -> list[MaskedFloats]:
+        """Signed margins of the truths in their sections after each step's measurement, for the times when x is zero.
+
+        Parameters
+        ----------
+        arrival_s : ndarray, shape (B,)
+            From the start to x = 0, s.
+
+        Returns
+        -------
+        list of masked array, shape (B,)
+            One a step, m, as of the last measurement; masked where nothing was measured yet.
+        """
+        labels = self._law.closing_speed * arrival_s
+        stack = SectionStack(self._law, labels[:, None], np.ones(len(labels), dtype=np.int64))
+        history, everywhere = History(len(labels)), np.ones(len(labels), dtype=bool)
+        margin = np.full(len(labels), np.inf)
+        margins = []
+        for elapsed, step in enumerate(self._steps):
+            if elapsed:
+                history.record(PREDICTION)
+                stack.predict(everywhere, elapsed)
+            if step.where is not None and step.slope is not None and step.slope_rate_per_s is not None:
+                ranges = stack.ranges(elapsed)[:, 0]
+                where = step.where & (ranges >= self._threshold_m)
+                if step.alpha_rad is not None:
+                    history.record(ANGLE, step.alpha_rad, where)
+                    stack.measure_angle(where, step.alpha_rad, elapsed, elapsed)
+                if step.omega_rad_s is not None:
+                    stack.measure_rate(where, step.omega_rad_s, self._rate_error, elapsed, elapsed, history)
+                z = step.slope * ranges
+                v = step.slope_rate_per_s * ranges - self._law.closing_speed * step.slope
+                now = stack.margins(v, z, elapsed)
+                now = np.where(stack.living[:, 0], now, stack.sections.overlaps[:, 0])
+                # The truth's own label is known to half an ulp, and its z and V as well as that.
+                now += LABEL_ROUNDING * labels * np.abs(step.slope)
+                margin = np.where(where, now, margin)
+            margins.append(_if_measured(margin))
+            if step.impulse_m_s is not None:
+                history.record(IMPULSE, step.impulse_m_s, step.impulse_m_s != 0.0)
+                stack.shift(everywhere, step.impulse_m_s, elapsed)
+        return margins
+
+    def least_margin_m(self, arrival_s: Floats) -> MaskedFloats:
+        """Least of the signed margins of each truth, m; masked where nothing was measured."""
+        margins = self.margins_m(arrival_s)
+        least = np.min([each.filled(np.inf) for each in margins], axis=0)
+        return _if_measured(least)
 
 
 def _if_measured(margin: Floats) -> MaskedFloats:

@@ -120,7 +120,7 @@ def fly(scenario: Scenario, draws: Draws, strategy: Strategy | None = None, step
         np.array([step.predicted_miss.lower_m for step in seen]),
         np.array([step.predicted_miss.upper_m for step in seen]),
         np.array([step.impulse_m_s for step in seen]),
-        np.array([step.truth_margin_m for step in seen]),
+        np.array(flight.truth_margins_m()),
         flight.results(np.arange(len(draws.position_m))),
         not flight.flying,
         first_new,

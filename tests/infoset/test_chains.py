@@ -168,7 +168,7 @@ class Section:
 
     def cut_misses(self, lower: float, upper: float) -> tuple[bool, float]:
         room = chains.working_room()
-        return whole_chains.cut_misses(*self.chains, ROW, self.tau, lower, upper, room)
+        return whole_chains.cut_misses(*self.chains, ROW, self.tau, 0.0, lower, upper, room)
 
     def reduce(self) -> None:
         whole_chains.reduce_outward(*self.chains, ROW, self.tau, chains.working_room())

@@ -98,8 +98,8 @@ class ModelMotion:
         self._z = self._z + self._v * step_s + 0.5 * push * step_s**2
         self._v = self._v + push * step_s
         self._steps += 1
-        self._x = self._start - self._e * step_s * self._steps
-        return Passage(self._x <= 0.0, np.abs(self._z))
+        before, self._x = self._x, self._start - self._e * step_s * self._steps
+        return Passage(self._x <= 0.0, np.abs(self._z), before / self._e)
 
 
 def fly_in_the_model(scenario: Scenario, engagements: int, seed: int) -> Results:

@@ -1,0 +1,108 @@
+"""Random scenarios of the guaranteed model: every sensor, fast and slow, near and far, with and without a Sun.
+
+    from benchmarks.random_scenarios import random_scenario
+    scenario = random_scenario(7, rate_sensor=True)
+
+The same number gives the same scenario. Each is one that a scenario file may hold: it is written as one and read back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from experiments.errors import InputError
+from experiments.scenario_file import read_scenario, scenario_to_toml
+from guidance import NoiseKind, Thruster, TieRule
+from infoset import AngleSensor, InitialSet, Model, RangeSensor, RateSensor, SetModel, StateBox
+from sim import Manoeuvre, Scenario, Sun, Target
+
+SOLAR_PARAMETER_M3_S2 = 1.324948e20
+STRATEGIES = ("symmetric-miss", "patient")
+
+
+def random_scenario(number: int, *, rate_sensor: bool) -> Scenario:
+    """Random scenario of a number, with a rate sensor or without one; about half have a range meter.
+
+    Speeds are 1 to 100 km/s, steps 0.01 to 10 s and 16 to 126 of them, angle errors 1e-6 to 1e-2 rad, sections 3 to
+    500.
+    """
+    generator = np.random.default_rng(np.random.SeedSequence(entropy=18, spawn_key=(number, int(rate_sensor))))
+    while True:
+        try:
+            scenario = _drawn(generator, number, rate_sensor)
+            return read_scenario(scenario_to_toml(scenario), f"random scenario {number}")
+        except InputError:
+            continue  # what no file may hold is drawn again
+
+
+def _drawn(generator: np.random.Generator, number: int, rate_sensor: bool) -> Scenario:
+    def decades(least: float, greatest: float) -> float:
+        return float(10.0 ** generator.uniform(least, greatest))
+
+    def often(share: float) -> bool:
+        return bool(generator.uniform() < share)
+
+    speed_m_s, steps, step_s = 1e3 * decades(0.0, 2.0), decades(1.2, 2.1), decades(-2.0, 1.0)
+    flight_s = steps * step_s
+    range_m = speed_m_s * flight_s
+    z_m, vz_m_s = range_m * decades(-4.0, -1.3), speed_m_s * decades(-5.5, -2.5)
+    spread, speed_error = decades(-2.5, -1.0), 0.0 if often(0.1) else decades(-5.0, -1.0)
+    bounds = StateBox(
+        (-z_m, z_m),
+        (range_m * (1.0 - spread), range_m * (1.0 + spread)),
+        (-vz_m_s, vz_m_s),
+        (-speed_m_s * (1.0 + speed_error), -speed_m_s * (1.0 - speed_error)),
+    )
+    error_rad = decades(-6.0, -2.0)
+    error_at_zero_rad = error_rad * float(generator.uniform(0.5, 3.0))
+    sections = round(decades(0.5, 1.8 if often(0.95) else 2.7))
+    disturbance_m_s2 = 0.0 if often(0.4) else z_m / flight_s**2 * decades(-3.0, 0.0)
+    model = SetModel(
+        speed_m_s,
+        step_s,
+        bounds,
+        AngleSensor(step_s * int(generator.integers(1, 4)), error_rad, error_at_zero_rad, range_m),
+        disturbance_m_s2,
+        range_threshold_m=range_m * decades(-5.0, -1.5),
+        sections=sections,
+        fewest_sections=int(generator.integers(2, min(6, sections) + 1)),
+        initial_set=InitialSet.BOX,
+        kind=Model.GUARANTEED,
+    )
+    greatest_m_s = z_m / flight_s * decades(-0.5, 1.5)
+    thruster = Thruster(
+        greatest_m_s * steps * decades(-1.5, 0.0),
+        0.0 if often(0.3) else greatest_m_s * decades(-2.0, -0.3),
+        greatest_m_s,
+        (0.0, 0.0, 0.01, 0.05)[int(generator.integers(4))],
+    )
+    sun = None
+    if often(0.6):
+        sun = Sun(SOLAR_PARAMETER_M3_S2, decades(10.3, 11.3), float(generator.uniform(0.0, 2.0 * np.pi)))
+    dispersion = bounds
+    if often(0.3):
+        dispersion = replace(bounds, z_m=(-0.5 * z_m, 0.5 * z_m), vz_m_s=(-0.5 * vz_m_s, 0.5 * vz_m_s))
+    rate_error_rad_s = error_rad / step_s * decades(-2.5, 0.5)
+    kinds = [each for each in Manoeuvre if each is not Manoeuvre.NONE]
+    return Scenario(
+        f"random-{number}",
+        "",
+        sun,
+        range_m,
+        dispersion,
+        model,
+        RangeSensor(step_s * int(generator.integers(1, 5)), decades(-3.0, -0.5)) if often(0.5) else None,
+        thruster,
+        strategy=STRATEGIES[int(generator.integers(len(STRATEGIES)))],
+        # Draws hold choices between ties for this noise alone; those are used as what else is random.
+        noise=NoiseKind.GAME,
+        tie=TieRule.RANDOM,
+        rate_sensor=RateSensor(step_s * int(generator.integers(1, 4)), rate_error_rad_s) if rate_sensor else None,
+        target=(
+            Target(kinds[int(generator.integers(len(kinds)))], disturbance_m_s2, 0.1 * flight_s)
+            if disturbance_m_s2 > 0.0 and often(0.7)
+            else None
+        ),
+    )
