@@ -246,7 +246,7 @@ class InformationSet(InformationSetView):
     def _least_label_next(self) -> float:
         """Least label whose range will not be below the threshold after the next step, m."""
         elapsed = self.model.step_s * (self._history.elapsed + 1)
-        return self.model.range_threshold_m + self.model.closing_speed_m_s * elapsed
+        return self.model.least_range_m + self.model.closing_speed_m_s * elapsed
 
     def predict(self) -> None:
         """Move the set one step on, under every disturbance within its bound.
@@ -260,8 +260,10 @@ class InformationSet(InformationSetView):
         self._stack.predict(active, self._history.elapsed)
 
     def stop(self, where: ArrayLike) -> None:
-        """Follow engagements no longer: nothing is computed from now on for those `where` is true, shape () or (B,)."""
-        self._status[self._active(where)] = SetStatus.STOPPED.value
+        """Follow engagements no longer: those `where` is true, shape () or (B,), have no sections from now on."""
+        stopped = np.broadcast_to(np.asarray(where, dtype=bool), self.batch)
+        self._status[stopped] = SetStatus.STOPPED.value
+        self._stack.sections.living[stopped] = False
 
     def _spread(self, value: ArrayLike, name: str) -> Floats:
         values = np.asarray(value, dtype=np.float64)

@@ -10,6 +10,10 @@ from infoset.sensors import AngleSensor
 Interval = tuple[float, float]
 
 
+LEAST_RANGE = 1e-9
+"""Of the greatest label: at a range of zero an angle is that of nothing."""
+
+
 class Model(Enum):
     """What the set allows for.
 
@@ -142,6 +146,11 @@ class SetModel:
     def steps_in(self, period_s: float) -> int:
         """Number of steps from one measurement to the next, at least one."""
         return max(1, round(period_s / self.step_s))
+
+    @property
+    def least_range_m(self) -> float:
+        """Least range that a hypothesis may have, m: the threshold, and more than rounding makes of zero."""
+        return max(self.range_threshold_m, LEAST_RANGE * self.label_limits_m[1])
 
     @property
     def label_limits_m(self) -> Interval:

@@ -55,7 +55,7 @@ class TruthSection:
     def __init__(self, model: SetModel, rate_error_rad_s: float) -> None:
         self._law = section_law(model)
         self._exact_angles = model.is_guaranteed
-        self._threshold_m = model.range_threshold_m
+        self._least_range_m = model.least_range_m
         self._rate_error = rate_error_rad_s * (1.0 + BOUND_SLACK)
         self._steps = [_Step()]
 
@@ -98,7 +98,7 @@ class TruthSection:
                 stack.predict(everywhere, elapsed)
             if step.where is not None and step.slope is not None and step.slope_rate_per_s is not None:
                 ranges = stack.ranges(elapsed)[:, 0]
-                where = step.where & (ranges >= self._threshold_m)
+                where = step.where & (ranges >= self._least_range_m)
                 if step.alpha_rad is not None:
                     history.record(ANGLE, step.alpha_rad, where)
                     stack.measure_angle(where, step.alpha_rad, elapsed, elapsed)

@@ -1,0 +1,206 @@
+"""Engagements that broke the guarantee once, and the families they came from."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from experiments.scenario_file import load_scenario
+from guidance import NoiseKind, TieRule
+from infoset import AngleSensor, InitialSet, Model, RateSensor, SetModel, StateBox
+from infoset.section_law import BOUND_SLACK, SectionLaw, section_law
+from infoset.section_life import LastSight, rate_band
+from sim import Outcome, Results, Scenario, simulate
+
+Floats = NDArray[np.float64]
+CASES = Path(__file__).parent / "cases"
+HAS_BENCHMARKS = importlib.util.find_spec("benchmarks") is not None
+
+
+def sound(results: Results) -> bool:
+    held = results.phi_held
+    assert np.isfinite(results.guaranteed_miss_m.compressed()).all()
+    return bool(results.truth_kept.all() and held.all() and not held.mask.any())
+
+
+@pytest.mark.parametrize(
+    ("case", "seed", "noise", "tie", "runs"),
+    [
+        # Phi between labels took the supports to be concave in the label, which a rate's bands do not leave them.
+        ("rate-between-labels", 13014, NoiseKind.GAME, TieRule.UPPER, [6, 13, 21, 40, 86]),
+        ("rate-free-space", 4006, NoiseKind.GAME, TieRule.UPPER, [84]),
+        # Living labels beyond those found were taken to be refuted.
+        ("rate-between-labels", 13014, NoiseKind.GAME, TieRule.UPPER, [1, 22, 36, 47]),
+        ("rate-between-labels", 13014, NoiseKind.RANDOM, TieRule.UPPER, [47]),
+        ("rate-wide-speeds", 13017, NoiseKind.RANDOM, TieRule.UPPER, [70]),
+        # The truth's label was that of a motion without impulses, 8.5 ns off.
+        ("late-arrival-strong-sun", 4008, NoiseKind.GAME, TieRule.LOWER, [10]),
+        ("late-arrival-no-rate", 4029, NoiseKind.GAME, TieRule.UPPER, [99]),
+    ],
+)
+def test_what_broke_the_guarantee_once(case: str, seed: int, noise: NoiseKind, tie: TieRule, runs: list[int]) -> None:
+    scenario = replace(load_scenario(CASES / f"{case}.toml"), noise=noise, tie=tie)
+    results = simulate(scenario, runs, seed=seed)
+    assert sound(results)
+    assert Outcome.SET_LOST not in results.outcomes
+
+
+@pytest.mark.skipif(not HAS_BENCHMARKS, reason="benchmarks are in a checkout only")
+@pytest.mark.parametrize("rate_sensor", [False, True])
+@pytest.mark.parametrize(
+    ("first", "scenarios", "batch"), [(0, 12, 16), pytest.param(10_000, 150, 80, marks=pytest.mark.slow)]
+)
+def test_random_scenarios_keep_the_guarantee(
+    rate_sensor: bool, first: int, scenarios: int, batch: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every sensor, noise and tie rule, with warnings as errors; `benchmarks/soundness.py` flies 300 000."""
+    from benchmarks import soundness
+
+    monkeypatch.setattr(soundness, "BATCH", batch)
+    total = soundness.Count()
+    for number in range(first, first + scenarios):
+        total += soundness.fly_random_batch(number, rate_sensor, seed=3)
+    assert total == soundness.Count(scenarios * batch)
+
+
+# Round numbers: truths and hypotheses come to a range of exactly zero at a step -----------------------------------
+
+
+def round_scenario(number: int) -> Scenario:
+    """Scenario of a number whose lengths, speeds and times are multiples of each other, in either model."""
+    generator = np.random.default_rng(number)
+
+    def one_of(*values: float) -> float:
+        return float(generator.choice(values))
+
+    e = one_of(1e3, 2e3, 5e3, 1e4, 2.5e4, 58e3, 1e5)
+    step_s, steps = one_of(0.01, 0.1, 0.25, 0.5, 1.0, 2.0, 10.0), int(generator.integers(10, 60))
+    range_m, spread_m = e * step_s * steps, one_of(0.0, 1.0, 2.0, 5.0) * e * step_s
+    z_m, vz_m_s, speed_error = range_m * one_of(1e-4, 1e-3, 0.01, 0.1), e * one_of(0.0, 1e-4, 1e-3), one_of(0, 1e-3)
+    bounds = StateBox(
+        (-z_m, z_m),
+        (range_m - spread_m, range_m + spread_m),
+        (-vz_m_s, vz_m_s),
+        (-e * (1.0 + speed_error), -e * (1.0 - speed_error)),
+    )
+    error_rad = float(10.0 ** generator.uniform(-6.0, -2.0))
+    model = (Model.PAPER, Model.GUARANTEED)[int(generator.integers(2))]
+    sections = int(one_of(3, 5, 11, 29, 101, 500))
+    set_model = SetModel(
+        e,
+        step_s,
+        bounds,
+        AngleSensor(step_s * int(generator.integers(1, 3)), error_rad, error_rad * one_of(0.7, 1.0, 1.5), range_m),
+        one_of(0.0, 1e-3, 0.1),
+        one_of(0.0, 0.0, 1e-3, 0.1) * range_m,
+        sections,
+        int(generator.integers(1, min(6, sections))),
+        InitialSet.BOX if model is Model.GUARANTEED or one_of(0, 1) else InitialSet.RECTANGLE,
+        model,
+    )
+    asteroid = load_scenario("asteroid-1997")
+    sensor = asteroid.range_sensor
+    assert sensor is not None
+    return replace(
+        asteroid,
+        sun=asteroid.sun if one_of(0, 1) else None,
+        nominal_range_m=range_m,
+        dispersion=replace(bounds, x_m=(range_m, range_m), vx_m_s=(-e, -e)) if one_of(0, 1) else bounds,
+        set_model=set_model,
+        range_sensor=replace(sensor, period_s=2.0 * step_s) if one_of(0, 1) else None,
+        thruster=replace(
+            asteroid.thruster,
+            budget_m_s=vz_m_s + 1.0,
+            least_impulse_m_s=one_of(0.0, 0.1),
+            greatest_impulse_m_s=vz_m_s + 1.0,
+        ),
+        strategy=str(generator.choice(["symmetric-miss", "patient", "kalman", "least-squares", "zero-effort-miss"])),
+        noise=(NoiseKind.RANDOM, NoiseKind.GAME)[int(generator.integers(2))],
+        tie=list(TieRule)[int(generator.integers(4))],
+        rate_sensor=None if one_of(0, 1) else RateSensor(step_s, 0.5 * error_rad / step_s),
+    )
+
+
+@pytest.mark.parametrize(("first", "number"), [(0, 60), pytest.param(1000, 2000, marks=pytest.mark.slow)])
+def test_round_numbers_give_no_warning_and_finite_results(first: int, number: int) -> None:
+    for case in range(first, first + number):
+        scenario = round_scenario(case)
+        results = simulate(scenario, 4)
+        for values in (results.miss_m, results.impulse_m_s, results.truth_margin_m.filled(0.0)):
+            assert np.isfinite(values).all(), case
+        assert np.isfinite(results.guaranteed_miss_m.filled(0.0)).all(), case
+        assert scenario.set_model.kind is Model.PAPER or sound(results), case
+
+
+# The band of a measured rate --------------------------------------------------------------------------------------
+
+
+def flat_law(error_rad: float) -> tuple[SetModel, SectionLaw]:
+    box = StateBox((-1e4, 1e4), (4e5, 6e5), (-300.0, 300.0), (-5e3, -5e3))
+    model = SetModel(
+        5e3, 1.0, box, AngleSensor(1.0, error_rad, 2.0 * error_rad, 5e5), 0.05, 0.0, 5, 2, InitialSet.BOX,
+        Model.GUARANTEED, execution_error_relative=0.02,
+    )  # fmt: skip
+    return model, section_law(model)
+
+
+SIDES = st.sampled_from([-1.0, 1.0]) | st.floats(-1.0, 1.0)
+
+
+@settings(max_examples=1000, deadline=None)
+@given(
+    st.floats(-0.02, 0.02), st.floats(-40.0, 40.0), st.integers(0, 6), SIDES, SIDES, st.floats(-8.0, -2.0),
+    st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(-5.0, 5.0), SIDES,
+)  # fmt: skip
+def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(
+    slope: float, v: float, ago: int, angle_draw: float, rate_draw: float,
+    log_error: float, place: float, width: float, impulse: float, push: float,
+) -> None:  # fmt: skip
+    """A motion that is integrated in closed form: what was measured of it admits z + V x_c/e for every window."""
+    error = 10.0**log_error
+    model, law = flat_law(error)
+    e, step, elapsed = law.closing_speed, law.step, 60
+    label = 4.2e5 + 1.5e5 * place
+    near, far = label - 8e4 * width * place, label + 8e4 * width * (1.0 - place)
+    # The last angle, `ago` steps before; an impulse in the middle, with an error; a push all the way.
+    x_then, executed = label - e * step * (elapsed - ago), impulse * (1.0 + 0.02 * angle_draw)
+    z_then = slope * x_then
+    bound = model.angle_sensor.error_bound(x_then / math.cos(math.atan(slope)))
+    alpha = math.atan(slope) + angle_draw * bound
+    fired_after = (ago // 2) * step if ago else 0.0
+    time, acceleration = ago * step, push * law.disturbance
+    v_now = v + acceleration * time - (executed if ago else 0.0)
+    z = z_then + v * time + 0.5 * acceleration * time**2 - (executed * (time - fired_after) if ago else 0.0)
+    x = label - e * step * elapsed
+    omega_true = (v_now + e * z / x) / x / (1.0 + (z / x) ** 2)
+    rate_error = 1e-9 * (1.0 + BOUND_SLACK)
+    omega = omega_true + rate_draw * 1e-9
+    size = abs(impulse) if ago else 0.0
+    sight = LastSight(
+        True, alpha, ago, impulse * fired_after if ago else 0.0, size * law.impulse_error * fired_after, size
+    )
+    if abs(v) + size + law.disturbance * time > 300.0:
+        return
+    middle = 0.5 * (near + far) - e * step * elapsed
+    lower, upper = rate_band(label, near, far, elapsed, omega, rate_error, sight, law)
+    value = z + v_now * middle / e
+    rounding = 1e-9 * (abs(value) + abs(lower) + abs(upper) + 1.0)
+    assert lower - rounding <= value <= upper + rounding
+    bounds = np.array(
+        [rate_band(each, near, far, elapsed, omega, rate_error, sight, law) for each in np.linspace(near, far, 9)]
+    )
+    bend = np.diff(bounds, n=2, axis=0)
+    assert (bend[:, 0] >= -rounding).all()
+    assert (bend[:, 1] <= rounding).all()
+    if ago == 0:
+        # A window of one label has nothing but the rate itself: its band is as wide as the sensor's error.
+        alone = rate_band(label, label, label, elapsed, omega, rate_error, sight, law)
+        assert alone[1] - alone[0] <= 1.01 * 2.0 * (abs(omega) * 0.01 + rate_error) * x**2 / e
