@@ -54,13 +54,15 @@ def _keep_exit_code() -> None:
 
     Notes
     -----
-    An interrupt inside an `exec` of text (a dataclass that is being defined) is remembered by Python as not handled
-    until the next such `exec`. Under ``python -m`` the process then ends by the signal, whatever `SystemExit` says.
+    An interrupt inside text that Python runs (a dataclass or a named tuple that is being defined) is remembered as not
+    handled until the next such text. Under ``python -m`` the process then ends by the signal, whatever `SystemExit`
+    says. Defining a named tuple clears it.
     """
     import signal
+    from collections import namedtuple
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    exec("")  # noqa: S102 - clears what Python remembers
+    namedtuple("_Nothing", ())
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
