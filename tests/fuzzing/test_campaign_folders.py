@@ -6,6 +6,7 @@ import json
 import random
 import shutil
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,8 @@ import pytest
 
 from experiments.cli import main
 from experiments.scenario_file import scenario_to_toml
-from sim.storage import CampaignFolder, ManifestError, StorageError, read_manifest
+from sim import Scenario, Sweep
+from sim.storage import Axis, CampaignFolder, ManifestError, StorageError, read_manifest
 from sim.storage.manifest import MANIFEST, checksum
 from sim.storage.parquet_pages import claimed_bytes
 
@@ -276,6 +278,30 @@ def test_absurd_values_under_a_sound_checksum_are_one_message(
     found = CampaignFolder.read(folder)
     assert found.complete
     assert found.table(["run"]).column("run").to_pylist() == list(range(given.runs))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "reason"),
+    [
+        ("cell", [0], "cell holds 0 in row 0, where 1 belongs"),
+        ("miss_m", [1e308], "miss_m must be finite"),
+        ("run", [1, 1], "run holds 1 in row 0, where 0 belongs"),
+    ],
+)
+def test_absurd_values_in_a_sweep_are_one_message(
+    name: str, values: list[float], reason: str, brief: Scenario, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    budgets = (100.0, 200.0)
+    cells = tuple(replace(brief, thruster=replace(brief.thruster, budget_m_s=budget)) for budget in budgets)
+    Sweep(brief, (Axis("thruster.budget_m_s", budgets),), cells, 3, tmp_path / "sweep").run()
+    replaced(tmp_path / "sweep", some(name, values))
+    with pytest.raises(SystemExit) as left:
+        main(["report", str(tmp_path / "sweep")])
+    err = capsys.readouterr().err.replace("\n", " ")
+    assert left.value.code == 2
+    assert reason in err
+    assert "fly its runs again with --resume" in err
+    assert err.count("error: ") == 1
 
 
 @pytest.mark.parametrize("index", [2, 7, 10**9])
