@@ -32,9 +32,9 @@ class ConvexPolygons:
     Raises
     ------
     TypeError
-        If a vertex is no real number, or a count no integer.
+        If a vertex or a count is no real number.
     ValueError
-        If shapes disagree or a vertex is not finite.
+        If shapes disagree, a vertex is not finite or a count no whole number.
 
     Notes
     -----
@@ -43,10 +43,10 @@ class ConvexPolygons:
     """
 
     def __init__(self, vertices: ArrayLike, counts: ArrayLike) -> None:
-        counted = np.asarray(counts)
-        if isinstance(counts, np.ma.MaskedArray) or (counted.dtype.kind not in "iu" and counted.size):
-            raise TypeError(f"counts must be integers: got {shown(counts)}")
-        self.counts: Integers = counted.astype(np.int64, copy=False)
+        counted = real_values("counts", counts)
+        if not np.isfinite(counted).all() or (counted != np.floor(counted)).any():
+            raise ValueError(f"counts must be whole numbers: got {shown(counts)}")
+        self.counts: Integers = counted.astype(np.int64)
         self.vertices: Floats = real_values("vertices", vertices)
         if self.vertices.ndim < 2 or self.vertices.shape[-1] != 2 or self.vertices.shape[:-2] != self.counts.shape:
             raise ValueError(

@@ -51,6 +51,8 @@ class InformationSet(InformationSetView):
     """
 
     def __init__(self, model: SetModel, batch: int = 1, *, guarantee: bool = True) -> None:
+        if not isinstance(model, SetModel):
+            raise TypeError(f"model must be a SetModel: got {shown(model)}")
         COUNT.need("batch", batch)
         least, greatest = model.label_limits_m
         slots = max(model.sections, 2 * model.fewest_sections + 1)

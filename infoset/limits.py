@@ -63,13 +63,14 @@ class Limits:
         Raises
         ------
         TypeError
-            If it is not a single real number, or not an integer where it must be; a bool is neither.
+            If it is no float and no integer, or not an integer where it must be; a bool is neither.
         ValueError
             If it is out of the limits.
         """
-        kinds = (int, np.integer) if self.whole else (int, float, np.integer, np.floating)
+        kinds = (int, np.integer) if self.whole else (int, float, np.integer)  # single precision would round
         if isinstance(value, bool) or not isinstance(value, kinds):
-            raise TypeError(f"{name} must be {'an integer' if self.whole else 'a real number'}: got {shown(value)}")
+            wanted = "an integer" if self.whole else "a real number, a float or an integer"
+            raise TypeError(f"{name} must be {wanted}: got {shown(value)}")
         problem = self.problem(value)
         if problem is not None:
             raise ValueError(f"{name} {problem}: got {shown(value)}")

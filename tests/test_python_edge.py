@@ -300,6 +300,12 @@ def test_what_is_no_count(value: Any) -> None:
         refused(partial(Plan, (scenario,), noise=CampaignNoise.GAME, guarantee=True, **numbers), name)
 
 
+def test_single_precision_is_refused_and_integers_are_numbers() -> None:
+    refused(partial(AngleSensor, np.float32(0.5), 1e-4, 1e-4, 5.8e6), "period_s")  # type: ignore[arg-type]
+    assert AngleSensor(np.float64(0.5), 1e-4, 1e-4, 5_800_000).error_bound(0.0) == 1e-4
+    refused(partial(InformationSet, None), "model")  # type: ignore[arg-type]
+
+
 def test_runs_are_integers() -> None:
     scenario = load_scenario("asteroid-1997")
     for runs in ([0.5, 1.0], [[0, 1]], [True, False], [1, -1], [], 0):
