@@ -30,6 +30,11 @@ class InformationSet(InformationSetView):
         Whether to keep the guaranteed miss Phi: only the guaranteed model, started from a box, has one. It takes about
         as long as the rest.
 
+    Raises
+    ------
+    TypeError, ValueError
+        If the model is of another type, the batch is no count, or the model has no labels.
+
     Examples
     --------
     >>> from infoset import AngleSensor, InformationSet, SetModel, StateBox
