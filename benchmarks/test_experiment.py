@@ -37,7 +37,7 @@ class Process:
 def infoset(*arguments: str, cache: Path | None = None) -> Process:
     """Run the command `infoset` in a process of its own, with a compile cache of its own if one is given."""
     environment = dict(os.environ) if cache is None else {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
-    command = [sys.executable, "-m", "experiments.cli", *arguments]
+    command = [sys.executable, "-m", "experiments", *arguments]
     began = time.perf_counter()
     with subprocess.Popen(
         command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+TYPE_CHECKING = False  # `typing` takes longer to import than all else before an interrupt can be caught
 if TYPE_CHECKING:
     from experiments.scenario_file import load_scenario
 

@@ -109,28 +109,29 @@ def _ranges(known: Known) -> Iterator[Problem]:
         )
 
 
+def _box(known: Known, table: str) -> StateBox | None:
+    """A box of starts in SI; None if a pair of it is missing or unsound."""
+    pairs = [known.pair(table, key) for key in ("z_km", "x_km", "vz_km_s", "vx_km_s")]
+    if None in pairs:
+        return None
+    return StateBox(*((si(pair[0], KILO), si(pair[1], KILO)) for pair in pairs if pair is not None))
+
+
 def _error_law(known: Known) -> Iterator[Problem]:
     nominal_range = known.number("nominal", "range_km")
     at_nominal = known.number("angle_sensor", "error_at_nominal_range_rad")
     at_zero = known.number("angle_sensor", "error_at_zero_range_rad")
-    spans = list(_spans(known, "x_km"))
-    if nominal_range is None or at_nominal is None or at_zero is None or not spans:
+    boxes = {f"{table}.x_km": _box(known, table) for table in ("uncertainty", "dispersion")}
+    distances = {where: box.farthest_m for where, box in boxes.items() if box is not None}
+    if nominal_range is None or at_nominal is None or at_zero is None or not distances:
         return
-    where, (_, greatest) = max(spans, key=lambda span: span[1][1])
-    offset, across = (
-        max((max(abs(end) for end in pair) for _, pair in _spans(known, key)), default=Decimal(0))
-        for key in ("z_km", "vz_km_s")
-    )
-    slowest = min((-pair[1] for _, pair in _spans(known, "vx_km_s")), default=None)
-    # The distance is a convex function of time: it is greatest at the start, or where the object has gone across.
-    farthest = (greatest * greatest + offset * offset).sqrt()
-    if slowest is not None and offset + across * greatest / slowest > farthest:
-        farthest = offset + across * greatest / slowest
-    bound = at_zero + (at_nominal - at_zero) * farthest / nominal_range
+    where = max(distances, key=lambda each: distances[each])
+    bound = AngleSensor(1.0, si(at_nominal), si(at_zero), si(nominal_range, KILO)).error_bound(distances[where])
     if bound <= 0:
+        farthest_km = float(f"{distances[where] / 1000.0:.6g}")
         yield Problem(
             ("angle_sensor", "error_at_nominal_range_rad"),
-            f"leaves no error bound at the greatest possible range, {farthest:.6g} km of {where}: the straight line "
+            f"leaves no error bound at the greatest possible range, {farthest_km!r} km of {where}: the straight line "
             f"from {shown(at_zero)} rad at zero range is {bound:.3g} rad there, found {shown(at_nominal)}",
             "raise it, or lower error_at_zero_range_rad, so that the bound stays positive",
         )
@@ -166,17 +167,16 @@ def _closing_speeds(known: Known) -> Iterator[Problem]:
     """Only closing speeds above zero and below twice the nominal one have labels: a range x means x / (1 + eta)."""
     speed, nominal_range = known.number("nominal", "closing_speed_km_s"), known.number("nominal", "range_km")
     step = known.number("guidance", "step_s")
-    intervals = [known.pair("uncertainty", key) for key in ("z_km", "x_km", "vz_km_s", "vx_km_s")]
-    if known.value("information_set", "model") != Model.GUARANTEED.value or speed is None or None in intervals:
+    box = _box(known, "uncertainty")
+    if known.value("information_set", "model") != Model.GUARANTEED.value or speed is None or box is None:
         return
     if nominal_range is None or step is None:
         return
-    z, x, vz, vx = ((si(pair[0], KILO), si(pair[1], KILO)) for pair in intervals if pair is not None)
-    e = si(speed, KILO)
+    e, vx = si(speed, KILO), box.vx_m_s
     # Of the sensor nothing is asked here.
-    sensor = AngleSensor(si(step), 1.0, 1.0, si(nominal_range, KILO))
+    sensor = AngleSensor(si(step), 0.5, 0.5, si(nominal_range, KILO))
     disturbance = si(known.number("information_set", "disturbance_m_s2") or Decimal(0))
-    plain = SetModel(e, si(step), StateBox(z, x, vz, vx), sensor, disturbance, kind=Model.GUARANTEED)
+    plain = SetModel(e, si(step), box, sensor, disturbance, kind=Model.GUARANTEED)
     parameter, distance = known.number("sun", "gravitational_parameter_km3_s2"), known.number("sun", "distance_km")
     sun = None
     if parameter is not None and distance is not None:

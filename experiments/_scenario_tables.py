@@ -12,16 +12,11 @@ from pydantic import PlainValidator
 
 import guidance
 from experiments.toml_values import (
-    NUMBER,
-    ONE,
-    POSITIVE,
-    ZERO,
+    KILO,
     DecimalPair,
     Degrees,
     Description,
-    Fraction,
     Name,
-    NotNegative,
     Number,
     OneOf,
     Pair,
@@ -32,45 +27,60 @@ from experiments.toml_values import (
     known_name,
 )
 from guidance.noise import NoiseKind, TieRule
-from infoset.model import InitialSet, Model, Recovery
-from sim.scenario import Manoeuvre
+from guidance.thruster import Thruster
+from infoset.limits import limits_of
+from infoset.model import MOST_SECTIONS, InitialSet, Model, Recovery, SetModel, StateBox
+from infoset.sensors import AngleSensor, RangeSensor, RateSensor
+from sim.scenario import Manoeuvre, Scenario, Sun, Target
 
 SCHEMA = 1
 SPEED_OF_LIGHT_KM_S = Decimal("299792.458")
-MOST_SECTIONS = 10_000
+"""A file's speeds have units: none is greater. The core knows numbers alone."""
 
 
 def _strategy(value: object) -> str:
     return known_name(value, tuple(guidance.strategy_names()))
 
 
-_SPEED = Number(least=-SPEED_OF_LIGHT_KM_S, most=SPEED_OF_LIGHT_KM_S)
-_APPROACH = Number(below=ZERO, least=-SPEED_OF_LIGHT_KM_S)
+def _number(owner: type, field: str, power_of_ten: int = 0) -> PlainValidator:
+    """A number within the limits that the dataclass declares, in the unit of the file."""
+    return PlainValidator(Number.of(limits_of(owner, field), power_of_ten))
 
-ClosingSpeed = Annotated[Decimal, PlainValidator(Number(above=ZERO, most=SPEED_OF_LIGHT_KM_S))]
-AngleError = Annotated[Decimal, PlainValidator(Number(above=ZERO, below=ONE))]
+
+_SPEED = Number(least=-SPEED_OF_LIGHT_KM_S, most=SPEED_OF_LIGHT_KM_S)
+_APPROACH = Number(below=Decimal(0), least=-SPEED_OF_LIGHT_KM_S)
+
+ClosingSpeed = Annotated[Decimal, PlainValidator(Number(above=Decimal(0), most=SPEED_OF_LIGHT_KM_S))]
+
+
+def _pair(field: str, *, fixed: bool = False) -> PlainValidator:
+    return PlainValidator(Pair(Number.of(limits_of(StateBox, field), KILO), fixed))
 
 
 class SunTable(Table):
     """[sun]."""
 
-    gravitational_parameter_km3_s2: Positive = key("gravitational parameter of the Sun", "1.324948e11")
-    distance_km: Positive = key("distance of the Sun from the spacecraft at t0", "150.0e6")
+    gravitational_parameter_km3_s2: Annotated[Decimal, _number(Sun, "gravitational_parameter_m3_s2", 3 * KILO)] = key(
+        "gravitational parameter of the Sun", "1.324948e11"
+    )
+    distance_km: Annotated[Decimal, _number(Sun, "distance_m", KILO)] = key(
+        "distance of the Sun from the spacecraft at t0", "150.0e6"
+    )
     direction_deg: Degrees = key("direction of the Sun at t0, from the x axis toward z", "90.0")
 
 
 class NominalTable(Table):
     """[nominal]."""
 
-    range_km: Positive = key("nominal range at t0", "5801.3")
+    range_km: Annotated[Decimal, _number(Scenario, "nominal_range_m", KILO)] = key("nominal range at t0", "5801.3")
     closing_speed_km_s: ClosingSpeed = key("closing speed the on-board model believes in", "58.0")
 
 
 class UncertaintyTable(Table):
     """[uncertainty]."""
 
-    z_km: Annotated[DecimalPair, PlainValidator(Pair(NUMBER))] = key("offset across the approach", "[-10.0, 10.0]")
-    x_km: Annotated[DecimalPair, PlainValidator(Pair(POSITIVE))] = key("range", "[5301.3, 6301.3]")
+    z_km: Annotated[DecimalPair, _pair("z_m")] = key("offset across the approach", "[-10.0, 10.0]")
+    x_km: Annotated[DecimalPair, _pair("x_m")] = key("range", "[5301.3, 6301.3]")
     vz_km_s: Annotated[DecimalPair, PlainValidator(Pair(_SPEED))] = key("speed across", "[-0.1, 0.1]")
     vx_km_s: Annotated[DecimalPair, PlainValidator(Pair(_APPROACH))] = key(
         "speed along x; negative, the object approaches", "[-59.0, -57.0]"
@@ -80,10 +90,10 @@ class UncertaintyTable(Table):
 class DispersionTable(Table):
     """[dispersion]."""
 
-    z_km: Annotated[DecimalPair, PlainValidator(Pair(NUMBER, fixed=True))] = key(
+    z_km: Annotated[DecimalPair, _pair("z_m", fixed=True)] = key(
         "a pair is a uniform interval, a number is fixed", "[-1.0, 1.0]"
     )
-    x_km: Annotated[DecimalPair, PlainValidator(Pair(POSITIVE, fixed=True))] = key("range", "[5701.3, 5901.3]")
+    x_km: Annotated[DecimalPair, _pair("x_m", fixed=True)] = key("range", "[5701.3, 5901.3]")
     vz_km_s: Annotated[DecimalPair, PlainValidator(Pair(_SPEED, fixed=True))] = key("speed across", "[-0.1, 0.1]")
     vx_km_s: Annotated[DecimalPair, PlainValidator(Pair(_APPROACH, fixed=True))] = key(
         "speed along x; negative, the object approaches", "[-58.1, -57.9]"
@@ -93,23 +103,37 @@ class DispersionTable(Table):
 class AngleSensorTable(Table):
     """[angle_sensor]."""
 
-    period_s: Positive = key("time between measurements, a multiple of guidance.step_s", "0.5")
-    error_at_nominal_range_rad: AngleError = key("greatest error at nominal.range_km", "0.00015")
-    error_at_zero_range_rad: AngleError = key("greatest error at range zero; a straight line joins both", "0.00023")
+    period_s: Annotated[Decimal, _number(AngleSensor, "period_s")] = key(
+        "time between measurements, a multiple of guidance.step_s", "0.5"
+    )
+    error_at_nominal_range_rad: Annotated[Decimal, _number(AngleSensor, "error_at_nominal_range_rad")] = key(
+        "greatest error at nominal.range_km", "0.00015"
+    )
+    error_at_zero_range_rad: Annotated[Decimal, _number(AngleSensor, "error_at_zero_range_rad")] = key(
+        "greatest error at range zero; a straight line joins both", "0.00023"
+    )
 
 
 class RangeSensorTable(Table):
     """[range_sensor]."""
 
-    period_s: Positive = key("time between measurements, a multiple of guidance.step_s", "2.0")
-    relative_error: Fraction = key("greatest error as a part of the range", "0.05")
+    period_s: Annotated[Decimal, _number(RangeSensor, "period_s")] = key(
+        "time between measurements, a multiple of guidance.step_s", "2.0"
+    )
+    relative_error: Annotated[Decimal, _number(RangeSensor, "relative_error")] = key(
+        "greatest error as a part of the range", "0.05"
+    )
 
 
 class RateSensorTable(Table):
     """[rate_sensor]."""
 
-    period_s: Positive = key("time between measurements, a multiple of guidance.step_s", "1.0")
-    error_rad_s: Positive = key("greatest error of the line of sight's angular rate", "1e-6")
+    period_s: Annotated[Decimal, _number(RateSensor, "period_s")] = key(
+        "time between measurements, a multiple of guidance.step_s", "1.0"
+    )
+    error_rad_s: Annotated[Decimal, _number(RateSensor, "error_rad_s")] = key(
+        "greatest error of the line of sight's angular rate", "1e-6"
+    )
 
 
 class TargetTable(Table):
@@ -118,8 +142,10 @@ class TargetTable(Table):
     manoeuvre: Annotated[Manoeuvre, PlainValidator(OneOf(Manoeuvre))] = key(
         '"none", "constant", "bang-bang", "random-telegraph" or "worst-case"', '"bang-bang"'
     )
-    acceleration_m_s2: NotNegative = key("its acceleration across", "0.005")
-    switching_period_s: Positive = key(
+    acceleration_m_s2: Annotated[Decimal, _number(Target, "acceleration_m_s2")] = key(
+        "its acceleration across", "0.005"
+    )
+    switching_period_s: Annotated[Decimal, _number(Target, "switching_period_s")] = key(
         "time between changes of side; its mean where they are random", "10.0", default=Decimal(10)
     )
 
@@ -127,18 +153,20 @@ class TargetTable(Table):
 class ThrusterTable(Table):
     """[thruster]."""
 
-    budget_m_s: NotNegative = key("sum of the sizes of all impulses", "1000.0")
-    least_impulse_m_s: NotNegative = key("smaller impulses cannot be given", "0.25")
-    greatest_impulse_m_s: Positive = key("nor greater ones", "7.5")
-    execution_error_relative: Annotated[Decimal, PlainValidator(Number(least=ZERO, below=ONE))] = key(
-        "an impulse may come out greater or less by this part", "0.0", default=ZERO
+    budget_m_s: Annotated[Decimal, _number(Thruster, "budget_m_s")] = key("sum of the sizes of all impulses", "1000.0")
+    least_impulse_m_s: Annotated[Decimal, _number(Thruster, "least_impulse_m_s")] = key(
+        "smaller impulses cannot be given", "0.25"
+    )
+    greatest_impulse_m_s: Annotated[Decimal, _number(Thruster, "greatest_impulse_m_s")] = key("nor greater ones", "7.5")
+    execution_error_relative: Annotated[Decimal, _number(Thruster, "execution_error_relative")] = key(
+        "an impulse may come out greater or less by this part", "0.0", default=Decimal(0)
     )
 
 
 class GuidanceTable(Table):
     """[guidance]."""
 
-    step_s: Positive = key("step of observation and control", "0.5")
+    step_s: Annotated[Decimal, _number(SetModel, "step_s")] = key("step of observation and control", "0.5")
     strategy: Annotated[str, PlainValidator(_strategy)] = key("name of the guidance strategy", '"symmetric-miss"')
     range_threshold_km: Positive = key("hypotheses about to come nearer leave the set", "5.0")
 
@@ -163,7 +191,9 @@ class InformationSetTable(Table):
         '"widened"',
         default=Recovery.WIDENED,
     )
-    disturbance_m_s2: NotNegative = key("bound of the unknown acceleration across, or of the target's", "0.005")
+    disturbance_m_s2: Annotated[Decimal, _number(SetModel, "disturbance_m_s2")] = key(
+        "bound of the unknown acceleration across, or of the target's", "0.005"
+    )
 
 
 class NoiseTable(Table):

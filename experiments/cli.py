@@ -148,9 +148,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         keep_kernels_somewhere()
         commands()(args=None if arguments is None else list(arguments), prog_name="infoset")
-    except KeyboardInterrupt:  # before a command had begun
-        _complain("interrupted")
-        sys.exit(INTERRUPTED)
     except MemoryError:
         _complain("error: there is not enough memory to begin with; give it more")
         sys.exit(INPUT_ERROR)
@@ -188,4 +185,6 @@ def _what_failed(error: OSError) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    from experiments.__main__ import main as begin
+
+    begin()

@@ -105,7 +105,6 @@ def write_file(file: Path, content: str | bytes, *, overwrite: bool = False) -> 
     Parameters
     ----------
     file : Path
-        Where. A link is followed, so that its target is replaced.
     content : str or bytes
         Text is written as UTF-8.
     overwrite : bool
@@ -114,16 +113,15 @@ def write_file(file: Path, content: str | bytes, *, overwrite: bool = False) -> 
     Raises
     ------
     InputError
-        If it cannot be written, or is there already and may not be replaced.
+        If it cannot be written, is a link, or is there already and may not be replaced.
     """
     with _said(file):
         _check_name(file, overwrite)
-        target = file.resolve() if file.is_symlink() else file
-        temporary = _temporary(target)
+        temporary = _temporary(file)
         try:
             with temporary.open("xb") as stream:
                 stream.write(content.encode() if isinstance(content, str) else content)
-            temporary.replace(target)
+            temporary.replace(file)
         finally:
             with contextlib.suppress(OSError, ValueError):
                 temporary.unlink(missing_ok=True)
@@ -231,6 +229,8 @@ def _check_name(file: Path, overwrite: bool) -> None:
     if file.is_dir():
         raise InputError(f"{file}: is a folder; name a file in it, for example {file / 'new-file'}")
     if os.path.lexists(file):
+        if file.is_symlink():
+            raise InputError(f"{file}: is a link, and links are not followed; remove it, or choose another name")
         if not file.is_file():
             raise InputError(f"{file}: exists already and is no ordinary file; choose another name")
         if not overwrite:

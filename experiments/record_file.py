@@ -28,6 +28,7 @@ from experiments.output import library_version, write_file
 from experiments.scenario_file import read_scenario, scenario_to_toml
 from experiments.toml_values import shown
 from infoset import ConvexPolygons, Section
+from infoset.limits import LARGEST, SMALLEST
 from sim import Inconsistency, Outcome, Record, Results, Scenario, StepRecord
 
 FORMAT = "infoset-record"
@@ -379,7 +380,7 @@ def _inconsistency_from_json(found: object, steps: int) -> Inconsistency | None:
     if not isinstance(found, dict) or set(found) != {"step", "label_m"}:
         raise _UnsoundError("its header has a wrong inconsistency")
     step, label = found["step"], found["label_m"]
-    if not (_is_whole(step) and step < steps and isinstance(label, float) and np.isfinite(label)):
+    if not (_is_whole(step) and step < steps and isinstance(label, float) and abs(label) <= LARGEST):
         raise _UnsoundError("its header has a wrong inconsistency")
     return Inconsistency(step, label)
 
@@ -404,6 +405,8 @@ def _check(arrays: Arrays) -> None:
             raise _UnsoundError(f"{name} has {len(values)} rows, not {wanted}")
         if values.dtype.kind == "f" and not np.isfinite(values).all():
             raise _UnsoundError(f"{name} holds what is not a finite number")
+        if values.dtype.kind == "f" and values.size and np.abs(values).max() > LARGEST:
+            raise _UnsoundError(f"{name} holds {np.abs(values).max():.3g}, more than {LARGEST:g} in size")
     if steps == 0:
         raise _UnsoundError("it has no step")
     if (np.diff(arrays["time_s"]) <= 0.0).any() or arrays["time_s"][0] < 0.0:
@@ -415,8 +418,11 @@ def _check(arrays: Arrays) -> None:
             raise _UnsoundError(f"{name} does not run from 0 to {size}")
         if (np.diff(offsets) < least).any():
             raise _UnsoundError(f"{name} does not rise")
-    if (arrays["section_range_m"] <= 0.0).any():
-        raise _UnsoundError("section_range_m holds a range that is not positive")
+    if (arrays["section_range_m"] < SMALLEST).any():
+        raise _UnsoundError(f"section_range_m holds a range that is not positive, at least {SMALLEST:g}")
+    for name in ("measured_range_m", "true_range_m"):
+        if (arrays[name] < 0.0).any():
+            raise _UnsoundError(f"{name} holds a range that is negative")
 
 
 def _result_from_json(found: object, run: int, guarantees: bool) -> Results:
@@ -428,8 +434,10 @@ def _result_from_json(found: object, run: int, guarantees: bool) -> Results:
     if not all(isinstance(pair, list) and len(pair) == 2 for pair in pairs):
         raise _UnsoundError("its header has a wrong start")
     numbers = [miss, impulse, *pairs[0], *pairs[1], *(each for each in (guaranteed, margin) if each is not None)]
-    if not all(isinstance(each, float) and np.isfinite(each) for each in numbers) or not isinstance(kept, bool):
+    if not all(isinstance(each, float) and abs(each) <= LARGEST for each in numbers) or not isinstance(kept, bool):
         raise _UnsoundError("its header has a wrong result")
+    if min(miss, impulse, guaranteed or 0.0) < 0.0:
+        raise _UnsoundError("its header has a negative miss or impulse")
     if outcome not in [each.value for each in Outcome]:
         raise _UnsoundError(f"its header has the outcome {shown(outcome)}")
     return Results(

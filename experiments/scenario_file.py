@@ -92,7 +92,7 @@ def load_scenario(name_or_path: str | os.PathLike[str]) -> Scenario:
     InputError
         If there is no such scenario or file, or the file is not a sound scenario; all its problems are named.
     """
-    return _to_scenario(load_tables(FORM, name_or_path))
+    return _to_scenario(load_tables(FORM, name_or_path), str(name_or_path))
 
 
 def read_scenario(text: str, source: str) -> Scenario:
@@ -115,7 +115,7 @@ def read_scenario(text: str, source: str) -> Scenario:
     InputError
         With every problem of the text: where it is, the value found and the remedy.
     """
-    return _to_scenario(read_tables(FORM, text, source))
+    return _to_scenario(read_tables(FORM, text, source), source)
 
 
 def scenario_warnings(scenario: Scenario) -> list[str]:
@@ -306,8 +306,18 @@ def _state_box(table: UncertaintyTable | DispersionTable) -> StateBox:
     )
 
 
-def _to_scenario(tables: ScenarioTables) -> Scenario:
+def _to_scenario(tables: ScenarioTables, source: str) -> Scenario:
     """Change units and compose the dataclasses of the core."""
+    try:
+        return _composed(tables)
+    except ValueError as error:
+        # The decimals keep to the limits; two that differ beyond the sixteenth digit are one number in the core.
+        raise InputError(
+            f"{source}: {error}; numbers are rounded to 16 digits: change it in the first of them"
+        ) from None
+
+
+def _composed(tables: ScenarioTables) -> Scenario:
     information_set, sun, range_sensor = tables.information_set, tables.sun, tables.range_sensor
     rate_sensor, target = tables.rate_sensor, tables.target
     nominal_range_m = si(tables.nominal.range_km, KILO)

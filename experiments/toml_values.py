@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, PlainValidator
 from pydantic_core import PydanticCustomError
 
 from experiments.errors import InputError
+from infoset.limits import Limits
 
 LARGEST = Decimal("1e15")
 SMALLEST = Decimal("1e-100")
@@ -111,6 +112,14 @@ class Number:
     least: Decimal | None = None
     below: Decimal | None = None
     most: Decimal | None = None
+
+    @classmethod
+    def of(cls, limits: Limits, power_of_ten: int = 0) -> Number:
+        """Return what a file may hold of a number with limits in SI, in a unit 10^power_of_ten times as great."""
+        ends = (limits.above, limits.least, limits.below, limits.most)
+        return cls(
+            *(None if end is None else Decimal(repr(end)).scaleb(-power_of_ten, _EXACT).normalize() for end in ends)
+        )
 
     def problem(self, value: object) -> str | None:
         """Return what is wrong with a value, or None."""

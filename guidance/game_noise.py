@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.noise import LineOfSight, Measurement, TieRule
+from guidance.noise import LineOfSight, Measurement, TieRule, need_draws
 from infoset import InformationSetView, PredictedMiss
 
 Floats = NDArray[np.float64]
@@ -27,6 +27,11 @@ class GameNoise:
     tie_draws : ndarray, shape (B, steps)
         Uniform in [-1, 1], used by `TieRule.RANDOM`: the upper extreme where the draw is not negative.
 
+    Raises
+    ------
+    TypeError, ValueError
+        If the rule is none, a draw is not within [-1, 1], or the array not of shape (B, steps).
+
     References
     ----------
     Kumkov and Patsko (1997), section 7.
@@ -34,6 +39,11 @@ class GameNoise:
 
     tie: TieRule
     tie_draws: Floats
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.tie, TieRule):
+            raise TypeError(f"tie must be a TieRule, for example TieRule.UPPER: got {self.tie!r}")
+        need_draws("tie_draws", self.tie_draws)
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
         """Choose the measurements of a step; the truth itself where no set is left to play against."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from guidance.estimated_miss import impulse_beyond_dead_zone
 from guidance.situation import Situation
+from infoset.limits import COUNT, NOT_NEGATIVE
 
 Floats = NDArray[np.float64]
 
@@ -49,6 +50,11 @@ class Kalman:
         Standard deviation of the acceleration along z, constant over a step and independent from step to step,
         in units of that of an acceleration uniform within the bound of the set's model.
 
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is negative or not finite, or there is no filter.
+
     Notes
     -----
     An extended Kalman filter with the state (z, V_z, x, closing speed), z' = V_z, x' = -closing speed, and the impulses
@@ -75,6 +81,9 @@ class Kalman:
     def __init__(
         self, dead_zone: float = 1.0, last_s: float = 3.0, members: int = 9, process_noise: float = 1.0
     ) -> None:
+        for name, value in (("dead_zone", dead_zone), ("last_s", last_s), ("process_noise", process_noise)):
+            NOT_NEGATIVE.need(name, value)
+        COUNT.need("members", members)
         self.dead_zone = dead_zone
         self.last_s = last_s
         self.members = members

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from guidance.estimated_miss import impulse_beyond_dead_zone
 from guidance.situation import Situation
+from infoset.limits import COUNT, NOT_NEGATIVE
 
 Floats = NDArray[np.float64]
 
@@ -83,6 +84,11 @@ class LeastSquares:
     iterations : int
         Gauss-Newton steps after each measurement, from the fit before.
 
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is negative or not finite, or there is no step.
+
     Notes
     -----
     The motion is z(t) = z_0 + V_0 t - sum k_j (t - t_j), x(t) = x_0 - c t: four unknowns, and the impulses really
@@ -104,6 +110,9 @@ class LeastSquares:
     name = "least-squares"
 
     def __init__(self, dead_zone: float = 1.0, last_s: float = 3.0, iterations: int = 3) -> None:
+        for name, value in (("dead_zone", dead_zone), ("last_s", last_s)):
+            NOT_NEGATIVE.need(name, value)
+        COUNT.need("iterations", iterations)
         self.dead_zone = dead_zone
         self.last_s = last_s
         self.iterations = iterations

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import PredictedMiss
+from infoset.limits import POSITIVE
 
 Floats = NDArray[np.float64]
 
@@ -29,6 +30,7 @@ def zero_effort_miss(omega_rad_s: Floats, range_m: Floats, closing_speed_m_s: fl
     ----------
     Kumkov and Patsko (1997), section 5, with the sign kept.
     """
+    POSITIVE.need("closing_speed_m_s", closing_speed_m_s)
     return omega_rad_s * range_m**2 / closing_speed_m_s
 
 
@@ -51,6 +53,7 @@ def symmetric_impulse(interval: PredictedMiss, closing_speed_m_s: float) -> Floa
     ----------
     Kumkov and Patsko (1997), equation (15).
     """
+    POSITIVE.need("closing_speed_m_s", closing_speed_m_s)
     ranges = interval.upper_point.range_m + interval.lower_point.range_m
     wanted = (interval.upper_m + interval.lower_m) * closing_speed_m_s
     return np.divide(wanted, ranges, out=np.zeros_like(ranges), where=interval.exists)

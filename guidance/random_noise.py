@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.noise import LineOfSight, Measurement
+from guidance.noise import LineOfSight, Measurement, need_draws
 from guidance.scripted_noise import measure_with_errors
 from infoset import InformationSetView
 
@@ -25,6 +25,11 @@ class RandomNoise:
     rate_draws : ndarray, shape (B, steps), or None
         The same for the angular rate, in [-1, 1]; None is no error.
 
+    Raises
+    ------
+    TypeError, ValueError
+        If a draw is not within [-1, 1], or an array not of shape (B, steps).
+
     References
     ----------
     Kumkov and Patsko (1997), section 7.
@@ -33,6 +38,12 @@ class RandomNoise:
     angle_draws: Floats
     range_draws: Floats
     rate_draws: Floats | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("angle_draws", "range_draws", "rate_draws"):
+            draws = getattr(self, name)
+            if draws is not None or name != "rate_draws":
+                need_draws(name, draws)
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
         """Draw the measurements of a step; the set is not looked at."""

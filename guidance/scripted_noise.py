@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.noise import LineOfSight, Measurement
+from guidance.noise import LineOfSight, Measurement, need_draws
 from infoset import InformationSetView
 
 Floats = NDArray[np.float64]
@@ -50,10 +50,9 @@ class ScriptedNoise:
             errors = getattr(self, name)
             if errors is None:
                 continue
-            if errors.ndim != 2 or errors.shape != self.angle_errors.shape:
+            need_draws(name, errors)
+            if errors.shape != self.angle_errors.shape:
                 raise ValueError(f"{name} must have the shape (B, steps), the same for all: got {errors.shape}")
-            if not (np.abs(errors) <= 1.0).all():  # refuses NaN as well
-                raise ValueError(f"{name} must lie within [-1, 1], in units of the bound")
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
         """Make the measurements of a step; the set is not looked at.

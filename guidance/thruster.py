@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from infoset.limits import NotNegative, Part, Positive, check_fields
+
 
 @dataclass(frozen=True)
 class Thruster:
@@ -21,15 +23,28 @@ class Thruster:
     execution_error_relative : float
         Bound delta of |given / commanded - 1|: an impulse k comes out as k (1 + error).
 
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not a number within its limits, or mu1 exceeds mu2.
+
     References
     ----------
     Kumkov and Patsko (1997), equation (3).
     """
 
-    budget_m_s: float
-    least_impulse_m_s: float
-    greatest_impulse_m_s: float
-    execution_error_relative: float = 0.0
+    budget_m_s: NotNegative
+    least_impulse_m_s: NotNegative
+    greatest_impulse_m_s: Positive
+    execution_error_relative: Part = 0.0
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.least_impulse_m_s > self.greatest_impulse_m_s:
+            raise ValueError(
+                f"Thruster: least_impulse_m_s must not exceed greatest_impulse_m_s, {self.greatest_impulse_m_s:g}: "
+                f"got {self.least_impulse_m_s!r}"
+            )
 
     def give(self, wanted_m_s: NDArray[np.float64], budget_left_m_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """Impulses that the engine gives when a strategy wants these.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -9,10 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from infoset import polygon, polygon_hull, polygon_sum
 from infoset._compile import compiled
+from infoset.limits import Limits, need_pair, real_values, shown
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+_CAP = Limits(least=4, whole=True)
 _NAMES = ("empty set", "point", "segment", "triangle", "quadrangle", "pentagon", "hexagon")
 
 
@@ -28,8 +31,10 @@ class ConvexPolygons:
 
     Raises
     ------
+    TypeError
+        If a vertex or a count is no real number.
     ValueError
-        If shapes disagree or a vertex is not finite.
+        If shapes disagree, a vertex is not finite or a count no whole number.
 
     Notes
     -----
@@ -38,8 +43,11 @@ class ConvexPolygons:
     """
 
     def __init__(self, vertices: ArrayLike, counts: ArrayLike) -> None:
-        self.counts: Integers = np.asarray(counts, dtype=np.int64)
-        self.vertices: Floats = np.asarray(vertices, dtype=np.float64)
+        counted = real_values("counts", counts)
+        if not np.isfinite(counted).all() or (counted != np.floor(counted)).any():
+            raise ValueError(f"counts must be whole numbers: got {shown(counts)}")
+        self.counts: Integers = counted.astype(np.int64)
+        self.vertices: Floats = real_values("vertices", vertices)
         if self.vertices.ndim < 2 or self.vertices.shape[-1] != 2 or self.vertices.shape[:-2] != self.counts.shape:
             raise ValueError(
                 f"vertices of shape (..., V, 2) and counts of shape (...) are needed: "
@@ -68,9 +76,11 @@ class ConvexPolygons:
         Raises
         ------
         ValueError
-            If a point is not finite.
+            If a point is not finite, or not of two coordinates.
         """
-        given = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+        given = real_values("points", points)
+        if given.size and given.shape[1:] != (2,):
+            raise ValueError(f"points must have the shape (n, 2): got {given.shape}")
         if not np.isfinite(given).all():
             raise ValueError("points must be finite")
         if len(given) == 0:
@@ -88,8 +98,8 @@ class ConvexPolygons:
         ValueError
             If an interval is reversed.
         """
-        if x[0] > x[1] or y[0] > y[1]:
-            raise ValueError(f"an interval is reversed: x = {x}, y = {y}")
+        need_pair("x", x)
+        need_pair("y", y)
         corners = [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])]
         distinct = list(dict.fromkeys(corners))
         return cls(np.array(distinct), len(distinct))
@@ -183,7 +193,7 @@ class ConvexPolygons:
         ValueError
             If the matrix is not finite.
         """
-        matrices = np.broadcast_to(np.asarray(matrix, dtype=np.float64), (*self.shape, 2, 2)).reshape(-1, 2, 2)
+        matrices = self._spread(real_values("matrix", matrix), "matrix", (2, 2)).reshape(-1, 2, 2)
         if not np.isfinite(matrices).all():
             raise ValueError("matrix must be finite")
         return self._make(0, _map_each, np.ascontiguousarray(matrices))
@@ -261,8 +271,7 @@ class ConvexPolygons:
         ValueError
             If `cap` is less than 4.
         """
-        if cap < 4:
-            raise ValueError(f"cap must be at least 4: got {cap}")
+        _CAP.need("cap", cap)
         return self._make(0, _reduce_each, np.full(self.counts.size, cap))
 
     def _need_points(self, what: str) -> None:
@@ -270,16 +279,26 @@ class ConvexPolygons:
             raise ValueError(f"the empty set has no {what}")
 
     def _vectors(self, value: ArrayLike, name: str) -> Floats:
-        vectors = np.asarray(value, dtype=np.float64)
+        vectors = real_values(name, value)
         if vectors.shape[-1:] != (2,) or not np.isfinite(vectors).all():
-            raise ValueError(f"{name} must be finite, of shape (2,) or (..., 2): got {value!r}")
-        return np.ascontiguousarray(np.broadcast_to(vectors, (*self.shape, 2)).reshape(-1, 2))
+            raise ValueError(f"{name} must be finite, of shape (2,) or (..., 2): got {shown(value)}")
+        return np.ascontiguousarray(self._spread(vectors, name, (2,)).reshape(-1, 2))
 
     def _scalars(self, value: ArrayLike, name: str) -> Floats:
-        scalars = np.asarray(value, dtype=np.float64)
+        scalars = real_values(name, value)
         if np.isnan(scalars).any():
             raise ValueError(f"{name} must be a number: got {value!r}")
-        return np.ascontiguousarray(np.broadcast_to(scalars, self.shape).reshape(-1))
+        return np.ascontiguousarray(self._spread(scalars, name, ()).reshape(-1))
+
+    def _spread(self, values: Floats, name: str, last: tuple[int, ...]) -> Floats:
+        """Broadcast over the batch; `last` is the shape of what belongs to one polygon."""
+        shape = (*self.shape, *last)
+        with contextlib.suppress(ValueError):
+            if not last or values.shape[-len(last) :] == last:
+                return np.broadcast_to(values, shape)
+        raise ValueError(
+            f"{name} must have the shape {last}, or one that can be broadcast to {shape}: got {values.shape}"
+        )
 
     def _broadcast(self, shape: tuple[int, ...]) -> ConvexPolygons:
         return ConvexPolygons(

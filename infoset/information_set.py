@@ -9,6 +9,7 @@ from infoset import section_life
 from infoset.guaranteed_miss import GuaranteedMiss
 from infoset.history import History
 from infoset.information_set_view import Flags, Floats, InformationSetView, SetStatus
+from infoset.limits import COUNT, NOT_NEGATIVE, PART, flags, real_array, shown
 from infoset.location import refine_all, workspace
 from infoset.model import InitialSet, Recovery, SetModel
 from infoset.section_law import BOUND_SLACK, section_law
@@ -28,6 +29,11 @@ class InformationSet(InformationSetView):
     guarantee : bool
         Whether to keep the guaranteed miss Phi: only the guaranteed model, started from a box, has one. It takes about
         as long as the rest.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the model is of another type, the batch is no count, or the model has no labels.
 
     Examples
     --------
@@ -50,6 +56,9 @@ class InformationSet(InformationSetView):
     """
 
     def __init__(self, model: SetModel, batch: int = 1, *, guarantee: bool = True) -> None:
+        if not isinstance(model, SetModel):
+            raise TypeError(f"model must be a SetModel: got {shown(model)}")
+        COUNT.need("batch", batch)
         least, greatest = model.label_limits_m
         slots = max(model.sections, 2 * model.fewest_sections + 1)
         labels = np.full((batch, slots), greatest)
@@ -108,18 +117,26 @@ class InformationSet(InformationSetView):
         range_m : array_like, shape () or (B,)
             Measured range x_m, m.
         relative_error : float
-            Bound b.
+            Bound b, in [0, 1).
         where : array_like of bool, shape () or (B,)
             Which engagements have measured.
         alpha_rad : array_like, shape () or (B,), or None
             Angle measured at the same moment: in the guaranteed model the distance measured is x / cos(alpha). Without
             it alpha is bounded by how far the object can have gone.
 
+        Raises
+        ------
+        TypeError, ValueError
+            If a value is not finite, the range is negative, or the error bound is not in [0, 1).
+
         Notes
         -----
         A range measurement cuts no polygon: it narrows the interval of labels.
         """
+        PART.need("relative_error", relative_error)
         measured = self._spread(range_m, "range_m")
+        if (measured < 0.0).any():
+            raise ValueError(f"range_m must not be negative: got {shown(range_m)}")
         active = self._active(where)
         travelled = self.model.closing_speed_m_s * self.time_s
         slack = section_life.CUT_SLACK * (measured + travelled)
@@ -184,6 +201,7 @@ class InformationSet(InformationSetView):
         ----------
         Kumkov and Patsko (2001).
         """
+        NOT_NEGATIVE.need("error_rad_s", error_rad_s)
         measured = self._spread(omega_rad_s, "omega_rad_s")
         active = self._active(where)
         error = error_rad_s * (1.0 + BOUND_SLACK)
@@ -266,13 +284,10 @@ class InformationSet(InformationSetView):
         self._stack.sections.living[stopped] = False
 
     def _spread(self, value: ArrayLike, name: str) -> Floats:
-        values = np.asarray(value, dtype=np.float64)
-        if not np.isfinite(values).all():
-            raise ValueError(f"{name} must be finite: got {value!r}")
-        return values if values.shape == (self.batch,) else np.ascontiguousarray(np.broadcast_to(values, self.batch))
+        return real_array(name, value, (self.batch,))
 
     def _active(self, where: ArrayLike) -> Flags:
-        return np.asarray(self.tracking & np.asarray(where, dtype=bool))
+        return np.asarray(self.tracking & flags("where", where, (self.batch,)))
 
     def _keep_enough(self, active: Flags, emptied: SetStatus) -> Flags:
         """Re-grid where fewer than the fewest sections are left; note, and return, where nothing lives any more."""

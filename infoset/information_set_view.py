@@ -14,6 +14,7 @@ from infoset.chains import empty_sections, working_room
 from infoset.convex_polygons import ConvexPolygons
 from infoset.guaranteed_miss import GuaranteedMiss
 from infoset.history import History
+from infoset.limits import NUMBER, POSITIVE, WHOLE
 from infoset.model import SetModel
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.section_stack import SectionStack, outline
@@ -91,6 +92,8 @@ def to_omega_alpha(polygon: ConvexPolygons, range_m: float, closing_speed_m_s: f
     ConvexPolygons
         omega = (V + e z/x)/x in rad/s, alpha = z/x in rad.
     """
+    POSITIVE.need("range_m", range_m)
+    POSITIVE.need("closing_speed_m_s", closing_speed_m_s)
     x, e = range_m, closing_speed_m_s
     return polygon.linear_map(np.array([[1.0 / x, e / x**2], [0.0, 1.0 / x]]))
 
@@ -253,6 +256,7 @@ class InformationSetView:
 
     def sections(self, engagement: int = 0) -> list[Section]:
         """Living sections of one engagement, in rising order of range."""
+        self._need_engagement(engagement)
         ranges = self.ranges_m[engagement]
         return [
             Section(
@@ -283,6 +287,8 @@ class InformationSetView:
         -----
         Some 30 ns an event of the history.
         """
+        NUMBER.need("label_m", label_m)
+        self._need_engagement(engagement)
         tape, law, label = self._history, self._stack.law, float(label_m)
         section = empty_sections(1)
         died = section_life.replay(
@@ -309,11 +315,18 @@ class InformationSetView:
         float
             Distance to the boundary, m, with V counted as V x/e, the miss that it is worth; -inf if refuted.
         """
+        NUMBER.need("alpha_rad", alpha_rad)
+        NUMBER.need("omega_rad_s", omega_rad_s)
         section = self.section_at(label_m, engagement)
         x, e = section.range_m, section.closing_speed_m_s
         scaled = section.polygon.linear_map(np.array([[x / e, 0.0], [0.0, 1.0]]))
         z, v = alpha_rad * x, omega_rad_s * x - e * alpha_rad
         return float(scaled.margin(np.array([v * x / e, z])))
+
+    def _need_engagement(self, engagement: int) -> None:
+        WHOLE.need("engagement", engagement)
+        if engagement >= self.batch:
+            raise IndexError(f"engagement must be less than {self.batch}, their number: got {engagement}")
 
     def living_range_interval_m(self) -> tuple[Floats, Floats]:
         """Exact ends of the ranges that agree with the history, found by replay between the stored sections.

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
+from typing import Annotated
 
+from infoset.limits import NUMBER, POSITIVE, Limits, NotNegative, Part, Positive, check_fields
 from infoset.sensors import AngleSensor
 
 Interval = tuple[float, float]
+
+MOST_SECTIONS = 10_000
+
+_APPROACH = Limits(below=0.0)
+_SECTIONS = Limits(least=1, most=MOST_SECTIONS, whole=True)
 
 
 LEAST_RANGE = 1e-9
@@ -56,12 +64,32 @@ class StateBox:
         Least and greatest lateral offset and range, m.
     vz_m_s, vx_m_s : tuple of float
         Least and greatest relative velocity along z and x, m/s (vx is negative: the object approaches).
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an interval is not a pair of numbers within their limits, or is reversed.
     """
 
-    z_m: Interval
-    x_m: Interval
-    vz_m_s: Interval
-    vx_m_s: Interval
+    z_m: Annotated[Interval, NUMBER]
+    x_m: Annotated[Interval, POSITIVE]
+    vz_m_s: Annotated[Interval, NUMBER]
+    vx_m_s: Annotated[Interval, _APPROACH]
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @property
+    def farthest_m(self) -> float:
+        """Greatest distance until x = 0, m.
+
+        Notes
+        -----
+        Without impulses the distance is a convex function of time: it is greatest at the start or at the end.
+        """
+        offset, greatest = max(abs(z) for z in self.z_m), self.x_m[1]
+        across = max(abs(v) for v in self.vz_m_s)
+        return max(math.hypot(greatest, offset), offset + across * (greatest / -self.vx_m_s[1]))
 
 
 @dataclass(frozen=True)
@@ -100,25 +128,64 @@ class SetModel:
     execution_error_relative : float
         Bound of |given / commanded - 1| of an impulse; only the guaranteed model counts it.
 
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not within its limits, or two of them contradict each other.
+
     References
     ----------
     Kumkov and Patsko (1997), equation (9) and section 4.
     """
 
-    closing_speed_m_s: float
-    step_s: float
+    closing_speed_m_s: Positive
+    step_s: Positive
     bounds: StateBox
     angle_sensor: AngleSensor
-    disturbance_m_s2: float = 0.0
-    range_threshold_m: float = 0.0
-    sections: int = 29
-    fewest_sections: int = 5
+    disturbance_m_s2: NotNegative = 0.0
+    range_threshold_m: NotNegative = 0.0
+    sections: Annotated[int, _SECTIONS] = 29
+    fewest_sections: Annotated[int, _SECTIONS] = 5
     initial_set: InitialSet = InitialSet.RECTANGLE
     kind: Model = Model.PAPER
     recovery: Recovery = Recovery.WIDENED
-    gravity_m_s2: float = 0.0
-    gravity_speed_change: float = 0.0
-    execution_error_relative: float = 0.0
+    gravity_m_s2: NotNegative = 0.0
+    gravity_speed_change: NotNegative = 0.0
+    execution_error_relative: Part = 0.0
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.sections < self.fewest_sections:
+            raise ValueError(
+                f"SetModel: sections must be at least fewest_sections, {self.fewest_sections}: got {self.sections}"
+            )
+        self.check_start("bounds", self.bounds)
+
+    def check_start(self, name: str, box: StateBox) -> None:
+        """Refuse a box of starts that reaches below the threshold, or in which the angle's error bound vanishes.
+
+        Parameters
+        ----------
+        name : str
+            Of the box, for the message.
+        box : StateBox
+
+        Raises
+        ------
+        ValueError
+            If it is.
+        """
+        if self.range_threshold_m >= box.x_m[0]:
+            raise ValueError(
+                f"range_threshold_m must be less than the least range of {name}, {box.x_m[0]:g} m: "
+                f"got {self.range_threshold_m!r}"
+            )
+        bound = self.angle_sensor.error_bound(box.farthest_m)
+        if not bound > 0.0:
+            raise ValueError(
+                f"angle_sensor: its error bound must be positive up to the greatest distance of {name}, "
+                f"{box.farthest_m:g} m: got {bound:.3g} rad there"
+            )
 
     @property
     def is_guaranteed(self) -> bool:
@@ -154,7 +221,18 @@ class SetModel:
 
     @property
     def label_limits_m(self) -> Interval:
-        """Least and greatest label of a truth, m: its range at t = 0 divided by 1 + eta."""
+        """Least and greatest label of a truth, m: its range at t = 0 divided by 1 + eta.
+
+        Raises
+        ------
+        ValueError
+            If eta may be 1 or more: the guaranteed model has no labels then.
+        """
         least, greatest = self.bounds.x_m
         eta = self.speed_error
+        if eta >= 1.0:
+            raise ValueError(
+                "SetModel: in the guaranteed model the closing speed must be known to within itself: bounds.vx_m_s and "
+                f"gravity_speed_change let it differ by {eta:.3g} of closing_speed_m_s, {self.closing_speed_m_s:g} m/s"
+            )
         return least / (1.0 + eta), greatest / (1.0 - eta)

@@ -8,6 +8,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from infoset.limits import Fraction, Positive, check_fields
+
 RangeOrRanges = TypeVar("RangeOrRanges", float, NDArray[np.float64])
 
 
@@ -20,19 +22,27 @@ class AngleSensor:
     period_s : float
         Time between measurements, s; the first is at t = 0.
     error_at_nominal_range_rad, error_at_zero_range_rad : float
-        Bound a + h(d) at `nominal_range_m` and at zero range, rad. The same line continues beyond.
+        Bound a + h(d) at `nominal_range_m` and at zero range, rad, in (0, 1). The same line continues beyond.
     nominal_range_m : float
         Range at which the first of the two holds, m.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not a number within its limits.
 
     References
     ----------
     Kumkov and Patsko (1997), equations (4) and (10).
     """
 
-    period_s: float
-    error_at_nominal_range_rad: float
-    error_at_zero_range_rad: float
-    nominal_range_m: float
+    period_s: Positive
+    error_at_nominal_range_rad: Fraction
+    error_at_zero_range_rad: Fraction
+    nominal_range_m: Positive
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
     @property
     def error_slope_rad_per_m(self) -> float:
@@ -55,13 +65,21 @@ class RangeSensor:
     relative_error : float
         Greatest |d_m - d| / d, in (0, 1).
 
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not a number within its limits.
+
     References
     ----------
     Kumkov and Patsko (1997), equations (5) and (11).
     """
 
-    period_s: float
-    relative_error: float
+    period_s: Positive
+    relative_error: Fraction
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -75,10 +93,18 @@ class RateSensor:
     error_rad_s : float
         Greatest |omega_m - omega|, rad/s.
 
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not a number within its limits.
+
     References
     ----------
     Kumkov and Patsko (2001).
     """
 
-    period_s: float
-    error_rad_s: float
+    period_s: Positive
+    error_rad_s: Positive
+
+    def __post_init__(self) -> None:
+        check_fields(self)

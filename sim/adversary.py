@@ -14,6 +14,7 @@ import numpy as np
 from guidance import Strategy, TieRule, make_strategy
 from guidance.scripted_noise import ScriptedNoise
 from infoset import StateBox
+from infoset.limits import INTEGER
 from sim.draws import corners, draw
 from sim.engagement import Engagements
 from sim.planned_flights import ANGLE, RANGE, RATE, Floats, Flown, PlannedNoise, Plans
@@ -162,6 +163,8 @@ def find_worst(
     ----------
     Kumkov and Patsko (1997), section 7: the rule of the game noise, here one plan of many.
     """
+    for name, count in (("budget", budget), ("threads", threads), ("seed", seed)):
+        INTEGER.need(name, count)
     if budget < 1 or threads < 1 or seed < 0:
         raise ValueError(
             f"need a positive budget and number of threads, and a seed not negative: got budget={budget}, "

@@ -169,7 +169,7 @@ class Campaign:
 
     @property
     def _noise(self) -> CampaignNoise:
-        return CampaignNoise(self.scenario.noise.value) if self.noise is None else self.noise
+        return CampaignNoise(self.scenario.noise.value if self.noise is None else self.noise)
 
     @property
     def _scenario(self) -> Scenario:

@@ -18,6 +18,8 @@ from guidance import (
     Strategy,
     make_strategy,
 )
+from guidance.noise import checked_measurement
+from guidance.strategy import checked_impulses
 from infoset import InformationSet, InformationSetView, PredictedMiss
 from infoset.information_set_view import MaskedFloats, MaskedIntegers
 from sim.draws import Draws
@@ -208,18 +210,16 @@ class Engagements:
         rating = rate_sensor is not None and self.step % self._rate_every == 0
         if not (looking or ranging or rating):
             return None, None, None
-        measurement = self._noise.measure(
-            LineOfSight(
-                self.step,
-                sight.alpha_rad,
-                sight.range_m,
-                self.scenario.set_model.angle_sensor,
-                sensor.relative_error if sensor is not None and ranging else None,
-                sight.omega_rad_s,
-                rate_sensor.error_rad_s if rate_sensor is not None and rating else None,
-            ),
-            self._view,
+        asked = LineOfSight(
+            self.step,
+            sight.alpha_rad,
+            sight.range_m,
+            self.scenario.set_model.angle_sensor,
+            sensor.relative_error if sensor is not None and ranging else None,
+            sight.omega_rad_s,
+            rate_sensor.error_rad_s if rate_sensor is not None and rating else None,
         )
+        measurement = checked_measurement(self._noise.measure(asked, self._view), asked, self._noise)
         if measurement.range_m is not None and sensor is not None:
             self._information.measure_range(
                 measurement.range_m,
@@ -275,14 +275,8 @@ class Engagements:
             range_is_new=self._range_every > 0 and self.step % self._range_every == 0,
             range_sensor=self.scenario.range_sensor,
         )
-        wanted = np.asarray(self._strategy.decide(situation, self._state), dtype=np.float64)
-        if wanted.shape != (self._batch,) or not np.isfinite(wanted[self._tracking]).all():
-            name = type(self._strategy).__name__
-            raise ValueError(
-                f"strategy {name} must return {self._batch} finite impulses (m/s), one an engagement: "
-                f"at step {self.step} it returned shape {wanted.shape}, {wanted}"
-            )
-        return wanted
+        wanted = self._strategy.decide(situation, self._state)
+        return checked_impulses(wanted, self._tracking, self._strategy, self.step)
 
     def _finish_labels(self) -> None:
         """Let labels leave below the threshold, and note the predicted miss of those that do."""

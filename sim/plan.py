@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from guidance import NoiseKind, Strategy
+from infoset.limits import INTEGER
 from sim.chunk import Chunk
 from sim.scenario import Scenario
 from sim.simulate import ENGAGEMENTS_AT_ONCE
@@ -43,7 +44,7 @@ class Plan:
 
     Raises
     ------
-    ValueError
+    TypeError, ValueError
         If the numbers make no campaign.
     """
 
@@ -56,6 +57,8 @@ class Plan:
     strategy: Strategy | None = None
 
     def __post_init__(self) -> None:
+        for name in ("runs", "chunk", "seed"):
+            INTEGER.need(name, getattr(self, name))
         if not self.scenarios or self.runs < 1 or self.chunk < 1 or self.seed < 0:
             raise ValueError(
                 "a campaign needs a scenario, at least one run, chunks of at least one and a seed not negative: got "

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from guidance import MeasurementNoise, Strategy
 from infoset import Section
 from infoset.information_set_view import MaskedFloats
+from infoset.limits import WHOLE
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.results import Results
@@ -165,11 +166,11 @@ def fly_one(
 
     Raises
     ------
-    ValueError
-        If `run` or `seed` is negative.
+    TypeError, ValueError
+        If `run` or `seed` is negative or no integer, or a strategy or noise of your own returns what it must not.
     """
-    if run < 0 or seed < 0:
-        raise ValueError(f"run and seed must not be negative: got run={run}, seed={seed}")
+    WHOLE.need("run", run)
+    WHOLE.need("seed", seed)
     draws = draw(scenario, [run], seed)
     flight = Engagements(scenario, draws, strategy, noise=noise)
     recorder = _Recorder()

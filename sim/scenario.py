@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
+from typing import Annotated
 
 from guidance.noise import NoiseKind, TieRule
 from guidance.strategy import Strategy
 from guidance.thruster import Thruster
+from infoset.limits import Limits, NotNegative, Positive, check_fields
 from infoset.model import SetModel, StateBox
 from infoset.sensors import RangeSensor, RateSensor
+
+_DIRECTION = Limits(least=-2.0 * math.pi, most=2.0 * math.pi)
 
 
 @dataclass(frozen=True)
@@ -24,11 +29,19 @@ class Sun:
         Distance from the spacecraft at t = 0, m.
     direction_rad : float
         Direction of the Sun seen from the spacecraft at t = 0, from the x axis toward z, rad.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not a number within its limits.
     """
 
-    gravitational_parameter_m3_s2: float
-    distance_m: float
-    direction_rad: float
+    gravitational_parameter_m3_s2: Positive
+    distance_m: Positive
+    direction_rad: Annotated[float, _DIRECTION]
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 class Manoeuvre(Enum):
@@ -56,11 +69,19 @@ class Target:
         Its acceleration along z, m/s^2.
     switching_period_s : float
         Time between changes of side (bang-bang), or its mean (random telegraph), s.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not within its limits.
     """
 
     manoeuvre: Manoeuvre
-    acceleration_m_s2: float
-    switching_period_s: float = 10.0
+    acceleration_m_s2: NotNegative
+    switching_period_s: Positive = 10.0
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -93,12 +114,17 @@ class Scenario:
         The sensor of the line of sight's rate, if there is one.
     target : Target or None
         None does not manoeuvre.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not within its limits, or two of them contradict each other.
     """
 
     name: str
     description: str
     sun: Sun | None
-    nominal_range_m: float
+    nominal_range_m: Positive
     dispersion: StateBox
     set_model: SetModel
     range_sensor: RangeSensor | None
@@ -108,6 +134,16 @@ class Scenario:
     tie: TieRule = TieRule.UPPER
     rate_sensor: RateSensor | None = None
     target: Target | None = None
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        self.set_model.check_start("dispersion", self.dispersion)
+        greatest = max(self.dispersion.x_m[1], self.set_model.bounds.x_m[1])
+        if self.sun is not None and self.sun.distance_m <= greatest:
+            raise ValueError(
+                f"sun.distance_m must be greater than the greatest possible range, {greatest:g} m: "
+                f"got {self.sun.distance_m!r}"
+            )
 
 
 def strategy_name(scenario: Scenario, own: Strategy | None) -> str:

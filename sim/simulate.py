@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from guidance import Strategy
+from infoset.limits import WHOLE, shown
 from sim.draws import draw
 from sim.engagement import Engagements
 from sim.results import Results, join
@@ -49,12 +50,17 @@ def simulate(
 
     Raises
     ------
-    ValueError
-        If there is no run to fly, or the strategy returns no proper impulses.
+    TypeError, ValueError
+        If there is no run to fly, a number of a run or the seed is negative or no integer, or the strategy returns no
+        proper impulses.
     """
-    numbers = np.arange(runs) if isinstance(runs, int) else np.asarray(runs, dtype=np.int64)
-    if numbers.size == 0 or numbers.min() < 0 or seed < 0:
-        raise ValueError(f"need at least one run, and run numbers and seed not negative: got runs={runs}, seed={seed}")
+    WHOLE.need("seed", seed)
+    numbers = np.asarray(runs)
+    if isinstance(runs, bool) or numbers.ndim > 1 or (numbers.dtype.kind not in "iu" and numbers.size):
+        raise TypeError(f"runs must be how many runs, or a sequence of run numbers, all integers: got {shown(runs)}")
+    numbers = np.arange(int(numbers)) if numbers.ndim == 0 else numbers.astype(np.int64)
+    if numbers.size == 0 or numbers.min() < 0:
+        raise ValueError(f"need at least one run, and run numbers not negative: got runs={runs}")
     parts = []
     # Few enough at once to stay in the processor's cache, and in memory when sections are very many.
     at_once = max(1, min(ENGAGEMENTS_AT_ONCE, SECTIONS_AT_ONCE // scenario.set_model.sections))

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from infoset.limits import COUNT, real_values
+
 Floats = NDArray[np.float64]
 
 
@@ -58,7 +60,7 @@ def empirical_distribution(sample: ArrayLike, confidence: float = 0.95) -> Distr
     ----------
     Massart (1990), The tight constant in the Dvoretzky-Kiefer-Wolfowitz inequality.
     """
-    values = np.sort(np.asarray(sample, dtype=np.float64).ravel())
+    values = np.sort(real_values("sample", sample).ravel())
     if values.size == 0 or not np.isfinite(values).all():
         raise ValueError("a distribution needs at least one value, all finite")
     half = band_half_width(values.size, confidence)
@@ -80,6 +82,7 @@ def band_half_width(size: int, confidence: float) -> float:
     ValueError
         If the confidence is not between 0 and 1.
     """
+    COUNT.need("size", size)
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"confidence must lie between 0 and 1: got {confidence}")
     return math.sqrt(math.log(2.0 / (1.0 - confidence)) / (2.0 * size))
@@ -97,8 +100,16 @@ def quantiles(sample: ArrayLike, levels: ArrayLike) -> Floats:
     Returns
     -------
     ndarray, shape (m,)
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the sample is empty or not finite, or a level is out of its range.
     """
-    return np.asarray(np.quantile(np.asarray(sample, dtype=np.float64), np.asarray(levels)), dtype=np.float64)
+    values, at = real_values("sample", sample), real_values("levels", levels)
+    if values.size == 0 or not np.isfinite(values).all() or not ((at >= 0.0) & (at <= 1.0)).all():
+        raise ValueError(f"quantiles need at least one value, all finite, and levels in [0, 1]: got levels {levels!r}")
+    return np.asarray(np.quantile(values, at), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -153,7 +164,7 @@ def estimate_quantiles(sample: ArrayLike, levels: Sequence[float], confidence: f
     The interval runs between two order statistics: as many values lie below the true quantile as a binomial variable
     of n trials of that probability says (David, Nagaraja 2003, Order Statistics, section 7.1). O(n log n).
     """
-    values = np.sort(np.asarray(sample, dtype=np.float64).ravel())
+    values = np.sort(real_values("sample", sample).ravel())
     if values.size == 0 or not np.isfinite(values).all():
         raise ValueError("quantiles need at least one value, all finite")
     if not 0.0 < confidence < 1.0 or not all(0.0 <= level <= 1.0 for level in levels):

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from infoset.limits import Fraction, Positive, check_fields
 from sim.statistics import estimate_quantiles
 
 Floats = NDArray[np.float64]
@@ -32,10 +33,20 @@ class QuantileName:
         One of `QUANTITIES`.
     level : float
         Between 0 and 1.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If there is no such quantity, or the level is out of its range.
     """
 
     quantity: str
-    level: float
+    level: Fraction
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.quantity not in QUANTITIES:
+            raise ValueError(f"there is no quantity {self.quantity[:40]}; choose one of: {', '.join(QUANTITIES)}")
 
     def __str__(self) -> str:
         """As it is written."""
@@ -75,11 +86,19 @@ class StoppingRule:
         In the unit of the quantity.
     confidence : float
         Of the interval, in (0, 1).
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the width or the confidence is out of its range.
     """
 
     quantile: QuantileName
-    width: float
-    confidence: float = 0.95
+    width: Positive
+    confidence: Fraction = 0.95
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
     def __str__(self) -> str:
         """As it is written."""
@@ -127,10 +146,18 @@ class Requirement:
     quantile : QuantileName
     bound : float
         In the unit of the quantity.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the bound is not positive.
     """
 
     quantile: QuantileName
-    bound: float
+    bound: Positive
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
     def __str__(self) -> str:
         """As it is written."""
@@ -230,8 +257,6 @@ def _looks(chunks: int) -> Iterator[int]:
 
 def _quantile(found: re.Match[str]) -> QuantileName:
     quantity, level = found["quantity"], float(found["level"]) / 100.0
-    if quantity not in QUANTITIES:
-        raise ValueError(f"there is no quantity {quantity[:40]}; choose one of: {', '.join(QUANTITIES)}")
     if not 0.0 < level < 1.0:
         raise ValueError("the quantile must lie between p0 and p100, for example p99")
     return QuantileName(quantity, level)

@@ -110,7 +110,7 @@ def scenario_with(
         if kind is not set_model.kind:
             set_model = replace(set_model, kind=kind, initial_set=default_initial_set(kind))
     if sections is not None:
-        from experiments._scenario_tables import MOST_SECTIONS
+        from infoset.model import MOST_SECTIONS
 
         fewest = set_model.fewest_sections
         if not fewest <= sections <= MOST_SECTIONS:

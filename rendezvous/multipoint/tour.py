@@ -150,11 +150,14 @@ def nodes_of(targets: MovingTargets, order: Sequence[int], time_s: ArrayLike) ->
     Raises
     ------
     ValueError
-        If there is no visit, a target is visited twice, or there are not as many times as visits.
+        If there is no visit, a visit is of no target, a target is visited twice, or there are not as many times as
+        visits.
     """
-    which, times = np.array(order, dtype=np.intp), np.asarray(time_s, dtype=np.float64)
+    which, times = np.asarray(order), np.asarray(time_s, dtype=np.float64)
     if not len(which) or times.shape != which.shape:
         raise ValueError(f"{len(which)} visits need {len(which)} times, at least one; found {times.size}")
+    if which.dtype.kind not in "iu" or which.min() < 0 or which.max() >= len(targets.targets):
+        raise ValueError(f"order must hold numbers of targets, from 0 to {len(targets.targets) - 1}: found {order!r}")
     if len(set(order)) < len(which):
         raise ValueError("a target is visited twice")
     if not np.isfinite(times).all():

@@ -64,6 +64,7 @@ class CampaignFolder:
         self.manifest = manifest
         self.damaged: list[Damage] = []
         self._files: dict[int, Path] = {}
+        self._sound: set[int] = set()
         self._tables = need_arrow()
         self._scan()
 
@@ -193,6 +194,7 @@ class CampaignFolder:
         file = self.path / SHARDS / f"chunk-{chunk.index:07d}-{zlib.crc32(content):08x}.parquet"
         write_whole(file, content)
         self._files[chunk.index] = file
+        self._sound.add(chunk.index)
 
     def write_beside(self, name: str, content: bytes) -> None:
         """Write another file into the folder, whole or not at all."""
@@ -256,10 +258,10 @@ class CampaignFolder:
         Raises
         ------
         DamagedError
-            If a shard has changed since the folder was opened.
+            If a shard has changed since the folder was opened, or holds what no campaign writes.
         """
-        with self._reading():
-            return self._read(self._files_of(cell), columns)
+        parts = [self._read(index, columns) for index in self._wanted(cell)]
+        return self._tables.joined(parts, columns, with_cell=bool(self.manifest.axes))
 
     def shards(
         self, quantities: Sequence[str], texts: Mapping[str, Sequence[str]], cell: int | None = None
@@ -284,12 +286,10 @@ class CampaignFolder:
         Raises
         ------
         DamagedError
-            If a shard has changed since the folder was opened.
+            If a shard has changed since the folder was opened, or holds what no campaign writes.
         """
         for index in self._wanted(cell):
-            with self._reading():
-                part = self._columns_of(index, quantities, texts)
-            yield part
+            yield self._columns_of(index, quantities, texts)
 
     def sample(self, quantity: str, noise: str, cell: int | None = None) -> NDArray[np.float64]:
         """Return what is known of a quantity under a noise, in the order of cells and runs."""
@@ -303,8 +303,7 @@ class CampaignFolder:
 
     def chunk_samples(self, index: int, quantity: str, noises: Sequence[str]) -> list[NDArray[np.float64]]:
         """Return what is known of a quantity in a finished chunk, a sample a noise."""
-        with self._reading():
-            numbers, codes = self._columns_of(index, [quantity], {"noise": noises})
+        numbers, codes = self._columns_of(index, [quantity], {"noise": noises})
         return _by_noise(numbers[quantity], codes["noise"], len(noises))
 
     def numbers(self, name: str, cell: int | None = None) -> Numbers:
@@ -325,39 +324,39 @@ class CampaignFolder:
 
     def at(self, places: Sequence[int], cell: int | None = None) -> list[dict[str, Any]]:
         """Return whole rows at some places of the columns, as mappings by column."""
-        files = self._files_of(cell)
-        sizes = [self._size(index) for index in self._wanted(cell)]
-        starts = np.concatenate([[0], np.cumsum(sizes)])
+        shards = self._wanted(cell)
+        starts = np.concatenate([[0], np.cumsum([self._size(index) for index in shards])])
         rows = []
-        with self._reading():
-            for place in places:
-                shard = int(np.searchsorted(starts, place, side="right")) - 1
-                table = self._read([files[shard]], None)
-                rows.append(table.slice(int(place - starts[shard]), 1).to_pylist()[0])
+        for place in places:
+            shard = int(np.searchsorted(starts, place, side="right")) - 1
+            rows.append(self._read(shards[shard], None).slice(int(place - starts[shard]), 1).to_pylist()[0])
         return rows
-
-    def _files_of(self, cell: int | None) -> list[Path]:
-        return [self._files[index] for index in self._wanted(cell)]
 
     def _columns_of(
         self, index: int, quantities: Sequence[str], texts: Mapping[str, Sequence[str]]
     ) -> tuple[dict[str, Numbers], dict[str, Codes]]:
-        table = self._read([self._files[index]], [*quantities, *texts])
+        table = self._read(index, [*quantities, *texts])
         return (
             {name: self._tables.numbers(table, name) for name in quantities},
             {name: self._tables.codes(table, name, known) for name, known in texts.items()},
         )
 
-    def _read(self, files: Sequence[Path], columns: Sequence[str] | None) -> Any:
-        return self._tables.read(files, columns, with_cell=bool(self.manifest.axes))
-
-    @contextlib.contextmanager
-    def _reading(self) -> Iterator[None]:
+    def _read(self, index: int, columns: Sequence[str] | None) -> Any:
+        """Some columns of a shard, None being all; when it is read first, all of its values are checked."""
+        file, with_cell = self._files[index], bool(self.manifest.axes)
         try:
-            yield
+            if index in self._sound:
+                return self._tables.read(file, columns, with_cell=with_cell)
+            table = self._tables.read(file, None, with_cell=with_cell)
+            cell, place = divmod(index, self.chunks_a_cell)
+            first = place * self.manifest.chunk
+            self._tables.need_sound(table, range(first, first + self._size(index)), cell)
+            self._sound.add(index)
+            return table if columns is None else table.select(list(columns))
         except (OSError, ValueError) as error:
             raise DamagedError(
-                f"{self.path}: a shard has changed or gone while it was read: {str(error)[:200]}; resume the campaign"
+                f"{file}: a shard has changed or gone: {str(error)[:200]}; delete it, and fly its runs again with "
+                "--resume"
             ) from None
 
     def _size(self, index: int) -> int:
@@ -396,6 +395,8 @@ class CampaignFolder:
         try:
             if not file.is_file():
                 return "is no ordinary file"
+            if rows < 1 or index >= self.chunks_a_cell * self.manifest.cells:
+                return "is of no chunk of this campaign"
             size, most = file.stat().st_size, self._tables.largest_file(rows)
             if size > most:
                 return f"has {size} bytes, more than any shard of {rows} rows"

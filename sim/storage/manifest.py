@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from infoset.limits import NUMBER
 from sim.fingerprint import scenario_hash
 from sim.scenario import Scenario
 from sim.storage.atomic_file import reporting, write_whole
@@ -294,8 +295,8 @@ def _axis(value: Any, path: str) -> Axis:
     values = _list(value["values"], f"{path}.values")
     if len(values) < 2 or any(isinstance(each, bool) or not isinstance(each, int | float) for each in values):
         raise ValueError(f"{path}.values: must be at least two numbers")
-    if not all(math.isfinite(each) for each in values):
-        raise ValueError(f"{path}.values: must be finite")
+    for each in values:
+        NUMBER.need(f"{path}.values", each)
     return Axis(
         _text(value["key"], f"{path}.key"),
         tuple(float(each) for each in values),

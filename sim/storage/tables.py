@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from guidance import NoiseKind, TieRule
+from infoset.limits import NOT_NEGATIVE, NUMBER
 from sim.chunk import Chunk
 from sim.results import Outcome, Results
 from sim.storage.parquet_pages import claimed_bytes
@@ -46,6 +47,8 @@ _TEXTS: Mapping[str, frozenset[str | None]] = {
 """Columns of text, and all that they can say."""
 _CELL = ("cell", pa.int32(), "", "number of the cell of the sweep")
 _NULLABLE = ("tie", "guaranteed_miss_m", "truth_margin_m")
+_LIMITS = dict.fromkeys(("miss_m", "impulse_m_s", "guaranteed_miss_m"), NOT_NEGATIVE)
+"""What a column of numbers may hold; the others hold any number."""
 
 
 def schema(*, with_cell: bool) -> Any:
@@ -78,11 +81,9 @@ def rows(chunk: Chunk, results: Results, *, with_cell: bool) -> Any:
     Raises
     ------
     FloatingPointError
-        If a miss or an impulse is not a finite number.
+        If a number is not finite or out of its limits.
     """
     guaranteed = results.guaranteed_miss_m
-    if not np.isfinite([results.miss_m, results.impulse_m_s, guaranteed.filled(0.0)]).all():
-        raise FloatingPointError(f"results of runs {results.runs[0]} to {results.runs[-1]} are not finite")
     noises = chunk.noises(results.runs)
     margin = results.truth_margin_m
     columns: dict[str, Any] = {
@@ -102,7 +103,51 @@ def rows(chunk: Chunk, results: Results, *, with_cell: bool) -> Any:
         "vx_km_s": results.velocity_m_s[:, 1] / M_PER_KM,
     }
     wanted = schema(with_cell=with_cell)
-    return pa.table({name: columns[name] for name in wanted.names}, schema=wanted)
+    table = pa.table({name: columns[name] for name in wanted.names}, schema=wanted)
+    try:
+        need_sound(table, range(chunk.first, chunk.first + chunk.runs), chunk.cell)
+    except ValueError as error:
+        raise FloatingPointError(
+            f"results of runs {results.runs[0]} to {results.runs[-1]} are not finite, or of no ordinary size: {error}"
+        ) from None
+    return table
+
+
+def need_sound(table: Any, runs: range, cell: int) -> None:
+    """Refuse rows that no campaign writes.
+
+    Parameters
+    ----------
+    table : pyarrow.Table
+        Whole rows.
+    runs : range
+        Numbers of the runs that they must be of, in order.
+    cell : int
+        Number of the cell that they must be of.
+
+    Raises
+    ------
+    ValueError
+        With the name of the column.
+    """
+    for name, wanted in (("run", np.arange(runs.start, runs.stop)), ("cell", np.full(len(runs), cell))):
+        if name in table.column_names:
+            found = table.column(name).to_numpy()
+            if not np.array_equal(found, wanted):
+                wrong = int(np.flatnonzero(found != wanted)[0])
+                raise ValueError(f"{name} holds {found[wrong]} in row {wrong}, where {wanted[wrong]} belongs")
+    for name in table.column_names:
+        column = table.column(name)
+        if not pa.types.is_floating(column.type) or column.null_count == len(column):
+            continue
+        known = (column.drop_null() if column.null_count else column).to_numpy()
+        ends = known.min(), known.max()  # NaN is both where there is one
+        if not np.isfinite(ends).all():
+            raise ValueError(f"{name} holds what is not a finite number")
+        for end in ends:
+            problem = _LIMITS.get(name, NUMBER).problem(end)
+            if problem is not None:
+                raise ValueError(f"{name} {problem}, and holds {end:g}")
 
 
 def to_bytes(table: Any, extra: Mapping[str, str]) -> bytes:
@@ -180,12 +225,12 @@ def _fault_of_sizes(content: bytes, found: Any) -> str | None:
     return None
 
 
-def read(files: Sequence[Path], columns: Sequence[str] | None, *, with_cell: bool) -> Any:
-    """Read some columns of shards, one after the other.
+def read(file: Path, columns: Sequence[str] | None, *, with_cell: bool) -> Any:
+    """Read some columns of a shard.
 
     Parameters
     ----------
-    files : sequence of Path
+    file : Path
         Without a `fault`.
     columns : sequence of str or None
         None is all of them.
@@ -198,18 +243,26 @@ def read(files: Sequence[Path], columns: Sequence[str] | None, *, with_cell: boo
     Raises
     ------
     ValueError
-        If one holds what no campaign writes.
+        If it holds text that no campaign writes.
     OSError
-        If one cannot be read.
+        If it cannot be read.
     """
-    wanted = schema(with_cell=with_cell)
-    names = wanted.names if columns is None else list(columns)
-    whole = pa.schema([wanted.field(name) for name in names], metadata=wanted.metadata)
+    wanted = _some(columns, with_cell=with_cell)
     try:
-        parts = [_read_one(file, whole) for file in files]
+        return _read_one(file, wanted)
     except (pa.ArrowException, KeyError) as error:
         raise ValueError(str(error)) from None
-    return pa.concat_tables(parts or [whole.empty_table()])
+
+
+def joined(parts: Sequence[Any], columns: Sequence[str] | None, *, with_cell: bool) -> Any:
+    """Return tables of some columns one after the other; without parts a table of no rows."""
+    return pa.concat_tables(parts or [_some(columns, with_cell=with_cell).empty_table()])
+
+
+def _some(columns: Sequence[str] | None, *, with_cell: bool) -> Any:
+    """Schema of some columns."""
+    wanted = schema(with_cell=with_cell)
+    return wanted if columns is None else pa.schema([wanted.field(name) for name in columns], metadata=wanted.metadata)
 
 
 def _read_one(file: Path, wanted: Any) -> Any:
@@ -217,14 +270,11 @@ def _read_one(file: Path, wanted: Any) -> Any:
     texts = [name for name in wanted.names if name in _TEXTS]
     table = pq.ParquetFile(file, read_dictionary=texts).read(columns=wanted.names, use_threads=False)
     table = table.select(wanted.names)
-    for name in wanted.names:
+    for name in texts:
         for part in table.column(name).chunks:
-            if name in _TEXTS:
-                said = part.dictionary
-                if len(said) > len(_TEXTS[name]) or not {*said.to_pylist()} <= _TEXTS[name]:
-                    raise ValueError(f"{name} says what no campaign writes")
-            elif pa.types.is_floating(part.type) and not pc.all(pc.is_finite(part), min_count=0).as_py():
-                raise ValueError(f"{name} holds what is not a finite number")
+            said = part.dictionary
+            if len(said) > len(_TEXTS[name]) or not {*said.to_pylist()} <= _TEXTS[name]:
+                raise ValueError(f"{name} says what no campaign writes")
     return table.cast(wanted).replace_schema_metadata(wanted.metadata)
 
 

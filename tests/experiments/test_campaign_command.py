@@ -314,7 +314,7 @@ def test_the_rate_is_told_where_nobody_looks(
 def _begin(file: Path, folder: Path, runs: int) -> subprocess.Popen[bytes]:
     """Begin or resume a campaign in a process of its own."""
     arguments = ["campaign", file, "--runs", runs, "--chunk", 8, "--noise", "mixed", "--out", folder, "--resume", "-q"]
-    return subprocess.Popen([sys.executable, "-m", "experiments.cli", *map(str, arguments)], stderr=subprocess.PIPE)
+    return subprocess.Popen([sys.executable, "-m", "experiments", *map(str, arguments)], stderr=subprocess.PIPE)
 
 
 def _killed_at_random_moments(file: Path, folder: Path, runs: int, kills: int, seed: int) -> list[int]:
@@ -416,7 +416,7 @@ def test_a_second_campaign_in_the_folder_is_refused(infoset: Infoset, file: Path
 @pytest.mark.slow
 def test_processes_give_the_same_bits_and_die_with_their_parent(brief: Scenario, file: Path, tmp_path: Path) -> None:
     arguments = ["campaign", file, "--runs", 6000, "--chunk", 8, "--noise", "mixed", "--out", tmp_path / "runs", "-q"]
-    command = [sys.executable, "-m", "experiments.cli", *map(str, arguments), "--resume", "--processes", "2"]
+    command = [sys.executable, "-m", "experiments", *map(str, arguments), "--resume", "--processes", "2"]
     with subprocess.Popen(command) as process:
         shards = tmp_path / "runs" / "shards"
         while not shards.is_dir() or len(list(shards.glob("*.parquet"))) < 10:

@@ -423,13 +423,34 @@ def test_a_folder_made_for_work_that_failed_is_taken_away(tmp_path: Path) -> Non
     assert names_in(tmp_path) == []
 
 
-def test_a_link_is_followed_when_replaced(tmp_path: Path) -> None:
+@pytest.mark.parametrize("target", ["file", "folder", "nothing"])
+@pytest.mark.parametrize("asked", ["--out out", "--json out/results.json", "--csv out/results.json"])
+def test_no_link_is_followed(asked: str, target: str, infoset: Command, brief_file: Path, tmp_path: Path) -> None:
+    elsewhere = tmp_path / "elsewhere"
+    if target == "file":
+        elsewhere.write_text("precious")
+    elif target == "folder":
+        elsewhere.mkdir()
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "results.json").symlink_to(elsewhere)
+    before = names_in(tmp_path)
+    message = infoset.refused("experiment", brief_file, "--runs", 1, "--overwrite", *asked.split())
+    assert "out/results.json: is a " in message
+    assert names_in(tmp_path) == before
+    assert (tmp_path / "out" / "results.json").is_symlink()
+    assert names_in(tmp_path / "out") == ["results.json"]
+    if target == "file":
+        assert elsewhere.read_text() == "precious"
+
+
+def test_a_link_is_not_written_through(tmp_path: Path) -> None:
     target, link = tmp_path / "target", tmp_path / "link"
     target.write_text("old")
     link.symlink_to(target)
-    write_file(link, "new", overwrite=True)
+    with pytest.raises(InputError, match="is a link, and links are not followed; remove it, or choose another name"):
+        write_file(link, "new", overwrite=True)
     assert link.is_symlink()
-    assert target.read_text() == "new"
+    assert target.read_text() == "old"
     assert names_in(tmp_path) == ["link", "target"]
 
 
@@ -507,7 +528,7 @@ def test_compiling_is_said_when_nothing_is_compiled(
 def test_a_reader_that_leaves_is_no_error() -> None:
     # Ample output, and a reader that closes at once.
     process = subprocess.Popen(
-        [sys.executable, "-m", "experiments.cli", "engage", "--json", "-", "--quiet"],
+        [sys.executable, "-m", "experiments", "engage", "--json", "-", "--quiet"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
     )
@@ -523,7 +544,7 @@ def test_a_reader_that_leaves_is_no_error() -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 def test_interrupt_of_a_process(tmp_path: Path) -> None:
     process = subprocess.Popen(
-        [sys.executable, "-m", "experiments.cli", "experiment", "--runs", "100000", "--out", "out"],
+        [sys.executable, "-m", "experiments", "experiment", "--runs", "100000", "--out", "out"],
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

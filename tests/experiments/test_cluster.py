@@ -241,7 +241,7 @@ def test_a_scheduler_that_dies_is_one_message_and_the_campaign_goes_on_without(
     processes.worker()
     processes.wait_for(1)
     asked = ["campaign", "brief.toml", "--runs", "6000", "--chunk", "16", "--out", "runs", "-q"]
-    command = [sys.executable, "-m", "experiments.cli", *asked]
+    command = [sys.executable, "-m", "experiments", *asked]
     with subprocess.Popen(
         [*command, "--dask", processes.address], cwd=tmp_path, stderr=subprocess.PIPE, text=True
     ) as process:

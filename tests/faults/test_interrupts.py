@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import random
 import signal
+import subprocess
 import sys
 import time
 import weakref
@@ -20,8 +21,6 @@ from tests.faults.conftest import Infoset, Left, begin, ended, need_whole
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="POSIX signals")
 
-INTERRUPTED = (130, -signal.SIGINT)
-"""The second, which a shell tells as 130 too, is Python's own where it was loading modules."""
 RESUME = "interrupted; what is stored is whole: go on with --resume"
 
 
@@ -34,10 +33,8 @@ def interrupted(*arguments: object, folder: Path, after_s: float) -> Left:
     process.send_signal(signal.SIGINT)
     left = ended(process)
     assert "Traceback" not in left.err
-    if left.code == -signal.SIGINT and not left.err:
-        return left  # all was done, and Python itself was leaving
     if left.code:
-        assert left.code in INTERRUPTED
+        assert left.code == 130
         assert "interrupted" in left.err.splitlines()[-1]
     return left
 
@@ -109,7 +106,7 @@ def test_interrupted_at_random_moments(name: str, infoset: Infoset, file: Path, 
         folder.mkdir()
         for each in (file.name, "flight.npz", "flown"):
             (folder / each).symlink_to(tmp_path / each)
-        # Past the first moments, which are Python's own.
+        # Past the first moments, which are Python's own: until it runs `experiments.__main__` it ends by the signal.
         left = interrupted(*command, folder=folder, after_s=chance.uniform(min(0.5, lasts_s), lasts_s))
         codes.append(left.code)
         need_whole(folder)
@@ -137,12 +134,91 @@ def test_a_campaign_interrupted_ten_times_gives_the_same_bits(brief: Scenario, f
         stored.append(CampaignFolder.read(tmp_path / "runs").finished_runs)
         if left.code == 0:
             break
-        assert left.code in INTERRUPTED
+        assert left.code == 130
         assert left.err.splitlines() == [RESUME]
     assert stored == sorted(set(stored))
     assert ended(begin(*asked, folder=tmp_path)).code == 0
     expected = Campaign(brief, 2000, tmp_path / "whole", noise=CampaignNoise.MIXED).run().table
     assert CampaignFolder.read(tmp_path / "runs").table().equals(expected)
+
+
+MOMENTS = {
+    "loading the command": "loading typer",
+    "loading numbers": "loading numpy",
+    "loading the simulator": "loading sim.engagement",
+    "loading a kernel": "in numba.core.dispatcher:Dispatcher.compile",
+    "in flight": "in sim.engagement:Engagements.advance",
+}
+AT_A_MOMENT = """
+import importlib.machinery, os, signal, sys
+
+kind, _, place = sys.argv.pop(1).partition(" ")
+
+def interrupt(*_):
+    os.kill(os.getpid(), signal.SIGINT)
+
+class Finder(importlib.machinery.PathFinder):
+    @classmethod
+    def find_spec(cls, name, path=None, target=None):
+        if kind == "loading" and name == place:
+            interrupt()
+        return None
+
+if kind == "in":
+    module, _, function = place.partition(":")
+    owner, _, name = function.partition(".")
+    setattr(getattr(__import__(module, fromlist=[owner]), owner), name, interrupt)
+sys.meta_path.insert(0, Finder)
+from experiments.__main__ import main
+main()
+"""
+
+
+def begun(program: str, *arguments: str, folder: Path) -> Left:
+    """Run a program as a module, as ``python -m``."""
+    (folder / "begun.py").write_text(program)
+    command = [sys.executable, "-m", "begun", *arguments]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+    return Left(done.returncode, done.stdout, done.stderr)
+
+
+@pytest.mark.parametrize("moment", MOMENTS)
+def test_an_interrupt_at_a_moment_is_one_message(moment: str, file: Path, tmp_path: Path) -> None:
+    left = begun(AT_A_MOMENT, MOMENTS[moment], "engage", file.name, "-q", folder=tmp_path)
+    assert (left.code, left.out) == (130, "")
+    assert left.err.splitlines()[-1] == "interrupted"
+    assert "Traceback" not in left.err
+
+
+def test_an_interrupt_while_a_dataclass_is_defined_is_one_message(tmp_path: Path) -> None:
+    program = """
+import experiments.cli
+from experiments.__main__ import main
+
+def run():
+    exec("raise KeyboardInterrupt")
+
+experiments.cli.main = run
+main()
+"""
+    assert begun(program, folder=tmp_path) == Left(130, "", "interrupted\n")
+
+
+def test_an_interrupt_while_python_exits_changes_nothing(tmp_path: Path) -> None:
+    program = """
+import os, signal, sys
+import experiments.cli
+from experiments.__main__ import main
+
+class Last:
+    def __del__(self, kill=os.kill, process=os.getpid(), interrupt=signal.SIGINT):
+        kill(process, interrupt)
+
+sys.last = Last()
+experiments.cli.main = lambda: sys.exit(0)
+main()
+"""
+    assert begun(program, folder=tmp_path) == Left(0, "", "")
 
 
 def test_an_interrupt_that_python_wraps_is_one_message(

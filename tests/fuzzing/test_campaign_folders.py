@@ -6,6 +6,7 @@ import json
 import random
 import shutil
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from sim.storage import CampaignFolder, ManifestError, StorageError, read_manifest
+from experiments.cli import main
+from experiments.scenario_file import scenario_to_toml
+from sim import Scenario, Sweep
+from sim.storage import Axis, CampaignFolder, ManifestError, StorageError, read_manifest
 from sim.storage.manifest import MANIFEST, checksum
 from sim.storage.parquet_pages import claimed_bytes
 
@@ -220,6 +224,92 @@ def test_a_shard_that_says_what_no_campaign_writes(name: str, value: object, fol
     kind = opened.numbers if isinstance(value, float) else lambda each: opened.codes(each, ["intercepted"])
     with pytest.raises(StorageError, match="a shard has changed"):
         kind(name)
+
+
+def some(name: str, values: object) -> Callable[[Any, Path], None]:
+    """Write other values into the first rows of a column."""
+
+    def write(table: Any, file: Path) -> None:
+        other = list(values)  # type: ignore[call-overload]
+        kept = table.column(name).to_pylist()[len(other) :]
+        pq.write_table(with_column(table, name, pa.array([*other, *kept], type=table.schema.field(name).type)), file)
+
+    return write
+
+
+ABSURD = {
+    "a great miss": (some("miss_m", [1e308]), "miss_m must be finite, at most 1e+60 in size, and holds 1e+308"),
+    "a negative miss": (some("miss_m", [-1.0]), "miss_m must be at least 0, and holds -1"),
+    "a negative impulse": (some("impulse_m_s", [-1e-3]), "impulse_m_s must be at least 0, and holds -0.001"),
+    "a negative guarantee": (some("guaranteed_miss_m", [-5.0]), "guaranteed_miss_m must be at least 0, and holds -5"),
+    "a far start": (some("x_km", [1.0, -1e300]), "x_km must be finite, at most 1e+60 in size, and holds -1e+300"),
+    "a margin beyond all": (some("truth_margin_m", [-1e200]), "truth_margin_m must be finite"),
+    "repeated runs": (some("run", [12, 12]), "run holds 12 in row 1, where 13 belongs"),
+    "shifted runs": (some("run", range(13, 13 + ROWS)), "run holds 13 in row 0, where 12 belongs"),
+    "negative runs": (some("run", [-1]), "run holds -1 in row 0, where 12 belongs"),
+    "runs in another order": (some("run", [13, 12]), "run holds 13 in row 0, where 12 belongs"),
+}
+
+
+@pytest.mark.parametrize("what", ABSURD)
+def test_absurd_values_under_a_sound_checksum_are_one_message(
+    what: str, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write, reason = ABSURD[what]
+    replaced(folder, write)
+    (shard,) = (folder / "shards").glob("chunk-0000001-*.parquet")
+    monkeypatch.setenv("COLUMNS", "1000")
+    given = read_manifest(folder)
+    (tmp_path / "same.toml").write_text(scenario_to_toml(given.scenario))
+    asked = ["--runs", str(given.runs), "--chunk", str(given.chunk), "--seed", str(given.seed), "--noise", given.noise]
+    resume = ["campaign", str(tmp_path / "same.toml"), *asked, "--out", str(folder), "--resume", "--quiet"]
+    for command in (["report", str(folder)], ["report", str(folder), "--out", str(tmp_path / "out")], resume):
+        with pytest.raises(SystemExit) as left:
+            main(command)
+        out, err = capsys.readouterr()
+        assert (left.value.code, out) == (2, ""), err
+        assert err.splitlines()[-1].startswith(f"error: {shard}: a shard has changed or gone: {reason}")
+        assert err.endswith("; delete it, and fly its runs again with --resume\n")
+        assert "Traceback" not in err
+    shard.unlink()
+    with pytest.raises(SystemExit) as left:
+        main(resume)
+    assert left.value.code == 0, capsys.readouterr().err
+    found = CampaignFolder.read(folder)
+    assert found.complete
+    assert found.table(["run"]).column("run").to_pylist() == list(range(given.runs))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "reason"),
+    [
+        ("cell", [0], "cell holds 0 in row 0, where 1 belongs"),
+        ("miss_m", [1e308], "miss_m must be finite"),
+        ("run", [1, 1], "run holds 1 in row 0, where 0 belongs"),
+    ],
+)
+def test_absurd_values_in_a_sweep_are_one_message(
+    name: str, values: list[float], reason: str, brief: Scenario, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    budgets = (100.0, 200.0)
+    cells = tuple(replace(brief, thruster=replace(brief.thruster, budget_m_s=budget)) for budget in budgets)
+    Sweep(brief, (Axis("thruster.budget_m_s", budgets),), cells, 3, tmp_path / "sweep").run()
+    replaced(tmp_path / "sweep", some(name, values))
+    with pytest.raises(SystemExit) as left:
+        main(["report", str(tmp_path / "sweep")])
+    err = capsys.readouterr().err.replace("\n", " ")
+    assert left.value.code == 2
+    assert reason in err
+    assert "fly its runs again with --resume" in err
+    assert err.count("error: ") == 1
+
+
+@pytest.mark.parametrize("index", [2, 7, 10**9])
+def test_a_shard_past_the_last_is_left_out(index: int, folder: Path) -> None:
+    shard = shard_of(folder)
+    shard.with_name(shard.name.replace("0000001", f"{index:07d}")).write_bytes(shard.read_bytes())
+    (damage,) = CampaignFolder.read(folder).damaged
+    assert damage.reason == "is of no chunk of this campaign"
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from experiments import record_file
+from experiments.cli import main
 from experiments.errors import InputError
 from experiments.record_file import read_record, write_record
 from sim import Record
@@ -102,6 +103,34 @@ def test_damage_whose_sums_were_made_to_fit(content: bytes, tmp_path: Path) -> N
     for _ in range(60):
         (tmp_path / "x.npz").write_bytes(remade_record(content, change))
         read_or_refused(tmp_path / "x.npz")
+
+
+ABSURD = [name for name, (kind, _) in record_file._MEMBERS.items() if kind == record_file._FLOAT]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ABSURD)
+def test_absurd_numbers_under_a_sound_checksum_are_drawn_or_refused(
+    name: str, content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "x.npz"
+    for value in (1e60, -1e60, 1e300, 1e-100, 0.0):
+
+        def change(_: object, members: dict[str, bytes], number: float = value) -> None:
+            array = np.load(io.BytesIO(members[f"{name}.npy"]))
+            array[:] = number
+            out = io.BytesIO()
+            np.lib.format.write_array(out, array, version=(1, 0))
+            members[f"{name}.npy"] = out.getvalue()
+
+        file.write_bytes(remade_record(content, change))
+        with pytest.raises(SystemExit) as left:
+            main(["replay", str(file), "--out", str(tmp_path / "o"), "--html", str(tmp_path / "p.html"), "--overwrite"])
+        err = capsys.readouterr().err
+        assert left.value.code in (0, 2), err
+        assert err.count("\n") == (left.value.code or 0) // 2, err
+        if abs(value) > 1e60:
+            assert left.value.code == 2
 
 
 def deflated_bomb(gigabytes: int) -> bytes:

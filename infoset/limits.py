@@ -1,0 +1,288 @@
+"""What a number may be: declared once, at the field of a dataclass, and read by its constructor and by file readers."""
+
+from __future__ import annotations
+
+import types
+from dataclasses import dataclass, fields
+from functools import cache
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+LARGEST = 1e60
+"""Greatest size of any number: products of a few such numbers do not overflow."""
+SMALLEST = 1e-110
+"""Least size of a number that must be positive: its square can be divided by."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a number may be; `above` and `below` are not allowed themselves, `least` and `most` are.
+
+    Parameters
+    ----------
+    above, least, below, most : float or None
+        None is no limit but `LARGEST`.
+    whole : bool
+        Whether it must be an integer; `LARGEST` does not bind an integer.
+    """
+
+    above: float | None = None
+    least: float | None = None
+    below: float | None = None
+    most: float | None = None
+    whole: bool = False
+
+    def problem(self, value: object) -> str | None:
+        """Return what is wrong with the size of a number, or None."""
+        number: Any = value
+        if not (self.whole or -LARGEST <= number <= LARGEST):  # NaN is neither
+            return f"must be finite, at most {LARGEST:g} in size"
+        if self.above is not None and not number > self.above:
+            return f"must be greater than {self.above:g}"
+        if self.above == 0.0 and number < SMALLEST:
+            return f"must be at least {SMALLEST:g}"
+        if self.least is not None and number < self.least:
+            return f"must be at least {self.least:g}"
+        if self.below is not None and number >= self.below:
+            return f"must be less than {self.below:g}"
+        if self.most is not None and number > self.most:
+            return f"must be at most {self.most:g}"
+        return None
+
+    def need(self, name: str, value: object) -> None:
+        """Refuse what is not a number within these limits.
+
+        Parameters
+        ----------
+        name : str
+            Of the parameter, for the message.
+        value : object
+
+        Raises
+        ------
+        TypeError
+            If it is no float and no integer, or not an integer where it must be; a bool is neither.
+        ValueError
+            If it is out of the limits.
+        """
+        kinds = (int, np.integer) if self.whole else (int, float, np.integer)  # single precision would round
+        if isinstance(value, bool) or not isinstance(value, kinds):
+            wanted = "an integer" if self.whole else "a real number, a float or an integer"
+            raise TypeError(f"{name} must be {wanted}: got {shown(value)}")
+        problem = self.problem(value)
+        if problem is not None:
+            raise ValueError(f"{name} {problem}: got {shown(value)}")
+
+
+NUMBER = Limits()
+POSITIVE = Limits(above=0.0)
+NOT_NEGATIVE = Limits(least=0.0)
+FRACTION = Limits(above=0.0, below=1.0)
+PART = Limits(least=0.0, below=1.0)
+INTEGER = Limits(whole=True)
+WHOLE = Limits(least=0, whole=True)
+COUNT = Limits(least=1, whole=True)
+
+Number = Annotated[float, NUMBER]
+Positive = Annotated[float, POSITIVE]
+NotNegative = Annotated[float, NOT_NEGATIVE]
+Fraction = Annotated[float, FRACTION]
+Part = Annotated[float, PART]
+
+
+@dataclass(frozen=True)
+class _Rule:
+    """What the annotation of a field asks for."""
+
+    field: str
+    name: str
+    limits: Limits | None
+    pair: bool
+    kind: type | None
+    optional: bool
+
+    def check(self, value: object) -> None:
+        if value is None and self.optional:
+            return
+        if self.limits is None:
+            if self.kind is not None and not isinstance(value, self.kind):
+                raise TypeError(f"{self.name} must be of the type {self.kind.__name__}: got {shown(value)}")
+        elif not self.pair:
+            self.limits.need(self.name, value)
+        else:
+            need_pair(self.name, value, self.limits)
+
+
+def limits_of(owner: type, field: str) -> Limits:
+    """Return the limits that a dataclass declares for the numbers of a field.
+
+    Parameters
+    ----------
+    owner : type
+    field : str
+
+    Returns
+    -------
+    Limits
+
+    Raises
+    ------
+    TypeError
+        If it declares none.
+    """
+    found = next(rule.limits for rule in _rules(owner) if rule.field == field)
+    if found is None:
+        raise TypeError(f"{owner.__name__}.{field} declares no limits")
+    return found
+
+
+def check_fields(owner: object) -> None:
+    """Refuse the values of a dataclass that do not fit the annotations of its fields.
+
+    Parameters
+    ----------
+    owner : dataclass
+        Numbers are annotated with `Limits`, intervals are pairs (least, greatest) of such numbers; enumerations, other
+        dataclasses and text are checked by type.
+
+    Raises
+    ------
+    TypeError, ValueError
+        With the name of the field, the value, and what is allowed.
+    """
+    kind: Any = type(owner)
+    for rule in _rules(kind):
+        rule.check(getattr(owner, rule.field))
+
+
+@cache
+def _rules(owner: type) -> tuple[_Rule, ...]:
+    hints = get_type_hints(owner, include_extras=True)
+    return tuple(_rule(each.name, f"{owner.__name__}: {each.name}", hints[each.name]) for each in fields(owner))
+
+
+def _rule(field: str, name: str, hint: Any) -> _Rule:
+    optional = get_origin(hint) in (Union, types.UnionType)
+    if optional:
+        (hint,) = (each for each in get_args(hint) if each is not types.NoneType)
+    inner, *more = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+    limits = next((each for each in more if isinstance(each, Limits)), None)
+    return _Rule(field, name, limits, get_origin(inner) is tuple, inner if isinstance(inner, type) else None, optional)
+
+
+def need_pair(name: str, value: object, limits: Limits = NUMBER) -> None:
+    """Refuse what is not a pair (least, greatest) of numbers within limits.
+
+    Parameters
+    ----------
+    name : str
+        Of the parameter, for the message.
+    value : object
+    limits : Limits
+
+    Raises
+    ------
+    TypeError
+        If it is not a tuple of two real numbers.
+    ValueError
+        If one is out of the limits, or the pair is reversed.
+    """
+    if not isinstance(value, tuple) or len(value) != 2:
+        raise TypeError(f"{name} must be a pair (least, greatest): got {shown(value)}")
+    for end in value:
+        limits.need(name, end)
+    if value[0] > value[1]:
+        raise ValueError(f"{name} must be a pair (least, greatest), and is reversed: got {shown(value)}")
+
+
+def real_values(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """Return an array of real numbers, finite or not, of any shape.
+
+    Parameters
+    ----------
+    name : str
+        Of the parameter, for the message.
+    value : array_like
+
+    Returns
+    -------
+    ndarray of float
+
+    Raises
+    ------
+    TypeError
+        If it is masked, complex, or of anything but numbers.
+    """
+    values = value if isinstance(value, np.ndarray) else np.asarray(value)
+    if isinstance(values, np.ma.MaskedArray):
+        raise TypeError(f"{name} must be real numbers, not masked: got {shown(value)}")
+    if values.dtype.kind not in "fiu":
+        raise TypeError(f"{name} must be real numbers, not of the type {values.dtype}: got {shown(value)}")
+    return np.asarray(values, dtype=np.float64)
+
+
+def real_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return an array of finite real numbers of a shape.
+
+    Parameters
+    ----------
+    name : str
+        Of the parameter, for the message.
+    value : array_like
+        Of that shape, or one number for all.
+    shape : tuple of int
+
+    Returns
+    -------
+    ndarray of float, of that shape
+
+    Raises
+    ------
+    TypeError
+        If it is masked, complex, or of anything but numbers.
+    ValueError
+        If a number is not finite, or the shape is another.
+    """
+    values = real_values(name, value)
+    if values.shape not in ((), shape):
+        raise ValueError(f"{name} must be a number or have the shape {shape}: got the shape {values.shape}")
+    if not np.isfinite(values).all():
+        raise ValueError(f"{name} must be finite: got {shown(value)}")
+    return values if values.shape == shape else np.ascontiguousarray(np.broadcast_to(values, shape))
+
+
+def flags(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Return an array of flags of a shape, or a single one for all.
+
+    Parameters
+    ----------
+    name : str
+        Of the parameter, for the message.
+    value : array_like of bool
+    shape : tuple of int
+
+    Returns
+    -------
+    ndarray of bool
+
+    Raises
+    ------
+    TypeError
+        If it is not of the type bool, or masked.
+    ValueError
+        If the shape is another.
+    """
+    values = np.asarray(value)
+    if isinstance(value, np.ma.MaskedArray) or values.dtype != np.bool_:
+        raise TypeError(f"{name} must be True, False or an array of them: got {shown(value)}")
+    if values.shape not in ((), shape):
+        raise ValueError(f"{name} must be a flag or have the shape {shape}: got the shape {values.shape}")
+    return values
+
+
+def shown(value: object) -> str:
+    """Return a value on one line of a message, cut short if it is long."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 80 else f"{text[:77]}..."

@@ -1,0 +1,609 @@
+"""Python's edge is as strict as the files': what is no sound value is refused with its name, in one sentence."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import guidance
+import infoset
+import sim
+from experiments import load_scenario
+from experiments.errors import InputError
+from experiments.scenario_file import read_scenario, scenario_to_toml
+from guidance import (
+    GameNoise,
+    Kalman,
+    LeastSquares,
+    Measurement,
+    Patient,
+    RandomNoise,
+    ScriptedNoise,
+    SymmetricMiss,
+    Thruster,
+    TieRule,
+    symmetric_impulse,
+    zero_effort_miss,
+)
+from infoset import (
+    AngleSensor,
+    ConvexPolygons,
+    InformationSet,
+    InitialSet,
+    Model,
+    RangeSensor,
+    RateSensor,
+    SetModel,
+    StateBox,
+    to_omega_alpha,
+)
+from infoset.limits import LARGEST
+from rendezvous.multipoint import DriftingTargets, Tour
+from rendezvous.multipoint import Target as Visited
+from rendezvous.relative_motion import ClohessyWiltshire
+from sim import (
+    Manoeuvre,
+    QuantileName,
+    Requirement,
+    Scenario,
+    StoppingRule,
+    Sun,
+    Target,
+    band_half_width,
+    empirical_distribution,
+    estimate_quantiles,
+    fly_one,
+    quantiles,
+    simulate,
+)
+from sim.adversary import find_worst
+from sim.plan import CampaignNoise, Plan
+
+REFUSALS = (TypeError, ValueError)
+NO_NUMBERS: tuple[Any, ...] = (
+    math.nan,
+    math.inf,
+    -math.inf,
+    1e300,
+    1 + 1j,
+    "1",
+    True,
+    [1.0],
+    np.array([1.0, 2.0]),
+    np.ma.masked,
+    10**400,
+)
+NO_COUNTS: tuple[Any, ...] = (1.5, math.nan, "1", True, 2j, [1], -1)
+
+BOX: dict[str, Any] = {"z_m": (-1e3, 1e3), "x_m": (5e6, 6e6), "vz_m_s": (-10.0, 10.0), "vx_m_s": (-5.9e4, -5.7e4)}
+SENSOR: dict[str, Any] = {
+    "period_s": 0.5,
+    "error_at_nominal_range_rad": 1.5e-4,
+    "error_at_zero_range_rad": 2.3e-4,
+    "nominal_range_m": 5.8e6,
+}
+MODEL: dict[str, Any] = {
+    "closing_speed_m_s": 5.8e4,
+    "step_s": 0.5,
+    "bounds": StateBox(**BOX),
+    "angle_sensor": AngleSensor(**SENSOR),
+    "disturbance_m_s2": 0.005,
+    "range_threshold_m": 5e3,
+    "sections": 9,
+    "fewest_sections": 3,
+    "initial_set": InitialSet.BOX,
+    "kind": Model.GUARANTEED,
+    "recovery": infoset.Recovery.WIDENED,
+    "gravity_m_s2": 0.0,
+    "gravity_speed_change": 0.0,
+    "execution_error_relative": 0.0,
+}
+THRUSTER: dict[str, Any] = {
+    "budget_m_s": 1e3,
+    "least_impulse_m_s": 0.25,
+    "greatest_impulse_m_s": 7.5,
+    "execution_error_relative": 0.0,
+}
+SCENARIO: dict[str, Any] = {
+    "name": "edge",
+    "description": "",
+    "sun": None,
+    "nominal_range_m": 5.8e6,
+    "dispersion": StateBox(**BOX),
+    "set_model": SetModel(**MODEL),
+    "range_sensor": None,
+    "thruster": Thruster(**THRUSTER),
+    "strategy": "patient",
+    "noise": guidance.NoiseKind.RANDOM,
+    "tie": TieRule.UPPER,
+    "rate_sensor": None,
+    "target": None,
+}
+SOUND: Mapping[Any, Mapping[str, Any]] = {
+    AngleSensor: SENSOR,
+    RangeSensor: {"period_s": 0.5, "relative_error": 0.05},
+    RateSensor: {"period_s": 0.5, "error_rad_s": 1e-6},
+    StateBox: BOX,
+    SetModel: MODEL,
+    Thruster: THRUSTER,
+    Sun: {"gravitational_parameter_m3_s2": 1.3e20, "distance_m": 1.5e11, "direction_rad": 1.0},
+    Target: {"manoeuvre": Manoeuvre.BANG_BANG, "acceleration_m_s2": 0.1, "switching_period_s": 10.0},
+    Scenario: SCENARIO,
+    QuantileName: {"quantity": "miss_m", "level": 0.9},
+    StoppingRule: {"quantile": QuantileName("miss_m", 0.9), "width": 1.0, "confidence": 0.95},
+    Requirement: {"quantile": QuantileName("miss_m", 0.9), "bound": 1.0},
+}
+ZERO_IS_SOUND = {
+    "disturbance_m_s2",
+    "range_threshold_m",
+    "gravity_m_s2",
+    "gravity_speed_change",
+    "execution_error_relative",
+    "budget_m_s",
+    "least_impulse_m_s",
+    "acceleration_m_s2",
+    "direction_rad",
+}
+FIELDS = [(kind, field) for kind, values in SOUND.items() for field in values]
+
+
+def refused(call: Callable[[], object], name: str) -> None:
+    """Check that a call is refused in a sentence that names the parameter, with no warning before it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(REFUSALS) as found:
+            call()
+    message = str(found.value)
+    assert name in message
+    assert len(message) < 400
+    assert message.isprintable()
+
+
+@pytest.mark.parametrize("kind", SOUND, ids=lambda kind: kind.__name__)
+def test_every_field_is_looked_at(kind: Any) -> None:
+    assert [each.name for each in dataclasses.fields(kind)] == list(SOUND[kind])
+    assert kind(**SOUND[kind]) == kind(**SOUND[kind])
+
+
+@pytest.mark.parametrize(("kind", "field"), FIELDS, ids=lambda each: getattr(each, "__name__", each))
+def test_what_is_no_value_of_a_field(kind: Any, field: str) -> None:
+    sound = SOUND[kind][field]
+    bad: list[Any]
+    if isinstance(sound, tuple):
+        bad = [None, 1.0, "ab", (), (sound[0],), (*sound, 1.0), sound[::-1]]
+        bad += [ends for each in NO_NUMBERS for ends in ((each, sound[1]), (sound[0], each))]
+    elif isinstance(sound, int):
+        bad = [None, 0, *NO_COUNTS]
+    elif isinstance(sound, float):
+        bad = [
+            None,
+            *NO_NUMBERS,
+            *(() if field == "direction_rad" else (-1.0,)),
+            *(() if field in ZERO_IS_SOUND else (0.0,)),
+        ]
+    elif isinstance(sound, str):
+        bad = [None, 1.0, b"x"]
+    else:  # an enumeration, another dataclass, or one that may be missing
+        bad = ["paper", 1.0, object, *([] if sound is None else [None])]
+    for value in bad:
+        refused(partial(kind, **{**SOUND[kind], field: value}), field)
+
+
+@pytest.mark.parametrize(
+    ("change", "name"),
+    [
+        (lambda: AngleSensor(0.5, -1, 0.00023, 5.8e6), "error_at_nominal_range_rad"),
+        (lambda: AngleSensor(0.5, 0.00015, 1.0, 5.8e6), "error_at_zero_range_rad"),
+        (lambda: Thruster(1e3, 8.0, 7.5), "least_impulse_m_s"),
+        (lambda: Thruster(1e3, 0.0, 7.5, 1.0), "execution_error_relative"),
+        (lambda: SetModel(**{**MODEL, "sections": 2}), "sections"),
+        (lambda: SetModel(**{**MODEL, "sections": 10_001}), "sections"),
+        (lambda: SetModel(**{**MODEL, "range_threshold_m": 5e6}), "range_threshold_m"),
+        (lambda: SetModel(**{**MODEL, "angle_sensor": AngleSensor(0.5, 1e-6, 0.1, 5.8e6)}), "angle_sensor"),
+        (lambda: InformationSet(SetModel(**{**MODEL, "gravity_speed_change": 1.0})), "gravity_speed_change"),
+        (lambda: StateBox(**{**BOX, "vx_m_s": (-1.0, 1.0)}), "vx_m_s"),
+        (lambda: StateBox(**{**BOX, "x_m": (0.0, 1.0)}), "x_m"),
+        (lambda: Scenario(**{**SCENARIO, "sun": Sun(1.3e20, 6e6, 0.0)}), "sun.distance_m"),
+        (lambda: Scenario(**{**SCENARIO, "dispersion": StateBox(**{**BOX, "x_m": (1.0, 2.0)})}), "dispersion"),
+        (lambda: Scenario(**{**SCENARIO, "dispersion": StateBox(**{**BOX, "z_m": (0.0, 1e8)})}), "dispersion"),
+        (lambda: StoppingRule(QuantileName("miss_m", 0.5), 1.0, 1.0), "confidence"),
+        (lambda: QuantileName("fuel", 0.5), "fuel"),
+    ],
+)
+def test_values_that_contradict_each_other(change: Callable[[], object], name: str) -> None:
+    refused(change, name)
+
+
+def information(batch: int = 2) -> InformationSet:
+    return InformationSet(SetModel(**MODEL), batch)
+
+
+NO_ARRAYS: tuple[Any, ...] = (
+    math.nan,
+    [0.0, math.inf],
+    [1.0, 2.0, 3.0],
+    np.zeros((2, 1)),
+    [1j, 0.0],
+    np.ma.masked_array([0.0, 0.0], [True, False]),
+    "1",
+    True,
+    [True, False],
+    None,
+    [],
+)
+
+
+@pytest.mark.parametrize(
+    ("operation", "name"),
+    [
+        (lambda given, value: given.measure_angle(value), "alpha_rad"),
+        (lambda given, value: given.measure_range(value, 0.05), "range_m"),
+        (lambda given, value: given.measure_rate(value, 1e-6), "omega_rad_s"),
+        (lambda given, value: given.shift(value), "impulse_m_s"),
+    ],
+)
+def test_what_is_no_measurement_or_impulse(operation: Callable[[Any, Any], object], name: str) -> None:
+    for value in NO_ARRAYS:
+        refused(partial(operation, information(), value), name)
+
+
+@pytest.mark.parametrize("value", [value for value in NO_ARRAYS if value is not None])
+def test_what_is_no_angle_beside_a_range(value: Any) -> None:
+    refused(lambda: information().measure_range(5.5e6, 0.05, alpha_rad=value), "alpha_rad")
+
+
+@pytest.mark.parametrize("value", [*NO_NUMBERS, -1e-9])
+def test_what_is_no_error_bound(value: Any) -> None:
+    refused(lambda: information().measure_range(5.5e6, value), "relative_error")
+    refused(lambda: information().measure_rate(0.0, value), "error_rad_s")
+    refused(lambda: information().measure_range(5.5e6, 1.0), "relative_error")
+    refused(lambda: information().measure_range(-1.0, 0.05), "range_m")
+
+
+@pytest.mark.parametrize(
+    "where", [1, [1, 0], [True], [[True], [False]], math.nan, "yes", np.ma.masked_array([True, False])]
+)
+def test_what_is_no_choice_of_engagements(where: Any) -> None:
+    refused(lambda: information().measure_angle(0.0, where), "where")
+    refused(lambda: information().stop(where), "where")
+
+
+@pytest.mark.parametrize("value", NO_COUNTS)
+def test_what_is_no_count(value: Any) -> None:
+    scenario = load_scenario("asteroid-1997")
+    refused(lambda: information(value), "batch")
+    refused(lambda: information().sections(value), "engagement")
+    refused(lambda: information().section_at(5.5e6, value), "engagement")
+    refused(lambda: Kalman(members=value), "members")
+    refused(lambda: LeastSquares(iterations=value), "iterations")
+    refused(lambda: square().reduce_outward(value), "cap")
+    refused(lambda: fly_one(scenario, value), "run")
+    refused(lambda: fly_one(scenario, seed=value), "seed")
+    refused(lambda: simulate(scenario, 1, seed=value), "seed")
+    refused(lambda: band_half_width(value, 0.9), "size")
+    if value != [1]:
+        refused(lambda: simulate(scenario, value), "run")
+    for name in ("budget", "seed", "threads"):
+        refused(partial(find_worst, scenario, **{name: value}), name)
+    for name in ("runs", "chunk", "seed"):
+        numbers = {"runs": 4, "chunk": 2, "seed": 0, name: value}
+        refused(partial(Plan, (scenario,), noise=CampaignNoise.GAME, guarantee=True, **numbers), name)
+
+
+def test_single_precision_is_refused_and_integers_are_numbers() -> None:
+    refused(partial(AngleSensor, np.float32(0.5), 1e-4, 1e-4, 5.8e6), "period_s")  # type: ignore[arg-type]
+    assert AngleSensor(np.float64(0.5), 1e-4, 1e-4, 5_800_000).error_bound(0.0) == 1e-4
+    refused(partial(InformationSet, None), "model")  # type: ignore[arg-type]
+
+
+def test_runs_are_integers() -> None:
+    scenario = load_scenario("asteroid-1997")
+    for runs in ([0.5, 1.0], [[0, 1]], [True, False], [1, -1], [], 0):
+        refused(partial(simulate, scenario, runs), "run")  # type: ignore[arg-type]
+
+
+def test_an_engagement_that_is_not_there() -> None:
+    for call in (lambda: information().sections(2), lambda: information().section_at(5.5e6, 2)):
+        with pytest.raises(IndexError, match="engagement must be less than 2, their number: got 2"):
+            call()
+
+
+@pytest.mark.parametrize("value", [value for value in NO_NUMBERS if value is not None])
+def test_what_is_no_number(value: Any) -> None:
+    given = information(1)
+    refused(lambda: given.section_at(value), "label_m")
+    refused(lambda: given.margin(5.5e6, value, 0.0), "alpha_rad")
+    refused(lambda: given.margin(5.5e6, 0.0, value), "omega_rad_s")
+    refused(lambda: to_omega_alpha(square(), value, 1.0), "range_m")
+    refused(lambda: to_omega_alpha(square(), 1.0, value), "closing_speed_m_s")
+    refused(lambda: zero_effort_miss(np.zeros(1), np.ones(1), value), "closing_speed_m_s")
+    refused(lambda: symmetric_impulse(given.predicted_miss(), value), "closing_speed_m_s")
+    refused(lambda: Kalman(dead_zone=value), "dead_zone")
+    refused(lambda: Kalman(process_noise=value), "process_noise")
+    refused(lambda: LeastSquares(last_s=value), "last_s")
+    refused(lambda: ConvexPolygons.box((0.0, value), (0.0, 1.0)), "x")
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.1, math.nan, "a"])
+def test_a_share_is_a_part(share: Any) -> None:
+    with pytest.raises(REFUSALS):
+        Patient(share)
+
+
+def square() -> ConvexPolygons:
+    return ConvexPolygons.box((0.0, 1.0), (0.0, 1.0))
+
+
+NO_POINTS = (
+    [1j, 0.0],
+    np.ma.masked_array([0.0, 1.0], [True, False]),
+    ["a", "b"],
+    [math.nan, 0.0],
+    [0.0],
+    [True, False],
+)
+
+
+@pytest.mark.parametrize("value", NO_POINTS)
+def test_what_is_no_point_of_a_polygon(value: Any) -> None:
+    polygon = square()
+    several = value[None] if isinstance(value, np.ndarray) else [value]
+    refused(lambda: ConvexPolygons(several, 1), "vertices")
+    refused(lambda: ConvexPolygons.from_points(several), "points")
+    refused(lambda: polygon.clip(value, 0.0), "normal")
+    refused(lambda: polygon.translate(value), "offset")
+    refused(lambda: polygon.add_segment(value), "half")
+    refused(lambda: polygon.support(value), "direction")
+    refused(lambda: polygon.margin(value), "point")
+    refused(lambda: polygon.contains(value), "point")
+    if len(several[0]) == 2:
+        refused(lambda: polygon.linear_map(several), "matrix")
+
+
+def test_points_of_three_coordinates_are_no_points() -> None:
+    refused(lambda: ConvexPolygons.from_points(np.zeros((2, 3))), "points")
+    refused(lambda: square().linear_map([[1.0, 2.0]]), "matrix")
+    refused(lambda: ConvexPolygons([[0.0, 1.0]], 1.5), "counts")
+    refused(lambda: ConvexPolygons([[0.0, 1.0]], True), "counts")
+    refused(lambda: square().clip((1.0, 0.0), [0.0, 1.0]), "lower")
+
+
+@pytest.mark.parametrize(
+    "draws",
+    [np.full((1, 3), 1.1), np.full((1, 3), math.nan), np.zeros(3), [[0.0]], np.zeros((1, 3), dtype=complex), None],
+)
+def test_what_are_no_errors_of_a_noise(draws: Any) -> None:
+    zeros = np.zeros((1, 3))
+    refused(lambda: RandomNoise(draws, zeros), "angle_draws")
+    refused(lambda: RandomNoise(zeros, draws), "range_draws")
+    refused(lambda: GameNoise(TieRule.UPPER, draws), "tie_draws")
+    refused(lambda: GameNoise("upper", zeros), "tie")  # type: ignore[arg-type]
+    if draws is not None:
+        refused(lambda: ScriptedNoise(draws), "angle_errors")
+        refused(lambda: RandomNoise(zeros, zeros, draws), "rate_draws")
+
+
+class Returns:
+    """A strategy, or a noise, that returns what it is given from its second step on."""
+
+    def __init__(self, value: Any) -> None:
+        self.value = value
+
+    def start(self, batch: int) -> None:
+        pass
+
+    def decide(self, situation: Any, state: None) -> Any:
+        return np.zeros(1) if situation.step == 0 else self.value
+
+    def measure(self, sight: Any, predicted: Any) -> Any:
+        honest = Measurement(sight.alpha_rad, None)
+        return honest if sight.step == 0 else self.value(sight) if callable(self.value) else self.value
+
+
+@pytest.mark.parametrize(
+    "wanted",
+    [
+        None,
+        0.5,
+        [0.5, 0.5],
+        [[0.5]],
+        [math.nan],
+        [-math.inf],
+        [0.5j],
+        np.ma.masked_array([0.5], [True]),
+        np.ma.masked_array([0.5], [False]),
+        ["0.5"],
+        [True],
+    ],
+)
+def test_what_a_strategy_must_not_want(wanted: Any, brief: Scenario) -> None:
+    refused(lambda: simulate(brief, 1, strategy=Returns(wanted)), "strategy Returns must return 1 finite impulses")
+
+
+@pytest.mark.parametrize(
+    ("measured", "name"),
+    [
+        (None, "Measurement"),
+        (0.001, "Measurement"),
+        (Measurement(np.array([math.nan]), None), "alpha_rad"),
+        (Measurement(np.array([0.0, 0.0]), None), "alpha_rad"),
+        (Measurement(np.array([1j]), None), "alpha_rad"),
+        (Measurement(np.ma.masked_array([0.0], [True]), None), "alpha_rad"),
+        (lambda sight: Measurement(sight.alpha_rad, sight.range_m), "range_m must be None"),
+        (lambda sight: Measurement(sight.alpha_rad, None, sight.omega_rad_s), "omega_rad_s must be None"),
+    ],
+)
+def test_what_a_noise_must_not_measure(measured: Any, name: str, brief: Scenario) -> None:
+    refused(lambda: fly_one(brief, noise=Returns(measured)), name)
+
+
+def test_sensors_that_measure_now_and_then_are_asked_now_and_then(brief: Scenario) -> None:
+    step_s = brief.set_model.step_s
+    scenario = replace(brief, range_sensor=RangeSensor(2 * step_s, 0.05), rate_sensor=RateSensor(3 * step_s, 1e-4))
+
+    class Honest:
+        def measure(self, sight: Any, predicted: Any) -> Measurement:
+            asked_range, asked_rate = sight.range_error is not None, sight.rate_error_rad_s is not None
+            assert (asked_range, asked_rate) == (sight.step % 2 == 0, sight.step % 3 == 0)
+            return Measurement(
+                sight.alpha_rad, sight.range_m if asked_range else None, sight.omega_rad_s if asked_rate else None
+            )
+
+    record = fly_one(scenario, noise=Honest(), strategy=SymmetricMiss())
+    for number, step in enumerate(record.steps):
+        if step.measured_angle_rad is not None:
+            assert (step.measured_range_m is None) == (number % 2 != 0)
+            assert (step.measured_rate_rad_s is None) == (number % 3 != 0)
+    always = replace(scenario, rate_sensor=None)
+    refused(
+        lambda: fly_one(always, noise=Returns(lambda s: Measurement(s.alpha_rad, s.range_m))), "range_m must be None"
+    )
+
+
+@pytest.mark.parametrize("sample", [[], [math.nan], [1.0, math.inf], [1j], np.ma.masked_array([1.0], [True]), ["a"]])
+def test_what_is_no_sample(sample: Any) -> None:
+    for call in (
+        lambda: empirical_distribution(sample),
+        lambda: estimate_quantiles(sample, [0.5]),
+        lambda: quantiles(sample, [0.5]),
+    ):
+        with pytest.raises(REFUSALS):
+            call()
+
+
+@pytest.mark.parametrize("level", [-0.1, 1.1, math.nan])
+def test_what_is_no_level(level: float) -> None:
+    refused(lambda: quantiles([1.0, 2.0], [level]), "levels")
+    refused(lambda: estimate_quantiles([1.0, 2.0], [level]), "levels")
+
+
+@pytest.mark.parametrize("order", [(-1, 0), (0, 2), (0, 5), (0.5, 1.0), (0, 10**30)])
+def test_what_is_no_order_of_targets(order: Any) -> None:
+    motion = ClohessyWiltshire(1e-3)
+    states = np.array([[0.0, 1e3, 0.0, 0.0, 0.0, 0.0], [0.0, 2e3, 0.0, 0.0, 0.0, 0.0]])
+    tour = Tour(motion, DriftingTargets((Visited("near"), Visited("far")), motion, states), np.zeros(6))
+    assert len(tour.fly((1, 0), [1e3, 2e3]).nodes.arrive_s) == 2
+    refused(lambda: tour.fly(order, [1e3, 2e3]), "order must hold numbers of targets, from 0 to 1")
+
+
+NOT_CALLED = {
+    "infoset": {"ExtremePoints", "InformationSetView", "PredictedMiss", "Section", "SetStatus", "to_shapely"},
+    "guidance": {"LineOfSight", "MeasurementNoise", "NoiseKind", "Situation", "Strategy", "ZeroEffortMiss"},
+    "sim": {"CampaignResult", "Distribution", "Inconsistency", "Outcome", "QuantileEstimate", "Record", "Results"},
+}
+"""What is exported to be read, not to be given numbers."""
+ELSEWHERE = {"Campaign", "Sweep", "StepRecord", "make_strategy", "strategy_names"}
+"""Looked at in tests of their own."""
+
+
+@pytest.mark.parametrize("package", [infoset, guidance, sim], ids=lambda package: package.__name__)
+def test_everything_exported_is_looked_at_here(package: Any) -> None:
+    named = set(globals()) | NOT_CALLED[package.__name__] | ELSEWHERE | {"Recovery"}
+    assert set(package.__all__) <= named
+
+
+# What a file refuses beyond what the dataclasses do: units make its numbers smaller, and it guards time and names.
+FILE_ONLY = (
+    "must be at most 1E+15 in size",
+    "must be at least -299792.458",
+    "must be at most 299792.458",
+    "must be short enough for more than one step",
+    "in size",
+    "range_threshold_km: must be greater than 0",
+    "must be a whole number of steps of guidance.step_s",
+    "must be long enough for at most",
+    "the truth is integrated in stretches",
+    "in the guaranteed model",
+    "the guaranteed model has room for",
+)
+SIZES = st.one_of(
+    st.sampled_from([0.0, -0.0, 1.0, -1.0, 1e-120, 1e-30, 0.5, 1e3, 1e9, 1e16, 1e60, 1e65, 1e308, math.inf, math.nan]),
+    st.floats(-1e61, 1e61),
+    st.floats(allow_nan=True, allow_infinity=True),
+)
+NESTED: list[tuple[tuple[str, ...], type]] = [
+    ((), Scenario),
+    (("sun",), Sun),
+    (("dispersion",), StateBox),
+    (("set_model",), SetModel),
+    (("set_model", "bounds"), StateBox),
+    (("set_model", "angle_sensor"), AngleSensor),
+    (("range_sensor",), RangeSensor),
+    (("rate_sensor",), RateSensor),
+    (("thruster",), Thruster),
+    (("target",), Target),
+]
+NUMBERS = [
+    (path, field)
+    for path, kind in NESTED
+    for field, value in SOUND[kind].items()
+    if isinstance(value, float | tuple)
+    and field not in ("gravity_m_s2", "gravity_speed_change")
+    and (kind, field) != (SetModel, "execution_error_relative")
+]
+
+
+def changed(owner: Any, path: tuple[str, ...], field: str, value: Any) -> Any:
+    if not path:
+        return replace(owner, **{field: value})
+    return replace(owner, **{path[0]: changed(getattr(owner, path[0]), path[1:], field, value)})
+
+
+def agree(place: tuple[tuple[str, ...], str], first: float, second: float) -> bool:
+    """Give a field a value; whatever Python takes, a file takes. Return whether it was taken."""
+    scenario = load_scenario("asteroid-1997")
+    whole = replace(scenario, rate_sensor=RateSensor(1.0, 1e-6), target=Target(Manoeuvre.CONSTANT, 0.001))
+    path, field = place
+    if place in (((), "nominal_range_m"), (("set_model", "angle_sensor"), "nominal_range_m")):
+        return False  # a file has one for both
+    owner: Any = whole
+    for each in path:
+        owner = getattr(owner, each)
+    value = (first, second) if isinstance(getattr(owner, field), tuple) else first
+    refusal, made = "", whole
+    try:
+        made = changed(whole, path, field, value)
+    except REFUSALS as error:
+        refusal = str(error)
+    if refusal:
+        assert any(each in refusal for each in (field, *path, "error bound", "step_s", "x_m")), refusal
+        return False
+    lines: list[str] = []
+    try:
+        same = read_scenario(scenario_to_toml(made), "mine.toml") == made
+    except InputError as error:
+        same, lines = True, str(error).splitlines()[1:] or [str(error)]
+    assert same
+    assert [line for line in lines if not any(each in line for each in FILE_ONLY)] == []
+    return True
+
+
+@given(st.sampled_from(NUMBERS), SIZES, SIZES)
+@settings(max_examples=200, deadline=None)
+def test_a_file_takes_whatever_python_takes(place: tuple[tuple[str, ...], str], first: float, second: float) -> None:
+    agree(place, first, second)
+
+
+@pytest.mark.slow
+def test_a_file_takes_whatever_python_takes_2000_times() -> None:
+    draw = np.random.default_rng(18)
+    taken = 0
+    for _ in range(2000):
+        place = NUMBERS[draw.integers(len(NUMBERS))]
+        first, second = 10.0 ** draw.uniform(-12.0, 12.0, 2) * draw.choice([-1.0, 1.0], 2)
+        taken += agree(place, float(first), float(second))
+    assert 200 < taken < 1800
+
+
+def test_results_of_ordinary_size_are_far_from_the_limit() -> None:
+    assert float(np.abs(simulate(load_scenario("asteroid-1997"), 2).position_m).max()) < 1e-9 * LARGEST
