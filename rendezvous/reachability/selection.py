@@ -151,7 +151,7 @@ def minimum_peak(optimal: OptimalControls) -> Floats:
     turned = scale[:, None] * space.control_response
     rows = np.vstack([space.rows, turned, -turned])
     limits = np.concatenate([space.limits, bound - scale * space.control_free, bound + scale * space.control_free])
-    face = relative_interior(rows, limits, space.equal, space.levels, bounded=True)
+    face = relative_interior(rows, limits, space.equal, space.levels, bounded=True, member=point)
     inner = replace(space.within(face.point, face.basis), rows=face.rows, limits=face.limits)
     return optimal.at(face.point + face.basis @ _least_energy(inner, scale))
 
