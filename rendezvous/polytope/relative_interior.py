@@ -92,18 +92,17 @@ def relative_interior(
     tell which rows no point can leave. A set is flat where it is thinner than 1e-9 of its width.
     """
     lengths = np.linalg.norm(normals, axis=1)
+    long = lengths > ROUNDING * float(lengths.max(initial=0.0))
     size = float(np.abs(offsets).max(initial=0.0))
     if member is not None:
         size = max(size, float(np.abs(member).max(initial=0.0)))
-        offsets, levels = np.maximum(offsets - normals @ member, 0.0), np.zeros(len(across))
+        offsets = np.maximum(offsets, normals @ member)
     # A row that is as long as what rounding leaves of nothing has no direction.
-    long = lengths > ROUNDING * float(lengths.max(initial=0.0))
     void = np.flatnonzero(~long & (offsets < -ROUNDING * size))
     if len(void):
         raise EmptyPolytopeError(float(-offsets[void].min()), void)
     used = np.flatnonzero(long)
     normals, offsets = normals[used] / lengths[used, None], offsets[used] / lengths[used]
-    shift = np.zeros(normals.shape[1]) if member is None else member
     for _ in range(len(normals) + 1):
         point, basis = solutions(across, levels)
         slack = FLAT * max(1.0, float(np.abs(point).max(initial=0.0)))
@@ -114,7 +113,7 @@ def relative_interior(
         if worst < -slack:
             raise EmptyPolytopeError(-worst, used[np.flatnonzero((lengths <= FLAT) & (limits < -slack))])
         if not basis.shape[1]:
-            return RelativeInterior(shift + point, basis, rows[:0], limits[:0], used[:0], np.zeros(0), 0.0)
+            return RelativeInterior(point, basis, rows[:0], limits[:0], used[:0], np.zeros(0), 0.0)
         rows, limits = rows[kept] / lengths[kept, None], limits[kept] / lengths[kept]
         if not bounded:
             _need_bounded(rows, basis)
@@ -125,10 +124,10 @@ def relative_interior(
             raise EmptyPolytopeError(-radius)
         tight = np.zeros(0, dtype=np.int64) if radius > flat else _always_tight(rows, limits, flat)
         if not len(tight):
-            return RelativeInterior(shift + point, basis, rows, limits, used[kept], centre, radius)
+            return RelativeInterior(point, basis, rows, limits, used[kept], centre, radius)
         turned = rows[tight] @ basis.T
         across = np.vstack([across, turned])
-        levels = np.concatenate([levels, limits[tight] + turned @ point])
+        levels = np.concatenate([levels, limits[tight] + turned @ point]) if member is None else across @ member
     raise UncertainHullError("the affine hull was not found")  # pragma: no cover - each pass lowers the dimension
 
 

@@ -18,9 +18,13 @@ Floats = NDArray[np.float64]
 _GAP = 1e-10
 _BROKEN, _APART = 1e-9, 1e-8
 """The greatest violation of a constraint, and the greatest duality gap, of an answer; both relative."""
+STEADY: dict[str, object] = {"static_regularization_constant": 1e-7}
+"""With cones a larger shift of the solver's systems than its default, 1e-8, which loses its way near the end."""
 _SETTINGS: tuple[dict[str, object], ...] = (
     {},
-    {"equilibrate_enable": False},
+    STEADY,
+    {**STEADY, "equilibrate_enable": False},
+    {"static_regularization_constant": 1e-6, "equilibrate_enable": False},
     {"static_regularization_constant": 1e-11, "dynamic_regularization_eps": 1e-15},
     {"max_step_fraction": 0.9, "iterative_refinement_max_iter": 50},
 )
@@ -140,7 +144,7 @@ class ConeProgram:
     def of_rows(self, multipliers: Floats) -> Floats:
         """Return the multipliers of inequality rows alone."""
         parts = [part for kind, part in self._parts(multipliers) if kind == "rows"]
-        return np.maximum(np.concatenate([np.zeros(0), *parts]), 0.0)
+        return np.asarray(np.maximum(np.concatenate([np.zeros(0), *parts]), 0.0), dtype=np.float64)
 
     def of_cones(self, multipliers: Floats) -> list[Floats]:
         """Return the multipliers of each second-order cone."""
@@ -185,7 +189,7 @@ class ConeProgram:
         held = np.concatenate(dual)
         turned = self._matrix @ point
         curved = 0.5 * float(point @ turned)
-        residual = turned + linear + rows.T @ held
+        residual = np.asarray(turned + linear + rows.T @ held, dtype=np.float64)
         size = 2.0 * max(1.0, float(np.abs(point).max(initial=0.0)))
         value = curved + float(linear @ point)
         bound = -curved - float(held @ ends) - size * float(np.abs(residual).sum())

@@ -111,9 +111,10 @@ def block_optimum(block: Block, *, relative: bool = False) -> BlockOptimum:
     if lifted.ball:  # on the sphere the thrust of a period is unique
         pressed = np.linalg.norm(found.pressures.reshape(-1, lifted.ball), axis=1)
         fixed = np.repeat(pressed > max(_PRESSED * most, 1e-300), lifted.ball)
-    across = np.vstack([lifted.response[-1], lifted.rows[held], lifted.control_response[fixed]])
+    across = np.vstack([lifted.rows[held], lifted.control_response[fixed]])
     terminal = np.zeros(block.size) if found.reached else lifted.free[-1] + lifted.response[-1] @ found.point
-    return _with_hull(block, lifted, terminal, found.reached, lifted.where(across, across @ found.point), found.point)
+    face = lifted.where(lifted.response[-1], terminal - lifted.free[-1]).where(across, across @ found.point)
+    return _with_hull(block, lifted, terminal, found.reached, face, found.point)
 
 
 def block_reaches_zero(block: Block) -> bool:

@@ -6,7 +6,7 @@ import clarabel
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.reachability.conic import ConeProgram, NoSolutionError, Optimum, linear
+from rendezvous.reachability.conic import STEADY, ConeProgram, NoSolutionError, Optimum, linear
 from rendezvous.reachability.lifted import Lifted
 
 Floats = NDArray[np.float64]
@@ -389,8 +389,8 @@ class _Repeated:
         self._lifted = lifted
         self._used = used
         self._program = self._with_cost(np.zeros(lifted.size))
-        # Its answers are checked whatever they come from, and refinement is a third of the time.
-        self._solver = self._program.solver(iterative_refinement_enable=False)
+        # Its answers are checked whatever they come from, and for a box refinement is a third of the time.
+        self._solver = self._program.solver(**(STEADY if lifted.ball else {"iterative_refinement_enable": False}))
 
     def maximise(self, cost: Floats) -> Optimum:
         size = float(np.abs(cost).max())
