@@ -200,17 +200,15 @@ def directions(across: Floats) -> Floats:
     Parameters
     ----------
     across : ndarray, shape (e, n)
-        Rows of any lengths; those that are as short as what rounding leaves of nothing say nothing.
+        They may depend on each other.
 
     Returns
     -------
     ndarray, shape (n, d)
     """
-    lengths = np.linalg.norm(across, axis=1)
-    long = lengths > ROUNDING * float(lengths.max(initial=0.0))
-    if not long.any():
+    if not across.any():
         return np.eye(across.shape[1])
-    return np.asarray(null_space(across[long] / lengths[long, None], rcond=FLAT))
+    return np.asarray(null_space(across, rcond=FLAT))
 
 
 def _need_bounded(rows: Floats, basis: Floats) -> None:

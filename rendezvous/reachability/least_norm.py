@@ -286,7 +286,7 @@ class _Search:
             multipliers[active] = found
             self._offer_point(point)
             length = float(np.linalg.norm(turned))
-            if self.at_zero or length == 0.0:
+            if self.at_zero or not length > _RANK:
                 return
             direction, multipliers, pressed = turned / length, multipliers / length, pressed / length
             self._offer_bound(direction, multipliers)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.polytope import Polytope
+from rendezvous.polytope import EmptyPolytopeError, Polytope, UncertainHullError
 from rendezvous.polytope.relative_interior import relative_interior
 from rendezvous.reachability.conic import NoSolutionError
 from rendezvous.reachability.lifted import Lifted
@@ -267,6 +267,8 @@ def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
     ------
     TooManyVerticesError
         If there are more, if they are too many to look for, or if thrust is in a ball.
+    UncertainHullError
+        If rounding decides which points are vertices.
     """
     parts = []
     for each in optimal.blocks:
@@ -280,7 +282,10 @@ def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
         if not each.optimal.size:
             parts.append(np.zeros((1, 0)))
             continue
-        parts.append(Polytope.from_halfspaces(each.optimal.rows, each.optimal.limits, bounded=True).vertices)
+        try:
+            parts.append(Polytope.from_halfspaces(each.optimal.rows, each.optimal.limits, bounded=True).vertices)
+        except EmptyPolytopeError as error:  # the centre is inside
+            raise UncertainHullError("the optimal controls of a block are so thin that rounding hides them") from error
     count = int(np.prod([len(part) for part in parts]))
     if count > most:
         raise TooManyVerticesError(f"the optimal controls have {count} vertices, over {most}: choose samples")

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-import clarabel
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_matrix
 
 from rendezvous.reachability import (
     InadmissibleStartError,
@@ -20,94 +18,12 @@ from rendezvous.reachability import (
 )
 from rendezvous.relative_motion import EllipticOrbit
 
+from .high_precision import Dense, cone_program
+
 Floats = NDArray[np.float64]
 
 MU_M3_S2 = 3.986004418e14
 GAPS = (0.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, -1e-9)
-
-
-@dataclass(frozen=True)
-class Dense:
-    """A problem as matrices of the controls alone: minimise |free + response u|, rows u <= limits, |u| <= bounds.
-
-    Written straight from x(t + 1) = A x + B u, without the package's own programs.
-    """
-
-    free: Floats
-    response: Floats
-    rows: Floats
-    limits: Floats
-    bounds: Floats
-    ball: bool
-
-
-def dense(problem: ReachabilityProblem) -> Dense:
-    periods, n, m = problem.periods, problem.states, problem.controls
-    normals = [np.eye(n), -np.eye(n)]
-    offsets = [np.tile(np.concatenate([problem.state_bounds] * 2), (periods + 1, 1))]
-    if problem.normals is not None:
-        normals.append(problem.normals)
-        offsets.append(problem.offsets)
-    sides, ends = np.vstack(normals), np.hstack(offsets)
-    state, moved = problem.initial, np.zeros((n, periods * m))
-    rows, limits = [], []
-    for t in range(periods):
-        now = np.zeros((m, periods * m))
-        now[:, t * m : (t + 1) * m] = np.eye(m)
-        if problem.between is not None:
-            for each in problem.between[t]:
-                rows.append(sides @ (each[:, :n] @ moved + each[:, n:] @ now))
-                limits.append(ends[t] - sides @ each[:, :n] @ state)
-        state = problem.transition[t] @ state
-        moved = problem.transition[t] @ moved + problem.control[t] @ now
-        rows.append(sides @ moved)
-        limits.append(ends[t + 1] - sides @ state)
-    held = np.isfinite(np.concatenate(limits))
-    return Dense(
-        state,
-        moved,
-        np.vstack(rows)[held],
-        np.concatenate(limits)[held],
-        np.tile(problem.control_bounds, periods),
-        problem.thrust is ThrustShape.BALL,
-    )
-
-
-def least_bound(problem: ReachabilityProblem) -> float | None:
-    """By how much the bounds on controls must be multiplied so that zero is just reached, if anything helps."""
-    given = dense(problem)
-    size, m = len(given.bounds), problem.controls
-    response, rows = given.response * given.bounds, given.rows * given.bounds
-    scale, lengths = problem.state_bounds, np.maximum(np.linalg.norm(rows, axis=1), 1e-9)
-    blocks = [np.hstack([response / scale[:, None], np.zeros((len(scale), 1))])]
-    ends = [-given.free / scale]
-    blocks.append(np.hstack([rows / lengths[:, None], np.zeros((len(rows), 1))]))
-    ends.append(given.limits / lengths)
-    cones = [clarabel.ZeroConeT(len(scale)), clarabel.NonnegativeConeT(len(rows))]
-    unit = np.eye(size)
-    if given.ball:
-        for t in range(problem.periods):
-            block = np.zeros((m + 1, size + 1))
-            block[0, -1] = -1.0
-            block[1:, :-1] = -unit[t * m : (t + 1) * m]
-            blocks.append(block)
-            ends.append(np.zeros(m + 1))
-            cones.append(clarabel.SecondOrderConeT(m + 1))
-    else:
-        below = -np.ones((size, 1))
-        blocks += [np.hstack([unit, below]), np.hstack([-unit, below])]
-        ends.append(np.zeros(2 * size))
-        cones.append(clarabel.NonnegativeConeT(2 * size))
-    cost = np.zeros(size + 1)
-    cost[-1] = 1.0
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11
-    matrix, right = csc_matrix(np.vstack(blocks)), np.concatenate(ends)
-    found = clarabel.DefaultSolver(csc_matrix((size + 1,) * 2), cost, matrix, right, cones, settings).solve()
-    if found.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
-        return None
-    return float(found.x[-1])
 
 
 def random_rendezvous(seed: int) -> ReachabilityProblem:
@@ -159,9 +75,11 @@ def _drawn(generator: np.random.Generator) -> ReachabilityProblem | None:
     except InadmissibleStartError:
         return None
     if generator.random() < 0.5:
-        factor = least_bound(problem)
+        factor = cone_program(Dense(problem), "bound")[
+            0
+        ]  # by which all bounds are multiplied that zero is just reached
         gap = float(generator.choice(GAPS))
-        if factor is not None and 1e-6 < factor < 1e3:
+        if 1e-6 < factor < 1e3:
             problem = replace(problem, control_bounds=problem.control_bounds * factor * (1.0 - gap))
     return problem
 
