@@ -24,11 +24,12 @@ _SETTINGS: tuple[dict[str, object], ...] = (
     {},
     STEADY,
     {**STEADY, "equilibrate_enable": False},
-    {"static_regularization_constant": 1e-6, "equilibrate_enable": False},
+    *({"static_regularization_constant": shift, "equilibrate_enable": False} for shift in (1e-8, 3e-8, 1e-6)),
+    *({"static_regularization_constant": shift} for shift in (1e-9, 1e-5, 1e-4)),
     {"static_regularization_constant": 1e-11, "dynamic_regularization_eps": 1e-15},
     {"max_step_fraction": 0.9, "iterative_refinement_max_iter": 50},
 )
-"""What is tried in turn: the defaults solve nearly all programs."""
+"""What is tried in turn: the defaults solve nearly all programs, and where they do not it is chance which ones do."""
 
 
 class NoSolutionError(ArithmeticError):

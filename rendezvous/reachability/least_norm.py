@@ -15,18 +15,18 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Places = NDArray[np.int64]
 
-_APART = 1e-9
+_APART = 1e-8
 """How far the norm may be above its lower bound, relatively."""
 _CLOSE = 1e-13
 """How near they are brought where rounding allows it."""
-_ZERO = 1e-12
+_ZERO = 1e-11
 """Norms below this part of what the controls can do count as zero, unless their lower bound is above rounding."""
 _BROKEN = 1e-11
 _ULP = float(np.finfo(float).eps)
 _RANK = 1e-13
 _ROUNDS = 6
 _REACH = 1e4
-_NEWTON_STEPS, _IDLE = 12, 3
+_NEWTON_STEPS, _IDLE = 16, 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ def least_norm(lifted: Lifted, weights: Floats) -> LeastNorm:
     Raises
     ------
     NoSolutionError
-        If the norm found is not within 1e-9 of its lower bound, or its controls break a constraint.
+        If the norm found is not within 1e-8 of its lower bound, or its controls break a constraint.
 
     Notes
     -----
@@ -185,7 +185,7 @@ class _Search:
             )
         value = 0.0 if self.at_zero else self.value
         residual = self._residual(self._direction, self._multipliers)
-        if self.at_zero and not (np.linalg.norm(self._direction) > 0.5 and self._bound > -_ZERO * self._reach):
+        if self.at_zero and self._bound < -_ZERO * self._reach:
             # Zero is not on the border of what is reached: nothing holds it.
             return LeastNorm(self._point, value, 0.0, np.zeros(len(self._multipliers)), np.zeros(self._size))
         multipliers = self._multipliers.copy()
@@ -237,8 +237,11 @@ class _Search:
         return np.asarray(self._response.T @ direction + self._lifted.rows.T @ multipliers)
 
     def _offer_bound(self, direction: Floats, multipliers: Floats) -> None:
-        direction = direction / max(1.0, float(np.linalg.norm(direction)))
-        multipliers = np.where(self._soft, np.maximum(multipliers, 0.0), 0.0)
+        length = float(np.linalg.norm(direction))
+        if length == 0.0:
+            return
+        direction = direction / length
+        multipliers = np.where(self._soft, np.maximum(multipliers, 0.0), 0.0) / length
         residual = self._residual(direction, multipliers)
         pressed = self._norms(residual)
         bound = float(direction @ self._free - multipliers @ self._lifted.limits) - float(pressed.sum())
@@ -258,8 +261,8 @@ class _Search:
     def _merit_of(self, point: Floats) -> float:
         value = float(np.linalg.norm(self._free + self._response @ point))
         outside = self._outside(point)
-        # A point that breaks a constraint by more than rounding is no solution, only a place to go on from.
-        return abs(value - max(self._bound, 0.0)) + (1.0 + outside * self._reach if outside > _BROKEN else 0.0)
+        # Breaking a constraint gains about as much; by more than rounding it is no solution, but a place to go on from.
+        return abs(value - max(self._bound, 0.0)) + outside * self._reach + (1.0 if outside > _BROKEN else 0.0)
 
     def _outside(self, point: Floats) -> float:
         broken = float((self._lifted.rows @ point - self._lifted.limits - 32.0 * _ULP * self._lengths).max(initial=0.0))
@@ -286,14 +289,15 @@ class _Search:
             multipliers[active] = found
             self._offer_point(point)
             length = float(np.linalg.norm(turned))
-            if self.at_zero or not length > _RANK:
+            if not length > _RANK:
                 return
             direction, multipliers, pressed = turned / length, multipliers / length, pressed / length
             self._offer_bound(direction, multipliers)
             idle = 0 if self._merit < before else idle + 1
             if self._merit <= _CLOSE * self.value or idle == _IDLE:
                 return
-            point = self._slid(point, direction, multipliers, pressed, held)
+            if idle > 1:
+                point = self._slid(point, direction, multipliers, pressed, held)
 
     def _newton(
         self, point: Floats, active: Places, held: Flags, pressed: Floats

@@ -124,7 +124,7 @@ def precise_least_norm(problem: ReachabilityProblem, digits: float = 1e-8) -> tu
         rough, exact = Dense(problem), Dense(problem, _decimals)
         state = rough.free + rough.response @ start
         t = 2.0 * float(np.linalg.norm(state)) + 1e-3
-        smallest = 1e-13 * (float(np.abs(rough.free).max()) + float(np.abs(rough.response).sum(axis=1).max()))
+        smallest = 1e-15 * (float(np.abs(rough.free).max()) + float(np.abs(rough.response).sum(axis=1).max()))
         count = 2.0 + len(rough.limits) + 2.0 * len(start) / rough.group
         weight, point = t, np.append(start, t)
         while weight > 1e-5 * t:
