@@ -112,7 +112,18 @@ class ConeProgram:
         raise failed
 
     def need_solution(self, point: Floats, multipliers: Floats, cost: Floats | None = None) -> None:
-        """Refuse an answer that breaks a constraint, or whose duality gap is open; arguments of `broken_and_apart`."""
+        """Refuse an answer that breaks a constraint, or whose duality gap is open.
+
+        Parameters
+        ----------
+        point, multipliers, cost
+            As for `broken_and_apart`.
+
+        Raises
+        ------
+        NoSolutionError
+            If a constraint is broken by more than 1e-9, or the gap is over 1e-8.
+        """
         broken, apart = self.broken_and_apart(point, multipliers, cost)
         if not (broken <= _BROKEN and apart <= _APART):
             raise NoSolutionError(
