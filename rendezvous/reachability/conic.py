@@ -18,9 +18,9 @@ Floats = NDArray[np.float64]
 _GAP = 1e-10
 _BROKEN, _APART = 1e-9, 1e-8
 """The greatest violation of a constraint, and the greatest duality gap, of an answer; both relative."""
-STEADY: dict[str, object] = {"static_regularization_constant": 1e-7}
+STEADY: dict[str, float] = {"static_regularization_constant": 1e-7}
 """With cones a larger shift of the solver's systems than its default, 1e-8, which loses its way near the end."""
-_SETTINGS: tuple[dict[str, object], ...] = (
+_SETTINGS: tuple[dict[str, float], ...] = (
     {},
     STEADY,
     {**STEADY, "equilibrate_enable": False},
@@ -140,7 +140,7 @@ class ConeProgram:
             if np.isfinite(point).all() and np.isfinite(multipliers).all():
                 yield point, multipliers
 
-    def solver(self, **changes: object) -> clarabel.DefaultSolver:
+    def solver(self, **changes: float) -> clarabel.DefaultSolver:
         """Return the solver itself, with some of its settings changed."""
         settings = clarabel.DefaultSettings()
         settings.verbose = False
