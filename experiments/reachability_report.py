@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from experiments.reachability_file import KIND, Rendezvous
+from rendezvous.polytope import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
 from rendezvous.reachability import (
     EmptyTubeError,
     Flight,
@@ -198,11 +199,12 @@ def make_report(
         )
     except EmptyTubeError as error:
         raise InputError(_conflict(rendezvous, error)) from None
-    except TooLargeError as error:
+    except (TooLargeError, UncertainHullError) as error:
         raise InputError(f"--route exact: {error}; choose --route lifted") from None
-    except ArithmeticError as error:
+    except (ArithmeticError, np.linalg.LinAlgError, EmptyPolytopeError, UnboundedPolytopeError) as error:
         raise InputError(
-            f"{rendezvous.name}: could not be solved: {error}; its numbers differ too much in size, check their units"
+            f"{rendezvous.name}: could not be solved to its tolerance: {error}; check the units of the numbers, and "
+            "that no constraint is within 1e-9 of its bound of having no solution"
         ) from None
 
 
@@ -368,8 +370,8 @@ def _members(
         elif choice == VERTICES:
             try:
                 found = vertices(solution.optimal)
-            except TooManyVerticesError as error:
-                raise InputError(f"--select vertices: {error}; for example --select samples:20") from None
+            except (TooManyVerticesError, UncertainHullError) as error:
+                raise InputError(f"--select vertices: {error}; choose for example --select samples:20") from None
         else:
             found = samples(solution.optimal, sample_count, np.random.default_rng(seed))
         single = {VERTICES: "vertex", SAMPLES: "sample"}.get(choice)

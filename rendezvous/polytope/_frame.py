@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 
 FLAT = 1e-9
 """A set is flat across a direction where it is this much thinner than it is long."""
-_ROUNDING = 1e-13
+ROUNDING = 1e-13
 """What rounding leaves of zero, relative to the size of the coordinates."""
 
 
@@ -79,6 +79,6 @@ def frame_of(points: Floats, flat: float = FLAT) -> Frame:
     # Fewer points than coordinates: all right singular vectors are wanted, and only then are all left ones few.
     directions = np.linalg.svd(centred, full_matrices=len(points) < points.shape[1])[2]
     extents = np.abs(centred @ directions.T).max(axis=0)
-    least = max(flat * float(extents.max()), _ROUNDING * float(np.abs(points).max(initial=0.0)))
+    least = max(flat * float(extents.max()), ROUNDING * float(np.abs(points).max(initial=0.0)))
     wide = extents > least
     return Frame(centre, directions[wide].T, extents[wide], directions[~wide].T)

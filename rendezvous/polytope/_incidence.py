@@ -104,7 +104,7 @@ def _need_agreement(points: Floats, corners: Places, on_facets: Flags) -> None:
     try:
         hull = ConvexHull(points[corners])
     except QhullError as error:
-        raise UncertainHullError(f"Qhull: {str(error).splitlines()[0]}") from None
+        raise UncertainHullError(f"rounding decides which of {len(corners)} points are vertices") from error
     outside = float((points @ hull.equations[:, :-1].T + hull.equations[:, -1]).max())
     if outside > _APART:
         raise UncertainHullError(f"a point is {outside:.2g} outside the hull of its vertices")

@@ -70,14 +70,15 @@ def _hull(inner: Floats) -> tuple[Floats, Floats, Floats]:
         ends = np.array([[inner.min()], [inner.max()]])
         return ends, np.array([[-1.0], [1.0]]), np.array([-ends[0, 0], ends[1, 0]])
     inner = inner[np.unique(together(inner, MERGE), return_index=True)[1]]
-    failed = UncertainHullError("Qhull was not tried")
+    failed = UncertainHullError("no hull was found")
     for options in _OPTIONS:
         try:
             found = ConvexHull(inner, qhull_options=options)
             planes = np.unique(found.equations.round(13), axis=0)
             vertices, normals, offsets = essential(inner[found.vertices], planes[:, :-1], -planes[:, -1])
         except QhullError as error:
-            failed = UncertainHullError(f"Qhull: {str(error).splitlines()[0]}")
+            failed = UncertainHullError(f"rounding decides which of {len(inner)} points are vertices")
+            failed.__cause__ = error
             continue
         except UncertainHullError as error:
             failed = error
@@ -85,7 +86,7 @@ def _hull(inner: Floats) -> tuple[Floats, Floats, Floats]:
         outside = float((inner @ normals.T - offsets).max())
         if outside <= _APART:
             return vertices, normals, offsets
-        failed = UncertainHullError(f"Qhull lost a point that is {outside:.2g} outside its hull")
+        failed = UncertainHullError(f"a point is {outside:.2g} outside its hull")
     raise failed
 
 
@@ -116,9 +117,9 @@ def _intersect(rows: Floats, limits: Floats, centre: Floats) -> Floats:
     try:
         points = HalfspaceIntersection(np.column_stack([rows, -limits]), centre).intersections
     except QhullError as error:
-        raise UncertainHullError(f"Qhull: {str(error).splitlines()[0]}") from None
+        raise UncertainHullError(f"rounding decides where {len(rows)} half-spaces meet") from error
     if not np.isfinite(points).all():
-        raise UncertainHullError("Qhull: a vertex at infinity of a bounded set")
+        raise UncertainHullError(f"rounding decides where {len(rows)} half-spaces meet: a vertex is at infinity")
     return np.asarray(points)
 
 

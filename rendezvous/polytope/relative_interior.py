@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.optimize import linprog
 
-from rendezvous.polytope._frame import FLAT
+from rendezvous.polytope._frame import FLAT, ROUNDING
 from rendezvous.polytope.errors import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
 
 Floats = NDArray[np.float64]
@@ -53,7 +53,13 @@ class RelativeInterior:
 
 
 def relative_interior(
-    normals: Floats, offsets: Floats, across: Floats, levels: Floats, *, bounded: bool = False
+    normals: Floats,
+    offsets: Floats,
+    across: Floats,
+    levels: Floats,
+    *,
+    bounded: bool = False,
+    member: Floats | None = None,
 ) -> RelativeInterior:
     """Find the affine hull of {x: normals x <= offsets, across x = levels}.
 
@@ -65,6 +71,9 @@ def relative_interior(
     levels : ndarray, shape (e,)
     bounded : bool
         Whether the set is known to be bounded, which spares a linear program.
+    member : ndarray, shape (n,), optional
+        A point that is known to be in the set: it stays in, whatever rounding says of its rows, and the set is not
+        empty.
 
     Returns
     -------
@@ -83,35 +92,42 @@ def relative_interior(
     tell which rows no point can leave. A set is flat where it is thinner than 1e-9 of its width.
     """
     lengths = np.linalg.norm(normals, axis=1)
-    void = np.flatnonzero((lengths == 0.0) & (offsets < 0.0))
+    long = lengths > ROUNDING * float(lengths.max(initial=0.0))
+    size = float(np.abs(offsets).max(initial=0.0))
+    if member is not None:
+        size = max(size, float(np.abs(member).max(initial=0.0)))
+        offsets = np.maximum(offsets, normals @ member)
+    # A row that is as long as what rounding leaves of nothing has no direction.
+    void = np.flatnonzero(~long & (offsets < -ROUNDING * size))
     if len(void):
         raise EmptyPolytopeError(float(-offsets[void].min()), void)
-    used = np.flatnonzero(lengths > 0.0)
+    used = np.flatnonzero(long)
     normals, offsets = normals[used] / lengths[used, None], offsets[used] / lengths[used]
     for _ in range(len(normals) + 1):
         point, basis = solutions(across, levels)
         slack = FLAT * max(1.0, float(np.abs(point).max(initial=0.0)))
         rows, limits = normals @ basis, offsets - normals @ point
-        size = np.linalg.norm(rows, axis=1)
-        kept = np.flatnonzero(size > FLAT)
+        lengths = np.linalg.norm(rows, axis=1)
+        kept = np.flatnonzero(lengths > FLAT)
         worst = float(np.delete(limits, kept).min(initial=np.inf))
         if worst < -slack:
-            raise EmptyPolytopeError(-worst, used[np.flatnonzero((size <= FLAT) & (limits < -slack))])
+            raise EmptyPolytopeError(-worst, used[np.flatnonzero((lengths <= FLAT) & (limits < -slack))])
         if not basis.shape[1]:
             return RelativeInterior(point, basis, rows[:0], limits[:0], used[:0], np.zeros(0), 0.0)
-        rows, limits = rows[kept] / size[kept, None], limits[kept] / size[kept]
+        rows, limits = rows[kept] / lengths[kept, None], limits[kept] / lengths[kept]
         if not bounded:
             _need_bounded(rows, basis)
         centre, radius = chebyshev_ball(rows, limits)
-        width = max(float(np.abs(limits - rows @ centre).max()), float(np.abs(centre).max()), 1e-300)
-        if radius < -FLAT * width:
+        width = max(float(np.abs(limits - rows @ centre).max()), float(np.abs(centre).max()))
+        flat = max(FLAT * width, ROUNDING * size, 1e-300)
+        if radius < -flat:
             raise EmptyPolytopeError(-radius)
-        if radius > FLAT * width:
+        tight = np.zeros(0, dtype=np.int64) if radius > flat else _always_tight(rows, limits, flat)
+        if not len(tight):
             return RelativeInterior(point, basis, rows, limits, used[kept], centre, radius)
-        tight = _always_tight(rows, limits, FLAT * width)
         turned = rows[tight] @ basis.T
         across = np.vstack([across, turned])
-        levels = np.concatenate([levels, limits[tight] + turned @ point])
+        levels = np.concatenate([levels, limits[tight] + turned @ point]) if member is None else across @ member
     raise UncertainHullError("the affine hull was not found")  # pragma: no cover - each pass lowers the dimension
 
 
@@ -145,7 +161,7 @@ def chebyshev_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
     cost[-1] = -1.0
     found = linprog(cost, A_ub=matrix, b_ub=limits, bounds=(None, None), method="highs", options=HIGHS)
     if found.status != 0:
-        raise UncertainHullError(f"the Chebyshev centre was not found: {found.message}")
+        raise UncertainHullError("no largest ball inside was found")
     return found.x[:-1], float(found.x[-1])
 
 
@@ -175,7 +191,24 @@ def solutions(across: Floats, levels: Floats) -> tuple[Floats, Floats]:
     misfit = float(np.abs(across @ point - levels).max())
     if misfit > 1e2 * FLAT * max(1.0, float(np.abs(levels).max())):
         raise EmptyPolytopeError(misfit)
-    return np.asarray(point, dtype=np.float64), np.asarray(null_space(across, rcond=FLAT))
+    return np.asarray(point, dtype=np.float64), directions(across)
+
+
+def directions(across: Floats) -> Floats:
+    """Return an orthonormal basis of the directions that equations leave free, columns of shape (n, d).
+
+    Parameters
+    ----------
+    across : ndarray, shape (e, n)
+        They may depend on each other.
+
+    Returns
+    -------
+    ndarray, shape (n, d)
+    """
+    if not across.any():
+        return np.eye(across.shape[1])
+    return np.asarray(null_space(across, rcond=FLAT))
 
 
 def _need_bounded(rows: Floats, basis: Floats) -> None:
@@ -188,7 +221,7 @@ def _need_bounded(rows: Floats, basis: Floats) -> None:
 
 
 def _always_tight(rows: Floats, limits: Floats, tolerance: float) -> Places:
-    """Return the rows that every point meets with equality."""
+    """Return the rows that every point meets with equality; none in a set that is thin but not flat."""
     loose = np.zeros(len(rows), dtype=bool)
     size = rows.shape[1]
     while not loose.all():
@@ -201,9 +234,9 @@ def _always_tight(rows: Floats, limits: Floats, tolerance: float) -> Places:
             cost, A_ub=np.hstack([rows, slack]), b_ub=limits + tolerance, bounds=bounds, method="highs", options=HIGHS
         )
         if found.status != 0:
-            raise UncertainHullError(f"the affine hull was not found: {found.message}")
+            raise UncertainHullError("the affine hull was not found")
         new = left[found.x[size:] > 30.0 * tolerance]
         if not len(new):
             return left
         loose[new] = True
-    raise UncertainHullError("a thin set without a row that is always tight")
+    return np.zeros(0, dtype=np.int64)

@@ -125,7 +125,8 @@ class ExactSets:
         if block.size > meter.budget.dimension:
             raise TooLargeError(f"a block of {block.size} states is over the {meter.budget.dimension} of exact sets")
         self._optimum, self._meter = optimum, meter
-        corners = Polytope.box(-np.ones(len(block.controls)), np.ones(len(block.controls))).vertices
+        reach = np.ones(len(block.controls))
+        corners = Polytope.box(-reach, reach).vertices if len(reach) else np.zeros((1, 0))
         forward = [Polytope.from_vertices(block.initial[None, :])]
         for t in range(block.periods):
             moved = forward[-1].vertices @ block.transition[t].T

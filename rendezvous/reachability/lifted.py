@@ -145,7 +145,7 @@ def lift(block: Block) -> Lifted:
         response,
         np.zeros(width),
         np.eye(width),
-        np.vstack(rows).reshape(-1, width),
+        np.vstack(rows),
         np.concatenate(limits),
         np.concatenate(moments),
         np.concatenate(labels),
@@ -155,7 +155,7 @@ def lift(block: Block) -> Lifted:
     )
 
 
-def joined(parts: Sequence[Lifted], controls: Sequence[Places], periods: int) -> Lifted:
+def joined(parts: Sequence[Lifted], controls: Sequence[Places], periods: int, total: int) -> Lifted:
     """Return several blocks as one set, whose controls are in the order of the problem.
 
     Parameters
@@ -164,6 +164,8 @@ def joined(parts: Sequence[Lifted], controls: Sequence[Places], periods: int) ->
     controls : sequence of ndarray of int
         Places of their controls in the problem.
     periods : int
+    total : int
+        How many controls the problem has: those that act on no block are zero.
 
     Returns
     -------
@@ -172,7 +174,6 @@ def joined(parts: Sequence[Lifted], controls: Sequence[Places], periods: int) ->
     """
     from scipy.linalg import block_diag
 
-    total = sum(len(each) for each in controls)
     order = [t * total + int(j) for places in controls for t in range(periods) for j in places]
     control_free, control_response = np.zeros(periods * total), np.zeros((periods * total, sum(p.size for p in parts)))
     control_free[order] = np.concatenate([each.control_free for each in parts])

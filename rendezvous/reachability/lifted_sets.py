@@ -28,7 +28,7 @@ class LiftedSets:
     Notes
     -----
     A linear program a direction, or one with cones for thrust in a ball; nothing is approximated but by the tolerance
-    of the programs, 1e-11 of the bounds. Of few controls these alone are the variables; of many the states are
+    of the programs, 1e-8 of the bounds at most. Of few controls these alone are the variables; of many the states are
     variables too, for the rows then have few entries that are not zero.
     """
 

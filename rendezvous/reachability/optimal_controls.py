@@ -37,6 +37,7 @@ class OptimalControls:
             [each.optimal for each in self.blocks],
             [each.block.controls for each in self.blocks],
             self.problem.periods,
+            self.problem.controls,
         )
 
     @property

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.polytope import EmptyPolytopeError
-from rendezvous.polytope.relative_interior import relative_interior, solutions
+from rendezvous.polytope.relative_interior import directions, relative_interior
 from rendezvous.reachability.blocks import Block
+from rendezvous.reachability.least_norm import least_norm, reaches_zero
 from rendezvous.reachability.lifted import Lifted, lift
-from rendezvous.reachability.programs import Optimum, deep_point, least_relaxation, quadratic
+from rendezvous.reachability.programs import deep_point, least_relaxation
 
 Floats = NDArray[np.float64]
 
 _REACHED = 1e-9
-"""States nearer to zero than this, relative to their bounds, count as zero."""
+"""Constraints that are broken by less than this, relative to their sizes, count as kept."""
+_PRESSED = 1e-7
 
 
 class EmptyTubeError(ValueError):
@@ -94,66 +95,64 @@ def block_optimum(block: Block, *, relative: bool = False) -> BlockOptimum:
 
     Notes
     -----
-    A linear program tells whether zero can be reached; if not, a quadratic one (Clarabel, then its active rows solved
-    for) gives the terminal state, which is unique. A row with a positive multiplier is then tight for every optimal
-    control: with the terminal equations these give a face of the set of admissible controls, whose affine hull is
-    found by linear programs.
+    A cone program gives the terminal state, which is unique, and multipliers (see `least_norm`). A row with a positive
+    multiplier is tight for every optimal control: with the terminal equations these give a face of the set of
+    admissible controls, whose affine hull is found by linear programs through the solution.
     """
+    block = admissible(block)
     lifted = lift(block)
-    need_admissible(block, lifted)
-    if reaches_zero(lifted):
-        terminal = lifted.where(lifted.response[-1], -lifted.free[-1])
-        return _with_hull(block, lifted, np.zeros(block.size), True, terminal)
-    weights = np.ones(block.size) if relative else block.scale / block.scale.max()
-    response, free = weights[:, None] * lifted.response[-1], weights * lifted.free[-1]
-    found = Optimum(np.zeros(lifted.size), np.zeros(0))
-    size = 1.0
-    for _ in range(2):  # once more with a least norm of about one, for all its digits
-        found = quadratic(lifted, response.T @ response / size**2, response.T @ free / size**2)
-        size = max(float(np.linalg.norm(free + response @ found.point)), 1e-12)
-    reached = lifted.free[-1] + lifted.response[-1] @ found.point
+    found = least_norm(lifted, np.ones(block.size) if relative else block.scale / block.scale.max())
+    # The solution itself is never outside, by no rounding.
+    lifted = replace(lifted, limits=np.maximum(lifted.limits, lifted.rows @ found.point))
     gaps = lifted.limits - lifted.rows @ found.point
-    pressed = found.multipliers[: len(lifted.rows)]
-    held = pressed > np.maximum(gaps, _REACHED * max(1.0, float(pressed.max(initial=0.0))))
-    face = _thrust_at_its_bound(lifted, found) if lifted.ball else lifted
-    face = face.where(
-        np.vstack([lifted.response[-1], lifted.rows[held]]),
-        np.concatenate([reached - lifted.free[-1], lifted.rows[held] @ found.point]),
-    )
-    return _with_hull(block, lifted, reached, False, face)
+    most = max(float(found.multipliers.max(initial=0.0)), float(np.abs(found.pressures).max(initial=0.0)))
+    held = (found.multipliers > gaps) & (found.multipliers > _REACHED * most)
+    fixed = np.zeros(len(lifted.control_free), dtype=bool)
+    if lifted.ball:  # on the sphere the thrust of a period is unique
+        pressed = np.linalg.norm(found.pressures.reshape(-1, lifted.ball), axis=1)
+        fixed = np.repeat(pressed > max(_PRESSED * most, 1e-300), lifted.ball)
+    across = np.vstack([lifted.rows[held], lifted.control_response[fixed]])
+    terminal = np.zeros(block.size) if found.reached else lifted.free[-1] + lifted.response[-1] @ found.point
+    face = lifted.where(lifted.response[-1], terminal - lifted.free[-1]).where(across, across @ found.point)
+    return _with_hull(block, lifted, terminal, found.reached, face, found.point)
 
 
-def reaches_zero(lifted: Lifted) -> bool:
-    """Return whether admissible controls lead to zero, within 1e-9 of the bounds.
+def block_reaches_zero(block: Block) -> bool:
+    """Return whether admissible controls lead a block to zero.
 
     Parameters
     ----------
-    lifted : Lifted
+    block : Block
 
     Returns
     -------
     bool
     """
-    return least_relaxation(lifted.where(lifted.response[-1], -lifted.free[-1]))[0] <= _REACHED
+    relaxation = least_relaxation(lift(block))[0]
+    return relaxation <= _REACHED and reaches_zero(lift(_relaxed(block, relaxation)))
 
 
-def need_admissible(block: Block, lifted: Lifted) -> None:
-    """Refuse constraints that no control keeps.
+def admissible(block: Block) -> Block:
+    """Return a block that controls can keep in its constraints: itself, or relaxed by rounding.
 
     Parameters
     ----------
     block : Block
-    lifted : Lifted
-        Its admissible controls.
+
+    Returns
+    -------
+    Block
+        Where no control keeps the constraints by 1e-9 of their sizes, all of them are relaxed until one does.
 
     Raises
     ------
     EmptyTubeError
-        With the first time they conflict at, found by bisection, a linear program each.
+        If that takes more than 1e-9, with the first time they conflict at, found by bisection, a linear program each.
     """
-    relaxation, point = least_relaxation(lifted)
+    lifted = lift(block)
+    relaxation = least_relaxation(lifted)[0]
     if relaxation <= _REACHED:
-        return
+        return _relaxed(block, relaxation)
     low, high = 0, block.periods
     while high - low > 1:
         middle = (low + high) // 2
@@ -171,26 +170,19 @@ def need_admissible(block: Block, lifted: Lifted) -> None:
     raise EmptyTubeError(high, relaxation, tuple(names)[:4])
 
 
-def _with_hull(block: Block, lifted: Lifted, terminal: Floats, reached: bool, face: Lifted) -> BlockOptimum:
-    """Find the affine hull of the optimal controls, for which no rounding may leave them empty."""
-    try:
-        if not lifted.ball:
-            hull = relative_interior(face.rows, face.limits, face.equal, face.levels, bounded=True)
-            optimal = face.within(hull.point, hull.basis).only(hull.kept)
-            return BlockOptimum(block, lifted, terminal, reached, optimal, hull.centre)
-        point, basis = solutions(face.equal, face.levels)
-    except EmptyPolytopeError as error:
-        raise ArithmeticError(f"the optimal controls were lost to rounding: {error}") from error
-    optimal = face.within(point, basis)
-    moving = np.flatnonzero(np.linalg.norm(optimal.rows, axis=1) > _REACHED)
-    optimal = optimal.only(moving)
-    return BlockOptimum(block, lifted, terminal, reached, optimal, deep_point(optimal)[0])
+def _relaxed(block: Block, relaxation: float) -> Block:
+    margin = relaxation + _REACHED
+    return replace(block, offsets=block.offsets + margin) if margin > 0.0 else block
 
 
-def _thrust_at_its_bound(lifted: Lifted, found: Optimum) -> Lifted:
-    """Return equations for the periods whose thrust is on the sphere for every optimal control: it is unique there."""
-    group = lifted.ball
-    pressed = found.multipliers[len(lifted.rows) :].reshape(-1, group + 1)[:, 0]
-    fixed = np.repeat(pressed > 1e-7 * max(1.0, float(pressed.max(initial=0.0))), group)
-    levels = lifted.controls(found.point)[fixed] - lifted.control_free[fixed]
-    return lifted.where(lifted.control_response[fixed], levels)
+def _with_hull(
+    block: Block, lifted: Lifted, terminal: Floats, reached: bool, face: Lifted, member: Floats
+) -> BlockOptimum:
+    """Find the affine hull of the optimal controls, through one of them."""
+    if lifted.ball:
+        optimal = face.within(member, directions(face.equal))
+        optimal = optimal.only(np.flatnonzero(np.linalg.norm(optimal.rows, axis=1) > _REACHED))
+        return BlockOptimum(block, lifted, terminal, reached, optimal, deep_point(optimal)[0])
+    hull = relative_interior(face.rows, face.limits, face.equal, face.levels, bounded=True, member=member)
+    optimal = face.within(hull.point, hull.basis).only(hull.kept)
+    return BlockOptimum(block, lifted, terminal, reached, optimal, hull.centre)

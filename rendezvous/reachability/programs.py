@@ -1,38 +1,21 @@
-"""Convex programs over admissible controls: linear by HiGHS or an interior point, quadratic and conic by Clarabel."""
+"""Convex programs over admissible controls: which function is least or greatest, and where."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import clarabel
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
-from scipy.sparse import csc_matrix
 
-from rendezvous.polytope.relative_interior import HIGHS
+from rendezvous.reachability.conic import STEADY, ConeProgram, NoSolutionError, Optimum, linear
 from rendezvous.reachability.lifted import Lifted
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_GAP = 1e-10
 _BROKEN = 3e-10
 _NEAR = 2
 _MANY_ROWS = 200
 _STILL = 1e-9
-
-
-class NoSolutionError(ArithmeticError):
-    """A program that has a solution was not solved."""
-
-
-@dataclass(frozen=True, eq=False)
-class Optimum:
-    """A solution of a program: the point, and the multipliers of the rows (none negative)."""
-
-    point: Floats
-    multipliers: Floats
 
 
 class Maximiser:
@@ -177,14 +160,11 @@ def least_relaxation(lifted: Lifted) -> tuple[float, Floats]:
     limits = np.concatenate([lifted.limits, lifted.levels, -lifted.levels, [1.0 if not len(about) else 0.0]])
     cost = np.zeros(size + 1)
     cost[-1] = 1.0
-    if lifted.ball:
-        wide = np.column_stack([lifted.control_response, np.zeros(len(lifted.control_free))])
-        found = _conic(np.zeros((0, 0)), cost, matrix, limits, (wide, lifted.control_free, lifted.ball))
-        return float(found.point[-1]), found.point[:-1]
-    solved = linprog(cost, A_ub=matrix, b_ub=limits, bounds=(None, None), method="highs", options=HIGHS)
-    if solved.status != 0:
-        raise NoSolutionError(f"HiGHS: {solved.message}")
-    return float(solved.x[-1]), solved.x[:-1]
+    if not lifted.ball:
+        point = linear(cost, matrix, limits)
+        return float(point[-1]), point[:-1]
+    found = with_thrust(ConeProgram(cost).keep(matrix, limits), lifted).solve().point
+    return float(found[-1]), found[:-1]
 
 
 def quadratic(lifted: Lifted, matrix: Floats, vector: Floats) -> Optimum:
@@ -212,8 +192,8 @@ def quadratic(lifted: Lifted, matrix: Floats, vector: Floats) -> Optimum:
     """
     if not lifted.size:
         return Optimum(np.zeros(0), np.zeros(len(lifted.limits)))
-    cone = (lifted.control_response, lifted.control_free, lifted.ball) if lifted.ball else None
-    found = _conic(matrix, vector, lifted.rows, lifted.limits, cone)
+    program = with_thrust(ConeProgram(vector, matrix).keep(lifted.rows, lifted.limits), lifted)
+    found = program.solve()
     return found if lifted.ball else _polished(found, matrix, vector, lifted.rows, lifted.limits)
 
 
@@ -243,27 +223,10 @@ def least_sum_of_norms(lifted: Lifted, scale: Floats, group: int) -> Floats:
     A second-order cone a period (Clarabel).
     """
     periods = len(lifted.control_free) // group
-    size = lifted.size
-    cost = np.concatenate([np.zeros(size), np.ones(periods)])
-    rows = np.hstack([lifted.rows, np.zeros((len(lifted.rows), periods))])
-    matrices, limits = [rows], [lifted.limits]
-    cones = [clarabel.NonnegativeConeT(len(rows))]
-    for t in range(periods):
-        block = np.zeros((group + 1, size + periods))
-        block[0, size + t] = -1.0
-        mine = slice(t * group, (t + 1) * group)
-        block[1:, :size] = -scale[mine, None] * lifted.control_response[mine]
-        matrices.append(block)
-        limits.append(np.concatenate([[0.0], scale[mine] * lifted.control_free[mine]]))
-        cones.append(clarabel.SecondOrderConeT(group + 1))
-    if lifted.ball:
-        wide = np.hstack([lifted.control_response, np.zeros((len(lifted.control_free), periods))])
-        block, ends, more = _ball_rows((wide, lifted.control_free, lifted.ball))
-        matrices.append(block)
-        limits.append(ends)
-        cones += more
-    empty = csc_matrix((size + periods, size + periods))
-    return _solve(empty, cost, csc_matrix(np.vstack(matrices)), np.concatenate(limits), cones).point[:size]
+    tops = np.hstack([np.zeros((periods, lifted.size)), np.eye(periods)])
+    cost = tops.sum(axis=0)
+    program = with_thrust(ConeProgram(cost).keep(*_widened(lifted.rows, lifted.limits, len(cost))), lifted)
+    return _with_norms_below(program, lifted, scale, tops).solve().point[: lifted.size]
 
 
 def least_peak(lifted: Lifted, scale: Floats, group: int) -> tuple[float, Floats]:
@@ -293,30 +256,21 @@ def least_peak(lifted: Lifted, scale: Floats, group: int) -> tuple[float, Floats
     -----
     A linear program (HiGHS), or one with cones (Clarabel).
     """
-    size = lifted.size
-    cost = np.concatenate([np.zeros(size), [1.0]])
-    rows = np.hstack([lifted.rows, np.zeros((len(lifted.rows), 1))])
+    cost = np.concatenate([np.zeros(lifted.size), [1.0]])
+    rows, limits = _widened(lifted.rows, lifted.limits, len(cost))
     if lifted.ball:
-        matrices, limits, cones = [rows], [lifted.limits], [clarabel.NonnegativeConeT(len(rows))]
-        for t in range(len(lifted.control_free) // group):
-            mine = slice(t * group, (t + 1) * group)
-            block = np.zeros((group + 1, size + 1))
-            block[0, size] = -1.0
-            block[1:, :size] = -scale[mine, None] * lifted.control_response[mine]
-            matrices.append(block)
-            limits.append(np.concatenate([[0.0], scale[mine] * lifted.control_free[mine]]))
-            cones.append(clarabel.SecondOrderConeT(group + 1))
-        empty = csc_matrix((size + 1, size + 1))
-        solved = _solve(empty, cost, csc_matrix(np.vstack(matrices)), np.concatenate(limits), cones)
-        return float(solved.point[-1]), solved.point[:-1]
-    turned = scale[:, None] * lifted.control_response
-    below = -np.ones((len(turned), 1))
-    matrix = np.vstack([rows, np.hstack([turned, below]), np.hstack([-turned, below])])
-    ends = np.concatenate([lifted.limits, -scale * lifted.control_free, scale * lifted.control_free])
-    found = linprog(cost, A_ub=matrix, b_ub=ends, bounds=(None, None), method="highs", options=HIGHS)
-    if found.status != 0:
-        raise NoSolutionError(f"HiGHS: {found.message}")
-    return float(found.x[-1]), found.x[:-1]
+        program = with_thrust(ConeProgram(cost).keep(rows, limits), lifted)
+        tops = np.repeat(cost[None, :], len(lifted.control_free) // group, axis=0)
+        point = _with_norms_below(program, lifted, scale, tops).solve().point
+    else:
+        turned = scale[:, None] * lifted.control_response
+        below = -np.ones((len(turned), 1))
+        point = linear(
+            cost,
+            np.vstack([rows, np.hstack([turned, below]), np.hstack([-turned, below])]),
+            np.concatenate([limits, -scale * lifted.control_free, scale * lifted.control_free]),
+        )
+    return float(point[-1]), point[:-1]
 
 
 def least_l1(lifted: Lifted, scale: Floats) -> Floats:
@@ -344,22 +298,13 @@ def least_l1(lifted: Lifted, scale: Floats) -> Floats:
     """
     size, count = lifted.size, len(scale)
     turned, below = scale[:, None] * lifted.control_response, -np.eye(count)
-    matrix = np.vstack(
-        [
-            np.hstack([lifted.rows, np.zeros((len(lifted.rows), count))]),
-            np.hstack([turned, below]),
-            np.hstack([-turned, below]),
-        ]
-    )
-    ends = np.concatenate([lifted.limits, -scale * lifted.control_free, scale * lifted.control_free])
     cost = np.concatenate([np.zeros(size), np.ones(count)])
+    rows, limits = _widened(lifted.rows, lifted.limits, len(cost))
+    rows = np.vstack([rows, np.hstack([turned, below]), np.hstack([-turned, below])])
+    limits = np.concatenate([limits, -scale * lifted.control_free, scale * lifted.control_free])
     if lifted.ball:
-        wide = np.hstack([lifted.control_response, np.zeros((count, count))])
-        return _conic(np.zeros((0, 0)), cost, matrix, ends, (wide, lifted.control_free, lifted.ball)).point[:size]
-    found = linprog(cost, A_ub=matrix, b_ub=ends, bounds=(None, None), method="highs", options=HIGHS)
-    if found.status != 0:
-        raise NoSolutionError(f"HiGHS: {found.message}")
-    return np.asarray(found.x[:size])
+        return with_thrust(ConeProgram(cost).keep(rows, limits), lifted).solve().point[:size]
+    return linear(cost, rows, limits)[:size]
 
 
 def deep_point(lifted: Lifted) -> tuple[Floats, float]:
@@ -385,39 +330,56 @@ def deep_point(lifted: Lifted) -> tuple[Floats, float]:
     A program with cones (Clarabel). What the radius takes from the thrust of a period is bounded by the norm of its
     response, so that the ball is inside but may not be the largest.
     """
-    size = lifted.size
-    if not size:
+    if not lifted.size:
         return np.zeros(0), 0.0
-    cost = np.concatenate([np.zeros(size), [-1.0]])
+    cost = np.concatenate([np.zeros(lifted.size), [-1.0]])
     rows = np.column_stack([lifted.rows, np.linalg.norm(lifted.rows, axis=1)])
-    block, ends, cones = _ball_rows((lifted.control_response, lifted.control_free, lifted.ball))
-    taken = np.zeros((len(block), 1))
-    norms = np.linalg.norm(lifted.control_response.reshape(-1, lifted.ball, size), ord=2, axis=(1, 2))
-    taken[:: lifted.ball + 1, 0] = norms[norms > _STILL]
-    matrix = csc_matrix(np.vstack([rows, np.hstack([block, taken])]))
-    limits = np.concatenate([lifted.limits, ends])
-    empty = csc_matrix((size + 1, size + 1))
-    found = _solve(empty, cost, matrix, limits, [clarabel.NonnegativeConeT(len(rows)), *cones])
-    return found.point[:size], float(found.point[-1])
+    # The least bound on the radius keeps the program bounded where every row is still.
+    found = with_thrust(
+        ConeProgram(cost).keep(np.vstack([rows, -cost]), np.concatenate([lifted.limits, [1.0]])), lifted, deep=True
+    ).solve()
+    return found.point[:-1], float(found.point[-1])
 
 
-def _by_simplex(lifted: Lifted, cost: Floats) -> Floats:
-    size = float(np.abs(cost).max())
-    if size == 0.0:
-        return least_relaxation(lifted)[1]
-    equal = {"A_eq": lifted.equal, "b_eq": lifted.levels} if len(lifted.equal) else {}
-    found = linprog(
-        -cost / size,
-        A_ub=lifted.rows,
-        b_ub=lifted.limits,
-        bounds=(None, None),
-        method="highs-ds",
-        options=HIGHS,
-        **equal,
-    )
-    if found.status != 0:
-        raise NoSolutionError(f"HiGHS: {found.message}")
-    return np.asarray(found.x)
+def with_thrust(program: ConeProgram, lifted: Lifted, *, deep: bool = False) -> ConeProgram:
+    """Add |u(t)| <= 1 to a program whose first variables are those of a set; nothing where thrust is in a box.
+
+    Parameters
+    ----------
+    program : ConeProgram
+    lifted : Lifted
+    deep : bool
+        Whether the program's last variable is the radius of a ball that is to be inside too.
+
+    Returns
+    -------
+    ConeProgram
+        The same.
+    """
+    if lifted.ball:
+        size, width = lifted.size, len(program.cost)
+        free = lifted.control_free.reshape(-1, lifted.ball)
+        for fixed, turned in zip(free, lifted.control_response.reshape(-1, lifted.ball, size), strict=True):
+            if np.linalg.norm(turned) > _STILL:  # a thrust that does not depend on v is within its bound already
+                top = np.zeros(width)
+                top[-1] = -np.linalg.norm(turned, ord=2) if deep else 0.0
+                program.bound(_widened(turned, fixed, width)[0], fixed, top, 1.0)
+    return program
+
+
+def _with_norms_below(program: ConeProgram, lifted: Lifted, scale: Floats, tops: Floats) -> ConeProgram:
+    """Add |u(t)| <= tops[t] . v, in the units of the controls."""
+    group = len(scale) // len(tops)
+    for t, top in enumerate(tops):
+        mine = slice(t * group, (t + 1) * group)
+        turned = scale[mine, None] * lifted.control_response[mine]
+        program.bound(_widened(turned, top, len(top))[0], scale[mine] * lifted.control_free[mine], top)
+    return program
+
+
+def _widened(rows: Floats, limits: Floats, width: int) -> tuple[Floats, Floats]:
+    """Rows with zeros for more variables."""
+    return np.hstack([rows, np.zeros((len(rows), width - rows.shape[1]))]), limits
 
 
 class _Repeated:
@@ -425,36 +387,34 @@ class _Repeated:
 
     def __init__(self, lifted: Lifted, used: Flags) -> None:
         self._lifted = lifted
-        self._count = used.sum()
-        matrices = [lifted.equal, lifted.rows[used]]
-        limits = [lifted.levels, lifted.limits[used]]
-        cones = [clarabel.ZeroConeT(len(lifted.equal)), clarabel.NonnegativeConeT(int(used.sum()))]
-        if lifted.ball:
-            block, ends, more = _ball_rows((lifted.control_response, lifted.control_free, lifted.ball))
-            matrices.append(block)
-            limits.append(ends)
-            cones += more
-        size = lifted.size
-        settings = _settings()
-        # Its residuals are checked whatever they come from, and refinement is a third of the time.
-        settings.iterative_refinement_enable = False
-        self._solver = clarabel.DefaultSolver(
-            csc_matrix((size, size)),
-            np.zeros(size),
-            csc_matrix(np.vstack(matrices)),
-            np.concatenate(limits),
-            cones,
-            settings,
-        )
+        self._used = used
+        self._program = self._with_cost(np.zeros(lifted.size))
+        # Its answers are checked whatever they come from, and for a box refinement is a third of the time.
+        self._solver = self._program.solver(**(STEADY if lifted.ball else {"iterative_refinement_enable": False}))
 
     def maximise(self, cost: Floats) -> Optimum:
         size = float(np.abs(cost).max())
-        self._solver.update(q=-cost / (size if size > 0.0 else 1.0))
+        down = -cost / (size if size > 0.0 else 1.0)
+        self._solver.update(q=down)
         solution = self._solver.solve()
-        if solution.status == clarabel.SolverStatus.Solved or self._lifted.ball:
-            point, multipliers = _checked(solution)
-            return Optimum(point, multipliers[len(self._lifted.equal) :])
-        return Optimum(_by_simplex(self._lifted, cost), np.zeros(int(self._count)))
+        if solution.status == clarabel.SolverStatus.Solved:
+            point, multipliers = np.array(solution.x), np.array(solution.z)
+            try:
+                self._program.need_solution(point, multipliers, down)
+            except NoSolutionError:
+                pass
+            else:
+                return Optimum(point, self._program.of_rows(multipliers))
+        if self._lifted.ball:
+            return self._with_cost(down).solve()
+        lifted, used = self._lifted, self._used
+        point = linear(down, lifted.rows[used], lifted.limits[used], lifted.equal, lifted.levels)
+        return Optimum(point, np.zeros(int(used.sum())))
+
+    def _with_cost(self, cost: Floats) -> ConeProgram:
+        lifted, used = self._lifted, self._used
+        program = ConeProgram(cost).meet(lifted.equal, lifted.levels).keep(lifted.rows[used], lifted.limits[used])
+        return with_thrust(program, lifted)
 
 
 def _polished(found: Optimum, matrix: Floats, vector: Floats, rows: Floats, limits: Floats) -> Optimum:
@@ -475,49 +435,3 @@ def _polished(found: Optimum, matrix: Floats, vector: Floats, rows: Floats, limi
     multipliers = np.zeros(len(rows))
     multipliers[active] = np.maximum(pressed, 0.0)
     return Optimum(point, multipliers)
-
-
-def _conic(
-    matrix: Floats, vector: Floats, rows: Floats, limits: Floats, ball: tuple[Floats, Floats, int] | None
-) -> Optimum:
-    size = len(vector)
-    upper = csc_matrix(np.triu(matrix)) if matrix.size else csc_matrix((size, size))
-    cones = [clarabel.NonnegativeConeT(len(rows))]
-    if ball is None:
-        return _solve(upper, vector, csc_matrix(rows), limits, cones)
-    block, ends, more = _ball_rows(ball)
-    found = _solve(upper, vector, csc_matrix(np.vstack([rows, block])), np.concatenate([limits, ends]), cones + more)
-    return Optimum(found.point, found.multipliers)
-
-
-def _ball_rows(ball: tuple[Floats, Floats, int]) -> tuple[Floats, Floats, list[object]]:
-    """Rows and cones of |control_free + control_response v| <= 1 a period, but where the thrust is fixed."""
-    response, free, group = ball
-    turned, fixed = response.reshape(-1, group, response.shape[1]), free.reshape(-1, group)
-    moving = np.linalg.norm(turned, axis=(1, 2)) > _STILL
-    periods = int(moving.sum())
-    rows = np.zeros((periods, group + 1, response.shape[1]))
-    rows[:, 1:] = -turned[moving]
-    ends = np.ones((periods, group + 1))
-    ends[:, 1:] = fixed[moving]
-    return rows.reshape(-1, response.shape[1]), ends.ravel(), [clarabel.SecondOrderConeT(group + 1)] * periods
-
-
-def _solve(upper: csc_matrix, vector: Floats, rows: csc_matrix, limits: Floats, cones: list[object]) -> Optimum:
-    solution = clarabel.DefaultSolver(upper, vector, rows, limits, cones, _settings()).solve()
-    return Optimum(*_checked(solution))
-
-
-def _checked(solution: clarabel.DefaultSolution) -> tuple[Floats, Floats]:
-    if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
-        raise NoSolutionError(f"Clarabel: {solution.status}")
-    return np.array(solution.x), np.array(solution.z)
-
-
-def _settings() -> clarabel.DefaultSettings:
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.presolve_enable = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _GAP
-    settings.max_threads = 1
-    return settings

@@ -13,6 +13,7 @@ Floats = NDArray[np.float64]
 
 _STEPS_A_DIMENSION = 20
 _INSIDE = 1.0 - 1e-12
+_FLATTEST = 1e-15
 
 
 def samples(optimal: OptimalControls, count: int, generator: np.random.Generator) -> Floats:
@@ -46,7 +47,11 @@ def samples(optimal: OptimalControls, count: int, generator: np.random.Generator
     points = np.repeat(start[None, :], count, axis=0)
     if not space.size:
         return optimal.at(points)
-    rounding = np.linalg.inv(np.linalg.cholesky(hessian)).T
+    try:
+        rounding = np.linalg.inv(np.linalg.cholesky(hessian)).T
+    except np.linalg.LinAlgError:  # a set so thin that the Hessian is flat along it by rounding
+        steep, ways = np.linalg.eigh(hessian)
+        rounding = ways / np.sqrt(np.maximum(steep, _FLATTEST * steep[-1]))
     for _ in range(_STEPS_A_DIMENSION * space.size):
         directions = generator.standard_normal(points.shape) @ rounding.T
         directions /= np.linalg.norm(directions, axis=1)[:, None]

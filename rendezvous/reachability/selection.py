@@ -7,23 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.polytope import Polytope
+from rendezvous.polytope import EmptyPolytopeError, Polytope, UncertainHullError
 from rendezvous.polytope.relative_interior import relative_interior
+from rendezvous.reachability.conic import NoSolutionError
 from rendezvous.reachability.lifted import Lifted
 from rendezvous.reachability.optimal_controls import OptimalControls
-from rendezvous.reachability.programs import (
-    NoSolutionError,
-    least_l1,
-    least_peak,
-    least_sum_of_norms,
-    quadratic,
-)
+from rendezvous.reachability.programs import least_l1, least_peak, least_sum_of_norms, quadratic
 
 Floats = NDArray[np.float64]
 
 MOST_VERTICES = 2000
 _MOST_DIMENSIONS = 8
 _NEWTON_STEPS = 200
+_STILL = 1e-9
 
 
 class TooManyVerticesError(ValueError):
@@ -148,10 +144,11 @@ def minimum_peak(optimal: OptimalControls) -> Floats:
     bound, point = least_peak(space, scale, optimal.problem.controls)
     if space.ball:
         return optimal.at(point)
-    turned = scale[:, None] * space.control_response
+    moving = np.linalg.norm(space.control_response, axis=1) > _STILL
+    turned, fixed = (scale[:, None] * space.control_response)[moving], (scale * space.control_free)[moving]
     rows = np.vstack([space.rows, turned, -turned])
-    limits = np.concatenate([space.limits, bound - scale * space.control_free, bound + scale * space.control_free])
-    face = relative_interior(rows, limits, space.equal, space.levels, bounded=True)
+    limits = np.concatenate([space.limits, bound - fixed, bound + fixed])
+    face = relative_interior(rows, limits, space.equal, space.levels, bounded=True, member=point)
     inner = replace(space.within(face.point, face.basis), rows=face.rows, limits=face.limits)
     return optimal.at(face.point + face.basis @ _least_energy(inner, scale))
 
@@ -270,6 +267,8 @@ def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
     ------
     TooManyVerticesError
         If there are more, if they are too many to look for, or if thrust is in a ball.
+    UncertainHullError
+        If rounding decides which points are vertices.
     """
     parts = []
     for each in optimal.blocks:
@@ -283,7 +282,10 @@ def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
         if not each.optimal.size:
             parts.append(np.zeros((1, 0)))
             continue
-        parts.append(Polytope.from_halfspaces(each.optimal.rows, each.optimal.limits, bounded=True).vertices)
+        try:
+            parts.append(Polytope.from_halfspaces(each.optimal.rows, each.optimal.limits, bounded=True).vertices)
+        except EmptyPolytopeError as error:  # the centre is inside
+            raise UncertainHullError("the optimal controls of a block are so thin that rounding hides them") from error
     count = int(np.prod([len(part) for part in parts]))
     if count > most:
         raise TooManyVerticesError(f"the optimal controls have {count} vertices, over {most}: choose samples")
@@ -310,7 +312,7 @@ def _barrier(space: Lifted, point: Floats) -> tuple[float, Floats, Floats]:
     if space.ball:
         turned = space.control_response.reshape(-1, space.ball, size)
         thrust = space.controls(point).reshape(-1, space.ball)
-        moving = np.linalg.norm(turned, axis=(1, 2)) > 1e-9
+        moving = np.linalg.norm(turned, axis=(1, 2)) > _STILL
         turned, thrust = turned[moving], thrust[moving]
         left = 1.0 - (thrust**2).sum(axis=1)
         if float(left.min(initial=np.inf)) <= 0.0:

@@ -7,14 +7,13 @@ from enum import Enum
 
 import numpy as np
 
-from rendezvous.polytope import UncertainHullError
+from rendezvous.polytope import EmptyPolytopeError, UncertainHullError
 from rendezvous.reachability.block_sets import BlockSets, SetKind
 from rendezvous.reachability.blocks import Block, split
 from rendezvous.reachability.exact_sets import Budget, ExactSets, Meter, TooLargeError
-from rendezvous.reachability.lifted import lift
 from rendezvous.reachability.lifted_sets import LiftedSets
 from rendezvous.reachability.optimal_controls import OptimalControls
-from rendezvous.reachability.optimum import block_optimum, reaches_zero
+from rendezvous.reachability.optimum import BlockOptimum, block_optimum, block_reaches_zero
 from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
 from rendezvous.reachability.reachable_sets import ReachableSets
 
@@ -89,7 +88,7 @@ def solve(problem: ReachabilityProblem, route: Route | None = None, budget: Budg
         why = "as asked" if refused is None else refused
         return Solution(problem, optimal, ReachableSets(problem, blocks, lifted), Route.LIFTED, why)
     try:
-        exact: tuple[BlockSets, ...] = tuple(ExactSets(each, meter) for each in optima)
+        exact = _exact(optima, meter)
         _need_agreement(exact, lifted)
     except (TooLargeError, UncertainHullError) as error:
         if route is Route.EXACT:
@@ -97,6 +96,13 @@ def solve(problem: ReachabilityProblem, route: Route | None = None, budget: Budg
         return Solution(problem, optimal, ReachableSets(problem, blocks, lifted), Route.LIFTED, str(error))
     why = "as asked" if route is Route.EXACT else f"blocks of {', '.join(str(each.size) for each in blocks)} states"
     return Solution(problem, optimal, ReachableSets(problem, blocks, exact), Route.EXACT, why)
+
+
+def _exact(optima: tuple[BlockOptimum, ...], meter: Meter) -> tuple[BlockSets, ...]:
+    try:
+        return tuple(ExactSets(each, meter) for each in optima)
+    except EmptyPolytopeError as error:  # what is not empty by the programs
+        raise UncertainHullError("a set is so thin that rounding leaves nothing of it") from error
 
 
 def _need_agreement(exact: tuple[BlockSets, ...], lifted: tuple[BlockSets, ...]) -> None:
@@ -130,7 +136,7 @@ def least_periods(problem: ReachabilityProblem) -> int | None:
     waits = all((each.offsets >= 0.0).all() for each in blocks)
 
     def reached(periods: int) -> bool:
-        return all(reaches_zero(lift(each.first(periods))) for each in blocks)
+        return all(block_reaches_zero(each.first(periods)) for each in blocks)
 
     if not waits:
         return next((each for each in range(1, problem.periods + 1) if reached(each)), None)

@@ -21,6 +21,7 @@ from rendezvous.polytope import (
     projection,
     shadow,
 )
+from rendezvous.polytope.relative_interior import relative_interior
 from rendezvous.reachability.exact_check import rational_hull, rational_intersection
 
 needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
@@ -255,3 +256,21 @@ def test_vertices_that_lie_together_count_once() -> None:
     near = Polytope.from_vertices([[0.0, 0.0], [1.0, 0.0], [1.0, 1e-8], [0.0, 1.0]])
     assert len(near.vertices) == 4
     assert near.essential_vertices() == 3
+
+
+@pytest.mark.parametrize("junk", [0.0, 1e-17, -1e-17])
+def test_rows_that_rounding_left_of_nothing_are_no_constraints(junk: float) -> None:
+    rows = np.vstack([np.eye(3), -np.eye(3), [[0.0, junk, -junk]], np.zeros((1, 3))])
+    limits = np.concatenate([np.ones(6), [-1e-17, -1e-16]])
+    found = Polytope.from_halfspaces(rows, limits)
+    assert found.dimension == 3
+    assert len(found.vertices) == 8
+
+
+def test_a_set_with_a_known_member_is_not_empty() -> None:
+    member = np.array([0.3, 0.1])
+    rows = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    limits = rows @ member - 1e-16
+    found = relative_interior(rows, limits, np.zeros((0, 2)), np.zeros(0), bounded=True, member=member)
+    assert found.dimension == 0
+    np.testing.assert_allclose(found.point, member, atol=1e-15)

@@ -1,0 +1,268 @@
+"""Linear, quadratic and second-order cone programs whose solutions are checked before they are returned."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import clarabel
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+from scipy.sparse import csc_matrix
+
+from rendezvous.polytope.relative_interior import HIGHS
+
+Floats = NDArray[np.float64]
+
+_GAP = 1e-10
+_BROKEN, _APART = 1e-9, 1e-8
+"""The greatest violation of a constraint, and the greatest duality gap, of an answer; both relative."""
+STEADY: dict[str, float] = {"static_regularization_constant": 1e-7}
+"""With cones a larger shift of the solver's systems than its default, 1e-8, which loses its way near the end."""
+_SETTINGS: tuple[dict[str, float], ...] = (
+    {},
+    STEADY,
+    {**STEADY, "equilibrate_enable": False},
+    *({"static_regularization_constant": shift, "equilibrate_enable": False} for shift in (1e-8, 3e-8, 1e-6)),
+    *({"static_regularization_constant": shift} for shift in (1e-9, 1e-5, 1e-4)),
+    {"static_regularization_constant": 1e-11, "dynamic_regularization_eps": 1e-15},
+    {"max_step_fraction": 0.9, "iterative_refinement_max_iter": 50},
+)
+"""What is tried in turn: the defaults solve nearly all programs, and where they do not it is chance which ones do."""
+
+
+class NoSolutionError(ArithmeticError):
+    """No solver's answer to a program met the conditions of optimality."""
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """A solution of a program: the point, and the multipliers of its inequality rows (none negative)."""
+
+    point: Floats
+    multipliers: Floats
+
+
+class ConeProgram:
+    """Minimise v . matrix v / 2 + cost . v over rows, equations and second-order cones.
+
+    Parameters
+    ----------
+    cost : ndarray, shape (p,)
+    matrix : ndarray, shape (p, p), or None
+        Positive semidefinite.
+    """
+
+    def __init__(self, cost: Floats, matrix: Floats | None = None) -> None:
+        self.cost = cost
+        self._matrix = csc_matrix((len(cost), len(cost))) if matrix is None else csc_matrix(matrix)
+        self._blocks: list[Floats] = []
+        self._ends: list[Floats] = []
+        self._cones: list[object] = []
+        self._kinds: list[str] = []
+        self._whole: tuple[Floats, Floats] | None = None
+
+    def keep(self, rows: Floats, limits: Floats) -> ConeProgram:
+        """Add rows v <= limits."""
+        return self._add("rows", rows, limits, clarabel.NonnegativeConeT(len(rows)))
+
+    def meet(self, rows: Floats, levels: Floats) -> ConeProgram:
+        """Add rows v = levels."""
+        return self._add("equations", rows, levels, clarabel.ZeroConeT(len(rows)))
+
+    def bound(self, response: Floats, free: Floats, top: Floats, height: float = 0.0) -> ConeProgram:
+        """Add |free + response v| <= top . v + height."""
+        block = np.vstack([-top[None, :], -response])
+        return self._add("cone", block, np.concatenate([[height], free]), clarabel.SecondOrderConeT(len(block)))
+
+    def _add(self, kind: str, block: Floats, ends: Floats, cone: object) -> ConeProgram:
+        if len(block):
+            self._blocks.append(block)
+            self._ends.append(ends)
+            self._cones.append(cone)
+            self._kinds.append(kind)
+            self._whole = None
+        return self
+
+    def solve(self) -> Optimum:
+        """Return a solution.
+
+        Returns
+        -------
+        Optimum
+
+        Raises
+        ------
+        NoSolutionError
+            If no answer passed the check of `broken_and_apart`.
+
+        Notes
+        -----
+        An interior point (Clarabel), with other settings where its answer fails the check.
+        """
+        failed = NoSolutionError("a convex program was not solved")
+        for point, multipliers in self.attempts():
+            try:
+                self.need_solution(point, multipliers)
+            except NoSolutionError as error:
+                failed = error
+            else:
+                return Optimum(point, self.of_rows(multipliers))
+        raise failed
+
+    def need_solution(self, point: Floats, multipliers: Floats, cost: Floats | None = None) -> None:
+        """Refuse an answer that breaks a constraint, or whose duality gap is open.
+
+        Parameters
+        ----------
+        point, multipliers, cost
+            As for `broken_and_apart`.
+
+        Raises
+        ------
+        NoSolutionError
+            If a constraint is broken by more than 1e-9, or the gap is over 1e-8.
+        """
+        broken, apart = self.broken_and_apart(point, multipliers, cost)
+        if not (broken <= _BROKEN and apart <= _APART):
+            raise NoSolutionError(
+                f"a convex program was not solved: the answer breaks a constraint by {max(broken, 0.0):.2g} and has a "
+                f"duality gap of {apart:.2g}"
+            )
+
+    def attempts(self) -> Iterator[tuple[Floats, Floats]]:
+        """Yield points and multipliers that a solver takes for a solution, unchecked."""
+        for changes in _SETTINGS:
+            solver = self.solver(**changes)
+            solution = solver.solve()
+            point, multipliers = np.array(solution.x), np.array(solution.z)
+            if np.isfinite(point).all() and np.isfinite(multipliers).all():
+                yield point, multipliers
+
+    def solver(self, **changes: float) -> clarabel.DefaultSolver:
+        """Return the solver itself, with some of its settings changed."""
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        settings.presolve_enable = False
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _GAP
+        settings.max_threads = 1
+        for name, value in changes.items():
+            setattr(settings, name, value)
+        upper = csc_matrix(np.triu(self._matrix.toarray())) if self._matrix.nnz else self._matrix
+        rows, ends = self._stacked()
+        return clarabel.DefaultSolver(upper, self.cost, csc_matrix(rows), ends, self._cones, settings)
+
+    def of_rows(self, multipliers: Floats) -> Floats:
+        """Return the multipliers of inequality rows alone."""
+        parts = [part for kind, part in self._parts(multipliers) if kind == "rows"]
+        return np.asarray(np.maximum(np.concatenate([np.zeros(0), *parts]), 0.0), dtype=np.float64)
+
+    def of_cones(self, multipliers: Floats) -> list[Floats]:
+        """Return the multipliers of each second-order cone."""
+        return [part for kind, part in self._parts(multipliers) if kind == "cone"]
+
+    def broken_and_apart(self, point: Floats, multipliers: Floats, cost: Floats | None = None) -> tuple[float, float]:
+        """Return by how much a point breaks a constraint, and how far its value is from a lower bound, relatively.
+
+        Parameters
+        ----------
+        point : ndarray, shape (p,)
+        multipliers : ndarray
+            Of all constraints, in their order; moved into the dual cone before they are used.
+        cost : ndarray, shape (p,), optional
+            In place of the program's.
+
+        Returns
+        -------
+        broken, apart : float
+
+        Notes
+        -----
+        The gap is relative to the value, or to what the violation that is forgiven may change of it. By weak duality no
+        solution y is below - v . matrix v / 2 - multipliers . limits - |residual| . |y|; y is taken
+        to be at most twice as large as the point.
+        """
+        linear = self.cost if cost is None else cost
+        rows, ends = self._stacked()
+        left = ends - rows @ point
+        dual, broken = [np.zeros(0)], 0.0
+        for (kind, slack), (_, given) in zip(self._parts(left), self._parts(multipliers), strict=True):
+            part = given.copy()
+            if kind == "rows":
+                broken = max(broken, float(-slack.min()))
+                part = np.maximum(part, 0.0)
+            elif kind == "equations":
+                broken = max(broken, float(np.abs(slack).max()))
+            else:
+                broken = max(broken, float(np.linalg.norm(slack[1:]) - slack[0]))
+                part[0] = max(part[0], float(np.linalg.norm(part[1:])))
+            dual.append(part)
+        held = np.concatenate(dual)
+        turned = self._matrix @ point
+        curved = 0.5 * float(point @ turned)
+        residual = np.asarray(turned + linear + rows.T @ held, dtype=np.float64)
+        size = 2.0 * max(1.0, float(np.abs(point).max(initial=0.0)))
+        value = curved + float(linear @ point)
+        bound = -curved - float(held @ ends) - size * float(np.abs(residual).sum())
+        return broken, abs(value - bound) / max(1.0, abs(value), _BROKEN / _APART * float(np.abs(held).sum()))
+
+    def _stacked(self) -> tuple[Floats, Floats]:
+        if self._whole is None:
+            rows = np.vstack([np.zeros((0, len(self.cost))), *self._blocks])
+            self._whole = rows, np.concatenate([np.zeros(0), *self._ends])
+        return self._whole
+
+    def _parts(self, values: Floats) -> Iterator[tuple[str, Floats]]:
+        start = 0
+        for kind, ends in zip(self._kinds, self._ends, strict=True):
+            yield kind, values[start : start + len(ends)]
+            start += len(ends)
+
+
+def linear(
+    cost: Floats, rows: Floats, limits: Floats, equal: Floats | None = None, levels: Floats | None = None
+) -> Floats:
+    """Minimise cost . v where rows v <= limits and equal v = levels.
+
+    Parameters
+    ----------
+    cost : ndarray, shape (p,)
+    rows : ndarray, shape (r, p)
+    limits : ndarray, shape (r,)
+    equal : ndarray, shape (e, p), optional
+    levels : ndarray, shape (e,), optional
+
+    Returns
+    -------
+    ndarray, shape (p,)
+        A vertex.
+
+    Raises
+    ------
+    NoSolutionError
+        If the program was not solved.
+
+    Notes
+    -----
+    The simplex method (HiGHS), checked as every other program; an interior point where that fails.
+    """
+    sizes = np.abs(rows).max(axis=1, initial=0.0)
+    sizes[sizes == 0.0] = 1.0
+    rows, limits = rows / sizes[:, None], limits / sizes
+    program = ConeProgram(cost)
+    given = {}
+    if equal is not None and levels is not None and len(equal):
+        program.meet(equal, levels)
+        given = {"A_eq": equal, "b_eq": levels}
+    program.keep(rows, limits)
+    found = linprog(cost, A_ub=rows, b_ub=limits, bounds=(None, None), method="highs", options=HIGHS, **given)
+    if found.status == 0:
+        point = np.asarray(found.x)
+        try:
+            program.need_solution(point, -np.concatenate([found.eqlin.marginals, found.ineqlin.marginals]))
+        except NoSolutionError:
+            pass
+        else:
+            return point
+    return program.solve().point

@@ -1,0 +1,221 @@
+"""The least terminal norm against programs of its own kind and forty digits, from well inside to the edges."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from experiments.reachability_file import load_rendezvous
+from rendezvous.reachability import (
+    EmptyTubeError,
+    ReachabilityProblem,
+    Route,
+    SetKind,
+    ThrustShape,
+    between_periods,
+    least_periods,
+    solve,
+)
+from rendezvous.reachability.blocks import split
+from rendezvous.reachability.conic import NoSolutionError
+from rendezvous.reachability.optimal_controls import OptimalControls
+from rendezvous.reachability.optimum import block_optimum
+from rendezvous.reachability.sampling import samples
+from rendezvous.reachability.selection import (
+    analytic_centre,
+    chebyshev_centre,
+    minimum_energy,
+    minimum_l1,
+    minimum_norms,
+    minimum_peak,
+)
+
+from .high_precision import Dense, cone_program, precise_least_norm
+from .random_rendezvous import random_rendezvous
+
+Floats = NDArray[np.float64]
+Paper = Callable[..., ReachabilityProblem]
+
+CASES = Path(__file__).parent / "cases"
+SELECTIONS = (minimum_energy, minimum_l1, minimum_norms, minimum_peak, chebyshev_centre, analytic_centre)
+RELATIVE = 1e-6
+ZERO = 1e-11
+"""Of what controls can do: misses below are zero."""
+
+
+def optimal_controls(problem: ReachabilityProblem) -> OptimalControls:
+    return OptimalControls(problem, tuple(block_optimum(each) for each in split(problem)))
+
+
+def size_of(problem: ReachabilityProblem) -> float:
+    """How far controls and free motion may bring a terminal state: doubles know it to so many parts in 1e16."""
+    given = Dense(problem)
+    return float(np.abs(given.free).max() + np.abs(given.response).sum(axis=1).max())
+
+
+def assert_precise(problem: ReachabilityProblem, miss: float) -> bool:
+    """Whether forty digits could tell, and then that they agree."""
+    found = precise_least_norm(problem)
+    if found is None:
+        return False
+    expected, rounding = found
+    if miss == 0.0:
+        assert expected <= ZERO * size_of(problem)
+        return True
+    assert abs(miss - expected) <= RELATIVE * expected + rounding
+    return True
+
+
+@pytest.mark.parametrize("name", ["near_0.172", "near_0.1726", "s2_1_193", "s2_2_133", "s2_2_26", "s2_2_68"])
+def test_misses_that_were_wrong_or_refused(name: str) -> None:
+    problem = load_rendezvous(CASES / f"{name}.toml").problem
+    miss = solve(problem).optimal.miss
+    if problem.periods <= 4:
+        assert assert_precise(problem, miss)
+    assert miss == pytest.approx(cone_program(Dense(problem), "norm")[0], rel=RELATIVE, abs=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["s2_2_26", "s2_2_68"])
+def test_misses_with_thrust_in_a_ball_to_forty_digits(name: str) -> None:
+    problem = load_rendezvous(CASES / f"{name}.toml").problem
+    assert assert_precise(problem, solve(problem).optimal.miss)
+
+
+@pytest.mark.parametrize("thrust", list(ThrustShape))
+@pytest.mark.parametrize("gap", [1e-1, 1e-5, 1e-9])
+def test_just_under_the_least_bound_that_reaches_zero(paper: Paper, thrust: ThrustShape, gap: float) -> None:
+    problem = paper(periods=3, thrust=thrust)
+    least = cone_program(Dense(problem), "bound")[0]
+    below = replace(problem, control_bounds=np.full(3, least * (1.0 - gap)))
+    miss = optimal_controls(below).miss
+    assert miss > 0.0
+    assert assert_precise(below, miss)
+    above = replace(problem, control_bounds=np.full(3, least * (1.0 + gap)))
+    assert optimal_controls(above).miss == 0.0
+
+
+@pytest.mark.parametrize("route", list(Route))
+@pytest.mark.parametrize("bound", [0.115, 0.12, 0.125, 0.14, 0.15, 0.16, 0.17, 0.172])
+def test_flat_sets_of_optimal_controls(paper: Paper, bound: float, route: Route) -> None:
+    problem = paper(bound=bound)
+    optimal = solve(problem, route).optimal
+    assert optimal.miss == pytest.approx(cone_program(Dense(problem), "norm")[0], rel=RELATIVE)
+    for select in SELECTIONS:
+        control = select(optimal)
+        assert float(optimal.excess(control)) < 1e-9
+        assert float(np.linalg.norm(problem.run(control)[-1])) == pytest.approx(optimal.miss, rel=1e-9)
+
+
+def test_every_dimension_down_to_a_point(paper: Paper) -> None:
+    """At the least bound that reaches zero the set loses dimensions; with fewer periods it is a point."""
+    problem, dimensions = paper(), []
+    for shape in ThrustShape:
+        given = replace(problem, thrust=shape)
+        for factor in (1.0, cone_program(Dense(given), "bound")[0]):
+            optimal = solve(replace(given, control_bounds=given.control_bounds * factor)).optimal
+            dimensions.append(optimal.dimension)
+            for select in SELECTIONS:
+                assert float(optimal.excess(select(optimal))) < 1e-7
+    assert dimensions[0] == dimensions[2] == 6
+    assert dimensions[1] < 6
+    assert dimensions[3] < 6
+    assert solve(problem.first(1)).optimal.dimension == 0
+
+
+@pytest.mark.parametrize("axes", [(2,), (0, 1), (0, 1, 2)])
+@pytest.mark.parametrize("thrust", list(ThrustShape))
+def test_axes_without_thrust(paper: Paper, axes: tuple[int, ...], thrust: ThrustShape) -> None:
+    problem = paper(thrust=thrust)
+    control = problem.control.copy()
+    control[:, :, list(axes)] = 0.0
+    start = problem.initial.copy()
+    start[3:] = [-1.0, 0.5, 0.5]
+    still = replace(problem, control=control, initial=0.1 * start)
+    optimal = solve(still).optimal
+    assert optimal.miss == pytest.approx(cone_program(Dense(still), "norm")[0], rel=RELATIVE)
+    for select in SELECTIONS:
+        controls = select(optimal)
+        assert float(optimal.excess(controls)) < 1e-9
+    if thrust is ThrustShape.BOX:
+        bounds = [solve(still, route).sets.bounds(SetKind.TUBE) for route in Route]
+        assert np.abs((bounds[0] - bounds[1]) / still.state_bounds[:, None]).max() < 1e-9
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e-3, 1e3, 1e6])
+def test_lengths_of_any_size(paper: Paper, size: float) -> None:
+    problem = paper(bound=0.1726)
+    other = replace(
+        problem,
+        control=problem.control * size,
+        initial=problem.initial * size,
+        state_bounds=problem.state_bounds * size,
+    )
+    assert solve(other).optimal.miss == pytest.approx(size * solve(problem).optimal.miss, rel=RELATIVE)
+
+
+def check(seed: int, *, precise_to: int = 0, members: bool = True) -> str:
+    """Solve a random problem and compare; return what became of it."""
+    problem = random_rendezvous(seed)
+    rough = Dense(problem)
+    try:
+        optimal = optimal_controls(problem)
+    except EmptyTubeError:
+        assert not cone_program(rough, "deep")[0] > 1e-8
+        return "no control"
+    except NoSolutionError:
+        return "refused"
+    expected = cone_program(rough, "norm")[0]
+    miss = optimal.miss
+    if np.isfinite(expected):
+        assert abs(miss - expected) <= RELATIVE * expected + 1e-8 * size_of(problem)
+    told = "reached" if miss == 0.0 else "missed"
+    if problem.periods <= precise_to and assert_precise(problem, miss):
+        told += ", to forty digits"
+    if members:
+        for select in SELECTIONS:
+            assert float(optimal.excess(select(optimal))) < 1e-8
+        assert float(optimal.excess(samples(optimal, 2, np.random.default_rng(seed))).max()) < 1e-8
+        optimal.ranges()
+        least = least_periods(problem)
+        assert (least is not None) == (miss == 0.0)
+    return told
+
+
+def test_random_problems() -> None:
+    told = Counter(check(seed) for seed in range(12))
+    assert told["refused"] == 0
+    assert told["reached"] > 0
+    assert told["missed"] > 3
+
+
+@pytest.mark.slow
+def test_two_thousand_random_problems() -> None:
+    told = Counter(check(seed, precise_to=4, members=False) for seed in range(2000))
+    assert told["refused"] == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("thrust", list(ThrustShape))
+@pytest.mark.parametrize("periods", [3, 6, 10, 16])
+@pytest.mark.parametrize("checks", [0, 2])
+def test_gaps_of_more_periods(paper: Paper, thrust: ThrustShape, periods: int, checks: int) -> None:
+    from rendezvous.reachability import MotionModel, motion_of
+    from rendezvous.relative_motion import EllipticOrbit
+
+    problem = paper(periods=periods, period_s=720.0 / periods, thrust=thrust)
+    if checks:
+        motion = motion_of(EllipticOrbit.of_size(1e7, 0.1, 3.986004418e14), MotionModel.FROZEN)
+        problem = replace(problem, between=between_periods(motion, periods, 720.0 / periods, 0.15, checks))
+    least = cone_program(Dense(problem), "bound")[0]
+    for gap in 10.0 ** -np.arange(1.0, 10.0):
+        below = replace(problem, control_bounds=np.full(3, least * (1.0 - gap)))
+        assert_precise(below, optimal_controls(below).miss) if periods <= 6 else optimal_controls(below)
+        if periods > 6 and gap > 1e-4:
+            assert optimal_controls(below).miss == pytest.approx(cone_program(Dense(below), "norm")[0], rel=1e-4)
