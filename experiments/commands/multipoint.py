@@ -132,6 +132,7 @@ def _find(problem: MultipointProblem, best_order: bool, best_times: bool, quiet:
     from experiments.commands._screen import progress_bar
     from experiments.errors import InputError
     from rendezvous import multipoint as core
+    from rendezvous.greatest_control import greatest_control
 
     tour, listed = problem.tour, tuple(range(len(problem.tour.targets.targets)))
     guesses = [] if problem.times_s is None else [np.sort(problem.times_s)]
@@ -156,7 +157,7 @@ def _find(problem: MultipointProblem, best_order: bool, best_times: bool, quiet:
     numbers = (path.cost, objective, path.costate_start, path.arrival_states, path.time_gradient)
     if not all(np.isfinite(each).all() for each in numbers):
         raise InputError(f"{problem.source}: the numbers are so large that results are not finite; check the units")
-    peak = _peak(path)
+    peak = greatest_control(path.control, path.breaks())
     bound = problem.greatest_control_m_s2
     if bound is not None and peak > bound:
         raise InputError(
@@ -164,14 +165,6 @@ def _find(problem: MultipointProblem, best_order: bool, best_times: bool, quiet:
             f"{peak / bound - 1.0:.2%} over the bound of {bound:g} m/s^2; raise it, or give the visits more time"
         )
     return Found(problem, order, path, objective, evaluations, searched, lost, best_times, best_order, peak)
-
-
-def _peak(path: FlightPath) -> float:
-    """Return the greatest |u|, leg by leg: it jumps from one to the next."""
-    from rendezvous.greatest_control import greatest_control
-
-    legs = zip(path.starts_s, path.nodes.arrive_s, strict=True)
-    return max(greatest_control(path.control, float(start), float(end)) for start, end in legs)
 
 
 def _summary(found: Found) -> dict[str, object]:

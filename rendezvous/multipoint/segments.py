@@ -147,6 +147,17 @@ class Path:
         """
         return np.asarray(np.einsum("kai,ka->ki", self.motion.input_map(time_s), self.costate(time_s)))
 
+    def breaks(self) -> Floats:
+        """Return times from the start to the last node between which the control is smooth and turns by about a radian.
+
+        Returns
+        -------
+        ndarray
+            The times of all arrivals and departures among them, not decreasing, s.
+        """
+        legs = zip(self.starts_s, self.nodes.arrive_s, strict=True)
+        return np.concatenate([self.motion.breaks(float(start), float(end)) for start, end in legs])
+
     def state(self, time_s: Floats) -> Floats:
         """Return the chaser's state at times.
 
