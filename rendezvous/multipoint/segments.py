@@ -233,7 +233,9 @@ def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, no
     Raises
     ------
     ValueError
-        If times do not increase, or the numbers overflow.
+        If times do not increase.
+    NotSettledError
+        If the numbers overflow, or a Gramian is singular in floating point.
 
     Notes
     -----
@@ -260,7 +262,7 @@ def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, no
         at_start,
     )
     if not solved or not np.isfinite(cost):
-        raise ValueError(
+        raise NotSettledError(
             "the numbers of the path overflow, or a segment is too short or too long for its Gramian; check the units"
         )
     after[:-1] = at_start[1:]

@@ -64,7 +64,7 @@ class TimeLimits:
     least_gap_s : float
         Between a departure and the next arrival.
     price_per_s : float
-        kappa: what a second of the last time costs, added to the energy, m^2/s^4.
+        kappa: what a second from the start to the last visit costs, added to the energy, m^2/s^4; not negative.
 
     Raises
     ------
@@ -147,7 +147,7 @@ class _Trials:
         gradient = found.time_gradient.copy()
         gradient[-1] += self.price_per_s
         slope = np.cumsum(gradient[::-1])[::-1]
-        return _Trial(gaps, found, found.cost + self.price_per_s * float(times[-1]), slope)
+        return _Trial(gaps, found, found.cost + self.price_per_s * float(times[-1] - self.shifts_s[0]), slope)
 
     def attempt(self, gaps: Floats) -> _Trial | None:
         """Fly, or return None where there is no path of such times."""

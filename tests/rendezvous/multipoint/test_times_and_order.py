@@ -67,6 +67,66 @@ def test_orders_of_slots_against_brute_force(count: int, share: float) -> None:
         assert found.nodes == count  # what dynamic programming compares at its end
 
 
+def with_a_stay(meet_all: Meet) -> Tour:
+    """Five satellites of a train, one of which is visited for longer than most slots leave."""
+    motion = ClohessyWiltshire(1.10e-3)
+    states = np.array(
+        [
+            [120.0, 1500.0, 40.0, 0.02, -0.264, 0.03],
+            [-90.0, 3000.0, 0.0, -0.04, 0.198, -0.06],
+            [0.0, 6000.0, -60.0, 0.0, 0.0, 0.05],
+            [60.0, 9000.0, 100.0, 0.0, -0.132, 0.0],
+            [-30.0, 12000.0, 20.0, 0.01, 0.066, -0.02],
+        ]
+    )
+    meets = [meet_all, meet_all, Meet.RENDEZVOUS, meet_all, Meet.RENDEZVOUS]
+    stays = [0.0, 0.0, 2000.0, 0.0, 0.0]
+    targets = tuple(
+        Target(name, meet, stay)
+        for name, meet, stay in zip(["alpha", "charlie", "bravo", "delta", "echo"], meets, stays, strict=True)
+    )
+    return Tour(motion, DriftingTargets(targets, motion, states), np.array([0.0, -400.0, 0.0, 0.0, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize("meet", list(Meet))
+def test_orders_that_do_not_fit_the_slots_are_left_out(meet: Meet) -> None:
+    # Branch and bound, and dynamic programming. The search failed as a whole where one order did not fit.
+    tour, slots = with_a_stay(meet), np.array([1500.0, 3000.0, 4500.0, 7000.0, 10000.0])
+    found = best_order_of_slots(tour, slots)
+    fitting = {}
+    for order in itertools.permutations(range(5)):
+        if order.index(2) == 4 or slots[order.index(2) + 1] > slots[order.index(2)] + 2000.0:
+            fitting[order] = tour.fly(order, slots).cost
+    assert len(fitting) == 72
+    assert found.unfit == 120 - 72
+    assert found.objective == pytest.approx(min(fitting.values()), rel=1e-12)
+    assert fitting[found.order] == pytest.approx(min(fitting.values()), rel=1e-12)
+    if meet is Meet.FLYBY:
+        assert found.objective == pytest.approx(0.065082, rel=1e-5)  # an independent search
+
+
+@pytest.mark.parametrize("meet", list(Meet))
+def test_slots_that_no_order_fits_are_refused(meet: Meet) -> None:
+    tour = with_a_stay(meet)
+    stays = tuple(Target(each.name, Meet.RENDEZVOUS, 500.0) for each in tour.targets.targets)
+    motion = ClohessyWiltshire(1.10e-3)
+    staying = Tour(motion, DriftingTargets(stays, motion, np.zeros((5, 6))), np.ones(6))
+    with pytest.raises(ValueError, match="no order fits the times"):
+        best_order_of_slots(staying, 400.0 * np.arange(1.0, 6.0))
+
+
+def test_a_price_counts_from_the_start() -> None:
+    # A start before t = 0 made the objective negative, whose logarithm was minimised.
+    motion, start_s = ClohessyWiltshire(1e-3), -5000.0
+    targets = DriftingTargets((Target("T"),), motion, np.array([[100.0, 0.0, 0.0, 0.0, 0.0, 0.0]]))
+    tour, limits = Tour(motion, targets, np.zeros(6), start_s), TimeLimits(0.0, price_per_s=1e-8)
+    found = best_times(tour, (0,), limits)
+    times = np.linspace(start_s + 10.0, 0.0, 2000)
+    values = [tour.fly((0,), [each]).cost + 1e-8 * (each - start_s) for each in times]
+    assert found.objective <= min(values)
+    assert found.objective == pytest.approx(min(values), rel=1e-4)
+
+
 def test_bounds_leave_orders_unseen(tours: Make) -> None:
     found = best_order_of_slots(tours(6), 1000.0 * np.arange(1.0, 7.0))
     beginnings = sum(len(list(itertools.permutations(range(6), size))) for size in range(1, 7))
