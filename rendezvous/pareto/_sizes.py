@@ -20,6 +20,7 @@ _HALVES = [
     for middle in (-0.5, 0.5)
 ]
 _LEAST_SHARE = 1e-3
+_OUTSIDE = float(1.0 - _PLACES[-1])
 _MOST_HALVINGS = 45
 
 
@@ -97,6 +98,9 @@ def integrate_size(coefficients: Floats, half_s: Floats, tolerance: float, direc
         turn = 0.5 * length[:, None] * np.einsum("k,nhki->ni", _WEIGHTS, units) - turned
         bent = np.linalg.norm(turn, axis=1)
         share = np.maximum(2.0 * length / total_s, _LEAST_SHARE)
+        # No rule sees a turn between its last node and the end: what that may cost counts as an error.
+        unseen = 0.5 * length[:, None] * _turned_at_ends(halves, sizes, units)
+        apart, bent = apart + unseen[:, 0], bent + unseen[:, 1]
         done = (apart <= tolerance * scale * share) & (bent <= direction * total_s * share)
         if level == _MOST_HALVINGS:
             done[:] = True
@@ -115,6 +119,18 @@ def integrate_size(coefficients: Floats, half_s: Floats, tolerance: float, direc
         panel, size = np.tile(panel[left], 2), np.tile(0.5 * size[left], 2)
     nodes = [np.concatenate(each) for each in zip(*found, strict=True)]
     return SizeIntegral(value, error, nodes[0], nodes[1], nodes[2], nodes[3], direction_error)
+
+
+def _turned_at_ends(halves: list[Floats], sizes: Floats, units: Floats) -> Floats:
+    """Bounds on what |w| and w / |w| change between the last nodes and the ends of halves of length 2, shape (n, 2)."""
+    found = np.zeros((len(sizes), 2))
+    for place, half in enumerate(halves):
+        for sign, node in ((-1.0, 0), (1.0, -1)):
+            size, unit = _polar(sign ** np.arange(NODES) @ half)
+            turned = (unit * units[:, place, node]).sum(axis=1) < 0.5
+            found[:, 0] += np.where(turned, 2.0 * _OUTSIDE * np.maximum(size, sizes[:, place, node]), 0.0)
+            found[:, 1] += np.where(turned, 2.0 * _OUTSIDE, 0.0)
+    return found
 
 
 def _polar(vectors: Floats) -> tuple[Floats, Floats]:

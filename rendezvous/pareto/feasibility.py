@@ -164,7 +164,7 @@ def least_peak(plan: Plan, common: int = 6) -> float:
     for _ in range(_MOST_STEPS):
         slope, bend = effect.derivatives(here)
         rest = goal - slope / here.value
-        if others.shape[1] == 0 or float(np.linalg.norm(rest)) * here.value * effect.greatest <= 0.01 * _GAP:
+        if others.shape[1] == 0 or float(np.linalg.norm(rest)) * here.value * effect.greatest <= 0.3 * _GAP:
             break
         flat, bent = others.T @ slope, others.T @ bend @ others
         # No step is longer than l itself: along a w of one direction throughout, nothing bends at first.

@@ -66,20 +66,22 @@ def sinusoids_and_secular_terms(seed: int) -> None:
 
     breaks = np.linspace(begin, begin + turns, max(1, int(np.ceil(turns))) + 1)
     found = greatest_control(control, breaks)
-    times = np.linspace(begin, begin + turns, 200_001)
+    times = np.linspace(begin, begin + turns, 20_001)
     sizes = np.linalg.norm(control(times), axis=1)
     step = times[1] - times[0]
     # |u|^2 bends by at most 2 (|u'|^2 + |u| |u''|): between samples it is at most that much greater.
     first = np.linalg.norm(coefficients[:, 1:3], axis=1).sum() + np.linalg.norm(coefficients[:, 3])
     bend = 2.0 * (first**2 + sizes.max() * np.linalg.norm(coefficients[:, 1:3], axis=1).sum())
     above = np.sqrt(sizes.max() ** 2 + bend * step**2 / 8.0)
-    assert sizes.max() * (1.0 - 1e-10) <= found <= above * (1.0 + 1e-10)
+    # Times are rounded: between short panels far from t = 0 the control is known no better.
+    rounding = 1e-10 + 1e-15 * abs(begin) / turns
+    assert sizes.max() * (1.0 - rounding) <= found <= above * (1.0 + rounding)
     # Around the greatest sample a parabola through three of |u|^2 gives the top to the fourth order.
     at = int(sizes.argmax())
     if 0 < at < len(times) - 1:
         low, top, high = sizes[at - 1 : at + 2] ** 2
         refined = top + (high - low) ** 2 / (16.0 * top - 8.0 * (low + high)) if low + high < 2.0 * top else top
-        assert found >= np.sqrt(refined) * (1.0 - 1e-9)
+        assert found >= np.sqrt(refined) * (1.0 - 1e-9 - rounding)
 
 
 @pytest.mark.parametrize("seed", FEW)
@@ -90,5 +92,6 @@ def test_controls_of_a_circular_orbit(seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seeds", [MANY])
 def test_many_controls_of_a_circular_orbit(seeds: range) -> None:
+    assert len(seeds) == 2000
     for seed in seeds:
         sinusoids_and_secular_terms(seed)

@@ -157,16 +157,24 @@ def sampled_peak(path: Path) -> float:
     top = 0.0
     for start, end in zip(path.starts_s, path.nodes.arrive_s, strict=True):
         times = np.linspace(start, end, 3001)
+        if isinstance(path.motion, TschaunerHempel):  # more of them near the periapsis
+            orbit = path.motion.orbit
+            first, last = (float(each) for each in orbit.eccentric_anomaly(np.array([start, end])))
+            times = orbit.time_of_eccentric(np.linspace(first, last, 6001))
+            times[0] = start
         times[-1] = np.nextafter(end, start)  # at the end itself the next leg begins
         sizes = np.linalg.norm(path.control(times), axis=1)
-        at = int(sizes.argmax())
-        low, high = times[max(at - 1, 0)], times[min(at + 1, len(times) - 1)]
-        found = minimize_scalar(
-            lambda time: -float(np.linalg.norm(path.control(np.array([time])))),
-            bounds=(low, high),
-            options={"xatol": 1e-9 * (high - low)},
-        )
-        top = max(top, float(sizes.max()), -float(found.fun))
+        top = max(top, float(sizes.max()))
+        inside = np.pad(sizes, 1, constant_values=-1.0)
+        humps = np.flatnonzero((inside[1:-1] >= inside[:-2]) & (inside[1:-1] >= inside[2:]))
+        for at in humps[np.argsort(sizes[humps])[-30:]]:
+            low, high = times[max(at - 1, 0)], times[min(at + 1, len(times) - 1)]
+            found = minimize_scalar(
+                lambda time: -float(np.linalg.norm(path.control(np.array([time])))),
+                bounds=(low, high),
+                options={"xatol": 1e-9 * (high - low)},
+            )
+            top = max(top, -float(found.fun))
     return top
 
 
@@ -258,8 +266,13 @@ def test_random_tours(check: Check, seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
 def test_many_random_tours(check: Check) -> None:
+    failed = {}
     for seed in MANY:
-        check(seed)
+        try:
+            check(seed)
+        except (AssertionError, ValueError, RuntimeWarning) as error:
+            failed[seed] = str(error).splitlines()[:3]
+    assert not failed
 
 
 @pytest.mark.slow

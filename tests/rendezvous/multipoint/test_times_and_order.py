@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rendezvous.multipoint import (
     DriftingTargets,
     Meet,
+    NotSettledError,
     Target,
     TimeLimits,
     Tour,
@@ -125,6 +126,36 @@ def test_a_price_counts_from_the_start() -> None:
     values = [tour.fly((0,), [each]).cost + 1e-8 * (each - start_s) for each in times]
     assert found.objective <= min(values)
     assert found.objective == pytest.approx(min(values), rel=1e-4)
+
+
+def test_times_are_best_where_gaps_differ_by_orders_of_magnitude() -> None:
+    # One scale for all gaps stopped short: 7.64e15 m^2/s^3 for 5.05e15.
+    motion = ClohessyWiltshire(0.0001160954816406749)
+    stays = (0.0, 0.0, 1668.0, 2202.0)
+    targets = tuple(Target(str(at), Meet.RENDEZVOUS, stay) for at, stay in enumerate(stays))
+    states = np.array(
+        [
+            [-8445.0, 1719.0, -67260.0, 0.9361, 3.103, 2.776],
+            [-85010.0, -149600.0, 16320.0, -6.633, -14.62, -0.3373],
+            [-16320.0, -29660.0, 71540.0, 6.708, 10.97, 24.29],
+            [-15920.0, 54100.0, 90570.0, -1.975, -4.053, 16.37],
+        ]
+    )
+    start, price = np.array([-73820.0, 82590.0, -16610.0, 0.8657, 1.785, 9.601]), 3.024e12
+    tour = Tour(motion, DriftingTargets(targets, motion, states), start)
+    guess = np.array([17230.0, 31560.0, 31560.1489, 45030.0])
+    found = best_times(tour, range(4), TimeLimits(price_per_s=price), [guess])
+    gaps = np.diff(np.concatenate([[0.0], found.time_s])) - np.array([0.0, *stays[:3]])
+    slope = np.cumsum((found.path.time_gradient + price * np.array([0.0, 0.0, 0.0, 1.0]))[::-1])[::-1]
+    assert (gaps > 0.05).all()
+    assert (np.abs(slope * gaps) <= 1e-4 * found.objective).all()
+
+
+def test_times_that_are_no_minimum_are_no_answer(tours: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rendezvous.multipoint.times._descend", lambda _, begin, *__: begin)
+    monkeypatch.setattr("rendezvous.multipoint.times._polish", lambda _, best, *__: best)
+    with pytest.raises(NotSettledError, match="are no minimum"):
+        best_times(tours(3), (0, 1, 2), TimeLimits(latest_s=4000.0))
 
 
 def test_bounds_leave_orders_unseen(tours: Make) -> None:

@@ -252,12 +252,19 @@ def some_plan(seed: int, longest_rad: float) -> tuple[Plan, int]:
 def the_peak_and_the_impulse_agree(seed: int) -> None:
     plan, _ = some_plan(seed, 1000.0)
     start, end = plan.craft.start_s, plan.meeting_s
-    times = np.linspace(start, end, 10_001)
+    times = np.linspace(start, end, 4001)
+    if isinstance(plan.craft.motion, TschaunerHempel):  # more of them near the periapsis
+        orbit = plan.craft.motion.orbit
+        first, last = (float(each) for each in orbit.eccentric_anomaly(np.array([start, end])))
+        times = orbit.time_of_eccentric(np.linspace(first, last, 4001))
+        times[0], times[-1] = start, end
     sizes = np.linalg.norm(plan.control(times), axis=1)
-    step = times[1] - times[0]
+    steps = np.diff(times)
     top = float(sizes.max())
-    for at in np.argsort(sizes)[-3:]:
-        low, high = max(times[at] - step, start), min(times[at] + step, end)
+    inside = np.pad(sizes, 1, constant_values=-1.0)
+    humps = np.flatnonzero((inside[1:-1] >= inside[:-2]) & (inside[1:-1] >= inside[2:]))
+    for at in humps[np.argsort(sizes[humps])[-30:]]:
+        low, high = times[max(at - 1, 0)], times[min(at + 1, len(times) - 1)]
         found = minimize_scalar(
             lambda time: -float(np.linalg.norm(plan.control(np.array([time])))),
             bounds=(low, high),
@@ -266,9 +273,10 @@ def the_peak_and_the_impulse_agree(seed: int) -> None:
         top = max(top, -float(found.fun))
     assert peak_control(plan) == pytest.approx(top, rel=2e-9)
     assert peak_control(plan) >= top * (1.0 - 1e-9)
-    rule = 0.5 * step * (sizes[1:] + sizes[:-1]).sum()
-    # The trapezoidal rule errs by the change of the slope of |u|, seen from its second differences.
-    doubt = float(np.abs(np.diff(sizes, 2)).sum()) * step
+    rule = 0.5 * steps @ (sizes[1:] + sizes[:-1])
+    # The trapezoidal rule errs by the changes of the slope of |u|, seen from its second differences.
+    slopes = np.diff(sizes) / steps
+    doubt = float(np.abs(np.diff(slopes)) @ np.maximum(steps[1:], steps[:-1]) ** 2)
     assert total_impulse(plan) == pytest.approx(rule, abs=doubt + 1e-9 * rule)
 
 
@@ -370,5 +378,10 @@ def test_random_encounters(check: Check, seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
 def test_many_random_encounters(check: Check) -> None:
+    failed = {}
     for seed in MANY:
-        check(seed)
+        try:
+            check(seed)
+        except (AssertionError, ValueError, RuntimeWarning) as error:
+            failed[seed] = str(error).splitlines()[:3]
+    assert not failed
