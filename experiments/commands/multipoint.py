@@ -33,6 +33,7 @@ class Found:
     evaluations: int
     searched: int
     lost: int
+    unfit: int
     best_times: bool
     best_order: bool
     peak_m_s2: float
@@ -132,6 +133,7 @@ def _find(problem: MultipointProblem, best_order: bool, best_times: bool, quiet:
     from experiments.commands._screen import progress_bar
     from experiments.errors import InputError
     from rendezvous import multipoint as core
+    from rendezvous.greatest_control import greatest_control
 
     tour, listed = problem.tour, tuple(range(len(problem.tour.targets.targets)))
     guesses = [] if problem.times_s is None else [np.sort(problem.times_s)]
@@ -139,39 +141,31 @@ def _find(problem: MultipointProblem, best_order: bool, best_times: bool, quiet:
         with progress_bar(quiet) as begin:
             if best_order and best_times:
                 best = core.best_order(tour, problem.limits(), guesses, progress=begin("orders and times"))
-                told = (best.order, best.path, best.objective, best.evaluations, best.nodes, len(best.lost))
+                told = (best.order, best.path, best.objective, best.evaluations, best.nodes, len(best.lost), best.unfit)
             elif best_order:
                 best = core.best_order_of_slots(tour, guesses[0], progress=begin("orders"))
-                told = (best.order, best.path, best.objective, best.evaluations, best.nodes, len(best.lost))
+                told = (best.order, best.path, best.objective, best.evaluations, best.nodes, len(best.lost), best.unfit)
             elif best_times:
                 timed = core.best_times(tour, listed, problem.limits(), guesses, progress=begin("times"))
-                told = (listed, timed.path, timed.objective, timed.evaluations, 1, 0)
+                told = (listed, timed.path, timed.objective, timed.evaluations, 1, 0, 0)
             else:
                 assert problem.times_s is not None
                 path = tour.fly(listed, problem.times_s)
-                told = (listed, path, path.cost + problem.price_per_s * float(problem.times_s[-1]), 1, 1, 0)
+                told = (listed, path, path.cost + problem.price_per_s * float(problem.times_s[-1]), 1, 1, 0, 0)
     except ValueError as error:
         raise InputError(f"{problem.source}: {error}") from None
-    order, path, objective, evaluations, searched, lost = told
+    order, path, objective, evaluations, searched, lost, unfit = told
     numbers = (path.cost, objective, path.costate_start, path.arrival_states, path.time_gradient)
     if not all(np.isfinite(each).all() for each in numbers):
         raise InputError(f"{problem.source}: the numbers are so large that results are not finite; check the units")
-    peak = _peak(path)
+    peak = greatest_control(path.control, path.breaks())
     bound = problem.greatest_control_m_s2
     if bound is not None and peak > bound:
         raise InputError(
             f"{problem.source}: greatest_control_m_s2: the minimum-energy control reaches {peak:.6g} m/s^2, "
             f"{peak / bound - 1.0:.2%} over the bound of {bound:g} m/s^2; raise it, or give the visits more time"
         )
-    return Found(problem, order, path, objective, evaluations, searched, lost, best_times, best_order, peak)
-
-
-def _peak(path: FlightPath) -> float:
-    """Return the greatest |u|, leg by leg: it jumps from one to the next."""
-    from rendezvous.greatest_control import greatest_control
-
-    legs = zip(path.starts_s, path.nodes.arrive_s, strict=True)
-    return max(greatest_control(path.control, float(start), float(end)) for start, end in legs)
+    return Found(problem, order, path, objective, evaluations, searched, lost, unfit, best_times, best_order, peak)
 
 
 def _summary(found: Found) -> dict[str, object]:
@@ -202,6 +196,7 @@ def _summary(found: Found) -> dict[str, object]:
         "evaluations": found.evaluations,
         "orders_begun": found.searched,
         "orders_left_out": found.lost,
+        "orders_that_do_not_fit": found.unfit,
     }
 
 
@@ -273,4 +268,5 @@ def _show(found: Found, stdout_taken: bool) -> None:
         if found.best_order:
             said += f", {found.searched} beginnings of orders looked at"
             said += f", {found.lost} of them left out, for no trajectory was found" if found.lost else ""
+            said += f"; {found.unfit} orders do not fit the times" if found.unfit else ""
         console.print(Text(said + "; a local minimum of the times" if found.best_times else said), soft_wrap=True)

@@ -128,6 +128,8 @@ def _find(problem: ParetoProblem, preferred: Any, samples: int, report: Callable
     from experiments.errors import InputError
     from rendezvous.pareto import (
         Meeting,
+        NotCertifiedError,
+        NotOptimalError,
         analyse_coalitions,
         check_bound,
         least_greatest_excess,
@@ -153,13 +155,19 @@ def _find(problem: ParetoProblem, preferred: Any, samples: int, report: Callable
         "least_greatest_excess": least_greatest_excess(solution),
     }
     if preferred is not None:
-        selections["preferred"] = nearest_to(solution, preferred)
+        try:
+            selections["preferred"] = nearest_to(solution, preferred)
+        except NotOptimalError as error:
+            raise InputError(f"{problem.source}: --prefer: {error}") from None
     report(0.2)
     plans = [solution.plan(index) for index in range(len(solution.costs))]
     common = 6 if encounter.meeting is Meeting.RENDEZVOUS else 3
     bounds: tuple[BoundCheck, ...] = ()
     if problem.greatest_control_m_s2 is not None:
-        bounds = tuple(check_bound(plan, problem.greatest_control_m_s2, common) for plan in plans)
+        try:
+            bounds = tuple(check_bound(plan, problem.greatest_control_m_s2, common) for plan in plans)
+        except NotCertifiedError as error:
+            raise InputError(f"{problem.source}: greatest_control_m_s2: {error}") from None
         _refuse_impossible(problem, bounds)
     report(0.4)
     coalitions = analyse_coalitions(solution) if len(plans) <= MOST_CRAFT else None

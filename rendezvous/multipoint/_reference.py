@@ -135,6 +135,10 @@ class TracedPath(Path):
 
     trace: Panels
 
+    def breaks(self) -> Floats:
+        """Return the ends of its panels, s."""
+        return self.trace.breaks_s
+
     def along(self, time_s: Floats) -> tuple[Floats, Floats]:
         """Return states and costates at times.
 

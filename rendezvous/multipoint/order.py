@@ -38,6 +38,8 @@ class BestOrder:
         How many paths were computed.
     lost : tuple of tuple of int
         Beginnings of orders that were left out, for no path was found.
+    unfit : int
+        How many orders do not fit given times: a stay ends after the next visit.
     """
 
     order: tuple[int, ...]
@@ -46,6 +48,7 @@ class BestOrder:
     nodes: int
     evaluations: int
     lost: tuple[tuple[int, ...], ...] = ()
+    unfit: int = 0
 
 
 def best_order(
@@ -138,31 +141,40 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
     Raises
     ------
     ValueError
-        If there are more than 9 targets, or times do not increase.
+        If there are more than 9 targets, times do not increase, or no order fits them.
     NotSettledError
-        If no order has a path that is found.
+        If no order that fits has a path that is found.
 
     Notes
     -----
     Dynamic programming over (visited, last) where every visit is a rendezvous, for then a leg's cost depends on its two
-    ends alone; else branch and bound.
+    ends alone; else branch and bound. Orders in which a stay ends after the next visit do not fit and are left out.
     """
     count, times = _checked_count(tour), np.asarray(time_s, dtype=np.float64)
     if times.shape != (count,):
         raise ValueError(f"{count} visits need {count} times, found {times.size}")
     check_times(tour.start_s, times, times)
+    # Whether each target may be visited at each time: its stay must end before the next visit.
+    fits = times[:, None] + tour.dwell_s < np.append(times[1:], np.inf)[:, None]
+    unfit = factorial(count) - _orders_that_fit(fits)
+    if unfit == factorial(count):
+        raise ValueError(
+            "no order fits the times: in each one a stay ends after the next visit; make times farther apart, or "
+            "stays shorter"
+        )
     if isinstance(tour, Tour) and all(each.meet is Meet.RENDEZVOUS for each in tour.targets.targets):
-        return _by_dynamic_programming(tour, times)
+        return _by_dynamic_programming(tour, times, fits, unfit)
 
     def solve(order: tuple[int, ...], _warm: Sequence[Floats], _complete: bool) -> tuple[float, Flown, int]:
         flown = tour.flyer(order)(times[: len(order)])
         return flown.cost, flown, 1
 
     slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0
-    search = _Search(solve, count, progress or (lambda _: None), tour.start_s, None, slack)
+    search = _Search(solve, count, progress or (lambda _: None), tour.start_s, None, slack, fits)
     search.branch((), None)
     path = search.found().settled()
-    return BestOrder(search.best, path, path.cost, search.nodes, search.evaluations, tuple(search.lost))
+    lost = tuple(search.lost)
+    return BestOrder(search.best, path, path.cost, search.nodes, search.evaluations, lost, unfit)
 
 
 def best_times(
@@ -209,6 +221,7 @@ class _Search:
     start_s: float
     horizon_s: float | None
     slack: float
+    fits: NDArray[np.bool_] | None = None
     best: tuple[int, ...] = ()
     best_path: Flown | None = None
     best_objective: float = np.inf
@@ -229,6 +242,9 @@ class _Search:
         complete = len(beginning) + 1 == self.count
         for target in (each for each in range(self.count) if each not in beginning):
             order = (*beginning, target)
+            if self.fits is not None and not self.fits[len(beginning), target]:
+                self._done(order)
+                continue
             self.nodes += 1
             try:
                 objective, path, evaluations = self.solve(order, self._warm(before), complete)
@@ -274,29 +290,58 @@ def _checked_count(tour: Visits) -> int:
     return count
 
 
-def _by_dynamic_programming(tour: Tour, times: Floats) -> BestOrder:
+def _orders_that_fit(fits: NDArray[np.bool_]) -> int:
+    """How many orders use only pairs of places and targets that fit, shape (place, target)."""
+    ways = {frozenset[int](): 1}
+    for place in fits:
+        longer: dict[frozenset[int], int] = {}
+        for visited, number in ways.items():
+            for target in (each for each in _indices(place) if each not in visited):
+                longer[visited | {target}] = longer.get(visited | {target}, 0) + number
+        ways = longer
+    return sum(ways.values())
+
+
+def _indices(flags: NDArray[np.bool_]) -> list[int]:
+    return [int(each) for each in np.flatnonzero(flags)]
+
+
+def _by_dynamic_programming(tour: Tour, times: Floats, fits: NDArray[np.bool_], unfit: int) -> BestOrder:
     """Held and Karp's recursion over sets of visited targets."""
     count, targets, dwell = len(times), tour.targets, tour.dwell_s
     found: dict[tuple[frozenset[int], int], tuple[float, tuple[int, ...]]] = {}
-    for target in range(count):
-        found[frozenset([target]), target] = tour.fly((target,), times[:1]).cost, (target,)
-    evaluations = count
+    lost: list[tuple[int, ...]] = []
+    evaluations = 0
+
+    def leg_cost(start_s: float, start: Floats, target: int, slot: int) -> float:
+        """What a leg costs; infinite where no path is found."""
+        nonlocal evaluations
+        evaluations += 1
+        try:
+            leg = nodes_of(targets, (target,), times[slot : slot + 1])
+            return solve_segments(tour.motion, start_s, start, leg).cost
+        except NotSettledError:
+            lost.append((target,))
+            return np.inf
+
+    for target in _indices(fits[0]):
+        found[frozenset([target]), target] = leg_cost(tour.start_s, tour.start_state, target, 0), (target,)
     for slot in range(1, count):
         legs = {}
-        for first in range(count):
-            leave_s = times[slot - 1] + dwell[first]
+        for first in _indices(fits[slot - 1]):
+            leave_s = float(times[slot - 1] + dwell[first])
             start = targets.states(np.array([first]), np.array([leave_s]))[0]
-            for second in (each for each in range(count) if each != first):
-                leg = nodes_of(targets, (second,), times[slot : slot + 1])
-                legs[first, second] = solve_segments(tour.motion, leave_s, start, leg).cost
-                evaluations += 1
+            for second in (each for each in _indices(fits[slot]) if each != first):
+                legs[first, second] = leg_cost(leave_s, start, second, slot)
         longer: dict[tuple[frozenset[int], int], tuple[float, tuple[int, ...]]] = {}
         for (visited, last), (cost, order) in found.items():
-            for target in (each for each in range(count) if each not in visited):
+            for target in (each for each in _indices(fits[slot]) if each not in visited):
                 key, total = (visited | {target}, target), cost + legs[last, target]
                 if key not in longer or total < longer[key][0]:
                     longer[key] = total, (*order, target)
         found = longer
-    _, best = min(found.values())
+    cost, best = min(found.values())
+    if not np.isfinite(cost):
+        raise NotSettledError("no order has a path that was found; give visits more time")
     path = tour.fly(best, times)
-    return BestOrder(best, path, path.cost, len(found), evaluations + 1)
+    return BestOrder(best, path, path.cost, len(found), evaluations + 1, tuple(lost), unfit)

@@ -147,6 +147,17 @@ class Path:
         """
         return np.asarray(np.einsum("kai,ka->ki", self.motion.input_map(time_s), self.costate(time_s)))
 
+    def breaks(self) -> Floats:
+        """Return times from the start to the last node between which the control is smooth and turns by about a radian.
+
+        Returns
+        -------
+        ndarray
+            The times of all arrivals and departures among them, not decreasing, s.
+        """
+        legs = zip(self.starts_s, self.nodes.arrive_s, strict=True)
+        return np.concatenate([self.motion.breaks(float(start), float(end)) for start, end in legs])
+
     def state(self, time_s: Floats) -> Floats:
         """Return the chaser's state at times.
 
@@ -222,7 +233,9 @@ def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, no
     Raises
     ------
     ValueError
-        If times do not increase, or the numbers overflow.
+        If times do not increase.
+    NotSettledError
+        If the numbers overflow, or a Gramian is singular in floating point.
 
     Notes
     -----
@@ -249,7 +262,7 @@ def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, no
         at_start,
     )
     if not solved or not np.isfinite(cost):
-        raise ValueError(
+        raise NotSettledError(
             "the numbers of the path overflow, or a segment is too short or too long for its Gramian; check the units"
         )
     after[:-1] = at_start[1:]

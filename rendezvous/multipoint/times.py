@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
-from rendezvous.multipoint.segments import Flown, Path
+from rendezvous.multipoint.segments import Flown, NotSettledError, Path
 
 Floats = NDArray[np.float64]
 FlyAt = Callable[[Floats], Flown]
@@ -23,6 +23,9 @@ _POLISH_ROUNDS = 8
 _DIFFERENCE = 1e-5
 _WALL = 20.0
 _MOST_WALLS = 6
+_MOST_RESTARTS = 4
+_SETTLED = 1e-3
+_ROUNDING = 1e-26
 
 
 class Effort(Enum):
@@ -64,7 +67,7 @@ class TimeLimits:
     least_gap_s : float
         Between a departure and the next arrival.
     price_per_s : float
-        kappa: what a second of the last time costs, added to the energy, m^2/s^4.
+        kappa: what a second from the start to the last visit costs, added to the energy, m^2/s^4; not negative.
 
     Raises
     ------
@@ -147,7 +150,7 @@ class _Trials:
         gradient = found.time_gradient.copy()
         gradient[-1] += self.price_per_s
         slope = np.cumsum(gradient[::-1])[::-1]
-        return _Trial(gaps, found, found.cost + self.price_per_s * float(times[-1]), slope)
+        return _Trial(gaps, found, found.cost + self.price_per_s * float(times[-1] - self.shifts_s[0]), slope)
 
     def attempt(self, gaps: Floats) -> _Trial | None:
         """Fly, or return None where there is no path of such times."""
@@ -195,6 +198,8 @@ def optimise_times(
     ------
     ValueError
         If the visits do not fit before the latest time.
+    NotSettledError
+        If the conditions of a minimum are not met by what is found; with the final effort alone.
 
     Notes
     -----
@@ -224,7 +229,35 @@ def optimise_times(
     best = min(ended, key=lambda each: each.objective)
     if effort is Effort.FINAL:
         best = _polish(trials, best, least, total, scale)
+        for _ in range(_MOST_RESTARTS):
+            if _unsettled(best, least, total) <= _SETTLED:
+                break
+            again = _descend(trials, best, least, total, best.gaps, effort.tolerance, enough)
+            best = _polish(trials, again, least, total, scale)
+        if not _unsettled(best, least, total) <= _SETTLED:
+            raise NotSettledError(
+                f"the best times that were found cost {best.objective:.6g} m^2/s^3 and are no minimum: a change of a "
+                "gap would still lower that; start from other times, or give visits more time"
+            )
     return BestTimes(best.flown, best.objective, trials.flown)
+
+
+def _unsettled(best: _Trial, least: float, total: float) -> float:
+    """By how much the conditions of a minimum are missed, relative to the objective.
+
+    To first order, by what share of the objective a change of one gap by its own length, or down to the least one,
+    would lower it; where the latest time holds, at the cost of the others.
+    """
+    gaps, excess = best.gaps, np.maximum(best.gaps - least, 0.0)
+    slope = best.slope
+    full = bool(np.isfinite(total)) and total - gaps.sum() <= 1e-9 * total
+    if full and excess.sum() > 0.0:
+        slope = slope + max(0.0, -float(excess @ slope) / float(excess.sum()))
+    gain = np.maximum(-slope * gaps, slope * excess)
+    # A path that costs nothing is one up to the rounding of states.
+    states = best.flown.nodes.arrive
+    size = (states[:, :3] ** 2).sum(axis=1) / gaps**3 + (states[:, 3:] ** 2).sum(axis=1) / gaps
+    return float(gain.max() / (best.objective + _ROUNDING * size.sum()))
 
 
 def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
@@ -278,12 +311,19 @@ def _spread(count: int, scale: float, least: float, bounded: bool) -> list[Float
 
 
 def _descend(
-    trials: _Trials, begin: _Trial, least: float, total: float, scale: float, tolerance: float, enough: float
+    trials: _Trials,
+    begin: _Trial,
+    least: float,
+    total: float,
+    scale: float | Floats,
+    tolerance: float,
+    enough: float,
 ) -> _Trial:
     """Follow one start downhill; where there are no paths all around, only so far, and no farther than enough."""
     if begin.objective < enough:
         return begin
     floor = 1e-30 * max(begin.objective, 1e-270)
+    shares = np.broadcast_to(scale, begin.gaps.shape) / total
     walls, lowest = 0, begin
 
     def value(x: Floats) -> tuple[float, Floats]:
@@ -303,7 +343,7 @@ def _descend(
         return float(np.log(size)), found.slope * (scale / size)
 
     constraints = (
-        {"type": "ineq", "fun": lambda x: total / scale - x.sum(), "jac": lambda x: -np.ones_like(x)}
+        {"type": "ineq", "fun": lambda x: 1.0 - (x * scale).sum() / total, "jac": lambda _: -shares}
         if np.isfinite(total)
         else ()
     )
@@ -312,7 +352,7 @@ def _descend(
             value,
             begin.gaps / scale,
             jac=True,
-            bounds=[(least / scale, None)] * len(begin.gaps),
+            bounds=[(float(each), None) for each in np.broadcast_to(least / scale, begin.gaps.shape)],
             constraints=constraints,
             method="SLSQP",
             options={"ftol": tolerance, "maxiter": 100},

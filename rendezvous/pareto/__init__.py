@@ -5,6 +5,7 @@ from rendezvous.pareto.encounter import Component, Craft, Encounter, Meeting
 from rendezvous.pareto.feasibility import (
     BoundCheck,
     Feasibility,
+    NotCertifiedError,
     check_bound,
     least_peak,
     peak_control,
@@ -19,7 +20,7 @@ from rendezvous.pareto.front import (
     simplex_weights,
 )
 from rendezvous.pareto.plan import Plan, PlanSamples
-from rendezvous.pareto.selections import least_greatest_excess, least_sum_of_costs, nearest_to
+from rendezvous.pareto.selections import NotOptimalError, least_greatest_excess, least_sum_of_costs, nearest_to
 from rendezvous.pareto.solution import CraftCost, EncounterSolution, solve_encounter, weighted_point
 from rendezvous.pareto.sweep import DurationSweep, sweep_meeting_time
 
@@ -36,6 +37,8 @@ __all__ = [
     "EncounterSolution",
     "Feasibility",
     "Meeting",
+    "NotCertifiedError",
+    "NotOptimalError",
     "ParetoSet",
     "Plan",
     "PlanSamples",

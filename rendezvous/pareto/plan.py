@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rendezvous.pareto.encounter import Craft
+from rendezvous.relative_motion import TimeVaryingMotion
 
 Floats = NDArray[np.float64]
 
@@ -95,6 +96,39 @@ class Plan:
         times = np.linspace(self.craft.start_s, self.meeting_s, count)
         return PlanSamples(times, self.state(times), self.control(times))
 
+    def effects(self, time_s: Floats) -> Floats:
+        """Return Phi(T, t) B(t), what a unit of control at a time does to the terminal state.
+
+        Parameters
+        ----------
+        time_s : ndarray, shape (k,)
+            Times from the craft's start to the meeting.
+
+        Returns
+        -------
+        ndarray, shape (k, 6, 3)
+            In states in m and m/s, of a control in m/s^2 for a second.
+        """
+        return np.asarray(self._to_meeting(time_s) @ self.craft.motion.input_map(time_s))
+
+    def breaks(self) -> Floats:
+        """Return times from start to meeting between which the motion turns by about a radian at most, s."""
+        return self.craft.motion.breaks(self.craft.start_s, self.meeting_s)
+
     def _costate_at(self, times: Floats) -> Floats:
-        transition = self.craft.motion.transition(times, np.full(times.shape, self.meeting_s))
-        return np.asarray(np.einsum("...ba,b->...a", transition, self.costate))
+        return np.asarray(np.einsum("...ba,b->...a", self._to_meeting(times), self.costate))
+
+    def _to_meeting(self, times: Floats) -> Floats:
+        """Phi(T, t), shape (..., 6, 6)."""
+        motion = self.craft.motion
+        if not isinstance(motion, TimeVaryingMotion):
+            return motion.transition(times, np.full(times.shape, self.meeting_s))
+        # From each time to the next one: long intervals of a motion that varies are expensive.
+        order = np.argsort(times, axis=None, kind="stable")
+        grid = np.append(times.ravel()[order], self.meeting_s)
+        steps = motion.transition(grid[:-1], grid[1:])
+        found, ahead = np.empty((times.size, 6, 6)), np.eye(6)
+        for place in range(times.size - 1, -1, -1):
+            ahead = ahead @ steps[place]
+            found[order[place]] = ahead
+        return found.reshape(*times.shape, 6, 6)

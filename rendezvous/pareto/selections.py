@@ -7,14 +7,21 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
+from scipy.stats import qmc
 
-from rendezvous.pareto.front import pareto_set
+from rendezvous.pareto.front import simplex_weights
 from rendezvous.pareto.hull import nearest_in_hull
 from rendezvous.pareto.solution import EncounterSolution
 
 Floats = NDArray[np.float64]
 
 _MOST_STEPS = 200
+_TRIED, _FOLLOWED, _MOST_ROUNDS = 500, 4, 20
+_NEAREST = 1e-6
+
+
+class NotOptimalError(ValueError):
+    """A choice was not found: what was computed does not satisfy the conditions of the best one."""
 
 
 def least_sum_of_costs(solution: EncounterSolution) -> Floats:
@@ -142,39 +149,104 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
     ndarray, shape (f,)
         Free values, nearest in the norm of M; of the weighted mean of the M where they differ.
 
+    Raises
+    ------
+    ValueError
+        If the preferred values are not f finite numbers.
+    NotOptimalError
+        If the point that is found does not satisfy the conditions of the nearest one.
+
     Notes
     -----
-    With one M a projection onto the convex hull of the ideals, exactly; else sequential quadratic programming over
-    the weights, from every craft and from the middle.
+    With one M, or multiples of one, a projection onto the convex hull of the ideals, exactly; else sequential quadratic
+    programming over the weights from the nearest of many meetings of the set, which finds a local minimum.
     """
-    roots, _, _, weights = _parts(solution)
-    if solution.same_matrix:
+    preferred = np.asarray(preferred, dtype=np.float64)
+    if preferred.shape != solution.point.shape or not np.isfinite(preferred).all():
+        raise ValueError(f"a preferred meeting must be {solution.point.size} finite numbers, found {preferred}")
+    roots, ideals, _, weights = _parts(solution)
+    matrices = np.einsum("nca,ncb->nab", roots, roots)
+    sizes = np.trace(matrices, axis1=1, axis2=2)
+    unit = matrices / sizes[:, None, None]
+    if np.allclose(unit, unit[0], rtol=1e-12, atol=1e-15):
         root = roots[0]
-        return np.asarray(nearest_in_hull(solution.ideals @ root.T, root @ preferred) @ solution.ideals)
-    matrix = np.einsum("n,nca,ncb->ab", weights / weights.sum(), roots, roots)
-    root = np.linalg.cholesky(matrix).T
-    count = len(weights)
-    size = max(float(((solution.ideals - preferred) @ root.T).max(initial=0.0)), np.finfo(float).tiny)
+        return np.asarray(nearest_in_hull(ideals @ root.T, root @ preferred) @ ideals)
+    root = np.linalg.cholesky(np.einsum("n,nab->ab", weights / weights.sum(), matrices)).T
+    back = np.linalg.inv(root)
+    # In the norm's own coordinates, about the preferred meeting, with M of one size: shares are then of one size too.
+    unit = np.einsum("ca,ncd,db->nab", back, unit, back)
+    sizes *= np.trace(unit, axis1=1, axis2=2)
+    unit /= np.trace(unit, axis1=1, axis2=2)[:, None, None]
+    ideals = (ideals - preferred) @ root.T
+    size = float(np.linalg.norm(ideals, axis=1).max())
+    if size == 0.0:
+        return preferred
+    ideals /= size
 
-    def distance(shares: Floats) -> float:
+    def places(shares: Floats) -> Floats:
+        left = np.einsum("kn,nab->kab", shares, unit)
+        right = np.einsum("kn,nab,nb->ka", shares, unit, ideals)
+        return np.asarray(np.linalg.solve(left, right[..., None])[..., 0])
+
+    def distance(shares: Floats) -> tuple[float, Floats]:
         shares = np.maximum(shares, 0.0)
-        point = pareto_set(solution, shares[None] / shares.sum()).points[0]
-        return float((((point - preferred) @ root.T / size) ** 2).sum())
+        point = places(shares[None])[0]
+        pull = np.linalg.solve(np.einsum("n,nab->ab", shares, unit), point)
+        return float(point @ point), 2.0 * np.einsum("nab,nb,a->n", unit, ideals - point, pull)
 
-    best: Floats | None = None
-    for begin in (np.full(count, 1.0 / count), *(0.9 * np.eye(count) + 0.1 / count)):
-        found = minimize(
-            distance,
-            begin,
-            bounds=[(0.0, 1.0)] * count,
-            constraints={"type": "eq", "fun": lambda x: x.sum() - 1.0},
-            method="SLSQP",
-            options={"ftol": 1e-14, "maxiter": 200},
-        )
-        if best is None or distance(found.x) < distance(best):
-            best = np.asarray(found.x)
-    assert best is not None
-    return np.asarray(pareto_set(solution, np.maximum(best, 0.0)[None]).points[0])
+    count = len(ideals)
+    # Where the M differ much in shape, shares of a millionth still count.
+    wide = 10.0 ** (-6.0 * qmc.Halton(count, scramble=False).random(3 * _TRIED)[1:])
+    tried = np.concatenate([np.eye(count), np.full((1, count), 1.0 / count), simplex_weights(count, _TRIED), wide])
+    nearest = np.argsort((places(tried) ** 2).sum(axis=1), kind="stable")
+    shares, left = _least_share(distance, tried[nearest[0]]), np.inf
+    for begin in tried[nearest[1:_FOLLOWED]]:
+        other = _least_share(distance, begin)
+        shares = min(shares, other, key=lambda each: distance(each)[0])
+    for _ in range(_MOST_ROUNDS):
+        # Shares count by their ratios alone, so each is bounded by zero and by nothing else: where none can be changed
+        # by itself so that the distance falls, the conditions of the least hold.
+        probes = _changed(shares)
+        squared = (places(probes) ** 2).sum(axis=1)
+        here = float(np.sqrt(distance(shares)[0]))
+        left = here - float(np.sqrt(squared.min()))
+        if left <= _NEAREST:
+            return np.asarray(preferred + size * back @ places(shares[None])[0])
+        shares = _least_share(distance, probes[squared.argmin()])
+    raise NotOptimalError(
+        "the Pareto-optimal meeting nearest to the preferred one was not found: one that is nearer by "
+        f"{left:.2g} of the distance of the farthest ideal is known; prefer another one"
+    )
+
+
+def _least_share(distance: Callable[[Floats], tuple[float, Floats]], begin: Floats) -> Floats:
+    """Shares of sum one near to some at which a squared distance is least."""
+    scale = np.maximum(begin / begin.sum(), 1e-6)
+
+    def scaled(x: Floats) -> tuple[float, Floats]:
+        squared, slopes = distance(x * scale)
+        return squared, slopes * scale
+
+    found = minimize(
+        scaled,
+        begin / scale,
+        jac=True,
+        bounds=[(0.0, 1.0 / each) for each in scale],
+        constraints={"type": "eq", "fun": lambda x: x @ scale - 1.0, "jac": lambda _: scale},
+        method="SLSQP",
+        options={"ftol": 1e-16, "maxiter": 300},
+    )
+    shares = np.maximum(found.x * scale, 0.0)
+    return np.asarray(shares / shares.sum() if np.isfinite(shares).all() and shares.sum() > 0.0 else begin)
+
+
+def _changed(shares: Floats) -> Floats:
+    """Shares of which one is greater, or less, by steps of all sizes, shape (k, n)."""
+    steps = 10.0 ** -np.arange(0.0, 13.0)
+    greater = shares + steps[:, None, None] * np.eye(len(shares))
+    less = shares * (1.0 - steps[:, None, None] * np.eye(len(shares)))
+    found = np.concatenate([greater, less]).reshape(-1, len(shares))
+    return np.asarray(found[found.sum(axis=1) > 0.0])
 
 
 def _parts(solution: EncounterSolution) -> tuple[Floats, Floats, Floats, Floats]:

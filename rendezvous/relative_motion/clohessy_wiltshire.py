@@ -14,6 +14,7 @@ from rendezvous.relative_motion.linear_motion import (
     checked_durations,
     checked_frame,
     checked_rate,
+    even_breaks,
     velocity_input,
 )
 
@@ -101,3 +102,7 @@ class ClohessyWiltshire:
     def drift(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Zero, shape (..., 6)."""
         return np.zeros((*np.broadcast_shapes(np.shape(start_s), np.shape(end_s)), 6))
+
+    def breaks(self, start_s: float, end_s: float) -> Floats:
+        """Times from start to end, both among them, a radian apart at most."""
+        return even_breaks(start_s, end_s, self.rate_rad_s * (end_s - start_s))

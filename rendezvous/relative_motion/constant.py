@@ -9,7 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import expm
 
 from rendezvous.relative_motion.frames import HILL, Frame
-from rendezvous.relative_motion.linear_motion import Segment, checked_durations, checked_frame, velocity_input
+from rendezvous.relative_motion.linear_motion import (
+    Segment,
+    checked_durations,
+    checked_frame,
+    even_breaks,
+    velocity_input,
+)
 
 Floats = NDArray[np.float64]
 
@@ -93,6 +99,11 @@ class ConstantMotion:
     def drift(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Zero, shape (..., 6)."""
         return np.zeros((*np.broadcast_shapes(np.shape(start_s), np.shape(end_s)), 6))
+
+    def breaks(self, start_s: float, end_s: float) -> Floats:
+        """Times from start to end, both among them, a radian of the fastest eigenvalue apart at most."""
+        rate = float(np.abs(np.linalg.eigvals(self.matrix)).max())
+        return even_breaks(start_s, end_s, rate * (end_s - start_s))
 
     def _scaled(self, durations: Floats, scale: Floats) -> Floats:
         """A T in states divided by (T, T, T, 1, 1, 1)."""

@@ -12,6 +12,8 @@ from rendezvous.relative_motion.frames import Frame, StateOrder
 
 Floats = NDArray[np.float64]
 
+MOST_PANELS = 200_000
+
 
 @dataclass(frozen=True)
 class Segment:
@@ -63,6 +65,9 @@ class LinearMotion(Protocol):
 
     def drift(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Where the drift alone leads from the origin, int Phi(end, t) w dt, shape (..., 6)."""
+
+    def breaks(self, start_s: float, end_s: float) -> Floats:
+        """Times from start to end, both among them, between which the motion turns by about a radian at most."""
 
 
 def checked_durations(start_s: ArrayLike, end_s: ArrayLike) -> Floats:
@@ -121,6 +126,33 @@ def checked_frame(frame: Frame) -> None:
     """
     if frame.order is not StateOrder.POSITION_THEN_VELOCITY:
         raise ValueError(f"frame {frame.name}: motions have position before velocity; convert their results")
+
+
+def even_breaks(start_s: float, end_s: float, radians: float) -> Floats:
+    """Return times that divide an interval into panels of equal length, of at most one radian each.
+
+    Parameters
+    ----------
+    start_s, end_s : float
+    radians : float
+        The angle by which the motion turns from start to end, rad.
+
+    Returns
+    -------
+    ndarray, shape (P + 1,)
+        s.
+
+    Raises
+    ------
+    ValueError
+        If there are more than 200 000 panels.
+    """
+    if not radians <= MOST_PANELS:
+        raise ValueError(
+            f"the motion turns by {radians:.3g} rad from {start_s:g} s to {end_s:g} s; at most {MOST_PANELS} rad can "
+            "be divided into panels; check the units"
+        )
+    return np.linspace(start_s, end_s, max(1, int(np.ceil(radians))) + 1)
 
 
 def velocity_input(shape: tuple[int, ...]) -> Floats:

@@ -19,6 +19,7 @@ NODES = 8
 AGREEMENT = 2e-13
 ROUNDING = 1e-10
 MOST_PANELS = 4096
+MOST_BREAKS = 200_000
 
 
 @dataclass(frozen=True)
@@ -117,6 +118,31 @@ class TimeVaryingMotion:
         """Where the drift alone leads from the origin, int Phi(end, t) w dt, shape (..., 6)."""
         return self._solved(start_s, end_s).drift
 
+    def breaks(self, start_s: float, end_s: float) -> Floats:
+        """Times from start to end, both among them, a radian of the fastest motion seen in between apart at most.
+
+        Notes
+        -----
+        Panels are halved where A at their Gauss points turns by more than a radian over them.
+
+        Raises
+        ------
+        ValueError
+            If A(t) is not finite, or there are more than 200 000 panels.
+        """
+        starts, ends = np.array([start_s]), np.array([end_s])
+        places = _gauss_collocation()[0]
+        settled = [np.array([start_s, end_s])]
+        while len(starts):
+            if len(starts) > MOST_BREAKS:
+                raise ValueError(f"A(t) turns too often from {start_s:g} s to {end_s:g} s; check the units")
+            times = starts[:, None] + (ends - starts)[:, None] * places
+            long = (_rates(self.dynamics(times)).max(axis=1) * (ends - starts) > 1.0) & (ends > starts)
+            settled.append(ends[~long])
+            middles = 0.5 * (starts[long] + ends[long])
+            starts, ends = np.concatenate([starts[long], middles]), np.concatenate([middles, ends[long]])
+        return np.unique(np.concatenate(settled))
+
     def _solved(self, start_s: ArrayLike, end_s: ArrayLike) -> _Solution:
         starts, ends = np.broadcast_arrays(np.asarray(start_s, dtype=np.float64), np.asarray(end_s, dtype=np.float64))
         if not (np.isfinite(starts).all() and np.isfinite(ends).all()):
@@ -155,12 +181,17 @@ def _first_panels(motion: TimeVaryingMotion, starts: Floats, ends: Floats) -> in
     if not len(starts):
         return 1
     matrices = motion.dynamics(np.stack([starts, 0.5 * (starts + ends), ends]))
+    radians = float((_rates(matrices) * np.abs(ends - starts)).max())
+    return int(np.clip(np.ceil(radians), 1, MOST_PANELS // 4))
+
+
+def _rates(matrices: Floats) -> Floats:
+    """How fast motions of matrices A, shape (..., 6, 6), turn, rad/s, shape (...)."""
     if not np.isfinite(matrices).all():
         raise ValueError("A(t) is not finite")
     gravity = np.sqrt(np.abs(matrices[..., 3:, :3]).sum(axis=-1).max(axis=-1))
     turning = np.abs(matrices[..., 3:, 3:]).sum(axis=-1).max(axis=-1)
-    radians = float((np.maximum(gravity, turning) * np.abs(ends - starts)).max())
-    return int(np.clip(np.ceil(radians), 1, MOST_PANELS // 4))
+    return np.asarray(np.maximum(gravity, turning))
 
 
 @lru_cache(maxsize=1)

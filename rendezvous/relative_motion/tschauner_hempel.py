@@ -9,7 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from rendezvous.relative_motion.elliptic_orbit import EllipticOrbit
 from rendezvous.relative_motion.frames import HILL, Frame
-from rendezvous.relative_motion.linear_motion import Segment, checked_durations, checked_frame, velocity_input
+from rendezvous.relative_motion.linear_motion import (
+    Segment,
+    checked_durations,
+    checked_frame,
+    even_breaks,
+    velocity_input,
+)
 from rendezvous.relative_motion.time_varying import TimeVaryingMotion
 
 Floats = NDArray[np.float64]
@@ -111,6 +117,23 @@ class TschaunerHempel:
         """Zero, shape (..., 6)."""
         return np.zeros((*_shape(start_s, end_s), 6))
 
+    def breaks(self, start_s: float, end_s: float) -> Floats:
+        """Times from start to end, both among them, a radian of the eccentric anomaly apart at most.
+
+        Notes
+        -----
+        The motion has poles at cos E = 1 / e; panels are no longer than the distance to them.
+        """
+        first, last = (float(each) for each in self.orbit.eccentric_anomaly(np.array([start_s, end_s])))
+        times = self.orbit.time_of_eccentric(even_breaks(first, last, (last - first) / self._widest_rad))
+        times[0], times[-1] = start_s, end_s
+        return np.maximum.accumulate(np.minimum(times, end_s))
+
+    @property
+    def _widest_rad(self) -> float:
+        e = self.orbit.eccentricity
+        return 1.0 if e < 0.6 else min(1.0, float(np.arccosh(1.0 / e)))
+
     @property
     def _collocated(self) -> TimeVaryingMotion:
         return TimeVaryingMotion(self.orbit.dynamics)
@@ -123,9 +146,7 @@ class TschaunerHempel:
         """Phi(end, t) B at the nodes, shape (k, 6, 3), and their weights in time, s."""
         first, last = (float(each) for each in self.orbit.eccentric_anomaly(np.array([start_s, end_s])))
         e = self.orbit.eccentricity
-        # The integrand has poles at cos E = 1 / e: panels are no longer than the way to them, nor than a radian.
-        widest = 1.0 if e < 0.6 else min(1.0, float(np.arccosh(1.0 / e)))
-        panels = max(1, int(np.ceil((last - first) / widest)))
+        panels = max(1, int(np.ceil((last - first) / self._widest_rad)))
         half = 0.5 * (last - first) / panels
         middles = first + half * (2.0 * np.arange(panels) + 1.0)
         anomalies = (middles[:, None] + half * _NODES).ravel()

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 import time
 from collections.abc import Callable
 from importlib.metadata import version
@@ -28,6 +29,7 @@ KEYS = [
         "evaluations",
         "orders_begun",
         "orders_left_out",
+        "orders_that_do_not_fit",
     ),
 ]
 NODE_KEYS = ["name", "meet", "position_m", "velocity_m_s", "target_velocity_m_s", "leave_s", "jump_m_s3"]
@@ -331,6 +333,47 @@ def test_a_bound_that_the_control_exceeds_says_by_how_much(infoset: Infoset, min
     assert (code, out) == (2, "")
     assert f"reaches {peak:.6g} m/s^2, {peak / 0.002 - 1.0:.2%} over the bound of 0.002 m/s^2" in err
     assert infoset(mine(changed("[chaser]", f"greatest_control_m_s2 = {peak * 1.0001}\n[chaser]")), "-q")[0] == 0
+
+
+LONG_LEG = """
+schema = 1
+kind = "multipoint"
+axes = "hill"
+orbit_rate_rad_s = 0.0011
+greatest_control_m_s2 = 1.2334e-06
+[chaser]
+position_m = [0.0, 0.0, 0.0]
+velocity_m_s = [0.0, 0.0, 0.0]
+[[target]]
+name = "T1"
+position_m = [84.146497, 564.105261, 99.171302]
+velocity_m_s = [0.04105, -0.101076, 0.078318]
+time_s = 363636.364
+meet = "rendezvous"
+"""
+
+
+def test_a_bound_is_checked_between_samples_of_a_long_leg(infoset: Infoset, mine: Callable[[str], Path]) -> None:
+    code, out, err = infoset(mine(LONG_LEG))
+    assert (code, out) == (2, "")
+    assert "reaches 1.3052" in err
+    assert infoset(mine(LONG_LEG.replace("1.2334e-06", "1.3053e-06")), "-q")[0] == 0
+
+
+def test_orders_that_do_not_fit_the_times_are_left_out(infoset: Infoset, mine: Callable[[str], Path]) -> None:
+    times = iter((1500.0, 3000.0, 4500.0, 7000.0, 10000.0))
+    text = re.sub(r"(?m)^time_s = .*$", lambda _: f"time_s = {next(times)}", problem_text("service-5"))
+    text = re.sub(r"(?m)^dwell_s = .*$", "dwell_s = 2000.0", text)
+    code, out, err = infoset(mine(text), "--order", "best", "--times", "given")
+    assert (code, err) == (0, "")
+    assert "I = 0.065082" in out
+    assert "48 orders do not fit the times" in out
+    text = re.sub(r"(?m)^dwell_s = .*$", "dwell_s = 4000.0", text)
+    text = text.replace('meet = "flyby"', 'meet = "rendezvous"\ndwell_s = 3500.0')
+    code, out, err = infoset(mine(text.replace("latest_s = 11000.0", "latest_s = 99000.0")), "--order", "best",
+                             "--times", "given")  # fmt: skip
+    assert (code, out) == (2, "")
+    assert "no order fits the times" in err
 
 
 @pytest.mark.parametrize(

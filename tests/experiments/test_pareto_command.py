@@ -272,6 +272,73 @@ def test_a_bound_that_no_control_meets_says_by_how_much(infoset: Infoset, mine: 
     assert infoset(mine(given), "-q")[0] == 0
 
 
+LONG = """
+schema = 1
+kind = "pareto-encounter"
+orbit_rate_rad_s = 0.0011
+duration_s = 818181.8
+free = ["y"]
+greatest_control_m_s2 = 1.05e-5
+[[craft]]
+name = "a"
+position_m = [544.668, 1042.875, -206.956]
+velocity_m_s = [-0.814, 0.348, 0.248]
+[[craft]]
+name = "b"
+position_m = [1098.813, -1284.581, -661.613]
+velocity_m_s = [-0.838, -1.734, 0.126]
+"""
+
+
+def test_a_meeting_after_many_revolutions_is_not_refused(infoset: Infoset, mine: Callable[[str], Path]) -> None:
+    # 9.980e-6 m/s^2 suffices (test_choices.py); a fixed rule of quadrature said 1.14e-5.
+    code, out, err = infoset(mine(LONG))
+    assert (code, err) == (0, "")
+    assert "another control meets it" in out
+    assert infoset(mine(LONG.replace("1.05e-5", "9.97e-6")), "-q")[0] == 2
+
+
+LATE = """
+schema = 1
+kind = "pareto-encounter"
+orbit_rate_rad_s = 6.53e-05
+duration_s = 28.9
+free = ["y"]
+meet = "intercept"
+[terminal]
+x_m = 66.4
+z_m = 87.7
+[[craft]]
+name = "c0"
+position_m = [67.6, -32.06, -3.53]
+velocity_m_s = [-0.1554, 0.00448, -0.00445]
+[[craft]]
+name = "c1"
+position_m = [-5328.8, -6724.3, 3198.4]
+velocity_m_s = [0.0593, 0.0145, -0.0749]
+weight = 0.0
+start_s = 0.1
+[[craft]]
+name = "c2"
+position_m = [-21.6, -5.078, -53.25]
+velocity_m_s = [-0.1168, 0.0015925, -0.0245]
+weight = 4.85
+start_s = 15.28
+"""
+
+
+@pytest.mark.parametrize(("wanted", "nearest"), [(500.0, max), (-1e5, min)])
+def test_a_preferred_meeting_of_craft_that_start_late(
+    wanted: float, nearest: Callable[[list[float]], float], infoset: Infoset, mine: Callable[[str], Path]
+) -> None:
+    # With one free component the Pareto set is all between the least and the greatest ideal.
+    code, out, err = infoset(mine(LATE), "--prefer", f"y_m={wanted}", "--json", "-", "-q")
+    assert (code, err) == (0, "")
+    found = strict(out)
+    ideals = [each["ideal"]["y_m"] for each in found["craft"]]
+    assert found["selections"]["preferred"]["meeting"]["y_m"] == pytest.approx(nearest(ideals), rel=1e-9)
+
+
 def test_numbers_of_extreme_size_end_in_a_message(infoset: Infoset, mine: Callable[[str], Path]) -> None:
     for position in ("1e15", "1e-100"):
         code, _, err = infoset(mine(EXAMPLE.replace("60.0", position)), "-q")

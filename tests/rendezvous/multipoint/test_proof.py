@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.sparse import csc_matrix
 
+from rendezvous.greatest_control import greatest_control
 from rendezvous.multipoint import DriftingTargets, Meet, Nodes, Target, Tour, solve_dense, solve_segments
 from rendezvous.relative_motion import (
     ClohessyWiltshire,
@@ -220,6 +221,18 @@ def test_many_nodes_and_the_dense_system() -> None:
     dense = solve_dense(motion, 0.0, np.zeros(6), nodes)
     assert np.linalg.cond(dense.matrix) > 1e8
     assert dense.cost == pytest.approx(path.cost, rel=1e-6)
+
+
+def test_no_peak_of_a_long_leg_is_missed() -> None:
+    # 400 radians: 257 samples of the control gave 1.1655e-6 m/s^2.
+    motion = ClohessyWiltshire(0.0011)
+    state = np.array([[84.146497, 564.105261, 99.171302, 0.04105, -0.101076, 0.078318]])
+    tour = Tour(motion, DriftingTargets((Target("T1", Meet.RENDEZVOUS),), motion, state), np.zeros(6))
+    path = tour.fly((0,), [363636.364])
+    sizes = np.linalg.norm(path.control(np.linspace(0.0, 363636.364, 400_001)), axis=1)
+    peak = greatest_control(path.control, path.breaks())
+    assert sizes.max() <= peak <= sizes.max() * (1.0 + 1e-6)
+    assert peak == pytest.approx(1.3052e-6, rel=1e-4)  # an independent computation
 
 
 def test_states_and_costates_along_a_path(tours: Callable[..., Tour]) -> None:

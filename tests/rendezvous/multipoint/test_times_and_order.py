@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rendezvous.multipoint import (
     DriftingTargets,
     Meet,
+    NotSettledError,
     Target,
     TimeLimits,
     Tour,
@@ -65,6 +66,96 @@ def test_orders_of_slots_against_brute_force(count: int, share: float) -> None:
     assert costs[found.order] == pytest.approx(min(costs.values()), rel=1e-12)
     if share == 1.0:
         assert found.nodes == count  # what dynamic programming compares at its end
+
+
+def with_a_stay(meet_all: Meet) -> Tour:
+    """Five satellites of a train, one of which is visited for longer than most slots leave."""
+    motion = ClohessyWiltshire(1.10e-3)
+    states = np.array(
+        [
+            [120.0, 1500.0, 40.0, 0.02, -0.264, 0.03],
+            [-90.0, 3000.0, 0.0, -0.04, 0.198, -0.06],
+            [0.0, 6000.0, -60.0, 0.0, 0.0, 0.05],
+            [60.0, 9000.0, 100.0, 0.0, -0.132, 0.0],
+            [-30.0, 12000.0, 20.0, 0.01, 0.066, -0.02],
+        ]
+    )
+    meets = [meet_all, meet_all, Meet.RENDEZVOUS, meet_all, Meet.RENDEZVOUS]
+    stays = [0.0, 0.0, 2000.0, 0.0, 0.0]
+    targets = tuple(
+        Target(name, meet, stay)
+        for name, meet, stay in zip(["alpha", "charlie", "bravo", "delta", "echo"], meets, stays, strict=True)
+    )
+    return Tour(motion, DriftingTargets(targets, motion, states), np.array([0.0, -400.0, 0.0, 0.0, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize("meet", list(Meet))
+def test_orders_that_do_not_fit_the_slots_are_left_out(meet: Meet) -> None:
+    # Branch and bound, and dynamic programming. The search failed as a whole where one order did not fit.
+    tour, slots = with_a_stay(meet), np.array([1500.0, 3000.0, 4500.0, 7000.0, 10000.0])
+    found = best_order_of_slots(tour, slots)
+    fitting = {}
+    for order in itertools.permutations(range(5)):
+        if order.index(2) == 4 or slots[order.index(2) + 1] > slots[order.index(2)] + 2000.0:
+            fitting[order] = tour.fly(order, slots).cost
+    assert len(fitting) == 72
+    assert found.unfit == 120 - 72
+    assert found.objective == pytest.approx(min(fitting.values()), rel=1e-12)
+    assert fitting[found.order] == pytest.approx(min(fitting.values()), rel=1e-12)
+    if meet is Meet.FLYBY:
+        assert found.objective == pytest.approx(0.065082, rel=1e-5)  # an independent search
+
+
+@pytest.mark.parametrize("meet", list(Meet))
+def test_slots_that_no_order_fits_are_refused(meet: Meet) -> None:
+    tour = with_a_stay(meet)
+    stays = tuple(Target(each.name, Meet.RENDEZVOUS, 500.0) for each in tour.targets.targets)
+    motion = ClohessyWiltshire(1.10e-3)
+    staying = Tour(motion, DriftingTargets(stays, motion, np.zeros((5, 6))), np.ones(6))
+    with pytest.raises(ValueError, match="no order fits the times"):
+        best_order_of_slots(staying, 400.0 * np.arange(1.0, 6.0))
+
+
+def test_a_price_counts_from_the_start() -> None:
+    # A start before t = 0 made the objective negative, whose logarithm was minimised.
+    motion, start_s = ClohessyWiltshire(1e-3), -5000.0
+    targets = DriftingTargets((Target("T"),), motion, np.array([[100.0, 0.0, 0.0, 0.0, 0.0, 0.0]]))
+    tour, limits = Tour(motion, targets, np.zeros(6), start_s), TimeLimits(0.0, price_per_s=1e-8)
+    found = best_times(tour, (0,), limits)
+    times = np.linspace(start_s + 10.0, 0.0, 2000)
+    values = [tour.fly((0,), [each]).cost + 1e-8 * (each - start_s) for each in times]
+    assert found.objective <= min(values)
+    assert found.objective == pytest.approx(min(values), rel=1e-4)
+
+
+def test_times_are_best_where_gaps_differ_by_orders_of_magnitude() -> None:
+    # One scale for all gaps stopped short: 7.64e15 m^2/s^3 for 5.05e15.
+    motion = ClohessyWiltshire(0.0001160954816406749)
+    stays = (0.0, 0.0, 1668.0, 2202.0)
+    targets = tuple(Target(str(at), Meet.RENDEZVOUS, stay) for at, stay in enumerate(stays))
+    states = np.array(
+        [
+            [-8445.0, 1719.0, -67260.0, 0.9361, 3.103, 2.776],
+            [-85010.0, -149600.0, 16320.0, -6.633, -14.62, -0.3373],
+            [-16320.0, -29660.0, 71540.0, 6.708, 10.97, 24.29],
+            [-15920.0, 54100.0, 90570.0, -1.975, -4.053, 16.37],
+        ]
+    )
+    start, price = np.array([-73820.0, 82590.0, -16610.0, 0.8657, 1.785, 9.601]), 3.024e12
+    tour = Tour(motion, DriftingTargets(targets, motion, states), start)
+    guess = np.array([17230.0, 31560.0, 31560.1489, 45030.0])
+    found = best_times(tour, range(4), TimeLimits(price_per_s=price), [guess])
+    gaps = np.diff(np.concatenate([[0.0], found.time_s])) - np.array([0.0, *stays[:3]])
+    slope = np.cumsum((found.path.time_gradient + price * np.array([0.0, 0.0, 0.0, 1.0]))[::-1])[::-1]
+    assert (gaps > 0.05).all()
+    assert (np.abs(slope * gaps) <= 1e-4 * found.objective).all()
+
+
+def test_times_that_are_no_minimum_are_no_answer(tours: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rendezvous.multipoint.times._descend", lambda _, begin, *__: begin)
+    monkeypatch.setattr("rendezvous.multipoint.times._polish", lambda _, best, *__: best)
+    with pytest.raises(NotSettledError, match="are no minimum"):
+        best_times(tours(3), (0, 1, 2), TimeLimits(latest_s=4000.0))
 
 
 def test_bounds_leave_orders_unseen(tours: Make) -> None:

@@ -1,0 +1,387 @@
+"""Random encounters and their edges against dense least squares, cone programs and brute force."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import clarabel
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.optimize import minimize_scalar, nnls
+from scipy.sparse import block_diag, csc_matrix
+
+from rendezvous.pareto import (
+    Component,
+    Craft,
+    Encounter,
+    EncounterSolution,
+    Feasibility,
+    Meeting,
+    Plan,
+    analyse_coalitions,
+    check_bound,
+    least_greatest_excess,
+    least_peak,
+    least_sum_of_costs,
+    nearest_to,
+    peak_control,
+    simplex_weights,
+    solve_encounter,
+    total_impulse,
+)
+from rendezvous.relative_motion import ORBITAL, ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
+
+Floats = NDArray[np.float64]
+Check = Callable[[int], None]
+
+FEW = range(2, 10)
+MANY = range(1000, 3000)
+"""Seeds in the default suite, and in the slow one."""
+
+
+def some_motion(random: np.random.Generator, rate: float, *, elliptic: float = 0.2) -> LinearMotion:
+    """A circular orbit, or an elliptic one."""
+    if random.random() >= elliptic:
+        return ClohessyWiltshire(rate, ORBITAL)
+    orbit = EllipticOrbit(rate, float(random.choice([0.0, 0.1, 0.6, 0.8])), float(random.uniform(0.0, 6.0)))
+    return TschaunerHempel(orbit, ORBITAL)
+
+
+def some_encounter(seed: int, longest_rad: float = 20.0, most_craft: int = 5) -> Encounter:
+    """An encounter: weights of zero, one craft, craft that coincide, late starts, any free components."""
+    random = np.random.default_rng(seed)
+    rate = 10.0 ** random.uniform(-5.0, -1.5)
+    duration = 10.0 ** random.uniform(-3.0, np.log10(longest_rad)) / rate
+    motion = some_motion(random, rate)
+    meeting = Meeting.RENDEZVOUS if random.random() < 0.6 else Meeting.INTERCEPT
+    components = list(Component)[: 6 if meeting is Meeting.RENDEZVOUS else 3]
+    count = len(components) if random.random() < 0.15 else int(random.integers(1, len(components) + 1))
+    free = tuple(components[each] for each in random.permutation(len(components))[:count])
+    scale = np.array([duration] * 3 + [1.0] * 3) * 10.0 ** random.uniform(-1.0, 1.0)
+    starts = str(random.choice(["together", "apart", "late"]))
+    craft: list[Craft] = []
+    for index in range(int(random.integers(1, most_craft + 1))):
+        state = random.normal(size=6) * scale * 10.0 ** (2.0 * random.random())
+        if craft and random.random() < 0.15:
+            state = craft[-1].state
+        start = 0.0
+        if starts == "apart":
+            start = float(random.uniform(0.0, 0.9)) * duration
+        elif starts == "late":
+            start = duration * (1.0 - 10.0 ** random.uniform(-2.0, 0.0))
+        weight = 0.0 if random.random() < 0.2 else float(random.choice([1.0, 10.0 ** random.uniform(-1.5, 1.5)]))
+        craft.append(Craft(str(index), state, motion, weight, start))
+    if not any(each.weight > 0.0 for each in craft):
+        craft[0] = Craft("0", craft[0].state, motion, 1.0, craft[0].start_s)
+    return Encounter(tuple(craft), duration, free, random.normal(size=6) * scale, meeting)
+
+
+def integrated(motion: LinearMotion, start: float, end: float) -> tuple[Floats, Floats]:
+    """Phi(end, start) and the Gramian by DOP853, in states divided by (T, T, T, 1, 1, 1)."""
+    duration = end - start
+    scale = np.array([duration] * 3 + [1.0] * 3)
+
+    def rates(share: float, values: Floats) -> Floats:
+        matrix = motion.dynamics(start + share * duration) * (scale / scale[:, None]) * duration
+        transition, gramian = values[:36].reshape(6, 6), values[36:].reshape(6, 6)
+        inputs = np.zeros((6, 6))
+        inputs[3:, 3:] = duration * np.eye(3)
+        return np.concatenate([(matrix @ transition).ravel(), (matrix @ gramian + gramian @ matrix.T + inputs).ravel()])
+
+    begin = np.concatenate([np.eye(6).ravel(), np.zeros(36)])
+    found = solve_ivp(rates, (0.0, 1.0), begin, method="DOP853", rtol=1e-13, atol=1e-16 * duration).y[:, -1]
+    return found[:36].reshape(6, 6), found[36:].reshape(6, 6)
+
+
+def dense(encounter: Encounter) -> tuple[Floats, Floats, float]:
+    """The best free values, the costs J^2 by least squares of all craft at once, and the worst condition number."""
+    rows, right, worst = [], [], 1.0
+    blocks = []
+    for craft in encounter.craft:
+        transition, gramian = integrated(craft.motion, craft.start_s, encounter.meeting_s)
+        scale = np.array([encounter.meeting_s - craft.start_s] * 3 + [1.0] * 3)
+        common = encounter.common
+        missing = (encounter.base / scale - transition @ (craft.state / scale))[:common]
+        opening = (encounter.opening / scale[:, None])[:common]
+        values, vectors = np.linalg.eigh(gramian[:common, :common])
+        worst = max(worst, float(values[-1] / values[0]))
+        root = vectors.T / np.sqrt(values)[:, None]
+        blocks.append((root @ opening, root @ missing))
+        rows.append(np.sqrt(craft.weight) * root @ opening)
+        right.append(-np.sqrt(craft.weight) * root @ missing)
+    system = np.concatenate(rows)
+    size = np.linalg.norm(system, axis=0)
+    point = np.linalg.lstsq(system / size, np.concatenate(right), rcond=None)[0] / size
+    return point, np.array([((slope @ point + base) ** 2).sum() for slope, base in blocks]), worst
+
+
+def the_dense_solution_agrees(seed: int) -> None:
+    encounter = some_encounter(seed)
+    solution = solve_encounter(encounter)
+    point, costs, condition = dense(encounter)
+    doubt = 1e-8 + 1e-15 * condition
+    loss = float(encounter.weights @ costs)
+    own = encounter.weights @ solution.cost_squared()
+    size = float(encounter.weights @ [cost.effort_base @ cost.effort_base for cost in solution.costs]) + loss
+    assert own == pytest.approx(loss, rel=doubt, abs=doubt * 1e-2 * size)
+    # What another meeting costs more is what the matrices say: the points differ by rounding alone.
+    assert encounter.weights @ solution.cost_squared(point) == pytest.approx(own, rel=doubt, abs=doubt * 1e-2 * size)
+
+
+def cone_program(solution: EncounterSolution, weights: Floats, floors: Floats, *, one: bool) -> float:
+    """Least sum of w_i |(R_i (p - p_i*), floor_i)|, or the least greatest of them, by clarabel."""
+    free, count = solution.point.size, len(solution.costs)
+    counts = weights > 0.0
+    middle = solution.ideals[counts].mean(axis=0)
+    root = np.linalg.cholesky(np.mean([each.matrix for each in np.array(solution.costs)[counts]], axis=0)).T
+    back = np.linalg.inv(root)
+    apart = np.linalg.norm((solution.ideals[counts] - middle) @ root.T, axis=1)
+    size = max(float(apart.max()), float(floors[counts].max()), 1e-300)
+    slack = 1 if one else count
+    rows, right, cones = [], [], []
+    for index, cost in enumerate(solution.costs):
+        if weights[index] == 0.0:
+            continue
+        block = np.zeros((free + 2, free + slack))
+        block[0, free + (0 if one else index)] = -1.0 / (weights[index] if one else 1.0)
+        block[1 : free + 1, :free] = -cost.root @ back
+        rows.append(block)
+        right.append(np.concatenate([[0.0], -cost.root @ (cost.ideal - middle) / size, [floors[index] / size]]))
+        cones.append(clarabel.SecondOrderConeT(free + 2))
+    options = clarabel.DefaultSettings()
+    options.verbose = False
+    options.tol_gap_abs = options.tol_gap_rel = options.tol_feas = 1e-12
+    goal = np.concatenate([np.zeros(free), np.ones(1) if one else weights])
+    system = csc_matrix(np.concatenate(rows))
+    solver = clarabel.DefaultSolver(
+        csc_matrix((free + slack, free + slack)), goal, system, np.concatenate(right), cones, options
+    )
+    found = solver.solve()
+    assert str(found.status) in ("Solved", "AlmostSolved")
+    return float(goal @ np.array(found.x)) * size
+
+
+def ideal_size(solution: EncounterSolution) -> float:
+    """The greatest weighted size of an ideal in the norm of M."""
+    pairs = zip(solution.encounter.weights, solution.costs, strict=True)
+    return max(float(np.sqrt(weight) * np.linalg.norm(cost.root @ cost.ideal)) for weight, cost in pairs)
+
+
+def the_least_sum_agrees(seed: int) -> None:
+    solution = solve_encounter(some_encounter(seed))
+    weights = solution.encounter.weights
+    floors = np.sqrt([each.ideal_cost_squared for each in solution.costs])
+    value = float(weights @ np.sqrt(solution.cost_squared(least_sum_of_costs(solution))))
+    size = float(weights @ np.sqrt(solution.cost_squared())) + 1e-6 * ideal_size(solution)
+    assert value == pytest.approx(cone_program(solution, weights, floors, one=False), rel=1e-7, abs=1e-8 * size)
+
+
+def the_least_greatest_agrees(seed: int) -> None:
+    solution = solve_encounter(some_encounter(seed))
+    roots = np.sqrt(solution.encounter.weights)
+    value = float((roots * np.sqrt(solution.excess(least_greatest_excess(solution)))).max())
+    # Ideals that coincide do so up to their own rounding.
+    size = float((roots * np.sqrt(solution.excess())).max()) + 1e-6 * ideal_size(solution)
+    wanted = cone_program(solution, roots, np.zeros(len(roots)), one=True)
+    assert value == pytest.approx(wanted, rel=1e-6, abs=1e-7 * size)
+
+
+def the_nearest_is_nearest(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    solution = solve_encounter(some_encounter(seed))
+    weights, ideals = solution.encounter.weights, solution.ideals
+    matrices = np.array([each.matrix for each in solution.costs])
+    norm = np.linalg.cholesky(np.einsum("n,nab->ab", weights / weights.sum(), matrices)).T
+    spread = np.ptp(ideals, axis=0) + 1e-3 * np.abs(ideals).max(axis=0)
+    if random.random() < 0.3:
+        preferred = random.dirichlet(np.ones(len(ideals))) @ ideals
+    else:
+        preferred = ideals.mean(axis=0) + 10.0 ** random.uniform(-1.0, 3.0) * spread * random.normal(size=len(spread))
+    found = nearest_to(solution, preferred)
+    # It is one of the set: multipliers that are not negative make the sum of the slopes vanish.
+    slopes = np.array([each.root @ (found - each.ideal) for each in solution.costs])
+    pulls = np.einsum("nba,nb->na", np.array([each.root for each in solution.costs]), slopes) @ np.linalg.inv(norm)
+    sizes = np.linalg.norm(pulls, axis=1)
+    if sizes.min() > 1e-9 * sizes.max():  # else it is an ideal
+        rest = nnls(np.vstack([(pulls / sizes[:, None]).T, np.ones(len(pulls))]), np.append(np.zeros(len(norm)), 1.0))[
+            1
+        ]
+        assert rest <= 1e-5
+    # None of many others is nearer.
+    many = np.concatenate([simplex_weights(len(ideals), 2000), 10.0 ** random.uniform(-6.0, 0.0, (2000, len(ideals)))])
+    many = many / np.trace(matrices, axis1=1, axis2=2)
+    left = np.einsum("kn,nab->kab", many, matrices)
+    others = np.linalg.solve(left, np.einsum("kn,nab,nb->ka", many, matrices, ideals)[..., None])[..., 0]
+    distance = float(np.linalg.norm(norm @ (found - preferred)))
+    size = float(np.linalg.norm(norm @ preferred))
+    farthest = float(np.linalg.norm((ideals - preferred) @ norm.T, axis=1).max())
+    assert (
+        distance <= float(np.linalg.norm((others - preferred) @ norm.T, axis=1).min()) + 1e-6 * farthest + 1e-12 * size
+    )
+
+
+def coalitions_agree(seed: int) -> None:
+    solution = solve_encounter(some_encounter(seed, most_craft=4))
+    weights = solution.encounter.weights
+    found = analyse_coalitions(solution)
+    size = float(found.shapley.sum()) + 1e-12 * ideal_size(solution) ** 2
+    for each in found.coalitions:
+        members = list(each.members)
+        rows = np.concatenate([np.sqrt(weights[one]) * solution.costs[one].root for one in members])
+        right = np.concatenate(
+            [np.sqrt(weights[one]) * solution.costs[one].root @ solution.costs[one].ideal for one in members]
+        )
+        scale = np.where(np.linalg.norm(rows, axis=0) > 0.0, np.linalg.norm(rows, axis=0), 1.0)
+        point = np.linalg.lstsq(rows / scale, right, rcond=None)[0] / scale
+        least = float(((rows @ point - right) ** 2).sum())
+        assert each.excess == pytest.approx(least, rel=1e-7, abs=1e-9 * size)
+        common = float((weights * solution.excess())[members].sum())
+        assert each.regret == pytest.approx(common - least, rel=1e-7, abs=1e-9 * size)
+        assert each.regret >= 0.0
+
+
+def some_plan(seed: int, longest_rad: float) -> tuple[Plan, int]:
+    random = np.random.default_rng(seed)
+    encounter = some_encounter(seed, longest_rad, most_craft=2)
+    solution = solve_encounter(encounter)
+    return solution.plan(int(random.integers(len(solution.costs)))), encounter.common
+
+
+def the_peak_and_the_impulse_agree(seed: int) -> None:
+    plan, _ = some_plan(seed, 1000.0)
+    start, end = plan.craft.start_s, plan.meeting_s
+    times = np.linspace(start, end, 4001)
+    if isinstance(plan.craft.motion, TschaunerHempel):  # more of them near the periapsis
+        orbit = plan.craft.motion.orbit
+        first, last = (float(each) for each in orbit.eccentric_anomaly(np.array([start, end])))
+        times = orbit.time_of_eccentric(np.linspace(first, last, 4001))
+        times[0], times[-1] = start, end
+    sizes = np.linalg.norm(plan.control(times), axis=1)
+    steps = np.diff(times)
+    top = float(sizes.max())
+    inside = np.pad(sizes, 1, constant_values=-1.0)
+    humps = np.flatnonzero((inside[1:-1] >= inside[:-2]) & (inside[1:-1] >= inside[2:]))
+    for at in humps[np.argsort(sizes[humps])[-30:]]:
+        low, high = times[max(at - 1, 0)], times[min(at + 1, len(times) - 1)]
+        found = minimize_scalar(
+            lambda time: -float(np.linalg.norm(plan.control(np.array([time])))),
+            bounds=(low, high),
+            options={"xatol": 1e-9 * (high - low)},
+        )
+        top = max(top, -float(found.fun))
+    assert peak_control(plan) == pytest.approx(top, rel=2e-9)
+    assert peak_control(plan) >= top * (1.0 - 1e-9)
+    rule = 0.5 * steps @ (sizes[1:] + sizes[:-1])
+    # The trapezoidal rule errs by the changes of the slope of |u|, seen from its second differences.
+    slopes = np.diff(sizes) / steps
+    doubt = float(np.abs(np.diff(slopes)) @ np.maximum(steps[1:], steps[:-1]) ** 2)
+    assert total_impulse(plan) == pytest.approx(rule, abs=doubt + 1e-9 * rule)
+
+
+def held(plan: Plan, common: int, count: int) -> tuple[Floats, Floats]:
+    """Effects at the meeting of controls held over equal intervals, shape (c, 3 k), and what must be achieved."""
+    motion, start, end = plan.craft.motion, plan.craft.start_s, plan.meeting_s
+    grid = np.linspace(start, end, count + 1)
+    effects = motion.transition(grid[1:], np.full(count, end)) @ motion.held_input(grid[:-1], grid[1:])
+    scale = np.array([end - start] * 3 + [1.0] * 3)
+    wanted = motion.gramian(start, end) @ plan.costate / scale
+    rows = (effects / scale[:, None]).transpose(1, 0, 2).reshape(6, -1)
+    return rows[:common], wanted[:common]
+
+
+def least_peak_program(plan: Plan, common: int, count: int) -> tuple[float, float]:
+    """Bounds of the least peak: of held controls by a cone program from above, of its multipliers from below."""
+    rows, wanted = held(plan, common, count)
+    # Balanced, so that the program's tolerances mean something in each component.
+    left, sizes, right = np.linalg.svd(rows, full_matrices=False)
+    goal = left.T @ wanted / sizes
+    length = float(np.linalg.norm(goal)) / np.sqrt(3.0 * count)
+    goal = goal / (length * np.sqrt(count))
+    cone = np.zeros((4, 3))
+    cone[1:] = -np.eye(3)
+    heights = np.zeros((4 * count, 1))
+    heights[::4] = -1.0
+    equal = np.concatenate([right / np.sqrt(count), np.zeros((len(goal), 1))], axis=1)
+    conic = np.concatenate([block_diag([cone] * count).toarray(), heights], axis=1)
+    options = clarabel.DefaultSettings()
+    options.verbose = False
+    options.tol_gap_abs = options.tol_gap_rel = options.tol_feas = 1e-11
+    size = 3 * count + 1
+    objective = np.append(np.zeros(size - 1), 1.0)
+    solver = clarabel.DefaultSolver(
+        csc_matrix((size, size)),
+        objective,
+        csc_matrix(np.concatenate([equal, conic])),
+        np.concatenate([goal, np.zeros(4 * count)]),
+        [clarabel.ZeroConeT(len(goal)), *[clarabel.SecondOrderConeT(4)] * count],
+        options,
+    )
+    found = solver.solve()
+    assert str(found.status) in ("Solved", "AlmostSolved")
+    above = float(objective @ np.array(found.x)) * length
+    multipliers = left @ (np.array(found.z)[: len(goal)] / sizes)
+    # Any multipliers l give the bound l'e / int |B' Phi' l| dt; the integral by a rule that is much too fine.
+    motion, start, end = plan.craft.motion, plan.craft.start_s, plan.meeting_s
+    places, weights = np.polynomial.legendre.leggauss(8)
+    half = 0.5 * (end - start) / (4 * count)
+    times = (start + half * (2.0 * np.arange(4 * count) + 1.0)[:, None] + half * places).ravel()
+    scale = np.array([end - start] * 3 + [1.0] * 3)
+    effects = (motion.transition(times, np.full(times.shape, end)) @ motion.input_map(times) / scale[:, None])[
+        :, :common
+    ]
+    sizes_at = np.linalg.norm(np.einsum("kai,a->ki", effects, multipliers), axis=1)
+    below = abs(float(multipliers @ wanted)) / float(np.tile(half * weights, 4 * count) @ sizes_at)
+    return below, above
+
+
+def the_least_peak_agrees(seed: int) -> None:
+    plan, common = some_plan(seed, 12.0)
+    least = least_peak(plan, common)
+    if not plan.costate.any():
+        assert least == peak_control(plan) == 0.0
+        return
+    below, above = least_peak_program(plan, common, 100)
+    assert least >= below * (1.0 - 2e-6)
+    assert least <= above * (1.0 + 1e-7)
+    assert above <= least * 1.02
+    peak = peak_control(plan)
+    assert least <= peak * (1.0 + 1e-9)
+    for bound, verdict in (
+        (least * (1.0 - 1e-9), Feasibility.IMPOSSIBLE),
+        (least * (1.0 + 1e-9), Feasibility.ANOTHER_CONTROL),
+        (peak * (1.0 + 1e-9), Feasibility.WITHIN),
+    ):
+        told = check_bound(plan, bound, common).feasibility
+        # Where the two bounds coincide, the control of least energy is that of least peak.
+        assert told is verdict or (peak <= least * (1.0 + 2e-6) and told is not Feasibility.IMPOSSIBLE)
+
+
+CHECKS = [
+    the_dense_solution_agrees,
+    the_least_sum_agrees,
+    the_least_greatest_agrees,
+    the_nearest_is_nearest,
+    coalitions_agree,
+    the_peak_and_the_impulse_agree,
+    the_least_peak_agrees,
+]
+
+
+@pytest.mark.parametrize("seed", FEW)
+@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
+def test_random_encounters(check: Check, seed: int) -> None:
+    check(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
+def test_many_random_encounters(check: Check) -> None:
+    failed = {}
+    for seed in MANY:
+        try:
+            check(seed)
+        except (AssertionError, ValueError, RuntimeWarning) as error:
+            failed[seed] = str(error).splitlines()[:3]
+    assert not failed
