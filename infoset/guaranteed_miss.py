@@ -13,18 +13,8 @@ from infoset import chains, whole_chains
 from infoset._compile import ZERO, allocation_free, entry
 from infoset.concave_bounds import bound_between
 from infoset.history import History, Tapes
-from infoset.location import (
-    LABEL_RESOLUTION,
-    LOWER,
-    PROBE,
-    UPPER,
-    Workspace,
-    keep_section,
-    locate_end,
-    run,
-    search_window,
-    workspace,
-)
+from infoset.location import LABEL_RESOLUTION, locate_end, search_window
+from infoset.replays import LOWER, PROBE, UPPER, Workspace, keep_section, run, workspace
 from infoset.section_law import SectionLaw
 from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape
 from infoset.section_passes import Sections, tape_of

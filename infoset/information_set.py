@@ -10,8 +10,9 @@ from infoset.guaranteed_miss import GuaranteedMiss
 from infoset.history import History
 from infoset.information_set_view import Flags, Floats, InformationSetView, SetStatus
 from infoset.limits import COUNT, NOT_NEGATIVE, PART, flags, real_array, shown
-from infoset.location import refine_all, workspace
+from infoset.location import refine_all
 from infoset.model import InitialSet, Recovery, SetModel
+from infoset.replays import workspace
 from infoset.section_law import BOUND_SLACK, section_law
 from infoset.section_life import steepest_angle
 from infoset.section_stack import SectionStack
@@ -279,7 +280,7 @@ class InformationSet(InformationSetView):
 
     def stop(self, where: ArrayLike) -> None:
         """Follow engagements no longer: those `where` is true, shape () or (B,), have no sections from now on."""
-        stopped = np.broadcast_to(np.asarray(where, dtype=bool), self.batch)
+        stopped = flags("where", where, (self.batch,))
         self._status[stopped] = SetStatus.STOPPED.value
         self._stack.sections.living[stopped] = False
 

@@ -10,64 +10,17 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from infoset._compile import allocation_free, constants, entry
-from infoset.chains import CAPACITY, copy_section, count_of, empty_sections, room_of, working_room
+from infoset._compile import allocation_free, entry
+from infoset.chains import CAPACITY, copy_section, count_of, room_of
 from infoset.concave_bounds import is_dead_between
 from infoset.history import Tapes
+from infoset.replays import LOWER, PROBE, UPPER, Workspace, keep_living, keep_section, outlives, run
 from infoset.section_law import SectionLaw
-from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape, replay, summarise_section
+from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape, summarise_section
 from infoset.section_passes import Sections, tape_of
 
 LABEL_RESOLUTION = 1e-13
 MOST_PROBES = 200
-MOST_WINDOWS = 4096
-HALVINGS = 64
-
-PROBE, LOWER, UPPER = constants(3)
-"""Rows of the workspace: the section of the last replay, and those at the ends of the living labels."""
-
-
-class Workspace(NamedTuple):
-    """Room for replays of E events and a search among K labels.
-
-    Parameters
-    ----------
-    values, applies : ndarray, shape (E,)
-        The history of one engagement, in one piece: angles, rates and impulses (SI), and which events are its own.
-    origins, rings, marks : ndarray
-        Three sections, `PROBE`, `LOWER` and `UPPER`, as `chains.empty_sections` makes them.
-    overlaps, living_overlaps : ndarray, shape (E,)
-        Overlap of section and band at each measurement, of the last replay and of the last label that lived; m.
-    points : ndarray, shape (n, 2)
-        Room for the outline of a section.
-    labels, died, label_overlaps : ndarray, shape (K,)
-        Labels that are known, m; the event at which each died, or `ALIVE`; its overlap there.
-    four_labels, four_died, four_overlaps : ndarray, shape (4,)
-        The same of a bracket and the label probed in it.
-    latest : ndarray, shape (2, 4)
-        Labels and overlaps of those of them that died last.
-    windows : ndarray, shape (HALVINGS, 2)
-        Windows of labels still to be searched.
-    """
-
-    values: Floats
-    applies: Flags
-    origins: Floats
-    rings: Floats
-    marks: Integers
-    overlaps: Floats
-    living_overlaps: Floats
-    points: Floats
-    labels: Floats
-    died: Integers
-    label_overlaps: Floats
-    four_labels: Floats
-    four_died: Integers
-    four_overlaps: Floats
-    latest: Floats
-    windows: Floats
 
 
 class Living(NamedTuple):
@@ -88,54 +41,6 @@ class Living(NamedTuple):
     lower: float
     upper: float
     above: float
-
-
-def workspace(events: int, slots: int) -> Workspace:
-    """Room for replays of histories of so many events, and for a search among so many stored labels."""
-    known = slots + 2
-    return Workspace(
-        np.empty(events),
-        np.empty(events, dtype=bool),
-        *empty_sections(3),
-        overlaps=np.empty(events),
-        living_overlaps=np.empty(events),
-        points=working_room(),
-        labels=np.empty(known),
-        died=np.empty(known, dtype=np.int64),
-        label_overlaps=np.empty(known),
-        four_labels=np.empty(4),
-        four_died=np.empty(4, dtype=np.int64),
-        four_overlaps=np.empty(4),
-        latest=np.empty((2, 4)),
-        windows=np.empty((HALVINGS, 2)),
-    )
-
-
-@allocation_free
-def run(label: float, tape: Tape, errors: Floats | None, law: SectionLaw, room: Workspace) -> tuple[int, float]:
-    """Event at which a label died (or ALIVE) and its overlap there (0 if alive)."""
-    died = replay(label, tape, errors, law, room.origins, room.rings, room.marks, PROBE, room.overlaps, room.points)
-    return died, room.overlaps[died] if died != ALIVE else 0.0
-
-
-@allocation_free
-def keep_section(room: Workspace, row: int) -> None:
-    """Keep the section of the last replay as that of an end."""
-    copy_section(room.origins, room.rings, room.marks, PROBE, room.origins, room.rings, room.marks, row)
-
-
-@allocation_free
-def keep_living(room: Workspace, events: int, row: int) -> None:
-    """Keep section and overlaps of the last replay as those of the living label."""
-    keep_section(room, row)
-    for event in range(events):
-        room.living_overlaps[event] = room.overlaps[event]
-
-
-@allocation_free
-def outlives(died: int, overlap: float, other_died: int, other_overlap: float) -> bool:
-    """Whether a dead label is nearer to living than another: it died later, or at less distance."""
-    return died > other_died or (died == other_died and overlap > other_overlap)
 
 
 @allocation_free
@@ -291,29 +196,35 @@ def search_everywhere(
     Notes
     -----
     A window in which none lives by the bands that are convex there is done with; another is halved, as far as it is
-    wider than the resolution.
+    wider than the resolution. The next is that in which a label came nearest to living by its own bands.
     """
-    windows = room.windows
+    windows, died, overlaps = room.windows, room.windows_died, room.windows_overlaps
     windows[0, 0], windows[0, 1] = lower, upper
+    died[0], overlaps[0] = ALIVE, 0.0
     count = 1
-    for _ in range(MOST_WINDOWS):
-        if count == 0:
-            break
-        count -= 1
-        near, far = windows[count, 0], windows[count, 1]
+    while 0 < count <= windows.shape[0] - 2:
+        best = 0
+        for i in range(1, count):
+            if outlives(died[i], overlaps[i], died[best], overlaps[best]):
+                best = i
+        near, far = windows[best, 0], windows[best, 1]
         middle = 0.5 * (near + far)
-        window = Tape(tape.kinds, tape.values, tape.applies, tape.events, near, far)
-        if not search_window(near, far, middle, resolution, window, errors, law, room):
-            continue
-        label = room.labels[1]
-        if run(label, tape, errors, law, room)[0] == ALIVE:
-            return True, label
-        if far - near > resolution and count + 2 <= windows.shape[0]:
-            # The half with the label that lived there comes first.
-            first = count + 1 if label <= middle else count
-            windows[first, 0], windows[first, 1] = near, middle
-            windows[2 * count + 1 - first, 0], windows[2 * count + 1 - first, 1] = middle, far
-            count += 2
+        count -= 1
+        windows[best, 0], windows[best, 1] = windows[count, 0], windows[count, 1]
+        died[best], overlaps[best] = died[count], overlaps[count]
+        for half in range(2):
+            p, q = (near, middle) if half == 0 else (middle, far)
+            window = Tape(tape.kinds, tape.values, tape.applies, tape.events, p, q)
+            if not search_window(p, q, 0.5 * (p + q), resolution, window, errors, law, room):
+                continue
+            label = room.labels[1]
+            own_died, own_overlap = run(label, tape, errors, law, room)
+            if own_died == ALIVE:
+                return True, label
+            if q - p > resolution:
+                windows[count, 0], windows[count, 1] = p, q
+                died[count], overlaps[count] = own_died, own_overlap
+                count += 1
     return False, lower
 
 
