@@ -279,10 +279,8 @@ class InformationSet(InformationSetView):
         self._stack.predict(active, self._history.elapsed)
 
     def stop(self, where: ArrayLike) -> None:
-        """Follow engagements no longer: those `where` is true, shape () or (B,), have no sections from now on."""
-        stopped = flags("where", where, (self.batch,))
-        self._status[stopped] = SetStatus.STOPPED.value
-        self._stack.sections.living[stopped] = False
+        """Follow engagements no longer: nothing is computed from now on for those `where` is true, shape () or (B,)."""
+        self._status[flags("where", where, (self.batch,))] = SetStatus.STOPPED.value
 
     def _spread(self, value: ArrayLike, name: str) -> Floats:
         return real_array(name, value, (self.batch,))

@@ -211,9 +211,10 @@ class InformationSetView:
         alpha_least, alpha_greatest, range_of_least, range_of_greatest : ndarray, shape (B,)
             rad and m; zeros where no section lives.
         """
-        living, ranges = self.living, self.ranges_m
+        ranges = self.ranges_m
+        # Dead or unused slots may stand at any range, and so may sections of engagements that are followed no longer.
+        living = self.living & (ranges != 0.0)
         rows = np.arange(self.batch)
-        # Dead or unused slots may stand at any range: divide only where a section lives.
         least, greatest = self._stack.heights
         alphas_least = np.divide(least, ranges, out=np.full(ranges.shape, np.inf), where=living)
         alphas_greatest = np.divide(greatest, ranges, out=np.full(ranges.shape, -np.inf), where=living)

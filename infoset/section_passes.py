@@ -331,7 +331,8 @@ def widest_all(elapsed: int, sections: Sections, law: SectionLaw, exists: Flags,
     for b in range(labels.shape[0]):
         lowest = highest = -1
         for s in range(used[b]):
-            if not living[b, s]:
+            # A section at a range of zero is of an engagement that is followed no longer.
+            if not living[b, s] or range_of(labels[b, s], elapsed, law) == 0.0:
                 continue
             if lowest < 0 or summaries[b, s, LOWER_MISS] < summaries[b, lowest, LOWER_MISS]:
                 lowest = s
