@@ -14,7 +14,7 @@ from infoset._compile import allocation_free, entry
 from infoset.chains import CAPACITY, copy_section, count_of, room_of
 from infoset.concave_bounds import is_dead_between
 from infoset.history import Tapes
-from infoset.replays import LOWER, PROBE, UPPER, Workspace, keep_living, keep_section, outlives, run
+from infoset.replays import LOWER, MOST_WINDOWS, PROBE, UPPER, Workspace, keep_living, keep_section, outlives, run
 from infoset.section_law import SectionLaw
 from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape, summarise_section
 from infoset.section_passes import Sections, tape_of
@@ -202,7 +202,9 @@ def search_everywhere(
     windows[0, 0], windows[0, 1] = lower, upper
     died[0], overlaps[0] = ALIVE, 0.0
     count = 1
-    while 0 < count <= windows.shape[0] - 2:
+    for _ in range(MOST_WINDOWS):
+        if count == 0:
+            break
         best = 0
         for i in range(1, count):
             if outlives(died[i], overlaps[i], died[best], overlaps[best]):
