@@ -442,14 +442,14 @@ def _contact(
     first, at_first = t, here
     most = 2.0 * CONTACT * here.lengths
     for _ in range(_MOST_CLOSING_STEPS):
-        if here.value <= 0.0:
-            first, at_first = t, here
-            break
-        if here.value > most or t >= end:
+        if here.value <= 0.0 or here.value > most or t >= end:
             break
         step = _safe_step(here.value, here.rate, max(bend(t, t), 0.0))
+        before, value = t, here.value
         t = min(end, t + max(step, _LEAST_STEP * t))
         here = gap(t)
+        if here.value <= 0.0:
+            first, at_first = before + (t - before) * value / (value - here.value), here
     probe = first - most / at_first.rate if at_first.rate < 0.0 else math.inf
     is_deep = probe <= end and gap(probe).value <= -0.5 * most
     return LinearCapture(first, at_first.direction, not is_deep)
