@@ -20,11 +20,21 @@ from rendezvous.relative_motion import ClohessyWiltshire
 
 Floats = NDArray[np.float64]
 
-_PARTS = 512
-_MOST_DOUBLINGS = 80
-_TURNED = 1e-8
-_REAL, _POLISHING = 1e-7, 3
-_MOST_NEWTON = 60
+CONTACT = 1e-12
+"""A gap is contact if it is at most this share of the lengths that it is the difference of."""
+
+_LEAST_STEP = 1e-14
+_MOST_STEPS, _MOST_CLOSING_STEPS = 200_000, 50
+_BEYOND_DRY = 1e-12
+_MOST_NEWTON, _OPTIMAL = 60, 1e-11
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+_GRADES = 0.25 ** np.arange(11)
+_GREATEST_VELOCITY_GAIN = math.sqrt(50.0)
+"""Bound of |Phi_vv| in Hill's equations: in plane its Frobenius norm squared is 9 c^2 - 24 c + 17, c = cos nt."""
+
+
+class LinearGameError(RuntimeError):
+    """The first contact of a linear game could not be computed to its tolerance."""
 
 
 @dataclass(frozen=True)
@@ -74,16 +84,62 @@ class Thruster:
         c [t - (tau - t) ln(tau / (tau - t))] with tau the time that all its mass would last; a series where t / tau is
         small, for there the difference loses its digits.
         """
-        if self.thrust_n == 0.0:
-            return 0.0
+        share = self._burnt(time_s)
+        if share < 0.05:
+            part = sum(share ** (k - 2) / (k * (k - 1.0)) for k in range(2, 16))
+        else:
+            part = (share + (1.0 - share) * math.log1p(-share)) / share**2
+        return self.thrust_n / self.mass_kg * time_s * time_s * part
+
+    def speed_m_s(self, time_s: float) -> float:
+        """Return the speed that full thrust along a line gives.
+
+        Parameters
+        ----------
+        time_s : float
+            Below the time at which all the mass would be burnt.
+
+        Returns
+        -------
+        float
+
+        Raises
+        ------
+        ValueError
+            If all the mass would be burnt by then.
+        """
+        share = self._burnt(time_s)
+        return self.thrust_n / self.mass_kg * time_s * (-math.log1p(-share) / share if share > 0.0 else 1.0)
+
+    def acceleration_m_s2(self, time_s: float) -> float:
+        """Return the acceleration of full thrust.
+
+        Parameters
+        ----------
+        time_s : float
+            Below the time at which all the mass would be burnt.
+
+        Returns
+        -------
+        float
+
+        Raises
+        ------
+        ValueError
+            If all the mass would be burnt by then.
+        """
+        return self.thrust_n / self.mass_kg / (1.0 - self._burnt(time_s))
+
+    @property
+    def lasts_s(self) -> float:
+        """The time at which all the mass would be burnt: infinite without thrust, or with an infinite exhaust speed."""
+        return self.mass_kg * self.exhaust_speed_m_s / self.thrust_n if self.thrust_n > 0.0 else math.inf
+
+    def _burnt(self, time_s: float) -> float:
         share = self.thrust_n * time_s / (self.mass_kg * self.exhaust_speed_m_s)
         if not share < 1.0:
             raise ValueError(f"all the mass is burnt before {time_s:g} s")
-        if share < 0.05:
-            part = sum(share**k / (k * (k - 1.0)) for k in range(2, 16))
-        else:
-            part = share + (1.0 - share) * math.log1p(-share)
-        return self.exhaust_speed_m_s * time_s * part / share if share > 0.0 else 0.0
+        return share
 
 
 @dataclass(frozen=True)
@@ -95,10 +151,32 @@ class LinearCapture:
     time_s : float
     direction : ndarray, shape (3,)
         nu, in the axes of the given positions.
+    is_grazing : bool
+        Whether the gap only comes within the tolerance of zero (see Notes).
+
+    Notes
+    -----
+    The gap is how far the evader can keep away at a time; capture is its first zero. The search begins at t = 0. Value,
+    slope and a bound of the curvature give a lower bound of the gap; a step ends before that bound is zero. So no pass
+    is missed, however short. The tolerance is `CONTACT` times the lengths in the gap: distance and travels. A gap above
+    twice the tolerance is no contact. A contact is grazing if the gap does not fall below minus the tolerance when it
+    goes on at its rate: errors of that size in the data decide whether there is a capture. Relative to itself the time
+    is right to 1e-12, and rounding of the gap over its rate; that of a grazing contact to the square root of `CONTACT`.
     """
 
     time_s: float
     direction: Floats
+    is_grazing: bool = False
+
+
+@dataclass(frozen=True)
+class _Gap:
+    """The gap at one time: value, rate, the evader's direction, and the lengths that it is the difference of."""
+
+    value: float
+    rate: float
+    direction: Floats
+    lengths: float
 
 
 def free_space_capture(
@@ -116,7 +194,7 @@ def free_space_capture(
     Returns
     -------
     LinearCapture or None
-        None where the evader gets away: its acceleration is not the lesser.
+        None where the evader gets away: its acceleration is not the lesser, and they are not on a collision course.
 
     Raises
     ------
@@ -125,23 +203,23 @@ def free_space_capture(
 
     Notes
     -----
-    The first root of |r + v t| = (a_P - a_E) t^2 / 2, of degree four; nu is along r + v t.
+    The first root of |r + v t| = (a_P - a_E) t^2 / 2; nu is along r + v t.
     """
     position, velocity = _relative(position_m, velocity_m_s)
     advantage = pursuer_m_s2 - evader_m_s2
-    if not advantage > 0.0:
+    length, speed = float(np.linalg.norm(position)), float(np.linalg.norm(velocity))
+    if advantage < 0.0 or (advantage == 0.0 and speed == 0.0):
         return None
-    # In units in which the distance and the advantage are one, so that the roots are of order one or more.
-    length = float(np.linalg.norm(position))
-    time = math.sqrt(length / advantage)
-    r, v = position / length, velocity * (time / length)
-    quartic = np.array([0.25, 0.0, -float(v @ v), -2.0 * float(r @ v), -1.0])
-    roots = np.roots(quartic)
-    at = min(float(root.real) for root in roots if root.real > 0.0 and abs(root.imag) < _REAL * abs(root))
-    for _ in range(_POLISHING):
-        slope = float(np.polyval(np.polyder(quartic), at))
-        at -= float(np.polyval(quartic, at)) / slope if slope != 0.0 else 0.0
-    return LinearCapture(at * time, _unit(r + v * at))
+
+    def gap(t: float) -> _Gap:
+        distance, direction = _line_of_sight(position, velocity, t)
+        gain = 0.5 * advantage * t * t
+        return _Gap(distance - gain, float(direction @ velocity) - advantage * t, direction, length + speed * t + gain)
+
+    # By then the pursuer is past |r| + |v| t; or, without an advantage, the nearest pass is over.
+    root = math.sqrt(speed * speed + 2.0 * advantage * length)
+    end = 1.001 * (speed + root) / advantage if advantage > 0.0 else 2.0 * length / speed
+    return _first_contact(gap, lambda _from, _to: advantage, end)
 
 
 def mass_loss_capture(
@@ -167,19 +245,25 @@ def mass_loss_capture(
 
     Notes
     -----
-    The first root of |r + v t| = S_P(t) - S_E(t), S the travel of full thrust.
+    The first root of |r + v t| = S_P(t) - S_E(t), S the travel of full thrust. The distance is convex; the second
+    derivative of the rest is bounded by S_P'' at the end of a step less S_E'' at its begin.
     """
     position, velocity = _relative(position_m, velocity_m_s)
-    lasts = [each.mass_kg * each.exhaust_speed_m_s / each.thrust_n for each in (pursuer, evader) if each.thrust_n > 0.0]
-    if not lasts:
-        return None
+    last = min(pursuer.lasts_s, evader.lasts_s)
+    if math.isinf(last):
+        return free_space_capture(position, velocity, pursuer.acceleration_m_s2(0.0), evader.acceleration_m_s2(0.0))
+    length, speed = float(np.linalg.norm(position)), float(np.linalg.norm(velocity))
 
-    def gap(t: float) -> float:
-        return float(np.linalg.norm(position + velocity * t)) - pursuer.travel_m(t) + evader.travel_m(t)
+    def gap(t: float) -> _Gap:
+        distance, direction = _line_of_sight(position, velocity, t)
+        gained, lost = pursuer.travel_m(t), evader.travel_m(t)
+        rate = float(direction @ velocity) - pursuer.speed_m_s(t) + evader.speed_m_s(t)
+        return _Gap(distance - gained + lost, rate, direction, length + speed * t + gained + lost)
 
-    end = min(lasts) * (1.0 - 1e-12)
-    at = _first_fall(gap, end) if math.isfinite(end) else _first_fall_doubling(gap, position, pursuer)
-    return None if at is None else LinearCapture(at, _unit(position + velocity * at))
+    def bend(begin: float, end: float) -> float:
+        return pursuer.acceleration_m_s2(end) - evader.acceleration_m_s2(begin)
+
+    return _first_contact(gap, bend, last * (1.0 - _BEYOND_DRY), last)
 
 
 def circular_orbit_capture(
@@ -207,109 +291,183 @@ def circular_orbit_capture(
     Returns
     -------
     LinearCapture or None
-        None where there is no capture by then.
+        None where there is no capture by then, or the evader's acceleration is not the lesser.
 
     Raises
     ------
     ValueError
-        If position or velocity are not three finite numbers, or the position is zero.
+        If position or velocity are not three finite numbers, the position is zero, or the mean motion is not positive.
+    LinearGameError
+        If the greatest distance is not found to its tolerance.
 
     Notes
     -----
     The first root of l(T) = max over |nu| <= 1 of nu . (Phi x)_r - (a_P - a_E) int |Phi_rv(T - t)^T nu| dt: a concave
-    function of nu, hence one maximum. The evader's greatest distance at T, as the two reachable sets are alike.
-    Quadrature of Gauss and Legendre, eight points a twentieth of a revolution.
+    function of nu, hence one maximum. The evader's greatest distance at T, as the two reachable sets are alike. With
+    nu held it is a lower bound at other times, whose second derivative is at least -|x''| - (a_P - a_E) |Phi_vv|.
     """
     position, velocity = _relative(position_m, velocity_m_s)
+    if not rate_rad_s > 0.0:
+        raise ValueError("the mean motion must be positive")
     advantage = pursuer_m_s2 - evader_m_s2
     if not advantage > 0.0:
         return None
-    motion = ClohessyWiltshire(rate_rad_s)
     end = 100.0 * np.pi / rate_rad_s if longest_s is None else longest_s
-    state = np.concatenate([position, velocity])
-
-    def best(t: float) -> tuple[float, Floats]:
-        return _greatest_distance(motion, state, advantage, t)
-
-    at = _first_fall(lambda t: best(t)[0] if t > 0.0 else float(np.linalg.norm(position)), end)
-    return None if at is None else LinearCapture(at, best(at)[1])
+    distance = _HillDistance(np.concatenate([position, velocity]), advantage, rate_rad_s, end)
+    greatest = distance.greatest_bend()
+    return _first_contact(distance, lambda _from, _to: greatest, end)
 
 
-def _greatest_distance(
-    motion: ClohessyWiltshire, state: Floats, advantage: float, time_s: float
-) -> tuple[float, Floats]:
-    """Return the greatest of nu . x - a int |M nu| over the unit ball, and where: zero where it is negative.
+class _HillDistance:
+    """l(T), by Newton's method on the sphere from the direction of the time before.
 
-    Newton's method on the sphere with a line search. What is maximised is concave and homogeneous, so that a maximum
-    that is positive is the only one, and on the sphere.
+    The integral is by Gauss and Legendre's rule, on panels that shrink toward the times at which Phi_rv is singular:
+    there |Phi_rv^T nu| can have a kink.
     """
-    there = (motion.transition(0.0, time_s) @ state)[:3]
-    panels = max(1, math.ceil(20.0 * motion.rate_rad_s * time_s / (2.0 * np.pi)))
-    points, weights = np.polynomial.legendre.leggauss(8)
-    width = time_s / panels
-    times = (np.arange(panels)[:, None] + 0.5 * (1.0 + points)).ravel() * width
-    effects = motion.transition(0.0, times)[:, :3, 3:]
-    shares = advantage * 0.5 * width * np.tile(weights, panels)
 
-    def value(nu: Floats) -> float:
-        return float(nu @ there - shares @ np.linalg.norm(nu @ effects, axis=1))
+    def __init__(self, state: Floats, advantage: float, rate: float, end: float) -> None:
+        self._motion, self._state, self._advantage, self._rate = ClohessyWiltshire(rate), state, advantage, rate
+        self._breaks = _graded_breaks(rate * end) / rate
+        low, high = self._breaks[:-1], self._breaks[1:]
+        self._effects, self._weights = self._nodes(low, high)
+        self._nu = _unit(state[:3])
 
-    nu = _unit(there)
-    now = value(nu)
-    for _ in range(_MOST_NEWTON):
-        along = nu @ effects
-        size = np.linalg.norm(along, axis=1)
-        unit = along / size[:, None]
-        gradient = there - np.einsum("k,kij,kj->i", shares, effects, unit)
-        flat = effects - np.einsum("kij,kj,kl->kil", effects, unit, unit)
-        hessian = -np.einsum("k,kij,klj->il", shares / size, flat, effects)
-        plane = np.linalg.svd(nu[None, :])[2][1:]
-        slope = plane @ gradient
-        curve = plane @ hessian @ plane.T - max(now, 0.0) * np.eye(2)
-        step = -np.linalg.solve(curve, slope) @ plane
-        stride = 1.0
-        while stride > 1e-8:
-            trial = _unit(nu + stride * step)
-            reached = value(trial)
-            if reached >= now:
+    def greatest_bend(self) -> float:
+        """Bound |x''| + a |Phi_vv|: relative accelerations in Hill's frame are an ellipse and an oscillation."""
+        (x, _, z, vx, vy, vz), n = self._state, self._rate
+        in_plane, normal = math.hypot(3.0 * n * n * x + 2.0 * n * vy, n * vx), math.hypot(n * n * z, n * vz)
+        return math.hypot(2.0 * in_plane, normal) + self._advantage * _GREATEST_VELOCITY_GAIN
+
+    def _nodes(self, low: Floats, high: Floats) -> tuple[Floats, Floats]:
+        half = 0.5 * (high - low)
+        times = (low[:, None] + half[:, None] * (1.0 + _POINTS)).ravel()
+        effects = self._motion.transition(0.0, times)[:, :3, 3:]
+        return effects, self._advantage * (half[:, None] * _WEIGHTS).ravel()
+
+    def __call__(self, time_s: float) -> _Gap:
+        """Return the greatest of nu . x - a int |M^T nu| over the unit sphere."""
+        x = self._motion.transition(0.0, time_s) @ self._state
+        if time_s == 0.0:
+            length = float(np.linalg.norm(x[:3]))
+            return _Gap(length, float(self._nu @ x[3:]), self._nu, length)
+        whole = int(np.searchsorted(self._breaks, time_s)) - 1
+        last = self._nodes(self._breaks[whole : whole + 1], np.array([time_s]))
+        effects = np.concatenate([self._effects[: whole * len(_POINTS)], last[0]])
+        weights = np.concatenate([self._weights[: whole * len(_POINTS)], last[1]])
+        lengths = float(np.linalg.norm(x[:3]) + weights @ np.linalg.norm(effects, axis=(1, 2)))
+        nu = self._maximised(x[:3], effects, weights, _OPTIMAL * lengths)
+        size = _along(nu, effects)[1]
+        size_now = float(np.linalg.norm(self._motion.transition(0.0, time_s)[:3, 3:].T @ nu))
+        self._nu = nu
+        value = float(nu @ x[:3] - weights @ size)
+        return _Gap(value, float(nu @ x[3:]) - self._advantage * size_now, nu, lengths)
+
+    def _maximised(self, there: Floats, effects: Floats, weights: Floats, tolerance: float) -> Floats:
+        nu = self._nu
+        products = (effects @ effects.transpose(0, 2, 1)).reshape(-1, 9)
+        for _ in range(_MOST_NEWTON):
+            along, size = _along(nu, effects)
+            now = float(nu @ there - weights @ size)
+            shares = weights / size
+            drift = np.einsum("kij,kj->ki", effects, along)
+            # Its length is a distance that the pursuer can come to, so that an upper bound is at hand too.
+            gradient = there - shares @ drift
+            plane = np.linalg.svd(nu[None, :])[2][1:]
+            slope = plane @ gradient
+            if float(np.abs(slope).max()) <= tolerance:
+                return nu
+            hessian = np.einsum("k,ki,kj->ij", shares / size**2, drift, drift) - (shares @ products).reshape(3, 3)
+            curve = plane @ hessian @ plane.T - max(now, 0.0) * np.eye(2)
+            step = -np.linalg.solve(curve, slope) @ plane
+            stride = 1.0
+            while stride > 1e-12:
+                trial = _unit(nu + stride * step)
+                reached = float(trial @ there - weights @ _along(trial, effects)[1])
+                if reached > now or (stride == 1.0 and reached >= now - 1e-3 * tolerance):
+                    break
+                stride *= 0.5
+            else:
                 break
-            stride *= 0.5
-        else:
+            nu = trial
+        raise LinearGameError(
+            "the evader's greatest distance was not found to its tolerance: check the units of state and accelerations"
+        )
+
+
+def _along(nu: Floats, effects: Floats) -> tuple[Floats, Floats]:
+    along = nu @ effects
+    return along, np.maximum(np.sqrt(np.einsum("ki,ki->k", along, along)), 1e-300)
+
+
+def _graded_breaks(angle: float) -> Floats:
+    """Return ends of panels, 0 to an angle: finer toward where sin s = 0, or tan(s / 2) = 3 s / 8."""
+    half_turns = np.pi * np.arange(math.ceil(angle / np.pi) + 1.0)
+    others = [
+        2.0 * float(brentq(lambda h: math.sin(h) - 0.75 * h * math.cos(h), k * np.pi + 0.5, (k + 0.5) * np.pi))
+        for k in range(1, math.ceil(0.5 * angle / np.pi) + 1)
+    ]
+    singular = np.unique(np.concatenate([half_turns, others]))
+    low, half = singular[:-1, None], 0.5 * np.diff(singular)[:, None]
+    breaks = np.concatenate([singular, (low + half * _GRADES).ravel(), (low + half * (2.0 - _GRADES)).ravel()])
+    breaks = np.unique(breaks)
+    return np.append(breaks[breaks < angle], angle)
+
+
+def _first_contact(
+    gap: Callable[[float], _Gap], bend: Callable[[float, float], float], end: float, dry: float = math.inf
+) -> LinearCapture | None:
+    """Return the first contact by a time.
+
+    From one time to a later one the gap is at least value + rate dt - bend dt^2 / 2. Steps stay well before the time at
+    which a craft is dry, where the bend is infinite.
+    """
+    t, window = 0.0, math.inf
+    for _ in range(_MOST_STEPS):
+        here = gap(t)
+        if here.value <= 2.0 * CONTACT * here.lengths:
+            return _contact(gap, bend, t, here, end)
+        if t >= end:
+            return None
+        window = min(window, end - t, 0.5 * (dry - t))
+        # Below the value by the tolerance, so that a pass that only grazes is not stepped over.
+        step = min(window, _safe_step(here.value - CONTACT * here.lengths, here.rate, bend(t, t + window)))
+        t, window = min(end, t + max(step, _LEAST_STEP * t)), 2.0 * step
+    raise LinearGameError("the gap is nearly zero for too long a time to tell the first contact")
+
+
+def _contact(
+    gap: Callable[[float], _Gap], bend: Callable[[float, float], float], t: float, here: _Gap, end: float
+) -> LinearCapture:
+    """Close in on the zero from a time at which the gap is within its tolerance, and look how deep the pass is."""
+    first, at_first = t, here
+    most = 2.0 * CONTACT * here.lengths
+    for _ in range(_MOST_CLOSING_STEPS):
+        if here.value <= 0.0 or here.value > most or t >= end:
             break
-        nu, now = trial, reached
-        # The distance errs as the square of what is left.
-        if stride * float(np.linalg.norm(step)) < _TURNED:
-            break
-    return now, nu
+        step = _safe_step(here.value, here.rate, max(bend(t, t), 0.0))
+        before, value = t, here.value
+        t = min(end, t + max(step, _LEAST_STEP * t))
+        here = gap(t)
+        if here.value <= 0.0:
+            first, at_first = before + (t - before) * value / (value - here.value), here
+    probe = first - most / at_first.rate if at_first.rate < 0.0 else math.inf
+    is_deep = probe <= end and gap(probe).value <= -0.5 * most
+    return LinearCapture(first, at_first.direction, not is_deep)
 
 
-def _first_fall(gap: Callable[[float], float], end: float) -> float | None:
-    """Return the first time at which a function that begins positive has fallen to zero, looked for at many times."""
-    before = 0.0
-    # Denser toward the start, where short games end.
-    for at in end * np.linspace(0.0, 1.0, _PARTS + 1)[1:] ** 2:
-        if gap(float(at)) <= 0.0:
-            return _first_root(gap, float(at), before)
-        before = float(at)
-    return None
+def _safe_step(value: float, rate: float, bend: float) -> float:
+    """Return how long value + rate dt - bend dt^2 / 2 stays positive."""
+    if bend <= 0.0:
+        return -value / rate if rate < 0.0 else math.inf
+    root = math.sqrt(rate * rate + 2.0 * bend * value)
+    return (rate + root) / bend if rate > 0.0 else 2.0 * value / (root - rate)
 
 
-def _first_fall_doubling(gap: Callable[[float], float], position: Floats, pursuer: Thruster) -> float | None:
-    """Look twice as far each time: masses that stay have no end of their own."""
-    end = math.sqrt(float(np.linalg.norm(position)) * pursuer.mass_kg / max(pursuer.thrust_n, 1e-300))
-    for _ in range(_MOST_DOUBLINGS):
-        found = _first_fall(gap, end)
-        if found is not None:
-            return found
-        end *= 2.0
-    return None
-
-
-def _first_root(gap: Callable[[float], float], high: float, low: float) -> float:
-    """Return the root between a time where a function is positive and one where it is not."""
-    if gap(low) <= 0.0:
-        low *= 0.5
-    return float(brentq(gap, low, high, xtol=1e-12 * high, rtol=8.9e-16))
+def _line_of_sight(position: Floats, velocity: Floats, time_s: float) -> tuple[float, Floats]:
+    """Return distance and direction without thrust; where they meet, the direction is that of the start."""
+    place = position + velocity * time_s
+    distance = float(np.linalg.norm(place))
+    return distance, place / distance if distance > 0.0 else _unit(position)
 
 
 def _relative(position_m: Floats, velocity_m_s: Floats) -> tuple[Floats, Floats]:

@@ -15,7 +15,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.pursuit_evasion._pair import COARSE, FINE, ROUGH, Node, Pair
+from rendezvous.pursuit_evasion._pair import COARSE, FINE, MOST_RESIDUAL, ROUGH, Node, Pair
 
 Floats = NDArray[np.float64]
 
@@ -131,14 +131,16 @@ def polish(pair: Pair, guess: Floats, duration: float, radius: float, latest: fl
     Returns
     -------
     Node or None
+        None where Newton's method does not converge, or to what misses the necessary conditions by `MOST_RESIDUAL`.
     """
     found = pair.solve(guess, duration, radius, time_free=True, tolerance=FINE, latest=latest)
     if found is None:
         return None
     # Once more, linearised at the solution itself: for its costates, curvature and residual.
-    return pair.solve(
+    fine = pair.solve(
         found.vector, found.duration, radius, time_free=True, tolerance=FINE, linear_tolerance=FINE, latest=latest
     )
+    return fine if fine is not None and fine.residual < MOST_RESIDUAL else None
 
 
 def first_crossing(before: Node, after: Node, radius: float) -> float | None:

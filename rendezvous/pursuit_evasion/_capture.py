@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.pursuit_evasion._pair import FINE, Node
+from rendezvous.pursuit_evasion._branch import polish
+from rendezvous.pursuit_evasion._pair import Node
 from rendezvous.pursuit_evasion.game import Game, Player
 from rendezvous.pursuit_evasion.solution import Capture, PlayerEnd
 from rendezvous.pursuit_evasion.units import Units, scaled_pair, units_of
@@ -30,13 +31,12 @@ def near(game: Game, units: Units, guess: Node) -> Node | None:
     Node or None
         With positive closing speed and curvature.
     """
-    found = scaled_pair(game, units).solve(
+    found = polish(
+        scaled_pair(game, units),
         guess.vector,
         guess.duration,
         game.capture_radius_m / units.length_m,
-        time_free=True,
-        tolerance=FINE,
-        latest=horizon_s(game) / units.time_s,
+        horizon_s(game) / units.time_s,
     )
     return found if found is not None and found.is_saddle and found.closing > 0.0 else None
 

@@ -21,6 +21,9 @@ Floats = NDArray[np.float64]
 FINE, COARSE = 1e-13, 1e-9
 """Tolerances of propagation: of what is kept, and on the way there."""
 
+MOST_RESIDUAL = 1e-9
+"""How far an answer may miss the necessary conditions: start states, and r_E - r_P = l nu."""
+
 CLOSE, ROUGH = 1e-7, 1e-4
 """Last corrections of Newton's method, for the same; what is left of the error is about their square."""
 
@@ -55,7 +58,7 @@ class Node:
     costates : ndarray, shape (2, 6)
         p at the start, pursuer's and evader's, of the last guess that was linearised.
     residual : float
-        By how much that guess missed the start states.
+        By how much that guess missed the start states, and the ends of this extremal r_E - r_P = l nu.
     """
 
     duration: float
@@ -120,6 +123,7 @@ class _Linear:
         """Return the extremal that the last step led to."""
         p, e, drift = self.pursuer, self.evader, self.drift[:2]
         hessian = self.plane @ (p.by_nu[:3] - e.by_nu[:3])
+        apart = state[6:9] - state[:3] - state[16] * state[12:15]
         return Node(
             duration=float(state[15]),
             distance=float(state[16]),
@@ -132,7 +136,7 @@ class _Linear:
             slope=np.concatenate([p.by_nu @ drift + p.by_time, e.by_nu @ drift + e.by_time, drift @ self.plane]),
             correction=correction,
             costates=np.stack([p.costate, e.costate]),
-            residual=max(p.residual, e.residual),
+            residual=max(p.residual, e.residual, float(np.abs(apart).max())),
         )
 
 

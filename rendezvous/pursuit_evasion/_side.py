@@ -149,7 +149,9 @@ class KnownPath:
         """Return the state on the path, whatever nu is."""
         state, acceleration_there = self.state_at(duration)
         by_time = np.concatenate([state[3:], acceleration_there])
-        return Response(state - end_state, np.zeros((6, 2)), by_time, True, np.eye(6), np.zeros(6), 0.0)
+        rho = state - end_state
+        residual = float(np.abs(rho).max())
+        return Response(rho, np.zeros((6, 2)), by_time, True, np.eye(6), np.zeros(6), residual)
 
     def correct(
         self, response: Response, end_state: Floats, nu: Floats, duration: float, tolerance: float

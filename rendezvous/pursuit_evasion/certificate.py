@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
-from rendezvous.pursuit_evasion._pair import Node, Pair
+from rendezvous.pursuit_evasion._pair import MOST_RESIDUAL, Node, Pair
 from rendezvous.pursuit_evasion._scan import greater, scan
 from rendezvous.pursuit_evasion._side import Craft, KnownPath, Side
 from rendezvous.pursuit_evasion.paths import ExtremalPath, PathError, Policy, extremal_paths, steered_path
@@ -23,7 +23,6 @@ from rendezvous.pursuit_evasion.units import scaled_craft
 
 Floats = NDArray[np.float64]
 
-MOST_RESIDUAL = 1e-9
 MOST_HAMILTONIAN_DRIFT = 1e-8
 MOST_INTEGRATOR_GAP = 1e-7
 """In units of length: metres of a geostationary orbit."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.linear_game import circular_orbit_capture
+from rendezvous.linear_game import LinearGameError, circular_orbit_capture
 from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow, polish
 from rendezvous.pursuit_evasion._capture import capture_of, horizon_s, near
 from rendezvous.pursuit_evasion._pair import COARSE, Node
@@ -24,7 +24,7 @@ _REACH_STEP, _MOST_REACH_STEPS, _REACHED = 0.1, 400, 1e-6
 _MOST_ITERATIONS = 8
 _THRUST_STEP, _LEAST_THRUST_STEP = 0.25, 1e-3
 _LONGEST = 40.0
-"""Radians that the linear game is looked at: more would take many seconds."""
+"""Radians that the linear game is looked at."""
 
 
 def solve_by_homotopy(game: Game) -> Capture | None:
@@ -117,14 +117,17 @@ def _linear_guess(game: Game, units: Units) -> tuple[float, Floats] | None:
     offset = np.array([radius - own_radius, angle, position[2]])
     drift = np.array([velocity[:2] @ inward - (axes @ p[3:])[0], rate - own_rate, velocity[2]])
     force = units.length_m / units.time_s**2
-    found = circular_orbit_capture(
-        offset,
-        drift,
-        game.pursuer.acceleration_m_s2 / force,
-        game.evader.acceleration_m_s2 / force,
-        1.0,
-        longest_s=min(_LONGEST, horizon_s(game) / units.time_s),
-    )
+    try:
+        found = circular_orbit_capture(
+            offset,
+            drift,
+            game.pursuer.acceleration_m_s2 / force,
+            game.evader.acceleration_m_s2 / force,
+            1.0,
+            longest_s=min(_LONGEST, horizon_s(game) / units.time_s),
+        )
+    except LinearGameError:  # it is only a guess
+        return None
     if found is None:
         return None
     coast = steered_path(pursuer, Policy.COAST.direction, found.time_s).state_at(found.time_s)[0]

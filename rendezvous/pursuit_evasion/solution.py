@@ -90,7 +90,7 @@ class Capture:
         Eigenvalues of the Hessian of h_P - h_E on the plane normal to nu, in units of length, ascending.
     pursuer, evader : PlayerEnd
     residual : float
-        Of the start states, in units of length and speed.
+        Of the start states and of r_E - r_P = R nu, in units of length and speed: below 1e-9.
     extremal : Node
         The same, nondimensional; a first guess for games near by.
 

@@ -38,7 +38,8 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
     -----
     The game of Wang's slides, after Shen and Casalino (2018); they shoot forward from a guess, which is not done here.
     At each duration the evader takes the branch with the greatest distance l; capture is the first time at which that
-    is the capture radius. 20 to 40 ms a revolution.
+    is the capture radius. 20 to 40 ms a revolution. A capture whose residual is not below 1e-9 is none: the verdict is
+    then that the branch is not certified.
     """
     units = units_of(game)
     pair = scaled_pair(game, units)
@@ -93,7 +94,7 @@ def solve_near(game: Game, units: Units, guess: Node) -> Capture | None:
     Returns
     -------
     Capture or None
-        A local saddle; None where Newton's method does not lead to one.
+        A local saddle; None where Newton's method does not lead to one whose residual is below 1e-9.
 
     Notes
     -----

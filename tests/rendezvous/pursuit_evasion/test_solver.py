@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,6 +25,7 @@ from rendezvous.pursuit_evasion import (
     solve_near,
 )
 from rendezvous.pursuit_evasion._branch import Ending, follow, polish
+from rendezvous.pursuit_evasion._pair import Node, Pair
 from rendezvous.pursuit_evasion.units import scaled_pair, units_of
 
 from .conftest import EARTH_M, MU_M3_S2, MakeGame
@@ -242,6 +245,33 @@ def test_what_another_route_finds_is_told_with_the_route(slides: MakeGame, monke
     assert solve(game).fallback_route is Route.LINEAR_GAME
     monkeypatch.setattr(solver + "solve_by_linear_game", lambda _game: None)
     assert (solve(game).fallback, solve(game).fallback_route) == (None, None)
+
+
+def test_a_capture_that_misses_the_conditions_is_not_returned(
+    slides: MakeGame, solved: Solution, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    exact, game, node = Pair.solve, slides(), captured(solved).extremal
+
+    def inexact(pair: Pair, guess: Floats, duration: float, distance: float, **how: Any) -> Node | None:
+        found = exact(pair, guess, duration, distance, **how)
+        return None if found is None else replace(found, residual=1e-8)
+
+    monkeypatch.setattr(Pair, "solve", inexact)
+    solution = solve(game, change_branch=False)
+    assert solution.verdict is Verdict.BRANCH_NOT_CERTIFIED
+    assert (solution.capture, solution.fallback) == (None, None)
+    assert solve_near(game, solved.units, node) is None
+    assert solve_by_homotopy(game) is None
+    assert solve_by_linear_game(game) is None
+
+
+@pytest.mark.parametrize("thrust_n", [9.0, 9.5, 10.3])
+def test_the_residual_of_a_neighbour_is_that_of_the_answer(thrust_n: float, slides: MakeGame, solved: Solution) -> None:
+    found = solve_near(slides(thrust_n), solved.units, captured(solved).extremal)
+    assert found is not None
+    assert found.residual < 1e-9
+    apart = found.evader.position_m - found.pursuer.position_m
+    assert np.abs(apart).max() < 1e-9 * solved.units.length_m
 
 
 def test_polishing_what_is_no_guess_gives_nothing(slides: MakeGame, solved: Solution) -> None:
