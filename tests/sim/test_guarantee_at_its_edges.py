@@ -14,11 +14,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from experiments.scenario_file import load_scenario
-from guidance import NoiseKind, TieRule
-from infoset import AngleSensor, InitialSet, Model, RateSensor, SetModel, StateBox
+from guidance import NoiseKind, RandomNoise, Thruster, TieRule
+from infoset import AngleSensor, InformationSetView, InitialSet, Model, RateSensor, SetModel, StateBox
 from infoset.section_law import BOUND_SLACK, SectionLaw, section_law
 from infoset.section_life import LastSight, rate_band
 from sim import Outcome, Results, Scenario, simulate
+from sim.draws import draw
+from sim.engagement import Engagements
 
 Floats = NDArray[np.float64]
 CASES = Path(__file__).parent / "cases"
@@ -204,3 +206,41 @@ def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(
         # A window of one label has nothing but the rate itself: its band is as wide as the sensor's error.
         alone = rate_band(label, label, label, elapsed, omega, rate_error, sight, law)
         assert alone[1] - alone[0] <= 1.01 * 2.0 * (abs(omega) * 0.01 + rate_error) * x**2 / e
+
+
+# Living labels that form two intervals ----------------------------------------------------------------------------
+
+
+def test_living_labels_of_the_published_model_may_form_two_intervals() -> None:
+    """A bound that rises with range and the rectangle at the start: nothing lives for 150 km between them."""
+    e, range_m = 20e3, 2.5e6
+    generator = np.random.default_rng(170)
+    step_s = float(generator.choice([1.0, 2.0, 5.0]))
+    z_m, vz_m_s = range_m * 10.0 ** generator.uniform(-3.0, -1.0), e * 10.0 ** generator.uniform(-4.0, -2.0)
+    error_rad = 10.0 ** generator.uniform(-4.0, -2.0)
+    at_zero_rad = error_rad * generator.uniform(0.0, 0.3)
+    box = StateBox((-z_m, z_m), (0.95 * range_m, 1.05 * range_m), (-vz_m_s, vz_m_s), (-1.01 * e, -0.99 * e))
+    model = SetModel(
+        e, step_s, box, AngleSensor(step_s, error_rad, at_zero_rad, range_m), 0.0, 1e4, 29, 3,
+        InitialSet.RECTANGLE, Model.PAPER,
+    )  # fmt: skip
+    scenario = Scenario("", "", None, range_m, box, model, None, Thruster(0.0, 0.1, 1.0))
+    draws = draw(scenario, range(6), 170)
+    signs = np.where(draws.angle >= 0.0, 1.0, -1.0)
+    flight = Engagements(scenario, draws, noise=RandomNoise(signs, draws.range))
+    views: list[InformationSetView] = []
+    while flight.step < 15:
+        flight.advance(lambda step: views.append(step.information))
+    information, run = views[-1], 2
+    assert not information.inconsistent[run]
+    labels = np.linspace(*model.label_limits_m, 120)
+    living = np.array([len(information.section_at(label, run).polygon.polygon()) > 0 for label in labels])
+    edges = labels[np.flatnonzero(np.diff(living.astype(int)))]
+    assert edges.size == 3  # dead, living, dead, living up to the greatest label
+    assert edges[2] - edges[1] > 150e3
+    # What is done: the stored sections that live are kept, on both sides, and the interval spans both.
+    stored = information.labels_m[run][information.living[run]]
+    assert not ((stored > edges[1] + 1e4) & (stored < edges[2])).any()
+    least, greatest = (ends[run] + e * step_s * 15 for ends in information.living_range_interval_m())
+    assert edges[0] < least < edges[1]
+    assert greatest == pytest.approx(model.label_limits_m[1], rel=1e-9)
