@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from math import factorial
 
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rendezvous.multipoint.segments import Flown, NotSettledError, Path, check_times, solve_segments
 from rendezvous.multipoint.targets import Meet
-from rendezvous.multipoint.times import BestTimes, Effort, TimeLimits, optimise_times, room_s
+from rendezvous.multipoint.times import BestTimes, Effort, NoRoomError, TimeLimits, optimise_times, room_s
 from rendezvous.multipoint.tour import SMOOTH, Tour, Visits, nodes_of
 
 Floats = NDArray[np.float64]
@@ -39,7 +40,8 @@ class BestOrder:
     lost : tuple of tuple of int
         Beginnings of orders that were left out, for no path was found.
     unfit : int
-        How many orders do not fit given times: a stay ends after the next visit.
+        How many orders do not fit: a stay ends after the next of given times, or stays leave no time for travelling
+        before the latest time.
     """
 
     order: tuple[int, ...]
@@ -79,37 +81,36 @@ def best_order(
     Notes
     -----
     Depth first, the cheapest beginning first. A beginning costs, at its own best times, no more than any order that
-    goes on from it: what it costs bounds them all, and warms their start. That holds of global minima; the local ones
-    that are found bound in practice in linear motion, and in Kepler's only with a factor (`ruggedness`).
+    goes on from it: what it costs bounds them all, and warms their start. That holds of global minima. The minima that
+    are found are local, so that the order is the best of those found: a beginning is dropped only where more starts
+    find no lower minimum, in Kepler's motion with a factor too (`ruggedness`).
     """
     count = _checked_count(tour)
     dwell = tour.dwell_s
-    room_s(tour.start_s, dwell, limits)
+    unfit = _orders_without_room(tour.start_s, dwell, limits)
     horizon = limits.latest_s
 
-    def solve(order: tuple[int, ...], warm: Sequence[Floats], complete: bool) -> tuple[float, Flown, int]:
-        held = limits
-        if horizon is not None and not complete:
-            rest = [each for each in range(count) if each not in order]
-            later = dwell[order[-1]] + dwell[rest].sum() - dwell[rest].max() + len(rest) * limits.least_gap_s
-            held = TimeLimits(horizon - float(later), limits.least_gap_s, limits.price_per_s)
-        flyer, stays = tour.flyer(order), dwell[list(order)]
+    def solve(order: tuple[int, ...], warm: Sequence[Floats], careful: bool) -> tuple[float, Flown, int]:
+        complete, held, enough = len(order) == count, limits, -np.inf
+        if not complete:
+            if horizon is not None:
+                rest = [each for each in range(count) if each not in order]
+                later = dwell[order[-1]] + dwell[rest].sum() - dwell[rest].max() + len(rest) * limits.least_gap_s
+                held = TimeLimits(horizon - float(later), limits.least_gap_s, limits.price_per_s)
+            if np.isfinite(search.best_objective):
+                enough = search.best_objective
         effort = Effort.BOUND if warm else Effort.ORDER
+        if careful:
+            effort = Effort.RUGGED if tour.ruggedness > SMOOTH else Effort.ORDER
         begins = [*warm, *guesses] if complete else warm
-        enough = -np.inf if complete or np.isinf(search.best_objective) else search.best_objective
-        found = optimise_times(flyer, tour.start_s, stays, held, begins, effort=effort, enough=enough)
-        if not complete or found.objective >= tour.ruggedness * search.best_objective:
-            return found.objective, found.flown, found.evaluations
-        # An order that may be the best deserves more starts.
-        careful = Effort.RUGGED if tour.ruggedness > SMOOTH else Effort.ORDER
-        again = optimise_times(flyer, tour.start_s, stays, held, [found.time_s, *guesses], effort=careful)
-        if again.objective < found.objective:
-            return again.objective, again.flown, found.evaluations + again.evaluations
-        return found.objective, found.flown, found.evaluations + again.evaluations
+        found = optimise_times(
+            tour.flyer(order), tour.start_s, dwell[list(order)], held, begins, effort=effort, enough=enough
+        )
+        return found.objective, found.flown, found.evaluations
 
     # Where local minima lie far apart a beginning's is no bound, and is taken for one that much lower.
     slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0 / (1.0 - _MARGIN)
-    search = _Search(solve, count, progress or (lambda _: None), tour.start_s, horizon, slack)
+    search = _Search(solve, count, progress or (lambda _: None), tour.start_s, horizon, slack, looks_twice=True)
     search.branch((), None)
     best = search.found()
     final = optimise_times(
@@ -120,7 +121,8 @@ def best_order(
         [best.nodes.arrive_s, *guesses],
     )
     evaluations = search.evaluations + final.evaluations
-    return BestOrder(search.best, final.path, final.objective, search.nodes, evaluations, tuple(search.lost))
+    lost = tuple(search.lost)
+    return BestOrder(search.best, final.path, final.objective, search.nodes, evaluations, lost, unfit)
 
 
 def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | None = None) -> BestOrder:
@@ -165,12 +167,14 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
     if isinstance(tour, Tour) and all(each.meet is Meet.RENDEZVOUS for each in tour.targets.targets):
         return _by_dynamic_programming(tour, times, fits, unfit)
 
-    def solve(order: tuple[int, ...], _warm: Sequence[Floats], _complete: bool) -> tuple[float, Flown, int]:
+    def solve(order: tuple[int, ...], _warm: Sequence[Floats], _careful: bool) -> tuple[float, Flown, int]:
         flown = tour.flyer(order)(times[: len(order)])
         return flown.cost, flown, 1
 
     slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0
-    search = _Search(solve, count, progress or (lambda _: None), tour.start_s, None, slack, fits)
+    search = _Search(
+        solve, count, progress or (lambda _: None), tour.start_s, None, slack, looks_twice=False, fits=fits
+    )
     search.branch((), None)
     path = search.found().settled()
     lost = tuple(search.lost)
@@ -221,6 +225,7 @@ class _Search:
     start_s: float
     horizon_s: float | None
     slack: float
+    looks_twice: bool
     fits: NDArray[np.bool_] | None = None
     best: tuple[int, ...] = ()
     best_path: Flown | None = None
@@ -239,7 +244,6 @@ class _Search:
     def branch(self, beginning: tuple[int, ...], before: Flown | None) -> None:
         """Look at all orders that go on from a beginning."""
         children = []
-        complete = len(beginning) + 1 == self.count
         for target in (each for each in range(self.count) if each not in beginning):
             order = (*beginning, target)
             if self.fits is not None and not self.fits[len(beginning), target]:
@@ -247,22 +251,36 @@ class _Search:
                 continue
             self.nodes += 1
             try:
-                objective, path, evaluations = self.solve(order, self._warm(before), complete)
+                objective, path = self._look(order, self._warm(before), careful=False)
+            except NoRoomError:
+                self._done(order)
             except NotSettledError:
                 self.lost.append(order)
                 self._done(order)
-                continue
-            self.evaluations += evaluations
-            children.append((objective, order, path))
+            else:
+                children.append((objective, order, path))
         for objective, order, path in sorted(children, key=lambda each: each[:2]):
+            complete = len(order) == self.count
+            lowest, best_path = objective, path
+            if self.looks_twice and (complete or objective >= self.slack * self.best_objective):
+                # What was found is a local minimum: more starts before an order is taken, or a beginning dropped.
+                with suppress(NotSettledError):
+                    again, other = self._look(order, [path.nodes.arrive_s], careful=True)
+                    if again < objective:
+                        lowest, best_path = again, other
             if complete:
                 self._done(order)
-                if objective < self.best_objective:
-                    self.best, self.best_path, self.best_objective = order, path, objective
-            elif objective < self.slack * self.best_objective:
-                self.branch(order, path)
+                if lowest < self.best_objective:
+                    self.best, self.best_path, self.best_objective = order, best_path, lowest
+            elif lowest < self.slack * self.best_objective:
+                self.branch(order, best_path)
             else:
                 self._done(order)
+
+    def _look(self, order: tuple[int, ...], warm: Sequence[Floats], careful: bool) -> tuple[float, Flown]:
+        objective, path, evaluations = self.solve(order, warm, careful)
+        self.evaluations += evaluations
+        return objective, path
 
     def _done(self, order: tuple[int, ...]) -> None:
         self.decided += factorial(self.count - len(order))
@@ -288,6 +306,24 @@ def _checked_count(tour: Visits) -> int:
             f"{factorial(MOST_TARGETS)}, for each more multiplies what it costs: give the order"
         )
     return count
+
+
+def _orders_without_room(start_s: float, dwell_s: Floats, limits: TimeLimits) -> int:
+    """How many orders do not fit before the latest time, which depends on the last target alone: its stay is free.
+
+    Raises
+    ------
+    NoRoomError
+        If none fits.
+    """
+    room_s(start_s, np.sort(dwell_s), limits)
+    unfit = 0
+    for last in range(len(dwell_s)):
+        try:
+            room_s(start_s, np.append(np.delete(dwell_s, last), dwell_s[last]), limits)
+        except NoRoomError:
+            unfit += factorial(len(dwell_s) - 1)
+    return unfit
 
 
 def _orders_that_fit(fits: NDArray[np.bool_]) -> int:

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
+from scipy.spatial import cKDTree
 from scipy.stats import qmc
 
 from rendezvous.multipoint.segments import Flown, NotSettledError, Path
@@ -26,6 +27,8 @@ _MOST_WALLS = 6
 _MOST_RESTARTS = 4
 _SETTLED = 1e-3
 _ROUNDING = 1e-26
+_CLOCK = 1e-9
+"""Time for travelling, as a share of the times themselves, that is none: rounding of times leaves no gaps in it."""
 
 
 class Effort(Enum):
@@ -37,7 +40,7 @@ class Effort(Enum):
     """For comparing orders."""
     RUGGED = (14, 5, 1e-5)
     """For comparing orders whose cost has many local minima."""
-    FINAL = (14, 6, 1e-9)
+    FINAL = (48, 6, 1e-9)
     """For the answer, to the last digits."""
 
     @property
@@ -130,6 +133,10 @@ class _Trial:
     slope: Floats
 
 
+class NoRoomError(ValueError):
+    """The visits do not fit before the latest time."""
+
+
 class _StoppedError(Exception):
     """A descent that finds no paths around it, or is low enough."""
 
@@ -196,15 +203,17 @@ def optimise_times(
 
     Raises
     ------
-    ValueError
+    NoRoomError
         If the visits do not fit before the latest time.
     NotSettledError
         If the conditions of a minimum are not met by what is found; with the final effort alone.
 
     Notes
     -----
-    Sequential quadratic programming in the gaps, on the logarithm of the cost, with the exact gradient dI/dt; then
-    Newton's method with differences of it on the gaps that no limit holds. Each step is one path.
+    The problem is not convex: of many starts those are followed first that cost no more than their neighbours, and no
+    lower minimum elsewhere is ruled out. Sequential quadratic programming in the gaps, on the logarithm of the cost,
+    with the exact gradient dI/dt; then Newton's method with differences of it on the gaps that no limit holds. Each
+    step is one path.
     """
     count = len(dwell_s)
     shifts = start_s + np.concatenate([[0.0], np.cumsum(dwell_s[:-1])])
@@ -213,12 +222,12 @@ def optimise_times(
     least = max(limits.least_gap_s, LEAST_SHARE * scale)
     trials = _Trials(fly, shifts, limits.price_per_s)
     candidates = [np.diff(np.concatenate([[0.0], np.asarray(each) - shifts])) for each in guesses]
-    candidates += _spread(count, scale, least, bounded=np.isfinite(total))[: effort.spread]
+    candidates += _spread(count, scale, least, bounded=np.isfinite(total), most=effort.spread)
     sound = [each for each in candidates if (each >= least * (1 - 1e-9)).all() and each.sum() <= total * (1 + 1e-12)]
     begun = [each for each in map(trials.attempt, sound) if each is not None]
     if not begun:
         trials(sound[0])  # says why
-    followed = sorted(begun, key=lambda each: each.objective)[: effort.followed]
+    followed = _valleys(begun, effort.followed)
     ended = []
     for index, each in enumerate(followed):
         ended.append(_descend(trials, each, least, total, scale, effort.tolerance, enough))
@@ -246,14 +255,15 @@ def _unsettled(best: _Trial, least: float, total: float) -> float:
     """By how much the conditions of a minimum are missed, relative to the objective.
 
     To first order, by what share of the objective a change of one gap by its own length, or down to the least one,
-    would lower it; where the latest time holds, at the cost of the others.
+    would lower it, or as far as the limits let it change; where the latest time holds, at the cost of the others.
     """
     gaps, excess = best.gaps, np.maximum(best.gaps - least, 0.0)
     slope = best.slope
     full = bool(np.isfinite(total)) and total - gaps.sum() <= 1e-9 * total
     if full and excess.sum() > 0.0:
         slope = slope + max(0.0, -float(excess @ slope) / float(excess.sum()))
-    gain = np.maximum(-slope * gaps, slope * excess)
+    farthest = max(total - gaps.sum(), 0.0) + excess.sum()
+    gain = np.maximum(-slope * np.minimum(gaps, farthest), slope * excess)
     # A path that costs nothing is one up to the rounding of states.
     states = best.flown.nodes.arrive
     size = (states[:, :3] ** 2).sum(axis=1) / gaps**3 + (states[:, 3:] ** 2).sum(axis=1) / gaps
@@ -275,20 +285,22 @@ def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
 
     Raises
     ------
-    ValueError
+    NoRoomError
         If the visits do not fit before the latest time.
     """
     if limits.latest_s is None:
         return float(np.inf)
-    total = limits.latest_s - start_s - float(dwell_s[:-1].sum())
+    stays = float(dwell_s[:-1].sum())
+    total = limits.latest_s - start_s - stays
     need = len(dwell_s) * limits.least_gap_s
-    if not total > 0.0 or total < need:
-        earliest = start_s + float(dwell_s[:-1].sum()) + need
-        raise ValueError(
+    clock = max(abs(limits.latest_s), abs(start_s))
+    if not total > _CLOCK * clock or total < need - 1e-14 * clock:
+        raise NoRoomError(
             f"{len(dwell_s)} visits do not fit before the latest time, {limits.latest_s:g} s: with gaps of at least "
-            f"{limits.least_gap_s:g} s and the dwells the last one is after {earliest:g} s at the earliest"
+            f"{limits.least_gap_s:g} s and the dwells the last one is after {start_s + stays + need:g} s at the "
+            "earliest"
         )
-    return total
+    return max(total, need)
 
 
 def _longest(guesses: Sequence[Floats], start_s: float, count: int) -> float:
@@ -299,15 +311,33 @@ def _longest(guesses: Sequence[Floats], start_s: float, count: int) -> float:
     return max(ends)
 
 
-def _spread(count: int, scale: float, least: float, bounded: bool) -> list[Floats]:
-    """Gaps to start from: even, early, late and some between, over all the time and over half of it."""
+def _spread(count: int, scale: float, least: float, bounded: bool, most: int) -> list[Floats]:
+    """Gaps to start from: even, rising and falling, over all the time and over half of it, and a Halton sequence."""
     rising = np.arange(1.0, count + 1.0)
-    shares = [np.ones(count), rising, rising[::-1]]
-    if count > 1:
-        shares += [0.2 - np.log(each) for each in qmc.Halton(count, scramble=False).random(5)[1:]]
     lengths = (1.0, 0.5) if bounded else (0.5, 1.0, 2.0, 4.0, 8.0)
-    extra = scale - count * least if bounded else scale
-    return [least + length * max(extra, 0.0) * each / each.sum() for each in shares for length in lengths]
+    extra = max(scale - count * least, 0.0) if bounded else scale
+    shares = [length * each / each.sum() for each in (np.ones(count), rising, rising[::-1]) for length in lengths]
+    for each in qmc.Halton(count + 1, scramble=False).random(most + 1)[1:]:
+        weights = 0.2 - np.log(each)
+        if bounded:  # the last weight is that of the time that is left at the end
+            shares.append((weights / weights.sum())[:count])
+        else:
+            shares.append(0.5 * 16.0 ** each[count] * weights[:count] / weights[:count].sum())
+    return [least + extra * each for each in shares[:most]]
+
+
+def _valleys(begun: Sequence[_Trial], most: int) -> list[_Trial]:
+    """Starts that cost no more than those nearest to them, the cheapest first: one start in each valley.
+
+    References
+    ----------
+    Toern and Viitanen, "Topographical global optimization using pre-sampled points", J. Global Optim. 5 (1994) 267-276.
+    """
+    ranked = sorted(begun, key=lambda each: each.objective)
+    places = np.stack([each.gaps for each in ranked])
+    nearest = cKDTree(places).query(places, k=min(len(ranked), places.shape[1] + 2))[1].reshape(len(ranked), -1)
+    lowest = (nearest >= np.arange(len(ranked))[:, None]).all(axis=1)
+    return [ranked[at] for at in np.argsort(~lowest, kind="stable")[:most]]
 
 
 def _descend(

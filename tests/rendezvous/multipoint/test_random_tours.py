@@ -242,15 +242,25 @@ def times_agree(seed: int) -> None:
 
     polished = minimize(walled, begin, method="Nelder-Mead", options={"xatol": 1e-8, "fatol": 0.0, "maxfev": 150})
     best = min(float(polished.fun), *values)
-    assert found.objective <= best * (1.0 + 1e-6)
+    # A chaser that starts on its target pays nothing, up to the rounding of states.
+    states = found.path.nodes.arrive
+    rounding = 1e-30 * float(
+        ((states[:, :3] ** 2).sum(axis=1) / gaps**3 + (states[:, 3:] ** 2).sum(axis=1) / gaps).sum()
+    )
+    assert found.objective <= best * (1.0 + 1e-6) + rounding
 
 
 def order_and_times_agree(seed: int) -> None:
     random = np.random.default_rng(seed)
     tour, times = some_tour(random, 3, 8.0, elliptic=0.0)
-    limits = TimeLimits(float(times[-1]))
+    latest_s = float(times[-1])
+    limits = TimeLimits(latest_s)
     found = best_order(tour, limits)
-    each = [best_times(tour, order, limits).objective for order in permutations(range(3))]
+    room = latest_s - tour.start_s - tour.dwell_s.sum() + tour.dwell_s
+    fitting = [order for order in permutations(range(3)) if room[order[-1]] > 0.0]
+    assert found.unfit == 6 - len(fitting)
+    assert found.order in fitting
+    each = [best_times(tour, order, limits).objective for order in fitting]
     assert found.objective <= min(each) * (1.0 + 1e-6)
 
 
@@ -261,6 +271,24 @@ CHECKS = [the_path_agrees, the_peak_agrees, slots_agree, times_agree]
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
 def test_random_tours(check: Check, seed: int) -> None:
     check(seed)
+
+
+@pytest.mark.parametrize("seed", [1097, 1099, 1428])
+def test_times_in_the_lowest_of_several_valleys(seed: int) -> None:
+    # From few starts, the valley of a worse minimum was found: 1.7 to 2.6 times the least cost.
+    times_agree(seed)
+
+
+@pytest.mark.parametrize("seed", [2, 65])
+def test_orders_whose_stays_do_not_fit_are_left_out(seed: int) -> None:
+    # The search failed as a whole.
+    order_and_times_agree(seed)
+
+
+@pytest.mark.parametrize("seed", [3, 15, 18, 76])
+def test_an_order_is_not_dropped_for_a_local_minimum_of_its_beginning(seed: int) -> None:
+    # The cost of a beginning at a local minimum of its times bounds nothing.
+    order_and_times_agree(seed)
 
 
 @pytest.mark.slow
@@ -277,5 +305,10 @@ def test_many_random_tours(check: Check) -> None:
 
 @pytest.mark.slow
 def test_many_orders_with_their_times() -> None:
+    failed = {}
     for seed in range(100):
-        order_and_times_agree(seed)
+        try:
+            order_and_times_agree(seed)
+        except (AssertionError, ValueError, RuntimeWarning) as error:
+            failed[seed] = str(error).splitlines()[:3]
+    assert not failed

@@ -116,6 +116,39 @@ def test_slots_that_no_order_fits_are_refused(meet: Meet) -> None:
         best_order_of_slots(staying, 400.0 * np.arange(1.0, 6.0))
 
 
+def test_a_long_stay_fits_where_it_is_last() -> None:
+    # The order of the list was taken for all orders: visits "do not fit before the latest time".
+    motion = ClohessyWiltshire(1.1e-3)
+    targets = tuple(Target(name, Meet.RENDEZVOUS, stay) for name, stay in [("A", 5000.0), ("B", 0.0), ("C", 100.0)])
+    states = np.array([[100.0, 900.0, 0, 0, -0.22, 0], [-50.0, 400.0, 20.0, 0, 0.11, 0], [0, -700.0, 0, 0, 0, 0.1]])
+    tour, limits = Tour(motion, DriftingTargets(targets, motion, states), np.zeros(6)), TimeLimits(4000.0)
+    found = best_order(tour, limits)
+    assert found.objective == pytest.approx(
+        min(best_times(tour, order, limits).objective for order in [(1, 2, 0), (2, 1, 0)]), rel=1e-7
+    )
+    assert found.order[-1] == 0
+    assert found.unfit == 4
+    with pytest.raises(ValueError, match=r"do not fit before the latest time, 100 s: .* after 100 s at the earliest"):
+        best_order(tour, TimeLimits(100.0))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_visits_that_just_fit_are_not_refused_for_rounding(seed: int) -> None:
+    random, motion = np.random.default_rng(seed), ClohessyWiltshire(1.1e-3)
+    stays, gap = random.uniform(10.0, 900.0, size=3), float(random.uniform(10.0, 900.0))
+    start_s = float(random.uniform(-1e5, 0.0))
+    targets = tuple(Target(str(at), Meet.RENDEZVOUS, float(stay)) for at, stay in enumerate(stays))
+    tour = Tour(motion, DriftingTargets(targets, motion, random.normal(size=(3, 6))), random.normal(size=6), start_s)
+    order = tuple(int(each) for each in np.argsort(stays))  # the longest stay last: the only ones that fit
+    times = start_s + np.cumsum(np.full(3, gap)) + np.append(0.0, np.cumsum(stays[list(order)])[:2])
+    found = best_order(tour, TimeLimits(float(times[-1]), gap))
+    swapped = (order[1], order[0], order[2])
+    middle = start_s + np.cumsum(np.full(3, gap)) + np.append(0.0, np.cumsum(stays[list(swapped)])[:2])
+    least = min(tour.fly(order, times).cost, tour.fly(swapped, middle).cost)
+    assert found.objective == pytest.approx(least, rel=1e-7)
+    assert found.unfit == 4
+
+
 def test_a_price_counts_from_the_start() -> None:
     # A start before t = 0 made the objective negative, whose logarithm was minimised.
     motion, start_s = ClohessyWiltshire(1e-3), -5000.0
