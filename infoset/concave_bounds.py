@@ -41,7 +41,6 @@ def bound_between(
     Beyond two of its points a concave function stays below the line through them. Infinite where neither side has two.
     """
     has_left, has_right = first >= 2, number - first >= 2
-    best = -np.inf
     left_p = left_q = right_p = right_q = np.inf
     if has_left:
         a, b = first - 2, first - 1

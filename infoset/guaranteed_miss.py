@@ -24,10 +24,10 @@ LABELS = 4
 """Labels replayed in what leaves at one step; with one more on either side for extrapolation."""
 MOST_LABELS = LABELS + 2
 PIECES = LABELS + 1
-MOST_WINDOWS = 16
+MOST_LEAVING_WINDOWS = 16
 """Windows that what leaves at one step may be bounded in, where rates were measured: a power of two."""
 LOOSE = 1.25
-"""A bound of a window that is greater than what is known to be reached by so much has the window halved."""
+"""A window is halved if its bound exceeds what is known to be reached by this factor."""
 LEAST, GREATEST, NEAREST, FARTHEST = range(4)
 """Columns of a piece: bounds of its predicted miss, and its ends as labels, all in m."""
 RESOLUTION = 1e-10
@@ -143,7 +143,7 @@ def bound_leaving(
     elif upper_died == ALIVE:
         living = upper
     if living < lower:
-        # The living labels are an interval, and one beyond the limits lives: nothing does between dead limits.
+        # The living labels are an interval. One beyond the limits lives, or none does: nothing between dead limits.
         return 0
     resolution = RESOLUTION * upper
     first_dead, last_dead = lower, upper
@@ -257,7 +257,7 @@ def bound_leaving_all(
                 if living[b, s] and near <= stored[b, s] <= far:
                     known = stored[b, s]
             window, middle = tape, 0.5 * (near + far)
-            may_halve = errors is not None and MOST_WINDOWS * (far - near) > 1.5 * (upper[b] - lower[b])
+            may_halve = errors is not None and MOST_LEAVING_WINDOWS * (far - near) > 1.5 * (upper[b] - lower[b])
             if errors is not None:
                 window = Tape(tape.kinds, tape.values, tape.applies, tape.events, near, far)
             spread = 0.0
@@ -353,7 +353,7 @@ class GuaranteedMiss:
         """Bound the labels that leave now: those that live from `lower` to `upper`."""
         batch = len(active)
         errors = history.errors_if_any
-        most = PIECES if errors is None else PIECES * MOST_WINDOWS
+        most = PIECES if errors is None else PIECES * MOST_LEAVING_WINDOWS
         pieces, made = np.zeros((batch, most, 4)), np.zeros(batch, dtype=np.int64)
         bound_leaving_all(
             active,

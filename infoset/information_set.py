@@ -223,9 +223,9 @@ class InformationSet(InformationSetView):
             Which engagements have fired.
         """
         impulse = self._spread(impulse_m_s, "impulse_m_s")
-        active = self._active(where) & (impulse != 0.0)
+        active = self._followed & flags("where", where, (self.batch,)) & (impulse != 0.0)
         if self._phi is not None:
-            self._phi.fire(np.where(self._active(where), impulse, 0.0), self._history.elapsed)
+            self._phi.fire(np.where(active, impulse, 0.0), self._history.elapsed)
         self._history.record(section_life.IMPULSE, impulse, active)
         self._stack.shift(active, impulse, self._history.elapsed)
 
@@ -238,8 +238,7 @@ class InformationSet(InformationSetView):
             Which stored sections left.
         """
         active, least_label = self.tracking, self._least_label_next()
-        # Phi covers what the search for living labels may have missed, so it does not end with it.
-        followed = (self._status != SetStatus.STOPPED.value) & (self._status != SetStatus.EMPTY.value)
+        followed = self._followed
         if self._phi is not None:
             leaving_below = np.minimum(self._upper_label, least_label)
             self._phi.leave(followed, self._lower_label, leaving_below, self._stack, self._history)
@@ -277,6 +276,11 @@ class InformationSet(InformationSetView):
         active = self.tracking
         self._history.record(section_life.PREDICTION)
         self._stack.predict(active, self._history.elapsed)
+
+    @property
+    def _followed(self) -> Flags:
+        """Which engagements Phi follows: also those in which no label above the threshold was found to live."""
+        return np.asarray((self._status != SetStatus.STOPPED.value) & (self._status != SetStatus.EMPTY.value))
 
     def stop(self, where: ArrayLike) -> None:
         """Follow engagements no longer: nothing is computed from now on for those `where` is true, shape () or (B,)."""

@@ -1,20 +1,32 @@
 """Where the living labels are, found exactly by replaying the history at chosen labels.
 
 Where the sets are convex in (z, V, label) the living labels form one interval: in the guaranteed model that starts
-from a box and measures no rates. Elsewhere they need not. The search then finds one interval of them, and the limits
-within which labels may live are not narrowed to it; before it says that none lives, it looks through every window of
-labels with bands that are convex there.
+from a box and measures no rates. Elsewhere they need not. With rates the search finds one interval of them, the limits
+within which labels may live are not narrowed to it, and before it says that none lives, it looks through windows of
+labels with bands that are convex there. docs/guarantee.md says what is done in the other cases.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from infoset._compile import allocation_free, entry
 from infoset.chains import CAPACITY, copy_section, count_of, room_of
 from infoset.concave_bounds import is_dead_between
 from infoset.history import Tapes
-from infoset.replays import LOWER, MOST_WINDOWS, PROBE, UPPER, Workspace, keep_living, keep_section, outlives, run
+from infoset.replays import (
+    LOWER,
+    MOST_HALVED_WINDOWS,
+    PROBE,
+    UPPER,
+    Workspace,
+    keep_living,
+    keep_section,
+    outlives,
+    run,
+)
 from infoset.section_law import SectionLaw
 from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape, summarise_section
 from infoset.section_passes import Sections, tape_of
@@ -196,13 +208,13 @@ def search_everywhere(
     Notes
     -----
     A window in which none lives by the bands that are convex there is done with; another is halved, as far as it is
-    wider than the resolution. The next is that in which a label came nearest to living by its own bands.
+    wider than the resolution. The next is that in which a label, or an end, came nearest to living by its own bands.
     """
     windows, died, overlaps = room.windows, room.windows_died, room.windows_overlaps
     windows[0, 0], windows[0, 1] = lower, upper
     died[0], overlaps[0] = ALIVE, 0.0
     count = 1
-    for _ in range(MOST_WINDOWS):
+    for _ in range(MOST_HALVED_WINDOWS):
         if count == 0:
             break
         best = 0
@@ -219,14 +231,16 @@ def search_everywhere(
             window = Tape(tape.kinds, tape.values, tape.applies, tape.events, p, q)
             if not search_window(p, q, 0.5 * (p + q), resolution, window, errors, law, room):
                 continue
-            label = room.labels[1]
-            own_died, own_overlap = run(label, tape, errors, law, room)
-            if own_died == ALIVE:
-                return True, label
-            if q - p > resolution:
-                windows[count, 0], windows[count, 1] = p, q
-                died[count], overlaps[count] = own_died, own_overlap
-                count += 1
+            windows[count, 0], windows[count, 1] = p, q
+            died[count], overlaps[count] = -1, -np.inf
+            inside = room.labels[1]
+            for label in (inside, p, q):
+                own_died, own_overlap = run(label, tape, errors, law, room)
+                if own_died == ALIVE:
+                    return True, label
+                if outlives(own_died, own_overlap, died[count], overlaps[count]):
+                    died[count], overlaps[count] = own_died, own_overlap
+            count += q - p > resolution
     return False, lower
 
 
@@ -359,9 +373,9 @@ def refine_all(
 
     Notes
     -----
-    `limit_below` and `limit_above` are narrowed to labels known to be dead, unless rates were measured: then others may
-    live beyond. Where nothing lives, the engagement is left with no living section. Returned is how many vertices
-    the fullest of the new sections may gain.
+    `limit_below` and `limit_above` are narrowed to labels known to be dead, unless rates were measured or a guaranteed
+    model starts from the rectangle: then others may live beyond. Where nothing lives, the engagement is left with no
+    living section. Returned is how many vertices the fullest of the new sections may gain.
     """
     spare = CAPACITY
     labels, used, alive, died, overlaps, origins, rings, marks, summaries, _ = sections
@@ -385,7 +399,7 @@ def refine_all(
         alive[b, :stored] = False
         if not living.found:
             continue
-        if errors is None:
+        if errors is None and not (law.rectangle and law.exact_angles):
             limit_below[b] = living.below
             limit_above[b] = living.above
         used[b] = number

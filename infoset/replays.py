@@ -11,8 +11,8 @@ from infoset.chains import copy_section, empty_sections, working_room
 from infoset.section_law import SectionLaw
 from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape, replay
 
-MOST_WINDOWS = 1000
-"""Windows of labels that a search may halve. A search that needs more takes the set for empty."""
+MOST_HALVED_WINDOWS = 1000
+"""Windows of labels that a search may halve. A search that would need more gives up: the set then counts as empty."""
 
 PROBE, LOWER, UPPER = constants(3)
 """Rows of the workspace: the section of the last replay, and those at the ends of the living labels."""
@@ -37,7 +37,7 @@ class Workspace(NamedTuple):
         The same of a bracket and the label probed in it.
     latest : ndarray, shape (2, 4)
         Labels and overlaps of those of them that died last.
-    windows, windows_died, windows_overlaps : ndarray, shape (MOST_WINDOWS + 2, 2) and (MOST_WINDOWS + 2,)
+    windows, windows_died, windows_overlaps : ndarray, shape (MOST_HALVED_WINDOWS + 2, 2) and (MOST_HALVED_WINDOWS + 2,)
         Windows of labels still to be searched, and how near to living a label of each came.
     """
 
@@ -78,9 +78,9 @@ def workspace(events: int, slots: int) -> Workspace:
         four_died=np.empty(4, dtype=np.int64),
         four_overlaps=np.empty(4),
         latest=np.empty((2, 4)),
-        windows=np.empty((MOST_WINDOWS + 2, 2)),
-        windows_died=np.empty(MOST_WINDOWS + 2, dtype=np.int64),
-        windows_overlaps=np.empty(MOST_WINDOWS + 2),
+        windows=np.empty((MOST_HALVED_WINDOWS + 2, 2)),
+        windows_died=np.empty(MOST_HALVED_WINDOWS + 2, dtype=np.int64),
+        windows_overlaps=np.empty(MOST_HALVED_WINDOWS + 2),
     )
 
 

@@ -61,7 +61,7 @@ class Tape(NamedTuple):
 
 
 NO_WINDOW = (np.inf, -np.inf)
-"""Of labels: each label has the bands of measured rates for itself."""
+"""No window: each label has rate bands of its own."""
 
 
 class LastSight(NamedTuple):
@@ -331,7 +331,7 @@ def measure_rate_section(
         whole_chains.reduce_outward(origins, rings, marks, n, time_to_go(label, elapsed, law), points)
     near, far = min(label, window[0]), max(label, window[1])
     lower, upper = rate_band(label, near, far, elapsed, omega, error, sight, law)
-    # The band is one of the predicted miss that there would be so much later, at the middle of the window.
+    # The band is one of z + V x_c/e, and `tilt` is (x_c - x)/e.
     tau, tilt = time_to_go(label, elapsed, law), (0.5 * (near + far) - label) / law.closing_speed
     slack = CUT_SLACK * (label * (abs(omega) + error) + origins[n, RIGHT, REACH]) * (label / law.closing_speed)
     # The next step's half of the disturbance is in the section already, and it does not commute with this band.

@@ -123,6 +123,7 @@ class Engagements:
         self._range_every = scenario.set_model.steps_in(scenario.range_sensor.period_s) if scenario.range_sensor else 0
         self._rate_every = scenario.set_model.steps_in(scenario.rate_sensor.period_s) if scenario.rate_sensor else 0
         self._flying = np.ones(batch, dtype=bool)
+        self._arrived = np.zeros(batch, dtype=bool)
         self._tracking = np.ones(batch, dtype=bool)
         self._miss = np.full(batch, np.inf)
         self._budget = np.full(batch, float(scenario.thruster.budget_m_s))
@@ -136,8 +137,8 @@ class Engagements:
 
     @property
     def flying(self) -> bool:
-        """Whether any truth has yet to pass its closest approach."""
-        return bool(self._flying.any()) and self.step < self._draws.angle.shape[1]
+        """Whether any truth has yet to pass its closest approach, or x = 0: until then its label may still leave."""
+        return bool((self._flying | ~self._arrived).any()) and self.step < self._draws.angle.shape[1]
 
     @property
     def inconsistency(self) -> tuple[MaskedIntegers, MaskedFloats]:
@@ -186,19 +187,28 @@ class Engagements:
         self._truth_section.predict()
         passage = self._truth.advance(model.step_s, self._manoeuvre(sight))
         np.minimum(self._miss, passage.least_distance_m, out=self._miss, where=self._flying)
-        arrived = self._flying & passage.passed
-        self._arrival_s = np.where(arrived, self.step * model.step_s + passage.arrival_s, self._arrival_s)
+        passing = self._flying & passage.passed
+        self._arrival_s = np.where(passing, self.step * model.step_s + passage.arrival_s, self._arrival_s)
         self._flying &= ~passage.passed
-        self._information.stop(passage.passed)
         self.step += 1
+        # The closest approach may come before x = 0, and the label leaves by then only.
+        self._arrived |= ~self._flying & (self._arrival_s <= self.step * model.step_s)
+        self._information.stop(self._arrived)
 
     def truth_margins_m(self) -> list[MaskedFloats]:
         """Signed margins of the truths in their own sections after each step's measurement, one array (B,) a step, m.
 
-        They are masked where nothing was measured yet. The truth's section is known when it has arrived: before that
-        they are of the section where it would arrive without further impulses.
+        They are masked where nothing was measured yet. Where the truth has not arrived, its section is that of a motion
+        without further impulses.
         """
-        return self._truth_section.margins_m(self._arrival_s)[: self.step]
+        return self._truth_section.margins_m(self._arrivals_s())[: self.step]
+
+    def _arrivals_s(self) -> Floats:
+        """Times when x is zero, as far as they are known now, s."""
+        if not self._flying.any():
+            return self._arrival_s
+        ahead_s = self.step * self.scenario.set_model.step_s + self._truth.arrival_s()
+        return np.where(self._flying, ahead_s, self._arrival_s)
 
     def _measure(self, sight: Sight) -> tuple[Floats | None, Floats | None, Floats | None]:
         """Measure what is due, cut the sets by it, and return angle, range and rate."""
@@ -297,7 +307,7 @@ class Engagements:
     def results(self, runs: NDArray[np.int64]) -> Results:
         """Results so far, under these run numbers."""
         lost = self._information.inconsistent
-        margin = self._truth_section.least_margin_m(self._arrival_s)
+        margin = self._truth_section.least_margin_m(self._arrivals_s())
         payoff, known = self._guaranteed, self._finished_label
         if self._model.is_guaranteed:
             payoff, known = self._information.guaranteed_miss()

@@ -64,7 +64,8 @@ class TruthSection:
         slope, rate = sight.alpha_rad, sight.omega_rad_s
         if self._exact_angles:
             slope, rate = sight.slope, sight.slope_rate_per_s
-        self._steps[-1] = _Step(where.copy(), alpha_rad, omega_rad_s, slope, rate)
+        alpha, omega = (None if each is None else each.copy() for each in (alpha_rad, omega_rad_s))
+        self._steps[-1] = _Step(where.copy(), alpha, omega, slope, rate)
 
     def shift(self, impulse_m_s: Floats) -> None:
         """Note an impulse."""

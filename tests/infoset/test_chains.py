@@ -28,7 +28,7 @@ from hypothesis import strategies as st
 from numba import types
 from numpy.typing import NDArray
 
-from infoset import chain_steps, chains, location, whole_chains
+from infoset import chain_steps, chains, replays, whole_chains
 from infoset.chains import (
     BEGIN,
     CAPACITY,
@@ -788,7 +788,7 @@ def test_no_kernel_is_compiled_anew_for_each_constant_it_is_handed() -> None:
     """Numba makes a type of its own of a constant that is Python's: it doubles the time to compile."""
     literal: Any = types.maybe_literal
     assert literal(1) is not None
-    for number in (RIGHT, LEFT, V_ORIGIN, M_ORIGIN, location.PROBE, location.LOWER, location.UPPER):
+    for number in (RIGHT, LEFT, V_ORIGIN, M_ORIGIN, replays.PROBE, replays.LOWER, replays.UPPER):
         assert literal(number) is None
 
 

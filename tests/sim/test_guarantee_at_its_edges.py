@@ -244,3 +244,24 @@ def test_living_labels_of_the_published_model_may_form_two_intervals() -> None:
     least, greatest = (ends[run] + e * step_s * 15 for ends in information.living_range_interval_m())
     assert edges[0] < least < edges[1]
     assert greatest == pytest.approx(model.label_limits_m[1], rel=1e-9)
+
+
+def test_phi_covers_a_truth_that_passes_its_closest_approach_before_its_label_leaves(asteroid: Scenario) -> None:
+    """An oblique, receding offset: the closest approach comes several steps before x = 0."""
+    e, range_m = 1e4, 1e6
+    box = StateBox((3e5, 5.5e5), (9e5, 1.1e6), (500.0, 1200.0), (-e, -e))
+    dispersion = StateBox((4.95e5, 5.5e5), (1.09e6, 1.1e6), (1080.0, 1200.0), (-e, -e))
+    # One angle only, at t = 0.
+    sensor = AngleSensor(200.0, 1e-3, 1e-3, range_m)
+    model = SetModel(e, 1.0, box, sensor, 0.0, 1e3, 11, 3, InitialSet.BOX, Model.GUARANTEED)
+    scenario = replace(
+        asteroid,
+        sun=None,
+        nominal_range_m=range_m,
+        dispersion=dispersion,
+        set_model=model,
+        thruster=Thruster(0, 0.1, 1),
+    )
+    results = simulate(scenario, 8, seed=1)
+    assert sound(results)
+    assert (results.miss_m > 5e5).all()
