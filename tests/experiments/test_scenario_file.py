@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from experiments import scenario_file
@@ -787,6 +787,11 @@ def _scenarios(draw: st.DrawFn) -> Scenario:
 @settings(max_examples=50, deadline=None)
 @given(_scenarios())
 def test_any_sound_scenario_comes_back_bit_for_bit(scenario: Scenario) -> None:
+    if scenario.set_model.is_guaranteed:
+        try:
+            on_board_model(scenario)
+        except ValueError:
+            reject()  # so strong a Sun leaves the guaranteed model no labels: files and simulator refuse it alike
     text = scenario_to_toml(scenario)
     again = read_scenario(text, "again")
     assert repr(again) == repr(scenario)  # equality does not see the sign of a zero
