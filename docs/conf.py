@@ -119,18 +119,24 @@ def _keep_moduli(app: Sphinx, what: str, name: str, thing: object, options: obje
 _ARRAY = re.compile(r"~?numpy\.ndarray\[tuple\[~?(?:typing\.)?Any, \.\.\.\], ~?numpy\.dtype\[[^\[\]]*\]\]")
 
 
-def _plain_arrays(
+_LIMITED = re.compile(r"~?(?:typing\.)?Annotated\[((?:[^\[\]]|\[[^\[\]]*\])*?), ~?[\w.]*Limits\([^()]*\)\]")
+
+
+def _plain_types(
     app: Sphinx, what: str, name: str, thing: object, options: object, signature: str | None, returned: str | None
 ) -> tuple[str | None, str | None]:
-    """Write `ndarray` where the type's full spelling says no more; shapes and units stand in the docstring."""
-    plain = [None if text is None else _ARRAY.sub("numpy.ndarray", text) for text in (signature, returned)]
+    """Write `ndarray` and `float` where the full type says no more: the docstring has shapes, units and limits."""
+    plain = [
+        None if text is None else _LIMITED.sub(r"\1", _ARRAY.sub("numpy.ndarray", text))
+        for text in (signature, returned)
+    ]
     return plain[0], plain[1]
 
 
 def setup(app: Sphinx) -> None:
     """Before numpydoc takes the docstrings apart."""
     app.connect("autodoc-process-docstring", _keep_moduli, priority=100)
-    app.connect("autodoc-process-signature", _plain_arrays, priority=900)
+    app.connect("autodoc-process-signature", _plain_types, priority=900)
 
 
 # --- pictures made while building
