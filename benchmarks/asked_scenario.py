@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from experiments import load_scenario
-from experiments.scenario_file import default_initial_set
+from experiments.interception.scenario_file import default_initial_set
 from infoset import Model
 from sim import Scenario
 

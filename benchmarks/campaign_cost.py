@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from experiments import load_scenario
-from experiments.figures.style import CURVE_LOOKS, new_figure, place_axes, save_figure, style
+from experiments.common.figure_style import CURVE_LOOKS, new_figure, place_axes, save_figure, style
 from guidance import NoiseKind
 from sim import Campaign, Scenario, simulate
 

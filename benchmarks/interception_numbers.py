@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from experiments import load_scenario
-from experiments.curves import curve_scenarios
+from experiments.interception.curves import curve_scenarios
 from guidance import NoiseKind, TieRule
 from sim import Results, simulate
 

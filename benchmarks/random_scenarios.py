@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.errors import InputError
-from experiments.scenario_file import read_scenario, scenario_to_toml
+from experiments.common.errors import InputError
+from experiments.interception.scenario_file import read_scenario, scenario_to_toml
 from guidance import NoiseKind, Thruster, TieRule
 from infoset import AngleSensor, InitialSet, Model, RangeSensor, RateSensor, SetModel, StateBox
 from sim import Manoeuvre, Scenario, Sun, Target

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.random_scenarios import random_scenario
-from experiments.scenario_file import load_scenario
+from experiments.interception.scenario_file import load_scenario
 from guidance import GameNoise, LineOfSight, Measurement, MeasurementNoise, NoiseKind, RandomNoise, TieRule
 from guidance.pair_noise import middle
 from infoset import InformationSetView, InitialSet, Model

@@ -29,7 +29,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 from experiments import load_scenario
-from experiments.campaign_samples import samples
+from experiments.campaigns.samples import samples
 from infoset import StateBox
 from sim import Campaign, CampaignNoise
 

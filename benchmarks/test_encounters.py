@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from experiments.multipoint_file import load_multipoint
-from experiments.pareto_file import load_pareto
+from experiments.multipoint.file import load_multipoint
+from experiments.pareto.file import load_pareto
 from rendezvous.multipoint import Nodes, best_order, best_times, solve_dense, solve_segments
 from rendezvous.pareto import analyse_coalitions, solve_encounter
 from rendezvous.relative_motion import ClohessyWiltshire

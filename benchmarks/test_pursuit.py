@@ -17,7 +17,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
-from experiments.pursuit_file import load_pursuit
+from experiments.pursuit.file import load_pursuit
 from rendezvous.orbital_elements import OrbitalElements
 from rendezvous.pursuit_evasion import Game, Player, PointStatus, Solution, capture_map, solve, solve_near
 from rendezvous.pursuit_evasion.units import scaled_craft, units_of

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from benchmarks.conftest import LINES
-from experiments.reachability_file import load_rendezvous
-from experiments.reachability_published import compare_published, comparison_rows
-from experiments.reachability_report import SINGLE, make_report, report_json
+from experiments.reachability.file import load_rendezvous
+from experiments.reachability.printed_tables import compare_published, comparison_rows
+from experiments.reachability.report import SINGLE, make_report, report_json
 from rendezvous.polytope import Polytope, cut
 from rendezvous.reachability import (
     Budget,

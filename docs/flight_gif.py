@@ -12,7 +12,7 @@ from pathlib import Path
 from PIL import Image, ImageSequence
 
 from experiments import load_scenario
-from experiments.figures.animation import GIF, animate
+from experiments.interception.figures.animation import GIF, animate
 from sim import fly_one
 
 EVERY = 4

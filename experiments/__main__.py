@@ -30,7 +30,7 @@ def main() -> None:
     except (KeyboardInterrupt, Exception) as error:
         if not _is_interrupt(error):
             raise
-        from experiments.errors import INTERRUPTED
+        from experiments.common.errors import INTERRUPTED
 
         sys.stderr.write("interrupted\n")
         sys.exit(INTERRUPTED)

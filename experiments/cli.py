@@ -14,25 +14,25 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
-from experiments.commands.adversary import adversary
-from experiments.commands.bound import bound
-from experiments.commands.campaign import campaign
-from experiments.commands.compare import compare
-from experiments.commands.engage import engage
-from experiments.commands.experiment import experiment
-from experiments.commands.multipoint import multipoint
-from experiments.commands.pareto import pareto
-from experiments.commands.problems import app as problems
-from experiments.commands.pursuit import pursuit
-from experiments.commands.pursuit_map import pursuit_map
-from experiments.commands.reach import reach
-from experiments.commands.replay import replay
-from experiments.commands.report import report
-from experiments.commands.reproduce import reproduce
-from experiments.commands.scenarios import app as scenarios
-from experiments.commands.sweep import sweep
-from experiments.compile_cache import keep_kernels_somewhere
-from experiments.errors import INTERRUPTED, InputError, on_a_screen
+from experiments.campaigns.campaign import campaign
+from experiments.campaigns.report import report
+from experiments.campaigns.sweep import sweep
+from experiments.common.compile_cache import keep_kernels_somewhere
+from experiments.common.errors import INTERRUPTED, InputError, on_a_screen
+from experiments.interception.commands.adversary import adversary
+from experiments.interception.commands.bound import bound
+from experiments.interception.commands.compare import compare
+from experiments.interception.commands.engage import engage
+from experiments.interception.commands.experiment import experiment
+from experiments.interception.commands.replay import replay
+from experiments.interception.commands.scenarios import app as scenarios
+from experiments.multipoint.command import multipoint
+from experiments.pareto.command import pareto
+from experiments.problem_list import app as problems
+from experiments.pursuit.command import pursuit
+from experiments.pursuit.map_command import pursuit_map
+from experiments.reachability.command import reach
+from experiments.reproduce import reproduce
 
 INPUT_ERROR = 2
 PATIENCE_S = 5.0

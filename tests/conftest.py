@@ -65,7 +65,7 @@ def environment_is_put_back() -> Iterator[None]:
 @pytest.fixture(scope="session")
 def brief() -> Scenario:
     """The last ten seconds of an approach whose range is known, in few sections: for what is no matter of numbers."""
-    from experiments.scenario_file import load_scenario
+    from experiments.interception.scenario_file import load_scenario
     from infoset import StateBox
 
     published = load_scenario("asteroid-1997")
@@ -78,7 +78,7 @@ def brief() -> Scenario:
 @pytest.fixture(scope="session")
 def brief_file(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The file of that scenario, in no folder that a test looks at."""
-    from experiments.scenario_file import scenario_to_toml
+    from experiments.interception.scenario_file import scenario_to_toml
 
     file = tmp_path_factory.mktemp("scenario") / "brief.toml"
     file.write_text(scenario_to_toml(brief))

@@ -19,8 +19,8 @@ import guidance
 import infoset
 import sim
 from experiments import load_scenario
-from experiments.errors import InputError
-from experiments.scenario_file import read_scenario, scenario_to_toml
+from experiments.common.errors import InputError
+from experiments.interception.scenario_file import read_scenario, scenario_to_toml
 from guidance import (
     GameNoise,
     Kalman,

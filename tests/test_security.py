@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments import record_file
 from experiments.cli import main
-from experiments.errors import on_a_screen
-from experiments.pages.interception import interception_page
-from experiments.record_file import read_record, write_record
-from experiments.scenario_file import load_scenario, scenario_text
+from experiments.common.errors import on_a_screen
+from experiments.interception import record_file
+from experiments.interception.page import interception_page
+from experiments.interception.record_file import read_record, write_record
+from experiments.interception.scenario_file import load_scenario, scenario_text
 from infoset import StateBox
 from sim import Campaign, Record, fly_one
 from sim.storage.manifest import checksum
@@ -222,8 +222,8 @@ def test_pages_show_names_as_text(record: Record, tmp_path: Path) -> None:
 
 
 def test_names_in_figures_are_no_formulas(record: Record, tmp_path: Path) -> None:
-    from experiments.figures.process import draw_process
-    from experiments.figures.style import save_figure
+    from experiments.common.figure_style import save_figure
+    from experiments.interception.figures.process import draw_process
 
     odd = dataclasses.replace(record, noise=r"$\frac{$")
     for file in save_figure(draw_process([odd]), tmp_path, "figure"):

@@ -54,6 +54,6 @@ for title, record in flights.items():
 # The sets themselves half a second, four and eight seconds after the start: the paper's figure 3, drawn by the function
 # that ``infoset engage`` uses. Crosses are the truth, which is inside, squares the measured angles.
 
-from experiments.figures.sets import draw_sets
+from experiments.interception.figures.sets import draw_sets
 
 library_figure = draw_sets(list(flights.values()))

@@ -11,8 +11,8 @@ those with a range meter (4). All have the same fifty starts.
 import numpy as np
 
 from experiments import load_scenario
-from experiments.curves import Curve, curve_scenarios
-from experiments.figures.distributions import draw_distributions
+from experiments.interception.curves import Curve, curve_scenarios
+from experiments.interception.figures.distributions import draw_distributions
 from sim import simulate
 
 curves = [

@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from experiments.scenario_file import load_scenario
+from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind
 from sim import Record, fly_one
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.pages.interception import interception_page
-from experiments.scenario_file import load_scenario
+from experiments.interception.page import interception_page
+from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind
 from infoset import InitialSet, Model, RateSensor, Recovery
 from sim import Record, fly_one

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.multipoint_file import load_multipoint
-from experiments.pages.multipoint import multipoint_page
-from experiments.pages.pareto import pareto_page
-from experiments.pages.pursuit import pursuit_page
-from experiments.pages.reachability import reachability_page
-from experiments.pareto_file import load_pareto
-from experiments.pursuit_file import load_pursuit
-from experiments.reachability_file import load_rendezvous
-from experiments.reachability_report import Report, make_report
+from experiments.multipoint.file import load_multipoint
+from experiments.multipoint.page import multipoint_page
+from experiments.pareto.file import load_pareto
+from experiments.pareto.page import pareto_page
+from experiments.pursuit.file import load_pursuit
+from experiments.pursuit.page import pursuit_page
+from experiments.reachability.file import load_rendezvous
+from experiments.reachability.page import reachability_page
+from experiments.reachability.report import Report, make_report
 from rendezvous.multipoint import Path as FlightPath
 from rendezvous.pareto import EncounterSolution, least_greatest_excess, least_sum_of_costs, solve_encounter
 from rendezvous.pursuit_evasion import History, Solution, history, solve

@@ -18,10 +18,10 @@ from typing import Any
 import pytest
 
 from experiments.cli import main
-from experiments.commands import _screen
-from experiments.errors import InputError
-from experiments.output import checked_destinations, to_csv, to_json, write_file
-from experiments.scenario_file import load_scenario, scenario_hash, scenario_text
+from experiments.common import screen
+from experiments.common.errors import InputError
+from experiments.common.output import checked_destinations, to_csv, to_json, write_file
+from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_text
 from sim import Scenario, simulate
 
 CURVE_KEYS = [
@@ -502,7 +502,7 @@ def test_what_is_said_of_compiling_is_what_numba_then_does(tmp_path: Path) -> No
     def said_and_done() -> tuple[bool, bool]:
         """Whether the kernel is said to be stored, and whether it was."""
         kernel = runpy.run_path(str(source))["twice"]
-        said = _screen._stored(kernel)
+        said = screen._stored(kernel)
         assert kernel(1.5) == 3.0
         return said, sum(kernel.stats.cache_hits.values()) == 1
 
@@ -518,7 +518,7 @@ def test_what_is_said_of_compiling_is_what_numba_then_does(tmp_path: Path) -> No
 def test_compiling_is_said_when_nothing_is_compiled(
     infoset: Command, brief_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(_screen, "_stored", lambda *_: False)
+    monkeypatch.setattr(screen, "_stored", lambda *_: False)
     _, out, err = infoset("experiment", brief_file, "--runs", 1, "--json", "-")
     json.loads(out)
     assert err.startswith("compiling the kernels, once")

@@ -16,12 +16,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.errors import InputError
-from experiments.pages.document import asset, embedded_json, page
-from experiments.pages.interception import interception_page
-from experiments.pages.packing import STEPS_OF_A_BOX, packed_outlines
-from experiments.pages.replayed_sets import replayed
-from experiments.scenario_file import load_scenario
+from experiments.common.errors import InputError
+from experiments.common.page_document import asset, embedded_json, page
+from experiments.common.page_packing import STEPS_OF_A_BOX, packed_outlines
+from experiments.interception.page import interception_page
+from experiments.interception.replayed_sets import replayed
+from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind
 from infoset import InitialSet, Model, RateSensor, Recovery
 from sim import Outcome, Record, fly_one

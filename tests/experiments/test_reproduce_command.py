@@ -10,9 +10,7 @@ from typing import Any
 import pytest
 
 from experiments.cli import main
-from experiments.pareto_file import load_pareto
-from experiments.published import PAPERS, pareto, reproduce_paper
-from experiments.published.number import (
+from experiments.common.published_number import (
     CUT_OR_ROUNDED,
     Band,
     Progress,
@@ -22,7 +20,10 @@ from experiments.published.number import (
     Verdict,
     last_digit,
 )
-from experiments.scenario_file import load_scenario, scenario_hash
+from experiments.interception.scenario_file import load_scenario, scenario_hash
+from experiments.papers import PAPERS, reproduce_paper
+from experiments.pareto import published as pareto
+from experiments.pareto.file import load_pareto
 
 Infoset = Callable[..., tuple[int, str, str]]
 REFERENCE = Reference("pareto")
@@ -150,7 +151,7 @@ def test_json_of_one_paper(infoset: Infoset, tmp_path: Path) -> None:
 
 def test_json_alone_and_quiet(infoset: Infoset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     right = REFERENCE.number("table 1", "x (m)", "1.25", 1.2501)
-    monkeypatch.setattr("experiments.published.reproduce_paper", only(right))
+    monkeypatch.setattr("experiments.papers.reproduce_paper", only(right))
     code, out, err = infoset("--json", "-")
     assert code == 0
     assert [each["paper"] for each in json.loads(out)["papers"]] == list(PAPERS)
@@ -166,7 +167,7 @@ def test_a_number_that_should_agree_and_does_not(
     right, wrong = (
         REFERENCE.number("table 1", name, "1.25", value) for name, value in (("x (m)", 1.25), ("y (m)", ours))
     )
-    monkeypatch.setattr("experiments.published.reproduce_paper", only(right, wrong))
+    monkeypatch.setattr("experiments.papers.reproduce_paper", only(right, wrong))
     code, out, err = infoset("--paper", "reachability", "--json", "-", "-q")
     assert code == 1
     assert "table 1, y (m): printed 1.25" in err

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from experiments.cli import main
-from experiments.record_file import read_record
-from experiments.scenario_file import scenario_to_toml
+from experiments.interception.record_file import read_record
+from experiments.interception.scenario_file import scenario_to_toml
 from sim import Scenario
 from sim.storage import CampaignFolder
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.commands._campaign_screen import campaign_progress
+from experiments.campaigns.screen import campaign_progress
 from sim.stored_flight import Progress
 from tests.faults.conftest import Infoset, need_whole
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 import infoset
-from experiments import compile_cache
-from experiments.compile_cache import VARIABLE, keep_kernels_somewhere
+from experiments.common import compile_cache
+from experiments.common.compile_cache import VARIABLE, keep_kernels_somewhere
 from infoset import _compile
 from rendezvous import _compile as _compile_of_rendezvous
 from tests.faults.conftest import begin, ended

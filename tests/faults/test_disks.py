@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from experiments.errors import InputError
-from experiments.figures.style import new_figure, save_figure
+from experiments.common.errors import InputError
+from experiments.common.figure_style import new_figure, save_figure
 from tests.faults.conftest import Infoset, Left, begin, ended, need_whole
 
 COMMANDS = {
@@ -133,7 +133,7 @@ def test_what_nobody_has_made_a_message_of(
     def fail(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("experiments.scenario_file.load_scenario", fail)
+    monkeypatch.setattr("experiments.interception.scenario_file.load_scenario", fail)
     message = refused(infoset("engage"))
     for part in parts:
         assert part in message

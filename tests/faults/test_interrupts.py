@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from experiments.__main__ import main as beginning
-from experiments.commands._campaign_options import campaign_errors
+from experiments.campaigns.options import campaign_errors
 from sim import Campaign, CampaignNoise, Scenario
 from sim.storage import CampaignFolder
 from tests.faults.conftest import Infoset, Left, begin, ended, need_whole

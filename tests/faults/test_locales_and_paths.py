@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.scenario_file import load_scenario
+from experiments.interception.scenario_file import load_scenario
 from sim import Scenario
 from sim.storage import CampaignFolder
 from tests.faults.conftest import Infoset, begin, ended, need_whole

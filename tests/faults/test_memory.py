@@ -18,7 +18,7 @@ LIMITED = (
     "import resource, sys\n"
     "from experiments.cli import main\n"
     "import numpy, pyarrow, scipy.linalg, sim.storage.tables, sim.simulate\n"
-    "import experiments.campaign_samples, experiments.scenario_file\n"
+    "import experiments.campaigns.samples, experiments.interception.scenario_file\n"
     "from infoset import section_passes, location\n"
     "used = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
     "resource.setrlimit(resource.RLIMIT_AS, (used + int(sys.argv[1]),) * 2)\n"

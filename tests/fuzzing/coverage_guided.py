@@ -139,7 +139,7 @@ def _subject(target: str, folder: Path) -> tuple[Parse, Mutate, list[bytes]]:
         return _record(folder)
     if target == "campaign":
         return _campaign(folder)
-    from experiments.errors import InputError
+    from experiments.common.errors import InputError
 
     from .mutations import mutated_toml
     from .subjects import attempted, text_files
@@ -160,8 +160,8 @@ def _subject(target: str, folder: Path) -> tuple[Parse, Mutate, list[bytes]]:
 
 def _record(folder: Path) -> tuple[Parse, Mutate, list[bytes]]:
     """Give a record as it comes, and one whose checksums have been made to fit."""
-    from experiments.errors import InputError
-    from experiments.record_file import read_record, write_record
+    from experiments.common.errors import InputError
+    from experiments.interception.record_file import read_record, write_record
 
     from .mutations import mutated_bytes
     from .subjects import attempted, remade_record, same_records, small_record
@@ -242,11 +242,11 @@ def _campaign(folder: Path) -> tuple[Parse, Mutate, list[bytes]]:
 
 def _expressions() -> tuple[Parse, Mutate, list[bytes]]:
     """Give the small languages of the command line: --vary, --until, --require, --x, --set."""
-    from experiments.commands.pursuit_map import _axis
-    from experiments.errors import InputError
-    from experiments.pursuit_file import load_pursuit
-    from experiments.scenario_file import load_scenario
-    from experiments.sweep_axes import EXAMPLE, sweep_axes, sweep_cells
+    from experiments.campaigns.sweep_axes import EXAMPLE, sweep_axes, sweep_cells
+    from experiments.common.errors import InputError
+    from experiments.interception.scenario_file import load_scenario
+    from experiments.pursuit.file import load_pursuit
+    from experiments.pursuit.map_command import _axis
     from sim.stopping_rule import QuantileName, Requirement, StoppingRule
 
     from .mutations import mutated_bytes

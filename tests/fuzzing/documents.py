@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from hypothesis import strategies as st
 
-from experiments.pareto_file import COMPONENTS
+from experiments.pareto.file import COMPONENTS
 from guidance import NoiseKind, TieRule, strategy_names
 from infoset.model import InitialSet, Model, Recovery
 from sim import Manoeuvre

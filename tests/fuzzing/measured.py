@@ -14,9 +14,9 @@ _CHILD = """
 import json, sys, time
 from pathlib import Path
 
-from experiments.errors import InputError
-from experiments.record_file import read_record
-from experiments.scenario_file import load_scenario
+from experiments.common.errors import InputError
+from experiments.interception.record_file import read_record
+from experiments.interception.scenario_file import load_scenario
 from sim.storage import CampaignFolder, StorageError
 
 def campaign(path):

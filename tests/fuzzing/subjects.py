@@ -14,13 +14,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from experiments import record_file
-from experiments.multipoint_file import load_multipoint
-from experiments.pareto_file import load_pareto
-from experiments.problem_file import built_in_problems
-from experiments.pursuit_file import load_pursuit, read_problem
-from experiments.reachability_file import load_rendezvous
-from experiments.scenario_file import (
+from experiments.common.problem_file import built_in_problems
+from experiments.interception import record_file
+from experiments.interception.scenario_file import (
     load_scenario,
     read_scenario,
     scenario_names,
@@ -28,6 +24,10 @@ from experiments.scenario_file import (
     scenario_to_toml,
     scenario_warnings,
 )
+from experiments.multipoint.file import load_multipoint
+from experiments.pareto.file import load_pareto
+from experiments.pursuit.file import load_pursuit, read_problem
+from experiments.reachability.file import load_rendezvous
 from infoset import AngleSensor, StateBox
 from sim import Campaign, CampaignNoise, Record, Scenario, fly_one
 from sim.storage import CampaignFolder

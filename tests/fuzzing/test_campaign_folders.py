@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from experiments.cli import main
-from experiments.scenario_file import scenario_to_toml
+from experiments.interception.scenario_file import scenario_to_toml
 from sim import Scenario, Sweep
 from sim.storage import Axis, CampaignFolder, ManifestError, StorageError, read_manifest
 from sim.storage.manifest import MANIFEST, checksum

@@ -32,8 +32,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from experiments import load_scenario
-from experiments.errors import InputError
-from experiments.scenario_file import read_scenario, scenario_to_toml
+from experiments.common.errors import InputError
+from experiments.interception.scenario_file import read_scenario, scenario_to_toml
 from guidance import Kalman, LeastSquares, NoiseKind, Strategy, SymmetricMiss, TieRule, ZeroEffortMiss
 from infoset import Model, RangeSensor, RateSensor
 from sim import Manoeuvre, Outcome, Scenario, Sun, Target, simulate

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments import record_file
 from experiments.cli import main
-from experiments.errors import InputError
-from experiments.record_file import read_record, write_record
+from experiments.common.errors import InputError
+from experiments.interception import record_file
+from experiments.interception.record_file import read_record, write_record
 from sim import Record
 
 from .measured import Measured, measured

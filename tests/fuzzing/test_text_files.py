@@ -15,9 +15,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from experiments.cli import main
-from experiments.errors import InputError
-from experiments.toml_file import LARGEST_FILE_BYTES
-from experiments.toml_file import MOST_PROBLEMS as MOST
+from experiments.common.errors import InputError
+from experiments.common.toml_file import LARGEST_FILE_BYTES
+from experiments.common.toml_file import MOST_PROBLEMS as MOST
 
 from .documents import KINDS
 from .mutations import mutated_toml

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from experiments.scenario_file import load_scenario
+from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind, RandomNoise, Thruster, TieRule
 from infoset import AngleSensor, InformationSetView, InitialSet, Model, RateSensor, SetModel, StateBox
 from infoset.section_law import BOUND_SLACK, SectionLaw, section_law

@@ -9,7 +9,7 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 import pytest
 
-from experiments.scenario_file import load_scenario
+from experiments.interception.scenario_file import load_scenario
 from infoset import ConvexPolygons, InformationSet, SetModel
 from infoset.svg import ticks
 from sim import Record, Results, fly_one, simulate

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from experiments.reachability_file import load_rendezvous
+from experiments.reachability.file import load_rendezvous
 from rendezvous.reachability import (
     EmptyTubeError,
     ReachabilityProblem,

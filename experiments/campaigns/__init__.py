@@ -1,0 +1,1 @@
+"""Campaigns and sweeps: commands, tables, figures and clusters."""

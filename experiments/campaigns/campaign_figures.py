@@ -1,0 +1,329 @@
+"""A campaign as pictures: distributions with bands, convergence of quantiles, and the miss over the initial state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.legend_handler import HandlerTuple
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, NullFormatter
+from numpy.typing import NDArray
+
+from experiments.common.figure_style import CURVE_LOOKS, INK, LIMIT, new_figure, place_axes, style
+from experiments.interception.figures.distributions import axis_limit, draw_band, scale_axis
+from sim import band_half_width, estimate_quantiles
+from sim.stopping_rule import level_name
+
+Floats = NDArray[np.float64]
+
+CONVERGING = (0.5, 0.9, 0.99)
+MOST_POINTS = 2000
+"""Points of a curve, and of a cloud: more show nothing more and make a file that nobody can open."""
+
+_CONFIDENCE = 0.95
+_LOOKS = 28
+_DOTTED: dict[str, Any] = {"linestyle": (0, (1, 1.2)), "linewidth": 0.9}
+_BINS = 24
+_START_LABELS = {
+    "z_km": "start z, km",
+    "x_km": "start x, km",
+    "vz_km_s": "start V$_z$, km/s",
+    "vx_km_s": "start V$_x$, km/s",
+}
+
+
+@dataclass(frozen=True)
+class CampaignColumns:
+    """The rows of one noise, column by column.
+
+    Parameters
+    ----------
+    noise : str
+    range_meter : bool
+    miss_m, impulse_m_s : ndarray, shape (n,)
+        In the order of the runs.
+    guaranteed_miss_m : ndarray, shape (m,)
+        Where it is known.
+    start : mapping of str to ndarray, shape (n,)
+        Initial state, by column.
+    guarantees : bool
+        Whether the guaranteed misses are guarantees.
+    """
+
+    noise: str
+    range_meter: bool
+    miss_m: Floats
+    impulse_m_s: Floats
+    guaranteed_miss_m: Floats
+    start: Mapping[str, Floats]
+    guarantees: bool
+
+    @property
+    def look(self) -> dict[str, Any]:
+        """How its curves are drawn: dark and solid, or light and dashed, to stay apart in grey."""
+        return CURVE_LOOKS[1 if self.noise == "random" else 4]
+
+
+def draw_campaign_distributions(columns: Sequence[CampaignColumns]) -> Figure:
+    """Draw the distribution functions of (a) the miss and (b) the impulse spent, with their confidence bands.
+
+    Parameters
+    ----------
+    columns : sequence of CampaignColumns
+        At least one, one a noise.
+
+    Returns
+    -------
+    Figure
+        The guaranteed miss beside the miss, dotted, where there is one.
+    """
+    with style():
+        figure = new_figure(height_mm=99.0)
+        (row,) = place_axes(figure, 1, 2, margins_mm=(14.0, 4.0, 31.0, 7.0), gaps_mm=(7.0, 0.0))
+        _draw_miss(row[0], columns)
+        _draw_impulse(row[1], columns)
+        row[0].set_ylabel("distribution function (share of runs)")
+        row[1].tick_params(labelleft=False)
+        handles, labels = _handles(columns)
+        figure.legend(
+            handles,
+            labels,
+            loc="lower center",
+            ncols=2,
+            columnspacing=2.5,
+            handler_map={tuple: HandlerTuple(ndivide=None, pad=0.15)},
+        )
+    return figure
+
+
+def draw_convergence(columns: Sequence[CampaignColumns]) -> Figure:
+    """Draw quantiles of the miss and the impulse of the first n runs over n, with their confidence intervals.
+
+    Parameters
+    ----------
+    columns : sequence of CampaignColumns
+        At least one.
+
+    Returns
+    -------
+    Figure
+        A row a noise.
+    """
+    with style():
+        figure = new_figure(height_mm=58.0 * len(columns) + 14.0 * len(columns) + 10.0)
+        rows = place_axes(figure, len(columns), 2, margins_mm=(16.0, 4.0, 21.0, 7.0), gaps_mm=(14.0, 17.0))
+        letter = iter("abcdefghijkl")
+        for row, each in zip(rows, columns, strict=True):
+            for axes, label, sample in zip(
+                row, ("miss, m", "impulse spent, m/s"), (each.miss_m, each.impulse_m_s), strict=True
+            ):
+                _convergence(axes, sample, str(each.look["color"]))
+                axes.set_title(f"({next(letter)}) {label.split(',')[0]}, {each.noise} noise")
+                axes.set_xlabel("runs")
+                axes.set_ylabel(label)
+        handles: list[Line2D | Patch] = [
+            Line2D([], [], color=INK, linewidth=1.2, linestyle=_line(place), label=level_name(level))
+            for place, level in enumerate(CONVERGING)
+        ]
+        handles.append(Patch(facecolor=LIMIT, alpha=0.3, label="95 % confidence interval, where the runs give one"))
+        figure.legend(handles=handles, loc="lower center", ncols=len(handles))
+    return figure
+
+
+def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
+    """Draw the miss over each component of the initial state: a cloud of runs, its median and 90 % quantile.
+
+    Parameters
+    ----------
+    columns : sequence of CampaignColumns
+        At least one.
+
+    Returns
+    -------
+    Figure
+        A row a noise.
+    """
+    with style():
+        figure = new_figure(height_mm=44.0 * len(columns) + 15.0 * len(columns) + 6.0)
+        rows = place_axes(figure, len(columns), 4, margins_mm=(14.0, 6.0, 20.0, 7.0), gaps_mm=(9.0, 15.0))
+        letter = iter("abcdefghijkl")
+        for row, each in zip(rows, columns, strict=True):
+            limit = axis_limit([each.miss_m])
+            for axes, name in zip(row, _START_LABELS, strict=True):
+                _cloud(axes, each.start[name], each.miss_m, str(each.look["color"]))
+                axes.set_xlabel(_START_LABELS[name])
+                axes.set_ylim(0.0, 1.04 * limit or 1.0)
+                axes.locator_params(axis="x", nbins=3)
+                axes.tick_params(labelleft=axes is row[0])
+                axes.set_title(f"({next(letter)}) {each.noise} noise")
+            row[0].set_ylabel("miss, m")
+        handles = [
+            Line2D([], [], linestyle="", marker=".", color=LIMIT, label=f"runs (at most {MOST_POINTS} drawn)"),
+            Line2D([], [], color=INK, label="median"),
+            Line2D([], [], color=INK, linestyle=_line(1), label="p90"),
+        ]
+        figure.legend(handles=handles, loc="lower center", ncols=3)
+    return figure
+
+
+def correlations(columns: CampaignColumns) -> dict[str, dict[str, float | None]]:
+    """Return Pearson's and Spearman's correlation of the miss with each component of the initial state and its size.
+
+    Parameters
+    ----------
+    columns : CampaignColumns
+
+    Returns
+    -------
+    dict of str to dict
+        By component, `|z_km|` and `|vz_km_s|` too; None where the component or the miss does not vary.
+    """
+    start = dict(columns.start)
+    start |= {f"|{name}|": np.abs(start[name]) for name in ("z_km", "vz_km_s")}
+    miss = columns.miss_m
+    return {
+        name: {"pearson": _correlation(values, miss), "spearman": _correlation(_ranks(values), _ranks(miss))}
+        for name, values in start.items()
+    }
+
+
+def _correlation(one: Floats, other: Floats) -> float | None:
+    deviations = one - one.mean(), other - other.mean()
+    size = float(np.sqrt((deviations[0] ** 2).sum() * (deviations[1] ** 2).sum()))
+    if len(one) < 2 or size == 0.0:
+        return None
+    return float(np.clip((deviations[0] * deviations[1]).sum() / size, -1.0, 1.0))
+
+
+def _ranks(values: Floats) -> Floats:
+    """Ranks from 0; equal values share the mean of theirs."""
+    _, places, counts = np.unique(values, return_inverse=True, return_counts=True)
+    first = np.cumsum(counts) - counts
+    return np.asarray((first + 0.5 * (counts - 1))[places], dtype=np.float64)
+
+
+def _draw_miss(axes: Axes, columns: Sequence[CampaignColumns]) -> None:
+    """Draw the misses, and dotted what was guaranteed of them; the axis has room for both."""
+    samples = [each.miss_m for each in columns]
+    guaranteed = [each.guaranteed_miss_m for each in columns]
+    ends = scale_axis(axes, [*samples, *(each for each in guaranteed if each.size)], from_zero=True)
+    for each in columns:
+        _distribution(axes, each.miss_m, ends, each.look, band=True)
+        if each.guaranteed_miss_m.size:
+            _distribution(axes, each.guaranteed_miss_m, ends, each.look | _DOTTED, band=False)
+    notes = [_beyond("runs", samples, ends[1]), _beyond("dotted", guaranteed, ends[1])]
+    axes.set_title("(a) miss")
+    axes.set_xlabel("\n".join(["miss, m", *filter(None, notes)]))
+
+
+def _draw_impulse(axes: Axes, columns: Sequence[CampaignColumns]) -> None:
+    samples = [each.impulse_m_s for each in columns]
+    ends = scale_axis(axes, samples, from_zero=False)
+    for each in columns:
+        _distribution(axes, each.impulse_m_s, ends, each.look, band=True)
+    axes.set_title("(b) impulse spent")
+    axes.set_xlabel("\n".join(["impulse spent, m/s", *filter(None, [_beyond("runs", samples, ends[1])])]))
+
+
+def _beyond(name: str, samples: Sequence[Floats], right: float) -> str:
+    """What is to be said of the values that do not fit; nothing where all do."""
+    told = [f"{int((each > right).sum())} of {each.size}" for each in samples if (each > right).any()]
+    return f"{name} beyond the axis: {', '.join(told)}" if told else ""
+
+
+def _distribution(
+    axes: Axes, sample: Floats, ends: tuple[float, float], look: Mapping[str, Any], *, band: bool
+) -> None:
+    values = np.sort(sample)
+    share = np.arange(1, values.size + 1) / values.size
+    if values.size > MOST_POINTS:
+        kept = np.unique(np.linspace(0, values.size - 1, MOST_POINTS).astype(np.int64))
+        values, share = values[kept], share[kept]
+    if band:
+        half = band_half_width(sample.size, _CONFIDENCE)
+        lower, upper = np.clip(share - half, 0.0, 1.0), np.clip(share + half, 0.0, 1.0)
+        draw_band(axes, values, lower, upper, look["color"])
+    values = np.concatenate([[min(ends[0], float(values[0]))], values, [max(ends[1], float(values[-1]))]])
+    axes.plot(values, np.concatenate([[0.0], share, [1.0]]), drawstyle="steps-post", zorder=3.0, **look)
+
+
+def _convergence(axes: Axes, sample: Floats, colour: str) -> None:
+    least = min(10, sample.size)
+    counts = np.unique(np.geomspace(least, sample.size, _LOOKS).astype(np.int64))
+    looks = [estimate_quantiles(sample[:count], CONVERGING, _CONFIDENCE) for count in counts.tolist()]
+    for place in range(len(CONVERGING)):
+        estimates = [look[place] for look in looks]
+        axes.plot(counts, [each.value for each in estimates], color=colour, linestyle=_line(place), zorder=3.0)
+        known = [
+            (n, each.lower, each.upper) for n, each in zip(counts, estimates, strict=True) if each.width is not None
+        ]
+        if known:
+            places, lower, upper = zip(*known, strict=True)
+            axes.fill_between(
+                places, lower, upper, facecolor=colour, alpha=0.18, linewidth=0.0, zorder=1.5 + 0.1 * place
+            )
+    axes.set_xscale("log")
+    axes.xaxis.set_major_formatter(
+        FuncFormatter(lambda tick, _: f"{tick:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}"))
+    )
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    if least < sample.size:
+        axes.set_xlim(least, sample.size)
+    bottom, top = axes.get_ylim()
+    axes.set_ylim(bottom if bottom > 0.5 * top else 0.0, top)
+
+
+def _cloud(axes: Axes, start: Floats, miss: Floats, colour: str) -> None:
+    step = -(-miss.size // MOST_POINTS)
+    axes.plot(
+        start[::step],
+        miss[::step],
+        linestyle="",
+        marker=".",
+        markersize=2.0,
+        markeredgewidth=0.0,
+        color=colour,
+        alpha=0.35,
+        zorder=2.0,
+        rasterized=True,
+    )
+    least, greatest = float(start.min()), float(start.max())
+    bins = min(_BINS, miss.size // 100)
+    if bins < 2 or greatest <= least:
+        return
+    places = np.minimum(((start - least) / (greatest - least) * bins).astype(np.int64), bins - 1)
+    middle = least + (np.arange(bins) + 0.5) * (greatest - least) / bins
+    for order, level in enumerate((0.5, 0.9)):
+        filled = np.unique(places)
+        values = [np.quantile(miss[places == each], level) for each in filled]
+        axes.plot(middle[filled], values, color=INK, linestyle=_line(order), zorder=3.0)
+
+
+def _line(place: int) -> Any:
+    return ("-", (0, (5, 1.5)), (0, (1.5, 1.2)))[place]
+
+
+def _guarantee_name(columns: Sequence[CampaignColumns]) -> str:
+    return "guaranteed miss" if columns[0].guarantees else "published $\\Phi$, no guarantee"
+
+
+def _handles(columns: Sequence[CampaignColumns]) -> tuple[list[Any], list[str]]:
+    """What the legend shows, and what it says: a line a noise, dotted its guarantee, and the band in all colours."""
+    handles: list[Any] = []
+    labels = []
+    for each in columns:
+        meter = "with" if each.range_meter else "no"
+        handles.append(Line2D([], [], **each.look))
+        labels.append(f"{each.noise} noise, {meter} range meter, {each.miss_m.size} runs")
+        if each.guaranteed_miss_m.size:
+            handles.append(Line2D([], [], **(each.look | _DOTTED)))
+            labels.append(f"{each.noise} noise: {_guarantee_name(columns)}")
+    handles.append(tuple(Line2D([], [], color=each.look["color"], linewidth=0.7) for each in columns))
+    labels.append("thin: 95 % confidence band (Dvoretzky-Kiefer-Wolfowitz)")
+    return handles, labels

@@ -1,0 +1,207 @@
+"""A Dask cluster as an executor: reached within seconds, or not at all, and of the same versions as here."""
+
+from __future__ import annotations
+
+import contextlib
+import ipaddress
+import logging
+import re
+import socket
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from experiments.common.errors import InputError
+from experiments.common.toml_values import shown
+from sim.versions import CALCULATING, calculating_versions, differences
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+PATIENCE_S = 8.0
+"""How long a scheduler has to answer, and then its workers to appear."""
+
+RETRIES = 3
+_ADDRESS = re.compile(r"(?P<protocol>tcp|tls)://(?P<host>\[[0-9a-fA-F:]+\]|[^\s/:\[\]]+):(?P<port>\d{1,5})/?")
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A cluster that is connected.
+
+    Parameters
+    ----------
+    executor : Executor
+        Flies on its workers.
+    threads : int
+        Of all its workers.
+    workers : int
+    """
+
+    executor: Executor
+    threads: int
+    workers: int
+
+
+@contextlib.contextmanager
+def connected(address: str) -> Iterator[Cluster]:
+    """Connect to a Dask scheduler.
+
+    Parameters
+    ----------
+    address : str
+        Such as tcp://host:8786.
+
+    Yields
+    ------
+    Cluster
+        Until leaving.
+
+    Raises
+    ------
+    InputError
+        If Dask is not installed, the scheduler does not answer within seconds or has no workers, or a worker is of
+        another version.
+    """
+    found = _ADDRESS.fullmatch(address)
+    if found is None or not 0 < int(found["port"]) < 65536:
+        raise InputError(f"--dask: must be an address such as tcp://host:8786, found {shown(address)}")
+    try:
+        from distributed import Client
+    except ImportError:
+        raise InputError(
+            "--dask: clusters need Dask, which is not installed; install the extra: pip install 'infoset[distributed]'"
+        ) from None
+    # A scheduler that dies is told of in one message here, not in the tracebacks of its client's threads.
+    for name in ("distributed", "distributed.client", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    _need_listener(address, found["host"].strip("[]"), int(found["port"]))
+    _need_scheduler(address)
+    try:
+        client = Client(address, timeout=PATIENCE_S, set_as_default=False)
+    except (OSError, ValueError, RuntimeError) as error:
+        raise _silent(address, error) from None
+    try:
+        _need_workers(client, address)
+        _need_same_versions(client)
+        threads = client.nthreads()
+        executor = client.get_executor(pure=False, retries=RETRIES)
+        yield Cluster(executor, sum(threads.values()), len(threads))
+    finally:
+        with contextlib.suppress(OSError, RuntimeError):
+            client.close(timeout=2)
+
+
+def is_open(address: str) -> bool:
+    """Whether a scheduler's address is neither encrypted nor on this machine alone.
+
+    Parameters
+    ----------
+    address : str
+        Such as tcp://host:8786.
+
+    Returns
+    -------
+    bool
+        False of what is no address.
+    """
+    found = _ADDRESS.fullmatch(address)
+    if found is None or found["protocol"] == "tls":
+        return False
+    host = found["host"].strip("[]")
+    if host == "localhost":
+        return False
+    try:
+        return not ipaddress.ip_address(host).is_loopback
+    except ValueError:  # a name, which may be anybody's
+        return True
+
+
+def _need_listener(address: str, host: str, port: int) -> None:
+    """Say at once that nobody listens; the cluster's own client would go on trying."""
+    try:
+        with socket.create_connection((host, port), timeout=PATIENCE_S / 2):
+            pass
+    except OSError as error:
+        raise _silent(address, error) from None
+
+
+def _need_scheduler(address: str) -> None:
+    """Ask who listens, and wait for an answer only so long; the cluster's own client may wait for ever."""
+    import asyncio
+
+    from distributed.comm.core import connect
+    from distributed.security import Security
+
+    async def kind() -> object:
+        arguments = Security().get_connection_args("client")
+        comm = await connect(address, timeout=PATIENCE_S / 2, **arguments)
+        try:
+            await comm.write({"op": "identity", "reply": True})
+            told = await comm.read()
+            return told.get("type") if isinstance(told, dict) else None
+        finally:
+            comm.abort()
+
+    async def in_time() -> object:
+        return await asyncio.wait_for(kind(), PATIENCE_S / 2)
+
+    try:
+        found = asyncio.run(in_time())
+    except Exception as error:  # whatever listens there may send anything, and reading that may fail in any way
+        raise _silent(address, error) from None
+    if found != "Scheduler":
+        raise _silent(address, OSError(0, f"it is a {str(found)[:40]}"))
+
+
+def _silent(address: str, error: BaseException) -> InputError:
+    reason = (error.strerror if isinstance(error, OSError) else "") or str(error) or "no answer in time"
+    if not isinstance(error, OSError | TypeError):  # TypeError: no certificates for TLS
+        reason = "what it sends is not Dask's protocol"
+    return InputError(
+        f"--dask: no Dask scheduler answers at {address} ({reason[:150]}); start one with: dask scheduler, and check "
+        "the address that it prints"
+    )
+
+
+def _need_workers(client: Client, address: str) -> None:
+    try:
+        client.wait_for_workers(1, timeout=PATIENCE_S)
+    except OSError:
+        raise InputError(
+            f"--dask: the scheduler at {address} has no workers; start some with: dask worker {address}"
+        ) from None
+
+
+def _need_same_versions(client: Client) -> None:
+    """Refuse workers whose numbers may differ from those of here."""
+    names = CALCULATING
+
+    def versions_there() -> tuple[tuple[str, str], ...]:
+        # Sent as code, for a worker may not have this package at all.
+        from importlib.metadata import PackageNotFoundError, version
+
+        told = []
+        for name in names:
+            try:
+                told.append((name, version(name)))
+            except PackageNotFoundError:
+                told.append((name, "none"))
+        return tuple(told)
+
+    answers: dict[str, Any] = client.run(versions_there, on_error="return")
+    lines = []
+    for worker, told in sorted(answers.items()):
+        if isinstance(told, BaseException):
+            lines.append(f"worker {worker} does not say its versions: {str(told)[:100]}")
+        else:
+            differ = differences(calculating_versions(), told)
+            lines += [f"worker {worker}: {'; '.join(differ)}"] if differ else []
+    if lines:
+        more = f"\n  and {len(lines) - 10} more" if len(lines) > 10 else ""
+        raise InputError(
+            "--dask: workers must have the versions of here, or their numbers may differ; install the same there:"
+            + "".join(f"\n  {line}" for line in lines[:10])
+            + more
+        )

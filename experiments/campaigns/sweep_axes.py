@@ -1,0 +1,220 @@
+"""What a sweep varies: keys of a scenario file, each over a range of values in the unit of the file.
+
+The cells are made by the one reader of scenario files: the scenario is written as a file, values are put into its text,
+and the text is read. So a cell is sound exactly when a file with these values is, and says what is wrong as one does.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Context, Decimal, InvalidOperation
+from typing import Any
+
+from experiments.common.errors import InputError
+from experiments.common.toml_values import LARGEST, SMALLEST, nearest, number_text, shown
+from experiments.interception.scenario_file import read_scenario, scenario_to_toml
+from sim.scenario import Scenario
+from sim.storage import MOST_CELLS, Axis
+
+MOST_AXES = 4
+MOST_VALUES = 1000
+EXAMPLE = "--vary angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:8,thruster.greatest_impulse_m_s=2:20:7"
+
+_PLACES = Context(prec=12)
+"""Values between the ends are rounded to as many digits: what a person would write."""
+
+_OPTIONAL = ("sun", "range_sensor", "rate_sensor", "target")
+_ENDS = ("least", "greatest")
+
+
+@dataclass(frozen=True)
+class _Key:
+    """A key that can be varied: where it stands, and whether only whole numbers may stand there."""
+
+    table: str
+    name: str
+    end: str | None = None
+    whole: bool = False
+
+
+def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
+    """Read what is to be varied.
+
+    Parameters
+    ----------
+    text : str
+        Of pieces `table.key=FROM:TO:COUNT` or `table.key=log:FROM:TO:COUNT`, separated by commas. Of a key that is a
+        pair `table.key.least` or `table.key.greatest` is varied.
+    scenario : Scenario
+        Whose keys they are.
+
+    Returns
+    -------
+    tuple of Axis
+        In the order given.
+
+    Raises
+    ------
+    InputError
+        If it is written otherwise, or the scenario has no such key; the nearest is suggested.
+    """
+    known = _known_keys(scenario)
+    pieces = [each.strip() for each in text.split(",")]
+    if len(pieces) > MOST_AXES:
+        raise InputError(f"--vary: at most {MOST_AXES} keys can be varied at once, found {len(pieces)}; leave some out")
+    axes = tuple(_axis(piece, known) for piece in pieces)
+    keys = [axis.key for axis in axes]
+    if len(set(keys)) < len(keys):
+        (twice, *_) = [key for key in keys if keys.count(key) > 1]
+        raise InputError(f"--vary: {twice} is named twice; name each key once")
+    cells = math.prod(len(axis.values) for axis in axes)
+    if cells > MOST_CELLS:
+        raise InputError(f"--vary: makes {cells} cells, and at most {MOST_CELLS} can be; take fewer values")
+    return axes
+
+
+def sweep_cells(scenario: Scenario, axes: Sequence[Axis]) -> tuple[Scenario, ...]:
+    """Make the scenario of each cell.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    axes : sequence of Axis
+        From `sweep_axes`.
+
+    Returns
+    -------
+    tuple of Scenario
+        One for each combination of values; the last axis varies fastest.
+
+    Raises
+    ------
+    InputError
+        If a cell is no sound scenario; the message is that of a scenario file.
+    """
+    known = _known_keys(scenario)
+    text = scenario_to_toml(scenario)
+    cells = []
+    for values in itertools.product(*(axis.values for axis in axes)):
+        changed, said = text, []
+        for axis, value in zip(axes, values, strict=True):
+            key = known[axis.key]
+            literal = str(round(value)) if key.whole else number_text(value)
+            changed = _with_value(changed, key, literal)
+            said.append(f"{axis.key} = {literal}")
+        cells.append(read_scenario(changed, f"{scenario.name} with {', '.join(said)}"))
+    return tuple(cells)
+
+
+def _known_keys(scenario: Scenario) -> dict[str, _Key]:
+    """The keys of a scenario that hold numbers."""
+    known: dict[str, _Key] = {}
+    for table, keys in _tables(scenario).items():
+        for name, value in keys.items():
+            path = f"{table}.{name}"
+            if isinstance(value, list) or table == "dispersion":
+                known |= {f"{path}.{end}": _Key(table, name, end) for end in _ENDS}
+            if table == "dispersion":  # a start that is fixed
+                known[path] = _Key(table, name)
+            elif isinstance(value, int | float) and not isinstance(value, bool):
+                known[path] = _Key(table, name, whole=isinstance(value, int))
+    return known
+
+
+def _tables(scenario: Scenario) -> Mapping[str, Mapping[str, Any]]:
+    values = tomllib.loads(scenario_to_toml(scenario))
+    return {table: keys for table, keys in values.items() if isinstance(keys, dict)}
+
+
+def _axis(piece: str, known: Mapping[str, _Key]) -> Axis:
+    key, equals, written = (each.strip() for each in piece.partition("="))
+    if not equals or not key:
+        raise InputError(f"--vary: {shown(piece)} is not written as KEY=FROM:TO:COUNT; for example {EXAMPLE}")
+    if key not in known:
+        raise InputError(f"--vary: {_unknown(key, known)}")
+    parts = [each.strip() for each in written.split(":")]
+    scale = "linear"
+    if parts[0] == "log":
+        scale, parts = "log", parts[1:]
+    if len(parts) != 3:
+        raise InputError(
+            f"--vary: {key}: must be FROM:TO:COUNT or log:FROM:TO:COUNT, found {shown(written)}; for example {EXAMPLE}"
+        )
+    first, last = (_number(each, key) for each in parts[:2])
+    if first >= last:
+        raise InputError(f"--vary: {key}: must go from a lesser to a greater value, found {shown(written)}")
+    if scale == "log" and first <= 0:
+        raise InputError(f"--vary: {key}: on a logarithmic scale values must be greater than 0, found {shown(written)}")
+    count = _count(parts[2], key)
+    values = _spaced(first, last, count, scale, whole=known[key].whole)
+    if len(set(values)) < count:
+        raise InputError(
+            f"--vary: {key}: {count} values from {parts[0]} to {parts[1]} are not all different"
+            f"{' whole numbers' if known[key].whole else ''}; take fewer"
+        )
+    return Axis(key, values, scale)
+
+
+def _unknown(key: str, known: Mapping[str, _Key]) -> str:
+    names = list(known)
+    table = key.partition(".")[0]
+    if table in _OPTIONAL and table not in {each.table for each in known.values()}:
+        return f"the scenario has no [{table}]; add that table to its file, or vary something else"
+    if f"{key}.least" in known:
+        return f"{key} is a pair; vary {key}.least or {key}.greatest"
+    guess = nearest(key, names)
+    if guess is None:  # perhaps only its last part was written
+        alike = [each for each in names if key.rsplit(".", 1)[-1] in each.split(".")]
+        guess = " or ".join(alike[:3]) or None
+    hint = f"did you mean {guess}?" if guess else f"the numbers there are: {', '.join(names)}"
+    return f"the scenario has no number {shown(key)}; {hint}"
+
+
+def _number(text: str, key: str) -> Decimal:
+    try:
+        value = Decimal(text) if re.fullmatch(r"[+-]?[0-9._]{1,40}(?:[eE][+-]?[0-9]{1,4})?", text) else None
+    except InvalidOperation:
+        value = None
+    if value is None:
+        raise InputError(f"--vary: {key}: must be a number, found {shown(text)}; for example {EXAMPLE}")
+    if value.copy_abs() > LARGEST:
+        raise InputError(f"--vary: {key}: must be at most {LARGEST:g} in size, found {shown(text)}")
+    if 0 < value.copy_abs() < SMALLEST:
+        raise InputError(f"--vary: {key}: must be 0 or at least {SMALLEST:g} in size, found {shown(text)}")
+    return value
+
+
+def _count(text: str, key: str) -> int:
+    if re.fullmatch(r"[0-9]{1,9}", text) and 2 <= int(text) <= MOST_VALUES:
+        return int(text)
+    raise InputError(f"--vary: {key}: the count must be a whole number from 2 to {MOST_VALUES}, found {shown(text)}")
+
+
+def _spaced(first: Decimal, last: Decimal, count: int, scale: str, *, whole: bool) -> tuple[float, ...]:
+    """Values from the first to the last, both as written."""
+    if scale == "log":
+        rise = math.log(last / first) / (count - 1)
+        between = [Decimal(float(first) * math.exp(rise * place)) for place in range(1, count - 1)]
+    else:
+        between = [first + (last - first) * place / (count - 1) for place in range(1, count - 1)]
+    values = [first, *(_PLACES.plus(each) for each in between), last]
+    return tuple(float(round(each)) if whole else float(each) for each in values)
+
+
+def _with_value(text: str, key: _Key, literal: str) -> str:
+    """Put a value into the text that `scenario_to_toml` wrote, which has each key on a line of its own."""
+    lines = text.split("\n")
+    table = lines.index(f"[{key.table}]")
+    place = next(at for at in range(table, len(lines)) if lines[at].startswith(f"{key.name} = "))
+    if key.end is not None:
+        found = lines[place].partition(" = ")[2].strip("[]").split(", ")
+        ends = [found[0], found[-1]]
+        ends[_ENDS.index(key.end)] = literal
+        literal = f"[{ends[0]}, {ends[1]}]"
+    lines[place] = f"{key.name} = {literal}"
+    return "\n".join(lines)

@@ -1,0 +1,289 @@
+"""Files that commands write: checked before the work, written whole or not at all, replaced only when told to."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import io
+import json
+import os
+import secrets
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+import typer
+
+from experiments.common.errors import InputError
+
+STDOUT = "-"
+
+Cell = str | int | float | bool | None
+
+
+@contextlib.contextmanager
+def checked_destinations(
+    *,
+    folder: Path | None = None,
+    names: Sequence[str] = (),
+    files: Mapping[str, Path | None] | None = None,
+    overwrite: bool = False,
+) -> Iterator[None]:
+    """Check everything that will be written, before the work: really try, and leave nothing behind.
+
+    Parameters
+    ----------
+    folder : Path or None
+        A folder to fill. It is made, and taken away again should the work fail before anything is in it.
+    names : sequence of str
+        What will be written into the folder.
+    files : mapping of str to Path or None
+        Single files, by the option that names them. The path ``-`` is stdout, and only one may be that.
+    overwrite : bool
+        Whether a folder may hold something, and files be replaced.
+
+    Yields
+    ------
+    None
+        While the work is done.
+
+    Raises
+    ------
+    InputError
+        If something cannot be written, or would replace what is there.
+    """
+    given = {option: path for option, path in (files or {}).items() if path is not None}
+    printed = [option for option, path in given.items() if str(path) == STDOUT]
+    if len(printed) > 1:
+        raise InputError(f"{' and '.join(printed)} cannot both be printed on stdout; name a file for one of them")
+    made: list[Path] = []
+    try:
+        if folder is not None:
+            made = _check_folder(folder, overwrite)
+            for name in names:
+                check_file(folder / name, overwrite=overwrite)
+        taken = {_resolved(folder / name): "a file of --out" for name in names} if folder is not None else {}
+        for option, path in given.items():
+            if option in printed:
+                continue
+            check_file(path, overwrite=overwrite)
+            other = taken.setdefault(_resolved(path), f"the file of {option}")
+            if other != f"the file of {option}":
+                raise InputError(f"{option}: {path} is also {other}; choose another name")
+        yield
+    finally:
+        for each in reversed(made):
+            with contextlib.suppress(OSError):
+                each.rmdir()  # only what is still empty goes
+
+
+def check_file(file: Path, *, overwrite: bool = False) -> None:
+    """Check that a file can be written, by writing beside it.
+
+    Parameters
+    ----------
+    file : Path
+    overwrite : bool
+        Whether it may be there already.
+
+    Raises
+    ------
+    InputError
+        If it cannot, or is there already and may not be replaced.
+    """
+    with _said(file):
+        _check_name(file, overwrite)
+        probe = _temporary(file)
+        with probe.open("x"):
+            pass
+        probe.unlink()
+
+
+def write_file(file: Path, content: str | bytes, *, overwrite: bool = False) -> None:
+    """Write a file whole or not at all, and replace one only when told to.
+
+    Parameters
+    ----------
+    file : Path
+    content : str or bytes
+        Text is written as UTF-8.
+    overwrite : bool
+        Whether it may be there already.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written, is a link, or is there already and may not be replaced.
+    """
+    with _said(file):
+        _check_name(file, overwrite)
+        temporary = _temporary(file)
+        try:
+            with temporary.open("xb") as stream:
+                stream.write(content.encode() if isinstance(content, str) else content)
+            temporary.replace(file)
+        finally:
+            with contextlib.suppress(OSError, ValueError):
+                temporary.unlink(missing_ok=True)
+
+
+def deliver(destination: Path | None, text: str, *, overwrite: bool) -> None:
+    """Give a text to whoever asked for it: print it on stdout, or write a file.
+
+    Parameters
+    ----------
+    destination : Path or None
+        ``-`` is stdout; None is nobody.
+    text : str
+    overwrite : bool
+        Whether a file may be there already.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written, or is there already and may not be replaced.
+    """
+    if destination is None:
+        return
+    if str(destination) == STDOUT:
+        typer.echo(text, nl=False)
+    else:
+        write_file(destination, text, overwrite=overwrite)
+
+
+@contextlib.contextmanager
+def reporting_failures(where: Path) -> Iterator[None]:
+    """Turn an error of the file system, in what is written by others, into one that a person can act on.
+
+    Parameters
+    ----------
+    where : Path
+        What is being written.
+
+    Yields
+    ------
+    None
+    """
+    with _said(where):
+        yield
+
+
+def library_version() -> str:
+    """Return the version of the installed distribution, which stands in every file."""
+    return version("infoset")
+
+
+def to_json(value: object) -> str:
+    """Return a value as indented JSON, keys in the order given.
+
+    Parameters
+    ----------
+    value : object
+        Of dicts, lists, strings, finite numbers, booleans and None.
+
+    Returns
+    -------
+    str
+        Ends with a new line.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite: JSON has no NaN and no infinity.
+    """
+    return json.dumps(value, indent=2, allow_nan=False) + "\n"
+
+
+def to_csv(columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
+    """Return a table as comma-separated values.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        Names, with their units.
+    rows : sequence of sequences
+        None is an empty cell, True and False are ``true`` and ``false``, numbers have all their digits.
+
+    Returns
+    -------
+    str
+        A line of names and a line a row.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([_cell(value) for value in row] for row in rows)
+    return text.getvalue()
+
+
+def _cell(value: Cell) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+def _check_name(file: Path, overwrite: bool) -> None:
+    """Say what is wrong with a name as the name of a file to write."""
+    if file.is_dir():
+        raise InputError(f"{file}: is a folder; name a file in it, for example {file / 'new-file'}")
+    if os.path.lexists(file):
+        if file.is_symlink():
+            raise InputError(f"{file}: is a link, and links are not followed; remove it, or choose another name")
+        if not file.is_file():
+            raise InputError(f"{file}: exists already and is no ordinary file; choose another name")
+        if not overwrite:
+            raise InputError(f"{file}: exists already; choose another name, or give --overwrite to replace it")
+    if not file.parent.is_dir():
+        raise InputError(f"{file}: there is no folder {file.parent}; make it first")
+    with contextlib.suppress(FileNotFoundError):
+        file.lstat()  # fails where the name itself cannot be: it is too long
+
+
+def _check_folder(folder: Path, overwrite: bool) -> list[Path]:
+    """Make a folder if it is not there, try to write in it, and return what was made, outermost first."""
+    made: list[Path] = []
+    try:
+        with _said(folder):
+            if os.path.lexists(folder) and not folder.is_dir():
+                raise InputError(f"{folder}: is a file, not a folder; choose another name for the output folder")
+            missing = [each for each in (folder, *folder.parents) if not each.exists()]
+            for each in reversed(missing):
+                each.mkdir()
+                made.append(each)
+            if not overwrite and next(folder.iterdir(), None) is not None:
+                raise InputError(
+                    f"{folder}: is not empty; choose another folder, or give --overwrite to replace files in it"
+                )
+            probe = _temporary(folder / "probe")
+            with probe.open("x"):
+                pass
+            probe.unlink()
+    except InputError:
+        for each in reversed(made):
+            with contextlib.suppress(OSError):
+                each.rmdir()
+        raise
+    return made
+
+
+def _temporary(file: Path) -> Path:
+    """Return a short name in the same folder that nobody else has."""
+    return file.parent / f".infoset-{os.getpid()}-{secrets.token_hex(4)}.tmp"
+
+
+def _resolved(path: Path) -> Path:
+    with _said(path):
+        return path.resolve()
+
+
+@contextlib.contextmanager
+def _said(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise InputError(f"{path}: cannot be written: {reason}; choose a folder you may write in") from None

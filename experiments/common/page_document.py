@@ -1,0 +1,118 @@
+"""One self-contained HTML document: template, style, scripts and data, under a policy that lets nothing else in.
+
+A person's texts (names, descriptions) travel as JSON in a block that no browser runs, with every character that could
+end it escaped; the scripts put them on the page as text alone. The policy names the style and the scripts by their
+hashes, so nothing else runs, and nothing is fetched.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+import re
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib import resources
+from pathlib import Path
+
+from experiments.common.errors import InputError
+from experiments.common.output import library_version
+
+BLOCKS = ("dom.js", "chart.js", "scene.js", "player.js")
+"""What every page is built from, in this order."""
+
+_MARKER = re.compile(r"\{\{(\w+)\}\}")
+_ESCAPES = str.maketrans({"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"})
+
+
+def page(title: str, scripts: Sequence[str], data: Mapping[str, object]) -> str:
+    """Return a page as HTML.
+
+    Parameters
+    ----------
+    title : str
+        Of the window; any text.
+    scripts : sequence of str
+        Names of the page's own scripts, after the common blocks.
+    data : mapping
+        What the scripts draw: dicts, lists, strings, finite numbers, booleans and None. The keys ``heading`` and
+        ``about`` (a list of lines) stand at the top of the page.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite.
+    """
+    style = asset("page.css")
+    programs = [asset(name) for name in (*BLOCKS, *scripts)]
+    parts = {
+        "title": html.escape(title),
+        "version": html.escape(library_version()),
+        "policy": _policy(style, programs),
+        "style": style,
+        "data": embedded_json({"version": library_version(), **data}),
+        "scripts": "\n".join(f"<script>{program}</script>" for program in programs),
+    }
+    return _MARKER.sub(lambda marker: parts[marker[1]], asset("page.html"))
+
+
+def embedded_json(value: object) -> str:
+    """Return a value as JSON that can stand inside a script element of HTML.
+
+    Parameters
+    ----------
+    value : object
+        Of dicts, lists, strings, finite numbers, booleans and None.
+
+    Returns
+    -------
+    str
+        Without ``<``, ``>``, ``&`` and the line separators that scripts stumble over; reads back as the same value.
+    """
+    text = json.dumps(value, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+    # A half of a surrogate pair is no character that a file can hold.
+    return text.translate(_ESCAPES).encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def page_path(option: str, path: Path | None) -> Path | None:
+    """Return the path of a page if its name ends as browsers expect.
+
+    Parameters
+    ----------
+    option : str
+        What it was given to.
+    path : Path or None
+
+    Returns
+    -------
+    Path or None
+
+    Raises
+    ------
+    InputError
+        If it does not end in ``.html``.
+    """
+    if path is not None and path.suffix != ".html":
+        raise InputError(f"{option}: {path} must end in .html; for example {option} page.html")
+    return path
+
+
+@cache
+def asset(name: str) -> str:
+    """Return a file of the folder `assets`."""
+    return (resources.files("experiments.common") / "assets" / name).read_text(encoding="utf-8")
+
+
+def _policy(style: str, programs: Sequence[str]) -> str:
+    scripts = " ".join(_hash(program) for program in programs)
+    return f"default-src 'none'; script-src {scripts}; style-src {_hash(style)}; base-uri 'none'; form-action 'none'"
+
+
+def _hash(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

@@ -1,0 +1,114 @@
+"""Problem files: TOML with a `kind`, one kind a command, built-in ones in `experiments/problems`."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from decimal import Decimal
+from enum import Enum
+from importlib import resources
+
+from experiments.common.errors import InputError
+from experiments.common.toml_file import Form, Known, Problem, Tables, no_checks
+from experiments.common.toml_values import nearest, shown
+
+
+@dataclass(frozen=True)
+class BuiltInProblem:
+    """A problem that comes with the project: its name, its kind, and a line about it."""
+
+    name: str
+    kind: str
+    description: str
+    text: str
+
+
+def built_in_problems() -> list[BuiltInProblem]:
+    """Return the built-in problems of every kind, in alphabetical order."""
+    folder = resources.files("experiments").joinpath("problems")
+    files = sorted((each for each in folder.iterdir() if each.name.endswith(".toml")), key=lambda each: each.name)
+    problems = []
+    for file in files:
+        text = file.read_text(encoding="utf-8")
+        values = tomllib.loads(text)
+        name = file.name.removesuffix(".toml")
+        problems.append(BuiltInProblem(name, values["kind"], values.get("description", ""), text))
+    return problems
+
+
+def problem_text(name: str) -> str:
+    """Return the file of a built-in problem, comments and all.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    str
+        TOML.
+
+    Raises
+    ------
+    InputError
+        If there is no such problem.
+    """
+    problems = {each.name: each.text for each in built_in_problems()}
+    if name not in problems:
+        guess = nearest(name, [*problems])
+        hint = f'did you mean "{guess}"? ' if guess else ""
+        raise InputError(
+            f"no built-in problem is called {shown(name)}; {hint}the built-in ones are {', '.join(problems)}"
+        )
+    return problems[name]
+
+
+def problem_form(
+    kind: str,
+    tables: type[Tables],
+    checks: Callable[[Known], Iterator[Problem]] = no_checks,
+) -> Form[Tables]:
+    """Return the form of the problem files of a kind.
+
+    Parameters
+    ----------
+    kind : str
+        What ``kind`` says in the file.
+    tables : type
+        The pydantic model of the whole file; it has `schema`, `kind` and `name` among its keys.
+    checks : callable, optional
+        What the values must be to one another.
+
+    Returns
+    -------
+    Form
+        To be given to `experiments.common.toml_file.load_tables`.
+    """
+    return Form("problem", "problems", "infoset problems list", "infoset problems show NAME", tables, checks, kind)
+
+
+def problem_hash(tables: Tables) -> str:
+    """Return a short fingerprint of every value of a problem but its name and description.
+
+    Parameters
+    ----------
+    tables : pydantic model
+
+    Returns
+    -------
+    str
+        16 hexadecimal digits, the same for equal values on every machine.
+    """
+    values = tables.model_dump(exclude={"name", "description"})
+    return hashlib.sha256(json.dumps(values, sort_keys=True, default=_plain).encode()).hexdigest()[:16]
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, Enum):
+        return str(value.value)
+    if isinstance(value, Decimal):
+        return f"{value.normalize():f}"
+    raise TypeError(f"a problem holds no {type(value).__name__}")

@@ -1,0 +1,197 @@
+"""What the commands that fly show of their work: progress, the notice of the first compilation, numbers in tables."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sim import Results, Scenario
+
+NOT_FINITE = (
+    "the numbers of the scenario are so large or so small that the results are not finite; "
+    "check its units with: infoset scenarios check FILE"
+)
+PUBLISHED_PHI = "published Phi, no guarantee"
+
+
+def figure_files(*names: str) -> list[str]:
+    """Return the names of the files that figures become."""
+    return [f"{name}.{kind}" for name in names for kind in ("pdf", "png")]
+
+
+def say(message: str, quiet: bool) -> None:
+    """Print a line beside the results, on stderr."""
+    if not quiet:
+        from experiments.common.errors import on_a_screen
+
+        typer.echo(on_a_screen(message), err=True)
+
+
+def say_warnings(warnings: Iterable[str], quiet: bool) -> None:
+    """Print warnings beside the results, a line each."""
+    for warning in warnings:
+        say(f"warning: {warning}", quiet)
+
+
+def table_console(stdout_taken: bool) -> Console:
+    """Return where tables go: stdout, or stderr where a file is printed on stdout."""
+    from rich.console import Console
+
+    return Console(stderr=stdout_taken, highlight=False, markup=False)
+
+
+def tell_of_compiling(quiet: bool) -> None:
+    """Say that the kernels are about to be compiled, if no compiled ones of this source are stored."""
+    from infoset import location, section_passes
+
+    kernels = ((section_passes.__file__, section_passes.measure_all), (location.__file__, location.refine_all))
+    _tell_of_compiling(quiet, "half a minute", kernels)
+
+
+def tell_of_compiling_pursuit(quiet: bool) -> None:
+    """Say the same of the kernels of the pursuit-evasion game."""
+    from rendezvous.pursuit_evasion import _extremal
+
+    _tell_of_compiling(quiet, "five seconds", [(_extremal.__file__, _extremal.flow_kernel)])
+
+
+def tell_of_compiling_rendezvous(quiet: bool, *, visits: bool = True, nonlinear: bool = False) -> None:
+    """Say the same of the kernels of encounters, and of visits to several targets, nonlinear ones too."""
+    from rendezvous.multipoint import _hamiltonian, _path
+    from rendezvous.relative_motion import _circular
+
+    kernels: list[tuple[str | None, object]] = [(_circular.__file__, _circular.fill_gramians)]
+    if visits:
+        kernels.append((_path.__file__, _path.solve_path))
+    if nonlinear:
+        kernels.append((_hamiltonian.__file__, _hamiltonian.propagate))
+    _tell_of_compiling(quiet, "ten seconds" if nonlinear else "five seconds", kernels)
+
+
+def _tell_of_compiling(quiet: bool, time: str, kernels: Sequence[tuple[str | None, object]]) -> None:
+    """Say it if one of some kernels, each with the file of its module, is not stored; and where, if not beside it."""
+    missing = [(Path(file or ""), kernel) for file, kernel in kernels if not _stored(kernel)]
+    if quiet or not missing:
+        return
+    source, kernel = missing[0]
+    folder = _cache_of(kernel)
+    where = ""
+    if folder is not None and folder != source.parent / "__pycache__":
+        where = f"; they are kept in {folder.parent}, not beside their source"
+    say(f"compiling the kernels, once (about {time}){where} ...", quiet)
+
+
+def _cache_of(kernel: object) -> Path | None:
+    """Where Numba keeps a kernel; None where it is not kept, or not compiled at all."""
+    folder = getattr(getattr(kernel, "stats", None), "cache_path", None)
+    return None if folder is None else Path(folder)
+
+
+def _stored(kernel: object) -> bool:
+    """Whether Numba has a compiled kernel of this very source: asked of its own index, whose stamp it will look at."""
+    if _cache_of(kernel) is None:
+        # Switched off by NUMBA_DISABLE_JIT; or nothing can be kept, which Numba's user was warned of.
+        return True
+    index = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
+    read = getattr(index, "_load_index", None)
+    if read is None:  # another Numba, that keeps its index elsewhere: nothing is said rather than something wrong
+        return True
+    try:
+        return bool(read())
+    except (OSError, EOFError):
+        return False
+
+
+@contextlib.contextmanager
+def progress_bar(quiet: bool) -> Iterator[Callable[[str], Callable[[float], None]]]:
+    """Show progress on stderr, where that is a terminal.
+
+    Parameters
+    ----------
+    quiet : bool
+        Whether to show nothing.
+
+    Yields
+    ------
+    callable
+        Begins a bar of a name; returns what is to be told the fraction done.
+    """
+    if quiet or not sys.stderr.isatty():
+        yield lambda _name: lambda _done: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+
+        def begin(name: str) -> Callable[[float], None]:
+            task = progress.add_task(name, total=1.0)
+            return lambda done: progress.update(task, completed=done)
+
+        yield begin
+
+
+def number(value: float | None) -> str:
+    """Return a number as a table shows it: three digits, more where they stand before the point."""
+    if value is None:
+        return "-"
+    return f"{value:.1f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+def need_finite(results: Results) -> None:
+    """Refuse results that overflowed, which no file and no figure can show.
+
+    Parameters
+    ----------
+    results : Results
+
+    Raises
+    ------
+    InputError
+        If a miss or an impulse is no finite number.
+    """
+    import numpy as np
+
+    values = np.concatenate([results.miss_m, results.impulse_m_s, results.guaranteed_miss_m.filled(0.0)])
+    if not np.isfinite(values).all():
+        from experiments.common.errors import InputError
+
+        raise InputError(NOT_FINITE)
+
+
+def guaranteed_miss_name(model: str) -> str:
+    """Return what to call `guaranteed_miss_m` of a model: the paper's model guarantees nothing."""
+    return PUBLISHED_PHI if model == "paper" else "guaranteed miss"
+
+
+def allowance(scenario: Scenario) -> str | None:
+    """Return what the guaranteed model of a scenario allows for, as a line; None for the paper's model."""
+    from sim.gravity import on_board_model
+
+    model = on_board_model(scenario)
+    if not model.is_guaranteed:
+        return None
+    return (
+        f"the guaranteed model allows for {model.acceleration_m_s2:.5g} m/s^2 along z (manoeuvres "
+        f"{model.disturbance_m_s2:g}, gravity {model.gravity_m_s2:.2g}), a closing speed within "
+        f"{model.speed_error:.2%}, impulses within {model.execution_error_relative:.2%}"
+    )
+
+
+def certificate(results: Results) -> str:
+    """Return the certificate of a batch as a line: how often the truth was kept, and how often Phi held."""
+    kept = f"truth kept {int(results.truth_kept.sum())}/{len(results)}"
+    known = [each for each in results.phi_held.tolist() if each is not None]
+    if not known:
+        return kept
+    missing = f" ({len(results) - len(known)} without Phi)" if len(known) < len(results) else ""
+    return f"{kept}, Phi held {sum(known)}/{len(known)}{missing}"

@@ -1,0 +1,443 @@
+"""TOML files that a person wrote: found by name or path, read within bounds, checked whole, problems told at once."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+import typing
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from importlib import resources
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from experiments.common.errors import InputError
+from experiments.common.toml_values import WRONG, DecimalPair, nearest, shown
+
+LARGEST_FILE_BYTES = 100_000
+LONGEST_LINE = 1000
+MOST_PROBLEMS = 100
+
+KeyPath = tuple[str, ...]
+Tables = TypeVar("Tables", bound=BaseModel)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing wrong with a file.
+
+    Parameters
+    ----------
+    path : tuple of str
+        Table and key; a table of an array of tables has its place, from 0, after its name.
+    text : str
+        What is wrong, and with which value.
+    remedy : str
+        What to do about it.
+    """
+
+    path: KeyPath
+    text: str
+    remedy: str
+
+
+@dataclass(frozen=True)
+class Known:
+    """The values of a file that are sound by themselves; the others are None.
+
+    Parameters
+    ----------
+    document : dict
+        The file as parsed.
+    bad : frozenset of tuple of str
+        Paths of the tables and keys already found wrong.
+    """
+
+    document: dict[str, Any]
+    bad: frozenset[KeyPath]
+
+    def value(self, *path: str) -> object:
+        """Return the value of a key as parsed, or None."""
+        value: object = self.document
+        for depth, part in enumerate(path, start=1):
+            if path[:depth] in self.bad:
+                return None
+            if isinstance(value, list):
+                value = value[int(part)] if int(part) < len(value) else None
+            else:
+                value = value.get(part) if isinstance(value, dict) else None
+        return value
+
+    def number(self, *path: str) -> Decimal | None:
+        """Return a number, or None."""
+        value = self.value(*path)
+        return Decimal(value) if isinstance(value, int | Decimal) else None
+
+    def pair(self, *path: str) -> DecimalPair | None:
+        """Return an interval, or None; a fixed number has equal ends."""
+        value = self.value(*path)
+        if isinstance(value, list):
+            return Decimal(value[0]), Decimal(value[1])
+        fixed = self.number(*path)
+        return None if fixed is None else (fixed, fixed)
+
+
+def no_checks(_known: Known) -> Iterator[Problem]:
+    """Find nothing wrong."""
+    return iter(())
+
+
+@dataclass(frozen=True)
+class Form(Generic[Tables]):
+    """What a kind of file is: its tables, and what to call it.
+
+    Parameters
+    ----------
+    noun : str
+        What a file of it is called in messages: ``scenario``.
+    folder : str
+        Where the built-in ones lie, in the package `experiments`.
+    listed_by : str
+        The command that lists the built-in ones.
+    begun_by : str
+        The command that gives a sound one to start from.
+    tables : type
+        The pydantic model of the whole file, made of `experiments.common.toml_values.Table`.
+    checks : callable, optional
+        What the values must be to one another.
+    kind : str or None, optional
+        What the file's ``kind`` must say, where files of several kinds lie in one folder.
+    schema : int, optional
+        The version of the form that is read.
+    """
+
+    noun: str
+    folder: str
+    listed_by: str
+    begun_by: str
+    tables: type[Tables]
+    checks: Callable[[Known], Iterator[Problem]] = no_checks
+    kind: str | None = None
+    schema: int = 1
+
+
+def built_in_names(form: Form[Tables]) -> tuple[str, ...]:
+    """Return the names of the built-in files of a form, in alphabetical order."""
+    files = {
+        file.name.removesuffix(".toml"): file
+        for file in resources.files("experiments").joinpath(form.folder).iterdir()
+        if file.name.endswith(".toml")
+    }
+    return tuple(
+        name
+        for name, file in sorted(files.items())
+        if form.kind is None or tomllib.loads(file.read_text(encoding="utf-8")).get("kind") == form.kind
+    )
+
+
+def built_in_text(form: Form[Tables], name: str) -> str:
+    """Return a built-in file, comments and all.
+
+    Parameters
+    ----------
+    form : Form
+    name : str
+        One of `built_in_names`.
+
+    Returns
+    -------
+    str
+        TOML.
+
+    Raises
+    ------
+    InputError
+        If there is no such file.
+    """
+    if name not in built_in_names(form):
+        raise _no_such_name(form, name, f"no built-in {form.noun}")
+    return resources.files("experiments").joinpath(form.folder, f"{name}.toml").read_text(encoding="utf-8")
+
+
+def load_tables(form: Form[Tables], name_or_path: str | os.PathLike[str]) -> Tables:
+    """Read a built-in file or one that a person names.
+
+    Parameters
+    ----------
+    form : Form
+    name_or_path : str or path
+        A built-in name, or the path of a TOML file. A name wins over a file of that name, unless the argument has a
+        path separator or ends in ``.toml``.
+
+    Returns
+    -------
+    pydantic model
+        ``form.tables``, numbers as written.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is not sound; all its problems are named.
+    """
+    given = os.fspath(name_or_path)
+    marks = [mark for mark in (os.sep, os.altsep) if mark]
+    is_name = isinstance(name_or_path, str) and not given.endswith(".toml") and not any(mark in given for mark in marks)
+    if is_name and given in built_in_names(form):
+        return read_tables(form, built_in_text(form, given), f"{given} (built in)")
+    if is_name and not _exists(given):
+        raise _no_such_name(form, given, f"no file and no built-in {form.noun}")
+    return read_tables(form, _text_of_file(form, given), given)
+
+
+def read_tables(form: Form[Tables], text: str, source: str) -> Tables:
+    """Check the text of a file, and return its values.
+
+    Parameters
+    ----------
+    form : Form
+    text : str
+        TOML.
+    source : str
+        What to call the text in messages: the file's name.
+
+    Returns
+    -------
+    pydantic model
+        ``form.tables``, numbers as written.
+
+    Raises
+    ------
+    InputError
+        With every problem of the text: where it is, the value found and the remedy.
+    """
+    document = _parse(form, text, source)
+    schema = document.get("schema", form.schema)
+    if isinstance(schema, bool) or not isinstance(schema, int) or schema != form.schema:
+        raise InputError(
+            f"{source}: schema: must be {form.schema}, the only form of file this version reads, found "
+            f"{shown(schema)}; write schema = {form.schema} and the keys of `{form.begun_by}`, or update infoset"
+        )
+    if form.kind is not None and document.get("kind") != form.kind:
+        found = f"found {shown(document['kind'])}" if "kind" in document else "which is missing"
+        raise InputError(
+            f'{source}: kind: must be "{form.kind}", {found}; write kind = "{form.kind}" above the first table, or '
+            f"use the command for that kind"
+        )
+    tables = None
+    problems: list[Problem] = []
+    try:
+        tables = form.tables.model_validate(document)
+    except ValidationError as error:
+        found_wrong = error.errors(include_url=False)
+        problems = [_problem(form, details) for details in found_wrong[: MOST_PROBLEMS + 1]]
+        known = Known(document, frozenset(tuple(str(part) for part in each["loc"]) for each in found_wrong))
+    else:
+        known = Known(document, frozenset())
+    problems += form.checks(known)
+    if tables is None or problems:
+        raise InputError(_report(form, problems, source))
+    return tables
+
+
+def keys_of(tables: type[BaseModel], path: KeyPath = ()) -> dict[str, Any]:
+    """Return the keys of a table as written, with what is known of each.
+
+    Parameters
+    ----------
+    tables : type
+        The model of the whole file.
+    path : tuple of str, optional
+        The table in it; empty is the top of the file.
+
+    Returns
+    -------
+    dict of str to FieldInfo
+    """
+    model = tables
+    for part in path:
+        if part.isdigit():
+            continue
+        inner = _table_in(_fields(model)[part].annotation)
+        if inner is None:
+            return {}
+        model = inner
+    return _fields(model)
+
+
+def tables_of(tables: type[BaseModel]) -> tuple[str, ...]:
+    """Return the names of the tables of a file, in their order."""
+    return tuple(name for name, field in _fields(tables).items() if _table_in(field.annotation) is not None)
+
+
+def _fields(model: type[BaseModel]) -> dict[str, Any]:
+    return {field.alias or name: field for name, field in model.model_fields.items()}
+
+
+def _table_in(annotation: Any) -> type[BaseModel] | None:
+    """Return the model of a table, optional or an array of them, or None for a plain value."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    inner = [_table_in(each) for each in typing.get_args(annotation)]
+    return next((each for each in inner if each is not None), None)
+
+
+def _is_array(tables: type[BaseModel], name: str) -> bool:
+    return any(typing.get_origin(each) in (list, tuple) for each in _options(_fields(tables)[name].annotation))
+
+
+def _options(annotation: Any) -> tuple[Any, ...]:
+    return (annotation, *typing.get_args(annotation))
+
+
+def _heading(tables: type[BaseModel], name: str) -> str:
+    return f"[[{name}]]" if _is_array(tables, name) else f"[{name}]"
+
+
+def _no_such_name(form: Form[Tables], name: str, what: str) -> InputError:
+    names = built_in_names(form)
+    guess = nearest(name, list(names))
+    hint = f'did you mean "{guess}"? ' if guess else ""
+    return InputError(f"{what} is called {shown(name)}; {hint}the built-in ones are {', '.join(names)}")
+
+
+def _exists(path: str) -> bool:
+    try:
+        return bool(path) and Path(path).exists()
+    except (OSError, ValueError):  # a name too long, or with a null in it
+        return False
+
+
+def _text_of_file(form: Form[Tables], path: str) -> str:
+    """Read a file a person named."""
+    try:
+        with Path(path).open("rb") as file:
+            content = file.read(LARGEST_FILE_BYTES + 1)
+    except FileNotFoundError:
+        raise InputError(
+            f"{path}: there is no such file; check the path, or see `{form.listed_by}` for the built-in names"
+        ) from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder; name a {form.noun} file in it") from None
+    except PermissionError:
+        raise InputError(f"{path}: cannot be read, permission denied; check who may read it") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise InputError(f"{shown(path)}: cannot be read: {reason}; check the path") from None
+    if len(content) > LARGEST_FILE_BYTES:
+        raise InputError(
+            f"{path}: is over {LARGEST_FILE_BYTES // 1000} kB, far more than a {form.noun} needs; name a {form.noun} "
+            f"file"
+        )
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise InputError(f"{path}: is not UTF-8 text (line {line}); save it as UTF-8") from None
+
+
+def _decimal(literal: str) -> Decimal:
+    """Read a TOML float as written."""
+    try:
+        return Decimal(literal)
+    except InvalidOperation:  # an exponent beyond what a Decimal holds: zero or infinity, as for a float
+        return Decimal(repr(float(literal)))
+
+
+def _parse(form: Form[Tables], text: str, source: str) -> dict[str, Any]:
+    """Parse TOML, refusing what would take the parser too long."""
+    if len(text) > LARGEST_FILE_BYTES:
+        raise InputError(f"{source}: is over {LARGEST_FILE_BYTES // 1000} kB, far more than a {form.noun} needs")
+    lines = text.split("\n")
+    for number, line in enumerate(lines, start=1):
+        if len(line) > LONGEST_LINE:  # the parser's time grows as the square of a dotted key's length
+            raise InputError(f"{source}: line {number} is over {LONGEST_LINE} characters; no line of a {form.noun} is")
+    try:
+        return tomllib.loads(text, parse_float=_decimal)
+    except tomllib.TOMLDecodeError as error:
+        column = len(lines[-1]) + 1
+        reason = str(error).replace("(at end of document)", f"(at line {len(lines)}, column {column}: the end)")
+        raise InputError(f"{source}: is not TOML: {reason}; correct that line") from None
+    except (RecursionError, ValueError) as error:
+        reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
+        raise InputError(f"{source}: is not a {form.noun}: {reason}; start from `{form.begun_by}`") from None
+
+
+def _report(form: Form[Tables], problems: list[Problem], source: str) -> str:
+    """Put all problems of a file into one message, in the order of the tables."""
+    order = [*keys_of(form.tables)]
+    problems = sorted(problems, key=lambda each: order.index(each.path[0]) if each.path[0] in order else len(order))
+    lines = [f"{source}: {_written(each.path)}: {each.text}; {each.remedy}" for each in problems[:MOST_PROBLEMS]]
+    if len(problems) > MOST_PROBLEMS:
+        lines.append(f"{source}: and more problems; correct these first")
+    if len(lines) == 1:
+        return lines[0]
+    return "\n  ".join([f"{source} has {len(lines)} problems:", *lines])
+
+
+def _written(path: KeyPath) -> str:
+    """Return a path as a person reads it: the second of [[craft]] is ``craft #2``."""
+    parts: list[str] = []
+    for depth, part in enumerate(path):
+        if part.isdigit() and depth:
+            parts[-1] += f" #{int(part) + 1}"
+        else:
+            parts.append(part if part.replace("_", "").replace("-", "").isalnum() else shown(part))
+    return ".".join(parts)
+
+
+def _problem(form: Form[Tables], details: Any) -> Problem:
+    """Say in our words what pydantic found."""
+    path = tuple(str(part) for part in details["loc"])
+    if details["type"] == "missing":
+        return Problem(path, "is missing", _remedy_of_missing(form.tables, path))
+    if details["type"] == "extra_forbidden":
+        return Problem(path, *_unknown(form, path, details["input"]))
+    found = shown(details["input"])
+    if details["type"] == WRONG:
+        context = details["ctx"]
+        remedy = context["remedy"] or f"write {_example(form.tables, path)}"
+        return Problem(path, f"{context['problem']}, found {found}", remedy)
+    if details["type"] in ("too_short", "too_long"):
+        least, most = details["ctx"].get("min_length"), details["ctx"].get("max_length")
+        limit = f"at least {least}" if least is not None else f"at most {most}"
+        return Problem(path, f"must have {limit} of them, found {len(details['input'])}", "add or remove some")
+    heading = _heading(form.tables, path[0])
+    problem = "must be tables" if heading.startswith("[[") and len(path) == 1 else "must be a table"
+    return Problem(path, f"{problem}, found {found}", f"write {heading} on a line of its own, its keys below it")
+
+
+def _example(tables: type[BaseModel], path: KeyPath) -> str:
+    return f"for example {path[-1]} = {keys_of(tables, path[:-1])[path[-1]].examples[0]}"
+
+
+def _remedy_of_missing(tables: type[BaseModel], path: KeyPath) -> str:
+    if len(path) > 1:
+        return f"add it under {_heading(tables, path[0])}, {_example(tables, path)}"
+    if path[0] in tables_of(tables):
+        return f"add the table {_heading(tables, path[0])} with its keys {', '.join(keys_of(tables, path))}"
+    return f"add it above the first table, {_example(tables, path)}"
+
+
+def _unknown(form: Form[Tables], path: KeyPath, value: object) -> tuple[str, str]:
+    """Say what to do about a key or a table that such a file does not have."""
+    name, home = path[-1], path[:-1]
+    known_tables = tables_of(form.tables)
+    homes = [_heading(form.tables, other) for other in known_tables if name in keys_of(form.tables, (other,))]
+    heading = _heading(form.tables, home[0]) if home else None
+    if heading is not None and name in keys_of(form.tables):
+        what = f"is not a key of {heading}"
+        if name in known_tables:
+            return what, f"write {_heading(form.tables, name)} as a table of its own"
+        return what, f"move {name} above the first table"
+    if homes and not isinstance(value, dict):
+        return f"is not a key of {heading or 'the top'}", f"move {name} to {' or '.join(homes)}"
+    valid = [*keys_of(form.tables, home)]
+    guess = nearest(name, valid)
+    if heading is not None:
+        what = f"is not a key of {heading}"
+    else:
+        what = f"is not a {'table' if isinstance(value, dict) else 'key'} of a {form.noun}"
+    return what, f"did you mean {guess}?" if guess else f"remove it; valid here: {', '.join(valid)}"

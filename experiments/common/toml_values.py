@@ -1,0 +1,286 @@
+"""Values of a TOML file that a person wrote: what each may be, and how it is shown back.
+
+Numbers stay decimal here, as written: they are rounded once, when they become SI.
+"""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+from decimal import Context, Decimal
+from enum import Enum
+from typing import Annotated, Any, Generic, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator
+from pydantic_core import PydanticCustomError
+
+from experiments.common.errors import InputError
+from infoset.limits import Limits
+
+LARGEST = Decimal("1e15")
+SMALLEST = Decimal("1e-100")
+LONGEST_NAME = 100
+LONGEST_DESCRIPTION = 300
+LONGEST_SHOWN = 60
+KILO = 3
+
+DecimalPair = tuple[Decimal, Decimal]
+Choice = TypeVar("Choice", bound=Enum)
+
+_EXACT = Context(prec=60)
+_RADIANS_PER_DEGREE = _EXACT.divide(
+    Decimal("3.14159265358979323846264338327950288419716939937510582097494459"), Decimal(180)
+)
+
+
+def si(value: Decimal, power_of_ten: int = 0) -> float:
+    """Change the unit of a decimal and round it, once."""
+    return float(value.scaleb(power_of_ten, _EXACT))
+
+
+def radians(degrees: Decimal) -> float:
+    """Change degrees to radians and round them, once."""
+    return float(_EXACT.multiply(degrees, _RADIANS_PER_DEGREE))
+
+
+def _toml_float(value: Decimal) -> str:
+    """Write a decimal as a TOML float, without an exponent where that is short."""
+    value = value.normalize(_EXACT)
+    if value and not -6 <= value.adjusted() < 9:
+        return f"{value:e}"
+    text = f"{value:f}"
+    return text if "." in text else f"{text}.0"
+
+
+def number_text(value_si: float, power_of_ten: int = 0) -> str:
+    """Write an SI value as the shortest decimal of a unit 10^power_of_ten times as great."""
+    value = Decimal(repr(float(value_si)))
+    if not value.is_finite():
+        raise InputError(f"a file holds finite numbers only, not {value_si}; correct what is written")
+    return _toml_float(value.scaleb(-power_of_ten, _EXACT))
+
+
+def degrees_text(value_rad: float) -> str:
+    """Write an angle as the shortest decimal of degrees that reads back as the same radians."""
+    exact = _EXACT.divide(Decimal(number_text(value_rad)), _RADIANS_PER_DEGREE)
+    shorter = (Context(prec=digits).plus(exact) for digits in range(1, 20))
+    return _toml_float(next((value for value in shorter if repr(radians(value)) == repr(value_rad)), exact))
+
+
+def quoted_text(text: str) -> str:
+    """Write a TOML string on one line."""
+    escapes = {"\\": "\\\\", '"': '\\"'}
+    return '"' + "".join(escapes.get(c, c if c.isprintable() or c == " " else f"\\U{ord(c):08x}") for c in text) + '"'
+
+
+def shown(value: object) -> str:
+    """Return a TOML value as a short piece of a message, whatever its size and depth."""
+    text = "an array of many values"
+    if isinstance(value, bool):
+        text = "true" if value else "false"
+    elif isinstance(value, str):
+        text = '"' + "".join(c if c.isprintable() else "?" for c in value[: LONGEST_SHOWN + 1]) + '"'
+    elif isinstance(value, dict):
+        text = "a table"
+    elif isinstance(value, list):
+        if len(value) <= 4:
+            text = "[" + ", ".join("[...]" if isinstance(item, list) else shown(item) for item in value) + "]"
+    else:
+        text = str(value).lower().replace("infinity", "inf")
+    return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 3] + "..."
+
+
+def nearest(word: str, known: list[str]) -> str | None:
+    """Return the known word most like this one, or None if nothing is like it."""
+    found = difflib.get_close_matches(word[:LONGEST_NAME], known, n=1, cutoff=0.6)
+    return found[0] if found else None
+
+
+WRONG = "wrong"
+
+
+def wrong(problem: str, remedy: str = "") -> PydanticCustomError:
+    """Return the error of a value that may not be; without a remedy the key's example becomes one."""
+    return PydanticCustomError(WRONG, "{problem}", {"problem": problem, "remedy": remedy})
+
+
+@dataclass(frozen=True)
+class Number:
+    """A finite number within limits; `above` and `below` are not themselves allowed, `least` and `most` are."""
+
+    above: Decimal | None = None
+    least: Decimal | None = None
+    below: Decimal | None = None
+    most: Decimal | None = None
+
+    @classmethod
+    def of(cls, limits: Limits, power_of_ten: int = 0) -> Number:
+        """Return what a file may hold of a number with limits in SI, in a unit 10^power_of_ten times as great."""
+        ends = (limits.above, limits.least, limits.below, limits.most)
+        return cls(
+            *(None if end is None else Decimal(repr(end)).scaleb(-power_of_ten, _EXACT).normalize() for end in ends)
+        )
+
+    def problem(self, value: object) -> str | None:
+        """Return what is wrong with a value, or None."""
+        if isinstance(value, bool) or not isinstance(value, int | Decimal):
+            return "must be a number"
+        number = Decimal(value)
+        if not number.is_finite():
+            return "must be a finite number"
+        if number.copy_abs() > LARGEST:
+            return f"must be at most {LARGEST:g} in size"
+        if 0 < number.copy_abs() < SMALLEST:
+            return f"must be 0 or at least {SMALLEST:g} in size"
+        if self.above is not None and number <= self.above:
+            return f"must be greater than {self.above}"
+        if self.least is not None and number < self.least:
+            return f"must be at least {self.least}"
+        if self.below is not None and number >= self.below:
+            return f"must be less than {self.below}"
+        if self.most is not None and number > self.most:
+            return f"must be at most {self.most}"
+        return None
+
+    def __call__(self, value: object) -> Decimal:
+        """Check and return it."""
+        problem = self.problem(value)
+        if problem is not None or not isinstance(value, int | Decimal):
+            raise wrong(problem or "must be a number", "write it without quotes" if isinstance(value, str) else "")
+        return Decimal(value)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """An interval [least, greatest] of numbers within limits; a number too, where `fixed` allows one."""
+
+    number: Number
+    fixed: bool = False
+
+    def __call__(self, value: object) -> DecimalPair:
+        """Check and return it."""
+        if self.fixed and not isinstance(value, list):
+            if not isinstance(value, int | Decimal) or isinstance(value, bool):
+                raise wrong("must be a number or a pair [least, greatest] of numbers")
+            return self.number(value), self.number(value)
+        if not isinstance(value, list):
+            raise wrong("must be a pair [least, greatest] of numbers")
+        if len(value) != 2:
+            raise wrong(f"must be a pair [least, greatest], not {len(value)} values")
+        for end, which in zip(value, ("least", "greatest"), strict=True):
+            problem = self.number.problem(end)
+            if problem is not None:
+                raise wrong(f"the {which} end {problem}")
+        least, greatest = (Decimal(end) for end in value)
+        if least > greatest:
+            raise wrong("is reversed", f"write the lesser end first: [{greatest}, {least}]")
+        return least, greatest
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """An array of so many numbers within limits; one number for all of them too, where `one_for_all` allows it."""
+
+    count: int
+    number: Number
+    one_for_all: bool = False
+
+    def __call__(self, value: object) -> tuple[Decimal, ...]:
+        """Check and return them."""
+        if self.one_for_all and isinstance(value, int | Decimal) and not isinstance(value, bool):
+            return (self.number(value),) * self.count
+        if not isinstance(value, list):
+            raise wrong(f"must be {'a number or ' if self.one_for_all else ''}an array of {self.count} numbers")
+        if len(value) != self.count:
+            raise wrong(f"must be an array of {self.count} numbers, not {len(value)}")
+        for place, each in enumerate(value, start=1):
+            problem = self.number.problem(each)
+            if problem is not None:
+                raise wrong(f"number {place} of the array {problem}")
+        return tuple(Decimal(each) for each in value)
+
+
+@dataclass(frozen=True)
+class Whole:
+    """A whole number from 1."""
+
+    most: int
+
+    def __call__(self, value: object) -> int:
+        """Check and return it."""
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise wrong("must be a whole number")
+        if not 1 <= value <= self.most:
+            raise wrong(f"must be from 1 to {self.most}")
+        return value
+
+
+@dataclass(frozen=True)
+class OneOf(Generic[Choice]):
+    """One of the names of an enumeration."""
+
+    choices: type[Choice]
+
+    def __call__(self, value: object) -> Choice:
+        """Check and return it."""
+        return self.choices(known_name(value, tuple(choice.value for choice in self.choices)))
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of printable text."""
+
+    longest: int
+    empty: bool
+    forbidden: str = ""
+    begins_badly: str = ""
+
+    def __call__(self, value: object) -> str:
+        """Check and return it."""
+        if not isinstance(value, str):
+            raise wrong("must be text in quotes")
+        if not value.strip() and not self.empty:
+            raise wrong("must not be empty")
+        if len(value) > self.longest:
+            raise wrong(f"must be at most {self.longest} characters, not {len(value)}", "shorten it")
+        if not value.isprintable():
+            raise wrong("must be one line without control characters")
+        if any(character in value for character in self.forbidden):
+            raise wrong(f"must not hold any of {' '.join(self.forbidden)}", "output files are named after it")
+        if value[:1] and value[0] in self.begins_badly:
+            raise wrong("must begin with a letter or a digit", "output files are named after it")
+        return value
+
+
+def known_name(value: object, names: tuple[str, ...]) -> str:
+    """Check that a value is one of these names."""
+    if isinstance(value, str) and value in names:
+        return value
+    guess = nearest(value, list(names)) if isinstance(value, str) else None
+    listed = ", ".join(f'"{name}"' for name in names)
+    problem = f"must be one of {listed}" if len(names) > 1 else f"must be {listed}"
+    raise wrong(problem, f'did you mean "{guess}"?' if guess else "")
+
+
+def key(meaning: str, example: str, **options: Any) -> Any:
+    """Describe a key: what the template says of it, and a value as TOML."""
+    return Field(description=meaning, examples=[example], **options)
+
+
+ZERO, ONE = Decimal(0), Decimal(1)
+NUMBER = Number()
+POSITIVE = Number(above=ZERO)
+
+Positive = Annotated[Decimal, PlainValidator(POSITIVE)]
+NotNegative = Annotated[Decimal, PlainValidator(Number(least=ZERO))]
+Fraction = Annotated[Decimal, PlainValidator(Number(above=ZERO, below=ONE))]
+Degrees = Annotated[Decimal, PlainValidator(Number(least=Decimal(-360), most=Decimal(360)))]
+Vector = Annotated[tuple[Decimal, ...], PlainValidator(Numbers(3, NUMBER))]
+Name = Annotated[str, PlainValidator(Line(LONGEST_NAME, empty=False, forbidden='/\\:*?"<>|$', begins_badly="-."))]
+Description = Annotated[str, PlainValidator(Line(LONGEST_DESCRIPTION, empty=True))]
+
+
+class Table(BaseModel):
+    """A table of a file: no keys but its own."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)

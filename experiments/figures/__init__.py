@@ -1,1 +1,0 @@
-"""Pictures made from results: what was found is sampled here, and nothing is looked for."""

@@ -1,0 +1,117 @@
+"""Engagements as moving pictures: the sets step by step, above their predicted misses."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
+from matplotlib.axes import Axes
+
+from experiments.common.errors import InputError
+from experiments.common.figure_style import INK, new_figure, place_axes, plain, style
+from experiments.interception.figures.process import draw_predicted_miss, level_predicted_miss
+from experiments.interception.figures.sets import choose_sections, draw_step, extent_of, level_planes
+from experiments.interception.record_titles import record_titles
+from sim import Record, StepRecord
+
+GIF, MP4 = ".gif", ".mp4"
+FRAMES_PER_S = 10
+DPI = 90
+
+_MOST_FRAMES = 80
+_SECTIONS = 7
+_SECOND_MM = 58.0
+
+
+def animation_path(option: str, path: Path | None, ending: str) -> None:
+    """Refuse a file that cannot be an animation of a kind.
+
+    Parameters
+    ----------
+    option : str
+        What it was given to.
+    path : Path or None
+    ending : str
+        ``.gif`` or ``.mp4``.
+
+    Raises
+    ------
+    InputError
+        If its name ends otherwise, or the program that makes it is missing.
+    """
+    if path is None:
+        return
+    if path.suffix != ending:
+        raise InputError(f"{option}: {path} must end in {ending}; for example {option} flight{ending}")
+    if ending == MP4 and shutil.which("ffmpeg") is None:
+        raise InputError(
+            f"{option}: the program ffmpeg, which makes such files, is not on the path; install it (Debian: apt-get "
+            "install ffmpeg), or ask for --gif flight.gif"
+        )
+
+
+def animate(records: Sequence[Record], ending: str, progress: Callable[[float], None] = lambda _done: None) -> bytes:
+    """Return engagements as a moving picture, side by side.
+
+    Parameters
+    ----------
+    records : sequence of Record
+    ending : str
+        ``.gif`` (by Pillow) or ``.mp4`` (by ffmpeg).
+    progress : callable
+        Told the fraction done.
+
+    Returns
+    -------
+    bytes
+        The file.
+
+    Notes
+    -----
+    At most 80 moments, evenly chosen over the steps; some 0.2 s each.
+    """
+    writer: AbstractMovieWriter = PillowWriter(fps=FRAMES_PER_S) if ending == GIF else FFMpegWriter(fps=FRAMES_PER_S)
+    times = np.unique([step.time_s for record in records for step in record.steps])
+    chosen = times[np.unique(np.linspace(0, len(times) - 1, min(len(times), _MOST_FRAMES)).round().astype(int))]
+    width_mm = 180.0 if len(records) > 1 else 120.0
+    with style(), TemporaryDirectory() as folder:
+        file = Path(folder) / f"animation{ending}"
+        figure = new_figure(height_mm=86.0 + _SECOND_MM, width_mm=width_mm)
+        above, below = place_axes(
+            figure, 2, len(records), margins_mm=(18.0, 5.0, 11.0, 8.0), gaps_mm=(8.0 if len(records) > 1 else 0.0, 15.0)
+        )
+        titles = [plain(each) for each in record_titles(records)]
+        for axes, record in zip(below, records, strict=True):
+            draw_predicted_miss(axes, record)
+            axes.set_xlabel("time t, s")
+            axes.set_ylabel("predicted miss π, m" if axes is below[0] else "")
+            axes.tick_params(labelleft=axes is below[0])
+        level_predicted_miss(below, records)
+        lines = [axes.axvline(float(chosen[0]), color=INK, linewidth=1.0) for axes in below]
+        with writer.saving(figure, str(file), DPI):
+            for index, time in enumerate(chosen.tolist()):
+                steps = [min(record.steps, key=lambda step: abs(step.time_s - time)) for record in records]
+                _draw_planes(above, steps, titles)
+                for line in lines:
+                    line.set_xdata([time, time])
+                writer.grab_frame()
+                progress((index + 1) / len(chosen))
+        return file.read_bytes()
+
+
+def _draw_planes(row: Sequence[Axes], steps: Sequence[StepRecord], titles: Sequence[str]) -> None:
+    """Draw the sets of one moment anew."""
+    for axes in row:
+        axes.clear()
+    shown = [choose_sections(step.sections, _SECTIONS) for step in steps]
+    level_planes(row, [extent_of(step, each) for step, each in zip(steps, shown, strict=True)])
+    for axes, step, each, title in zip(row, steps, shown, titles, strict=True):
+        draw_step(axes, step, each)
+        axes.set_title(f"{title}, t = {step.time_s:.1f} s")
+        axes.set_xlabel("line-of-sight rate ω, µrad/s")
+        axes.set_ylabel("angle α, mrad" if axes is row[0] else "")
+        axes.tick_params(labelleft=axes is row[0])

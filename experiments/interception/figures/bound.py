@@ -1,0 +1,164 @@
+"""The lower bound on what any strategy can guarantee: against the label, and the pair of truths that shows it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from experiments.common.figure_style import INK, LIMIT, SET_EDGE, SET_FILL, new_figure, place_axes, style
+from sim import Scenario
+from sim.bound import LowerBound
+
+Floats = NDArray[np.float64]
+
+_HEIGHT_MM = 66.0
+_LOOKS: tuple[dict[str, Any], ...] = (
+    {"color": "#7f2704", "linestyle": "-", "marker": "o"},
+    {"color": "#08306b", "linestyle": "-", "marker": "s"},
+    {"color": "#5a9bd4", "linestyle": (0, (4, 1.5)), "marker": "^"},
+)
+_SECONDS_SHOWN = 3.0
+"""How many times the last stretch, in which the two are no longer alike, is shown."""
+
+
+def draw_bound(scenario: Scenario, lower: LowerBound) -> Figure:
+    """Draw (a) the bound against the label, a curve a closing speed, and (b) the pair that reaches it.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        For its sensor and its step.
+    lower : LowerBound
+
+    Returns
+    -------
+    Figure
+        Two axes.
+    """
+    with style():
+        figure = new_figure(height_mm=_HEIGHT_MM + 19.0)
+        ((left, right),) = place_axes(figure, 1, 2, margins_mm=(13.0, 4.0, 12.0, 7.0), gaps_mm=(14.0, 0.0))
+        _draw_labels(left, lower)
+        _draw_pair(right, scenario, lower)
+    return figure
+
+
+def ripples(labels_m: Floats, bounds_m: Floats) -> list[tuple[Floats, Floats]]:
+    """Split a curve where labels were not looked at.
+
+    Parameters
+    ----------
+    labels_m, bounds_m : ndarray, shape (n,)
+        Labels in rising order.
+
+    Returns
+    -------
+    list of tuple of ndarray
+        Stretches of labels that lie close together, with their bounds.
+    """
+    gaps = np.diff(labels_m)
+    if not len(gaps):
+        return [(labels_m, bounds_m)]
+    cuts = np.flatnonzero(gaps > 3.0 * np.median(gaps)) + 1
+    return list(zip(np.split(labels_m, cuts), np.split(bounds_m, cuts), strict=True))
+
+
+def _draw_labels(axes: Axes, lower: LowerBound) -> None:
+    banded = False
+    for look, speed in zip(_LOOKS, lower.speeds_m_s, strict=False):
+        stretches = ripples(*lower.curve(speed))
+        name = f"{-speed / 1e3:g} km/s"
+        if len(stretches) == 1:
+            axes.plot(stretches[0][0] / 1e3, stretches[0][1], label=name, **(look | {"markersize": 2.5}))
+            continue
+        banded = True
+        # Within the way of one step the bound ripples: the greatest of each ripple, and the range of it.
+        middles = np.array([0.5 * (labels[0] + labels[-1]) for labels, _ in stretches]) / 1e3
+        most = np.array([bounds.max() for _, bounds in stretches])
+        least = np.array([bounds.min() for _, bounds in stretches])
+        axes.fill_between(middles, least, most, facecolor=look["color"], alpha=0.16, linewidth=0.0)
+        axes.plot(middles, most, label=name, markersize=3.0, **look)
+    pair = lower.pair
+    axes.plot(pair.label_m / 1e3, pair.bound_m, marker="*", markersize=9.0, color=INK, linestyle="none", zorder=5)
+    axes.annotate(
+        f"{pair.bound_m:.1f} m",
+        (pair.label_m / 1e3, pair.bound_m),
+        xytext=(7.0, 3.0),
+        textcoords="offset points",
+        color=INK,
+    )
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.08 * (high - low))
+    axes.set_title("(a) what no strategy can guarantee")
+    axes.set_xlabel("label: range at $t = 0$, km")
+    axes.set_ylabel("lower bound of the guaranteed miss, m")
+    handles, names = axes.get_legend_handles_labels()
+    if banded:
+        handles.append(Patch(facecolor=LIMIT, alpha=0.25))
+        names.append("labels within one step")
+    axes.legend(handles, names, title="closing speed", loc="best")
+
+
+def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
+    pair, sensor = lower.pair, scenario.set_model.angle_sensor
+    times, distance = pair.distance_m(scenario.set_model.step_s)
+    to_go = pair.arrival_s - times
+    alike_until = pair.arrival_s - pair.last_common_step * scenario.set_model.step_s
+    shown = min(_SECONDS_SHOWN * alike_until + 2.0 * scenario.set_model.step_s, float(to_go[0]))
+    fine = np.linspace(0.0, shown, 200)
+    ranges = -pair.vx_m_s * fine
+    corridor = sensor.error_bound(ranges) * ranges
+    seen = fine >= alike_until
+    axes.fill_between(
+        fine[seen], -corridor[seen], corridor[seen], facecolor=SET_FILL, linewidth=0.0, label="measured alike"
+    )
+    axes.plot(fine, corridor, color=SET_EDGE, linewidth=0.7, linestyle=":")
+    axes.plot(fine, -corridor, color=SET_EDGE, linewidth=0.7, linestyle=":")
+    half = 0.5 * distance
+    corrected = half - _correction(scenario, pair.last_common_step, times)
+    after = to_go <= alike_until + 1e-9
+    looks: tuple[tuple[float, dict[str, Any], str], ...] = (
+        (1.0, {"color": "#7f2704", "linestyle": "-"}, "one truth, equal impulses"),
+        (-1.0, {"color": "#08306b", "linestyle": (0, (4, 1.5))}, "the other"),
+    )
+    for sign, look, name in looks:
+        axes.plot(to_go, sign * half, marker="o", markersize=2.2, label=name, **look)
+        axes.plot(to_go[after], sign * corrected[after], color=look["color"], linewidth=0.8, linestyle=":")
+    axes.plot([], [], color=INK, linewidth=0.8, linestyle=":", label="corrected, all it can")
+    axes.axvline(alike_until, ymax=0.72, color=LIMIT, linewidth=0.8, linestyle="--")
+    top = float(max(half[-1], corridor[-1])) * 1.12
+    axes.text(alike_until, -0.93 * top, "  alike until here", color=LIMIT, ha="left", va="bottom", fontsize=7.0)
+    _bracket(axes, shown, float(half[-1]), pair.correction_m)
+    axes.set_xlim(shown, -0.3 * shown)
+    axes.set_ylim(-top, top)
+    axes.set_xticks([tick for tick in axes.get_xticks() if 0.0 <= tick <= shown])
+    axes.set_title("(b) the two truths that show it")
+    axes.set_xlabel("time to arrival, s")
+    axes.set_ylabel("$z$ from the middle between them, m")
+    axes.legend(loc="upper right", handlelength=2.0, borderaxespad=0.2)
+
+
+def _correction(scenario: Scenario, last_common_step: int, times_s: Floats) -> Floats:
+    """How far the greatest impulses after a step have moved a truth at each time, m."""
+    thruster = scenario.thruster
+    fired_s = times_s[last_common_step + 1 : -1]
+    left = thruster.budget_m_s - thruster.greatest_impulse_m_s * np.arange(len(fired_s))
+    sizes = np.clip(left, 0.0, thruster.greatest_impulse_m_s)
+    return np.asarray(np.maximum(times_s[:, None] - fired_s[None, :], 0.0) @ sizes)
+
+
+def _bracket(axes: Axes, shown: float, half: float, correction: float) -> None:
+    """Show beside the arrival what can be corrected, and the bound that is left."""
+    at, bound = -0.03 * shown, max(half - correction, 0.0)
+    for low, high, colour, text in (
+        (0.0, bound, INK, f"bound\n{bound:.1f} m"),
+        (bound, half, LIMIT, f"correction\n{half - bound:.1f} m"),
+    ):
+        arrow = {"arrowstyle": "<->", "color": colour, "linewidth": 0.9, "shrinkA": 0.0, "shrinkB": 0.0}
+        axes.annotate("", (at, high), xytext=(at, low), arrowprops=arrow)
+        axes.text(at - 0.02 * shown, 0.5 * (low + high), text, ha="left", va="center", color=colour, fontsize=7.0)

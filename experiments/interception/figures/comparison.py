@@ -1,0 +1,132 @@
+"""Strategies side by side: how the miss and the impulse spent are distributed, random beside game noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
+from numpy.typing import NDArray
+
+from experiments.common.figure_style import INK, SET_EDGE, SET_FILL, new_figure, place_axes, style
+from experiments.interception.comparison import Comparison
+from guidance import NoiseKind
+
+Floats = NDArray[np.float64]
+
+_ROW_MM = 9.0
+_BINS = 48
+_HILL = 0.62
+"""Greatest height of a histogram, in rows."""
+
+_BAR = 0.17
+"""Where the bar of the quantiles lies below the foot of its histogram, in rows."""
+
+_NOISES = ((NoiseKind.RANDOM, "random noise"), (NoiseKind.GAME, "game noise, worst of four tie rules"))
+
+
+def draw_comparison(compared: Sequence[Comparison]) -> Figure:
+    """Draw the distributions of (a, b) the miss and (c, d) the impulse spent, a row a strategy.
+
+    Parameters
+    ----------
+    compared : sequence of Comparison
+        Of each strategy one under random and one under game noise.
+
+    Returns
+    -------
+    Figure
+        Four axes: random noise left, game noise right. Misses are on a logarithmic axis.
+    """
+    names = list(dict.fromkeys(each.strategy for each in compared))
+    if not names:
+        raise ValueError("at least one strategy is needed")
+    height = _ROW_MM * len(names)
+    with style():
+        figure = new_figure(height_mm=2.0 * height + 46.0)
+        rows = place_axes(figure, 2, 2, margins_mm=(30.0, 4.0, 20.0, 7.0), gaps_mm=(6.0, 19.0))
+        _draw_row(rows[0], compared, names, lambda each: each.miss_m, logarithmic=True)
+        _draw_row(rows[1], compared, names, lambda each: each.impulse_m_s, logarithmic=False)
+        for row, label in zip(rows, ("miss, m", "impulse spent, m/s"), strict=True):
+            for axes in row:
+                axes.set_xlabel(label)
+        for axes, letter in zip((*rows[0], *rows[1]), "abcd", strict=True):
+            axes.set_title(f"({letter}) {_NOISES['abcd'.index(letter) % 2][1]}")
+        figure.legend(handles=_handles(len(compared[0].miss_m)), loc="lower center", ncols=5, columnspacing=1.6)
+    return figure
+
+
+def _draw_row(
+    row: Sequence[Axes],
+    compared: Sequence[Comparison],
+    names: Sequence[str],
+    value: Callable[[Comparison], Floats],
+    *,
+    logarithmic: bool,
+) -> None:
+    """Draw one quantity under both noises, on one scale."""
+    everything = np.concatenate([value(each) for each in compared])
+    left, right = _ends(everything, [value(each) for each in compared], logarithmic=logarithmic)
+    for axes, (noise, _) in zip(row, _NOISES, strict=True):
+        for each in compared:
+            if each.noise is noise:
+                _draw_strategy(axes, names.index(each.strategy), value(each), (left, right), logarithmic=logarithmic)
+        if logarithmic:
+            axes.set_xscale("log")
+            decades = 10.0 ** np.arange(np.ceil(np.log10(left) - 1e-9), np.floor(np.log10(right)) + 1.0)
+            axes.xaxis.set_major_locator(FixedLocator(decades.tolist()))
+            axes.xaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
+            axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.set_xlim(left, right)
+        axes.set_ylim(len(names) - 0.62, -0.78)
+        axes.set_yticks(range(len(names)), names)
+        axes.tick_params(axis="y", length=0.0)
+        axes.grid(visible=False, axis="y")
+    row[1].tick_params(labelleft=False)
+
+
+def _ends(everything: Floats, samples: Sequence[Floats], *, logarithmic: bool) -> tuple[float, float]:
+    """Ends of an axis; on a logarithmic one a few small values may lie left of it."""
+    if not logarithmic:
+        return 0.0, 1.04 * float(everything.max()) or 1.0
+    positive = everything[everything > 0.0]
+    if not positive.size:
+        return 0.1, 1.0
+    least = min(float(np.quantile(sample[sample > 0.0], 0.02)) for sample in samples if (sample > 0.0).any())
+    right = 1.25 * float(positive.max())
+    return min(least, 0.1 * right), right
+
+
+def _draw_strategy(axes: Axes, place: int, sample: Floats, ends: tuple[float, float], *, logarithmic: bool) -> None:
+    edges = np.geomspace(*ends, _BINS + 1) if logarithmic else np.linspace(*ends, _BINS + 1)
+    counts, _ = np.histogram(np.clip(sample, edges[0], edges[-1]), bins=edges)
+    heights = _HILL * counts / counts.max()
+    axes.stairs(
+        place - heights, edges, baseline=place, fill=True, facecolor=SET_FILL, edgecolor=SET_EDGE, linewidth=0.5
+    )
+    low, middle, high, nearly, worst = np.maximum(np.quantile(sample, (0.1, 0.5, 0.9, 0.99, 1.0)), ends[0])
+    level = place + _BAR
+    axes.plot([high, worst], [level, level], color=INK, linewidth=0.6, zorder=3.0, solid_capstyle="butt")
+    axes.plot([low, high], [level, level], color=INK, linewidth=2.4, zorder=3.0, solid_capstyle="butt")
+    axes.plot([middle], [level], marker="o", markersize=5.0, markerfacecolor="white", color=INK, zorder=4.0)
+    axes.plot([nearly], [level], marker="|", markersize=6.0, markeredgewidth=1.0, color=INK, zorder=4.0)
+    axes.plot([worst], [level], marker="x", markersize=4.5, markeredgewidth=1.0, color=INK, zorder=4.0)
+
+
+def _handles(runs: int) -> list[Line2D | Patch]:
+    def mark(marker: str, label: str, size: float) -> Line2D:
+        return Line2D(
+            [], [], linestyle="", marker=marker, markersize=size, markerfacecolor="white", color=INK, label=label
+        )
+
+    return [
+        Patch(facecolor=SET_FILL, edgecolor=SET_EDGE, linewidth=0.5, label=f"histogram of {runs} runs"),
+        mark("o", "median", 5.0),
+        Line2D([], [], color=INK, linewidth=2.4, label="10 to 90 %"),
+        mark("|", "99 %", 6.0),
+        mark("x", "worst run", 4.5),
+    ]

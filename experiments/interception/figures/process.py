@@ -1,0 +1,289 @@
+"""The course of engagements against time: the paper's figure 2."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from experiments.common.figure_style import (
+    IMPULSE,
+    INK,
+    LIMIT,
+    MEASURED,
+    SET_EDGE,
+    SET_FILL,
+    TRUTH,
+    WIDTH_MM,
+    new_figure,
+    place_axes,
+    plain,
+    style,
+    width_mm,
+)
+from experiments.interception.record_titles import outcome_title, record_titles
+from sim import Record
+
+Floats = NDArray[np.float64]
+
+ANGLE_RANGE_SHARE = 0.01
+RATE_RANGE_SHARE = 0.1
+"""The axes cover what is seen above this share of the first range: nearer, angle and rate blow up as 1/x and 1/x^2."""
+
+_ROWS = 4
+_LETTER_MM, _LINE_MM = 1.8, 4.0
+"""Mean width of a letter of a title, and the height of its lines."""
+
+_MOST_DECADES = 4
+"""Decades up to which each is labelled."""
+
+_RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def draw_process(records: Sequence[Record]) -> Figure:
+    """Draw angle, angular rate, impulse and predicted miss against time, one column a record.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        At least one.
+
+    Returns
+    -------
+    Figure
+        Four rows of axes; the axes of a row have the same limits.
+    """
+    if not records:
+        raise ValueError("at least one record is needed")
+    with style():
+        gap = 7.0 if len(records) > 1 else 0.0
+        letters = int((WIDTH_MM - 25.0 - gap * (len(records) - 1)) / len(records) / _LETTER_MM)
+        titles = [
+            "\n".join([*textwrap.wrap(title, letters), *textwrap.wrap(outcome_title(record), letters)])
+            for title, record in zip(map(plain, record_titles(records)), records, strict=True)
+        ]
+        top = 4.0 + _LINE_MM * max(title.count("\n") + 1 for title in titles)
+        figure = new_figure(height_mm=184.0 + top)
+        grid = place_axes(figure, _ROWS, len(records), margins_mm=(21.0, 4.0, 24.0, top), gaps_mm=(gap, 4.0))
+        for record, title, column in zip(records, titles, zip(*grid, strict=True), strict=True):
+            _draw_angle(column[0], record)
+            _draw_rate(column[1], record)
+            _draw_impulse(column[2], record)
+            draw_predicted_miss(column[3], record)
+            column[0].set_title(title, linespacing=1.3)
+            column[-1].set_xlabel("time t, s")
+        _level(grid[0], [_angle_extent(record) for record in records], scale=1e3)
+        _level(grid[1], [_rate_extent(record) for record in records], scale=1e6)
+        _level_impulse(grid[2], records)
+        level_predicted_miss(grid[3], records)
+        for record, column in zip(records, zip(*grid, strict=True), strict=True):
+            _note_exit(column[0], _angles(record) * 1e3, record, 1.0, "mrad")
+            _note_exit(column[1], _rates(record) * 1e6, record, 1e-3, "mrad/s")
+        _finish(figure, grid, records)
+    return figure
+
+
+def _draw_angle(axes: Axes, record: Record) -> None:
+    measured = [(step.time_s, step.measured_angle_rad) for step in record.steps if step.measured_angle_rad is not None]
+    if measured:
+        times, angles = np.array(measured).T
+        axes.plot(
+            times, angles * 1e3, ".", color=MEASURED, markersize=6.0 if _marker(record) else 3.0, markeredgewidth=0.0
+        )
+    axes.plot(_times(record), _angles(record) * 1e3, color=TRUTH, marker=_marker(record), markersize=3.0)
+
+
+def _draw_rate(axes: Axes, record: Record) -> None:
+    axes.axhline(0.0, color=LIMIT, linewidth=0.6)
+    measured = [
+        (step.time_s, step.measured_rate_rad_s) for step in record.steps if step.measured_rate_rad_s is not None
+    ]
+    if measured:
+        times, rates = np.array(measured).T
+        axes.plot(times, rates * 1e6, ".", color=MEASURED, markersize=3.0, markeredgewidth=0.0)
+    axes.plot(_times(record), _rates(record) * 1e6, color=TRUTH, marker=_marker(record), markersize=3.0)
+
+
+def _draw_impulse(axes: Axes, record: Record) -> None:
+    times = _times(record)
+    impulses = np.array([step.impulse_m_s for step in record.steps])
+    greatest = record.scenario.thruster.greatest_impulse_m_s
+    axes.axhline(0.0, color=LIMIT, linewidth=0.6)
+    for limit in (-greatest, greatest):
+        axes.axhline(limit, color=LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
+    axes.annotate(
+        f"greatest impulse ±{greatest:g} m/s",
+        (0.985, greatest),
+        xycoords=axes.get_yaxis_transform(),
+        xytext=(0.0, 2.5),
+        textcoords="offset points",
+        ha="right",
+        va="bottom",
+    )
+    given = impulses != 0.0
+    axes.vlines(times[given], 0.0, impulses[given], color=IMPULSE, linewidth=0.9)
+    axes.plot(times[given], impulses[given], ".", color=IMPULSE, markersize=2.2, markeredgewidth=0.0)
+
+
+def draw_predicted_miss(axes: Axes, record: Record) -> None:
+    """Draw the predicted-miss interval against time.
+
+    Parameters
+    ----------
+    axes : Axes
+    record : Record
+    """
+    times, lower, upper = _predicted_miss(record)
+    axes.axhline(0.0, color=LIMIT, linewidth=0.6)
+    axes.fill_between(times, lower, upper, color=SET_FILL, linewidth=0.0)
+    for bound in (lower, upper):
+        axes.plot(times, bound, color=SET_EDGE, linewidth=0.9, marker=_marker(record), markersize=3.0)
+
+
+def _level(row: Sequence[Axes], extents: Sequence[tuple[float, float]], scale: float) -> None:
+    least = min(extent[0] for extent in extents) * scale
+    greatest = max(extent[1] for extent in extents) * scale
+    margin = 0.12 * (greatest - least) or 0.1 * abs(greatest) or 1.0
+    for axes in row:
+        axes.set_ylim(least - margin, greatest + 1.8 * margin)
+
+
+def _level_impulse(row: Sequence[Axes], records: Sequence[Record]) -> None:
+    greatest = max(record.scenario.thruster.greatest_impulse_m_s for record in records)
+    for axes in row:
+        axes.set_ylim(-1.2 * greatest, 1.35 * greatest)
+
+
+def level_predicted_miss(row: Sequence[Axes], records: Sequence[Record]) -> None:
+    """Give axes of predicted misses the same limits: linear to ten metres, a step a decade beyond.
+
+    Parameters
+    ----------
+    row : sequence of Axes
+    records : sequence of Record
+    """
+    bounds = np.concatenate([np.concatenate(_predicted_miss(record)[1:]) for record in records])
+    greatest = float(np.abs(bounds).max(initial=10.0))
+    decades = int(np.log10(greatest) + 1e-9)
+    powers = range(1, decades + 1) if decades <= _MOST_DECADES else range(1, decades + 1, 2)
+    names = ["10" + (str(power).translate(_RAISED) if power > 1 else "") for power in powers]
+    sizes = [10.0**power for power in powers]
+    between = [10.0**power for power in range(decades + 1) if power not in powers]
+    for axes in row:
+        axes.set_yscale("symlog", linthresh=10.0, linscale=1.0)
+        axes.set_yticks(
+            [*(-size for size in reversed(sizes)), 0.0, *sizes],
+            [*("\N{MINUS SIGN}" + name for name in reversed(names)), "0", *names],
+        )
+        axes.set_yticks([*(-size for size in between), *between], minor=True)
+        axes.set_ylim(-2.0 * greatest, 2.0 * greatest)
+
+
+def _note_exit(axes: Axes, values: Floats, record: Record, scale: float, unit: str) -> None:
+    """Say how far a curve goes that leaves the axes."""
+    low, high = axes.get_ylim()
+    beyond = np.maximum(values - high, low - values)
+    worst = int(beyond.argmax())
+    if beyond[worst] <= 0.0:
+        return
+    value = float(values[worst]) * scale
+    if abs(value) >= 1e3:
+        value, unit = 1e-3 * value, unit.removeprefix("m")
+    text = f"to {_signed(value)} {unit} at {record.steps[worst].time_s:g} s"
+    down = values[worst] < low
+    axes.annotate(
+        text,
+        (0.985, 0.94 if down else 0.06),
+        xycoords="axes fraction",
+        ha="right",
+        va="top" if down else "bottom",
+        bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
+    )
+
+
+def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], records: Sequence[Record]) -> None:
+    labels = (
+        "line-of-sight angle α, mrad",
+        "line-of-sight rate ω, µrad/s",
+        "impulse k, m/s",
+        "predicted miss π, m\n(linear within ±10 m)",
+    )
+    end = max(record.steps[-1].time_s for record in records)
+    start = min(record.steps[0].time_s for record in records)
+    margin = 0.015 * (end - start) or 0.5
+    for row, label in zip(grid, labels, strict=True):
+        for axes in row:
+            axes.set_xlim(start - margin, end + margin)
+            axes.tick_params(labelbottom=row is grid[-1], labelleft=axes is row[0])
+            axes.set_ylabel(label)
+            axes.yaxis.label.set_visible(axes is row[0])
+        row[0].yaxis.set_label_coords(-12.5 / width_mm(row[0]), 0.5)
+    rated = any(step.measured_rate_rad_s is not None for record in records for step in record.steps)
+    measured = "measured angle and rate" if rated else "measured angle"
+    handles = [
+        Line2D([], [], color=TRUTH, label="true angle and rate"),
+        Line2D([], [], color=MEASURED, marker=".", markersize=7, linestyle="none", label=measured),
+        Line2D([], [], color=IMPULSE, linewidth=1.2, label="impulse given"),
+        Line2D([], [], color=LIMIT, linewidth=0.8, linestyle=(0, (4, 2)), label="greatest impulse"),
+        Patch(facecolor=SET_FILL, edgecolor=SET_EDGE, label="predicted-miss interval"),
+    ]
+    figure.legend(handles=handles, loc="lower center", ncols=3, columnspacing=2.5, labelcolor=INK)
+
+
+def _times(record: Record) -> Floats:
+    return np.array([step.time_s for step in record.steps])
+
+
+def _angles(record: Record) -> Floats:
+    return np.array([step.true_angle_rad for step in record.steps])
+
+
+def _rates(record: Record) -> Floats:
+    return np.array([step.true_rate_rad_s for step in record.steps])
+
+
+def _predicted_miss(record: Record) -> tuple[Floats, Floats, Floats]:
+    known = [(step.time_s, *step.predicted_miss_m) for step in record.steps if step.predicted_miss_m is not None]
+    times, lower, upper = np.array(known).reshape(-1, 3).T
+    return times, lower, upper
+
+
+def _far(record: Record, share: float) -> NDArray[np.bool_]:
+    ranges = np.array([step.true_range_m for step in record.steps])
+    return np.asarray(ranges >= share * ranges.max())
+
+
+def _angle_extent(record: Record) -> tuple[float, float]:
+    far = _far(record, ANGLE_RANGE_SHARE)
+    seen = [step.true_angle_rad for step, use in zip(record.steps, far, strict=True) if use]
+    seen += [
+        step.measured_angle_rad
+        for step, use in zip(record.steps, far, strict=True)
+        if use and step.measured_angle_rad is not None
+    ]
+    return min(seen), max(seen)
+
+
+def _rate_extent(record: Record) -> tuple[float, float]:
+    far = _far(record, RATE_RANGE_SHARE)
+    seen = _rates(record)[far].tolist()
+    seen += [
+        step.measured_rate_rad_s
+        for step, use in zip(record.steps, far, strict=True)
+        if use and step.measured_rate_rad_s is not None
+    ]
+    return min(seen), max(seen)
+
+
+def _marker(record: Record) -> str:
+    return "o" if len(record.steps) == 1 else ""
+
+
+def _signed(value: float) -> str:
+    return f"{value:.3g}".replace("-", "\N{MINUS SIGN}")

@@ -1,0 +1,279 @@
+"""Information sets in the (omega, alpha) plane: the paper's figure 3."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from string import ascii_lowercase
+from typing import Any
+
+import numpy as np
+from matplotlib import patheffects
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Polygon
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from experiments.common.figure_style import INK, MEASURED, new_figure, place_axes, plain, style, width_mm
+from experiments.interception.record_titles import record_titles
+from infoset import Section
+from sim import Record, StepRecord
+
+Floats = NDArray[np.float64]
+Colour = tuple[float, float, float]
+
+TRUTH_MARK = "true (ω, α)"
+MEASUREMENT_MARK = "measured α, drawn at the true ω"
+
+_DARK, _LIGHT = (0.03, 0.14, 0.36), (0.36, 0.66, 0.86)
+_LABEL_MM, _LABEL_ROOM_MM = 14.0, 19.0
+"""Where the labels start, and the room that the sets leave for them, from the right side of the axes."""
+
+
+def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8.0), sections: int = 5) -> Figure:
+    """Draw sections of the sets after the measurement: one row a time, one column a record.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        At least one.
+    times_s : sequence of float
+        The nearest step is shown, and the title says which it is.
+    sections : int
+        Most sections to show, evenly chosen over the range, the first and the last included.
+
+    Returns
+    -------
+    Figure
+        The axes of a row have the same limits.
+    """
+    if not records or not times_s:
+        raise ValueError("at least one record and one time are needed")
+    if sections < 1:
+        raise ValueError(f"at least one section must be shown: got {sections}")
+    with style():
+        figure = new_figure(height_mm=25.0 + 63.0 * len(times_s))
+        grid = place_axes(
+            figure,
+            len(times_s),
+            len(records),
+            margins_mm=(17.0, 4.0, 26.0, 11.0),
+            gaps_mm=(6.0 if len(records) > 1 else 0.0, 15.5),
+        )
+        titles = [plain(each) for each in record_titles(records)]
+        if len(records) > 1:
+            titles = [
+                title.removeprefix(f"({letter}) ") for title, letter in zip(titles, ascii_lowercase, strict=False)
+            ]
+        count = len(times_s) * len(records)
+        letters = iter([f"({each}) " for each in ascii_lowercase[:count]] if 1 < count <= 26 else [""] * count)
+        for time, row in zip(times_s, grid, strict=True):
+            steps = [min(record.steps, key=lambda step: abs(step.time_s - time)) for record in records]
+            shown = [choose_sections(step.sections, sections) for step in steps]
+            level_planes(row, [extent_of(step, chosen) for step, chosen in zip(steps, shown, strict=True)])
+            for axes, record, step, chosen, title in zip(row, records, steps, shown, titles, strict=True):
+                _shade_allowed(axes, record, step, chosen)
+                draw_step(axes, step, chosen)
+                axes.set_title(f"{next(letters)}{title}, t = {step.time_s:g} s")
+                axes.set_xlabel("line-of-sight rate ω, µrad/s", labelpad=2.0)
+                axes.set_ylabel("line-of-sight angle α, mrad")
+                axes.yaxis.label.set_visible(axes is row[0])
+                axes.tick_params(labelleft=axes is row[0])
+        handles: list[Line2D | Patch] = [
+            Line2D([], [], label=TRUTH_MARK, **_TRUTH_LOOK),
+            Line2D([], [], label=MEASUREMENT_MARK, **_MEASUREMENT_LOOK),
+            Line2D([], [], color=_colour(0, 2), label="section of the set, with its range in km"),
+            Patch(facecolor=MEASURED, alpha=0.22, label="angles that the measurement allows at these ranges"),
+        ]
+        figure.legend(handles=handles, loc="lower center", ncols=2, columnspacing=2.5)
+    return figure
+
+
+def choose_sections(sections: Sequence[Section], most: int) -> list[Section]:
+    """Return up to so many sections, evenly chosen over the range, the first and the last included.
+
+    Parameters
+    ----------
+    sections : sequence of Section
+        In rising order of range.
+    most : int
+
+    Returns
+    -------
+    list of Section
+    """
+    if len(sections) <= most:
+        return list(sections)
+    if most == 1:
+        return [sections[len(sections) // 2]]
+    ranges = np.array([section.range_m for section in sections])
+    wanted = np.linspace(ranges[0], ranges[-1], most)
+    chosen = np.unique(np.abs(ranges[None, :] - wanted[:, None]).argmin(axis=1))
+    return [sections[index] for index in chosen]
+
+
+_TRUTH_LOOK: dict[str, Any] = {
+    "marker": "x",
+    "color": INK,
+    "markersize": 7.0,
+    "markeredgewidth": 1.6,
+    "linestyle": "none",
+}
+_MEASUREMENT_LOOK: dict[str, Any] = {
+    "marker": "s",
+    "markerfacecolor": "white",
+    "markeredgecolor": INK,
+    "markersize": 5.5,
+    "markeredgewidth": 1.3,
+    "linestyle": "none",
+}
+
+
+def draw_step(axes: Axes, step: StepRecord, chosen: Sequence[Section]) -> None:
+    """Draw some sections of one step with the truth and the measurement, on axes that have their limits.
+
+    Parameters
+    ----------
+    axes : Axes
+    step : StepRecord
+    chosen : sequence of Section
+    """
+    outlines = [_outline(section) for section in chosen]
+    for index, outline in enumerate(outlines):
+        _draw_outline(axes, outline, _colour(index, len(outlines)), zorder=3.0 - 0.01 * index)
+    _label(axes, chosen, outlines)
+    halo = [patheffects.withStroke(linewidth=3.2, foreground="white")]
+    rate = step.true_rate_rad_s * 1e6
+    if step.measured_angle_rad is not None:
+        axes.plot(rate, step.measured_angle_rad * 1e3, zorder=5, label=MEASUREMENT_MARK, **_MEASUREMENT_LOOK)
+    axes.plot(rate, step.true_angle_rad * 1e3, zorder=6, label=TRUTH_MARK, path_effects=halo, **_TRUTH_LOOK)
+    if not outlines:
+        axes.text(0.5, 0.94, "no section is left", transform=axes.transAxes, ha="center", va="top")
+
+
+def _shade_allowed(axes: Axes, record: Record, step: StepRecord, chosen: Sequence[Section]) -> None:
+    """Shade the angles that the measurement allows at the nearest and at the farthest section drawn."""
+    if step.measured_angle_rad is None or not chosen:
+        return
+    for section in (chosen[0], chosen[-1]):
+        error = float(record.scenario.set_model.angle_sensor.error_bound(section.range_m))
+        low, high = ((step.measured_angle_rad + sign * error) * 1e3 for sign in (-1.0, 1.0))
+        axes.axhspan(low, high, color=MEASURED, alpha=0.09, linewidth=0.0, zorder=0.4)
+
+
+def _draw_outline(axes: Axes, outline: Floats, colour: Colour, zorder: float) -> None:
+    """Draw a section; a point becomes a dot and a segment a thick line with dots at its ends."""
+    if len(outline) > 2:
+        patch = Polygon(outline.tolist(), closed=True, facecolor=(*colour, 0.05), edgecolor=(*colour, 1.0))
+        patch.set(linewidth=1.1, joinstyle="round", zorder=zorder)
+        axes.add_patch(patch)
+    elif len(outline):
+        axes.plot(*outline.T, color=colour, linewidth=2.0, marker="o", markersize=4.0, zorder=zorder + 1.0)
+
+
+def _label(axes: Axes, chosen: Sequence[Section], outlines: Sequence[Floats]) -> None:
+    """Put the ranges in a column to the right of the sets, in the order that crosses the fewer of their lines."""
+    anchors = [(*_right_top(outline), index) for index, outline in enumerate(outlines) if len(outline)]
+    if not anchors:
+        return
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    spacing = 0.085 * (high - low)
+    heights = _spread(sorted(y for _, y, _ in anchors), spacing, low + 0.6 * spacing, high - 0.6 * spacing)
+    start = right - _LABEL_MM / width_mm(axes) * (right - left)
+    anchors = min(anchors, anchors[::-1], key=lambda order: _crossings(order, heights, start))
+    for (x, y, index), height in zip(anchors, heights, strict=True):
+        axes.annotate(
+            f"{chosen[index].range_m / 1e3:.{0 if chosen[index].range_m >= 1e6 else 1}f} km",
+            (x, y),
+            xytext=(start, height),
+            ha="left",
+            va="center",
+            zorder=4.5,
+            arrowprops={
+                "arrowstyle": "-",
+                "color": _colour(index, len(outlines)),
+                "linewidth": 0.6,
+                "shrinkA": 1.0,
+                "shrinkB": 0.0,
+                "relpos": (0.0, 0.5),
+            },
+        )
+
+
+def _crossings(anchors: Sequence[tuple[float, float, int]], heights: Floats, start: float) -> int:
+    """Count the lines that cross on the way from their anchors to the column at `start`, its heights rising."""
+    count = 0
+    for (lower, low_end), (upper, high_end) in combinations(zip(anchors, heights, strict=True), 2):
+        at = max(lower[0], upper[0])
+        low, high = (y + (end - y) * (at - x) / (start - x) for (x, y, _), end in ((lower, low_end), (upper, high_end)))
+        count += low > high
+    return count
+
+
+def _right_top(outline: Floats) -> tuple[float, float]:
+    """Return the rightmost vertex, the upper one of a vertical edge."""
+    least, greatest = outline[:, 0].min(), outline[:, 0].max()
+    edge = outline[outline[:, 0] >= greatest - 1e-6 * (greatest - least)]
+    x, y = edge[edge[:, 1].argmax()]
+    return float(x), float(y)
+
+
+def _spread(wanted: Sequence[float], spacing: float, low: float, high: float) -> Floats:
+    """Heights nearest the wanted rising ones, so far apart and inside the limits."""
+    heights = np.clip(np.asarray(wanted, dtype=np.float64), low, high)
+    steps = spacing * np.arange(len(heights))
+    heights = np.maximum.accumulate(heights - steps) + steps
+    over = np.maximum(0.0, heights - (high - steps[::-1]))
+    return np.asarray(heights - over)
+
+
+def level_planes(row: Sequence[Axes], points: Sequence[Floats]) -> None:
+    """Give planes of sets the same limits, with room for the labels.
+
+    Parameters
+    ----------
+    row : sequence of Axes
+    points : sequence of ndarray, shape (n, 2)
+        What must be seen, as `extent_of` returns it.
+    """
+    everything = np.concatenate(points)
+    least, greatest = everything.min(axis=0), everything.max(axis=0)
+    margin = 0.07 * (greatest - least)
+    margin = np.where(margin > 0.0, margin, np.maximum(0.05 * np.abs(greatest), 1e-6))
+    least, greatest = least - margin, greatest + margin
+    for axes in row:
+        room = _LABEL_ROOM_MM / width_mm(axes)
+        axes.set_xlim(float(least[0]), float(greatest[0] + room / (1.0 - room) * (greatest[0] - least[0])))
+        axes.set_ylim(float(least[1]), float(greatest[1]))
+        axes.xaxis.set_major_locator(MaxNLocator(nbins=6 if np.abs(least[0]) < 1e4 else 3, steps=[1, 2, 2.5, 5, 10]))
+
+
+def extent_of(step: StepRecord, chosen: Sequence[Section]) -> Floats:
+    """Return all points (omega in µrad/s, alpha in mrad) that a drawing of a step must have room for.
+
+    Parameters
+    ----------
+    step : StepRecord
+    chosen : sequence of Section
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+    """
+    rate, angle = step.true_rate_rad_s * 1e6, step.true_angle_rad * 1e3
+    marks = [[rate, angle]]
+    if step.measured_angle_rad is not None:
+        marks.append([rate, step.measured_angle_rad * 1e3])
+    return np.concatenate([np.array(marks), *(_outline(section) for section in chosen)])
+
+
+def _outline(section: Section) -> Floats:
+    return np.asarray(section.omega_alpha.polygon() * np.array([1e6, 1e3]))
+
+
+def _colour(index: int, count: int) -> Colour:
+    share = index / max(count - 1, 1)
+    red, green, blue = ((1.0 - share) * dark + share * light for dark, light in zip(_DARK, _LIGHT, strict=True))
+    return red, green, blue

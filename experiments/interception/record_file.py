@@ -1,0 +1,489 @@
+"""Records of engagements as `.npz` files: a JSON header and plain arrays, no pickle.
+
+The members of the archive are stored, not compressed, so that no file can hold more than its own size. The sets are
+flat vertices with offsets. What is not known in a step has a mask; no number stands for a reason.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import io
+import json
+import os
+import struct
+import tokenize
+import warnings
+import zipfile
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.common.errors import InputError
+from experiments.common.output import library_version, write_file
+from experiments.common.toml_values import shown
+from experiments.interception.scenario_file import read_scenario, scenario_to_toml
+from infoset import ConvexPolygons, Section
+from infoset.limits import LARGEST, SMALLEST
+from sim import Inconsistency, Outcome, Record, Results, Scenario, StepRecord
+
+FORMAT = "infoset-record"
+SCHEMA = 2
+LARGEST_FILE_BYTES = 1 << 30
+LARGEST_HEADER_BYTES = 1_000_000
+LONGEST_NAME = 200
+REMEDY = "make a record with `infoset engage --record FILE.npz`"
+
+Floats = NDArray[np.float64]
+Arrays = dict[str, NDArray[Any]]
+
+_STEPS, _STEPS_2, _STEPS_AND_1, _SECTIONS, _SECTIONS_AND_1, _VERTICES_2, _ANY = range(7)
+_FLOAT, _FLAG, _COUNT, _BYTE = "<f8", "|b1", "<i8", "|u1"
+
+_MEMBERS: Mapping[str, tuple[str, int]] = {
+    "header": (_BYTE, _ANY),
+    "time_s": (_FLOAT, _STEPS),
+    "angle_measured": (_FLAG, _STEPS),
+    "measured_angle_rad": (_FLOAT, _STEPS),
+    "range_measured": (_FLAG, _STEPS),
+    "measured_range_m": (_FLOAT, _STEPS),
+    "rate_measured": (_FLAG, _STEPS),
+    "measured_rate_rad_s": (_FLOAT, _STEPS),
+    "true_angle_rad": (_FLOAT, _STEPS),
+    "true_rate_rad_s": (_FLOAT, _STEPS),
+    "true_range_m": (_FLOAT, _STEPS),
+    "impulse_m_s": (_FLOAT, _STEPS),
+    "predicted_miss_exists": (_FLAG, _STEPS),
+    "predicted_miss_m": (_FLOAT, _STEPS_2),
+    "truth_margin_known": (_FLAG, _STEPS),
+    "truth_margin_m": (_FLOAT, _STEPS),
+    "section_offsets": (_COUNT, _STEPS_AND_1),
+    "section_label_m": (_FLOAT, _SECTIONS),
+    "section_range_m": (_FLOAT, _SECTIONS),
+    "vertex_offsets": (_COUNT, _SECTIONS_AND_1),
+    "vertex_v_m_s_z_m": (_FLOAT, _VERTICES_2),
+}
+"""Type and shape of each member."""
+_LISTED_MEMBER = b"PK\x01\x02"
+"""How an entry of an archive's list of members begins."""
+
+
+class _UnsoundError(Exception):
+    """Why a file is no record."""
+
+
+def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    """Write the record of an engagement as an `.npz` file, whole or not at all.
+
+    Parameters
+    ----------
+    record : Record
+    path : str or path
+        Where, ending in ``.npz``.
+    overwrite : bool
+        Whether it may be there already.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written, is there already, or no scenario file can hold the record's scenario.
+    """
+    file = record_path("record", Path(path))
+    toml = scenario_to_toml(record.scenario)
+    if read_scenario(toml, f"the scenario of {file}") != record.scenario:
+        raise InputError(f"{file}: the scenario {shown(record.scenario.name)} does not read back as it is; correct it")
+    arrays = _to_arrays(record)
+    header = {
+        "format": FORMAT,
+        "schema": SCHEMA,
+        "version": library_version(),
+        "seed": record.seed,
+        "run": record.run,
+        "strategy": record.strategy,
+        **({} if record.noise is None else {"noise": record.noise}),
+        "result": _result_to_json(record.result),
+        "inconsistency": None if record.inconsistency is None else dataclasses.asdict(record.inconsistency),
+        "scenario": toml,
+    }
+    header["sha256"] = _checksum(header, arrays)
+    text = json.dumps(header, allow_nan=False).encode()
+    content = _pack({"header": np.frombuffer(text, dtype=np.uint8), **arrays})
+    if len(content) > LARGEST_FILE_BYTES:
+        raise InputError(
+            f"{file}: the record would take {len(content)} bytes, more than the {LARGEST_FILE_BYTES} that can be read "
+            "back; take fewer sections or longer steps"
+        )
+    write_file(file, content, overwrite=overwrite)
+
+
+def read_record(path: str | os.PathLike[str]) -> Record:
+    """Read the record of an engagement.
+
+    Parameters
+    ----------
+    path : str or path
+        A file that `write_record` or ``infoset engage --record`` has written.
+
+    Returns
+    -------
+    Record
+        Equal, bit for bit, to what was written.
+
+    Raises
+    ------
+    InputError
+        If it is no such file, or no longer what was written.
+    """
+    file = Path(path)
+    try:
+        if file.is_dir():
+            raise InputError(f"{file}: is a folder; name a record in it, a file ending in .npz")
+        if file.exists() and not file.is_file():
+            raise InputError(f"{file}: is no ordinary file; {REMEDY}")
+        size = file.stat().st_size
+        if size > LARGEST_FILE_BYTES:
+            raise InputError(f"{file}: has {size} bytes, more than any record ({LARGEST_FILE_BYTES}); {REMEDY}")
+        content = file.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{file}: there is no such file; {REMEDY}") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise InputError(f"{file}: cannot be read: {reason}; check its name and permissions") from None
+    try:
+        arrays = _unpack(content)
+        header = _read_header(arrays.pop("header"))
+        if header.get("sha256") != _checksum(header, arrays):
+            raise _UnsoundError("its contents are not what was written (the checksum differs): the file is damaged")
+        return _to_record(header, arrays, str(file))
+    except _UnsoundError as error:
+        raise InputError(f"{file}: is not a readable record: {error}; {REMEDY}") from None
+
+
+def record_path(option: str, path: Path) -> Path:
+    """Return the path of a record if its name ends as it must.
+
+    Parameters
+    ----------
+    option : str
+        What it was given to.
+    path : Path
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        If it does not end in ``.npz``.
+    """
+    if path.suffix != ".npz":
+        raise InputError(f"{option}: {path} must end in .npz; for example {option} flight.npz")
+    return path
+
+
+def _to_arrays(record: Record) -> Arrays:
+    """Put the steps of a record into flat arrays."""
+    steps = record.steps
+    sections = [section for step in steps for section in step.sections]
+    polygons = [section.polygon.vertices[: int(section.polygon.counts)] for section in sections]
+    if any(section.closing_speed_m_s != record.scenario.set_model.closing_speed_m_s for section in sections):
+        raise ValueError("the sections of a record must have the closing speed of its scenario")
+
+    def optional(values: list[float | None]) -> tuple[NDArray[np.bool_], Floats]:
+        return np.array([value is not None for value in values], dtype=bool), _floats(value or 0.0 for value in values)
+
+    angle_measured, measured_angle = optional([step.measured_angle_rad for step in steps])
+    range_measured, measured_range = optional([step.measured_range_m for step in steps])
+    rate_measured, measured_rate = optional([step.measured_rate_rad_s for step in steps])
+    miss_exists = np.array([step.predicted_miss_m is not None for step in steps], dtype=bool)
+    margin_known, margin = optional([step.truth_margin_m for step in steps])
+    return {
+        "time_s": _floats(step.time_s for step in steps),
+        "angle_measured": angle_measured,
+        "measured_angle_rad": measured_angle,
+        "range_measured": range_measured,
+        "measured_range_m": measured_range,
+        "rate_measured": rate_measured,
+        "measured_rate_rad_s": measured_rate,
+        "true_angle_rad": _floats(step.true_angle_rad for step in steps),
+        "true_rate_rad_s": _floats(step.true_rate_rad_s for step in steps),
+        "true_range_m": _floats(step.true_range_m for step in steps),
+        "impulse_m_s": _floats(step.impulse_m_s for step in steps),
+        "predicted_miss_exists": miss_exists,
+        "predicted_miss_m": _floats(end for step in steps for end in (step.predicted_miss_m or (0.0, 0.0))).reshape(
+            -1, 2
+        ),
+        "truth_margin_known": margin_known,
+        "truth_margin_m": margin,
+        "section_offsets": _offsets([len(step.sections) for step in steps]),
+        "section_label_m": _floats(section.label_m for section in sections),
+        "section_range_m": _floats(section.range_m for section in sections),
+        "vertex_offsets": _offsets([len(polygon) for polygon in polygons]),
+        "vertex_v_m_s_z_m": np.concatenate([np.empty((0, 2)), *polygons]),
+    }
+
+
+def _floats(values: Any) -> Floats:
+    return np.fromiter(values, dtype=np.float64)
+
+
+def _offsets(counts: list[int]) -> NDArray[np.int64]:
+    return np.concatenate([[0], np.cumsum(np.array(counts, dtype=np.int64))]).astype(np.int64)
+
+
+def _result_to_json(result: Results) -> dict[str, object]:
+    if len(result) != 1:
+        raise ValueError(f"the result of a record is a batch of one: got {len(result)}")
+    return {
+        "miss_m": float(result.miss_m[0]),
+        "impulse_m_s": float(result.impulse_m_s[0]),
+        "guaranteed_miss_m": result.guaranteed_miss_m.tolist()[0],
+        "outcome": result.outcomes[0].value,
+        "truth_kept": bool(result.truth_kept[0]),
+        "truth_margin_m": result.truth_margin_m.tolist()[0],
+        "position_m": result.position_m[0].tolist(),
+        "velocity_m_s": result.velocity_m_s[0].tolist(),
+    }
+
+
+def _checksum(header: Mapping[str, object], arrays: Arrays) -> str:
+    """Return the SHA-256 of everything but itself."""
+    rest = {key: value for key, value in header.items() if key != "sha256"}
+    digest = hashlib.sha256(json.dumps(rest, sort_keys=True).encode())
+    for name in sorted(arrays):
+        digest.update(f"\0{name}{arrays[name].shape}\0".encode())
+        digest.update(np.ascontiguousarray(arrays[name]).tobytes())
+    return digest.hexdigest()
+
+
+def _pack(arrays: Arrays) -> bytes:
+    """Return an `.npz` archive that depends on nothing but its arrays."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_STORED) as archive:
+        for name, (kind, _) in _MEMBERS.items():
+            member = io.BytesIO()
+            values = np.ascontiguousarray(arrays[name], dtype=np.dtype(kind))
+            np.lib.format.write_array(member, values, version=(1, 0), allow_pickle=False)
+            archive.writestr(zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0)), member.getvalue())
+    return content.getvalue()
+
+
+def _unpack(content: bytes) -> Arrays:
+    """Read the members of an archive, none of which can be larger than the file."""
+    if content.count(_LISTED_MEMBER) > 2 * len(_MEMBERS):  # numbers may look like one, too
+        raise _UnsoundError("it has more members than any record")
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            members = archive.infolist()
+            names = [member.filename for member in members]
+            wanted = [f"{name}.npy" for name in _MEMBERS]
+            unknown = sorted(set(names) - set(wanted))
+            missing = [name for name in wanted if name not in names]
+            if unknown or missing:
+                what = f"it has {shown(unknown[0])}" if unknown else f"it has no {missing[0]}"
+                raise _UnsoundError(f"{what}: another program has made it")
+            if len(set(names)) != len(names):
+                raise _UnsoundError("it has a member twice")
+            if any(member.compress_type != zipfile.ZIP_STORED or member.flag_bits & 1 for member in members):
+                raise _UnsoundError("it is compressed or encrypted, which no record is")
+            if sum(member.file_size for member in members) > len(content):
+                raise _UnsoundError("it claims to hold more than its own size")
+            return {
+                member.filename.removesuffix(".npy"): _read_array(archive.read(member), member.filename)
+                for member in members
+            }
+    except zipfile.BadZipFile as error:
+        raise _UnsoundError(f"it is not a whole .npz archive ({error})") from None
+    except (OSError, ValueError, EOFError, RuntimeError, struct.error, OverflowError) as error:
+        raise _UnsoundError(f"the archive is damaged ({error})") from None
+
+
+def _read_array(member: bytes, filename: str) -> NDArray[Any]:
+    """Read an array after checking that its header tells the truth about its size."""
+    kind, shape_kind = _MEMBERS[filename.removesuffix(".npy")]
+    stream = io.BytesIO(member)
+    try:
+        version = np.lib.format.read_magic(stream)
+        if version != (1, 0):
+            raise _UnsoundError(f"{filename} has the array format {version}")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of the parser, about headers that are refused below
+            shape, fortran, dtype = np.lib.format.read_array_header_1_0(stream)
+    except (ValueError, TypeError, SyntaxError, KeyError, RecursionError, MemoryError, tokenize.TokenError) as error:
+        raise _UnsoundError(f"{filename} is damaged ({str(error)[:200]})") from None
+    two = shape_kind in (_STEPS_2, _VERTICES_2)
+    if dtype != np.dtype(kind) or fortran or len(shape) != 1 + two or (two and shape[1] != 2) or shape[0] < 0:
+        raise _UnsoundError(
+            f"{filename} holds {dtype} of shape {shape}, not {kind} of shape {'(n, 2)' if two else '(n,)'}"
+        )
+    data = member[stream.tell() :]
+    if len(data) != shape[0] * (1 + two) * dtype.itemsize:
+        raise _UnsoundError(f"{filename} holds {len(data)} bytes, not those of an array of shape {shape}")
+    if kind == _FLAG and data.strip(b"\0\1"):
+        raise _UnsoundError(f"{filename} holds flags other than true and false")
+    return np.frombuffer(data, dtype=dtype).reshape(shape)
+
+
+def _read_header(header: NDArray[Any]) -> dict[str, Any]:
+    if header.size > LARGEST_HEADER_BYTES:
+        raise _UnsoundError("its header is too long")
+    try:
+        found = json.loads(header.tobytes().decode())
+    except (ValueError, RecursionError):
+        raise _UnsoundError("its header is not JSON") from None
+    if not isinstance(found, dict) or found.get("format") != FORMAT:
+        raise _UnsoundError(f"its header does not say {FORMAT}: another program has made it")
+    if found.get("schema") != SCHEMA or isinstance(found["schema"], bool):
+        raise _UnsoundError(
+            f"it has the schema {shown(found.get('schema'))}, and this version of infoset reads {SCHEMA}"
+        )
+    return found
+
+
+def _to_record(header: Mapping[str, Any], arrays: Arrays, source: str) -> Record:
+    keys = {"format", "schema", "version", "seed", "run", "strategy", "result", "inconsistency", "scenario", "sha256"}
+    if set(header) - {"noise"} != keys:
+        raise _UnsoundError(f"its header has the keys {', '.join(sorted(map(str, header)))}")
+    seed, run, strategy, toml = (header[key] for key in ("seed", "run", "strategy", "scenario"))
+    if not (_is_whole(seed) and _is_whole(run) and run < 2**63 and isinstance(strategy, str) and isinstance(toml, str)):
+        raise _UnsoundError("its header has a wrong seed, run, strategy or scenario")
+    if not strategy.isprintable() or len(strategy) > LONGEST_NAME:
+        raise _UnsoundError("its header has a strategy whose name cannot be printed")
+    noise = header.get("noise", "")
+    if not isinstance(noise, str) or not noise.isprintable() or len(noise) > LONGEST_NAME:
+        raise _UnsoundError("its header has a noise whose name cannot be printed")
+    try:
+        scenario = read_scenario(toml, f"{source}: the scenario in it")
+    except InputError as error:
+        raise _UnsoundError(f"its scenario is unsound: {error}") from None
+    _check(arrays)
+    return Record(
+        scenario=scenario,
+        seed=seed,
+        run=run,
+        strategy=strategy,
+        result=_result_from_json(header["result"], run, scenario.set_model.is_guaranteed),
+        steps=_to_steps(arrays, scenario),
+        noise=header.get("noise"),
+        inconsistency=_inconsistency_from_json(header["inconsistency"], len(arrays["time_s"])),
+    )
+
+
+def _inconsistency_from_json(found: object, steps: int) -> Inconsistency | None:
+    if found is None:
+        return None
+    if not isinstance(found, dict) or set(found) != {"step", "label_m"}:
+        raise _UnsoundError("its header has a wrong inconsistency")
+    step, label = found["step"], found["label_m"]
+    if not (_is_whole(step) and step < steps and isinstance(label, float) and abs(label) <= LARGEST):
+        raise _UnsoundError("its header has a wrong inconsistency")
+    return Inconsistency(step, label)
+
+
+def _is_whole(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+
+
+def _check(arrays: Arrays) -> None:
+    """Refuse arrays that do not fit together."""
+    steps, sections = len(arrays["time_s"]), len(arrays["section_label_m"])
+    sizes = {
+        _STEPS: steps,
+        _STEPS_2: steps,
+        _STEPS_AND_1: steps + 1,
+        _SECTIONS: sections,
+        _SECTIONS_AND_1: sections + 1,
+    }
+    for name, values in arrays.items():
+        wanted = sizes.get(_MEMBERS[name][1])
+        if wanted is not None and len(values) != wanted:
+            raise _UnsoundError(f"{name} has {len(values)} rows, not {wanted}")
+        if values.dtype.kind == "f" and not np.isfinite(values).all():
+            raise _UnsoundError(f"{name} holds what is not a finite number")
+        if values.dtype.kind == "f" and values.size and np.abs(values).max() > LARGEST:
+            raise _UnsoundError(f"{name} holds {np.abs(values).max():.3g}, more than {LARGEST:g} in size")
+    if steps == 0:
+        raise _UnsoundError("it has no step")
+    if (np.diff(arrays["time_s"]) <= 0.0).any() or arrays["time_s"][0] < 0.0:
+        raise _UnsoundError("time_s does not rise")
+    for name, size, least in (("section_offsets", sections, 0), ("vertex_offsets", len(arrays["vertex_v_m_s_z_m"]), 1)):
+        offsets = arrays[name]
+        # The ends are compared before the differences, and one by one: a difference may overflow.
+        if offsets[0] != 0 or offsets[-1] != size or (offsets < 0).any() or (offsets > size).any():
+            raise _UnsoundError(f"{name} does not run from 0 to {size}")
+        if (np.diff(offsets) < least).any():
+            raise _UnsoundError(f"{name} does not rise")
+    if (arrays["section_range_m"] < SMALLEST).any():
+        raise _UnsoundError(f"section_range_m holds a range that is not positive, at least {SMALLEST:g}")
+    for name in ("measured_range_m", "true_range_m"):
+        if (arrays[name] < 0.0).any():
+            raise _UnsoundError(f"{name} holds a range that is negative")
+
+
+def _result_from_json(found: object, run: int, guarantees: bool) -> Results:
+    keys = ("miss_m", "impulse_m_s", "guaranteed_miss_m", "outcome", "truth_kept", "truth_margin_m")
+    if not isinstance(found, dict) or set(found) != {*keys, "position_m", "velocity_m_s"}:
+        raise _UnsoundError("its header has a wrong result")
+    miss, impulse, guaranteed, outcome, kept, margin = (found[key] for key in keys)
+    pairs = [found["position_m"], found["velocity_m_s"]]
+    if not all(isinstance(pair, list) and len(pair) == 2 for pair in pairs):
+        raise _UnsoundError("its header has a wrong start")
+    numbers = [miss, impulse, *pairs[0], *pairs[1], *(each for each in (guaranteed, margin) if each is not None)]
+    if not all(isinstance(each, float) and abs(each) <= LARGEST for each in numbers) or not isinstance(kept, bool):
+        raise _UnsoundError("its header has a wrong result")
+    if min(miss, impulse, guaranteed or 0.0) < 0.0:
+        raise _UnsoundError("its header has a negative miss or impulse")
+    if outcome not in [each.value for each in Outcome]:
+        raise _UnsoundError(f"its header has the outcome {shown(outcome)}")
+    return Results(
+        runs=np.array([run]),
+        miss_m=np.array([miss]),
+        impulse_m_s=np.array([impulse]),
+        guaranteed_miss_m=np.ma.MaskedArray([guaranteed or 0.0], mask=[guaranteed is None]),
+        outcomes=(Outcome(outcome),),
+        truth_kept=np.array([kept]),
+        truth_margin_m=np.ma.MaskedArray([margin or 0.0], mask=[margin is None]),
+        position_m=np.array([pairs[0]]),
+        velocity_m_s=np.array([pairs[1]]),
+        guarantees=guarantees,
+    )
+
+
+def _to_steps(arrays: Arrays, scenario: Scenario) -> tuple[StepRecord, ...]:
+    speed = scenario.set_model.closing_speed_m_s
+    vertices = arrays["vertex_v_m_s_z_m"]
+    bounds = arrays["vertex_offsets"].tolist()
+    sections = [
+        Section(label, now, speed, ConvexPolygons(vertices[first:last].copy(), np.asarray(last - first)))
+        for label, now, first, last in zip(
+            arrays["section_label_m"].tolist(), arrays["section_range_m"].tolist(), bounds[:-1], bounds[1:], strict=True
+        )
+    ]
+    ends = arrays["section_offsets"].tolist()
+
+    def optional(mask: str, values: str) -> list[Any]:
+        return [
+            value if known else None
+            for known, value in zip(arrays[mask].tolist(), arrays[values].tolist(), strict=True)
+        ]
+
+    columns = zip(
+        arrays["time_s"].tolist(),
+        optional("angle_measured", "measured_angle_rad"),
+        optional("range_measured", "measured_range_m"),
+        optional("rate_measured", "measured_rate_rad_s"),
+        arrays["true_angle_rad"].tolist(),
+        arrays["true_rate_rad_s"].tolist(),
+        arrays["true_range_m"].tolist(),
+        arrays["impulse_m_s"].tolist(),
+        [miss and (miss[0], miss[1]) for miss in optional("predicted_miss_exists", "predicted_miss_m")],
+        optional("truth_margin_known", "truth_margin_m"),
+        [tuple(sections[first:last]) for first, last in pairwise(ends)],
+        strict=True,
+    )
+    return tuple(StepRecord(*row) for row in columns)

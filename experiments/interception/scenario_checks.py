@@ -1,0 +1,220 @@
+"""What the values of a scenario file must be to one another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from decimal import Decimal
+
+from experiments.common.toml_file import Known, Problem
+from experiments.common.toml_values import KILO, DecimalPair, shown, si
+from guidance import Thruster
+from infoset import AngleSensor, Model, SetModel, StateBox
+from sim.draws import MOST_STEPS
+from sim.gravity import greatest_impulses_m_s, with_gravity
+from sim.kepler import LONGEST_SUBSTEP_S
+from sim.scenario import Sun
+
+MOST_LEAPS = 10_000_000
+"""Stretches that the truth of one flight may be integrated in: some minutes."""
+WHOLE_STEPS_TOLERANCE = Decimal("1e-9")
+
+
+def cross_problems(known: Known) -> Iterator[Problem]:
+    """Yield what is wrong between keys, as far as the sound values tell."""
+    yield from _impulses(known)
+    yield from _periods(known)
+    yield from _ranges(known)
+    yield from _error_law(known)
+    yield from _sections(known)
+    yield from _sun(known)
+    yield from _closing_speeds(known)
+
+
+def _impulses(known: Known) -> Iterator[Problem]:
+    least = known.number("thruster", "least_impulse_m_s")
+    greatest = known.number("thruster", "greatest_impulse_m_s")
+    if least is not None and greatest is not None and least > greatest:
+        yield Problem(
+            ("thruster", "least_impulse_m_s"),
+            f"must not exceed thruster.greatest_impulse_m_s, {shown(greatest)}, found {shown(least)}",
+            "lower it, or raise the greatest impulse",
+        )
+
+
+def _periods(known: Known) -> Iterator[Problem]:
+    step = known.number("guidance", "step_s")
+    for sensor in ("angle_sensor", "range_sensor", "rate_sensor"):
+        period = known.number(sensor, "period_s")
+        if step is None or period is None:
+            continue
+        steps = period / step
+        whole = max(Decimal(1), steps.to_integral_value())
+        if abs(steps - whole) > WHOLE_STEPS_TOLERANCE * whole:
+            yield Problem(
+                (sensor, "period_s"),
+                f"must be a whole number of steps of guidance.step_s, {shown(step)} s, found {shown(period)}",
+                f"write period_s = {shown((whole * step).normalize())}, or a step that divides it",
+            )
+
+
+def _spans(known: Known, key: str) -> Iterator[tuple[str, DecimalPair]]:
+    for table in ("uncertainty", "dispersion"):
+        pair = known.pair(table, key)
+        if pair is not None:
+            yield f"{table}.{key}", pair
+
+
+def _ranges(known: Known) -> Iterator[Problem]:
+    step = known.number("guidance", "step_s")
+    speed = known.number("nominal", "closing_speed_km_s")
+    threshold = known.number("guidance", "range_threshold_km")
+    spans = list(_spans(known, "x_km"))
+    if not spans:
+        return
+    where, (least, _) = min(spans, key=lambda span: span[1][0])
+    if threshold is not None and threshold >= least:
+        yield Problem(
+            ("guidance", "range_threshold_km"),
+            f"must be below the least possible range, {shown(least)} km of {where}, found {shown(threshold)}",
+            "lower it, or start farther away",
+        )
+    elif threshold is not None and step is not None and speed is not None and threshold + speed * step >= least:
+        yield Problem(
+            ("guidance", "step_s"),
+            f"must be short enough for more than one step from the least possible range, {shown(least)} km of {where}, "
+            f"to the range threshold, {shown(threshold)} km, found {shown(step)}",
+            "shorten the step",
+        )
+    if step is None or speed is None:
+        return
+    where, (_, greatest) = max(spans, key=lambda span: span[1][1])
+    slowest = min([speed] + [-pair[1] for _, pair in _spans(known, "vx_km_s")])
+    steps = greatest / slowest / step
+    if steps > MOST_STEPS:
+        yield Problem(
+            ("guidance", "step_s"),
+            f"must be long enough for at most {MOST_STEPS} steps, found {shown(step)}: "
+            f"{shown(greatest)} km of {where} at {shown(slowest)} km/s take {steps:.3g} steps",
+            "lengthen the step",
+        )
+        return
+    leaps = steps * max(Decimal(1), step / Decimal(LONGEST_SUBSTEP_S))
+    # In free space a step is one stretch, however long.
+    if leaps > MOST_LEAPS and known.value("sun") is not None:
+        yield Problem(
+            ("guidance", "step_s"),
+            f"makes {steps:.3g} steps of {shown(step)} s, and the truth is integrated in stretches of at most "
+            f"{LONGEST_SUBSTEP_S:g} s: {leaps:.3g} of them, and {MOST_LEAPS:,} are allowed, some minutes of computing",
+            "start nearer, approach faster, or leave the table [sun] out",
+        )
+
+
+def _box(known: Known, table: str) -> StateBox | None:
+    """A box of starts in SI; None if a pair of it is missing or unsound."""
+    pairs = [known.pair(table, key) for key in ("z_km", "x_km", "vz_km_s", "vx_km_s")]
+    if None in pairs:
+        return None
+    return StateBox(*((si(pair[0], KILO), si(pair[1], KILO)) for pair in pairs if pair is not None))
+
+
+def _error_law(known: Known) -> Iterator[Problem]:
+    nominal_range = known.number("nominal", "range_km")
+    at_nominal = known.number("angle_sensor", "error_at_nominal_range_rad")
+    at_zero = known.number("angle_sensor", "error_at_zero_range_rad")
+    boxes = {f"{table}.x_km": _box(known, table) for table in ("uncertainty", "dispersion")}
+    distances = {where: box.farthest_m for where, box in boxes.items() if box is not None}
+    if nominal_range is None or at_nominal is None or at_zero is None or not distances:
+        return
+    where = max(distances, key=lambda each: distances[each])
+    bound = AngleSensor(1.0, si(at_nominal), si(at_zero), si(nominal_range, KILO)).error_bound(distances[where])
+    if bound <= 0:
+        farthest_km = float(f"{distances[where] / 1000.0:.6g}")
+        yield Problem(
+            ("angle_sensor", "error_at_nominal_range_rad"),
+            f"leaves no error bound at the greatest possible range, {farthest_km!r} km of {where}: the straight line "
+            f"from {shown(at_zero)} rad at zero range is {bound:.3g} rad there, found {shown(at_nominal)}",
+            "raise it, or lower error_at_zero_range_rad, so that the bound stays positive",
+        )
+
+
+def _sections(known: Known) -> Iterator[Problem]:
+    sections = known.number("information_set", "sections")
+    fewest = known.number("information_set", "fewest_sections")
+    if sections is not None and fewest is not None and sections < fewest:
+        yield Problem(
+            ("information_set", "sections"),
+            f"must be at least information_set.fewest_sections, {fewest}, found {sections}",
+            "raise it, or lower fewest_sections",
+        )
+
+
+def _sun(known: Known) -> Iterator[Problem]:
+    distance = known.number("sun", "distance_km")
+    spans = list(_spans(known, "x_km"))
+    if distance is None or not spans:
+        return
+    where, (_, greatest) = max(spans, key=lambda span: span[1][1])
+    if distance <= greatest:
+        yield Problem(
+            ("sun", "distance_km"),
+            f"must be greater than the greatest possible range, {shown(greatest)} km of {where}, "
+            f"found {shown(distance)}",
+            "check the unit; for free space leave the table [sun] out",
+        )
+
+
+def _closing_speeds(known: Known) -> Iterator[Problem]:
+    """Only closing speeds above zero and below twice the nominal one have labels: a range x means x / (1 + eta)."""
+    speed, nominal_range = known.number("nominal", "closing_speed_km_s"), known.number("nominal", "range_km")
+    step = known.number("guidance", "step_s")
+    box = _box(known, "uncertainty")
+    if known.value("information_set", "model") != Model.GUARANTEED.value or speed is None or box is None:
+        return
+    if nominal_range is None or step is None:
+        return
+    e, vx = si(speed, KILO), box.vx_m_s
+    # Of the sensor nothing is asked here.
+    sensor = AngleSensor(si(step), 0.5, 0.5, si(nominal_range, KILO))
+    disturbance = si(known.number("information_set", "disturbance_m_s2") or Decimal(0))
+    plain = SetModel(e, si(step), box, sensor, disturbance, kind=Model.GUARANTEED)
+    parameter, distance = known.number("sun", "gravitational_parameter_km3_s2"), known.number("sun", "distance_km")
+    sun = None
+    if parameter is not None and distance is not None:
+        sun = Sun(si(parameter, 3 * KILO), si(distance, KILO), 0.0)
+    least, change = (with_gravity(plain, body, 0.0).gravity_speed_change for body in (None, sun))
+    if plain.speed_error + least >= 1.0:
+        yield Problem(
+            ("uncertainty", "vx_km_s"),
+            f"must differ from nominal.closing_speed_km_s, {shown(speed)}, by less than that itself in the guaranteed "
+            f"model, found closing speeds from {-vx[1] / 1000.0:g} to {-vx[0] / 1000.0:g}",
+            "write the middle of uncertainty.vx_km_s as nominal.closing_speed_km_s, or narrow uncertainty.vx_km_s",
+        )
+    elif plain.speed_error + change >= 1.0:
+        yield Problem(
+            ("sun", "distance_km"),
+            f"is so little, for so long a flight, that gravity may change the closing speed by {change:.3g} of itself: "
+            f"beside uncertainty.vx_km_s the guaranteed model has room for {1.0 - plain.speed_error:.3g}, "
+            f"found {shown(known.number('sun', 'distance_km'))}",
+            "start nearer or approach faster, move the Sun away, or leave the table [sun] out",
+        )
+    else:
+        yield from _impulses_across(known, plain, sun)
+
+
+def _impulses_across(known: Known, plain: SetModel, sun: Sun | None) -> Iterator[Problem]:
+    """Impulses may lead so far across that gravity does there what the guaranteed model has no room for."""
+    budget, greatest, execution = (
+        known.number("thruster", key) for key in ("budget_m_s", "greatest_impulse_m_s", "execution_error_relative")
+    )
+    if budget is None or greatest is None:
+        return
+    thruster = Thruster(si(budget), 0.0, si(greatest), si(execution or Decimal(0)))
+    change = with_gravity(plain, sun, greatest_impulses_m_s(plain, thruster)).gravity_speed_change
+    if plain.speed_error + change >= 1.0:
+        yield Problem(
+            ("thruster", "budget_m_s"),
+            f"lets the spacecraft go so far across that gravity may change the closing speed by {change:.3g} of "
+            f"itself: the guaranteed model has room for {1.0 - plain.speed_error:.3g}, found {shown(budget)} in "
+            f"impulses of up to {shown(greatest)}",
+            "write the budget or the greatest impulse that the engine has, or leave the table [sun] out",
+        )

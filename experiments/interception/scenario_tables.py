@@ -1,0 +1,233 @@
+"""The tables and keys of a scenario file, and what each value may be.
+
+Numbers stay decimal here, as written: they are rounded once, when they become SI.
+"""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from typing import Annotated
+
+from pydantic import PlainValidator
+
+import guidance
+from experiments.common.toml_values import (
+    KILO,
+    DecimalPair,
+    Degrees,
+    Description,
+    Name,
+    Number,
+    OneOf,
+    Pair,
+    Positive,
+    Table,
+    Whole,
+    key,
+    known_name,
+)
+from guidance.noise import NoiseKind, TieRule
+from guidance.thruster import Thruster
+from infoset.limits import limits_of
+from infoset.model import MOST_SECTIONS, InitialSet, Model, Recovery, SetModel, StateBox
+from infoset.sensors import AngleSensor, RangeSensor, RateSensor
+from sim.scenario import Manoeuvre, Scenario, Sun, Target
+
+SCHEMA = 1
+SPEED_OF_LIGHT_KM_S = Decimal("299792.458")
+"""A file's speeds have units: none is greater. The core knows numbers alone."""
+
+
+def _strategy(value: object) -> str:
+    return known_name(value, tuple(guidance.strategy_names()))
+
+
+def _number(owner: type, field: str, power_of_ten: int = 0) -> PlainValidator:
+    """A number within the limits that the dataclass declares, in the unit of the file."""
+    return PlainValidator(Number.of(limits_of(owner, field), power_of_ten))
+
+
+_SPEED = Number(least=-SPEED_OF_LIGHT_KM_S, most=SPEED_OF_LIGHT_KM_S)
+_APPROACH = Number(below=Decimal(0), least=-SPEED_OF_LIGHT_KM_S)
+
+ClosingSpeed = Annotated[Decimal, PlainValidator(Number(above=Decimal(0), most=SPEED_OF_LIGHT_KM_S))]
+
+
+def _pair(field: str, *, fixed: bool = False) -> PlainValidator:
+    return PlainValidator(Pair(Number.of(limits_of(StateBox, field), KILO), fixed))
+
+
+class SunTable(Table):
+    """[sun]."""
+
+    gravitational_parameter_km3_s2: Annotated[Decimal, _number(Sun, "gravitational_parameter_m3_s2", 3 * KILO)] = key(
+        "gravitational parameter of the Sun", "1.324948e11"
+    )
+    distance_km: Annotated[Decimal, _number(Sun, "distance_m", KILO)] = key(
+        "distance of the Sun from the spacecraft at t0", "150.0e6"
+    )
+    direction_deg: Degrees = key("direction of the Sun at t0, from the x axis toward z", "90.0")
+
+
+class NominalTable(Table):
+    """[nominal]."""
+
+    range_km: Annotated[Decimal, _number(Scenario, "nominal_range_m", KILO)] = key("nominal range at t0", "5801.3")
+    closing_speed_km_s: ClosingSpeed = key("closing speed the on-board model believes in", "58.0")
+
+
+class UncertaintyTable(Table):
+    """[uncertainty]."""
+
+    z_km: Annotated[DecimalPair, _pair("z_m")] = key("offset across the approach", "[-10.0, 10.0]")
+    x_km: Annotated[DecimalPair, _pair("x_m")] = key("range", "[5301.3, 6301.3]")
+    vz_km_s: Annotated[DecimalPair, PlainValidator(Pair(_SPEED))] = key("speed across", "[-0.1, 0.1]")
+    vx_km_s: Annotated[DecimalPair, PlainValidator(Pair(_APPROACH))] = key(
+        "speed along x; negative, the object approaches", "[-59.0, -57.0]"
+    )
+
+
+class DispersionTable(Table):
+    """[dispersion]."""
+
+    z_km: Annotated[DecimalPair, _pair("z_m", fixed=True)] = key(
+        "a pair is a uniform interval, a number is fixed", "[-1.0, 1.0]"
+    )
+    x_km: Annotated[DecimalPair, _pair("x_m", fixed=True)] = key("range", "[5701.3, 5901.3]")
+    vz_km_s: Annotated[DecimalPair, PlainValidator(Pair(_SPEED, fixed=True))] = key("speed across", "[-0.1, 0.1]")
+    vx_km_s: Annotated[DecimalPair, PlainValidator(Pair(_APPROACH, fixed=True))] = key(
+        "speed along x; negative, the object approaches", "[-58.1, -57.9]"
+    )
+
+
+class AngleSensorTable(Table):
+    """[angle_sensor]."""
+
+    period_s: Annotated[Decimal, _number(AngleSensor, "period_s")] = key(
+        "time between measurements, a multiple of guidance.step_s", "0.5"
+    )
+    error_at_nominal_range_rad: Annotated[Decimal, _number(AngleSensor, "error_at_nominal_range_rad")] = key(
+        "greatest error at nominal.range_km", "0.00015"
+    )
+    error_at_zero_range_rad: Annotated[Decimal, _number(AngleSensor, "error_at_zero_range_rad")] = key(
+        "greatest error at range zero; a straight line joins both", "0.00023"
+    )
+
+
+class RangeSensorTable(Table):
+    """[range_sensor]."""
+
+    period_s: Annotated[Decimal, _number(RangeSensor, "period_s")] = key(
+        "time between measurements, a multiple of guidance.step_s", "2.0"
+    )
+    relative_error: Annotated[Decimal, _number(RangeSensor, "relative_error")] = key(
+        "greatest error as a part of the range", "0.05"
+    )
+
+
+class RateSensorTable(Table):
+    """[rate_sensor]."""
+
+    period_s: Annotated[Decimal, _number(RateSensor, "period_s")] = key(
+        "time between measurements, a multiple of guidance.step_s", "1.0"
+    )
+    error_rad_s: Annotated[Decimal, _number(RateSensor, "error_rad_s")] = key(
+        "greatest error of the line of sight's angular rate", "1e-6"
+    )
+
+
+class TargetTable(Table):
+    """[target]."""
+
+    manoeuvre: Annotated[Manoeuvre, PlainValidator(OneOf(Manoeuvre))] = key(
+        '"none", "constant", "bang-bang", "random-telegraph" or "worst-case"', '"bang-bang"'
+    )
+    acceleration_m_s2: Annotated[Decimal, _number(Target, "acceleration_m_s2")] = key(
+        "its acceleration across", "0.005"
+    )
+    switching_period_s: Annotated[Decimal, _number(Target, "switching_period_s")] = key(
+        "time between changes of side; its mean where they are random", "10.0", default=Decimal(10)
+    )
+
+
+class ThrusterTable(Table):
+    """[thruster]."""
+
+    budget_m_s: Annotated[Decimal, _number(Thruster, "budget_m_s")] = key("sum of the sizes of all impulses", "1000.0")
+    least_impulse_m_s: Annotated[Decimal, _number(Thruster, "least_impulse_m_s")] = key(
+        "smaller impulses cannot be given", "0.25"
+    )
+    greatest_impulse_m_s: Annotated[Decimal, _number(Thruster, "greatest_impulse_m_s")] = key("nor greater ones", "7.5")
+    execution_error_relative: Annotated[Decimal, _number(Thruster, "execution_error_relative")] = key(
+        "an impulse may come out greater or less by this part", "0.0", default=Decimal(0)
+    )
+
+
+class GuidanceTable(Table):
+    """[guidance]."""
+
+    step_s: Annotated[Decimal, _number(SetModel, "step_s")] = key("step of observation and control", "0.5")
+    strategy: Annotated[str, PlainValidator(_strategy)] = key("name of the guidance strategy", '"symmetric-miss"')
+    range_threshold_km: Positive = key("hypotheses about to come nearer leave the set", "5.0")
+
+
+class InformationSetTable(Table):
+    """[information_set]."""
+
+    model: Annotated[Model, PlainValidator(OneOf(Model))] = key(
+        '"paper", as published, or "guaranteed", which never loses the truth', '"paper"'
+    )
+    initial_set: Annotated[InitialSet | None, PlainValidator(OneOf(InitialSet))] = key(
+        'a section at t0: "rectangle" in (omega, alpha) or "box" in (z, V)', '"rectangle"', default=None
+    )
+    sections: Annotated[int, PlainValidator(Whole(MOST_SECTIONS))] = key(
+        "ranges the set is stored at, a uniform grid over uncertainty.x_km", "29"
+    )
+    fewest_sections: Annotated[int | None, PlainValidator(Whole(MOST_SECTIONS))] = key(
+        "fewer left: the grid is made anew with 2 fewest_sections + 1", "5", default=None
+    )
+    recovery: Annotated[Recovery, PlainValidator(OneOf(Recovery))] = key(
+        'what a set that empties becomes: "widened", or "none"',
+        '"widened"',
+        default=Recovery.WIDENED,
+    )
+    disturbance_m_s2: Annotated[Decimal, _number(SetModel, "disturbance_m_s2")] = key(
+        "bound of the unknown acceleration across, or of the target's", "0.005"
+    )
+
+
+class NoiseTable(Table):
+    """[noise]."""
+
+    kind: Annotated[NoiseKind, PlainValidator(OneOf(NoiseKind))] = key(
+        '"random", or "game": errors chosen against the guidance', '"random"'
+    )
+    tie: Annotated[TieRule, PlainValidator(OneOf(TieRule))] = key(
+        'the game keeps of equals: "upper", "lower", "alternate", "random"',
+        '"upper"',
+        default=TieRule.UPPER,
+    )
+
+
+class ScenarioTables(Table):
+    """A whole scenario file."""
+
+    schema_number: Annotated[int, PlainValidator(lambda value: value)] = key(
+        "version of this form of file", str(SCHEMA), alias="schema"
+    )
+    name: Name = key("what results and files are called", '"my-scenario"')
+    description: Description = key("a line for `infoset scenarios list`", '"What this scenario is about"', default="")
+    sun: SunTable | None = key("the Sun, seen from the spacecraft; without the table: free space", "", default=None)
+    nominal: NominalTable = key("where the object is expected", "")
+    uncertainty: UncertaintyTable = key("what is known on board of the start", "")
+    dispersion: DispersionTable = key("where the truth starts, unknown on board", "")
+    angle_sensor: AngleSensorTable = key("the line-of-sight sensor", "")
+    range_sensor: RangeSensorTable | None = key("the range meter; without the table: none", "", default=None)
+    rate_sensor: RateSensorTable | None = key(
+        "the sensor of the line of sight's rate; without the table: none", "", default=None
+    )
+    target: TargetTable | None = key("how the object accelerates; without the table: not at all", "", default=None)
+    thruster: ThrusterTable = key("the engine", "")
+    guidance: GuidanceTable = key("how impulses are chosen", "")
+    information_set: InformationSetTable = key("how hypotheses are kept", "")
+    noise: NoiseTable = key("how measurement errors are chosen", "")

@@ -1,0 +1,1 @@
+"""Encounters of several craft: file, command, figures, page and printed numbers."""

@@ -1,0 +1,1 @@
+"""Pursuit-evasion on orbits: file, commands, report, figures, page and printed numbers."""

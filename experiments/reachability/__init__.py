@@ -1,0 +1,1 @@
+"""Rendezvous through reachable sets: file, command, report, figures, page and printed numbers."""

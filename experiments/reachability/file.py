@@ -1,0 +1,462 @@
+"""Problem files of kind `reachable-rendezvous`: their tables, and the problem of the core that they describe."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from decimal import Decimal
+from functools import cached_property
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, PlainValidator
+
+from experiments.common.errors import InputError
+from experiments.common.problem_file import problem_form, problem_hash
+from experiments.common.toml_file import Known, Problem, load_tables
+from experiments.common.toml_values import (
+    KILO,
+    NUMBER,
+    POSITIVE,
+    Degrees,
+    Description,
+    Name,
+    Number,
+    Numbers,
+    OneOf,
+    Positive,
+    Table,
+    Vector,
+    Whole,
+    key,
+    radians,
+    si,
+    wrong,
+)
+from rendezvous.polytope import EmptyPolytopeError, Polytope, UnboundedPolytopeError, UncertainHullError
+from rendezvous.reachability import (
+    InadmissibleStartError,
+    MotionModel,
+    NonlinearMotion,
+    ReachabilityProblem,
+    ThrustShape,
+    between_periods,
+    discretised,
+    motion_of,
+)
+from rendezvous.reachability.problem import MOST_PERIODS
+from rendezvous.relative_motion import ConstantMotion, EllipticOrbit, TschaunerHempel
+
+Floats = NDArray[np.float64]
+Rows = tuple[tuple[Decimal, ...], ...]
+
+KIND = "reachable-rendezvous"
+MOST_FACES = 24
+MOST_HALFSPACES = 50
+MOST_POLYTOPES = 20
+MOST_CHECKS = 10
+_INSTANTS = 12
+_MOST_REVOLUTIONS = 100
+_MOST_REACH = 1e4
+STATE_NAMES = ("x", "y", "z", "vx", "vy", "vz")
+
+
+def _rows(value: object) -> Rows:
+    """Check an array of arrays of three numbers."""
+    if not isinstance(value, list) or not 1 <= len(value) <= MOST_HALFSPACES:
+        raise wrong(f"must be an array of 1 to {MOST_HALFSPACES} arrays of 3 numbers")
+    return tuple(Numbers(3, NUMBER)(each) for each in value)
+
+
+def _row(value: object) -> tuple[Decimal, ...]:
+    if not isinstance(value, list) or not 1 <= len(value) <= MOST_HALFSPACES:
+        raise wrong(f"must be an array of 1 to {MOST_HALFSPACES} numbers")
+    return Numbers(len(value), NUMBER)(value)
+
+
+def _from_period(value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MOST_PERIODS:
+        raise wrong(f"must be a whole number from 0 to {MOST_PERIODS}")
+    return value
+
+
+Eccentricity = Annotated[Decimal, PlainValidator(Number(least=Decimal(0), below=Decimal(1)))]
+OpenAngle = Annotated[Decimal, PlainValidator(Number(above=Decimal(0), below=Decimal(90)))]
+Bound = Annotated[tuple[Decimal, ...], PlainValidator(Numbers(3, POSITIVE, one_for_all=True))]
+FromPeriod = Annotated[int, PlainValidator(_from_period)]
+
+
+class OrbitTable(Table):
+    """The orbit of the passive craft."""
+
+    semi_major_axis_km: Positive = key("semi-major axis", "10000.0")
+    eccentricity: Eccentricity = key("at least 0 and below 1", "0.1")
+    true_anomaly_deg: Degrees = key("at t = 0", "0.0")
+    gravitational_parameter_m3_s2: Positive = key("of the Earth or another body", "3.986004418e14")
+
+
+class InitialTable(Table):
+    """The active craft at t = 0: x against the motion, y outward, z completes."""
+
+    position_m: Vector = key("x, y, z", "[2650.0, -2540.0, 2120.0]")
+    velocity_m_s: Vector = key("of the same", "[-3.0, 2.0, 3.0]")
+
+
+class BoundsTable(Table):
+    """What no component may exceed: one number, or one an axis."""
+
+    position_m: Bound = key("at t = 0..T", "3000.0")
+    velocity_m_s: Bound = key("at t = 0..T", "7.5")
+    control: Bound = key("of the control, which acceleration_m_s2 multiplies", "1.0")
+
+
+class ConeTable(Table):
+    """An approach cone, as a pyramid inside it."""
+
+    apex_m: Vector = key("where it begins", "[-20.0, 0.0, 0.0]")
+    axis: Vector = key("along which it opens; of any length", "[1.0, 0.0, 0.0]")
+    half_angle_deg: OpenAngle = key("between axis and cone", "20.0")
+    faces: Annotated[int, PlainValidator(Whole(MOST_FACES))] = key("of the pyramid, at least 3", "8", default=8)
+    from_period: FromPeriod = key("the first t at which it holds", "0", default=0)
+
+
+class KeepInTable(Table):
+    """A bounded polytope that the position must stay in: normals . position <= offsets_m."""
+
+    normals: Annotated[Rows, PlainValidator(_rows)] = key("an array a half-space", "[[1.0, 0.0, 0.0]]")
+    offsets_m: Annotated[tuple[Decimal, ...], PlainValidator(_row)] = key("a number a half-space", "[2000.0]")
+    from_period: FromPeriod = key("the first t at which it holds", "0", default=0)
+
+
+class DisturbanceTable(Table):
+    """An acceleration that nobody knows, held over each period."""
+
+    acceleration_m_s2: Bound = key("greatest size along an axis", "1e-4")
+
+
+class NavigationTable(Table):
+    """Errors of the state that a plan begins from, in closed loop."""
+
+    position_error_m: Bound = key("greatest error along an axis", "1.0")
+    velocity_error_m_s: Bound = key("greatest error along an axis", "0.01")
+
+
+class ReachabilityTables(Table):
+    """A problem file of kind `reachable-rendezvous`."""
+
+    schema_number: int = key("the form of this file", "1", default=1, alias="schema")
+    kind: str = key("the kind of problem", f'"{KIND}"')
+    name: Name = key("what to call it", '"rendezvous-2021"')
+    description: Description = key("a line about it", '"..."', default="")
+    periods: Annotated[int, PlainValidator(Whole(MOST_PERIODS))] = key("how many, T", "4")
+    period_s: Positive = key("how long each is", "180.0")
+    acceleration_m_s2: Positive = key("of a unit control", "0.15")
+    model: Annotated[MotionModel, PlainValidator(OneOf(MotionModel))] = key(
+        "frozen at t = 0, or time-varying", '"frozen"', default=MotionModel.FROZEN
+    )
+    thrust: Annotated[ThrustShape, PlainValidator(OneOf(ThrustShape))] = key(
+        "box: each component is bounded; ball: their norm", '"box"', default=ThrustShape.BOX
+    )
+    checks_between_periods: FromPeriod = key(
+        "at how many instants within a period constraints hold too", "0", default=0
+    )
+    orbit: OrbitTable = key("the orbit of the passive craft", "")
+    initial: InitialTable = key("the active craft at t = 0", "")
+    bounds: BoundsTable = key("what no component may exceed", "")
+    cone: ConeTable | None = key("an approach cone", "", default=None)
+    keep_in: Annotated[tuple[KeepInTable, ...], Field(max_length=MOST_POLYTOPES)] = key(
+        "polytopes to stay in", "", default=()
+    )
+    disturbance: DisturbanceTable | None = key("an unknown acceleration", "", default=None)
+    navigation: NavigationTable | None = key("errors of navigation", "", default=None)
+
+
+@dataclass(frozen=True, eq=False)
+class Rendezvous:
+    """A problem as a person wrote it, in SI.
+
+    Parameters
+    ----------
+    name, description : str
+    hash : str
+        Of every value that can change a result.
+    problem : ReachabilityProblem
+    motion : ConstantMotion or TschaunerHempel
+        The linear motion that the problem is made of.
+    truth : NonlinearMotion
+    period_s, acceleration_m_s2 : float
+    disturbance : ndarray, shape (T, 6, 3), or None
+        What unit moves of the unknown acceleration do to the state.
+    navigation_error : ndarray, shape (6,), or None
+        Greatest error of each component.
+    """
+
+    name: str
+    description: str
+    hash: str
+    problem: ReachabilityProblem
+    motion: ConstantMotion | TschaunerHempel
+    truth: NonlinearMotion
+    period_s: float
+    acceleration_m_s2: float
+    disturbance: Floats | None
+    navigation_error: Floats | None
+
+    @cached_property
+    def instants(self) -> Floats:
+        """Matrices of states between the periods, at which all members are checked."""
+        return between_periods(self.motion, self.problem.periods, self.period_s, self.acceleration_m_s2, _INSTANTS)
+
+    def lasting(self, periods: int) -> ReachabilityProblem:
+        """Return the problem with another number of periods, its last constraints kept on.
+
+        Parameters
+        ----------
+        periods : int
+            At least as many as it has.
+
+        Returns
+        -------
+        ReachabilityProblem
+        """
+        given = self.problem
+        transition, control = discretised(self.motion, periods, self.period_s, self.acceleration_m_s2)
+        more = periods - given.periods
+        offsets = None if given.offsets is None else np.vstack([given.offsets, np.repeat(given.offsets[-1:], more, 0)])
+        between = None
+        if given.between is not None:
+            instants = given.between.shape[1]
+            between = between_periods(self.motion, periods, self.period_s, self.acceleration_m_s2, instants)
+        return ReachabilityProblem(
+            transition,
+            control,
+            given.initial,
+            given.state_bounds,
+            given.control_bounds,
+            given.thrust,
+            given.normals,
+            offsets,
+            given.constraint_names,
+            between,
+            given.state_names,
+        )
+
+
+def load_rendezvous(name_or_path: str | os.PathLike[str]) -> Rendezvous:
+    """Read a built-in problem, or a problem file, of reachable rendezvous.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+
+    Returns
+    -------
+    Rendezvous
+
+    Raises
+    ------
+    InputError
+        If there is no such problem, or it is not sound.
+    """
+    form = problem_form(KIND, ReachabilityTables, _checks)
+    tables = load_tables(form, name_or_path)
+    try:
+        return _rendezvous(tables)
+    except InadmissibleStartError as error:
+        said = "; ".join(f"{name} by {excess:.6g}" for name, excess in error.broken)
+        raise InputError(
+            f"{os.fspath(name_or_path)}: initial: the craft begins outside its constraints: {said}; move it inside, "
+            "or let them hold from a later period (from_period)"
+        ) from None
+    except (ValueError, ArithmeticError) as error:
+        raise InputError(f"{os.fspath(name_or_path)}: {error}; check the numbers and their units") from None
+
+
+def _checks(known: Known) -> Iterator[Problem]:
+    """What values must be to one another."""
+    for quantity, unit in (("position", "m"), ("velocity", "m_s")):
+        name = f"{quantity}_{unit}"
+        values, bounds = known.value("initial", name), known.value("bounds", name)
+        if not isinstance(values, list):
+            continue
+        limits = bounds if isinstance(bounds, list) else [bounds] * len(values)
+        for axis, value, limit in zip("xyz", values, limits, strict=False):
+            if limit is not None and abs(Decimal(value)) > Decimal(limit):
+                yield Problem(
+                    ("initial", name),
+                    f"{axis} is outside its bound, {limit}: found {value}",
+                    f"move it inside, or raise bounds.{name}",
+                )
+    control = known.value("bounds", "control")
+    if known.value("thrust") == "ball" and isinstance(control, list) and len({Decimal(each) for each in control}) > 1:
+        yield Problem(("bounds", "control"), "must be one number for thrust in a ball", "write its radius")
+    faces = known.value("cone", "faces")
+    if isinstance(faces, int) and faces < 3:
+        yield Problem(("cone", "faces"), f"must be from 3 to {MOST_FACES}, found {faces}", "write faces = 8")
+    direction = known.value("cone", "axis")
+    if isinstance(direction, list) and not any(direction):
+        yield Problem(("cone", "axis"), "has no direction: all its components are 0", "write axis = [1.0, 0.0, 0.0]")
+    checks = known.value("checks_between_periods")
+    if isinstance(checks, int) and checks > MOST_CHECKS:
+        yield Problem(
+            ("checks_between_periods",), f"must be at most {MOST_CHECKS}, found {checks}", "shorten period_s instead"
+        )
+    if known.value("disturbance") is not None and checks:
+        yield Problem(
+            ("disturbance",), "is allowed for at whole periods only", "remove it, or write checks_between_periods = 0"
+        )
+    yield from _size_problems(known)
+    yield from _keep_in_problems(known)
+
+
+def _size_problems(known: Known) -> Iterator[Problem]:
+    """Refuse numbers with which nothing would finish, or be told from rounding: mostly a unit taken for another."""
+    period, periods = known.number("period_s"), known.value("periods")
+    axis, mu = known.number("orbit", "semi_major_axis_km"), known.number("orbit", "gravitational_parameter_m3_s2")
+    if period is None:
+        return
+    if isinstance(periods, int) and axis is not None and mu is not None:
+        turns = periods * float(period) * (float(mu) / (1e3 * float(axis)) ** 3) ** 0.5 / (2.0 * np.pi)
+        if turns > _MOST_REVOLUTIONS:
+            yield Problem(
+                ("period_s",),
+                f"{periods} periods are {turns:.3g} revolutions, over {_MOST_REVOLUTIONS}: found {period}",
+                "check its unit, and those of [orbit]",
+            )
+    push = known.number("acceleration_m_s2")
+    for name, power in (("position_m", 2), ("velocity_m_s", 1)):
+        bound, control = known.value("bounds", name), known.value("bounds", "control")
+        if push is None or bound is None or control is None:
+            continue
+        least, most = min(_numbers(bound)), max(_numbers(control))
+        reach = float(push) * most * float(period) ** power / least
+        if reach > _MOST_REACH:
+            yield Problem(
+                ("acceleration_m_s2",),
+                f"full thrust over one period changes {name} by {reach:.3g} bounds, over {_MOST_REACH:g}: found {push}",
+                f"check its unit, and those of period_s and bounds.{name}",
+            )
+
+
+def _numbers(value: object) -> list[float]:
+    """The numbers of a sound value: one, or an array."""
+    return [float(str(each)) for each in (value if isinstance(value, list) else [value])]
+
+
+def _keep_in_problems(known: Known) -> Iterator[Problem]:
+    boxes = known.value("keep_in")
+    for place in range(len(boxes) if isinstance(boxes, list) else 0):
+        path = ("keep_in", str(place))
+        normals, offsets = known.value(*path, "normals"), known.value(*path, "offsets_m")
+        if not isinstance(normals, list) or not isinstance(offsets, list):
+            continue
+        if len(normals) != len(offsets):
+            yield Problem(
+                (*path, "offsets_m"),
+                f"must be as many as normals, {len(normals)}, found {len(offsets)}",
+                "write one number a normal",
+            )
+            continue
+        rows, limits = np.array(normals, dtype=float), np.array(offsets, dtype=float)
+        if (np.linalg.norm(rows, axis=1) == 0.0).any():
+            yield Problem((*path, "normals"), "has a normal of zero length", "remove it, with its offset")
+            continue
+        size = max(float(np.abs(limits).max()), 1e-300)
+        try:
+            Polytope.from_halfspaces(rows, limits / size)
+        except EmptyPolytopeError as error:
+            remedy = f"relax its offsets by {error.relaxation * size:.6g} m at least"
+            yield Problem(path, "is empty: no position meets all its half-spaces", remedy)
+        except UnboundedPolytopeError as error:
+            along = ", ".join(f"{each:.3g}" for each in error.direction)
+            yield Problem(
+                path, f"is unbounded: it goes on without end along ({along})", "add half-spaces that close it"
+            )
+        except UncertainHullError:
+            yield Problem(path, "is too flat or too fine to be told from rounding", "make it wider")
+
+
+def _rendezvous(tables: ReachabilityTables) -> Rendezvous:
+    orbit = EllipticOrbit.of_size(
+        si(tables.orbit.semi_major_axis_km, KILO),
+        si(tables.orbit.eccentricity),
+        si(tables.orbit.gravitational_parameter_m3_s2),
+        radians(tables.orbit.true_anomaly_deg),
+    )
+    motion = motion_of(orbit, tables.model)
+    period_s, acceleration = si(tables.period_s), si(tables.acceleration_m_s2)
+    transition, control = discretised(motion, tables.periods, period_s, acceleration)
+    normals, offsets, names = _regions(tables)
+    between = None
+    if tables.checks_between_periods:
+        between = between_periods(motion, tables.periods, period_s, acceleration, tables.checks_between_periods)
+    bounds = tables.bounds
+    problem = ReachabilityProblem(
+        transition,
+        control,
+        _vector(tables.initial.position_m, tables.initial.velocity_m_s),
+        _vector(bounds.position_m, bounds.velocity_m_s),
+        _vector(bounds.control),
+        tables.thrust,
+        normals,
+        offsets,
+        names,
+        between,
+        STATE_NAMES,
+    )
+    disturbance = None
+    if tables.disturbance is not None:
+        disturbance = control / acceleration * _vector(tables.disturbance.acceleration_m_s2)
+    navigation = tables.navigation
+    return Rendezvous(
+        tables.name,
+        tables.description,
+        problem_hash(tables),
+        problem,
+        motion,
+        NonlinearMotion(orbit, si(tables.orbit.semi_major_axis_km, KILO)),
+        period_s,
+        acceleration,
+        disturbance,
+        None if navigation is None else _vector(navigation.position_error_m, navigation.velocity_error_m_s),
+    )
+
+
+def _regions(tables: ReachabilityTables) -> tuple[Floats | None, Floats | None, tuple[str, ...]]:
+    """Half-spaces of the cone and of polytopes to stay in, as constraints on states."""
+    normals, offsets, names, begin = [], [], [], []
+    cone = tables.cone
+    if cone is not None:
+        rows = _pyramid(_vector(cone.axis), radians(cone.half_angle_deg), cone.faces)
+        normals.append(rows)
+        offsets.append(rows @ _vector(cone.apex_m))
+        names += [f"face {place + 1} of the cone" for place in range(len(rows))]
+        begin += [cone.from_period] * len(rows)
+    for number, box in enumerate(tables.keep_in, start=1):
+        rows = np.array([_vector(each) for each in box.normals])
+        lengths = np.linalg.norm(rows, axis=1)
+        normals.append(rows / lengths[:, None])
+        offsets.append(_vector(box.offsets_m) / lengths)
+        names += [f"half-space {place + 1} of keep_in #{number}" for place in range(len(rows))]
+        begin += [box.from_period] * len(rows)
+    if not normals:
+        return None, None, ()
+    both = np.hstack([np.vstack(normals), np.zeros((len(names), 3))])
+    times = np.arange(tables.periods + 1)[:, None]
+    return both, np.where(times >= np.array(begin), np.concatenate(offsets), np.inf), tuple(names)
+
+
+def _pyramid(axis: Floats, half_angle_rad: float, faces: int) -> Floats:
+    """Outward normals of a pyramid whose edges are on a cone, of unit length."""
+    along = axis / np.linalg.norm(axis)
+    across = np.linalg.svd(along[None, :])[2][1:]
+    turns = 2.0 * np.pi * np.arange(faces) / faces
+    slope = np.tan(half_angle_rad) * np.cos(np.pi / faces)
+    rows = np.outer(np.cos(turns), across[0]) + np.outer(np.sin(turns), across[1]) - slope * along
+    return np.asarray(rows / np.linalg.norm(rows, axis=1)[:, None])
+
+
+def _vector(*parts: tuple[Decimal, ...]) -> Floats:
+    return np.array([si(each) for part in parts for each in part])

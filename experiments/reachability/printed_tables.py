@@ -1,0 +1,225 @@
+"""Tables 1 to 3 of Shorikov and Goranov (2021), as printed and corrected, beside what is computed here."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.common.output import Cell
+from experiments.reachability.file import Rendezvous, load_rendezvous
+from experiments.reachability.report import Member, fly_members
+from rendezvous.reachability import OptimalControls, Solution
+from rendezvous.reachability.selection import minimum_energy, minimum_l1, nearest
+
+Floats = NDArray[np.float64]
+
+PROBLEM = "rendezvous-2021"
+COLUMNS = ("table", "ours", "quantity", "period", "printed", "corrected", "computed")
+
+
+@dataclass(frozen=True)
+class PrintedTable:
+    """One of the paper's tables, as printed.
+
+    Parameters
+    ----------
+    number : int
+    ours : str
+        Which optimal control stands beside it.
+    controls : tuple
+        u(t), t = 0..3.
+    nonlinear, linear : tuple
+        x(t), t = 1..4.
+    nonlinear_miss : float
+    misprints : tuple of (str, int, int, float)
+        Quantity, t, component from 1, and what it should be.
+    """
+
+    number: int
+    ours: str
+    controls: tuple[tuple[float, ...], ...]
+    nonlinear: tuple[tuple[float, ...], ...]
+    linear: tuple[tuple[float, ...], ...]
+    nonlinear_miss: float
+    misprints: tuple[tuple[str, int, int, float], ...]
+
+
+_ZERO = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+TABLES = (
+    PrintedTable(
+        1,
+        "least energy",
+        (
+            (-0.1206, 0.0555, -0.2164),
+            (-0.0337, 0.0042, -0.0883),
+            (0.0358, -0.0690, 0.0414),
+            (0.0821, -0.1623, 0.1703),
+        ),
+        (
+            (1879.7, -2018.0, 2110.9, -5.47, 3.94, -3.10),
+            (902.6, -1214.5, 1318.9, -5.14, 5.01, -5.68),
+            (200.8, -397.2, 386.3, -2.90, 4.01, -4.66),
+            (-54.3, -29.1, -40.6, -0.12, -0.03, -0.07),
+        ),
+        (
+            (1884.2, -2014.2, 2114.6, -5.42, 3.98, -3.05),
+            (937.24, -1202.0, 1332.6, -5.05, 5.07, -5.62),
+            (234.85, -375.2, 413.2, -2.80, -4.06, -4.58),
+            _ZERO,
+        ),
+        73.19,
+        (("linear x", 3, 5, 4.06), ("linear x", 1, 6, -3.06)),
+    ),
+    PrintedTable(
+        2,
+        "least L1",
+        (
+            (-0.1254, -0.0373, -0.2612),
+            (-0.0034, 0.0021, -0.0012),
+            (0.0055, -0.0019, 0.0001),
+            (0.0893, -0.2055, 0.1685),
+        ),
+        (
+            (1864.0, -2060.9, 2002.2, -5.66, 3.47, -4.31),
+            (937.6, -1356.5, 1206.2, -4.59, 4.34, -4.52),
+            (227.6, -502.2, 382.7, -3.26, 5.13, -4.61),
+            (-55.7, -32.3, -39.6, -0.12, -0.03, -0.07),
+        ),
+        (
+            (1868.5, -2057.1, 2005.9, -5.61, 3.51, -4.27),
+            (954.3, -1343.4, 1219.6, -4.50, 4.40, -4.46),
+            (262.05, -478.2, 480.9, -3.15, 5.19, -4.54),
+            _ZERO,
+        ),
+        75.37,
+        (("u", 0, 2, 0.0373), ("linear x", 3, 3, 408.9)),
+    ),
+    PrintedTable(
+        3,
+        "nearest optimal",
+        (
+            (-0.0879, -0.0559, -0.1314),
+            (-0.0899, 0.0115, -0.2357),
+            (0.0519, -0.0732, 0.0846),
+            (0.0895, -0.1655, 0.1913),
+        ),
+        (
+            (1958.7, -2024.4, 2317.1, -4.59, 3.83, -0.81),
+            (1017.6, -1232.2, 1575.6, -5.80, 5.07, -7.41),
+            (219.1, -402.2, 435.4, -3.11, 4.07, -5.23),
+            (-54.8, -27.0, -43.9, -0.11, -0.02, -0.82),
+        ),
+        (
+            (1963.2, -2020.6, 2320.9, -4.54, 3.87, -0.77),
+            (1034.5, -1220.1, 1590.6, -5.72, 5.12, -7.34),
+            (253.5, -381.3, 464.2, -3.15, 5.19, -4.54),
+            _ZERO,
+        ),
+        74.85,
+        (
+            ("u", 0, 2, 0.0559),
+            ("linear x", 3, 4, -3.01),
+            ("linear x", 3, 5, 4.12),
+            ("linear x", 3, 6, -5.15),
+        ),
+    ),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A printed table beside the optimal control that it is nearest to.
+
+    Parameters
+    ----------
+    table : PrintedTable
+    ours : Member
+    printed : Member
+        The printed controls, corrected, on our model and on the truth.
+    """
+
+    table: PrintedTable
+    ours: Member
+    printed: Member
+
+    @property
+    def largest_difference(self) -> float:
+        """Greatest difference of a control."""
+        return float(np.abs(self.ours.controls - self.printed.controls).max())
+
+
+def is_published(rendezvous: Rendezvous) -> bool:
+    """Return whether a problem has the values of the published one."""
+    return rendezvous.hash == load_rendezvous(PROBLEM).hash
+
+
+def compare_published(rendezvous: Rendezvous, solution: Solution) -> tuple[Comparison, ...]:
+    """Put the paper's tables beside optimal controls.
+
+    Parameters
+    ----------
+    rendezvous : Rendezvous
+        The published problem.
+    solution : Solution
+
+    Returns
+    -------
+    tuple of Comparison
+    """
+    printed = [corrected(table) for table in TABLES]
+    ours = [_ours(table, solution.optimal, each) for table, each in zip(TABLES, printed, strict=True)]
+    names = [f"table {table.number}" for table in TABLES]
+    members = fly_members(rendezvous, [*names, *names], np.array([*ours, *printed]))
+    return tuple(
+        Comparison(table, one, other) for table, one, other in zip(TABLES, members[:3], members[3:], strict=True)
+    )
+
+
+def corrected(table: PrintedTable) -> Floats:
+    """Return the printed controls with the misprints mended, shape (4, 3)."""
+    controls = np.array(table.controls)
+    for quantity, t, component, value in table.misprints:
+        if quantity == "u":
+            controls[t, component - 1] = value
+    return controls
+
+
+def comparison_rows(comparisons: Sequence[Comparison]) -> list[list[Cell]]:
+    """Return every printed number beside its correction, if it has one, and what is computed.
+
+    Parameters
+    ----------
+    comparisons : sequence of Comparison
+
+    Returns
+    -------
+    list of list
+        Rows of `COLUMNS`.
+    """
+    rows: list[list[Cell]] = []
+    for each in comparisons:
+        table, ours = each.table, each.ours
+        mended = {(quantity, t, component): value for quantity, t, component, value in table.misprints}
+        blocks = (
+            ("u", 0, table.controls, ours.controls),
+            ("linear x", 1, table.linear, ours.linear[1:]),
+            ("nonlinear x", 1, table.nonlinear, ours.nonlinear[1:]),
+        )
+        for quantity, first, printed, computed in blocks:
+            for t, (known, found) in enumerate(zip(printed, computed, strict=True), start=first):
+                for component, (one, other) in enumerate(zip(known, found, strict=True), start=1):
+                    name = f"{quantity}{component}"
+                    correction = mended.get((quantity, t, component))
+                    rows.append([table.number, table.ours, name, t, one, correction, float(other)])
+        miss = float(np.linalg.norm(ours.nonlinear[-1]))
+        rows.append([table.number, table.ours, "nonlinear miss", 4, table.nonlinear_miss, None, miss])
+    return rows
+
+
+def _ours(table: PrintedTable, optimal: OptimalControls, printed: Floats) -> Floats:
+    choices = {"least energy": minimum_energy, "least L1": minimum_l1}
+    return choices[table.ours](optimal) if table.ours in choices else nearest(optimal, printed)

@@ -1,1 +1,0 @@
-"""What can be looked at in a terminal, over ssh too."""

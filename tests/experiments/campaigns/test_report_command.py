@@ -1,0 +1,178 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import spearmanr
+
+from experiments.campaigns.campaign_figures import (
+    MOST_POINTS,
+    CampaignColumns,
+    correlations,
+    draw_campaign_distributions,
+    draw_convergence,
+    draw_dispersion,
+)
+from experiments.cli import main
+from experiments.interception.scenario_file import load_scenario
+from sim import Campaign, CampaignNoise, Scenario
+
+Infoset = Callable[..., tuple[int, str, str]]
+FIGURES = [
+    f"figure-{name}.{kind}" for name in ("convergence", "dispersion", "distributions") for kind in ("pdf", "png")
+]
+
+
+@pytest.fixture(scope="module")
+def folder(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A campaign that no command has flown: manifest and shards only."""
+    path = tmp_path_factory.mktemp("campaign") / "runs"
+    Campaign(brief, 300, path, noise=CampaignNoise.MIXED).run()
+    return path
+
+
+@pytest.fixture
+def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Infoset:
+    """Run the command in an empty folder: exit code, stdout and stderr."""
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as left:
+            main([str(each) for each in arguments])
+        captured = capsys.readouterr()
+        assert "Traceback" not in captured.err
+        return int(left.value.code or 0), captured.out, captured.err
+
+    return run
+
+
+def test_a_report_of_files_alone(infoset: Infoset, brief: Scenario, folder: Path, tmp_path: Path) -> None:
+    before = sorted(each.name for each in folder.iterdir())
+    code, out, err = infoset("report", folder, "--out", tmp_path / "report")
+    assert (code, err) == (0, "")
+    assert sorted(each.name for each in folder.iterdir()) == before == [".lock", "manifest.json", "shards"]
+    assert sorted(each.name for each in (tmp_path / "report").iterdir()) == [*FIGURES, "report.json", "scenario.toml"]
+    assert load_scenario(tmp_path / "report" / "scenario.toml") == brief
+    found = json.loads((tmp_path / "report" / "report.json").read_text())
+    assert [each["noise"] for each in found["samples"]] == ["random", "game"]
+    assert set(found["correlation_with_miss"]) == {"random", "game"}
+    assert len(found["worst"]) == 10
+    scenario = tmp_path / "report" / "scenario.toml"
+    for each in found["worst"]:
+        assert each["replay"] == f"infoset engage {scenario} --noise {each['noise']} --seed 0 --run {each['run']}"
+        assert each["replay"] in out
+    for title in ("correlation of the miss with", "|z_km|", "Spearman", "the worst runs:", "p99.9", "at least"):
+        assert title in out
+
+
+def test_a_report_writes_nothing_unasked(infoset: Infoset, folder: Path, tmp_path: Path) -> None:
+    code, out, _ = infoset("report", folder)
+    assert code == 0
+    assert "with --out the report writes one" in out
+    assert list(tmp_path.iterdir()) == []
+    assert infoset("report", folder, "-q") == (0, "", "")
+
+
+@pytest.mark.parametrize(
+    ("what", "parts"),
+    [
+        ("missing", ["there is no such folder"]),
+        (".", ["holds no campaign and no sweep"]),
+        ("empty", ["no run is stored in it yet"]),
+        ("broken", ["is no manifest of a campaign"]),
+    ],
+)
+def test_what_cannot_be_reported(what: str, parts: list[str], infoset: Infoset, folder: Path, tmp_path: Path) -> None:
+    for name, manifest in (("empty", (folder / "manifest.json").read_text()), ("broken", "{]")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "manifest.json").write_text(manifest)
+    code, out, err = infoset("report", what, "--out", "report")
+    assert (code, out) == (2, "")
+    assert err.count("error: ") == 1
+    for part in parts:
+        assert part in err
+    assert not (tmp_path / "report").exists()
+
+
+def test_nothing_is_replaced_unless_told(infoset: Infoset, folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "report").mkdir()
+    (tmp_path / "report" / "notes.txt").write_text("precious")
+    code, _, err = infoset("report", folder, "--out", "report")
+    assert code == 2
+    assert "is not empty" in err
+    assert [each.name for each in (tmp_path / "report").iterdir()] == ["notes.txt"]
+
+
+def columns(noise: str, size: int) -> CampaignColumns:
+    rng = np.random.default_rng([size, noise == "game"])
+    start = {name: rng.uniform(size=size) for name in ("z_km", "x_km", "vz_km_s", "vx_km_s")}
+    return CampaignColumns(
+        noise, False, rng.exponential(size=size), rng.normal(100.0, 5.0, size), np.zeros(0), start, False
+    )
+
+
+def test_the_axis_has_room_for_the_guarantee_or_says_what_is_beyond() -> None:
+    drawn = replace(columns("random", 40), guaranteed_miss_m=np.linspace(10.0, 20.0, 40), guarantees=True)
+    figure = draw_campaign_distributions([drawn])
+    (miss, _) = figure.axes
+    assert miss.get_xlim()[1] > 20.0
+    assert miss.get_xlabel() == "miss, m"
+    (legend,) = figure.legends
+    assert "random noise: guaranteed miss" in [text.get_text() for text in legend.get_texts()]
+    tailed = replace(drawn, guaranteed_miss_m=np.append(np.linspace(10.0, 20.0, 39), 9e4))
+    (miss, _) = draw_campaign_distributions([tailed]).axes
+    assert miss.get_xlabel().split("\n")[1:] == ["dotted beyond the axis: 1 of 40"]
+
+
+@pytest.mark.parametrize("size", [1, 2, 30, 20_000])
+def test_figures_of_few_runs_and_of_many(size: int) -> None:
+    both = [columns("random", size), columns("game", size)]
+    left, right = draw_campaign_distributions(both).axes
+    assert (left.get_xlabel().split("\n")[0], right.get_xlabel()) == ("miss, m", "impulse spent, m/s")
+    assert max(len(np.asarray(line.get_xdata())) for line in left.get_lines()) <= MOST_POINTS + 2
+    panels = draw_convergence(both).axes
+    assert [each.get_title() for each in panels] == [
+        "(a) miss, random noise",
+        "(b) impulse spent, random noise",
+        "(c) miss, game noise",
+        "(d) impulse spent, game noise",
+    ]
+    assert all(each.get_xlabel() == "runs" for each in panels)
+    clouds = draw_dispersion(both).axes
+    assert [each.get_xlabel() for each in clouds[:4]] == [
+        *("start z, km", "start x, km", "start V$_z$, km/s", "start V$_x$, km/s"),
+    ]
+    assert max(len(np.asarray(line.get_xdata())) for line in clouds[0].get_lines()) <= MOST_POINTS
+
+
+def test_correlations_by_hand() -> None:
+    given = columns("random", 50)
+    rising = np.arange(50.0)
+    start = {"z_km": rising - 20.0, "x_km": rising**3, "vz_km_s": -rising, "vx_km_s": np.ones(50)}
+    found = correlations(replace(given, miss_m=rising, start=start))
+    assert found["z_km"] == {"pearson": pytest.approx(1.0), "spearman": pytest.approx(1.0)}
+    assert found["x_km"]["spearman"] == pytest.approx(1.0)
+    assert found["x_km"]["pearson"] == pytest.approx(np.corrcoef(rising, rising**3)[0, 1])
+    assert found["vz_km_s"]["pearson"] == pytest.approx(-1.0)
+    assert found["|vz_km_s|"]["pearson"] == pytest.approx(1.0)
+    assert found["vx_km_s"] == {"pearson": None, "spearman": None}
+
+
+@given(values=st.lists(st.tuples(st.integers(-4, 4), st.integers(-4, 4)), min_size=3, max_size=30))
+@settings(deadline=None)
+def test_spearmans_correlation_is_scipys_with_ties(values: list[tuple[int, int]]) -> None:
+    one, other = (np.array(each, dtype=np.float64) for each in zip(*values, strict=True))
+    given = columns("random", len(values))
+    found = correlations(replace(given, miss_m=other, start={**given.start, "z_km": one}))["z_km"]["spearman"]
+    if np.ptp(one) == 0.0 or np.ptp(other) == 0.0:
+        assert found is None
+    else:
+        assert found == pytest.approx(spearmanr(one, other).statistic, abs=1e-12)

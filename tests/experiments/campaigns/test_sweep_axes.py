@@ -1,0 +1,135 @@
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
+from experiments.common.errors import InputError
+from experiments.interception.scenario_file import load_scenario
+from sim import Scenario
+from sim.storage import Axis
+
+
+@pytest.fixture(scope="module")
+def asteroid() -> Scenario:
+    return load_scenario("asteroid-1997")
+
+
+def test_the_issues_example(asteroid: Scenario) -> None:
+    text = "angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:8,thruster.greatest_impulse_m_s=2:20:7"
+    first, second = axes = sweep_axes(text, asteroid)
+    assert (first.key, second.key) == ("angle_sensor.error_at_nominal_range_rad", "thruster.greatest_impulse_m_s")
+    assert (first.values[0], first.values[-1], len(first.values)) == (5e-5, 5e-4, 8)
+    assert second.values == (2.0, 5.0, 8.0, 11.0, 14.0, 17.0, 20.0)
+    cells = sweep_cells(asteroid, axes)
+    found = [
+        (cell.set_model.angle_sensor.error_at_nominal_range_rad, cell.thruster.greatest_impulse_m_s) for cell in cells
+    ]
+    assert found == list(itertools.product(first.values, second.values))
+    back = {
+        replace(
+            cell,
+            thruster=asteroid.thruster,
+            set_model=replace(cell.set_model, angle_sensor=asteroid.set_model.angle_sensor),
+        )
+        for cell in cells
+    }
+    assert back == {asteroid}  # nothing else has changed
+
+
+def test_units_are_those_of_the_file(asteroid: Scenario) -> None:
+    axes = sweep_axes("guidance.range_threshold_km=3:7:3,sun.direction_deg=0:90:2", asteroid)
+    cells = sweep_cells(asteroid, axes)
+    assert [each.set_model.range_threshold_m for each in cells[::2]] == [3e3, 5e3, 7e3]
+    assert cells[0].sun is not None
+    assert cells[0].sun.direction_rad == 0.0
+    assert cells[1] == replace(asteroid, set_model=cells[1].set_model)
+
+
+def test_ends_of_pairs_and_fixed_starts(asteroid: Scenario) -> None:
+    cells = sweep_cells(asteroid, sweep_axes("uncertainty.vx_km_s.least=-60:-58:2", asteroid))
+    assert [each.set_model.bounds.vx_m_s for each in cells] == [(-60e3, -57e3), (-58e3, -57e3)]
+    cells = sweep_cells(asteroid, sweep_axes("dispersion.z_km.greatest=2:3:2", asteroid))
+    assert [each.dispersion.z_m for each in cells] == [(-1e3, 2e3), (-1e3, 3e3)]
+    cells = sweep_cells(asteroid, sweep_axes("dispersion.z_km=0:2:2", asteroid))
+    assert [each.dispersion.z_m for each in cells] == [(0.0, 0.0), (2e3, 2e3)]
+    fixed = cells[1]
+    cells = sweep_cells(fixed, sweep_axes("dispersion.z_km.least=-2:0:2", fixed))
+    assert [each.dispersion.z_m for each in cells] == [(-2e3, 2e3), (0.0, 2e3)]
+
+
+def test_whole_numbers_and_logarithms(asteroid: Scenario) -> None:
+    (axis,) = sweep_axes("information_set.sections=log:9:101:4", asteroid)
+    assert (axis.values, axis.scale) == ((9.0, 20.0, 45.0, 101.0), "log")
+    assert [each.set_model.sections for each in sweep_cells(asteroid, (axis,))] == [9, 20, 45, 101]
+    (axis,) = sweep_axes("thruster.budget_m_s=log:1:10000:5", asteroid)
+    assert axis.values == pytest.approx((1.0, 10.0, 100.0, 1000.0, 10000.0), rel=1e-11)
+
+
+@given(ends=st.tuples(st.integers(1, 10**6), st.integers(1, 10**6)), count=st.integers(2, 40), log=st.booleans())
+@settings(deadline=None, max_examples=60)
+def test_values_rise_evenly_between_the_ends_as_written(ends: tuple[int, int], count: int, log: bool) -> None:
+    asteroid = load_scenario("asteroid-1997")
+    least, greatest = min(ends), max(ends) + 1
+    (axis,) = sweep_axes(f"thruster.budget_m_s={'log:' if log else ''}{least}e-2:{greatest}e-2:{count}", asteroid)
+    assert axis.values[0] == float(f"{least}e-2")
+    assert axis.values[-1] == float(f"{greatest}e-2")
+    assert len(axis.values) == count
+    assert list(axis.values) == sorted(set(axis.values))
+    spaced = np.geomspace if log else np.linspace
+    np.testing.assert_allclose(axis.values, spaced(least / 100.0, greatest / 100.0, count), rtol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("", ['"" is not written as KEY=FROM:TO:COUNT']),
+        ("thruster.budget_m_s", ["is not written as KEY=FROM:TO:COUNT"]),
+        ("thruster.budget=1:2:2", ["did you mean thruster.budget_m_s?"]),
+        ("budget_m_s=1:2:2", ["did you mean thruster.budget_m_s?"]),
+        ("zzzz=1:2:2", ["has no number", "the numbers there are:", "nominal.range_km"]),
+        ("guidance.strategy=1:2:2", ["has no number"]),
+        ("uncertainty.z_km=1:2:2", ["is a pair; vary uncertainty.z_km.least or uncertainty.z_km.greatest"]),
+        ("target.acceleration_m_s2=1:2:2", ["has no [target]; add that table"]),
+        ("thruster.budget_m_s=1:2", ["must be FROM:TO:COUNT"]),
+        ("thruster.budget_m_s=1:2:3:4", ["must be FROM:TO:COUNT"]),
+        ("thruster.budget_m_s=lin:1:2:3", ["must be FROM:TO:COUNT"]),
+        ("thruster.budget_m_s=2:1:3", ["from a lesser to a greater value"]),
+        ("thruster.budget_m_s=1:1:3", ["from a lesser to a greater value"]),
+        ("thruster.budget_m_s=log:0:1:3", ["greater than 0"]),
+        ("thruster.budget_m_s=inf:1:3", ['must be a number, found "inf"']),
+        ("thruster.budget_m_s=1:1e99:3", ["at most 1e+15"]),
+        ("information_set.sections=log:1e-400:1e15:3", ["0 or at least 1e-100"]),
+        ("thruster.budget_m_s=1:2:1", ["count must be a whole number from 2 to 1000"]),
+        ("thruster.budget_m_s=1:2:1001", ["count must be a whole number from 2 to 1000"]),
+        ("thruster.budget_m_s=1:2:" + "9" * 5000, ["count must be"]),
+        ("thruster.budget_m_s=" + "9" * 5000 + ":2:2", ["must be a number"]),
+        ("information_set.sections=9:10:5", ["are not all different whole numbers"]),
+        ("thruster.budget_m_s=1:2:2,thruster.budget_m_s=1:2:2", ["is named twice"]),
+        ("thruster.budget_m_s=1:2:1000,nominal.range_km=5800:5801:1000", ["makes 1000000 cells"]),
+        (",".join(["thruster.budget_m_s=1:2:2"] * 5), ["at most 4 keys"]),
+        (
+            "thruster.greatest_impulse_m_s=0.1:5:3",
+            ["asteroid-1997 with thruster.greatest_impulse_m_s = 0.1: thruster."],
+        ),
+        (
+            "angle_sensor.error_at_zero_range_rad=0.1:2:2",
+            ["with angle_sensor.error_at_zero_range_rad = 0.1", "leaves no err"],
+        ),
+    ],
+)
+def test_what_cannot_be_varied(text: str, parts: list[str], asteroid: Scenario) -> None:
+    with pytest.raises(InputError) as refused:
+        sweep_cells(asteroid, sweep_axes(text, asteroid))
+    for part in parts:
+        assert part in str(refused.value)
+    assert len(str(refused.value)) < 3000
+
+
+def test_axes_are_kept_as_they_are() -> None:
+    assert Axis("a.b", (1.0, 2.0)).scale == "linear"

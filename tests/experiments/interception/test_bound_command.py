@@ -1,0 +1,201 @@
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from experiments.cli import main
+from experiments.interception.figures.bound import draw_bound, ripples
+from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
+from guidance import strategy_names
+from infoset import StateBox
+from sim import Scenario
+from sim.bound import LabelBound, LowerBound, lower_bound, pair_at
+
+FILES = ["figure-bound.pdf", "figure-bound.png", "results.json", "scenario.toml"]
+KEYS = [
+    *("version", "scenario", "scenario_hash", "model", "elapsed_s", "disturbance_m_s2"),
+    *("lower_bound_m", "reached_at", "by_label", "strategies"),
+]
+
+Infoset = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Infoset:
+    """Run the command in an empty folder: exit code, stdout and stderr."""
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as left:
+            main(["bound", *(str(each) for each in arguments)])
+        captured = capsys.readouterr()
+        assert "Traceback" not in captured.err
+        return int(left.value.code or 0), captured.out, captured.err
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def short() -> Scenario:
+    """Half a minute of the published approach, from a range that is known to a step."""
+    published = load_scenario("asteroid-1997")
+    box = StateBox((-1e3, 1e3), (1740e3, 1750e3), (-100.0, 100.0), (-58e3, -57.5e3))
+    model = replace(published.set_model, bounds=box)
+    nominal = replace(model, angle_sensor=replace(model.angle_sensor, nominal_range_m=1745e3))
+    return replace(published, name="short", set_model=nominal, dispersion=box, nominal_range_m=1745e3)
+
+
+@pytest.fixture
+def short_file(short: Scenario, tmp_path: Path, infoset: Infoset) -> Path:
+    file = tmp_path / "short.toml"
+    file.write_text(scenario_to_toml(short))
+    return file
+
+
+def test_bound_into_a_folder(infoset: Infoset, short: Scenario, short_file: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "results"
+    code, out, err = infoset(short_file, "--out", folder, "--model", "guaranteed", "--budget", 8)
+    assert (code, err) == (0, "")
+    assert sorted(each.name for each in folder.iterdir()) == FILES
+    found = json.loads((folder / "results.json").read_text())
+    assert list(found) == KEYS
+    flown = load_scenario(folder / "scenario.toml")
+    assert found["version"] == version("infoset")
+    assert (found["scenario"], found["model"]) == ("short", "guaranteed")
+    assert found["scenario_hash"] == scenario_hash(flown)
+    expected = lower_bound(short)
+    assert found["lower_bound_m"] == expected.bound_m
+    assert [each["bound_m"] for each in found["by_label"]] == [each.bound_m for each in expected.by_label]
+    assert max(each["bound_m"] for each in found["by_label"]) == found["lower_bound_m"]
+    assert {each["closing_speed_m_s"] for each in found["by_label"]} == {57.5e3, 58e3}
+    assert all(1740e3 <= each["label_m"] <= 1750e3 for each in found["by_label"])
+    assert found["reached_at"]["label_m"] == expected.pair.label_m
+    assert [each["name"] for each in found["strategies"]] == strategy_names()
+    for each in found["strategies"]:
+        assert each["worst_found_m"] >= found["lower_bound_m"] * (1.0 - 1e-4)
+        assert each["worst_over_bound"] == pytest.approx(each["worst_found_m"] / found["lower_bound_m"])
+        assert each["guaranteed_m"] is not None
+        assert each["guaranteed_m"] >= each["worst_found_m"]
+        pairs = max(miss for flight in each["flights"] for miss in flight["miss_m"])
+        assert each["worst_found_m"] == max(pairs, each["worst_of_search_m"])
+        assert all(all(flight["truth_kept"]) for flight in each["flights"])
+        assert each["name"] in out
+    assert f"no strategy can guarantee a miss below {found['lower_bound_m']:.3g} m" in out
+    for title in ("worst found", "closing speed", "alike until", "guaranteed", "outcome"):
+        assert title in out
+
+
+def test_bound_as_json_alone(infoset: Infoset, short_file: Path, tmp_path: Path) -> None:
+    code, out, err = infoset(short_file, "--strategies", "symmetric-miss", "--json", "-", "--budget", 0)
+    assert code == 0
+    found: Any = json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    (only,) = found["strategies"]
+    assert only["name"] == "symmetric-miss"
+    assert only["guaranteed_m"] is None
+    assert only["worst_of_search_m"] is None
+    assert "symmetric-miss" in err
+    assert [each.name for each in tmp_path.iterdir()] == ["short.toml"]
+    assert infoset(short_file, "--strategies", "patient", "-q", "--budget", 0) == (0, "", "")
+
+
+def test_help_has_an_example(infoset: Infoset) -> None:
+    code, out, _ = infoset("--help")
+    assert code == 0
+    assert "Example: infoset bound" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["asteroid-1996"], ["asteroid-1996", "did you mean"]),
+        (["--strategies", "patent"], ["--strategies", "did you mean patient?"]),
+        (["--strategies", "patient,patient"], ["named twice"]),
+        (["--budget", -1], ["--budget", "must be"]),
+        (["--model", "papr"], ["--model", "did you mean paper?"]),
+        (["--json", "missing/x.json"], ["there is no folder missing"]),
+        (["--out", "/dev/null"], ["is a file"]),
+        (["--json", "out/results.json", "--out", "out"], ["also a file of --out"]),
+    ],
+)
+def test_what_is_wrong_is_said_before_the_work(
+    arguments: list[str], parts: list[str], infoset: Infoset, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("sim.bound.lower_bound", lambda *_, **__: pytest.fail("began to work"))
+    code, out, err = infoset(*arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: ")
+    assert err.count("error: ") == 1
+    for part in parts:
+        assert part in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_nothing_is_replaced_unless_told(infoset: Infoset, short_file: Path, tmp_path: Path) -> None:
+    precious = tmp_path / "x.json"
+    precious.write_text("precious")
+    code, _, err = infoset(short_file, "--json", precious)
+    assert code == 2
+    assert "--overwrite" in err
+    assert precious.read_text() == "precious"
+    asked = (short_file, "--strategies", "patient", "--budget", 0)
+    assert infoset(*asked, "--json", precious, "--overwrite", "-q")[0] == 0
+    assert json.loads(precious.read_text())["scenario"] == "short"
+
+
+def test_a_program_without_a_solution_is_one_message(
+    infoset: Infoset, short_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from sim.bound import BoundError
+
+    def fail(*_: object, **__: object) -> None:
+        raise BoundError("label 1 m")
+
+    monkeypatch.setattr("sim.bound.lower_bound", fail)
+    code, out, err = infoset(short_file)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: short: a linear program of the bound has no solution (label 1 m)")
+
+
+def test_figure_of_few_labels_and_of_many(short: Scenario) -> None:
+    few = lower_bound(short)
+    left, right = draw_bound(short, few).axes
+    assert [line.get_label() for line in left.get_lines()[:2]] == ["58 km/s", "57.5 km/s"]
+    assert f"{few.bound_m:.1f} m" in {text.get_text() for text in left.texts}
+    assert "s" in right.get_xlabel()
+    assert not left.collections
+    places = np.concatenate([first + np.linspace(0.0, 29e3, 9) for first in (5.3e6, 5.8e6, 6.2e6)])
+    many = LowerBound(
+        (pair_at(short, 1745e3, -58e3, 0.005),),
+        tuple(LabelBound(label, -58e3, 1, 20.0 + math.sin(label)) for label in places),
+        0.005,
+    )
+    (left, _) = draw_bound(short, many).axes
+    assert len(left.collections) == 1  # the ripple as a band
+    assert len(left.get_lines()[0].get_xydata()) == 3  # type: ignore[arg-type]
+
+
+def test_ripples_are_split_where_no_label_was_looked_at() -> None:
+    labels = np.array([0.0, 1.0, 2.0, 10.0, 11.0, 11.5, 12.0])
+    found = ripples(labels, 2.0 * labels)
+    assert [each.tolist() for each, _ in found] == [[0.0, 1.0, 2.0], [10.0, 11.0, 11.5, 12.0]]
+    assert all((2.0 * each == values).all() for each, values in found)
+    assert len(ripples(np.array([1.0]), np.array([2.0]))) == 1
+
+
+@pytest.mark.slow
+def test_bound_of_the_published_scenario_in_the_guaranteed_model(infoset: Infoset) -> None:
+    code, out, _ = infoset("asteroid-1997", "--model", "guaranteed", "--json", "-")
+    assert code == 0
+    found = json.loads(out)
+    assert 24.0 < found["lower_bound_m"] < 25.0
+    assert all(each["worst_found_m"] > 24.0 for each in found["strategies"])

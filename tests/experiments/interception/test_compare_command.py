@@ -1,0 +1,226 @@
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from experiments.cli import main
+from experiments.interception.comparison import Comparison, flights, gather, summary
+from experiments.interception.figures.comparison import draw_comparison
+from experiments.interception.scenario_file import load_scenario, scenario_hash
+from guidance import NoiseKind, TieRule, strategy_names
+from sim import Scenario, simulate
+
+TWO = ("--strategies", "symmetric-miss,patient")
+LEVELS = ["p10", "p50", "p90", "p99", "max"]
+FILES = ["figure-comparison.pdf", "figure-comparison.png", "results.csv", "results.json", "scenario.toml"]
+
+Infoset = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Infoset:
+    """Run the command in an empty folder: exit code, stdout and stderr."""
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as left:
+            main(["compare", *(str(each) for each in arguments)])
+        captured = capsys.readouterr()
+        assert "Traceback" not in captured.err
+        return int(left.value.code or 0), captured.out, captured.err
+
+    return run
+
+
+def as_json(infoset: Infoset, *arguments: object) -> Any:
+    code, out, _ = infoset(*arguments, "--json", "-")
+    assert code == 0
+    return json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+
+
+def test_compare_as_json(infoset: Infoset, brief: Scenario, brief_file: Path, tmp_path: Path) -> None:
+    found = as_json(infoset, brief_file, *TWO, "--runs", 4, "--seed", 3)
+    assert found["version"] == version("infoset")
+    assert (found["scenario"], found["scenario_hash"]) == ("brief", scenario_hash(brief))
+    assert (found["seed"], found["runs"], found["model"], found["range_meter"]) == (3, 4, "paper", True)
+    strategies = found["strategies"]
+    assert [(each["name"], each["noise"]) for each in strategies] == [
+        ("symmetric-miss", "random"),
+        ("symmetric-miss", "game"),
+        ("patient", "random"),
+        ("patient", "game"),
+    ]
+    for each in strategies:
+        for quantity in ("miss_m", "impulse_m_s"):
+            assert list(each[quantity]) == LEVELS
+            assert sorted(each[quantity].values()) == list(each[quantity].values())
+        assert 0 <= each["truth_kept"] <= 4
+        assert each["phi_held"] is None
+        assert list(each["ties"]) == ([] if each["noise"] == "random" else ["upper", "lower", "alternate", "random"])
+        assert sum(each["outcomes"].values()) == (4 if each["noise"] == "random" else 16)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_guaranteed_model_keeps_the_truth_and_its_word(infoset: Infoset, brief_file: Path) -> None:
+    for each in as_json(infoset, brief_file, *TWO, "--runs", 3, "--model", "guaranteed")["strategies"]:
+        assert (each["truth_kept"], each["phi_held"]) == (3, 3)
+
+
+def test_the_figures_are_those_of_the_simulator_and_the_worst_tie_rule_counts(
+    infoset: Infoset, brief: Scenario, brief_file: Path
+) -> None:
+    found = as_json(infoset, brief_file, "--strategies", "symmetric-miss", "--runs", 5, "--seed", 2)["strategies"]
+    assert found[0]["miss_m"] == summary(simulate(brief, 5, seed=2).miss_m)
+    game = [simulate(replace(brief, noise=NoiseKind.GAME, tie=tie), 5, seed=2) for tie in TieRule]
+    assert found[1]["miss_m"] == summary(np.max([each.miss_m for each in game], axis=0))
+    assert found[1]["impulse_m_s"]["max"] == max(each.impulse_m_s.max() for each in game)
+    assert found[1]["ties"]["lower"]["miss_m"] == summary(game[1].miss_m)
+
+
+def test_what_is_said_is_told_apart_from_what_is_piped(infoset: Infoset, brief_file: Path) -> None:
+    code, out, err = infoset(brief_file, *TWO, "--runs", 1, "--json", "-")
+    assert code == 0
+    json.loads(out)
+    assert "impulse, m/s" in err
+    assert infoset(brief_file, *TWO, "--runs", 1, "--quiet") == (0, "", "")
+
+
+def test_the_table(infoset: Infoset) -> None:
+    code, out, _ = infoset(*TWO, "--runs", 2, "--no-range-meter")
+    assert code == 0
+    assert "asteroid-1997, without range meter, model paper, 2 runs" in out
+    for part in ("10%", "50%", "99%", "worst", "symmetric-miss  miss, m", "impulse, m/s", "random", "game"):
+        assert part in out
+    assert max(len(line.rstrip()) for line in out.splitlines()[1:]) <= 80
+
+
+def test_compare_into_a_folder(infoset: Infoset, brief_file: Path, tmp_path: Path) -> None:
+    asked = (brief_file, *TWO)
+    assert infoset(*asked, "--runs", 3, "--out", "out", "--csv", "beside.csv", "--no-range-meter")[0] == 0
+    assert sorted(each.name for each in (tmp_path / "out").iterdir()) == FILES
+    text = (tmp_path / "out" / "results.csv").read_text()
+    assert text == (tmp_path / "beside.csv").read_text()
+    rows = list(csv.DictReader(io.StringIO(text)))
+    assert len(rows) == 2 * 5 * 3
+    assert [row["tie"] for row in rows[:6:3]] == ["", "upper"]
+    found = json.loads((tmp_path / "out" / "results.json").read_text())
+    flown = load_scenario(tmp_path / "out" / "scenario.toml")
+    assert flown.range_sensor is None
+    assert found["scenario_hash"] == scenario_hash(flown)
+    worst = max(float(row["miss_m"]) for row in rows if (row["strategy"], row["noise"]) == ("patient", "game"))
+    assert found["strategies"][3]["miss_m"]["max"] == worst
+
+    code, _, err = infoset(*asked, "--runs", 1, "--out", "out")
+    assert code == 2
+    assert "--overwrite" in err
+    assert (tmp_path / "out" / "results.csv").read_text() == text
+    assert infoset(*asked, "--runs", 1, "--out", "out", "--overwrite", "-q")[0] == 0
+    assert (tmp_path / "out" / "results.csv").read_text() != text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["--strategies", "pateint"], ["--strategies", "did you mean patient?", "symmetric-miss"]),
+        (["--strategies", "patient,,"], ["--strategies", "choose one of"]),
+        (["--strategies", ""], ["--strategies", "choose one of"]),
+        (["--strategies", "patient,patient"], ["patient is named twice"]),
+        (["--runs", "0"], ["--runs", "found 0"]),
+        (["--seed", "-1"], ["--seed"]),
+        (["--model", "papr"], ["--model", "did you mean paper?"]),
+        (["asteroid-1996"], ["asteroid-1996", "did you mean"]),
+        (["asteroid-1997-single", "--range-meter"], ["--range-meter", "[range_sensor]"]),
+        (["--json", "-", "--csv", "-"], ["--json and --csv"]),
+        (["--json", "missing/x.json"], ["there is no folder missing"]),
+    ],
+)
+def test_what_is_wrong_is_said_before_the_work(
+    arguments: list[str], parts: list[str], infoset: Infoset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sim.simulate", lambda *_: pytest.fail("began to work"))
+    code, out, err = infoset(*arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: ")
+    assert err.count("error: ") == 1
+    for part in parts:
+        assert part in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unknown_strategy_is_told_all_there_are(infoset: Infoset) -> None:
+    err = infoset("--strategies", "none-such")[2]
+    assert all(name in err for name in strategy_names())
+
+
+def test_help_has_an_example(infoset: Infoset) -> None:
+    code, out, _ = infoset("--help")
+    assert code == 0
+    assert "Example: infoset compare" in out
+
+
+def test_interrupted(infoset: Infoset, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sim.simulate", interrupt)
+    code, out, err = infoset("--out", "out")
+    # Before it, perhaps, that kernels are compiled.
+    assert (code, out, err.splitlines()[-1]) == (130, "", "interrupted")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture(scope="module")
+def compared(brief: Scenario) -> list[Comparison]:
+    names = ["symmetric-miss", "patient"]
+    return gather([(name, tie, simulate(flown, 6)) for name, tie, flown in flights(brief, names)])
+
+
+def axes_of(figure: Figure) -> dict[str, Any]:
+    return {axes.get_title()[:3]: axes for axes in figure.axes}
+
+
+def test_the_figure_shows_the_quantiles_of_every_strategy(compared: list[Comparison]) -> None:
+    axes = axes_of(draw_comparison(compared))
+    assert [each.get_text() for each in axes["(a)"].get_yticklabels()] == ["symmetric-miss", "patient"]
+    assert (axes["(a)"].get_xlabel(), axes["(c)"].get_xlabel()) == ("miss, m", "impulse spent, m/s")
+    assert axes["(a)"].get_xlim() == axes["(b)"].get_xlim()
+    assert axes["(c)"].get_xlim() == axes["(d)"].get_xlim()
+    for letter, values in (("(b)", compared[3].miss_m), ("(d)", compared[3].impulse_m_s)):
+        marks = {line.get_marker(): line.get_xdata()[0] for line in axes[letter].lines[-3:]}
+        assert marks["o"] == pytest.approx(np.median(values))
+        assert marks["x"] == pytest.approx(values.max())
+
+
+def test_nothing_lies_right_of_the_axes(compared: list[Comparison]) -> None:
+    for axes in draw_comparison(compared).axes:
+        right = axes.get_xlim()[1]
+        assert all(np.max(line.get_xdata()) < right for line in axes.lines)
+
+
+def test_misses_of_zero_can_be_drawn(compared: list[Comparison]) -> None:
+    exact = [
+        Comparison(
+            each.strategy, each.noise, {tie: replace(r, miss_m=0.0 * r.miss_m) for tie, r in each.results.items()}
+        )
+        for each in compared
+    ]
+    figure = draw_comparison(exact)
+    figure.canvas.draw()
+    assert all(np.isfinite([*axes.get_xlim(), *axes.get_ylim()]).all() for axes in figure.axes)
+
+
+def test_a_comparison_of_nothing_cannot_be_drawn() -> None:
+    with pytest.raises(ValueError, match="at least one strategy"):
+        draw_comparison([])

@@ -1,0 +1,387 @@
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import io
+import json
+import math
+import random
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from experiments.common.errors import InputError
+from experiments.interception import record_file
+from experiments.interception.record_file import read_record, write_record
+from experiments.interception.scenario_file import load_scenario
+from guidance import LineOfSight, Measurement, NoiseKind, Situation
+from infoset import InformationSetView, RateSensor
+from sim import Record, StepRecord, fly_one
+
+
+class Idle:
+    """A strategy that nobody has registered."""
+
+    def start(self, batch: int) -> None:
+        return None
+
+    def decide(self, situation: Situation, state: object) -> Any:
+        return np.zeros(situation.information.batch)
+
+
+OUTLIER_AT = 60
+
+
+class Outlier:
+    """Measures truly, but for one angle that is wrong by five times its bound."""
+
+    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
+        wrong = 5.0 * sight.angle_sensor.error_bound(sight.range_m) if sight.step == OUTLIER_AT else 0.0
+        rate = None if sight.rate_error_rad_s is None else sight.omega_rad_s
+        return Measurement(sight.alpha_rad + wrong, None, rate)
+
+
+@pytest.fixture(scope="module")
+def record() -> Record:
+    """The beginning of an engagement: small, so that it can be spoilt often."""
+    whole = fly_one(load_scenario("asteroid-1997"), 3, seed=11)
+    return dataclasses.replace(whole, steps=whole.steps[:6])
+
+
+@pytest.fixture(scope="module")
+def content(record: Record, tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    file = tmp_path_factory.mktemp("record") / "x.npz"
+    write_record(record, file)
+    return file.read_bytes()
+
+
+def refused(content: bytes, tmp_path: Path) -> str:
+    """The message about a file with this content."""
+    file = tmp_path / "bad.npz"
+    file.write_bytes(content)
+    with pytest.raises(InputError) as refusal:
+        read_record(file)
+    message = str(refusal.value)
+    assert message.startswith(f"{file}: is not a readable record: ")
+    assert message.endswith("make a record with `infoset engage --record FILE.npz`")
+    return message
+
+
+def assert_same_step(one: StepRecord, other: StepRecord) -> None:
+    for field in dataclasses.fields(StepRecord):
+        if field.name != "sections":
+            assert getattr(one, field.name) == getattr(other, field.name)
+    assert len(one.sections) == len(other.sections)
+    for a, b in zip(one.sections, other.sections, strict=True):
+        assert (a.label_m, a.range_m, a.closing_speed_m_s) == (b.label_m, b.range_m, b.closing_speed_m_s)
+        assert np.array_equal(a.polygon.polygon(), b.polygon.polygon())
+
+
+def assert_same(one: Record, other: Record) -> None:
+    assert (one.scenario, one.seed, one.run, one.strategy) == (other.scenario, other.seed, other.run, other.strategy)
+    assert (one.noise, one.inconsistency) == (other.noise, other.inconsistency)
+    for field in dataclasses.fields(one.result):
+        a, b = getattr(one.result, field.name), getattr(other.result, field.name)
+        if np.ma.isMaskedArray(a):
+            assert np.ma.getmaskarray(a).tolist() == np.ma.getmaskarray(b).tolist()
+            a, b = a.filled(0.0), b.filled(0.0)
+        assert np.array_equal(a, b)
+    assert len(one.steps) == len(other.steps)
+    for a, b in zip(one.steps, other.steps, strict=True):
+        assert_same_step(a, b)
+
+
+@pytest.mark.parametrize("noise", NoiseKind)
+@pytest.mark.parametrize("name", ["asteroid-1997", "asteroid-1997-single", "comet-fast"])
+def test_a_record_comes_back_bit_for_bit(name: str, noise: NoiseKind, tmp_path: Path) -> None:
+    flown = fly_one(dataclasses.replace(load_scenario(name), noise=noise), 1, seed=2**70)
+    write_record(flown, tmp_path / "x.npz")
+    assert_same(read_record(tmp_path / "x.npz"), flown)
+    assert [each.name for each in tmp_path.iterdir()] == ["x.npz"]
+
+
+def test_a_record_of_ones_own_strategy(tmp_path: Path) -> None:
+    flown = fly_one(load_scenario("asteroid-1997-single"), strategy=Idle())
+    write_record(flown, tmp_path / "x.npz")
+    found = read_record(tmp_path / "x.npz")
+    assert (found.strategy, found.scenario.strategy) == (f"{Idle.__module__}.Idle", "symmetric-miss")
+    assert_same(found, flown)
+
+
+def test_measured_rates_and_where_data_contradict_the_model_come_back(tmp_path: Path) -> None:
+    scenario = dataclasses.replace(load_scenario("asteroid-1997-single"), rate_sensor=RateSensor(1.0, 1e-6))
+    flown = fly_one(scenario, noise=Outlier())
+    assert [step.measured_rate_rad_s is None for step in flown.steps[:4]] == [False, True, False, True]
+    assert flown.inconsistency is not None
+    assert flown.inconsistency.step == OUTLIER_AT
+    write_record(flown, tmp_path / "x.npz")
+    assert_same(read_record(tmp_path / "x.npz"), flown)
+
+
+def test_what_is_not_known_comes_back_as_not_known(record: Record, tmp_path: Path) -> None:
+    blank = dataclasses.replace(
+        record.steps[0],
+        measured_angle_rad=None,
+        measured_range_m=None,
+        predicted_miss_m=None,
+        truth_margin_m=None,
+        sections=(),
+    )
+    result = dataclasses.replace(
+        record.result,
+        guaranteed_miss_m=np.ma.MaskedArray([0.0], mask=[True]),
+        truth_margin_m=np.ma.MaskedArray([0.0], mask=[True]),
+    )
+    changed = dataclasses.replace(record, steps=(blank, *record.steps[1:3]), result=result)
+    write_record(changed, tmp_path / "x.npz")
+    assert_same(read_record(tmp_path / "x.npz"), changed)
+
+
+def test_the_same_record_gives_the_same_bytes(record: Record, content: bytes, tmp_path: Path) -> None:
+    write_record(record, tmp_path / "y.npz")
+    assert (tmp_path / "y.npz").read_bytes() == content
+
+
+def test_numpy_reads_it_without_pickle(content: bytes) -> None:
+    with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+        header = json.loads(arrays["header"].tobytes())
+        assert header["format"] == "infoset-record"
+        assert all(np.isfinite(arrays[name]).all() for name in arrays.files)
+        assert len(arrays["vertex_v_m_s_z_m"]) == arrays["vertex_offsets"][-1]
+
+
+def test_nothing_is_replaced_unless_told(record: Record, tmp_path: Path) -> None:
+    file = tmp_path / "x.npz"
+    file.write_text("precious")
+    with pytest.raises(InputError, match="exists already"):
+        write_record(record, file)
+    assert file.read_text() == "precious"
+    write_record(record, file, overwrite=True)
+    assert_same(read_record(file), record)
+    with pytest.raises(InputError, match=r"must end in \.npz"):
+        write_record(record, tmp_path / "x")
+
+
+def test_a_scenario_that_no_file_can_hold(record: Record, tmp_path: Path) -> None:
+    odd = dataclasses.replace(record.scenario, nominal_range_m=1.0)
+    with pytest.raises(InputError, match="nominal range"):
+        write_record(dataclasses.replace(record, scenario=odd), tmp_path / "x.npz")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_no_file(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"there is no such file.*engage --record"):
+        read_record(tmp_path / "x.npz")
+    with pytest.raises(InputError, match="is a folder"):
+        read_record(tmp_path)
+    with pytest.raises(InputError, match="no ordinary file"):
+        read_record("/dev/null")
+    with pytest.raises(InputError, match="cannot be read"):
+        read_record("a\0b")
+
+
+def test_an_unreadable_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_: Path) -> bytes:  # chmod does not stop root
+        raise PermissionError(13, "Permission denied")
+
+    (tmp_path / "x.npz").write_bytes(b"")
+    monkeypatch.setattr(Path, "read_bytes", refuse)
+    with pytest.raises(InputError, match="cannot be read: Permission denied"):
+        read_record(tmp_path / "x.npz")
+
+
+def test_a_file_too_large_is_not_even_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(record_file, "LARGEST_FILE_BYTES", 10)
+    (tmp_path / "x.npz").write_bytes(b"x" * 11)
+    with pytest.raises(InputError, match="more than any record"):
+        read_record(tmp_path / "x.npz")
+
+
+@pytest.mark.parametrize("foreign", [b"", b"x", b"PK\x03\x04", b"\x93NUMPY\x01\x00", b"\0" * 1000])
+def test_what_is_no_archive(foreign: bytes, tmp_path: Path) -> None:
+    refused(foreign, tmp_path)
+
+
+def test_a_foreign_npz(tmp_path: Path) -> None:
+    archive = io.BytesIO()
+    np.savez(archive, a=np.arange(3))
+    assert "another program" in refused(archive.getvalue(), tmp_path)
+    archive = io.BytesIO()
+    np.savez(archive, header=np.array([{}], dtype=object))
+    refused(archive.getvalue(), tmp_path)
+
+
+def test_truncated_anywhere(content: bytes, tmp_path: Path) -> None:
+    draw = random.Random(0)
+    sizes = [1, 100, len(content) // 2, len(content) - 1, *(draw.randrange(len(content)) for _ in range(30))]
+    for size in sizes:
+        refused(content[:size], tmp_path)
+
+
+def test_a_flipped_bit_is_found_or_harmless(content: bytes, record: Record, tmp_path: Path) -> None:
+    draw = random.Random(1)
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        heads = [member.header_offset + at for member in archive.infolist() for at in range(0, 180, 7)]
+        directory = range(archive.start_dir, len(content), 11)
+    file = tmp_path / "x.npz"
+    harmless = 0
+    for at in [*heads, *directory, *(draw.randrange(len(content)) for _ in range(100))]:
+        flipped = bytearray(content)
+        flipped[at] ^= 1 << draw.randrange(8)
+        file.write_bytes(flipped)
+        with contextlib.suppress(InputError):
+            found = read_record(file)
+            harmless += 1
+            if harmless % 20 == 1:
+                assert_same(found, record)
+    assert harmless < 300  # dates and attributes of the archive's members, which nothing reads
+
+
+Arrays = dict[str, Any]
+
+
+def remade(content: bytes, change: Callable[[Arrays], None], *, compression: int = zipfile.ZIP_STORED) -> bytes:
+    """The record with something changed and the checksum made to fit again."""
+    with np.load(io.BytesIO(content), allow_pickle=False) as stored:
+        arrays: Arrays = {name: stored[name].copy() for name in stored.files}
+    header = json.loads(arrays.pop("header").tobytes())
+    arrays["json"] = header
+    change(arrays)
+    header = arrays.pop("json")
+    if isinstance(header, dict) and "sha256" in header:
+        header["sha256"] = record_file._checksum(header, arrays)
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", compression) as archive:
+        for name, values in arrays.items():
+            member = io.BytesIO()
+            np.lib.format.write_array(member, np.asarray(values), version=(1, 0))
+            archive.writestr(f"{name}.npy", member.getvalue())
+    return out.getvalue()
+
+
+def test_remade_without_a_change_it_is_read(content: bytes, record: Record, tmp_path: Path) -> None:
+    (tmp_path / "x.npz").write_bytes(remade(content, lambda arrays: None))
+    assert_same(read_record(tmp_path / "x.npz"), record)
+
+
+def put(name: str, at: int, value: object) -> Callable[[Arrays], None]:
+    def change(arrays: Arrays) -> None:
+        arrays[name][at] = value
+
+    return change
+
+
+def header(**values: object) -> Callable[[Arrays], None]:
+    return lambda arrays: arrays["json"].update(values)
+
+
+def result(**values: object) -> Callable[[Arrays], None]:
+    return lambda arrays: arrays["json"]["result"].update(values)
+
+
+def cast(name: str, kind: str) -> Callable[[Arrays], None]:
+    return lambda arrays: arrays.update({name: arrays[name].astype(kind)})
+
+
+def shorter(name: str) -> Callable[[Arrays], None]:
+    return lambda arrays: arrays.update({name: arrays[name][:-1]})
+
+
+@pytest.mark.parametrize(
+    ("change", "part"),
+    [
+        (lambda arrays: arrays.update(extra=np.zeros(3)), "another program"),
+        (lambda arrays: arrays.pop("time_s"), "has no time_s.npy"),
+        (header(schema=1), "has the schema 1"),
+        (header(schema=True), "has the schema true"),
+        (header(schema=[1]), "has the schema"),
+        (header(format="other"), "does not say infoset-record"),
+        (lambda arrays: arrays.update(json=[1]), "does not say infoset-record"),
+        (lambda arrays: arrays["json"].pop("seed"), "keys"),
+        (header(more=1), "keys"),
+        (header(seed=-1), "wrong seed"),
+        (header(seed=True), "wrong seed"),
+        (header(seed=0.5), "wrong seed"),
+        (header(run=2**63), "wrong seed, run"),
+        (header(strategy=3), "strategy"),
+        (header(strategy="\x1b[2J"), "cannot be printed"),
+        (header(strategy="\ud800"), "cannot be printed"),
+        (header(scenario="schema = 1"), "its scenario is unsound"),
+        (header(scenario="\ud800"), "unsound"),
+        (header(scenario="x = ["), "is not TOML"),
+        (header(result=[]), "wrong result"),
+        (result(miss_m=math.nan), "wrong result"),
+        (result(miss_m="1"), "wrong result"),
+        (result(miss_m=True), "wrong result"),
+        (result(more=1), "wrong result"),
+        (result(truth_kept=1), "wrong result"),
+        (result(outcome="won"), "outcome"),
+        (result(outcome=[]), "outcome"),
+        (result(position_m=[1.0]), "wrong start"),
+        (result(position_m=[1.0, [2.0]]), "wrong result"),
+        (put("time_s", 0, math.nan), "not a finite number"),
+        (put("vertex_v_m_s_z_m", 0, math.inf), "not a finite number"),
+        (put("vertex_v_m_s_z_m", 0, 1e300), "vertex_v_m_s_z_m holds 1e+300, more than 1e+60 in size"),
+        (put("impulse_m_s", 1, -1e300), "impulse_m_s holds 1e+300, more than 1e+60 in size"),
+        (put("predicted_miss_m", 0, 1e200), "predicted_miss_m holds 1e+200"),
+        (put("measured_range_m", 0, -1.0), "measured_range_m holds a range that is negative"),
+        (put("true_range_m", 0, -1.0), "true_range_m holds a range that is negative"),
+        (put("section_range_m", 0, 1e-300), "not positive"),
+        (result(miss_m=1e308), "wrong result"),
+        (result(miss_m=-1.0), "negative miss"),
+        (result(impulse_m_s=-1.0), "negative miss or impulse"),
+        (result(guaranteed_miss_m=-1.0), "negative miss"),
+        (result(truth_margin_m=-1e300), "wrong result"),
+        (result(position_m=[1e300, 1.0]), "wrong result"),
+        (put("time_s", 3, 0.0), "time_s does not rise"),
+        (put("section_offsets", 0, 1), "section_offsets does not run"),
+        (put("section_offsets", 5, -1), "section_offsets does not run"),
+        (put("section_offsets", 5, 2**63 - 1), "section_offsets does not run"),
+        (put("section_offsets", 5, 0), "section_offsets does not rise"),
+        (put("section_offsets", -1, 7), "section_offsets does not run"),
+        (put("vertex_offsets", 1, 0), "vertex_offsets does not rise"),
+        (put("section_range_m", 0, 0.0), "not positive"),
+        (shorter("impulse_m_s"), "impulse_m_s has"),
+        (shorter("vertex_offsets"), "vertex_offsets has"),
+        (shorter("vertex_v_m_s_z_m"), "vertex_offsets does not run"),
+        (cast("time_s", "<f4"), "holds float32"),
+        (cast("time_s", ">f8"), "holds >f8"),
+        (cast("section_offsets", "<i4"), "holds int32"),
+        (lambda arrays: arrays.update(predicted_miss_m=np.zeros((6, 3))), "shape"),
+        (lambda arrays: arrays.update(predicted_miss_m=np.asfortranarray(arrays["predicted_miss_m"])), "shape"),
+        (lambda arrays: arrays.update({name: values[:0] for name, values in arrays.items() if name != "json"}), "rows"),
+    ],
+)
+def test_what_does_not_fit_together(
+    change: Callable[[Arrays], None], part: str, content: bytes, tmp_path: Path
+) -> None:
+    assert part in refused(remade(content, change), tmp_path)
+
+
+def test_contents_that_were_changed(content: bytes, tmp_path: Path) -> None:
+    with np.load(io.BytesIO(content)) as stored:
+        arrays = {name: stored[name].copy() for name in stored.files}
+    arrays["impulse_m_s"][0] += 1e-9
+    out = io.BytesIO()
+    np.savez(out, **arrays)
+    assert "checksum" in refused(out.getvalue(), tmp_path)
+
+
+def test_a_compressed_archive_is_not_unpacked(content: bytes, tmp_path: Path) -> None:
+    assert "compressed" in refused(remade(content, lambda _: None, compression=zipfile.ZIP_DEFLATED), tmp_path)
+
+
+def test_an_array_that_claims_more_than_it_holds(content: bytes, tmp_path: Path) -> None:
+    head = b"{'descr': '<f8', 'fortran_order': False, 'shape': (999999999999,), }"
+    text = head.ljust(117) + b"\n"
+    out = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as archive, zipfile.ZipFile(out, "w") as changed:
+        for name in archive.namelist():
+            member = archive.read(name)
+            changed.writestr(name, b"\x93NUMPY\x01\x00\x76\x00" + text if name == "time_s.npy" else member)
+    assert "time_s.npy holds 0 bytes" in refused(out.getvalue(), tmp_path)

@@ -1,0 +1,428 @@
+from __future__ import annotations
+
+import json
+import re
+import time
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from experiments.cli import main
+from experiments.common.problem_file import built_in_problems, problem_text
+from experiments.multipoint.curves import cost_curves
+from experiments.multipoint.figures import Scene, draw_control, draw_costates, draw_path, draw_times
+from experiments.multipoint.file import load_multipoint
+from experiments.multipoint.tables import KIND, Axes
+
+FIGURES = ["figure-control", "figure-costates", "figure-path", "figure-times"]
+KEYS = [
+    *("version", "problem", "problem_hash", "units", "order_chosen", "times_chosen", "cost_m2_s3", "order", "times_s"),
+    *(
+        "time_gradient_m2_s4",
+        "nodes",
+        "costate0",
+        "peak_control_m_s2",
+        "evaluations",
+        "orders_begun",
+        "orders_left_out",
+        "orders_that_do_not_fit",
+    ),
+]
+NODE_KEYS = ["name", "meet", "position_m", "velocity_m_s", "target_velocity_m_s", "leave_s", "jump_m_s3"]
+TWO, THREE, FIVE, TOUR = (problem_text(name) for name in ("service-2", "service-3", "service-5", "asteroid-tour"))
+HEAD = THREE.split("[[target]]")[0]
+
+Infoset = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Infoset:
+    """Run the command in an empty folder: exit code, stdout and stderr."""
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as left:
+            main(["multipoint", *(str(each) for each in arguments)])
+        captured = capsys.readouterr()
+        assert "Traceback" not in captured.err
+        return int(left.value.code or 0), captured.out, captured.err
+
+    return run
+
+
+@pytest.fixture
+def mine(tmp_path: Path) -> Callable[[str], Path]:
+    """Write a problem file."""
+
+    def write(text: str) -> Path:
+        file = tmp_path / "mine.toml"
+        file.write_text(text, encoding="utf-8")
+        return file
+
+    return write
+
+
+def changed(old: str, new: str, text: str = THREE) -> str:
+    """A problem with its first `old` replaced."""
+    assert old in text
+    return text.replace(old, new, 1)
+
+
+def strict(text: str) -> Any:
+    return json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+
+
+def told(infoset: Infoset, *arguments: object) -> Any:
+    code, out, err = infoset(*arguments, "--json", "-", "-q")
+    assert (code, err) == (0, "")
+    return strict(out)
+
+
+def targets(count: int, apart_s: float = 500.0) -> str:
+    """A file of so many targets."""
+    table = '[[target]]\nname = "n{0}"\nposition_m = [{0}, 10, 0]\nvelocity_m_s = [0, 0, 0]\ntime_s = {1}\n'
+    return HEAD + "".join(table.format(each, apart_s * (each + 1)) for each in range(count))
+
+
+def test_three_targets_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
+    code, out, _ = infoset("--out", "results")
+    assert code == 0
+    files = [f"{name}.{kind}" for name in FIGURES for kind in ("pdf", "png")]
+    assert sorted(each.name for each in (tmp_path / "results").iterdir()) == sorted([*files, "results.json"])
+    found = strict((tmp_path / "results" / "results.json").read_text())
+    assert list(found) == KEYS
+    assert (found["version"], found["problem"]) == (version("infoset"), "service-3")
+    assert found["problem_hash"] == load_multipoint("service-3").hash
+    assert (found["order_chosen"], found["times_chosen"], found["evaluations"]) == ("given", "given", 1)
+    # The acceptance, N = 3.
+    assert found["cost_m2_s3"] == pytest.approx(0.021142280110555873, rel=1e-9)
+    assert found["order"] == ["T1", "T2", "T3"]
+    assert found["times_s"] == [1200.0, 2600.0, 4000.0]
+    gradient = [-7.836556601890862e-06, -7.232202376944674e-06, -3.2601679492735453e-06]
+    np.testing.assert_allclose(found["time_gradient_m2_s4"], gradient, rtol=1e-9)
+    assert [list(each) for each in found["nodes"]] == [NODE_KEYS] * 3
+    second = found["nodes"][1]
+    np.testing.assert_allclose(
+        second["position_m"], [129.00913664506174, 3910.983539171972, 87.2941398534269], rtol=1e-9
+    )
+    np.testing.assert_allclose(second["velocity_m_s"][0], 0.3308297971586566, rtol=1e-9)
+    np.testing.assert_allclose(second["jump_m_s3"][0], 1.3547481759700994e-05, rtol=1e-9)
+    assert list(found["costate0"]) == ["position_m_s3", "velocity_m_s2"]
+    np.testing.assert_allclose(found["costate0"]["position_m_s3"][1], 1.0260057565247972e-05, rtol=1e-9)
+    np.testing.assert_allclose(found["costate0"]["velocity_m_s2"][0], -0.003951812093324485, rtol=1e-9)
+    for piece in ("I = 0.02114228", "T1", "flyby", "dI/dt", "|jump|"):
+        assert piece in out
+
+
+def test_order_and_times_override_the_file(infoset: Infoset, mine: Callable[[str], Path]) -> None:
+    best = told(infoset, "service-3", "--times", "best")
+    assert best["times_chosen"] == "best"
+    assert best["cost_m2_s3"] == pytest.approx(0.01835844971766454, rel=1e-9)
+    np.testing.assert_allclose(best["times_s"], [1521.3233432870954, 3015.0416119664947, 4000.0], rtol=1e-9)
+    both = told(infoset, "service-3", "--order", "best", "--times", "best")
+    assert both["order"] == ["T3", "T2", "T1"]
+    assert both["cost_m2_s3"] == pytest.approx(0.008734876263, rel=1e-9)
+    assert both["orders_begun"] <= 15
+    slots = told(infoset, "service-3", "--order", "best")
+    assert slots["times_s"] == [1200.0, 2600.0, 4000.0]
+    assert slots["cost_m2_s3"] <= 0.0211422802
+    asked = mine(changed("optimise = false", "optimise = true"))
+    assert told(infoset, asked)["cost_m2_s3"] == pytest.approx(best["cost_m2_s3"], rel=1e-12)
+    assert told(infoset, asked, "--times", "given")["times_chosen"] == "given"
+    assert told(infoset, asked, "--times", "given")["cost_m2_s3"] == pytest.approx(0.021142280110555873, rel=1e-9)
+
+
+def test_rendezvous_stays_prices_and_eccentric_orbits(infoset: Infoset, mine: Callable[[str], Path]) -> None:
+    met = told(infoset, mine(changed('4000.0\nmeet = "flyby"', '4000.0\nmeet = "rendezvous"')))
+    assert met["cost_m2_s3"] == pytest.approx(0.023815941208960852, rel=1e-9)
+    last = met["nodes"][-1]
+    assert list(last) == [*NODE_KEYS, "velocity_jump_m_s2"]
+    assert last["velocity_m_s"] == last["target_velocity_m_s"]
+    # A free last time with a price: the acceptance of the theory.
+    free = changed("latest_s = 3000.0", "price_per_s = 1e-6", changed("optimise = false", "optimise = true", TWO))
+    priced = told(infoset, mine(free))
+    np.testing.assert_allclose(priced["times_s"], [2905.083078, 4690.157388], rtol=1e-9)
+    assert priced["cost_m2_s3"] == pytest.approx(0.0008170807218, rel=1e-9)
+    assert priced["cost_with_price_m2_s3"] == pytest.approx(priced["cost_m2_s3"] + 1e-6 * priced["times_s"][-1])
+    # A nearly circular orbit is nearly the circular one, wherever the craft is on it.
+    for anomaly in ("0.0", "200.0"):
+        orbit = f"eccentricity = 1e-7\ntrue_anomaly_deg = {anomaly}\norbit_rate_rad_s"
+        near = told(infoset, mine(changed("orbit_rate_rad_s", orbit)))
+        assert near["cost_m2_s3"] == pytest.approx(0.021142280110555873, rel=1e-4)
+    costs = [
+        told(
+            infoset,
+            mine(changed("orbit_rate_rad_s", f"eccentricity = 0.3\ntrue_anomaly_deg = {anomaly}\norbit_rate_rad_s")),
+        )["cost_m2_s3"]
+        for anomaly in ("0.0", "180.0")
+    ]
+    assert costs[0] != pytest.approx(costs[1], rel=0.05)
+
+
+def test_keys_that_may_be_left_out(infoset: Infoset, mine: Callable[[str], Path]) -> None:
+    dropped = ("schema", "name", "description", "meet", "optimise", "latest_s", "[times]")
+    lines = [line for line in THREE.splitlines() if line.split("=")[0].split("#")[0].strip() not in dropped]
+    text = "\n".join(lines)
+    for name in ("T1", "T2", "T3"):
+        text = (
+            changed("[[target]]   ", f'[[target]]\nname = "{name}"\n#', text)
+            if name == "T1"
+            else changed("[[target]]\nposition", f'[[target]]\nname = "{name}"\nposition', text)
+        )
+    found = told(infoset, mine(text))
+    assert found["problem"] == "tour"
+    assert found["cost_m2_s3"] == pytest.approx(0.021142280110555873, rel=1e-9)
+
+
+def test_the_asteroid_tour(infoset: Infoset, mine: Callable[[str], Path]) -> None:
+    found = told(infoset, "asteroid-tour")
+    assert found["order"] == ["Itokawa", "Bennu", "Ryugu"]
+    assert "inertial" in found["units"]
+    problem = load_multipoint("asteroid-tour")
+    assert problem.times_s is not None
+    where = problem.tour.targets.states(np.arange(3), problem.times_s)
+    for node, state in zip(found["nodes"], where, strict=True):
+        np.testing.assert_allclose(node["position_m"], state[:3], rtol=1e-9)
+        assert 0.9 < np.linalg.norm(state[:3]) / 1.495978707e11 < 1.7
+    # Elements or the state they mean: the same.
+    lines = TOUR.splitlines()
+    place = next(place for place, line in enumerate(lines) if line.startswith("elements"))
+    problem_start = load_multipoint("asteroid-tour").tour.start_state / 1e3  # type: ignore[attr-defined]
+    position, velocity = ([float(each) for each in part] for part in np.split(problem_start, 2))
+    lines[place] = f"position_km = {position}\nvelocity_km_s = {velocity}"
+    assert told(infoset, mine("\n".join(lines)))["cost_m2_s3"] == pytest.approx(found["cost_m2_s3"], rel=1e-9)
+
+
+def test_five_targets_as_listed(infoset: Infoset) -> None:
+    found = told(infoset, "service-5")
+    assert found["times_chosen"] == "best"
+    leave = [each["leave_s"] for each in found["nodes"]]
+    assert leave[2] == pytest.approx(found["times_s"][2] + 300.0)
+    assert (np.array(found["times_s"]) - np.array([0.0, *leave[:-1]]) >= 600.0 * (1.0 - 1e-9)).all()
+    assert max(abs(each) for each in found["time_gradient_m2_s4"][:-1]) < 1e-6 * abs(found["time_gradient_m2_s4"][-1])
+
+
+def test_json_alone_and_nothing_written(infoset: Infoset, tmp_path: Path) -> None:
+    code, out, err = infoset("service-2", "--json", "-")
+    assert code == 0
+    assert strict(out)["problem"] == "service-2"
+    assert "T1" in err
+    assert infoset("service-2", "-q") == (0, "", "")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_help_has_an_example(infoset: Infoset) -> None:
+    code, out, _ = infoset("--help")
+    assert code == 0
+    assert "Example: infoset multipoint" in out
+
+
+def test_every_built_in_problem_is_sound() -> None:
+    mine = [each for each in built_in_problems() if each.kind == KIND]
+    assert {each.name for each in mine} == {"asteroid-tour", "service-2", "service-3", "service-5"}
+    for each in mine:
+        loaded = load_multipoint(each.name)
+        assert loaded.name == each.name
+        assert each.description
+        assert loaded.axes is (Axes.INERTIAL if each.name == "asteroid-tour" else Axes.HILL)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["service-4"], ["service-4", "did you mean"]),
+        (["pareto-2008"], ["pareto-2008", "service-3"]),
+        (["missing.toml"], ["missing.toml: there is no such file"]),
+        (["bad\x1b[31mname"], ["bad?[31mname"]),
+        (["--order", "bets"], ["--order", "did you mean best?"]),
+        (["--times", ""], ["--times", "given, best"]),
+        (["--json", "missing/x.json"], ["there is no folder missing"]),
+        (["--json", "out/results.json", "--out", "out"], ["also a file of --out"]),
+        (["--out", "/dev/null"], ["is a file"]),
+    ],
+)
+def test_what_is_wrong_is_said_before_the_work(
+    arguments: list[str], parts: list[str], infoset: Infoset, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("rendezvous.multipoint.tour.solve_segments", lambda *_: pytest.fail("began to work"))
+    code, out, err = infoset(*arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: ")
+    assert err.count("error: ") == 1
+    assert "\x1b" not in err
+    for part in parts:
+        assert part in err
+    assert list(tmp_path.iterdir()) == []
+
+
+OPTIMISED = changed("optimise = false", "optimise = true")
+MANY = "[times]\noptimise = true\nlatest_s = 99999.0\n"
+ORBIT = "orbit_rate_rad_s = 1.13e-3"
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "parts"),
+    [
+        (changed("2600.0", "900.0"), [], ["target #2.time_s: must be later, found 900.0", "left at 1200.0 s"]),
+        (changed("2600.0", "1200.0"), [], ["target #2.time_s: must be later, found 1200.0"]),
+        (changed("2600.0", "nan"), [], ["target #2.time_s: must be a finite number, found nan"]),
+        (changed("2600.0", "-5"), [], ["target #2.time_s: must be greater than 0"]),
+        (changed("2600.0", "1e300"), [], ["target #2.time_s: must be at most 1e+15 in size"]),
+        (changed("time_s = 2600.0\n", ""), [], ["target #2.time_s: is missing", "optimise = true"]),
+        (OPTIMISED.replace("time_s = 2600.0\n", ""), ["--times", "given"], ["--times given: needs time_s"]),
+        (changed('"T2"', '"T1"'), [], ['target #2.name: lists "T1" a second time', "list each target once"]),
+        (changed('"T2"', '"a\\u0007b"'), [], ["target #2.name: must be one line without control characters"]),
+        (changed('"T2"', f'"{"n" * 900}"'), [], ["target #2.name: must be at most 100 characters"]),
+        (changed(ORBIT, "orbit_rate_rad_s = 0.0"), [], ["orbit_rate_rad_s: must be greater than 0"]),
+        (changed(ORBIT, "orbit_rate_rad_s = -1.0"), [], ["orbit_rate_rad_s: must be greater than 0"]),
+        (changed(ORBIT, "orbit_rate_rad_s = 1e12"), [], ["4e+15 radians of the orbit", "check the units"]),
+        (changed(ORBIT, "orbit_rate_rad_s = 1e-99"), [], ["radians of the orbit", "check the units"]),
+        (changed(ORBIT, ""), [], ['orbit_rate_rad_s: is missing, and axes = "hill" needs it']),
+        (changed(ORBIT, f"{ORBIT}\neccentricity = 1.0"), [], ["eccentricity: must be less than 1"]),
+        (changed(ORBIT, f"{ORBIT}\neccentricity = -0.1"), [], ["eccentricity: must be at least 0"]),
+        (changed(ORBIT, f"{ORBIT}\ntrue_anomaly_deg = 1e6"), [], ["true_anomaly_deg: must be at most 360"]),
+        (changed("latest_s = 4000.0", "latest_s = 3999.0"), [], ["times.latest_s: is 3999.0, before the last visit"]),
+        (
+            OPTIMISED.replace("latest_s = 4000.0", "latest_s = 1000.0\nleast_gap_s = 400.0"),
+            [],
+            ["times.latest_s: is 1000.0", "take 1200.0 s", "make it later"],
+        ),
+        (
+            changed("latest_s = 4000.0", ""), ["--times", "best"],
+            ["with the last time free the energy falls to zero as it grows", "latest_s or price_per_s under [times]"],
+        ),
+        (OPTIMISED.replace("latest_s = 4000.0", ""), [], ["times.latest_s", "the cost falls to zero", "price_per_s"]),
+        (targets(10) + MANY, ["--order", "best"], ["10 targets have 3 628 800 orders", "at most 9, with 362 880"]),
+        (targets(120) + MANY, ["--order", "best"], ["120 targets have 6.7e+198 orders"]),
+        (changed('"flyby"', '"fly-by"'), [], ["target #1.meet: must be one of", 'did you mean "flyby"?']),
+        (changed('meet = "flyby"', "dwell_s = 5.0"), [], ["target #1.dwell_s: is 5.0, but a flyby cannot stay"]),
+        (changed("[100.0, 2000.0, 50.0]", "[inf, 0, 0]"), [], ["target #1.position_m", "finite"]),
+        (changed("[100.0, 2000.0, 50.0]", "[1e300, 0, 0]"), [], ["target #1.position_m", "1e+15 in size"]),
+        (HEAD, [], ["target: is missing", "[[target]]"]),
+        (changed("[chaser]", "[chased]"), [], ["chased: is not a table", "did you mean chaser?"]),
+        (changed("gravitational_parameter_km3_s2 = 132712440018.0", "", TOUR), [], ['axes = "inertial" needs it']),
+        (changed("0.280177641", "1.0", TOUR), [], ["target #1.elements", "an eccentricity from 0 to below 1"]),
+        (changed("[198075401.78, ", "[-1.0, ", TOUR), [], ["target #1.elements", "semi-major axis above 0"]),
+        (changed("-293760000.0]", "nan]", TOUR), [], ["target #1.elements: number 7", "finite"]),
+        (changed("[198075401.78, ", "[", TOUR), [], ["array of 7 numbers, not 6"]),
+        (changed('axes = "inertial"', 'axes = "hill"', TOUR), [], ['belongs to axes = "inertial"']),
+        (changed("132712440018.0", "1e-50", TOUR), [], ["no trajectory was found", "check units"]),
+    ],
+)  # fmt: skip
+def test_unsound_problems_are_told(
+    text: str, options: list[str], parts: list[str], infoset: Infoset, mine: Callable[[str], Path], tmp_path: Path
+) -> None:
+    code, out, err = infoset(mine(text), *options, "--out", tmp_path / "out")
+    assert (code, out) == (2, "")
+    assert err.count("error: ") == 1
+    assert "\x07" not in err
+    for part in parts:
+        assert part in err
+    assert [each.name for each in tmp_path.iterdir()] == ["mine.toml"]
+
+
+def test_a_bound_that_the_control_exceeds_says_by_how_much(infoset: Infoset, mine: Callable[[str], Path]) -> None:
+    peak = told(infoset, "service-3")["peak_control_m_s2"]
+    code, out, err = infoset(mine(changed("[chaser]", "greatest_control_m_s2 = 0.002\n[chaser]")))
+    assert (code, out) == (2, "")
+    assert f"reaches {peak:.6g} m/s^2, {peak / 0.002 - 1.0:.2%} over the bound of 0.002 m/s^2" in err
+    assert infoset(mine(changed("[chaser]", f"greatest_control_m_s2 = {peak * 1.0001}\n[chaser]")), "-q")[0] == 0
+
+
+LONG_LEG = """
+schema = 1
+kind = "multipoint"
+axes = "hill"
+orbit_rate_rad_s = 0.0011
+greatest_control_m_s2 = 1.2334e-06
+[chaser]
+position_m = [0.0, 0.0, 0.0]
+velocity_m_s = [0.0, 0.0, 0.0]
+[[target]]
+name = "T1"
+position_m = [84.146497, 564.105261, 99.171302]
+velocity_m_s = [0.04105, -0.101076, 0.078318]
+time_s = 363636.364
+meet = "rendezvous"
+"""
+
+
+def test_a_bound_is_checked_between_samples_of_a_long_leg(infoset: Infoset, mine: Callable[[str], Path]) -> None:
+    code, out, err = infoset(mine(LONG_LEG))
+    assert (code, out) == (2, "")
+    assert "reaches 1.3052" in err
+    assert infoset(mine(LONG_LEG.replace("1.2334e-06", "1.3053e-06")), "-q")[0] == 0
+
+
+def test_orders_that_do_not_fit_the_times_are_left_out(infoset: Infoset, mine: Callable[[str], Path]) -> None:
+    times = iter((1500.0, 3000.0, 4500.0, 7000.0, 10000.0))
+    text = re.sub(r"(?m)^time_s = .*$", lambda _: f"time_s = {next(times)}", problem_text("service-5"))
+    text = re.sub(r"(?m)^dwell_s = .*$", "dwell_s = 2000.0", text)
+    code, out, err = infoset(mine(text), "--order", "best", "--times", "given")
+    assert (code, err) == (0, "")
+    assert "I = 0.065082" in out
+    assert "48 orders do not fit the times" in out
+    text = re.sub(r"(?m)^dwell_s = .*$", "dwell_s = 4000.0", text)
+    text = text.replace('meet = "flyby"', 'meet = "rendezvous"\ndwell_s = 3500.0')
+    code, out, err = infoset(mine(text.replace("latest_s = 11000.0", "latest_s = 99000.0")), "--order", "best",
+                             "--times", "given")  # fmt: skip
+    assert (code, out) == (2, "")
+    assert "no order fits the times" in err
+
+
+@pytest.mark.parametrize(
+    ("number", "told"), [(500, "target: must have at most 200 of them, found 500"), (10_000, "is over 100 kB")]
+)
+def test_too_many_targets_are_refused_at_once(
+    infoset: Infoset, mine: Callable[[str], Path], number: int, told: str
+) -> None:
+    began = time.process_time()
+    code, _, err = infoset(mine(targets(number).replace("10, 0]", "0, 0]")))
+    assert code == 2
+    assert told in err
+    assert time.process_time() - began < 10.0
+
+
+def test_nothing_is_replaced_unless_told(infoset: Infoset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("experiments.common.figure_style.save_figure", lambda *_: [])  # drawn, but not written
+    precious, folder = tmp_path / "x.json", tmp_path / "folder"
+    precious.write_text("precious")
+    folder.mkdir()
+    (folder / "notes.txt").write_text("mine")
+    for option, target in (("--json", precious), ("--out", folder)):
+        code, _, err = infoset("service-2", option, target)
+        assert code == 2
+        assert "--overwrite" in err
+    assert precious.read_text() == "precious"
+    assert infoset("service-2", "--json", precious, "--overwrite", "-q")[0] == 0
+    assert strict(precious.read_text())["problem"] == "service-2"
+    assert infoset("service-2", "--out", folder, "--overwrite", "-q")[0] == 0
+    assert (folder / "notes.txt").read_text() == "mine"
+
+
+def test_figures_say_what_they_show() -> None:
+    problem = load_multipoint("service-3")
+    assert problem.times_s is not None
+    path = problem.tour.fly((0, 1, 2), problem.times_s)
+    scene = Scene(problem.axes, problem.tour, (0, 1, 2), path)
+    curves = cost_curves(problem.tour, (0, 1, 2), path)
+    assert len(curves) == 3
+    for index, curve in enumerate(curves):
+        at = int(np.flatnonzero(curve.time_s == problem.times_s[index])[0])
+        assert curve.cost[at] == path.cost
+        moved = problem.times_s.copy()
+        moved[index] = curve.time_s[0]
+        assert curve.cost[0] == pytest.approx(problem.tour.fly((0, 1, 2), moved).cost, rel=1e-12)
+    plane = draw_path(scene).axes[0]
+    assert (plane.get_xlabel(), plane.get_ylabel()) == ("y (along the motion), km", "x (radial), km")
+    assert [each.get_ylabel() for each in draw_control(scene).axes] == ["$u$, mm/s$^2$", "$|u|$, mm/s$^2$"]
+    costates = draw_costates(scene).axes[0]
+    pieces = [line for line in costates.get_lines() if len(line.get_xydata()) > 2]  # type: ignore[arg-type]
+    assert len(pieces) == 9  # three components, broken where they jump
+    assert draw_times(scene, curves).axes[0].get_xlabel() == "time of T1, s"
