@@ -18,7 +18,7 @@ from benchmarks.conftest import LINES
 from experiments.reachability.file import load_rendezvous
 from experiments.reachability.printed_tables import compare_published, comparison_rows
 from experiments.reachability.report import SINGLE, make_report, report_json
-from rendezvous.polytope import Polytope, cut
+from infoset.polytope import Polytope, cut
 from rendezvous.reachability import (
     Budget,
     MotionModel,

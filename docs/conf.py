@@ -15,7 +15,8 @@ from sphinx.application import Sphinx
 import guidance
 import infoset
 import sim
-from rendezvous import multipoint, pareto, polytope, pursuit_evasion, reachability, relative_motion
+from infoset import polytope
+from rendezvous import multipoint, pareto, pursuit_evasion, reachability, relative_motion
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "_extensions"))

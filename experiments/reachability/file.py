@@ -35,7 +35,7 @@ from experiments.common.toml_values import (
     si,
     wrong,
 )
-from rendezvous.polytope import EmptyPolytopeError, Polytope, UnboundedPolytopeError, UncertainHullError
+from infoset.polytope import EmptyPolytopeError, Polytope, UnboundedPolytopeError, UncertainHullError
 from rendezvous.reachability import (
     InadmissibleStartError,
     MotionModel,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from experiments.common.errors import InputError
 from experiments.reachability.file import KIND, Rendezvous
-from rendezvous.polytope import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
+from infoset.polytope import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
 from rendezvous.reachability import (
     EmptyTubeError,
     Flight,

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.polytope import Polytope
+from infoset.polytope import Polytope
 
 Floats = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.sparse import csc_matrix
 
-from rendezvous.polytope.relative_interior import HIGHS
+from infoset.polytope import HIGHS
 
 Floats = NDArray[np.float64]
 

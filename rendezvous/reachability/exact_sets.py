@@ -8,7 +8,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.polytope import Polytope, cut, intersection, linear_image
+from infoset.polytope import Polytope, cut, intersection, linear_image
 from rendezvous.reachability.block_sets import SetKind
 from rendezvous.reachability.optimum import BlockOptimum
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.polytope import Polytope, shadow
+from infoset.polytope import Polytope, shadow
 from rendezvous.reachability.block_sets import SetKind
 from rendezvous.reachability.lifted import Lifted, lift, lift_with_states
 from rendezvous.reachability.optimum import BlockOptimum

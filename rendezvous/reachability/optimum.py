@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.polytope.relative_interior import directions, relative_interior
+from infoset.polytope import null_space_basis, relative_interior
 from rendezvous.reachability.blocks import Block
 from rendezvous.reachability.least_norm import least_norm, reaches_zero
 from rendezvous.reachability.lifted import Lifted, lift
@@ -180,7 +180,7 @@ def _with_hull(
 ) -> BlockOptimum:
     """Find the affine hull of the optimal controls, through one of them."""
     if lifted.ball:
-        optimal = face.within(member, directions(face.equal))
+        optimal = face.within(member, null_space_basis(face.equal))
         optimal = optimal.only(np.flatnonzero(np.linalg.norm(optimal.rows, axis=1) > _REACHED))
         return BlockOptimum(block, lifted, terminal, reached, optimal, deep_point(optimal)[0])
     hull = relative_interior(face.rows, face.limits, face.equal, face.levels, bounded=True, member=member)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.polytope import Polytope
+from infoset.polytope import Polytope
 from rendezvous.reachability.block_sets import BlockSets, SetKind
 from rendezvous.reachability.blocks import Block
 from rendezvous.reachability.problem import ReachabilityProblem

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linprog
 from scipy.sparse import coo_array
 
-from rendezvous.polytope.relative_interior import HIGHS
+from infoset.polytope import HIGHS
 from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
 
 Floats = NDArray[np.float64]

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.polytope import EmptyPolytopeError, Polytope, UncertainHullError
-from rendezvous.polytope.relative_interior import relative_interior
+from infoset.polytope import EmptyPolytopeError, Polytope, UncertainHullError, relative_interior
 from rendezvous.reachability.conic import NoSolutionError
 from rendezvous.reachability.lifted import Lifted
 from rendezvous.reachability.optimal_controls import OptimalControls

@@ -7,7 +7,7 @@ from enum import Enum
 
 import numpy as np
 
-from rendezvous.polytope import EmptyPolytopeError, UncertainHullError
+from infoset.polytope import EmptyPolytopeError, UncertainHullError
 from rendezvous.reachability.block_sets import BlockSets, SetKind
 from rendezvous.reachability.blocks import Block, split
 from rendezvous.reachability.exact_sets import Budget, ExactSets, Meter, TooLargeError

@@ -1,7 +1,7 @@
 """Laws that the sets of `rendezvous` obey: polytopes in R^n and reachable sets.
 
 Shown elsewhere: hulls and intersections are those of exact rationals, supports of sums, images and projections,
-members of intersections, flat sets, empty and unbounded ones (`tests/rendezvous/polytope`); exact and lifted reachable
+members of intersections, flat sets, empty and unbounded ones (`tests/infoset/polytope`); exact and lifted reachable
 sets agree with each other and with rationals, samples and selections are members (`tests/rendezvous/reachability`). The
 other problems have no set operations: a front of points (`tests/rendezvous/pareto`), paths, or numbers.
 
@@ -22,7 +22,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rendezvous.polytope import (
+from infoset.polytope import (
     EmptyPolytopeError,
     Polytope,
     cut,

@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rendezvous.polytope import (
+from infoset.polytope import (
     EmptyPolytopeError,
     Polytope,
     UnboundedPolytopeError,
@@ -19,9 +19,9 @@ from rendezvous.polytope import (
     minkowski_sum,
     product,
     projection,
+    relative_interior,
     shadow,
 )
-from rendezvous.polytope.relative_interior import relative_interior
 from rendezvous.reachability.exact_check import rational_hull, rational_intersection
 
 needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")

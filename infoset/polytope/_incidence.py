@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
-from rendezvous.polytope.errors import UncertainHullError
+from infoset.polytope.errors import UncertainHullError
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rendezvous.polytope.polytope import Polytope
+from infoset.polytope.polytope import Polytope
 
 Floats = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rendezvous.polytope._frame import FLAT, frame_of
-from rendezvous.polytope._incidence import together
-from rendezvous.polytope._qhull import Description, hull_of_points, intersection_of_halfspaces
+from infoset.polytope._frame import FLAT, frame_of
+from infoset.polytope._incidence import together
+from infoset.polytope._qhull import Description, hull_of_points, intersection_of_halfspaces
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

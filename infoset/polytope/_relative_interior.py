@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.optimize import linprog
 
-from rendezvous.polytope._frame import FLAT, ROUNDING
-from rendezvous.polytope.errors import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
+from infoset.polytope._frame import FLAT, ROUNDING
+from infoset.polytope.errors import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
 
 Floats = NDArray[np.float64]
 Places = NDArray[np.int64]
@@ -191,10 +191,10 @@ def solutions(across: Floats, levels: Floats) -> tuple[Floats, Floats]:
     misfit = float(np.abs(across @ point - levels).max())
     if misfit > 1e2 * FLAT * max(1.0, float(np.abs(levels).max())):
         raise EmptyPolytopeError(misfit)
-    return np.asarray(point, dtype=np.float64), directions(across)
+    return np.asarray(point, dtype=np.float64), null_space_basis(across)
 
 
-def directions(across: Floats) -> Floats:
+def null_space_basis(across: Floats) -> Floats:
     """Return an orthonormal basis of the directions that equations leave free, columns of shape (n, d).
 
     Parameters
@@ -231,7 +231,12 @@ def _always_tight(rows: Floats, limits: Floats, tolerance: float) -> Places:
         cost = np.concatenate([np.zeros(size), -np.ones(len(left))])
         bounds = [(None, None)] * size + [(0.0, 1.0)] * len(left)
         found = linprog(
-            cost, A_ub=np.hstack([rows, slack]), b_ub=limits + tolerance, bounds=bounds, method="highs", options=HIGHS
+            cost,
+            A_ub=np.hstack([rows, slack]),
+            b_ub=limits + tolerance,
+            bounds=bounds,
+            method="highs",
+            options=HIGHS,
         )
         if found.status != 0:
             raise UncertainHullError("the affine hull was not found")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.polytope.polytope import Polytope
+from infoset.polytope.polytope import Polytope
 
 Floats = NDArray[np.float64]
 

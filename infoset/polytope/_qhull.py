@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
-from rendezvous.polytope._frame import FLAT, Frame, frame_of
-from rendezvous.polytope._incidence import MERGE, essential, together
-from rendezvous.polytope.errors import UncertainHullError
-from rendezvous.polytope.relative_interior import chebyshev_ball, relative_interior
+from infoset.polytope._frame import FLAT, Frame, frame_of
+from infoset.polytope._incidence import MERGE, essential, together
+from infoset.polytope._relative_interior import chebyshev_ball, relative_interior
+from infoset.polytope.errors import UncertainHullError
 
 Floats = NDArray[np.float64]
 
