@@ -36,7 +36,9 @@ extensions = [
     "numpydoc",
     "sphinx_gallery.gen_gallery",
     "command_help",
+    "mathml",
 ]
+html_math_renderer = "mathml"
 exclude_patterns = ["_build", "_extensions", "examples", "gallery/*.py", "gallery/*.ipynb", "**/sg_execution_times.rst"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 nitpicky = True
@@ -74,7 +76,9 @@ nitpick_ignore = [
 ]
 
 # --- text
-myst_enable_extensions = ["colon_fence", "deflist"]
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+# Displayed formulas are fenced blocks: hosts of repositories render those without losing backslashes.
+myst_fence_as_directive = ["math"]
 myst_heading_anchors = 3
 myst_links_external_new_tab = False
 

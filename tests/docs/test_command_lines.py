@@ -62,7 +62,7 @@ SET_UP = r"(python3 -m venv \.venv|\.venv/bin/pip install -c constraints\.txt (\
 """What makes an environment and runs these tests. `.ci/run` does it word for word; here the names in it are checked."""
 
 _PROMPT = "$ "
-LANGUAGES = {"sh", "console", "python", "pycon", "text", "toml", "{eval-rst}", "{toctree}"}
+LANGUAGES = {"sh", "console", "python", "pycon", "text", "toml", "math", "{eval-rst}", "{toctree}"}
 
 _PLACEHOLDER = re.compile(r"\[|\||\.\.\.|=?\b[A-Z]+\b(?!\w)|^infoset [a-z-]+( [a-z-]+| --[a-z-]+)?$")
 """Something that stands for something else, or the mere name of a command."""
