@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import DOP853
 
-from rendezvous._compile import compiled
+from rendezvous._compile import allocation_free, compiled
+from rendezvous.dormand_prince import STAGES, step_of
 
 Floats = NDArray[np.float64]
 
@@ -19,74 +19,10 @@ STEP_RAD = 0.1
 MOST_STEPS = 50_000
 LEAST_RADIUS = 0.02
 """Nearer to the centre than this share of where it starts a trajectory counts as falling into it."""
-_STAGES = int(DOP853.n_stages)
-_TABLE = np.ascontiguousarray(DOP853.A[:_STAGES, :_STAGES], dtype=np.float64)
-_WEIGHTS = np.ascontiguousarray(DOP853.B, dtype=np.float64)
 
 
-@compiled
-def propagate(z: Floats, variations: Floats, duration: float) -> bool:
-    """Carry (r, v, lambda_r, lambda_v, energy) and variations of all but the energy on, in place.
-
-    Parameters
-    ----------
-    z : ndarray, shape (13,)
-    variations : ndarray, shape (12, m)
-        Derivatives of z by what the caller likes; m may be zero.
-    duration : float
-
-    Returns
-    -------
-    bool
-        False where the trajectory falls into the centre or never ends.
-
-    Notes
-    -----
-    The method of Dormand and Prince of order 8 in steps of 0.1 radians of the circular orbit at the present distance:
-    relative errors of about 1e-12 a revolution.
-    """
-    columns = variations.shape[1] + 1
-    slopes = np.zeros((_STAGES, ROWS, columns))
-    base, trial = np.zeros((ROWS, columns)), np.zeros((ROWS, columns))
-    flat_base, flat_trial = base.reshape(-1), trial.reshape(-1)
-    flat_slopes = slopes.reshape(_STAGES, -1)
-    base[:, 0] = z
-    base[: ROWS - 1, 1:] = variations
-    left = duration
-    for _ in range(MOST_STEPS):
-        radius = np.sqrt(base[0, 0] ** 2 + base[1, 0] ** 2 + base[2, 0] ** 2)
-        if not radius > LEAST_RADIUS:
-            return False
-        step = min(left, STEP_RAD * radius * np.sqrt(radius))
-        if left - step < 1e-3 * step:
-            step = left
-        for stage in range(_STAGES):
-            _combine(flat_base, flat_slopes[:stage], _TABLE[stage], step, flat_trial)
-            _slopes(trial, slopes[stage])
-        _combine(flat_base, flat_slopes, _WEIGHTS, step, flat_trial)
-        flat_base[:] = flat_trial
-        left -= step
-        if left <= 0.0:
-            z[:] = base[:, 0]
-            variations[:] = base[: ROWS - 1, 1:]
-            return True
-    return False
-
-
-@compiled
-def _combine(base: Floats, slopes: Floats, weights: Floats, step: float, found: Floats) -> None:
-    """Base and a step along a weighted sum of slopes, all flat."""
-    found[:] = base
-    for each in range(len(slopes)):
-        part = step * weights[each]
-        if part != 0.0:
-            slope = slopes[each]
-            for place in range(len(found)):
-                found[place] += part * slope[place]
-
-
-@compiled
-def _slopes(z: Floats, slope: Floats) -> None:
+@allocation_free
+def _rates(_time: float, _y: Floats, z: Floats, _parameters: tuple[()], _dy: Floats, slope: Floats) -> None:
     """Time derivatives: of z in column 0, of its variations in the others."""
     r0, r1, r2 = z[0, 0], z[1, 0], z[2, 0]
     l0, l1, l2 = z[9, 0], z[10, 0], z[11, 0]
@@ -115,3 +51,50 @@ def _slopes(z: Floats, slope: Floats) -> None:
             second -= 15.0 * fifth / squared * along * out * position
             first = 3.0 * fifth * costate * position - third * z[9 + axis, column]
             slope[6 + axis, column] = -first - second
+
+
+_step = step_of(_rates)
+
+
+@compiled
+def propagate(z: Floats, variations: Floats, duration: float) -> bool:
+    """Carry (r, v, lambda_r, lambda_v, energy) and variations of all but the energy on, in place.
+
+    Parameters
+    ----------
+    z : ndarray, shape (13,)
+    variations : ndarray, shape (12, m)
+        Derivatives of z by what the caller likes; m may be zero.
+    duration : float
+
+    Returns
+    -------
+    bool
+        False where the trajectory falls into the centre or never ends.
+
+    Notes
+    -----
+    The method of Dormand and Prince of order 8 in steps of 0.1 radians of the circular orbit at the present distance:
+    relative errors of about 1e-12 a revolution.
+    """
+    columns = variations.shape[1] + 1
+    slopes, base, trial = np.zeros((STAGES, ROWS, columns)), np.zeros((ROWS, columns)), np.zeros((ROWS, columns))
+    no_y, no_slopes = np.zeros(0), np.zeros((STAGES, 0))
+    base[:, 0] = z
+    base[: ROWS - 1, 1:] = variations
+    left = duration
+    for _ in range(MOST_STEPS):
+        radius = np.sqrt(base[0, 0] ** 2 + base[1, 0] ** 2 + base[2, 0] ** 2)
+        if not radius > LEAST_RADIUS:
+            return False
+        step = min(left, STEP_RAD * radius * np.sqrt(radius))
+        if left - step < 1e-3 * step:
+            step = left
+        _step(0.0, step, 0, no_y, base, (), no_slopes, slopes, no_y, trial)
+        base[:] = trial
+        left -= step
+        if left <= 0.0:
+            z[:] = base[:, 0]
+            variations[:] = base[: ROWS - 1, 1:]
+            return True
+    return False

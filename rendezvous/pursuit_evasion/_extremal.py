@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import DOP853
 
-from rendezvous._compile import allocation_free
+from rendezvous._compile import allocation_free, compiled
+from rendezvous.dormand_prince import STAGES, error_of_step, step_of
 from rendezvous.pursuit_evasion._gravity import acceleration, derivatives
 
 Floats = NDArray[np.float64]
@@ -23,37 +23,24 @@ Floats = NDArray[np.float64]
 STATES, COLUMNS = 12, 9
 """Position, velocity and costate; what they are differentiated by: end state (6), nu in its plane (2), end mass."""
 
-_STAGES = 12
-_NODES = np.ascontiguousarray(DOP853.C[:_STAGES])
-_WEIGHTS = np.vstack([DOP853.A[:_STAGES, :_STAGES], DOP853.B])
-"""Of the stages, a row each, and of the step."""
-_THIRD, _FIFTH = np.ascontiguousarray(DOP853.E3[:_STAGES]), np.ascontiguousarray(DOP853.E5[:_STAGES])
 _SAFETY, _LEAST_FACTOR, _GREATEST_FACTOR = 0.9, 0.2, 6.0
 _MOST_STEPS = 20_000
 _FIRST_STEP = 0.05
-_NOTHING, _NONE = np.zeros((1, COLUMNS)), np.zeros((1, 1, COLUMNS))
+_NO_VARIATIONS = np.zeros((0, COLUMNS))
+_Parameters = tuple[Floats, Floats, Floats]
 
 
 @allocation_free
-def _rates(
-    s: float,
-    y: Floats,
-    z: Floats,
-    craft: Floats,
-    columns: int,
-    dy: Floats,
-    dz: Floats,
-    first: Floats,
-    second: Floats,
-) -> None:
+def _rates(s: float, y: Floats, z: Floats, parameters: _Parameters, dy: Floats, dz: Floats) -> None:
     """Rates, in time to go, of the state and of its variations.
 
-    `craft` is mu, oblateness, thrust, mass at the end, flow. At the end of the game p_v is zero: there the direction
-    of thrust is that of p_r, which is its rate.
+    `parameters` are the craft (mu, oblateness, thrust, mass at the end, flow) and room for two matrices, (3, 3). At the
+    end of the game p_v is zero: there the direction of thrust is that of p_r, which is its rate.
     """
+    craft, first, second = parameters
     thrust, mass = craft[2], craft[3] + craft[4] * s
     push = thrust / mass
-    derivatives(y[:3], y[9:], craft[0], craft[1], dy[3:6], first, second, columns > 0)
+    derivatives(y[:3], y[9:], craft[0], craft[1], dy[3:6], first, second, len(z) > 0)
     at = 9 if s > 0.0 else 6
     x0, x1, x2 = y[at], y[at + 1], y[at + 2]
     inverse = 1.0 / np.sqrt(x0 * x0 + x1 * x1 + x2 * x2)
@@ -65,7 +52,7 @@ def _rates(
     dy[3] = -dy[3] - push * u0
     dy[4] = -dy[4] - push * u1
     dy[5] = -dy[5] - push * u2
-    if columns == 0:
+    if len(z) == 0:
         return
     turn = push * inverse
     g00, g01, g02, g11, g12, g22 = first[0, 0], first[0, 1], first[0, 2], first[1, 1], first[1, 2], first[2, 2]
@@ -91,6 +78,9 @@ def _rates(
     dz[3, COLUMNS - 1] += fall * u0
     dz[4, COLUMNS - 1] += fall * u1
     dz[5, COLUMNS - 1] += fall * u2
+
+
+_step = step_of(_rates)
 
 
 def flow_back(y: Floats, z: Floats | None, craft: Floats, begin: float, end: float, tolerance: float) -> bool:
@@ -121,105 +111,40 @@ def flow_back(y: Floats, z: Floats | None, craft: Floats, begin: float, end: flo
     """
     if begin == end:
         return True
-    ks, first, second = np.empty((_STAGES + 1, STATES)), np.empty((3, 3)), np.empty((3, 3))
-    if z is None:
-        return bool(
-            flow_kernel(y, _NOTHING, craft, begin, end, tolerance, 0, ks, _NONE, np.empty((1, COLUMNS)), first, second)
-        )
-    kz, zn = np.empty((_STAGES, STATES, COLUMNS)), np.empty((STATES, COLUMNS))
-    return bool(flow_kernel(y, z, craft, begin, end, tolerance, 1, ks, kz, zn, first, second))
+    return bool(flow_kernel(y, _NO_VARIATIONS if z is None else z, craft, begin, end, tolerance))
 
 
-@allocation_free
-def flow_kernel(
-    y: Floats,
-    z: Floats,
-    craft: Floats,
-    begin: float,
-    end: float,
-    tolerance: float,
-    columns: int,
-    ks: Floats,
-    kz: Floats,
-    zn: Floats,
-    first: Floats,
-    second: Floats,
-) -> bool:
-    """Do what `flow_back` does, with room given for the stages."""
+@compiled
+def flow_kernel(y: Floats, z: Floats, craft: Floats, begin: float, end: float, tolerance: float) -> bool:
+    """Do what `flow_back` does; z of no rows carries y alone."""
+    ky, kz = np.empty((STAGES, STATES)), np.empty((STAGES, len(z), COLUMNS))
+    y_next, z_next = np.empty_like(y), np.empty_like(z)
+    parameters = craft, np.empty((3, 3)), np.empty((3, 3))
     span = abs(end - begin)
     sign = 1.0 if end > begin else -1.0
-    yn = ks[_STAGES]
     s, step = begin, min(_FIRST_STEP, span)
-    fresh = 0
+    first = 0
     for _ in range(_MOST_STEPS):
         left = abs(end - s)
         last = step >= left * (1.0 - 1e-12)
         h = sign * (left if last else step)
-        # One place that calls each helper, for each such place is compiled on its own.
-        for k in range(fresh, _STAGES + 1):
-            _stage(y, z, ks, kz, k, h, columns, yn, zn)
-            if k < _STAGES:
-                _rates(s + _NODES[k] * h, yn, zn, craft, columns, ks[k], kz[k * columns], first, second)
-        error = _error(y, yn, ks, tolerance, abs(h))
+        _step(s, h, first, y, z, parameters, ky, kz, y_next, z_next)
+        error = error_of_step(y, y_next, ky, tolerance, abs(h))
         if not error < np.inf:
             return False
-        fresh = 1
+        first = 1
         if error < 1.0:
-            for i in range(STATES):
-                y[i] = yn[i]
-            if columns > 0:
-                for i in range(STATES):
-                    for j in range(COLUMNS):
-                        z[i, j] = zn[i, j]
+            y[:] = y_next
+            z[:] = z_next
             if last:
                 return True
             s += h
-            fresh = 0
+            first = 0
         factor = _GREATEST_FACTOR if error < 1e-10 else _SAFETY * error**-0.125
         step = abs(h) * min(max(factor, _LEAST_FACTOR), _GREATEST_FACTOR)
         if step < 1e-13 * max(span, 1e-3):
             return False
     return False
-
-
-@allocation_free
-def _stage(
-    y: Floats, z: Floats, ks: Floats, kz: Floats, stage: int, h: float, columns: int, yn: Floats, zn: Floats
-) -> None:
-    """Put y + h sum(weights k) of a stage into yn, and the same of z into zn; after the last stage comes the step."""
-    for i in range(STATES):
-        total = 0.0
-        for k in range(stage):
-            total += _WEIGHTS[stage, k] * ks[k, i]
-        yn[i] = y[i] + h * total
-    if columns == 0:
-        return
-    for i in range(STATES):
-        for j in range(COLUMNS):
-            zn[i, j] = z[i, j]
-    for k in range(stage):
-        weight = h * _WEIGHTS[stage, k]
-        if weight != 0.0:
-            for i in range(STATES):
-                for j in range(COLUMNS):
-                    zn[i, j] += weight * kz[k, i, j]
-
-
-@allocation_free
-def _error(y: Floats, yn: Floats, ks: Floats, tolerance: float, h: float) -> float:
-    """Error of a step over the tolerance (Hairer, Norsett and Wanner, II.10)."""
-    third = fifth = 0.0
-    for i in range(STATES):
-        scale = tolerance * (1.0 + max(abs(y[i]), abs(yn[i])))
-        e3 = e5 = 0.0
-        for k in range(_STAGES):
-            e3 += _THIRD[k] * ks[k, i]
-            e5 += _FIFTH[k] * ks[k, i]
-        third += (e3 / scale) ** 2
-        fifth += (e5 / scale) ** 2
-    if third == 0.0 and fifth == 0.0:
-        return 0.0
-    return float(h * fifth / np.sqrt((fifth + 0.01 * third) * STATES))
 
 
 def shoot_back(
