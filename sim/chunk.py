@@ -94,21 +94,5 @@ def fly_chunk(chunk: Chunk, check: Callable[[], None] | None = None) -> Results:
                 progress=None if check is None else lambda _: check(),
             )
         )
-    return parts[0] if len(parts) == 1 else _in_order(join(parts))
-
-
-def _in_order(results: Results) -> Results:
-    """Results in the order of their runs."""
-    order = np.argsort(results.runs)
-    return Results(
-        results.runs[order],
-        results.miss_m[order],
-        results.impulse_m_s[order],
-        results.guaranteed_miss_m[order],
-        tuple(results.outcomes[place] for place in order.tolist()),
-        results.truth_kept[order],
-        results.truth_margin_m[order],
-        results.position_m[order],
-        results.velocity_m_s[order],
-        results.guarantees,
-    )
+    joined = join(parts)
+    return joined.take(np.argsort(joined.runs))

@@ -321,7 +321,6 @@ class Engagements:
             outcomes=tuple(
                 _outcome(*flags) for flags in zip(miss > self.scenario.nominal_range_m, lost, self._spent, strict=True)
             ),
-            truth_kept=margin.filled(0.0) >= 0.0,
             truth_margin_m=margin,
             position_m=self._draws.position_m,
             velocity_m_s=self._draws.velocity_m_s,

@@ -1,99 +1,93 @@
-"""What a notebook shows of results and of single engagements: a small table, and pictures without scripts."""
+"""HTML of results and of single engagements for notebooks: a small table, and pictures without scripts."""
 
 from __future__ import annotations
 
 import html
 from collections import Counter
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from infoset.svg import ACCENT, NEAR, Plane, limits
 
-if TYPE_CHECKING:
-    from sim.record import Record
-    from sim.results import Results
+Floats = NDArray[np.float64]
 
 LEVELS = (0.1, 0.5, 0.9)
 _DECADES = 10.0
 
 
-def results_html(results: Results) -> str:
-    """Return a table of the results of a batch.
+def results_html(samples: Mapping[str, Floats], outcomes: Sequence[str], truths_kept: int) -> str:
+    """Return a table of the results of a batch as HTML.
 
     Parameters
     ----------
-    results : Results
-
-    Returns
-    -------
-    str
-        HTML.
+    samples : mapping of str to ndarray
+        Known values by title, unit included; each is a row with its quantiles.
+    outcomes : sequence of str
+        Outcome of each engagement.
+    truths_kept : int
+        Number of engagements whose true state was inside its section at every step.
     """
-    known = results.guaranteed_miss_m.compressed()
-    name = "guaranteed miss, m" if results.guarantees else "published Φ, no guarantee, m"
-    rows = [
-        ("miss, m", _quantiles(results.miss_m)),
-        ("impulse, m/s", _quantiles(results.impulse_m_s)),
-        (name, _quantiles(known)),
-    ]
-    outcomes = Counter(outcome.value for outcome in results.outcomes)
-    said = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.items())
-    caption = f"{len(results)} engagements: {said}; truth kept {int(results.truth_kept.sum())}/{len(results)}"
+    counts = ", ".join(f"{count} {outcome}" for outcome, count in Counter(outcomes).items())
+    caption = f"{len(outcomes)} engagements: {counts}; truth kept {truths_kept}/{len(outcomes)}"
+    rows = [(title, _quantiles(values)) for title, values in samples.items()]
     return _table(caption, ("", *(f"{level:.0%}" for level in LEVELS), "greatest"), rows)
 
 
-def record_html(record: Record) -> str:
-    """Return the course of an engagement: what came of it, its predicted miss and its impulses over time.
+def course_html(
+    caption: str,
+    facts: Mapping[str, str],
+    time_s: Floats,
+    impulse_m_s: Floats,
+    greatest_impulse_m_s: float,
+    miss_time_s: Floats,
+    miss_m: Floats,
+) -> str:
+    """Return the course of one engagement as HTML: facts, predicted miss and impulses over time.
 
     Parameters
     ----------
-    record : Record
-
-    Returns
-    -------
-    str
-        HTML.
+    caption : str
+        Caption of the table of facts.
+    facts : mapping of str to str
+        Rows of that table.
+    time_s, impulse_m_s : ndarray, shape (steps,)
+        Impulse of each step.
+    greatest_impulse_m_s : float
+        Greatest impulse of the thruster, m/s.
+    miss_time_s : ndarray, shape (n,)
+        Times at which a predicted miss exists, s.
+    miss_m : ndarray, shape (n, 2)
+        Least and greatest predicted miss at these times, m.
     """
-    result, scenario = record.result, record.scenario
-    rows = [
-        ("scenario", [scenario.name]),
-        ("noise, strategy", [f"{record.noise_name}, {record.strategy}"]),
-        ("miss", [f"{result.miss_m[0]:.4g} m"]),
-        ("impulse", [f"{result.impulse_m_s[0]:.4g} m/s of {scenario.thruster.budget_m_s:g}"]),
-        ("truth kept", ["yes" if result.truth_kept[0] else "no"]),
-    ]
-    caption = f"{result.outcomes[0].value}: {len(record.steps)} steps, seed {record.seed}, run {record.run}"
-    return _table(caption, (), rows) + _miss_svg(record) + _impulse_svg(record)
+    table = _table(caption, (), [(name, [text]) for name, text in facts.items()])
+    impulses = _impulse_svg(time_s, impulse_m_s, greatest_impulse_m_s)
+    return table + (_miss_svg(miss_time_s, miss_m) if len(miss_time_s) else "") + impulses
 
 
-def _miss_svg(record: Record) -> str:
-    """The predicted-miss interval over time: linear to ten metres, a step a decade beyond."""
-    known = [(step.time_s, *step.predicted_miss_m) for step in record.steps if step.predicted_miss_m is not None]
-    if not known:
-        return ""
-    times, lower, upper = np.array(known).T
-    size = np.abs(np.concatenate([lower, upper])) / _DECADES
-    bent = np.sign(np.concatenate([lower, upper])) * np.where(size > 1.0, 1.0 + np.log10(np.maximum(size, 1.0)), size)
-    low, high = np.split(bent, 2)
-    span, powers = limits(bent), range(1, 1 + int(np.abs(bent).max()))
+def _miss_svg(time_s: Floats, miss_m: Floats) -> str:
+    """Draw the predicted-miss interval over time: linear up to 10 m, one unit per decade beyond."""
+    scaled = miss_m / _DECADES
+    size = np.abs(scaled)
+    bent = np.sign(scaled) * np.where(size > 1.0, 1.0 + np.log10(np.maximum(size, 1.0)), size)
+    powers = range(1, 1 + int(np.abs(bent).max()))
     marks = [(float(sign * power), f"{sign * 10**power:g}") for power in powers for sign in (-1, 1)] + [(0.0, "0")]
-    plane = Plane(limits(times, 0.02), span, "time t, s", "m", "predicted miss, with no more impulses", levels=marks)
-    around = np.concatenate([np.stack([times, low], axis=1), np.stack([times, high], axis=1)[::-1]])
+    plane = Plane(
+        limits(time_s, 0.02), limits(bent), "time t, s", "m", "predicted miss, with no more impulses", levels=marks
+    )
+    low, high = bent.T
+    around = np.concatenate([np.stack([time_s, low], axis=1), np.stack([time_s, high], axis=1)[::-1]])
     plane.line(around, NEAR, closed=True)
     return plane.svg()
 
 
-def _impulse_svg(record: Record) -> str:
-    greatest = record.scenario.thruster.greatest_impulse_m_s
-    times = np.array([step.time_s for step in record.steps])
-    plane = Plane(
-        limits(times, 0.02), (-1.1 * greatest, 1.1 * greatest), "time t, s", "impulse k, m/s", "impulses", 170
-    )
-    for step in record.steps:
-        if step.impulse_m_s != 0.0:
-            plane.line(np.array([[step.time_s, 0.0], [step.time_s, step.impulse_m_s]]), ACCENT)
+def _impulse_svg(time_s: Floats, impulse_m_s: Floats, greatest_m_s: float) -> str:
+    span = (-1.1 * greatest_m_s, 1.1 * greatest_m_s)
+    plane = Plane(limits(time_s, 0.02), span, "time t, s", "impulse k, m/s", "impulses", 170)
+    for time, impulse in zip(time_s.tolist(), impulse_m_s.tolist(), strict=True):
+        if impulse != 0.0:
+            plane.line(np.array([[time, 0.0], [time, impulse]]), ACCENT)
     return plane.svg()
 
 

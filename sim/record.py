@@ -14,6 +14,7 @@ from infoset.information_set_view import MaskedFloats
 from infoset.limits import WHOLE
 from sim.draws import draw
 from sim.engagement import Engagements, Step
+from sim.pictures import course_html
 from sim.results import Results
 from sim.scenario import Scenario, strategy_name
 
@@ -105,9 +106,23 @@ class Record:
         return self.scenario.noise.value if self.noise is None else self.noise
 
     def _repr_html_(self) -> str:
-        from sim.pictures import record_html
-
-        return record_html(self)
+        result, thruster = self.result, self.scenario.thruster
+        known = [(step.time_s, step.predicted_miss_m) for step in self.steps if step.predicted_miss_m is not None]
+        return course_html(
+            f"{result.outcomes[0].value}: {len(self.steps)} steps, seed {self.seed}, run {self.run}",
+            {
+                "scenario": self.scenario.name,
+                "noise, strategy": f"{self.noise_name}, {self.strategy}",
+                "miss": f"{result.miss_m[0]:.4g} m",
+                "impulse": f"{result.impulse_m_s[0]:.4g} m/s of {thruster.budget_m_s:g}",
+                "truth kept": "yes" if result.truth_kept[0] else "no",
+            },
+            np.array([step.time_s for step in self.steps]),
+            np.array([step.impulse_m_s for step in self.steps]),
+            thruster.greatest_impulse_m_s,
+            np.array([time for time, _ in known]),
+            np.array([miss for _, miss in known]),
+        )
 
 
 @dataclass

@@ -1,109 +1,142 @@
-"""What came of a batch of engagements."""
+"""Results of a batch of engagements."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from enum import Enum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from infoset.information_set_view import MaskedFloats
+from infoset.limits import NOT_NEGATIVE
+from sim.columns import Column, columns, columns_of, documented, values_of
+from sim.pictures import results_html
 
 Floats = NDArray[np.float64]
+MaskedFlags = np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]
 
 
 class Outcome(Enum):
     """How an engagement ended."""
 
     INTERCEPTED = "intercepted"
-    """Flown to the closest approach with a set, or with none needed any more."""
+    """The spacecraft flew to the closest approach, and no other outcome applies."""
     SET_LOST = "set-lost"
-    """The set emptied while no hypothesis had left it: measurements and model disagree.
+    """A measurement left the set empty although no label was below the threshold: measurements and model disagree.
 
-    With recovery the engagement goes on from the last consistent set, widened; without it no impulse is given after.
+    With recovery the last consistent set is enlarged and guidance continues; without it no more impulses are given.
     """
     BUDGET_SPENT = "budget-spent"
-    """Less than the least impulse was left while the strategy wanted more."""
+    """The budget fell below the least impulse while the strategy still commanded one."""
     DIVERGED = "diverged"
-    """The closest approach was farther than the nominal range."""
+    """The miss is greater than the nominal range."""
 
 
+_PHI = (
+    "Bound Phi of the miss (in the paper's model the published Phi, which is not a bound); unknown where no label "
+    "left, the set did not start as a box, or the data exceeded their error bounds"
+)
+_MARGIN = (
+    "Smallest distance from the true state to the boundary of its section, negative outside; unknown where nothing was "
+    "measured"
+)
+_HELD = "Miss at most the guaranteed miss; unknown without a guarantee"
+
+
+@documented
 @dataclass(frozen=True)
 class Results:
     """Results of a batch of B engagements.
 
+    A column of results is declared at its field here; CSV, JSON, Parquet and record files follow the declaration.
+
     Parameters
     ----------
-    runs : ndarray of int, shape (B,)
-        Numbers of the runs.
-    miss_m : ndarray, shape (B,)
-        Least distance between the centres of mass, m.
-    impulse_m_s : ndarray, shape (B,)
-        Sum of the moduli of the impulses, m/s.
-    guaranteed_miss_m : masked array, shape (B,)
-        In the guaranteed model Phi, which the true miss cannot exceed, over all labels; masked where it is not known:
-        no label has left, the set did not start as a box, or the data broke their bounds. In the model `paper` the
-        published payoff over the stored sections, which is no guarantee; masked where no label finished. m.
-    outcomes : tuple of Outcome
-    truth_kept : ndarray of bool, shape (B,)
-        Whether the truth was inside its own section after every measurement.
-    truth_margin_m : masked array, shape (B,)
-        Least signed margin of the truth in its section, m; masked where nothing was measured.
-    position_m, velocity_m_s : ndarray, shape (B, 2)
-        Where the truth started: (z, x) and (V_z, V_x).
     guarantees : bool
-        Whether `guaranteed_miss_m` is a guarantee.
+        Whether `guaranteed_miss_m` is a bound: the set's model is the guaranteed one.
     """
 
-    runs: NDArray[np.int64]
-    miss_m: Floats
-    impulse_m_s: Floats
-    guaranteed_miss_m: MaskedFloats
-    outcomes: tuple[Outcome, ...]
-    truth_kept: NDArray[np.bool_]
-    truth_margin_m: MaskedFloats
-    position_m: Floats
-    velocity_m_s: Floats
+    runs: NDArray[np.int64] = field(metadata=columns(Column("run", "", "Run number", int)))
+    miss_m: Floats = field(
+        metadata=columns(Column("miss_m", "m", "Least distance between the centres of mass", limits=NOT_NEGATIVE))
+    )
+    impulse_m_s: Floats = field(
+        metadata=columns(Column("impulse_m_s", "m/s", "Sum of the impulses' absolute values", limits=NOT_NEGATIVE))
+    )
+    guaranteed_miss_m: MaskedFloats = field(
+        metadata=columns(Column("guaranteed_miss_m", "m", _PHI, nullable=True, limits=NOT_NEGATIVE))
+    )
+    outcomes: tuple[Outcome, ...] = field(metadata=columns(Column("outcome", "", "How the engagement ended", Outcome)))
+    truth_kept: NDArray[np.bool_] = field(
+        init=False, metadata=columns(Column("truth_kept", "", "True state inside its section at every step", bool))
+    )
+    truth_margin_m: MaskedFloats = field(metadata=columns(Column("truth_margin_m", "m", _MARGIN, nullable=True)))
+    phi_held: MaskedFlags = field(init=False, metadata=columns(Column("phi_held", "", _HELD, bool, nullable=True)))
+    position_m: Floats = field(
+        metadata=columns(Column("start_z_m", "m", "True z at the start"), Column("start_x_m", "m", "true x"))
+    )
+    velocity_m_s: Floats = field(
+        metadata=columns(
+            Column("start_vz_m_s", "m/s", "True V_z at the start"), Column("start_vx_m_s", "m/s", "true V_x")
+        )
+    )
     guarantees: bool = False
 
-    @property
-    def phi_held(self) -> np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]:
-        """Whether the true miss stayed within the guaranteed one, shape (B,); masked where nothing was guaranteed."""
+    def __post_init__(self) -> None:
         unknown = np.ma.getmaskarray(self.guaranteed_miss_m) | (not self.guarantees)
-        return np.ma.MaskedArray(self.miss_m <= self.guaranteed_miss_m.filled(np.inf), mask=unknown)
+        within = self.miss_m <= self.guaranteed_miss_m.filled(np.inf)
+        object.__setattr__(self, "truth_kept", self.truth_margin_m.filled(0.0) >= 0.0)
+        object.__setattr__(self, "phi_held", np.ma.MaskedArray(within, mask=unknown))
 
     def __len__(self) -> int:
         return len(self.runs)
 
-    def _repr_html_(self) -> str:
-        from sim.pictures import results_html
+    def to_dict(self) -> dict[str, list[Any]]:
+        """Return the columns by name as plain values, one per run: texts for outcomes, None where unknown."""
+        return {column.name: values_of(self, column) for column in columns_of(Results)}
 
-        return results_html(self)
+    def take(self, indices: NDArray[np.intp]) -> Results:
+        """Return the results at these indices, in their order."""
+
+        def taken(values: Any) -> Any:
+            if isinstance(values, bool):
+                return values
+            return tuple(values[index] for index in indices) if isinstance(values, tuple) else values[indices]
+
+        return Results(**{name: taken(getattr(self, name)) for name in _INPUTS})
+
+    def _repr_html_(self) -> str:
+        guaranteed = "guaranteed miss, m" if self.guarantees else "published Φ, no guarantee, m"
+        samples = {
+            "miss, m": self.miss_m,
+            "impulse, m/s": self.impulse_m_s,
+            guaranteed: self.guaranteed_miss_m.compressed(),
+        }
+        outcomes = [outcome.value for outcome in self.outcomes]
+        return results_html(samples, outcomes, int(self.truth_kept.sum()))
 
     def __repr__(self) -> str:
         miss, fuel = np.median(self.miss_m), np.median(self.impulse_m_s)
         return f"<{len(self)} engagements: median miss {miss:.3g} m for {fuel:.4g} m/s>"
 
 
+_INPUTS = [declared.name for declared in fields(Results) if declared.init]
+
+
 def join(parts: Sequence[Results]) -> Results:
-    """Results of several batches as one, in their order."""
-    return Results(
-        np.concatenate([part.runs for part in parts]),
-        np.concatenate([part.miss_m for part in parts]),
-        np.concatenate([part.impulse_m_s for part in parts]),
-        _joined([part.guaranteed_miss_m for part in parts]),
-        tuple(outcome for part in parts for outcome in part.outcomes),
-        np.concatenate([part.truth_kept for part in parts]),
-        _joined([part.truth_margin_m for part in parts]),
-        np.concatenate([part.position_m for part in parts]),
-        np.concatenate([part.velocity_m_s for part in parts]),
-        all(part.guarantees for part in parts),
-    )
+    """Return the results of several batches as one, in their order."""
+    return Results(**{name: _joined([getattr(part, name) for part in parts]) for name in _INPUTS})
 
 
-def _joined(parts: Sequence[MaskedFloats]) -> MaskedFloats:
-    return np.ma.MaskedArray(
-        np.concatenate([part.data for part in parts]), mask=np.concatenate([np.ma.getmaskarray(part) for part in parts])
-    )
+def _joined(parts: Sequence[Any]) -> Any:
+    if isinstance(parts[0], bool):
+        return all(parts)
+    if isinstance(parts[0], tuple):
+        return tuple(value for part in parts for value in part)
+    if isinstance(parts[0], np.ma.MaskedArray):
+        mask = np.concatenate([np.ma.getmaskarray(part) for part in parts])
+        return np.ma.MaskedArray(np.concatenate([part.data for part in parts]), mask=mask)
+    return np.concatenate(parts)

@@ -11,10 +11,14 @@ import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
 from experiments.common.errors import InputError
+
+if TYPE_CHECKING:
+    from sim import Results
 
 STDOUT = "-"
 
@@ -171,6 +175,11 @@ def reporting_failures(where: Path) -> Iterator[None]:
 def library_version() -> str:
     """Return the version of the installed distribution, which stands in every file."""
     return version("infoset")
+
+
+def outcome_columns(results: Results) -> dict[str, list[Cell]]:
+    """Return the columns of results by name, without run numbers and starts."""
+    return {name: values for name, values in results.to_dict().items() if not name.startswith(("run", "start_"))}
 
 
 def to_json(value: object) -> str:

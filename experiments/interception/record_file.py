@@ -16,6 +16,7 @@ import tokenize
 import warnings
 import zipfile
 from collections.abc import Mapping
+from enum import Enum
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,8 @@ from experiments.common.toml_values import shown
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
 from infoset import ConvexPolygons, Section
 from infoset.limits import LARGEST, SMALLEST
-from sim import Inconsistency, Outcome, Record, Results, Scenario, StepRecord
+from sim import Inconsistency, Record, Results, Scenario, StepRecord
+from sim.columns import Column, columns_of, values_of
 
 FORMAT = "infoset-record"
 SCHEMA = 2
@@ -68,6 +70,11 @@ _MEMBERS: Mapping[str, tuple[str, int]] = {
     "vertex_v_m_s_z_m": (_FLOAT, _VERTICES_2),
 }
 """Type and shape of each member."""
+_RESULT: dict[str, list[Column]] = {}
+"""Columns of the result in the header by key; the two components of a start have one key."""
+for _column in columns_of(Results):
+    if _column.name not in ("run", "phi_held"):
+        _RESULT.setdefault(_column.name if _column.component is None else _column.field, []).append(_column)
 _LISTED_MEMBER = b"PK\x01\x02"
 """How an entry of an archive's list of members begins."""
 
@@ -239,16 +246,8 @@ def _offsets(counts: list[int]) -> NDArray[np.int64]:
 def _result_to_json(result: Results) -> dict[str, object]:
     if len(result) != 1:
         raise ValueError(f"the result of a record is a batch of one: got {len(result)}")
-    return {
-        "miss_m": float(result.miss_m[0]),
-        "impulse_m_s": float(result.impulse_m_s[0]),
-        "guaranteed_miss_m": result.guaranteed_miss_m.tolist()[0],
-        "outcome": result.outcomes[0].value,
-        "truth_kept": bool(result.truth_kept[0]),
-        "truth_margin_m": result.truth_margin_m.tolist()[0],
-        "position_m": result.position_m[0].tolist(),
-        "velocity_m_s": result.velocity_m_s[0].tolist(),
-    }
+    values = {key: [values_of(result, column)[0] for column in columns] for key, columns in _RESULT.items()}
+    return {key: value[0] if len(value) == 1 else value for key, value in values.items()}
 
 
 def _checksum(header: Mapping[str, object], arrays: Arrays) -> str:
@@ -426,32 +425,46 @@ def _check(arrays: Arrays) -> None:
 
 
 def _result_from_json(found: object, run: int, guarantees: bool) -> Results:
-    keys = ("miss_m", "impulse_m_s", "guaranteed_miss_m", "outcome", "truth_kept", "truth_margin_m")
-    if not isinstance(found, dict) or set(found) != {*keys, "position_m", "velocity_m_s"}:
+    # A record written before a nullable column was added lacks it.
+    optional = {key: None for key, columns in _RESULT.items() if columns[0].nullable}
+    if not isinstance(found, dict) or set(optional | found) != set(_RESULT):
         raise _UnsoundError("its header has a wrong result")
-    miss, impulse, guaranteed, outcome, kept, margin = (found[key] for key in keys)
-    pairs = [found["position_m"], found["velocity_m_s"]]
-    if not all(isinstance(pair, list) and len(pair) == 2 for pair in pairs):
-        raise _UnsoundError("its header has a wrong start")
-    numbers = [miss, impulse, *pairs[0], *pairs[1], *(each for each in (guaranteed, margin) if each is not None)]
-    if not all(isinstance(each, float) and abs(each) <= LARGEST for each in numbers) or not isinstance(kept, bool):
-        raise _UnsoundError("its header has a wrong result")
-    if min(miss, impulse, guaranteed or 0.0) < 0.0:
-        raise _UnsoundError("its header has a negative miss or impulse")
-    if outcome not in [each.value for each in Outcome]:
-        raise _UnsoundError(f"its header has the outcome {shown(outcome)}")
-    return Results(
-        runs=np.array([run]),
-        miss_m=np.array([miss]),
-        impulse_m_s=np.array([impulse]),
-        guaranteed_miss_m=np.ma.MaskedArray([guaranteed or 0.0], mask=[guaranteed is None]),
-        outcomes=(Outcome(outcome),),
-        truth_kept=np.array([kept]),
-        truth_margin_m=np.ma.MaskedArray([margin or 0.0], mask=[margin is None]),
-        position_m=np.array([pairs[0]]),
-        velocity_m_s=np.array([pairs[1]]),
-        guarantees=guarantees,
-    )
+    found = optional | found
+    fields: dict[str, Any] = {"runs": np.array([run]), "guarantees": guarantees}
+    for key, columns in _RESULT.items():
+        values = [found[key]] if len(columns) == 1 else found[key]
+        if not isinstance(values, list) or len(values) != len(columns):
+            raise _UnsoundError("its header has a wrong start")
+        for column, value in zip(columns, values, strict=True):
+            problem = _problem(column, value)
+            if problem is not None:
+                raise _UnsoundError(f"its header has a wrong result: {column.name} {problem}")
+        fields[columns[0].field] = _array(columns[0], values)
+    kept = fields.pop("truth_kept")
+    result = Results(**fields)
+    if (result.truth_kept != kept).any():
+        raise _UnsoundError("its header has a wrong result: truth_kept contradicts truth_margin_m")
+    return result
+
+
+def _problem(column: Column, value: object) -> str | None:
+    """Return what is wrong with a value of a column, or None."""
+    if issubclass(column.kind, Enum):
+        return None if value in [member.value for member in column.kind] else f"is {shown(value)}"
+    if value is None and column.nullable:
+        return None
+    if type(value) is not column.kind:
+        return f"must be of the type {column.kind.__name__}"
+    return column.limits.problem(value) if column.kind is float else None
+
+
+def _array(column: Column, values: list[Any]) -> Any:
+    """Return the values of a field of `Results` for a batch of one."""
+    if issubclass(column.kind, Enum):
+        return (column.kind(values[0]),)
+    if column.nullable:
+        return np.ma.MaskedArray([values[0] or 0.0], mask=[values[0] is None])
+    return np.array(values if column.component is None else [values])
 
 
 def _to_steps(arrays: Arrays, scenario: Scenario) -> tuple[StepRecord, ...]:

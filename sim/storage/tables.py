@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +15,9 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from guidance import NoiseKind, TieRule
-from infoset.limits import NOT_NEGATIVE, NUMBER
 from sim.chunk import Chunk
-from sim.results import Outcome, Results
+from sim.columns import Column, columns_of, values_of
+from sim.results import Results
 from sim.storage.parquet_pages import claimed_bytes
 
 SCHEMA_VERSION = 2
@@ -24,43 +26,46 @@ MOST_BYTES_A_ROW = 120
 """A row takes about 80, and would take 115 with its text written out."""
 BYTES_BESIDE_ROWS = 100_000
 
-_COLUMNS: tuple[tuple[str, Any, str, str], ...] = (
-    ("run", pa.int64(), "", "number of the run"),
-    ("noise", pa.string(), "", "measurement noise: random or game"),
-    ("tie", pa.string(), "", "what game noise does between equals; null under random noise"),
-    ("range_meter", pa.bool_(), "", "whether there is a range meter"),
-    ("miss_m", pa.float64(), "m", "least distance between the centres of mass"),
-    ("impulse_m_s", pa.float64(), "m/s", "sum of the sizes of the impulses"),
-    ("guaranteed_miss_m", pa.float64(), "m", "Phi; null where it is not known or was not kept"),
-    ("outcome", pa.string(), "", "how the engagement ended"),
-    ("truth_margin_m", pa.float64(), "m", "least margin of the truth in its section; null where nothing was measured"),
-    ("z_km", pa.float64(), "km", "where the truth started, across"),
-    ("x_km", pa.float64(), "km", "where the truth started, along"),
-    ("vz_km_s", pa.float64(), "km/s", "its speed across"),
-    ("vx_km_s", pa.float64(), "km/s", "its speed along"),
+_RESULTS = [column for column in columns_of(Results) if not column.derived]
+_NOISES = (
+    Column("noise", "", "Measurement noise", NoiseKind),
+    Column("tie", "", "How game noise breaks ties; null under random noise", TieRule, nullable=True),
+    Column("range_meter", "", "Whether there is a range meter", bool),
 )
-_TEXTS: Mapping[str, frozenset[str | None]] = {
-    "noise": frozenset(each.value for each in NoiseKind),
-    "tie": frozenset(each.value for each in TieRule),
-    "outcome": frozenset(each.value for each in Outcome),
+
+
+def _stored(column: Column) -> Column:
+    """Return a column as it is stored: the components of the start are in km."""
+    if column.component is None:
+        return column
+    name = column.name.removeprefix("start_").replace("_m", "_km")
+    return replace(column, name=name, unit=f"k{column.unit}")
+
+
+_COLUMNS = [_stored(column) for column in (_RESULTS[0], *_NOISES, *_RESULTS[1:])]
+_TYPES = {int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
+_TEXTS: Mapping[str, frozenset[str]] = {
+    column.name: frozenset(member.value for member in column.kind)
+    for column in _COLUMNS
+    if issubclass(column.kind, Enum)
 }
-"""Columns of text, and all that they can say."""
-_CELL = ("cell", pa.int32(), "", "number of the cell of the sweep")
-_NULLABLE = ("tie", "guaranteed_miss_m", "truth_margin_m")
-_LIMITS = dict.fromkeys(("miss_m", "impulse_m_s", "guaranteed_miss_m"), NOT_NEGATIVE)
-"""What a column of numbers may hold; the others hold any number."""
+"""Columns of text, and the texts that they may hold."""
+_LIMITS = {column.name: column.limits for column in _COLUMNS}
 
 
 def schema(*, with_cell: bool) -> Any:
     """Return the Arrow schema of the rows: names, types, and unit and meaning in each field's metadata."""
-    columns = (_CELL, *_COLUMNS) if with_cell else _COLUMNS
-    return pa.schema(
-        [
-            pa.field(name, kind, nullable=name in _NULLABLE, metadata={"unit": unit, "meaning": meaning})
-            for name, kind, unit, meaning in columns
-        ],
-        metadata={"infoset_schema": str(SCHEMA_VERSION)},
-    )
+    fields = [
+        pa.field(
+            column.name,
+            _TYPES.get(column.kind, pa.string()),
+            nullable=column.nullable,
+            metadata={"unit": column.unit, "meaning": column.meaning},
+        )
+        for column in _COLUMNS
+    ]
+    cell = [pa.field("cell", pa.int32(), nullable=False, metadata={"unit": "", "meaning": "Cell number in the sweep"})]
+    return pa.schema([*(cell if with_cell else []), *fields], metadata={"infoset_schema": str(SCHEMA_VERSION)})
 
 
 def rows(chunk: Chunk, results: Results, *, with_cell: bool) -> Any:
@@ -83,27 +88,18 @@ def rows(chunk: Chunk, results: Results, *, with_cell: bool) -> Any:
     FloatingPointError
         If a number is not finite or out of its limits.
     """
-    guaranteed = results.guaranteed_miss_m
     noises = chunk.noises(results.runs)
-    margin = results.truth_margin_m
-    columns: dict[str, Any] = {
+    stored: dict[str, Any] = {
         "cell": np.full(len(results), chunk.cell, dtype=np.int32),
-        "run": results.runs,
         "noise": [noise.value for noise in noises],
         "tie": [chunk.scenario.tie.value if noise is NoiseKind.GAME else None for noise in noises],
         "range_meter": np.full(len(results), chunk.scenario.range_sensor is not None),
-        "miss_m": results.miss_m,
-        "impulse_m_s": results.impulse_m_s,
-        "guaranteed_miss_m": pa.array(guaranteed.filled(0.0), mask=np.ma.getmaskarray(guaranteed)),
-        "outcome": [outcome.value for outcome in results.outcomes],
-        "truth_margin_m": pa.array(margin.filled(0.0), mask=np.ma.getmaskarray(margin)),
-        "z_km": results.position_m[:, 0] / M_PER_KM,
-        "x_km": results.position_m[:, 1] / M_PER_KM,
-        "vz_km_s": results.velocity_m_s[:, 0] / M_PER_KM,
-        "vx_km_s": results.velocity_m_s[:, 1] / M_PER_KM,
     }
+    for column in _RESULTS:
+        values = values_of(results, column)
+        stored[_stored(column).name] = values if column.component is None else np.array(values) / M_PER_KM
     wanted = schema(with_cell=with_cell)
-    table = pa.table({name: columns[name] for name in wanted.names}, schema=wanted)
+    table = pa.table({name: stored[name] for name in wanted.names}, schema=wanted)
     try:
         need_sound(table, range(chunk.first, chunk.first + chunk.runs), chunk.cell)
     except ValueError as error:
@@ -145,7 +141,7 @@ def need_sound(table: Any, runs: range, cell: int) -> None:
         if not np.isfinite(ends).all():
             raise ValueError(f"{name} holds what is not a finite number")
         for end in ends:
-            problem = _LIMITS.get(name, NUMBER).problem(end)
+            problem = _LIMITS[name].problem(end)
             if problem is not None:
                 raise ValueError(f"{name} {problem}, and holds {end:g}")
 
@@ -159,7 +155,7 @@ def to_bytes(table: Any, extra: Mapping[str, str]) -> bytes:
         whole,
         sink,
         compression="zstd",
-        use_dictionary=[name for name in ("noise", "tie", "outcome") if name in table.column_names],
+        use_dictionary=[name for name in _TEXTS if name in table.column_names],
     )
     return bytes(sink.getvalue().to_pybytes())
 
@@ -194,7 +190,9 @@ def fault(content: bytes, told: Mapping[str, str], rows: int, *, with_cell: bool
             return "belongs to another campaign"
         if found.num_rows != rows:
             return f"has {found.num_rows} rows in place of {rows}"
-        if not columns.equals(schema(with_cell=with_cell)):
+        wanted = schema(with_cell=with_cell)
+        # A file written before a nullable column was added lacks it.
+        if not columns.equals(pa.schema([each for each in wanted if each.name in columns.names or not each.nullable])):
             return "has other columns than a campaign"
         return _fault_of_sizes(content, found)
     except (pa.ArrowException, OSError, ValueError, MemoryError):
@@ -269,13 +267,15 @@ def _read_one(file: Path, wanted: Any) -> Any:
     # Text stays a dictionary until that is known to be short: a long one that every row names would fill the memory.
     texts = [name for name in wanted.names if name in _TEXTS]
     table = pq.ParquetFile(file, read_dictionary=texts).read(columns=wanted.names, use_threads=False)
-    table = table.select(wanted.names)
+    missing = [name for name in wanted.names if name not in table.column_names]
     for name in texts:
-        for part in table.column(name).chunks:
+        for part in [] if name in missing else table.column(name).chunks:
             said = part.dictionary
             if len(said) > len(_TEXTS[name]) or not {*said.to_pylist()} <= _TEXTS[name]:
                 raise ValueError(f"{name} says what no campaign writes")
-    return table.cast(wanted).replace_schema_metadata(wanted.metadata)
+    for name in missing:
+        table = table.append_column(name, pa.nulls(len(table), wanted.field(name).type))
+    return table.select(wanted.names).cast(wanted).replace_schema_metadata(wanted.metadata)
 
 
 def numbers(table: Any, name: str) -> np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]:

@@ -312,6 +312,14 @@ def test_a_shard_past_the_last_is_left_out(index: int, folder: Path) -> None:
     assert damage.reason == "is of no chunk of this campaign"
 
 
+def test_a_shard_without_a_nullable_column_reads_as_null(folder: Path) -> None:
+    replaced(folder, lambda table, file: pq.write_table(table.drop_columns(["truth_margin_m"]), file))
+    read = CampaignFolder.read(folder)
+    assert not read.damaged
+    assert read.table(["truth_margin_m"]).column("truth_margin_m").null_count == ROWS
+    assert read.table().column_names.index("truth_margin_m") == 8
+
+
 @pytest.mark.parametrize(
     "change",
     [

@@ -161,11 +161,11 @@ def _fly(flown: Sequence[Scenario], seed: int, run: int, quiet: bool) -> list[tu
 
 
 def _summary(record: Record, elapsed_s: float, warnings: Sequence[str]) -> dict[str, object]:
-    from experiments.common.output import library_version
+    from experiments.common.output import library_version, outcome_columns
     from experiments.interception.scenario_file import scenario_hash
     from guidance import NoiseKind
 
-    scenario, result = record.scenario, record.result
+    scenario = record.scenario
     return {
         "version": library_version(),
         "scenario": scenario.name,
@@ -178,13 +178,7 @@ def _summary(record: Record, elapsed_s: float, warnings: Sequence[str]) -> dict[
         "published_curve": 1 + (scenario.range_sensor is not None) + 2 * (scenario.noise is NoiseKind.GAME),
         "noise": scenario.noise.value,
         "range_meter": scenario.range_sensor is not None,
-        "miss_m": float(result.miss_m[0]),
-        "impulse_m_s": float(result.impulse_m_s[0]),
-        "guaranteed_miss_m": result.guaranteed_miss_m.tolist()[0],
-        "outcome": result.outcomes[0].value,
-        "truth_kept": bool(result.truth_kept[0]),
-        "truth_margin_m": result.truth_margin_m.tolist()[0],
-        "phi_held": result.phi_held.tolist()[0],
+        **{name: values[0] for name, values in outcome_columns(record.result).items()},
         "inconsistency": None if record.inconsistency is None else _where(record, record.inconsistency),
         "steps": [
             {

@@ -34,23 +34,6 @@ if TYPE_CHECKING:
 
 FIGURE = "figure-4-distributions"
 LEVELS = (0.1, 0.5, 0.9, 0.99)
-COLUMNS = (
-    "published_curve",
-    "noise",
-    "range_meter",
-    "run",
-    "miss_m",
-    "impulse_m_s",
-    "guaranteed_miss_m",
-    "outcome",
-    "truth_kept",
-    "truth_margin_m",
-    "phi_held",
-    "start_z_m",
-    "start_x_m",
-    "start_vz_m_s",
-    "start_vx_m_s",
-)
 
 
 def experiment(
@@ -85,10 +68,10 @@ def experiment(
         warnings = _warn(given, quiet)
         tell_of_compiling(quiet)
         curves, elapsed_s = _fly(given, runs, seed, quiet)
-        from experiments.common.output import STDOUT, deliver, to_csv, to_json
+        from experiments.common.output import STDOUT, deliver, to_json
 
         json_text = to_json(_summary(given, runs, seed, elapsed_s, curves, warnings))
-        csv_text = to_csv(COLUMNS, _rows(curves)) if csv is not None or out is not None else ""
+        csv_text = _to_csv(curves) if csv is not None or out is not None else ""
         deliver(json_, json_text, overwrite=overwrite)
         deliver(csv, csv_text, overwrite=overwrite)
         if out is not None:
@@ -147,7 +130,7 @@ def _fly(scenario: Scenario, runs: int, seed: int, quiet: bool) -> tuple[list[Cu
 def _summary(
     scenario: Scenario, runs: int, seed: int, elapsed_s: float, curves: Sequence[Curve], warnings: Sequence[str]
 ) -> dict[str, object]:
-    from experiments.common.output import library_version
+    from experiments.common.output import library_version, outcome_columns
     from experiments.interception.scenario_file import scenario_hash
 
     return {
@@ -163,43 +146,23 @@ def _summary(
                 "published_curve": curve.number,
                 "noise": curve.noise.value,
                 "range_meter": curve.range_meter,
-                "miss_m": curve.results.miss_m.tolist(),
-                "impulse_m_s": curve.results.impulse_m_s.tolist(),
-                "guaranteed_miss_m": curve.results.guaranteed_miss_m.tolist(),
-                "outcome": [outcome.value for outcome in curve.results.outcomes],
-                "truth_kept": curve.results.truth_kept.tolist(),
-                "truth_margin_m": curve.results.truth_margin_m.tolist(),
-                "phi_held": curve.results.phi_held.tolist(),
+                **outcome_columns(curve.results),
             }
             for curve in curves
         ],
     }
 
 
-def _rows(curves: Sequence[Curve]) -> list[list[Cell]]:
-    rows: list[list[Cell]] = []
-    for curve in curves:
-        results, guaranteed = curve.results, curve.results.guaranteed_miss_m.tolist()
-        margins, phi_held = results.truth_margin_m.tolist(), results.phi_held.tolist()
-        for i in range(len(results)):
-            rows.append(
-                [
-                    curve.number,
-                    curve.noise.value,
-                    curve.range_meter,
-                    int(results.runs[i]),
-                    float(results.miss_m[i]),
-                    float(results.impulse_m_s[i]),
-                    guaranteed[i],
-                    results.outcomes[i].value,
-                    bool(results.truth_kept[i]),
-                    margins[i],
-                    phi_held[i],
-                    *results.position_m[i].tolist(),
-                    *results.velocity_m_s[i].tolist(),
-                ]
-            )
-    return rows
+def _to_csv(curves: Sequence[Curve]) -> str:
+    from experiments.common.output import to_csv
+
+    columns = [curve.results.to_dict() for curve in curves]
+    rows: list[list[Cell]] = [
+        [curve.number, curve.noise.value, curve.range_meter, *values]
+        for curve, by_name in zip(curves, columns, strict=True)
+        for values in zip(*by_name.values(), strict=True)
+    ]
+    return to_csv(("published_curve", "noise", "range_meter", *columns[0]), rows)
 
 
 def _fill(

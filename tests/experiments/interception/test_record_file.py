@@ -269,6 +269,12 @@ def test_remade_without_a_change_it_is_read(content: bytes, record: Record, tmp_
     assert_same(read_record(tmp_path / "x.npz"), record)
 
 
+def test_a_header_without_a_nullable_column_reads_as_unknown(content: bytes, tmp_path: Path) -> None:
+    changed = remade(content, lambda arrays: arrays["json"]["result"].pop("guaranteed_miss_m"))
+    (tmp_path / "x.npz").write_bytes(changed)
+    assert read_record(tmp_path / "x.npz").result.guaranteed_miss_m.mask.all()
+
+
 def put(name: str, at: int, value: object) -> Callable[[Arrays], None]:
     def change(arrays: Arrays) -> None:
         arrays[name][at] = value
@@ -320,6 +326,7 @@ def shorter(name: str) -> Callable[[Arrays], None]:
         (result(miss_m=True), "wrong result"),
         (result(more=1), "wrong result"),
         (result(truth_kept=1), "wrong result"),
+        (result(truth_margin_m=-1.0), "truth_kept contradicts truth_margin_m"),
         (result(outcome="won"), "outcome"),
         (result(outcome=[]), "outcome"),
         (result(position_m=[1.0]), "wrong start"),
@@ -333,9 +340,9 @@ def shorter(name: str) -> Callable[[Arrays], None]:
         (put("true_range_m", 0, -1.0), "true_range_m holds a range that is negative"),
         (put("section_range_m", 0, 1e-300), "not positive"),
         (result(miss_m=1e308), "wrong result"),
-        (result(miss_m=-1.0), "negative miss"),
-        (result(impulse_m_s=-1.0), "negative miss or impulse"),
-        (result(guaranteed_miss_m=-1.0), "negative miss"),
+        (result(miss_m=-1.0), "miss_m must be at least 0"),
+        (result(impulse_m_s=-1.0), "impulse_m_s must be at least 0"),
+        (result(guaranteed_miss_m=-1.0), "guaranteed_miss_m must be at least 0"),
         (result(truth_margin_m=-1e300), "wrong result"),
         (result(position_m=[1e300, 1.0]), "wrong result"),
         (put("time_s", 3, 0.0), "time_s does not rise"),

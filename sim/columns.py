@@ -1,0 +1,93 @@
+"""Columns of results: each is declared once, at its field, and every file format reads the declaration."""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import dataclass, fields, replace
+from enum import Enum
+from functools import cache
+from typing import Any, TypeVar, cast
+
+from infoset.limits import NUMBER, Limits
+
+_Owner = TypeVar("_Owner")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table with one row per run, declared in the metadata of a dataclass field.
+
+    Parameters
+    ----------
+    name : str
+        Heading in CSV files and key in JSON.
+    unit : str
+        Empty for a flag, a text and a number without a unit.
+    meaning : str
+        Description, for the documentation and the metadata of Parquet files.
+    kind : type
+        `float`, `int`, `bool`, `str`, or an enumeration whose values are texts.
+    nullable : bool
+        Whether a value may be unknown: masked in an array, null in a file.
+    limits : Limits
+        Limits of the numbers.
+    field : str
+        Name of the field; set by `columns_of`.
+    component : int or None
+        Index along the second axis of a field of shape (B, 2), None for a field of shape (B,); set by `columns_of`.
+    derived : bool
+        Whether the field is computed from others (``init=False``); set by `columns_of`.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    kind: type = float
+    nullable: bool = False
+    limits: Limits = NUMBER
+    field: str = ""
+    component: int | None = None
+    derived: bool = False
+
+
+def columns(*declared: Column) -> dict[str, tuple[Column, ...]]:
+    """Return the metadata of a dataclass field that holds these columns, one for each component."""
+    return {"columns": declared}
+
+
+@cache
+def columns_of(owner: Any) -> tuple[Column, ...]:
+    """Return the columns that a dataclass declares, in the order of its fields."""
+    return tuple(
+        replace(column, field=field.name, component=index if len(declared) > 1 else None, derived=not field.init)
+        for field in fields(owner)
+        for declared in [field.metadata.get("columns", ())]
+        for index, column in enumerate(declared)
+    )
+
+
+def values_of(owner: object, column: Column) -> list[Any]:
+    """Return one column as plain Python values, one per run: texts for an enumeration, None where unknown."""
+    values: Any = getattr(owner, column.field)
+    if isinstance(values, tuple):
+        return [value.value for value in values]
+    plain: list[Any] = (values if column.component is None else values[:, column.component]).tolist()
+    return plain
+
+
+def documented(owner: type[_Owner]) -> type[_Owner]:
+    """Complete the docstring of a dataclass, which ends with its parameters, by the fields that declare columns."""
+    parameters: list[str] = []
+    attributes = ["", "Attributes", "----------"]
+    for field in fields(cast("Any", owner)):
+        declared: tuple[Column, ...] = field.metadata.get("columns", ())
+        if declared:
+            first = declared[0]
+            array = "masked array" if first.nullable else "tuple" if issubclass(first.kind, Enum) else "ndarray"
+            shape = "(B,)" if len(declared) == 1 else f"(B, {len(declared)})"
+            meaning = "; ".join(column.meaning for column in declared)
+            unit = f" Unit: {first.unit}." if first.unit else ""
+            lines = parameters if field.init else attributes
+            lines += [f"{field.name} : {array} of {first.kind.__name__}, shape {shape}", f"    {meaning}.{unit}"]
+    owner.__doc__ = "\n".join([inspect.getdoc(owner) or "", *parameters, *attributes])
+    return owner
