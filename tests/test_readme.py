@@ -39,13 +39,18 @@ def test_python_blocks_run(block: str, tmp_path: Path) -> None:
     assert own != published
 
 
-def test_there_is_one_example_of_python_and_one_of_the_command_line() -> None:
+def test_there_is_one_example_of_python_and_five_of_the_command_line() -> None:
     assert len(blocks("python")) == 1
-    assert len(blocks("console")) == 1
+    _, _, examples = blocks("sh")
+    activation, *lines = examples.splitlines()
+    assert activation == ". .venv/bin/activate"
+    commands = [line.split()[1] for line in lines]
+    assert commands == ["engage", "replay", "pareto", "multipoint", "reach", "pursuit"]
+    assert blocks("console") == []
 
 
 def test_two_commands_do_all_the_set_up() -> None:
-    assert blocks("sh") == [f"{command('experiment')}\n", f"{command('tests')}\n"]
+    assert blocks("sh")[:2] == [f"{command('experiment')}\n", f"{command('tests')}\n"]
 
 
 def test_ci_runs_the_test_command_word_for_word() -> None:

@@ -58,7 +58,10 @@ ELSEWHERE = {
 }
 """Lines in running text, which can have no comment above them, that are not run, and why."""
 
-SET_UP = r"(python3 -m venv \.venv|\.venv/bin/pip install -c constraints\.txt (\S+|-e \S+)|\.venv/bin/python -m pytest)"
+SET_UP = (
+    r"(python3 -m venv \.venv|\. \.venv/bin/activate|\.venv/bin/python -m pytest"
+    r"|\.venv/bin/pip install -c constraints\.txt (\S+|-e \S+))"
+)
 """What makes an environment and runs these tests. `.ci/run` does it word for word; here the names in it are checked."""
 
 _PROMPT = "$ "
