@@ -141,32 +141,28 @@ def width_mm(axes: Axes) -> float:
     return float(axes.get_position().width * figure.get_figwidth() * _MM_PER_INCH)
 
 
-def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
-    """Write a figure as NAME.pdf (vector) and NAME.png (200 dpi); the same figure gives the same bytes.
+def figure_bytes(figure: Figure) -> list[tuple[str, bytes]]:
+    """Return a figure as a vector PDF and a PNG of 200 dpi, each with its file ending.
 
-    Parameters
-    ----------
-    figure : Figure
-    folder : Path
-        Made if it is not there.
-    name : str
-        Without an ending.
-
-    Returns
-    -------
-    list of Path
-        The PDF, then the PNG.
+    The same figure gives the same bytes.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    pdf, png = folder / f"{name}.pdf", folder / f"{name}.png"
-    # Drawn in memory first: a figure on the disk is whole, or the one before.
-    options: list[tuple[Path, dict[str, Any]]] = [
-        (pdf, {"format": "pdf", "metadata": {"CreationDate": None}}),
-        (png, {"format": "png", "metadata": {"Software": None}, "dpi": PNG_DPI}),
+    options: list[tuple[str, dict[str, Any]]] = [
+        ("pdf", {"metadata": {"CreationDate": None}}),
+        ("png", {"metadata": {"Software": None}, "dpi": PNG_DPI}),
     ]
-    for file, option in options:
+    files = []
+    for kind, option in options:
         content = io.BytesIO()
         with style():
-            figure.savefig(content, **option)
-        write_file(file, content.getvalue(), overwrite=True)
-    return [pdf, png]
+            figure.savefig(content, format=kind, **option)
+        files.append((kind, content.getvalue()))
+    return files
+
+
+def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
+    """Write a figure as NAME.pdf and NAME.png into a folder, which is created if it does not exist."""
+    folder.mkdir(parents=True, exist_ok=True)
+    files = [(folder / f"{name}.{kind}", content) for kind, content in figure_bytes(figure)]
+    for file, content in files:
+        write_file(file, content, overwrite=True)
+    return [file for file, _ in files]

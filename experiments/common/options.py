@@ -9,10 +9,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from experiments.common.errors import InputError
+
 if TYPE_CHECKING:
     from sim import Scenario
 
 MOST_RUNS = 10_000_000
+
+
+def _page_path(path: Path | None) -> Path | None:
+    if path is not None and path.suffix != ".html":
+        raise InputError(f"--html: {path} must end in .html; for example --html page.html")
+    return path
+
 
 ScenarioName = Annotated[
     str,
@@ -21,7 +30,9 @@ ScenarioName = Annotated[
 ProblemName = Annotated[
     str, typer.Argument(metavar="[PROBLEM]", help="A built-in problem (see: infoset problems list), or a problem file.")
 ]
-Seed = Annotated[int, typer.Option("--seed", metavar="N", help="Root seed: the same seed draws the same engagements.")]
+Seed = Annotated[
+    int, typer.Option("--seed", metavar="N", min=0, help="Root seed. The same seed gives the same random numbers.")
+]
 StrategyName = Annotated[
     str | None, typer.Option("--strategy", metavar="NAME", help="Guidance strategy, in place of the scenario's.")
 ]
@@ -60,7 +71,12 @@ Csv = Annotated[
 ]
 Html = Annotated[
     Path | None,
-    typer.Option("--html", metavar="FILE.html", help="Write a page to play with: one file, for any browser, offline."),
+    typer.Option(
+        "--html",
+        metavar="FILE.html",
+        callback=_page_path,
+        help="Write an interactive page: one file that opens in any browser, offline.",
+    ),
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files, and write into a folder that has some.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress and no tables.")]
@@ -94,7 +110,6 @@ def scenario_with(
     InputError
         If the scenario is unsound, or there is no such name or number.
     """
-    from experiments.common.errors import InputError
     from experiments.interception.scenario_file import default_initial_set, load_scenario
     from guidance import TieRule, strategy_names
     from infoset import Model
@@ -139,8 +154,6 @@ def with_range_meter(scenario: Scenario, range_meter: bool | None) -> Scenario:
     InputError
         If it has none.
     """
-    from experiments.common.errors import InputError
-
     if range_meter and scenario.range_sensor is None:
         raise InputError(
             f"--range-meter: the scenario {scenario.name} has no [range_sensor]; add that table to its file, for "
@@ -170,7 +183,6 @@ def choice(option: str, name: str, valid: Sequence[str]) -> str:
     """
     if name in valid:
         return name
-    from experiments.common.errors import InputError
     from experiments.common.toml_values import nearest, shown
 
     guess = nearest(name, list(valid))
@@ -195,7 +207,6 @@ def chosen_strategies(names: str | None) -> list[str]:
     InputError
         If there is no such strategy, or one is named twice.
     """
-    from experiments.common.errors import InputError
     from guidance import strategy_names
 
     valid = strategy_names()
@@ -231,8 +242,6 @@ def whole_number(option: str, value: int, least: int, greatest: int | None, exam
     """
     if value >= least and (greatest is None or value <= greatest):
         return value
-    from experiments.common.errors import InputError
-
     limits = f"at least {least}" if greatest is None else f"from {least} to {greatest}"
     digits = str(value) if abs(value) < 10**20 else "a number of more than 20 digits"
     raise InputError(f"{option}: must be {limits}, found {digits}; for example {option} {example}")

@@ -15,7 +15,10 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from experiments.common.errors import InputError
+from experiments.common.errors import InputError, on_a_screen
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 if TYPE_CHECKING:
     from sim import Results
@@ -79,6 +82,107 @@ def checked_destinations(
         for each in reversed(made):
             with contextlib.suppress(OSError):
                 each.rmdir()  # only what is still empty goes
+
+
+class Output:
+    """The files of one command: written whole or not at all, and listed when the command ends.
+
+    Parameters
+    ----------
+    folder : Path or None
+        The folder of ``--out``.
+    files : mapping of str to Path
+        Single files, by the option that names them; the path ``-`` is stdout.
+    overwrite : bool
+        Whether existing files are replaced.
+    """
+
+    def __init__(self, folder: Path | None, files: Mapping[str, Path], overwrite: bool) -> None:
+        self.folder = folder
+        self.files = files
+        self.written: list[Path] = []
+        self._overwrite = overwrite
+
+    @property
+    def stdout_taken(self) -> bool:
+        """Whether a file is printed on stdout, so that tables go to stderr."""
+        return any(str(file) == STDOUT for file in self.files.values())
+
+    def wants(self, option: str) -> bool:
+        """Whether the file of an option, or the folder, is written."""
+        return self.folder is not None or option in self.files
+
+    def save(self, name: str, content: str | bytes, option: str | None = None) -> None:
+        """Write a file of the folder under its name, and the file of an option with the same content."""
+        if self.folder is not None:
+            self._write(self.folder / name, content)
+        if option is not None:
+            self.deliver(option, content)
+
+    def deliver(self, option: str, content: str | bytes) -> None:
+        """Write the file of an option, or print it on stdout, if the option was given."""
+        file = self.files.get(option)
+        if file is None:
+            return
+        if str(file) == STDOUT:
+            typer.echo(content, nl=False)
+        else:
+            self._write(file, content)
+
+    def figure(self, name: str, figure: Figure) -> None:
+        """Write a figure into the folder, as PDF and PNG."""
+        from experiments.common.figure_style import figure_bytes
+
+        if self.folder is not None:
+            for kind, content in figure_bytes(figure):
+                self._write(self.folder / f"{name}.{kind}", content)
+
+    def _write(self, file: Path, content: str | bytes) -> None:
+        write_file(file, content, overwrite=self._overwrite)
+        self.written.append(file)
+
+
+@contextlib.contextmanager
+def output(
+    *,
+    folder: Path | None = None,
+    names: Sequence[str] = (),
+    files: Mapping[str, Path | None] | None = None,
+    overwrite: bool = False,
+    quiet: bool = False,
+) -> Iterator[Output]:
+    """Check every file that a command will write before the work begins, and list them on stderr at the end.
+
+    Parameters
+    ----------
+    folder : Path or None
+        The folder to fill. It is created; if the work fails, it is removed again as long as it is empty.
+    names : sequence of str
+        Names of the files that will be written into the folder.
+    files : mapping of str to Path or None
+        Single files, by the option that names them. The path ``-`` is stdout, which only one may be.
+    overwrite : bool
+        Whether the folder may contain files, and files be replaced.
+    quiet : bool
+        Whether the list of written files is left out.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written, or would replace an existing one.
+    """
+    with checked_destinations(folder=folder, names=names, files=files, overwrite=overwrite):
+        opened = Output(folder, {option: path for option, path in (files or {}).items() if path}, overwrite)
+        yield opened
+    if opened.written and not quiet:
+        typer.echo(on_a_screen("\n".join(_listed(opened.written))), err=True)
+
+
+def _listed(files: Sequence[Path]) -> Iterator[str]:
+    """Return a line for each folder, with the files written into it."""
+    for folder in dict.fromkeys(file.parent for file in files):
+        names = ", ".join(file.name for file in files if file.parent == folder)
+        yield f"wrote {names}" + (f" in {folder}" if folder != Path() else "")
 
 
 def check_file(file: Path, *, overwrite: bool = False) -> None:
