@@ -1,4 +1,4 @@
-"""Kernels of the motion about a circular orbit, axes of Hill: each fills one matrix an angle."""
+"""Kernels of the motion about a circular orbit, axes of Hill: each fills one matrix for each duration."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 SERIES_BELOW_RAD = 1.0
 QUADRATURE_BELOW_RAD = 2.0
-NODES, WEIGHTS = (each.astype(np.float64) for each in np.polynomial.legendre.leggauss(12))
+NODES, WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.leggauss(12))
 
 
 @compiled

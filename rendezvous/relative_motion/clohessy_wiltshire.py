@@ -9,26 +9,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from rendezvous.relative_motion._circular import NODES, WEIGHTS, fill_gramians, fill_held_inputs, fill_transitions
 from rendezvous.relative_motion.frames import HILL, Frame
-from rendezvous.relative_motion.linear_motion import (
-    Segment,
-    checked_durations,
-    checked_frame,
-    checked_rate,
-    even_breaks,
-    velocity_input,
-)
+from rendezvous.relative_motion.linear_motion import LinearMotion, checked_durations, checked_rate, even_breaks
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class ClohessyWiltshire:
+class ClohessyWiltshire(LinearMotion):
     """Relative motion about a circular orbit.
 
     Parameters
     ----------
     rate_rad_s : float
-        Mean motion of the reference orbit.
+        Mean motion n of the reference orbit.
     frame : Frame
         Of states and controls; position before velocity.
 
@@ -48,7 +41,7 @@ class ClohessyWiltshire:
 
     def __post_init__(self) -> None:
         checked_rate(self.rate_rad_s)
-        checked_frame(self.frame)
+        super().__post_init__()
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A, the same at all times, shape (..., 6, 6)."""
@@ -59,14 +52,6 @@ class ClohessyWiltshire:
         matrix[..., 4, 3], matrix[..., 5, 2] = -2.0 * n, -n * n
         return HILL.matrices_to(self.frame, matrix)
 
-    def input_map(self, time_s: ArrayLike) -> Floats:
-        """B, shape (..., 6, 3)."""
-        return velocity_input(np.shape(time_s))
-
-    def forcing(self, time_s: ArrayLike) -> Floats:
-        """Zero, shape (..., 6)."""
-        return np.zeros((*np.shape(time_s), 6))
-
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
         durations = np.asarray(end_s, dtype=np.float64) - np.asarray(start_s, dtype=np.float64)
@@ -75,34 +60,25 @@ class ClohessyWiltshire:
         return HILL.matrices_to(self.frame, matrices.reshape(*durations.shape, 6, 6))
 
     def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Gramian, int Phi(end, t) B B' Phi(end, t)' dt from start to end, shape (..., 6, 6); end >= start.
+        """Gramian, shape (..., 6, 6); end >= start.
 
         Notes
         -----
-        Below two radians by Gauss and Legendre's rule, where the closed forms cancel, beyond by these; each entry is
-        within 1e-14 of its own size up to 50 radians.
+        Below two radians, where the closed forms cancel, by Gauss and Legendre's rule, beyond by the closed forms. Each
+        entry is within 1e-14 of its size up to 50 radians.
         """
         durations = checked_durations(start_s, end_s)
         matrices = np.zeros((durations.size, 6, 6))
         fill_gramians(self.rate_rad_s, durations.ravel(), NODES, WEIGHTS, matrices)
         return HILL.matrices_to(self.frame, matrices.reshape(*durations.shape, 6, 6))
 
-    def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> Segment:
-        """Transition, Gramian and drift at once; end >= start."""
-        return Segment(self.transition(start_s, end_s), self.gramian(start_s, end_s), self.drift(start_s, end_s))
-
     def held_input(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Effect at the end of a unit control held from the start, int Phi(end, t) B dt, shape (..., 6, 3)."""
+        """Effect at the end of a unit control held from the start, shape (..., 6, 3)."""
         durations = checked_durations(start_s, end_s)
         matrices = np.zeros((durations.size, 6, 3))
         fill_held_inputs(self.rate_rad_s, durations.ravel(), matrices)
-        conversion, turn = HILL.conversion_to(self.frame), self.frame.rotation @ HILL.rotation.T
-        return np.asarray(conversion @ matrices.reshape(*durations.shape, 6, 3) @ turn.T)
-
-    def drift(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Zero, shape (..., 6)."""
-        return np.zeros((*np.broadcast_shapes(np.shape(start_s), np.shape(end_s)), 6))
+        return HILL.effects_to(self.frame, matrices.reshape(*durations.shape, 6, 3))
 
     def breaks(self, start_s: float, end_s: float) -> Floats:
-        """Times from start to end, both among them, a radian apart at most."""
+        """Times from start to end, inclusive, a radian apart at most."""
         return even_breaks(start_s, end_s, self.rate_rad_s * (end_s - start_s))

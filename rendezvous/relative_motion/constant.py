@@ -9,19 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import expm
 
 from rendezvous.relative_motion.frames import HILL, Frame
-from rendezvous.relative_motion.linear_motion import (
-    Segment,
-    checked_durations,
-    checked_frame,
-    even_breaks,
-    velocity_input,
-)
+from rendezvous.relative_motion.linear_motion import LinearMotion, checked_durations, even_breaks
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class ConstantMotion:
+class ConstantMotion(LinearMotion):
     """x' = A x + (0, u)'.
 
     Parameters
@@ -38,8 +32,7 @@ class ConstantMotion:
 
     Notes
     -----
-    Van Loan's block exponential, balanced: velocities are multiplied by the duration, so that all blocks are of one
-    size. 12 x 12 an interval.
+    Van Loan's block exponential, 12 x 12 for each interval, in states divided by (T, T, T, 1, 1, 1) to balance it.
     """
 
     matrix: Floats
@@ -48,19 +41,11 @@ class ConstantMotion:
     def __post_init__(self) -> None:
         if np.shape(self.matrix) != (6, 6) or not np.isfinite(self.matrix).all():
             raise ValueError("A must be a finite matrix of shape (6, 6)")
-        checked_frame(self.frame)
+        super().__post_init__()
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A, the same at all times, shape (..., 6, 6)."""
         return np.broadcast_to(self.matrix, (*np.shape(time_s), 6, 6))
-
-    def input_map(self, time_s: ArrayLike) -> Floats:
-        """B, shape (..., 6, 3)."""
-        return velocity_input(np.shape(time_s))
-
-    def forcing(self, time_s: ArrayLike) -> Floats:
-        """Zero, shape (..., 6)."""
-        return np.zeros((*np.shape(time_s), 6))
 
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
@@ -69,7 +54,7 @@ class ConstantMotion:
         return np.asarray(expm(self._scaled(durations, scale)) * (scale[..., :, None] / scale[..., None, :]))
 
     def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Gramian, int Phi(end, t) B B' Phi(end, t)' dt from start to end, shape (..., 6, 6); end >= start."""
+        """Gramian, shape (..., 6, 6); end >= start."""
         durations = checked_durations(start_s, end_s)
         scale = _scales(durations)
         scaled = self._scaled(durations, scale)
@@ -83,12 +68,8 @@ class ConstantMotion:
         factor = durations[..., None, None] * scale[..., :, None] * scale[..., None, :]
         return np.asarray(unit * factor)
 
-    def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> Segment:
-        """Transition, Gramian and drift at once; end >= start."""
-        return Segment(self.transition(start_s, end_s), self.gramian(start_s, end_s), self.drift(start_s, end_s))
-
     def held_input(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Effect at the end of a unit control held from the start, int Phi(end, t) B dt, shape (..., 6, 3)."""
+        """Effect at the end of a unit control held from the start, shape (..., 6, 3)."""
         durations = checked_durations(start_s, end_s)
         scale = _scales(durations)
         block = np.zeros((*durations.shape, 9, 9))
@@ -96,12 +77,8 @@ class ConstantMotion:
         block[..., (3, 4, 5), (6, 7, 8)] = 1.0
         return np.asarray(expm(block)[..., :6, 6:] * scale[..., :, None] * durations[..., None, None])
 
-    def drift(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Zero, shape (..., 6)."""
-        return np.zeros((*np.broadcast_shapes(np.shape(start_s), np.shape(end_s)), 6))
-
     def breaks(self, start_s: float, end_s: float) -> Floats:
-        """Times from start to end, both among them, a radian of the fastest eigenvalue apart at most."""
+        """Times from start to end, inclusive, a radian of the fastest eigenvalue apart at most."""
         rate = float(np.abs(np.linalg.eigvals(self.matrix)).max())
         return even_breaks(start_s, end_s, rate * (end_s - start_s))
 
@@ -111,7 +88,7 @@ class ConstantMotion:
 
 
 def _scales(durations: Floats) -> Floats:
-    """(T, T, T, 1, 1, 1) an interval; an empty one is as good as a second long."""
+    """(T, T, T, 1, 1, 1) of each interval; T = 1 s for an empty one."""
     scale = np.ones((*durations.shape, 6))
     scale[..., :3] = np.where(durations == 0.0, 1.0, np.abs(durations))[..., None]
     return scale

@@ -1,4 +1,4 @@
-"""The reference orbit of elliptic relative motion: where it is at a time, and A(t) about it."""
+"""The reference orbit of elliptic relative motion: its anomalies at a time, and A(t) about it."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ class EllipticOrbit:
     Parameters
     ----------
     mean_motion_rad_s : float
+        n.
     eccentricity : float
         0 <= e < 1.
     true_anomaly_rad : float
@@ -53,20 +54,7 @@ class EllipticOrbit:
         gravitational_parameter_m3_s2: float,
         true_anomaly_rad: float = 0.0,
     ) -> EllipticOrbit:
-        """Return the orbit of a semi-major axis.
-
-        Parameters
-        ----------
-        semi_major_axis_m : float
-        eccentricity : float
-        gravitational_parameter_m3_s2 : float
-        true_anomaly_rad : float
-            At t = 0.
-
-        Returns
-        -------
-        EllipticOrbit
-        """
+        """Return the orbit of a semi-major axis and an eccentricity; `true_anomaly_rad` is that at t = 0."""
         rate = float(np.sqrt(gravitational_parameter_m3_s2 / semi_major_axis_m**3))
         return cls(rate, eccentricity, true_anomaly_rad)
 
@@ -79,16 +67,7 @@ class EllipticOrbit:
         return float(self.mean_motion_rad_s / (1.0 - self.eccentricity**2) ** 1.5)
 
     def eccentric_anomaly(self, time_s: ArrayLike) -> Floats:
-        """Return the eccentric anomaly, which grows without end, rad.
-
-        Parameters
-        ----------
-        time_s : array_like
-
-        Returns
-        -------
-        ndarray
-        """
+        """Return the eccentric anomaly at times, rad; it increases without bound."""
         start = self._eccentric_of_true(self.true_anomaly_rad)
         mean = start - self.eccentricity * np.sin(start) + self.mean_motion_rad_s * np.asarray(time_s, dtype=np.float64)
         return eccentric_of_mean(mean, self.eccentricity)
@@ -102,16 +81,7 @@ class EllipticOrbit:
         )
 
     def true_anomaly(self, time_s: ArrayLike) -> Floats:
-        """Return the true anomaly, which grows without end, rad.
-
-        Parameters
-        ----------
-        time_s : array_like
-
-        Returns
-        -------
-        ndarray
-        """
+        """Return the true anomaly at times, rad; it increases without bound."""
         eccentric, e = self.eccentric_anomaly(time_s), self.eccentricity
         fraction = e / (1.0 + np.sqrt(1.0 - e * e))
         return np.asarray(
@@ -125,15 +95,7 @@ class EllipticOrbit:
         )
 
     def dynamics(self, time_s: ArrayLike) -> Floats:
-        """Return A(t) in axes of Hill, for states in m and m/s.
-
-        Parameters
-        ----------
-        time_s : array_like
-
-        Returns
-        -------
-        ndarray, shape (..., 6, 6)
+        """Return A(t) in axes of Hill, shape (..., 6, 6), for states in m and m/s.
 
         Notes
         -----
@@ -150,17 +112,7 @@ class EllipticOrbit:
         return matrix
 
     def frozen(self, time_s: float, frame: Frame = HILL) -> ConstantMotion:
-        """Return the motion with A(t) as it is at one time, for ever.
-
-        Parameters
-        ----------
-        time_s : float
-        frame : Frame
-            Of states and controls; position before velocity.
-
-        Returns
-        -------
-        ConstantMotion
+        """Return the motion whose constant matrix is A at a time; `frame` has position before velocity.
 
         Raises
         ------
@@ -176,32 +128,20 @@ class EllipticOrbit:
 
 
 def eccentric_of_mean(mean_rad: ArrayLike, eccentricity: ArrayLike) -> Floats:
-    """Solve Kepler's equation E - e sin E = M.
-
-    Parameters
-    ----------
-    mean_rad : array_like
-        M; E grows with it without end.
-    eccentricity : array_like
-        0 <= e < 1.
-
-    Returns
-    -------
-    ndarray
-        E, rad.
+    """Solve Kepler's equation E - e sin E = M for E, rad; E increases with M without bound.
 
     Notes
     -----
-    Newton's method from above, where the function is convex: it falls to the root and cannot overshoot.
+    Newton's method from above, where the function is convex: it decreases to the root and cannot overshoot.
     """
     mean, e = np.asarray(mean_rad, dtype=np.float64), np.asarray(eccentricity, dtype=np.float64)
     turns = 2.0 * np.pi * np.round(mean / (2.0 * np.pi))
     sign, rest = np.where(mean < turns, -1.0, 1.0), np.abs(mean - turns)
-    found = np.minimum(np.minimum(rest + e, rest / (1.0 - e)), np.pi)
+    eccentric = np.minimum(np.minimum(rest + e, rest / (1.0 - e)), np.pi)
     for _ in range(_MOST_STEPS):
-        excess = found - e * np.sin(found) - rest
-        step = excess / (1.0 - e * np.cos(found))
-        found = np.maximum(found - step, 0.0)
-        if np.all(np.abs(step) <= 4e-16 * (1.0 + found)):
+        excess = eccentric - e * np.sin(eccentric) - rest
+        step = excess / (1.0 - e * np.cos(eccentric))
+        eccentric = np.maximum(eccentric - step, 0.0)
+        if np.all(np.abs(step) <= 4e-16 * (1.0 + eccentric)):
             break
-    return np.asarray(turns + sign * found)
+    return np.asarray(turns + sign * eccentric)

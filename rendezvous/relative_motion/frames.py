@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 
 class Axis(Enum):
-    """A direction at the origin of an orbital frame, as its components along (radial, along the motion, normal)."""
+    """A direction at the origin of an orbital frame: its components along (radial, along the motion, normal)."""
 
     RADIAL_OUTWARD = (1, 0, 0)
     RADIAL_INWARD = (-1, 0, 0)
@@ -37,8 +37,9 @@ class Frame:
     Parameters
     ----------
     name : str
+        In messages.
     x, y, z : Axis
-        What the axes point along.
+        Directions of the axes.
     order : StateOrder
         (x, y, z, vx, vy, vz), or (x, vx, y, vy, z, vz).
 
@@ -66,63 +67,26 @@ class Frame:
         return np.array([self.x.value, self.y.value, self.z.value], dtype=np.float64)
 
     def conversion_to(self, other: Frame) -> Floats:
-        """Return the matrix that turns a state of this frame into the same state of another.
-
-        Parameters
-        ----------
-        other : Frame
-
-        Returns
-        -------
-        ndarray, shape (6, 6)
-            A signed permutation, hence exact and orthogonal. Not to be written to.
-        """
+        """Return the read-only signed permutation, shape (6, 6), that converts states to the frame `other`."""
         return _conversion(self, other)
 
     def states_to(self, other: Frame, states: Floats) -> Floats:
-        """Convert states to another frame, exactly.
-
-        Parameters
-        ----------
-        other : Frame
-        states : ndarray, shape (..., 6)
-            m and m/s, in this frame.
-
-        Returns
-        -------
-        ndarray, shape (..., 6)
-        """
+        """Convert `states` (m, m/s), shape (..., 6), to the frame `other`, exactly."""
         return np.asarray(states @ _conversion(self, other).T)
 
     def matrices_to(self, other: Frame, matrices: Floats) -> Floats:
-        """Convert matrices that map states to states, or Gramians, to another frame, exactly.
-
-        Parameters
-        ----------
-        other : Frame
-        matrices : ndarray, shape (..., 6, 6)
-
-        Returns
-        -------
-        ndarray, shape (..., 6, 6)
-        """
+        """Convert `matrices`, shape (..., 6, 6), of maps from states to states or Gramians, to the frame `other`."""
         if other == self:
             return matrices
         conversion = _conversion(self, other)
         return np.asarray(conversion @ matrices @ conversion.T)
 
+    def effects_to(self, other: Frame, matrices: Floats) -> Floats:
+        """Convert `matrices`, shape (..., 6, 3), that map controls to states, to the frame `other`, exactly."""
+        return np.asarray(_conversion(self, other) @ matrices @ (other.rotation @ self.rotation.T).T)
+
     def vectors_to(self, other: Frame, vectors: Floats) -> Floats:
-        """Convert positions, velocities or accelerations to another frame, exactly.
-
-        Parameters
-        ----------
-        other : Frame
-        vectors : ndarray, shape (..., 3)
-
-        Returns
-        -------
-        ndarray, shape (..., 3)
-        """
+        """Convert positions, velocities or accelerations `vectors`, shape (..., 3), to the frame `other`, exactly."""
         return np.asarray(vectors @ (other.rotation @ self.rotation.T).T)
 
 

@@ -1,14 +1,14 @@
-"""What every linear relative motion can tell: A(t), the transition matrix, the Gramian, what a held control does."""
+"""The base of linear relative motions: A(t), transition matrix, Gramian, effect of a held control."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rendezvous.relative_motion.frames import Frame, StateOrder
+from rendezvous.relative_motion.frames import HILL, Frame, StateOrder
 
 Floats = NDArray[np.float64]
 
@@ -17,7 +17,7 @@ MOST_PANELS = 200_000
 
 @dataclass(frozen=True)
 class Segment:
-    """What happens between two times: x(end) = transition x(start) + drift + what the control does.
+    """Motion between two times: x(end) = transition x(start) + drift + the effect of the control.
 
     Parameters
     ----------
@@ -32,56 +32,64 @@ class Segment:
     drift: Floats
 
 
-class LinearMotion(Protocol):
-    """x' = A(t) x + B(t) u + w(t), x = (position, velocity).
+class LinearMotion(ABC):
+    """x' = A(t) x + B(t) u + w(t), x = (position, velocity) in a frame; by default B = (0, 1)' and w = 0.
 
     Times are scalars or arrays, in seconds, broadcast against each other; the results have their shape in front.
+
+    Raises
+    ------
+    ValueError
+        If the frame interleaves positions and velocities.
     """
 
-    @property
-    def frame(self) -> Frame:
-        """The frame that states and controls are in."""
+    frame: Frame = HILL
 
+    def __post_init__(self) -> None:
+        if self.frame.order is not StateOrder.POSITION_THEN_VELOCITY:
+            raise ValueError(f"frame {self.frame.name}: motions have position before velocity; convert their results")
+
+    @abstractmethod
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A(t), shape (..., 6, 6)."""
 
-    def input_map(self, time_s: ArrayLike) -> Floats:
-        """B(t), shape (..., 6, 3)."""
-
-    def forcing(self, time_s: ArrayLike) -> Floats:
-        """w(t), shape (..., 6)."""
-
+    @abstractmethod
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
 
+    @abstractmethod
     def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Gramian, int Phi(end, t) B B' Phi(end, t)' dt from start to end, shape (..., 6, 6); end >= start."""
 
-    def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> Segment:
-        """Transition, Gramian and drift at once; end >= start."""
-
+    @abstractmethod
     def held_input(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Effect at the end of a unit control held from the start, int Phi(end, t) B dt, shape (..., 6, 3)."""
 
-    def drift(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Where the drift alone leads from the origin, int Phi(end, t) w dt, shape (..., 6)."""
-
+    @abstractmethod
     def breaks(self, start_s: float, end_s: float) -> Floats:
-        """Times from start to end, both among them, between which the motion turns by about a radian at most."""
+        """Times from start to end, inclusive, between which the motion turns by about a radian at most."""
+
+    def input_map(self, time_s: ArrayLike) -> Floats:
+        """B(t), shape (..., 6, 3)."""
+        matrix = np.zeros((*np.shape(time_s), 6, 3))
+        matrix[..., 3, 0] = matrix[..., 4, 1] = matrix[..., 5, 2] = 1.0
+        return matrix
+
+    def forcing(self, time_s: ArrayLike) -> Floats:
+        """w(t), shape (..., 6)."""
+        return np.zeros((*np.shape(time_s), 6))
+
+    def drift(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
+        """Effect of w alone, int Phi(end, t) w dt, shape (..., 6)."""
+        return np.zeros((*np.broadcast_shapes(np.shape(start_s), np.shape(end_s)), 6))
+
+    def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> Segment:
+        """Transition, Gramian and drift together; end >= start."""
+        return Segment(self.transition(start_s, end_s), self.gramian(start_s, end_s), self.drift(start_s, end_s))
 
 
 def checked_durations(start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-    """Return end - start.
-
-    Parameters
-    ----------
-    start_s, end_s : array_like
-        Times, s.
-
-    Returns
-    -------
-    ndarray
-        Durations, s, none negative.
+    """Return end - start, s, none negative.
 
     Raises
     ------
@@ -97,11 +105,7 @@ def checked_durations(start_s: ArrayLike, end_s: ArrayLike) -> Floats:
 
 
 def checked_rate(rate_rad_s: float) -> None:
-    """Refuse an orbit rate that is not positive and finite.
-
-    Parameters
-    ----------
-    rate_rad_s : float
+    """Check an orbit rate.
 
     Raises
     ------
@@ -112,35 +116,8 @@ def checked_rate(rate_rad_s: float) -> None:
         raise ValueError(f"the orbit rate must be positive and finite, found {rate_rad_s!r} rad/s")
 
 
-def checked_frame(frame: Frame) -> None:
-    """Refuse a frame whose states have no position before velocity.
-
-    Parameters
-    ----------
-    frame : Frame
-
-    Raises
-    ------
-    ValueError
-        If the frame interleaves positions and velocities.
-    """
-    if frame.order is not StateOrder.POSITION_THEN_VELOCITY:
-        raise ValueError(f"frame {frame.name}: motions have position before velocity; convert their results")
-
-
 def even_breaks(start_s: float, end_s: float, radians: float) -> Floats:
-    """Return times that divide an interval into panels of equal length, of at most one radian each.
-
-    Parameters
-    ----------
-    start_s, end_s : float
-    radians : float
-        The angle by which the motion turns from start to end, rad.
-
-    Returns
-    -------
-    ndarray, shape (P + 1,)
-        s.
+    """Return times, s, of panels of equal length and at most one radian, for a motion that turns by `radians` in all.
 
     Raises
     ------
@@ -153,20 +130,3 @@ def even_breaks(start_s: float, end_s: float, radians: float) -> Floats:
             "be divided into panels; check the units"
         )
     return np.linspace(start_s, end_s, max(1, int(np.ceil(radians))) + 1)
-
-
-def velocity_input(shape: tuple[int, ...]) -> Floats:
-    """Return B = (0, 1)', the acceleration that acts on the velocity.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        What stands in front.
-
-    Returns
-    -------
-    ndarray, shape (*shape, 6, 3)
-    """
-    found = np.zeros((*shape, 6, 3))
-    found[..., 3, 0] = found[..., 4, 1] = found[..., 5, 2] = 1.0
-    return found

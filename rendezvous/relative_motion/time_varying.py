@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rendezvous.relative_motion.frames import HILL, Frame
-from rendezvous.relative_motion.linear_motion import Segment, checked_durations, checked_frame, velocity_input
+from rendezvous.relative_motion.linear_motion import LinearMotion, Segment, checked_durations
 
 Floats = NDArray[np.float64]
 OfTime = Callable[[Floats], Floats]
@@ -23,17 +23,14 @@ MOST_BREAKS = 200_000
 
 
 @dataclass(frozen=True)
-class _Solution:
-    """What happens from each start to each end, one a row."""
+class _Solution(Segment):
+    """Segments, and the effect of a held control, shape (..., 6, 3)."""
 
-    transition: Floats
-    gramian: Floats
     held: Floats
-    drift: Floats
 
 
 @dataclass(frozen=True, eq=False)
-class TimeVaryingMotion:
+class TimeVaryingMotion(LinearMotion):
     """x' = A(t) x + B(t) u + w(t).
 
     Parameters
@@ -57,7 +54,7 @@ class TimeVaryingMotion:
     -----
     The adjoint Psi' = -A' Psi, Psi(end) = 1, is collocated backwards at 8 Gauss points a panel (order 16); Phi(end, t)
     = Psi(t)' at the nodes gives the Gramian, the held control and the drift as sums of positive weights. Panels are
-    doubled until two answers agree to 2e-13, or until only rounding parts them. A panel is a 48 x 48 system.
+    doubled until two solutions agree to 2e-13, or differ by rounding only. A panel is a 48 x 48 system.
     """
 
     matrix_at: OfTime
@@ -65,61 +62,47 @@ class TimeVaryingMotion:
     input_at: OfTime | None = None
     drift_at: OfTime | None = None
 
-    def __post_init__(self) -> None:
-        checked_frame(self.frame)
-
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A(t), shape (..., 6, 6)."""
         return _at(self.matrix_at, time_s)
 
     def input_map(self, time_s: ArrayLike) -> Floats:
         """B(t), shape (..., 6, 3)."""
-        return velocity_input(np.shape(time_s)) if self.input_at is None else _at(self.input_at, time_s)
+        return super().input_map(time_s) if self.input_at is None else _at(self.input_at, time_s)
 
     def forcing(self, time_s: ArrayLike) -> Floats:
         """w(t), shape (..., 6)."""
-        return np.zeros((*np.shape(time_s), 6)) if self.drift_at is None else _at(self.drift_at, time_s)
+        return super().forcing(time_s) if self.drift_at is None else _at(self.drift_at, time_s)
 
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
         return self._solved(start_s, end_s).transition
 
     def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Gramian, int Phi(end, t) B B' Phi(end, t)' dt from start to end, shape (..., 6, 6); end >= start."""
+        """Gramian, shape (..., 6, 6); end >= start."""
         checked_durations(start_s, end_s)
         return self._solved(start_s, end_s).gramian
 
     def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> Segment:
-        """Transition, Gramian and drift at once; end >= start."""
+        """Transition, Gramian and drift together; end >= start."""
         checked_durations(start_s, end_s)
-        found = self._solved(start_s, end_s)
-        return Segment(found.transition, found.gramian, found.drift)
+        return self._solved(start_s, end_s)
 
     def short_segment(self, start_s: Floats, end_s: Floats) -> Segment:
-        """Transition, Gramian and drift over intervals known to be well under a radian: one panel, unchecked.
-
-        Parameters
-        ----------
-        start_s, end_s : ndarray, shape (k,)
-
-        Returns
-        -------
-        Segment
-        """
-        found = _collocated(self, start_s, end_s, 1)
-        return Segment(found.transition, found.gramian, found.drift)
+        """Transition, Gramian and drift over k intervals well under a radian: one panel, unchecked."""
+        return _collocated(self, start_s, end_s, 1)
 
     def held_input(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Effect at the end of a unit control held from the start, int Phi(end, t) B dt, shape (..., 6, 3)."""
+        """Effect at the end of a unit control held from the start, shape (..., 6, 3)."""
         checked_durations(start_s, end_s)
         return self._solved(start_s, end_s).held
 
     def drift(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Where the drift alone leads from the origin, int Phi(end, t) w dt, shape (..., 6)."""
+        """Effect of w alone, int Phi(end, t) w dt, shape (..., 6)."""
         return self._solved(start_s, end_s).drift
 
     def breaks(self, start_s: float, end_s: float) -> Floats:
-        """Times from start to end, both among them, a radian of the fastest motion seen in between apart at most.
+        """Times from start to end, inclusive, a radian of the fastest motion seen in between apart at most.
 
         Notes
         -----
@@ -131,12 +114,12 @@ class TimeVaryingMotion:
             If A(t) is not finite, or there are more than 200 000 panels.
         """
         starts, ends = np.array([start_s]), np.array([end_s])
-        places = _gauss_collocation()[0]
+        nodes = _gauss_collocation()[0]
         settled = [np.array([start_s, end_s])]
         while len(starts):
             if len(starts) > MOST_BREAKS:
                 raise ValueError(f"A(t) turns too often from {start_s:g} s to {end_s:g} s; check the units")
-            times = starts[:, None] + (ends - starts)[:, None] * places
+            times = starts[:, None] + (ends - starts)[:, None] * nodes
             long = (_rates(self.dynamics(times)).max(axis=1) * (ends - starts) > 1.0) & (ends > starts)
             settled.append(ends[~long])
             middles = 0.5 * (starts[long] + ends[long])
@@ -147,17 +130,17 @@ class TimeVaryingMotion:
         starts, ends = np.broadcast_arrays(np.asarray(start_s, dtype=np.float64), np.asarray(end_s, dtype=np.float64))
         if not (np.isfinite(starts).all() and np.isfinite(ends).all()):
             raise ValueError("a time is not finite")
-        found, shape = _refined(self, starts.ravel(), ends.ravel()), starts.shape
+        solution, shape = _refined(self, starts.ravel(), ends.ravel()), starts.shape
         return _Solution(
-            found.transition.reshape(*shape, 6, 6),
-            found.gramian.reshape(*shape, 6, 6),
-            found.held.reshape(*shape, 6, 3),
-            found.drift.reshape(*shape, 6),
+            *(
+                part.reshape(*shape, *part.shape[1:])
+                for part in (solution.transition, solution.gramian, solution.drift, solution.held)
+            )
         )
 
 
 def _refined(motion: TimeVaryingMotion, starts: Floats, ends: Floats) -> _Solution:
-    """Double the panels until two answers agree, or differ by rounding alone."""
+    """Double the panels until two solutions agree, or differ by rounding only."""
     panels = _first_panels(motion, starts, ends)
     coarse, apart = _collocated(motion, starts, ends, panels), np.inf
     while 2 * panels <= MOST_PANELS:
@@ -172,12 +155,12 @@ def _refined(motion: TimeVaryingMotion, starts: Floats, ends: Floats) -> _Soluti
 
 def _at(function: OfTime, time_s: ArrayLike) -> Floats:
     times = np.asarray(time_s, dtype=np.float64)
-    found = np.asarray(function(times.ravel()), dtype=np.float64)
-    return found.reshape(*times.shape, *found.shape[1:])
+    values = np.asarray(function(times.ravel()), dtype=np.float64)
+    return values.reshape(*times.shape, *values.shape[1:])
 
 
 def _first_panels(motion: TimeVaryingMotion, starts: Floats, ends: Floats) -> int:
-    """A panel a radian of the fastest motion seen at the ends and the middle."""
+    """One panel for each radian of the fastest motion at the ends and the middle."""
     if not len(starts):
         return 1
     matrices = motion.dynamics(np.stack([starts, 0.5 * (starts + ends), ends]))
@@ -186,7 +169,7 @@ def _first_panels(motion: TimeVaryingMotion, starts: Floats, ends: Floats) -> in
 
 
 def _rates(matrices: Floats) -> Floats:
-    """How fast motions of matrices A, shape (..., 6, 6), turn, rad/s, shape (...)."""
+    """Rates, rad/s, shape (...), at which motions of matrices A, shape (..., 6, 6), turn."""
     if not np.isfinite(matrices).all():
         raise ValueError("A(t) is not finite")
     gravity = np.sqrt(np.abs(matrices[..., 3:, :3]).sum(axis=-1).max(axis=-1))
@@ -244,8 +227,8 @@ def _collocated(motion: TimeVaryingMotion, starts: Floats, ends: Floats, panels:
     return _Solution(
         power * (scale[:, :, None] / scale[:, None, :]),
         gramian * outer * width[:, None, None],
-        held * scale[:, :, None] * width[:, None, None],
         drift * scale * width[:, None],
+        held * scale[:, :, None] * width[:, None, None],
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,28 +10,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from rendezvous.relative_motion.elliptic_orbit import EllipticOrbit
 from rendezvous.relative_motion.frames import HILL, Frame
-from rendezvous.relative_motion.linear_motion import (
-    Segment,
-    checked_durations,
-    checked_frame,
-    even_breaks,
-    velocity_input,
-)
+from rendezvous.relative_motion.linear_motion import LinearMotion, checked_durations, even_breaks
 from rendezvous.relative_motion.time_varying import TimeVaryingMotion
 
 Floats = NDArray[np.float64]
+_OfIntervals = Callable[[Floats, Floats], Floats]
 
 SHORT_RAD = 0.1
-_NODES, _WEIGHTS = (each.astype(np.float64) for each in np.polynomial.legendre.leggauss(20))
+_NODES, _WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.leggauss(20))
 
 
 @dataclass(frozen=True)
-class TschaunerHempel:
+class TschaunerHempel(LinearMotion):
     """Relative motion about an elliptic orbit.
 
     Parameters
     ----------
     orbit : EllipticOrbit
+        The reference orbit.
     frame : Frame
         Of states and controls; position before velocity.
 
@@ -48,20 +45,9 @@ class TschaunerHempel:
     orbit: EllipticOrbit
     frame: Frame = HILL
 
-    def __post_init__(self) -> None:
-        checked_frame(self.frame)
-
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """A(t), shape (..., 6, 6)."""
         return HILL.matrices_to(self.frame, self.orbit.dynamics(time_s))
-
-    def input_map(self, time_s: ArrayLike) -> Floats:
-        """B, shape (..., 6, 3)."""
-        return velocity_input(np.shape(time_s))
-
-    def forcing(self, time_s: ArrayLike) -> Floats:
-        """Zero, shape (..., 6)."""
-        return np.zeros((*np.shape(time_s), 6))
 
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Phi(end, start), shape (..., 6, 6); the end may be before the start.
@@ -71,60 +57,35 @@ class TschaunerHempel:
         ValueError
             If a time is not finite.
         """
-        starts, ends = _pairs(start_s, end_s)
-        if not (np.isfinite(starts).all() and np.isfinite(ends).all()):
+        if not (np.isfinite(start_s).all() and np.isfinite(end_s).all()):
             raise ValueError("a time is not finite")
-        short = self._short(starts, ends)
-        matrix = np.empty((len(starts), 6, 6))
-        if short.any():
-            matrix[short] = self._collocated.transition(starts[short], ends[short])
-        if not short.all():
-            matrix[~short] = _closed(self.orbit, starts[~short], ends[~short])
-        return HILL.matrices_to(self.frame, matrix.reshape(*_shape(start_s, end_s), 6, 6))
+        matrices = self._by_length(
+            start_s, end_s, self._collocated.transition, lambda starts, ends: _closed(self.orbit, starts, ends)
+        )
+        return HILL.matrices_to(self.frame, matrices)
 
     def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Gramian, int Phi(end, t) B B' Phi(end, t)' dt from start to end, shape (..., 6, 6); end >= start."""
+        """Gramian, shape (..., 6, 6); end >= start."""
         checked_durations(start_s, end_s)
-        starts, ends = _pairs(start_s, end_s)
-        short = self._short(starts, ends)
-        matrix = np.empty((len(starts), 6, 6))
-        if short.any():
-            matrix[short] = self._collocated.gramian(starts[short], ends[short])
-        for row in np.flatnonzero(~short):
-            effect, weights = self._effects(starts[row], ends[row])
-            matrix[row] = np.einsum("kai,kbi,k->ab", effect, effect, weights)
-        return HILL.matrices_to(self.frame, matrix.reshape(*_shape(start_s, end_s), 6, 6))
-
-    def segment(self, start_s: ArrayLike, end_s: ArrayLike) -> Segment:
-        """Transition, Gramian and drift at once; end >= start."""
-        return Segment(self.transition(start_s, end_s), self.gramian(start_s, end_s), self.drift(start_s, end_s))
+        return HILL.matrices_to(
+            self.frame, self._by_length(start_s, end_s, self._collocated.gramian, self._integrals("kai,kbi,k->ab", 2))
+        )
 
     def held_input(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Effect at the end of a unit control held from the start, int Phi(end, t) B dt, shape (..., 6, 3)."""
+        """Effect at the end of a unit control held from the start, shape (..., 6, 3)."""
         checked_durations(start_s, end_s)
-        starts, ends = _pairs(start_s, end_s)
-        short = self._short(starts, ends)
-        matrix = np.empty((len(starts), 6, 3))
-        if short.any():
-            matrix[short] = self._collocated.held_input(starts[short], ends[short])
-        for row in np.flatnonzero(~short):
-            effect, weights = self._effects(starts[row], ends[row])
-            matrix[row] = np.einsum("kai,k->ai", effect, weights)
-        conversion, turn = HILL.conversion_to(self.frame), self.frame.rotation @ HILL.rotation.T
-        return np.asarray(conversion @ matrix.reshape(*_shape(start_s, end_s), 6, 3) @ turn.T)
-
-    def drift(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
-        """Zero, shape (..., 6)."""
-        return np.zeros((*_shape(start_s, end_s), 6))
+        return HILL.effects_to(
+            self.frame, self._by_length(start_s, end_s, self._collocated.held_input, self._integrals("kai,k->ai", 1))
+        )
 
     def breaks(self, start_s: float, end_s: float) -> Floats:
-        """Times from start to end, both among them, a radian of the eccentric anomaly apart at most.
+        """Times from start to end, inclusive, a radian of the eccentric anomaly apart at most.
 
         Notes
         -----
         The motion has poles at cos E = 1 / e; panels are no longer than the distance to them.
         """
-        first, last = (float(each) for each in self.orbit.eccentric_anomaly(np.array([start_s, end_s])))
+        first, last = (float(anomaly) for anomaly in self.orbit.eccentric_anomaly(np.array([start_s, end_s])))
         times = self.orbit.time_of_eccentric(even_breaks(first, last, (last - first) / self._widest_rad))
         times[0], times[-1] = start_s, end_s
         return np.maximum.accumulate(np.minimum(times, end_s))
@@ -142,9 +103,33 @@ class TschaunerHempel:
         anomalies = self.orbit.true_anomaly(starts), self.orbit.true_anomaly(ends)
         return np.asarray(np.abs(anomalies[1] - anomalies[0]) < SHORT_RAD)
 
+    def _by_length(self, start_s: ArrayLike, end_s: ArrayLike, of_short: _OfIntervals, of_long: _OfIntervals) -> Floats:
+        """Matrices of intervals, in axes of Hill, by two methods, of short and of long intervals."""
+        starts, ends = np.broadcast_arrays(np.asarray(start_s, dtype=np.float64), np.asarray(end_s, dtype=np.float64))
+        shape, starts, ends = starts.shape, starts.ravel(), ends.ravel()
+        short = self._short(starts, ends)
+        if short.all():
+            matrices = of_short(starts, ends)
+        else:
+            long = of_long(starts[~short], ends[~short])
+            matrices = np.empty((len(starts), *long.shape[1:]))
+            matrices[~short] = long
+            if short.any():
+                matrices[short] = of_short(starts[short], ends[short])
+        return matrices.reshape(*shape, *matrices.shape[1:])
+
+    def _integrals(self, product: str, power: int) -> _OfIntervals:
+        """Integrals over intervals of a product of Phi(end, t) B, given as subscripts of `einsum`."""
+
+        def integrals(starts: Floats, ends: Floats) -> Floats:
+            nodes = (self._effects(start, end) for start, end in zip(starts, ends, strict=True))
+            return np.array([np.einsum(product, *[effect] * power, weights) for effect, weights in nodes])
+
+        return integrals
+
     def _effects(self, start_s: float, end_s: float) -> tuple[Floats, Floats]:
         """Phi(end, t) B at the nodes, shape (k, 6, 3), and their weights in time, s."""
-        first, last = (float(each) for each in self.orbit.eccentric_anomaly(np.array([start_s, end_s])))
+        first, last = (float(anomaly) for anomaly in self.orbit.eccentric_anomaly(np.array([start_s, end_s])))
         e = self.orbit.eccentricity
         panels = max(1, int(np.ceil((last - first) / self._widest_rad)))
         half = 0.5 * (last - first) / panels
@@ -158,15 +143,6 @@ class TschaunerHempel:
         if near.any():
             effect[near] = self._collocated.transition(times[near], end_s)[..., 3:]
         return effect, weights
-
-
-def _shape(start_s: ArrayLike, end_s: ArrayLike) -> tuple[int, ...]:
-    return np.broadcast_shapes(np.shape(start_s), np.shape(end_s))
-
-
-def _pairs(start_s: ArrayLike, end_s: ArrayLike) -> tuple[Floats, Floats]:
-    starts, ends = np.broadcast_arrays(np.asarray(start_s, dtype=np.float64), np.asarray(end_s, dtype=np.float64))
-    return starts.ravel(), ends.ravel()
 
 
 def _closed(orbit: EllipticOrbit, starts: Floats, ends: Floats) -> Floats:
@@ -201,9 +177,9 @@ def _closed(orbit: EllipticOrbit, starts: Floats, ends: Floats) -> Floats:
     later[:, 2, 1], later[:, 2, 2], later[:, 2, 3] = 2.0 * s, 2.0 * c - e, 3.0 * (1.0 - 2.0 * e * s * passed)
     later[:, 3, 1], later[:, 3, 2] = s_slope, c_slope
     later[:, 3, 3] = -3.0 * e * (s_slope * passed + s / rho**2)
-    # Of (along, -radial, and their rates) in the order of Hill: radial 0, along 1, rates 3 and 4.
-    signs, places = np.array([1.0, -1.0, 1.0, -1.0]), np.array([1, 0, 4, 3])
-    in_plane[:, places[:, None], places] = (later @ plane) * np.outer(signs, signs)
+    # From the order (along, -radial, and their rates) to that of Hill: radial 0, along 1, rates 3 and 4.
+    signs, order = np.array([1.0, -1.0, 1.0, -1.0]), np.array([1, 0, 4, 3])
+    in_plane[:, order[:, None], order] = (later @ plane) * np.outer(signs, signs)
     turn = at_end - at_start
     in_plane[:, 2, 2] = in_plane[:, 5, 5] = np.cos(turn)
     in_plane[:, 2, 5], in_plane[:, 5, 2] = np.sin(turn), -np.sin(turn)
