@@ -15,7 +15,7 @@ import pytest
 
 from guidance import NoiseKind
 from sim import Campaign, Scenario, simulate
-from sim.worker_processes import worker_processes
+from sim.flights import worker_processes
 
 Check = Callable[[str, float, float, str], None]
 Work = Callable[[Path], object]

@@ -67,10 +67,9 @@ nitpick_ignore = [
         "rendezvous.reachability.blocks": ("Block",),
         "rendezvous.reachability.lifted": ("Lifted",),
         "rendezvous.reachability.optimum": ("BlockOptimum",),
-        "sim.plan": ("Plan",),
         "sim.storage.campaign_folder": ("CampaignFolder", "Damage"),
         "sim.storage.manifest": ("Axis", "Manifest"),
-        "sim.stored_flight": ("Progress",),
+        "sim.campaign": ("Progress",),
     }.items()
     for name in names
 ]

@@ -162,7 +162,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _leave(code: int) -> NoReturn:
     """Leave, without threads that memory's end has left waiting for a lock which nobody holds any more."""
-    flights = sys.modules.get("sim.chunks_in_flight")
+    flights = sys.modules.get("sim.flights")
     if flights is not None:
         threads = [each for each in threading.enumerate() if each.name.startswith(flights.THREADS)]
         last_s = time.monotonic() + PATIENCE_S

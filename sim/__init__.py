@@ -1,7 +1,7 @@
 """The simulator: scenarios, the truth, the closed loop, records and statistics."""
 
-from sim.campaign import Campaign, CampaignResult
-from sim.plan import CampaignNoise
+from sim.campaign import Campaign, CampaignResult, Sweep
+from sim.chunk import CampaignNoise
 from sim.record import Inconsistency, Record, StepRecord, fly_one
 from sim.results import Outcome, Results
 from sim.scenario import Manoeuvre, Scenario, Sun, Target
@@ -15,7 +15,6 @@ from sim.statistics import (
     quantiles,
 )
 from sim.stopping_rule import QuantileName, Requirement, StoppingRule
-from sim.sweep import Sweep
 
 __all__ = [
     "Campaign",

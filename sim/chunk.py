@@ -1,9 +1,10 @@
-"""A chunk of a campaign: consecutive runs of one scenario, flown by whoever has time."""
+"""A chunk of a campaign: consecutive runs of one scenario, flown together on any worker."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,28 @@ from numpy.typing import NDArray
 from guidance import NoiseKind, Strategy
 from sim.results import Results, join
 from sim.scenario import Scenario
-from sim.simulate import simulate
+from sim.simulate import ENGAGEMENTS_AT_ONCE, simulate
 from sim.versions import VersionError, calculating_versions, differences
+
+FEWEST_CHUNKS = 256
+LARGEST_CHUNK = 4096
+
+
+class CampaignNoise(Enum):
+    """Measurement noise of a campaign; MIXED is random in even runs and game in odd ones."""
+
+    RANDOM = "random"
+    GAME = "game"
+    MIXED = "mixed"
+
+    @property
+    def kinds(self) -> tuple[NoiseKind, ...]:
+        """Noises of run 0, 1, 2, ..., repeated."""
+        return (NoiseKind.RANDOM, NoiseKind.GAME) if self is CampaignNoise.MIXED else (NoiseKind(self.value),)
+
+    def applied_to(self, scenario: Scenario) -> Scenario:
+        """Return a scenario with this noise; a mixed one leaves it unchanged."""
+        return scenario if self is CampaignNoise.MIXED else replace(scenario, noise=NoiseKind(self.value))
 
 
 @dataclass(frozen=True)
@@ -26,73 +47,78 @@ class Chunk:
     cell : int
         Number of the scenario in a sweep; 0 in a campaign.
     scenario : Scenario
-    first, runs : int
-        Number of the first run, and how many follow from there.
+        Its own noise is not used.
+    runs : range
+        Numbers of the runs.
     seed : int
-    mixed : bool
-        Whether even runs have random noise and odd ones game noise, in place of the scenario's.
+        Root seed.
+    noise : CampaignNoise
+        Measurement noise of the runs.
     guarantee : bool
-        Whether the guaranteed model keeps its guaranteed miss.
+        Whether the guaranteed model computes the guaranteed miss.
     strategy : Strategy or None
         None is the scenario's.
     versions : tuple of pairs of str
-        What it must be flown with.
+        Versions of the packages that must compute it.
     """
 
     index: int
     cell: int
     scenario: Scenario
-    first: int
-    runs: int
+    runs: range
     seed: int
-    mixed: bool = False
+    noise: CampaignNoise
     guarantee: bool = True
     strategy: Strategy | None = None
     versions: tuple[tuple[str, str], ...] = field(default_factory=calculating_versions)
 
     def noises(self, runs: NDArray[np.int64]) -> list[NoiseKind]:
         """Noise of each run."""
-        if not self.mixed:
-            return [self.scenario.noise] * len(runs)
-        return [NoiseKind.GAME if odd else NoiseKind.RANDOM for odd in (runs % 2).tolist()]
+        kinds = self.noise.kinds
+        return [kinds[run % len(kinds)] for run in runs.tolist()]
 
 
 def fly_chunk(chunk: Chunk, check: Callable[[], None] | None = None) -> Results:
-    """Fly the runs of a chunk.
+    """Fly the runs of a chunk, in their order.
+
+    The results of a run do not depend on the chunk, the worker or the machine.
 
     Parameters
     ----------
     chunk : Chunk
+        The runs to fly.
     check : callable or None
-        Is called now and then, and may raise to break off.
-
-    Returns
-    -------
-    Results
-        In the order of the runs: the same numbers whatever chunk a run is flown in, and wherever.
+        Called after every step; an exception that it raises stops the flight.
 
     Raises
     ------
     VersionError
-        If the chunk is to be flown with other versions than those at hand.
+        If the chunk is to be flown with other versions of the packages.
     """
     differ = differences(chunk.versions, calculating_versions())
     if differ:
         raise VersionError("; ".join(differ))
-    runs = np.arange(chunk.first, chunk.first + chunk.runs, dtype=np.int64)
+    runs = np.array(chunk.runs, dtype=np.int64)
     noises = chunk.noises(runs)
-    parts = []
-    for kind in dict.fromkeys(noises):
-        own = runs[np.array([noise is kind for noise in noises])]
-        parts.append(
-            simulate(
-                replace(chunk.scenario, noise=kind),
-                own.tolist(),
-                seed=chunk.seed,
-                strategy=chunk.strategy,
-                guarantee=chunk.guarantee,
-                progress=None if check is None else lambda _: check(),
-            )
+    parts = [
+        simulate(
+            replace(chunk.scenario, noise=kind),
+            [run for run, noise in zip(chunk.runs, noises, strict=True) if noise is kind],
+            seed=chunk.seed,
+            strategy=chunk.strategy,
+            guarantee=chunk.guarantee,
+            progress=None if check is None else lambda _: check(),
         )
-    joined = join(parts)
-    return joined.take(np.argsort(joined.runs))
+        for kind in dict.fromkeys(noises)
+    ]
+    flown = join(parts)
+    return flown.take(np.argsort(flown.runs))
+
+
+def chunk_size(runs: int) -> int:
+    """Return the default engagements of a chunk: a few hundred chunks, each of some batches of the engine.
+
+    A process that dies loses its unfinished chunks, so they are small; each is a file, so they are not too many.
+    """
+    batches = -(-runs // (FEWEST_CHUNKS * ENGAGEMENTS_AT_ONCE))
+    return max(1, min(batches, LARGEST_CHUNK // ENGAGEMENTS_AT_ONCE)) * ENGAGEMENTS_AT_ONCE

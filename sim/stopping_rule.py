@@ -1,4 +1,4 @@
-"""When a campaign may stop: the confidence interval of a quantile is narrow enough."""
+"""Quantiles as text, and when a campaign may stop: the confidence interval of a quantile is narrow enough."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 QUANTITIES = ("miss_m", "impulse_m_s", "guaranteed_miss_m")
 GROWTH = 1.05
-"""Between two looks the sample grows by this factor at least: looking after every chunk would cost O(N^2)."""
+"""The sample grows by at least this factor between two checks: a check after every chunk would cost O(N^2)."""
 
 _QUANTILE = r"\s*(?P<quantity>\w+)\s+p(?P<level>\d{1,2}(?:\.\d{1,6})?)\s*"
 _NUMBER = r"\s*(?P<number>\d{1,15}(?:\.\d{1,15})?(?:[eE][+-]?\d{1,3})?)\s*"
@@ -37,7 +37,7 @@ class QuantileName:
     Raises
     ------
     TypeError, ValueError
-        If there is no such quantity, or the level is out of its range.
+        If the quantity is unknown, or the level is out of its range.
     """
 
     quantity: str
@@ -49,30 +49,12 @@ class QuantileName:
             raise ValueError(f"there is no quantity {self.quantity[:40]}; choose one of: {', '.join(QUANTITIES)}")
 
     def __str__(self) -> str:
-        """As it is written."""
         return f"{self.quantity} {level_name(self.level)}"
 
     @classmethod
     def parse(cls, text: str) -> QuantileName:
-        """Read `miss_m p99`.
-
-        Parameters
-        ----------
-        text : str
-
-        Returns
-        -------
-        QuantileName
-
-        Raises
-        ------
-        ValueError
-            If it is written otherwise.
-        """
-        found = re.fullmatch(_QUANTILE, text[:100])
-        if found is None:
-            raise ValueError('must be a quantity and a quantile, for example "miss_m p99"')
-        return _quantile(found)
+        """Read `miss_m p99`; raise ValueError for any other text."""
+        return _parse(text, "", 'a quantity and a quantile, for example "miss_m p99"')[0]
 
 
 @dataclass(frozen=True)
@@ -82,6 +64,7 @@ class StoppingRule:
     Parameters
     ----------
     quantile : QuantileName
+        Whose interval is meant.
     width : float
         In the unit of the quantity.
     confidence : float
@@ -101,49 +84,30 @@ class StoppingRule:
         check_fields(self)
 
     def __str__(self) -> str:
-        """As it is written."""
         return f"{self.quantile} ci<{self.width:g}"
 
     @classmethod
     def parse(cls, text: str) -> StoppingRule:
-        """Read `miss_m p99 ci<0.5`.
-
-        Parameters
-        ----------
-        text : str
-
-        Returns
-        -------
-        StoppingRule
-
-        Raises
-        ------
-        ValueError
-            If it is written otherwise.
-        """
-        found = re.fullmatch(rf"{_QUANTILE}\s+ci\s*<{_NUMBER}", text[:100])
-        if found is None:
-            raise ValueError('must be a quantity, a quantile and a width, for example "miss_m p99 ci<0.5"')
-        width = float(found["number"])
-        if not 0.0 < width < math.inf:
-            raise ValueError("the width of the confidence interval must be greater than 0")
-        return cls(_quantile(found), width)
+        """Read `miss_m p99 ci<0.5`; raise ValueError for any other text."""
+        example = 'a quantity, a quantile and a width, for example "miss_m p99 ci<0.5"'
+        return cls(*_parse(text, rf"\s+ci\s*<{_NUMBER}", example, "the width of the confidence interval"))
 
     def met_by(self, sample: Floats) -> bool:
         """Whether a sample is large enough."""
         if not sample.size:
             return False
-        (found,) = estimate_quantiles(sample, [self.quantile.level], self.confidence)
-        return found.width is not None and found.width < self.width
+        (estimate,) = estimate_quantiles(sample, [self.quantile.level], self.confidence)
+        return estimate.width is not None and estimate.width < self.width
 
 
 @dataclass(frozen=True)
 class Requirement:
-    """What a quantile must stay under, written `miss_m p99<10`.
+    """An upper bound of a quantile, written `miss_m p99<10`.
 
     Parameters
     ----------
     quantile : QuantileName
+        What is bounded.
     bound : float
         In the unit of the quantity.
 
@@ -160,52 +124,33 @@ class Requirement:
         check_fields(self)
 
     def __str__(self) -> str:
-        """As it is written."""
         return f"{self.quantile}<{self.bound:g}"
 
     @classmethod
     def parse(cls, text: str) -> Requirement:
-        """Read `miss_m p99<10`.
-
-        Parameters
-        ----------
-        text : str
-
-        Returns
-        -------
-        Requirement
-
-        Raises
-        ------
-        ValueError
-            If it is written otherwise.
-        """
-        found = re.fullmatch(rf"{_QUANTILE}<{_NUMBER}", text[:100])
-        if found is None:
-            raise ValueError('must be a quantity, a quantile and a bound, for example "miss_m p99<10"')
-        bound = float(found["number"])
-        if not 0.0 < bound < math.inf:
-            raise ValueError("the bound must be greater than 0")
-        return cls(_quantile(found), bound)
+        """Read `miss_m p99<10`; raise ValueError for any other text."""
+        example = 'a quantity, a quantile and a bound, for example "miss_m p99<10"'
+        return cls(*_parse(text, f"<{_NUMBER}", example, "the bound"))
 
 
 class Watch:
-    """Looks at the chunks of a campaign in their order, as far as they are there without a gap, and says when to stop.
+    """Checks a stopping rule on the chunks of a campaign in their order, as far as they are stored without a gap.
 
     Parameters
     ----------
     rule : StoppingRule
+        What must be met.
     groups : int
-        Into how many samples each chunk is split: one a noise. The rule must be met by each.
+        Samples of each chunk, one for each noise. Each must meet the rule.
     read : callable
-        Returns the samples of a chunk, one a group.
+        Returns the samples of a chunk.
     chunks : int
-        How many chunks there are.
+        Chunks of the campaign.
 
     Notes
     -----
-    It looks after certain numbers of chunks only, which do not depend on who flew them or when: so the campaign stops
-    at the same run on one worker and on a hundred, in one session and in ten. O(N log N) over a campaign.
+    It checks after certain numbers of chunks only, which do not depend on the workers and their speed: the campaign
+    stops at the same run on one worker and on a hundred, in one session and in ten. O(N log N) over a campaign.
     """
 
     def __init__(self, rule: StoppingRule, groups: int, read: Callable[[int], list[Floats]], chunks: int) -> None:
@@ -214,28 +159,28 @@ class Watch:
         self._chunks = chunks
         self._samples: list[list[Floats]] = [[] for _ in range(groups)]
         self._seen = 0
-        self._looks = _looks(chunks)
-        self._next = next(self._looks)
+        self._checks = _checks(chunks)
+        self._next = next(self._checks)
 
     def met(self, finished: Callable[[int], bool]) -> int | None:
-        """Look at what is new.
+        """Check the new chunks.
 
         Parameters
         ----------
         finished : callable
-            Whether a chunk is there.
+            Whether a chunk is stored.
 
         Returns
         -------
         int or None
-            After how many chunks to stop; None: not yet.
+            Number of chunks after which to stop; None to go on.
         """
         while self._seen < self._chunks and finished(self._seen):
             for sample, values in zip(self._samples, self._read(self._seen), strict=True):
                 sample.append(values)
             self._seen += 1
             if self._seen == self._next:
-                self._next = next(self._looks)
+                self._next = next(self._checks)
                 self._samples = [[np.concatenate(sample)] for sample in self._samples]
                 if all(self._rule.met_by(sample[0]) for sample in self._samples):
                     return self._seen
@@ -247,16 +192,23 @@ def level_name(level: float) -> str:
     return f"p{round(100.0 * level, 8):g}"
 
 
-def _looks(chunks: int) -> Iterator[int]:
-    """After how many chunks the samples are looked at."""
+def _checks(chunks: int) -> Iterator[int]:
+    """Yield the numbers of chunks after which the rule is checked."""
     count = 0
     while True:
         count = max(count + 1, math.ceil(GROWTH * count))
-        yield count if count < chunks else chunks
+        yield min(count, chunks)
 
 
-def _quantile(found: re.Match[str]) -> QuantileName:
-    quantity, level = found["quantity"], float(found["level"]) / 100.0
+def _parse(text: str, end: str, wanted: str, number: str = "") -> tuple[QuantileName, float]:
+    """Read a quantile and, if the pattern `end` has one, the number after it."""
+    match = re.fullmatch(_QUANTILE + end, text[:100])
+    if match is None:
+        raise ValueError(f"must be {wanted}")
+    level = float(match["level"]) / 100.0
     if not 0.0 < level < 1.0:
         raise ValueError("the quantile must lie between p0 and p100, for example p99")
-    return QuantileName(quantity, level)
+    value = float(match["number"]) if end else 0.0
+    if end and not 0.0 < value < math.inf:
+        raise ValueError(f"{number} must be greater than 0")
+    return QuantileName(match["quantity"], level), value

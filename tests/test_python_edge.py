@@ -52,6 +52,7 @@ from rendezvous.multipoint import DriftingTargets, Tour
 from rendezvous.multipoint import Target as Visited
 from rendezvous.relative_motion import ClohessyWiltshire
 from sim import (
+    Campaign,
     Manoeuvre,
     QuantileName,
     Requirement,
@@ -67,7 +68,6 @@ from sim import (
     simulate,
 )
 from sim.adversary import find_worst
-from sim.plan import CampaignNoise, Plan
 
 REFUSALS = (TypeError, ValueError)
 NO_NUMBERS: tuple[Any, ...] = (
@@ -297,7 +297,7 @@ def test_what_is_no_count(value: Any) -> None:
         refused(partial(find_worst, scenario, **{name: value}), name)
     for name in ("runs", "chunk", "seed"):
         numbers = {"runs": 4, "chunk": 2, "seed": 0, name: value}
-        refused(partial(Plan, (scenario,), noise=CampaignNoise.GAME, guarantee=True, **numbers), name)
+        refused(partial(Campaign, scenario, folder="runs", **numbers), name)
 
 
 def test_single_precision_is_refused_and_integers_are_numbers() -> None:
@@ -502,7 +502,7 @@ NOT_CALLED = {
     "sim": {"CampaignResult", "Distribution", "Inconsistency", "Outcome", "QuantileEstimate", "Record", "Results"},
 }
 """What is exported to be read, not to be given numbers."""
-ELSEWHERE = {"Campaign", "Sweep", "StepRecord", "make_strategy", "strategy_names"}
+ELSEWHERE = {"CampaignNoise", "Sweep", "StepRecord", "make_strategy", "strategy_names"}
 """Looked at in tests of their own."""
 
 

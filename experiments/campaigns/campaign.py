@@ -90,7 +90,7 @@ def campaign(
         crew,
         need_campaign_extra,
     )
-    from experiments.common.output import STDOUT, checked_destinations, deliver, to_json
+    from experiments.common.output import STDOUT, checked_destinations, deliver, to_json, write_file
     from experiments.common.screen import say_warnings, tell_of_compiling
 
     whole_number("--runs", runs, 1, MOST_RUNS, 10_000)
@@ -126,7 +126,7 @@ def campaign(
             result, elapsed_s = _fly(asked, flying, resume, quiet)
         found = samples(result.folder)
         summary = _summary(result, found, elapsed_s, warnings)
-        result.folder.write_beside(SUMMARY, to_json(summary).encode())
+        write_file(out / SUMMARY, to_json(summary), overwrite=True)
         deliver(json_, to_json(summary), overwrite=overwrite)
     if not quiet:
         _show(result, found, elapsed_s, str(json_) == STDOUT)
@@ -145,13 +145,11 @@ def _rule(until: str | None) -> StoppingRule | None:
 
 
 def _tell_estimate(asked: Campaign, cores: int, quiet: bool) -> None:
-    from pathlib import Path
-
     from experiments.campaigns.screen import ESTIMATED_FROM, estimate
     from experiments.common.screen import say
 
     if asked.runs >= ESTIMATED_FROM:
-        said = estimate(asked.plan(), cores, Path(asked.folder))
+        said = estimate(asked, cores)
         say(f"{said}{' at most' if asked.until else ''}", quiet)
 
 

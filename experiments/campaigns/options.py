@@ -137,7 +137,7 @@ def crew(dask: str | None, workers: int | None, processes: int | None, quiet: bo
             "--workers (threads here), --processes (here) and --dask (elsewhere) say who flies; leave all but one out"
         )
     if processes is not None:
-        from sim.worker_processes import worker_processes
+        from sim.flights import worker_processes
 
         with worker_processes(processes) as pool:
             yield Crew(pool, 2 * processes, processes)

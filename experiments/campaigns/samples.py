@@ -12,11 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.common.output import library_version
-from guidance import NoiseKind
 from sim import Outcome, QuantileEstimate, estimate_quantiles
-from sim.fingerprint import scenario_hash
 from sim.stopping_rule import QUANTITIES, level_name
-from sim.storage import CampaignFolder
+from sim.storage import CampaignFolder, scenario_hash
 
 Floats = NDArray[np.float64]
 
@@ -24,7 +22,6 @@ LEVELS = (0.1, 0.5, 0.9, 0.99, 0.999)
 START = ("z_km", "x_km", "vz_km_s", "vx_km_s")
 WORST = 10
 OUTCOMES = tuple(each.value for each in Outcome)
-NOISES = tuple(each.value for each in NoiseKind)
 
 
 @dataclass(frozen=True)
@@ -58,7 +55,7 @@ class Sample:
 
 def noises_of(folder: CampaignFolder) -> list[str]:
     """Return the noises that a campaign flies."""
-    return [folder.manifest.noise] if folder.manifest.noise in NOISES else list(NOISES)
+    return [kind.value for kind in folder.manifest.noise.kinds]
 
 
 def noise_flags(folder: CampaignFolder) -> dict[str, NDArray[np.bool_] | slice]:
@@ -143,12 +140,12 @@ def heading(folder: CampaignFolder) -> dict[str, Any]:
     manifest = folder.manifest
     return {
         "version": library_version(),
-        "kind": "sweep" if manifest.axes else "campaign",
+        "kind": manifest.kind,
         "scenario": manifest.scenario.name,
         "scenario_hash": scenario_hash(manifest.scenario),
         "model": manifest.scenario.set_model.kind.value,
         "strategy": manifest.strategy,
-        "noise": manifest.noise,
+        "noise": manifest.noise.value,
         "range_meter": manifest.scenario.range_sensor is not None,
         "seed": manifest.seed,
         "runs": folder.finished_runs,

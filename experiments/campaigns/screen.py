@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from experiments.campaigns.samples import Sample
-    from sim.plan import Plan
-    from sim.stored_flight import Progress
+    from sim import Campaign
+    from sim.campaign import Progress
 
 ESTIMATED_FROM = 50_000
 """Engagements from which on time and disk are estimated before the work."""
@@ -92,15 +92,15 @@ def size(count: float) -> str:
     return f"{count:.3g} TB"
 
 
-def estimate(plan: Plan, cores: int, folder: Path) -> str:
-    """Say how much time and disk a plan will take, by flying a few of its engagements.
+def estimate(asked: Campaign, cores: int) -> str:
+    """Estimate the time and the disk space of a campaign by flying a few of its engagements.
 
     Parameters
     ----------
-    plan : Plan
+    asked : Campaign
+        Not yet flown.
     cores : int
-        How many fly at the same time.
-    folder : Path
+        How many engagements are flown at the same time.
 
     Returns
     -------
@@ -119,18 +119,19 @@ def estimate(plan: Plan, cores: int, folder: Path) -> str:
     from sim.chunk import fly_chunk
     from sim.simulate import ENGAGEMENTS_AT_ONCE
 
-    chunk = plan.chunk_at(plan.chunks // 2)
-    fly_chunk(replace(chunk, first=0, runs=_WARM))  # loads or compiles the kernels
-    pilot = min(ENGAGEMENTS_AT_ONCE, plan.runs)
+    manifest, folder = asked.manifest(), Path(asked.folder)
+    chunk = asked.chunk_at(manifest.chunks // 2, manifest)
+    fly_chunk(replace(chunk, runs=range(_WARM)))  # loads or compiles the kernels
+    pilot = min(ENGAGEMENTS_AT_ONCE, asked.runs)
     began_s = time.perf_counter()
-    fly_chunk(replace(chunk, first=0, runs=pilot))
-    seconds = (time.perf_counter() - began_s) / pilot * plan.engagements / cores
-    needed = BYTES_A_RUN * plan.engagements + BYTES_A_SHARD * plan.chunks
+    fly_chunk(replace(chunk, runs=range(pilot)))
+    seconds = (time.perf_counter() - began_s) / pilot * asked.engagements / cores
+    needed = BYTES_A_RUN * asked.engagements + BYTES_A_SHARD * manifest.chunks
     there = next(each for each in (folder, *folder.absolute().parents) if each.is_dir())
     free = shutil.disk_usage(there).free
     said = (
-        f"{plan.engagements} engagements: about {duration(seconds)} on {cores} core{'s' if cores > 1 else ''}, and "
-        f"{size(needed)} in {plan.chunks} shards"
+        f"{asked.engagements} engagements: about {duration(seconds)} on {cores} core{'s' if cores > 1 else ''}, and "
+        f"{size(needed)} in {manifest.chunks} shards"
     )
     if needed > free:
         raise InputError(f"{folder}: {said}, but the disk has {size(free)} left; make room, or ask for fewer runs")

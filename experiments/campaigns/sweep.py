@@ -116,7 +116,7 @@ def sweep(
         crew,
         need_campaign_extra,
     )
-    from experiments.common.output import STDOUT, checked_destinations, deliver, to_json
+    from experiments.common.output import STDOUT, checked_destinations, deliver, to_json, write_file
     from experiments.common.screen import figure_files, say, say_warnings, tell_of_compiling
 
     whole_number("--runs", runs, 1, MOST_RUNS, 200)
@@ -157,9 +157,9 @@ def sweep(
             tell_of_compiling(quiet)
             result, elapsed_s = _fly(asked, flying, resume, quiet)
         table = sweep_table(result.folder, [*shown, required.quantile])
-        result.folder.write_beside(TABLE, result.folder.table_file(*table.columns()))
+        write_file(out / TABLE, result.folder.table_file(*table.columns()), overwrite=True)
         summary = to_json(sweep_summary(result.folder, table, required, elapsed_s))
-        result.folder.write_beside("summary.json", summary.encode())
+        write_file(out / "summary.json", summary, overwrite=True)
         draw_into(table, shown, required, out)
         deliver(json_, summary, overwrite=overwrite)
     if not quiet:
@@ -244,16 +244,14 @@ def _ask(asked: Sweep) -> None:
 
 
 def _fly(asked: Sweep, flying: Crew, resume: bool, quiet: bool) -> tuple[CampaignResult, float]:
-    from pathlib import Path
     from time import perf_counter
 
     from experiments.campaigns.screen import ESTIMATED_FROM, campaign_progress, estimate
     from experiments.common.screen import say
     from experiments.interception.scenario_file import scenario_to_toml
 
-    plan = asked.plan()
-    if plan.engagements >= ESTIMATED_FROM:
-        say(estimate(plan, flying.cores, Path(asked.folder)), quiet)
+    if asked.engagements >= ESTIMATED_FROM:
+        say(estimate(asked, flying.cores), quiet)
     began_s = perf_counter()
     with campaign_progress("sweep", quiet) as progress:
         result = asked.run(

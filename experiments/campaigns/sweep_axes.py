@@ -13,7 +13,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Context, Decimal, InvalidOperation
-from typing import Any
+from typing import Any, Literal
 
 from experiments.common.errors import InputError
 from experiments.common.toml_values import LARGEST, SMALLEST, nearest, number_text, shown
@@ -138,7 +138,7 @@ def _axis(piece: str, known: Mapping[str, _Key]) -> Axis:
     if key not in known:
         raise InputError(f"--vary: {_unknown(key, known)}")
     parts = [each.strip() for each in written.split(":")]
-    scale = "linear"
+    scale: Literal["linear", "log"] = "linear"
     if parts[0] == "log":
         scale, parts = "log", parts[1:]
     if len(parts) != 3:

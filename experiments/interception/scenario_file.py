@@ -26,8 +26,8 @@ from experiments.interception.scenario_tables import SCHEMA, DispersionTable, Sc
 from guidance.thruster import Thruster
 from infoset.model import InitialSet, Interval, Model, SetModel, StateBox
 from infoset.sensors import AngleSensor, RangeSensor, RateSensor
-from sim.fingerprint import scenario_hash as scenario_hash  # noqa: PLC0414 (a scenario's hash is asked for here)
 from sim.scenario import Scenario, Sun, Target
+from sim.storage.codec import scenario_hash as scenario_hash  # noqa: PLC0414 (users import it from here)
 
 DEFAULT_FEWEST_SECTIONS = 5
 SMALL_ANGLE_RAD = 0.01

@@ -1,7 +1,9 @@
-"""Campaigns on disk: a manifest, shards of rows, one lock. The only place that knows Parquet."""
+"""Campaigns on disk: a manifest, shards of rows, one lock. The only package that knows Parquet and pydantic."""
 
-from sim.storage.campaign_folder import CampaignFolder, Damage, need_arrow, need_free
-from sim.storage.errors import (
+from sim.storage.campaign_folder import CampaignFolder, Damage, need_arrow
+from sim.storage.campaign_writer import CampaignWriter, need_free
+from sim.storage.codec import scenario_hash
+from sim.storage.files import (
     DamagedError,
     DiskFullError,
     ManifestError,
@@ -15,6 +17,7 @@ __all__ = [
     "MOST_CELLS",
     "Axis",
     "CampaignFolder",
+    "CampaignWriter",
     "Damage",
     "DamagedError",
     "DiskFullError",
@@ -26,4 +29,5 @@ __all__ = [
     "need_arrow",
     "need_free",
     "read_manifest",
+    "scenario_hash",
 ]

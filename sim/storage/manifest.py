@@ -1,4 +1,4 @@
-"""The manifest of a campaign: all that decides its numbers, so that it can be resumed, read and repeated."""
+"""The manifest of a campaign: all that determines its numbers, so that it can be resumed, read and repeated."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from infoset.limits import NUMBER
-from sim.fingerprint import scenario_hash
+from infoset.limits import COUNT, NUMBER, WHOLE
+from sim.chunk import CampaignNoise
 from sim.scenario import Scenario
-from sim.storage.atomic_file import reporting, write_whole
-from sim.storage.errors import ManifestError
-from sim.storage.scenario_json import scenario_from_json, scenario_to_json
+from sim.storage.codec import from_json, scenario_hash, to_json
+from sim.storage.files import ManifestError, reporting, write_whole
 
 FORMAT = "infoset-campaign"
 SCHEMA = 1
@@ -26,8 +25,10 @@ MOST_DIFFERENCES = 20
 MOST_CELLS = 10_000
 MOST_RUNS_A_SHARD = 1_000_000
 
-_NOISES = ("random", "game", "mixed")
-_SCALES = ("linear", "log")
+_PROGRESS = ("runs", "until", "stopped_after", "made_by")
+"""Keys that may differ between the sessions of a campaign."""
+_DERIVED = ("format", "schema", "version", "kind", "name", "scenario_hash", "sha256")
+"""Keys of the file that follow from the others."""
 
 
 @dataclass(frozen=True)
@@ -39,70 +40,91 @@ class Axis:
     key : str
         As in a scenario file, with its table and unit.
     values : tuple of float
-        In the unit of the file.
+        At least two, in the unit of the file.
     scale : str
-        `linear` or `log`: how the values are spaced.
+        `linear` or `log`: the spacing of the values.
     """
 
     key: str
     values: tuple[float, ...]
-    scale: str = "linear"
+    scale: Literal["linear", "log"] = "linear"
+
+    def __post_init__(self) -> None:
+        if len(self.values) < 2:
+            raise ValueError(f"{self.key}: an axis needs at least two values")
+        for value in self.values:
+            NUMBER.need(self.key, value)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Manifest:
-    """All that decides the numbers of a campaign or a sweep, and how far it came.
+    """All that determines the numbers of a campaign or a sweep, its progress, and its division into chunks.
+
+    Chunks are numbered from 0, cell by cell; each is stored as one shard.
 
     Parameters
     ----------
-    scenario : Scenario
-        Whole; of a sweep the one that is varied.
-    runs, chunk, seed : int
-        Engagements (a cell), engagements a shard, root seed.
-    noise : str
-        `random`, `game` or `mixed`.
-    strategy : str
-        Its name.
-    guarantee : bool
-        Whether guaranteed misses were kept.
-    versions : mapping of str to str
-        Of what computes.
-    axes : tuple of Axis
-        What a sweep varies, every value with every other; the last varies fastest. None in a campaign.
-    cells_hash : str
-        Fingerprint of the scenarios of a sweep's cells; empty in a campaign.
+    runs : int
+        Engagements of each cell, numbered from 0.
     until : str or None
-        The rule that may stop it early.
+        The rule that may stop the campaign early.
     stopped_after : int or None
         Runs after which the rule stopped it.
+    scenario : Scenario
+        Of a sweep, the one that is varied.
+    seed : int
+        Root seed.
+    noise : CampaignNoise
+        Measurement noise of all cells.
+    strategy : str
+        Its name; of a strategy file its name and a hash too.
+    guarantee : bool
+        Whether the guaranteed miss Phi was computed.
+    chunk : int
+        Engagements of a shard; the last of a cell may be smaller. It changes no number.
+    axes : tuple of Axis
+        Keys that a sweep varies, every value with every other; the last varies fastest. Empty in a campaign.
+    cells_hash : str
+        Fingerprint of the scenarios of a sweep's cells; empty in a campaign.
+    versions : mapping of str to str
+        Versions of the packages that compute.
     made_by : mapping of str to str
-        Version of Python and machine that began it: told, not compared.
+        Python and machine of the first session; not compared on a resume.
 
     Raises
     ------
-    ValueError
-        If a shard would have too many engagements, or a sweep too many cells.
+    TypeError, ValueError
+        If a number is out of its range.
     """
 
-    scenario: Scenario
     runs: int
-    chunk: int
-    seed: int
-    noise: str
-    strategy: str
-    guarantee: bool
-    versions: Mapping[str, str]
-    axes: tuple[Axis, ...] = ()
-    cells_hash: str = ""
     until: str | None = None
     stopped_after: int | None = None
+    scenario: Scenario
+    seed: int
+    noise: CampaignNoise
+    strategy: str
+    guarantee: bool
+    chunk: int
+    axes: tuple[Axis, ...] = ()
+    cells_hash: str = ""
+    versions: Mapping[str, str]
     made_by: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        for name, limits in (("runs", COUNT), ("chunk", COUNT), ("seed", WHOLE)):
+            limits.need(name, getattr(self, name))
         if self.chunk > MOST_RUNS_A_SHARD:
-            raise ValueError(f"chunk: must be at most {MOST_RUNS_A_SHARD} engagements a shard, found {self.chunk}")
+            raise ValueError(f"chunk must be at most {MOST_RUNS_A_SHARD} engagements: got {self.chunk}")
         if self.cells > MOST_CELLS:
-            raise ValueError(f"axes: make {self.cells} cells, and at most {MOST_CELLS} can be")
+            raise ValueError(f"axes make {self.cells} cells, more than the {MOST_CELLS} that a sweep may have")
+        if self.stopped_after is not None and not 1 <= self.stopped_after <= self.runs:
+            raise ValueError(f"stopped_after must be from 1 to {self.runs}: got {self.stopped_after}")
+
+    @property
+    def kind(self) -> str:
+        """`campaign` or `sweep`."""
+        return "sweep" if self.axes else "campaign"
 
     @property
     def cells(self) -> int:
@@ -111,11 +133,27 @@ class Manifest:
 
     @property
     def wanted_runs(self) -> int:
-        """Engagements a cell that belong to the result: fewer where a rule has stopped it."""
+        """Engagements of each cell that belong to the result: fewer than `runs` where a rule stopped the campaign."""
         return self.runs if self.stopped_after is None else self.stopped_after
 
+    @property
+    def chunks_a_cell(self) -> int:
+        """Number of chunks of each cell."""
+        return -(-self.runs // self.chunk)
+
+    @property
+    def chunks(self) -> int:
+        """Number of chunks of all cells."""
+        return self.chunks_a_cell * self.cells
+
+    def runs_of(self, index: int) -> tuple[int, range]:
+        """Return the cell and the numbers of the runs of a chunk."""
+        cell, place = divmod(index, self.chunks_a_cell)
+        first = place * self.chunk
+        return cell, range(first, min(first + self.chunk, self.runs))
+
     def values_of(self, cell: int) -> dict[str, float]:
-        """What a cell of a sweep has in place of the scenario's values, by key."""
+        """Return the values that a cell of a sweep has in place of the scenario's, by key."""
         values = {}
         for axis in reversed(self.axes):
             cell, place = divmod(cell, len(axis.values))
@@ -123,54 +161,39 @@ class Manifest:
         return dict(reversed(values.items()))
 
     def decisive(self) -> dict[str, Any]:
-        """What may not differ between one session of a campaign and the next, as JSON."""
-        return {
-            "format": FORMAT,
-            "schema": SCHEMA,
-            "kind": "sweep" if self.axes else "campaign",
-            "scenario": scenario_to_json(self.scenario),
-            "seed": self.seed,
-            "noise": self.noise,
-            "strategy": self.strategy,
-            "guarantee": self.guarantee,
-            "chunk": self.chunk,
-            "axes": [{"key": each.key, "scale": each.scale, "values": list(each.values)} for each in self.axes],
-            "cells_hash": self.cells_hash,
-            "versions": dict(self.versions),
-        }
+        """Return all that must be equal in every session of a campaign, as JSON values."""
+        plain = to_json(self)
+        for key in _PROGRESS:
+            del plain[key]
+        return {"format": FORMAT, "schema": SCHEMA, "kind": self.kind, **plain}
 
     @property
     def identity(self) -> str:
-        """Fingerprint of what is decisive; every shard carries it."""
+        """Fingerprint of `decisive`, which every shard carries."""
         return hashlib.sha256(json.dumps(self.decisive(), sort_keys=True).encode()).hexdigest()[:32]
 
     def to_json(self) -> dict[str, Any]:
-        """Return everything, as it stands in the file."""
-        decisive = self.decisive()
+        """Return the content of the file."""
         value = {
-            "format": decisive.pop("format"),
-            "schema": decisive.pop("schema"),
+            "format": FORMAT,
+            "schema": SCHEMA,
             "version": self.versions.get("infoset", ""),
-            "kind": decisive.pop("kind"),
+            "kind": self.kind,
             "name": self.scenario.name,
             "scenario_hash": scenario_hash(self.scenario),
-            "runs": self.runs,
-            "until": self.until,
-            "stopped_after": self.stopped_after,
-            **decisive,
-            "made_by": dict(self.made_by),
+            **to_json(self),
         }
         return {**value, "sha256": checksum(value)}
 
 
 def checksum(value: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of everything in a manifest but itself."""
-    rest = {key: each for key, each in value.items() if key != "sha256"}
+    """Return the SHA-256 of everything in a manifest but `sha256` itself."""
+    rest = {key: inner for key, inner in value.items() if key != "sha256"}
     return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
 
 
 def made_here() -> dict[str, str]:
-    """What a manifest tells of the machine it was begun on."""
+    """Return Python's version and the kind of this machine."""
     return {"python": platform.python_version(), "machine": platform.machine(), "system": platform.system()}
 
 
@@ -180,24 +203,10 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Read the manifest of a folder.
-
-    Parameters
-    ----------
-    folder : Path
-
-    Returns
-    -------
-    Manifest
-
-    Raises
-    ------
-    ManifestError
-        If there is none, or it is not one that this version reads; the message names the key.
-    """
+    """Read the manifest of a folder; raise `ManifestError` with the key at fault if this version cannot read it."""
     file = folder / MANIFEST
     if not file.is_file():
-        raise ManifestError(f"{folder}: holds no campaign and no sweep: there is no {MANIFEST} in it")
+        raise ManifestError(f"{folder}: holds no campaign and no sweep: it has no {MANIFEST}")
     with reporting(file), file.open("rb") as stream:
         content = stream.read(LARGEST_BYTES + 1)
     try:
@@ -205,33 +214,22 @@ def read_manifest(folder: Path) -> Manifest:
             raise ValueError(f"is over {LARGEST_BYTES // 1_000_000} MB")
         value = json.loads(content)
         if not isinstance(value, dict) or value.get("format") != FORMAT:
-            raise ValueError(f"its format is not {FORMAT}")
+            raise ValueError(f"format: must be {FORMAT}")
         if value.get("schema") != SCHEMA:
             raise ValueError(f"schema: must be {SCHEMA}, the only one this version reads, found {value.get('schema')}")
-        found = _from_json(value)
-        if value["sha256"] != checksum(value):
-            raise ValueError("it is not what was written (the checksum differs): the file is damaged")
-        return found
-    except (ValueError, RecursionError, KeyError, TypeError) as error:
-        said = f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)
-        raise ManifestError(f"{file}: is no manifest of a campaign: {said[:300]}") from None
+        manifest = from_json(Manifest, {key: inner for key, inner in value.items() if key not in _DERIVED})
+        if value.get("kind") != manifest.kind:
+            raise ValueError("kind: must be sweep with axes, and campaign without")
+        if value.get("sha256") != checksum(value):
+            raise ValueError("the checksum differs: the file is damaged")
+    except (ValueError, RecursionError) as error:
+        raise ManifestError(f"{file}: is not a readable manifest: {str(error)[:300]}") from None
+    return manifest
 
 
-def need_same(found: Manifest, given: Manifest, folder: Path) -> None:
-    """Refuse to go on with a campaign as if it were another.
-
-    Parameters
-    ----------
-    found, given : Manifest
-        In the folder, and asked for.
-    folder : Path
-
-    Raises
-    ------
-    ManifestError
-        If they differ in anything decisive; every difference is shown.
-    """
-    there, here = _flat(found.decisive()), _flat(given.decisive())
+def need_same(found: Manifest, asked: Manifest, folder: Path) -> None:
+    """Raise `ManifestError`, with every difference, if a folder's campaign has other decisive values than asked."""
+    there, here = _flat(found.decisive()), _flat(asked.decisive())
     lines = [
         f"{key}: {_shown(there, key)} in the folder, {_shown(here, key)} now"
         for key in dict.fromkeys((*there, *here))
@@ -242,96 +240,21 @@ def need_same(found: Manifest, given: Manifest, folder: Path) -> None:
     if len(lines) > MOST_DIFFERENCES:
         lines = [*lines[:MOST_DIFFERENCES], f"and {len(lines) - MOST_DIFFERENCES} more"]
     raise ManifestError(
-        f"{folder}: is another campaign than the one asked for; resume it as it was begun, or choose another folder:"
+        f"{folder}: contains a campaign with different settings; resume it with its own, or choose another folder:"
         + "".join(f"\n  {line}" for line in lines)
     )
 
 
 def _flat(value: Any, path: str = "") -> dict[str, Any]:
-    """Values by dotted key."""
+    """Return nested values by dotted key."""
     if isinstance(value, dict) and value:
         return {
-            name: each
+            name: leaf
             for key, inner in value.items()
-            for name, each in _flat(inner, f"{path}.{key}" if path else str(key)).items()
+            for name, leaf in _flat(inner, f"{path}.{key}" if path else str(key)).items()
         }
     return {path: value}
 
 
 def _shown(flat: Mapping[str, Any], key: str) -> str:
     return json.dumps(flat[key])[:200] if key in flat else "nothing"
-
-
-def _from_json(value: Mapping[str, Any]) -> Manifest:
-    axes = tuple(_axis(each, f"axes[{place}]") for place, each in enumerate(_list(value["axes"], "axes")))
-    if (value["kind"] == "sweep") != bool(axes):
-        raise ValueError("kind: must be a sweep with axes, or a campaign without")
-    runs = _whole(value, "runs", 1)
-    stopped = value["stopped_after"]
-    if stopped is not None and not 1 <= _whole(value, "stopped_after", 1) <= runs:
-        raise ValueError("stopped_after: must be at most runs")
-    if not isinstance(value["guarantee"], bool):
-        raise ValueError("guarantee: must be true or false")
-    return Manifest(
-        scenario=scenario_from_json(value["scenario"]),
-        runs=runs,
-        chunk=_whole(value, "chunk", 1),
-        seed=_whole(value, "seed", 0),
-        noise=_one_of(value["noise"], _NOISES, "noise"),
-        strategy=_text(value["strategy"], "strategy"),
-        guarantee=value["guarantee"],
-        versions=_texts(value["versions"], "versions"),
-        axes=axes,
-        cells_hash=_text(value["cells_hash"], "cells_hash"),
-        until=None if value["until"] is None else _text(value["until"], "until"),
-        stopped_after=stopped,
-        made_by=_texts(value["made_by"], "made_by"),
-    )
-
-
-def _axis(value: Any, path: str) -> Axis:
-    if not isinstance(value, dict):
-        raise ValueError(f"{path}: must be an object")
-    values = _list(value["values"], f"{path}.values")
-    if len(values) < 2 or any(isinstance(each, bool) or not isinstance(each, int | float) for each in values):
-        raise ValueError(f"{path}.values: must be at least two numbers")
-    for each in values:
-        NUMBER.need(f"{path}.values", each)
-    return Axis(
-        _text(value["key"], f"{path}.key"),
-        tuple(float(each) for each in values),
-        _one_of(value["scale"], _SCALES, f"{path}.scale"),
-    )
-
-
-def _whole(value: Mapping[str, Any], key: str, least: int) -> int:
-    number = value[key]
-    if isinstance(number, bool) or not isinstance(number, int) or number < least:
-        raise ValueError(f"{key}: must be a whole number from {least}")
-    return number
-
-
-def _text(value: Any, path: str) -> str:
-    if not isinstance(value, str):
-        raise ValueError(f"{path}: must be text")
-    if not value.isprintable():  # it is shown on terminals, which may be steered by what is not
-        raise ValueError(f"{path}: must be text without control characters")
-    return value
-
-
-def _texts(value: Any, path: str) -> dict[str, str]:
-    if not isinstance(value, dict):
-        raise ValueError(f"{path}: must be an object")
-    return {key: _text(each, f"{path}.{key}") for key, each in value.items()}
-
-
-def _one_of(value: Any, names: tuple[str, ...], path: str) -> str:
-    if value not in names:
-        raise ValueError(f"{path}: must be one of {', '.join(names)}")
-    return _text(value, path)
-
-
-def _list(value: Any, path: str) -> list[Any]:
-    if not isinstance(value, list):
-        raise ValueError(f"{path}: must be a list")
-    return value

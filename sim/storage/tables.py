@@ -18,7 +18,6 @@ from guidance import NoiseKind, TieRule
 from sim.chunk import Chunk
 from sim.columns import Column, columns_of, values_of
 from sim.results import Results
-from sim.storage.parquet_pages import claimed_bytes
 
 SCHEMA_VERSION = 2
 M_PER_KM = 1e3
@@ -101,7 +100,7 @@ def rows(chunk: Chunk, results: Results, *, with_cell: bool) -> Any:
     wanted = schema(with_cell=with_cell)
     table = pa.table({name: stored[name] for name in wanted.names}, schema=wanted)
     try:
-        need_sound(table, range(chunk.first, chunk.first + chunk.runs), chunk.cell)
+        need_sound(table, chunk.runs, chunk.cell)
     except ValueError as error:
         raise FloatingPointError(
             f"results of runs {results.runs[0]} to {results.runs[-1]} are not finite, or of no ordinary size: {error}"
@@ -134,6 +133,8 @@ def need_sound(table: Any, runs: range, cell: int) -> None:
                 raise ValueError(f"{name} holds {found[wrong]} in row {wrong}, where {wanted[wrong]} belongs")
     for name in table.column_names:
         column = table.column(name)
+        if name in _TEXTS and not {*pc.unique(column).to_pylist()} <= {*_TEXTS[name], None}:
+            raise ValueError(f"{name} holds a text that no campaign writes")
         if not pa.types.is_floating(column.type) or column.null_count == len(column):
             continue
         known = (column.drop_null() if column.null_count else column).to_numpy()
@@ -161,93 +162,64 @@ def to_bytes(table: Any, extra: Mapping[str, str]) -> bytes:
 
 
 def largest_file(rows: int) -> int:
-    """Return how many bytes a shard of so many rows may have, and may come to when it is unpacked."""
+    """Return the most bytes that a shard of so many rows may have, as a file and unpacked."""
     return BYTES_BESIDE_ROWS + MOST_BYTES_A_ROW * rows
 
 
-def fault(content: bytes, told: Mapping[str, str], rows: int, *, with_cell: bool) -> str | None:
-    """Return what is wrong with a shard, or None; nothing is unpacked.
+def fault(content: bytes, wanted: Mapping[str, str], rows: int, *, with_cell: bool) -> str | None:
+    """Return what is wrong with a shard by its metadata, or None.
 
     Parameters
     ----------
     content : bytes
         The file.
-    told : mapping of str to str
-        What the metadata of its schema must say.
+    wanted : mapping of str to str
+        Entries that the metadata of its schema must have.
     rows : int
-        How many it must have.
+        Number of rows that it must have.
     with_cell : bool
-
-    Returns
-    -------
-    str or None
+        Whether it is a sweep's.
     """
     try:
         file = pq.ParquetFile(pa.BufferReader(content))
-        found, columns = file.metadata, file.schema_arrow
-        says = {key.decode(): value.decode() for key, value in (columns.metadata or {}).items()}
-        if any(says.get(key) != value for key, value in told.items()):
-            return "belongs to another campaign"
-        if found.num_rows != rows:
-            return f"has {found.num_rows} rows in place of {rows}"
-        wanted = schema(with_cell=with_cell)
-        # A file written before a nullable column was added lacks it.
-        if not columns.equals(pa.schema([each for each in wanted if each.name in columns.names or not each.nullable])):
-            return "has other columns than a campaign"
-        return _fault_of_sizes(content, found)
-    except (pa.ArrowException, OSError, ValueError, MemoryError):
-        return "is no Parquet file"
-
-
-def _fault_of_sizes(content: bytes, found: Any) -> str | None:
-    """What columns claim to hold against what the file can: a file may say anything."""
-    groups = [found.row_group(place) for place in range(found.num_row_groups)]
-    columns = [(group.num_rows, group.column(place)) for group in groups for place in range(group.num_columns)]
-    sizes = [group.num_rows for group in groups]
-    if (
-        sum(sizes) != found.num_rows
-        or min(sizes, default=0) < 0
-        or any(each.num_values != size for size, each in columns)
-    ):
-        return "has columns of other lengths than it says"
-    if sum(max(column.total_compressed_size, 0) for _, column in columns) > len(content):
-        return "has columns that overlap"
-    claimed = 0
-    for size, column in columns:
-        first = column.data_page_offset
-        if column.has_dictionary_page:
-            first = min(first, column.dictionary_page_offset)
-        claimed += claimed_bytes(content, first, column.total_compressed_size, size)
-    if claimed > largest_file(found.num_rows):
-        return f"claims to come to {claimed} bytes, more than any of {found.num_rows} rows"
+        metadata, columns = file.metadata, file.schema_arrow
+        found = {key.decode(): value.decode() for key, value in (columns.metadata or {}).items()}
+        groups = [metadata.row_group(number) for number in range(metadata.num_row_groups)]
+        unpacked = sum(
+            group.column(number).total_uncompressed_size for group in groups for number in range(len(columns))
+        )
+    except (pa.ArrowException, OSError, ValueError):
+        return "is not a Parquet file"
+    if any(found.get(key) != value for key, value in wanted.items()):
+        return "belongs to another campaign"
+    if metadata.num_rows != rows:
+        return f"has {metadata.num_rows} rows in place of {rows}"
+    # A file written before a nullable column was added lacks it.
+    fields = [field for field in schema(with_cell=with_cell) if field.name in columns.names or not field.nullable]
+    if not columns.equals(pa.schema(fields)):
+        return "has other columns than a campaign"
+    if unpacked > largest_file(rows):
+        return f"has {unpacked} bytes unpacked, more than any shard of {rows} rows"
     return None
 
 
 def read(file: Path, columns: Sequence[str] | None, *, with_cell: bool) -> Any:
-    """Read some columns of a shard.
-
-    Parameters
-    ----------
-    file : Path
-        Without a `fault`.
-    columns : sequence of str or None
-        None is all of them.
-    with_cell : bool
-
-    Returns
-    -------
-    pyarrow.Table
+    """Return some columns of a shard without a `fault`, None being all.
 
     Raises
     ------
     ValueError
-        If it holds text that no campaign writes.
+        If it is not what a campaign writes.
     OSError
         If it cannot be read.
     """
     wanted = _some(columns, with_cell=with_cell)
     try:
-        return _read_one(file, wanted)
+        table = pq.ParquetFile(file).read(columns=wanted.names, use_threads=False)
+        for field in wanted:
+            if field.name not in table.column_names:
+                table = table.append_column(field.name, pa.nulls(len(table), field.type))
+        return table.select(wanted.names).cast(wanted).replace_schema_metadata(wanted.metadata)
     except (pa.ArrowException, KeyError) as error:
         raise ValueError(str(error)) from None
 
@@ -261,21 +233,6 @@ def _some(columns: Sequence[str] | None, *, with_cell: bool) -> Any:
     """Schema of some columns."""
     wanted = schema(with_cell=with_cell)
     return wanted if columns is None else pa.schema([wanted.field(name) for name in columns], metadata=wanted.metadata)
-
-
-def _read_one(file: Path, wanted: Any) -> Any:
-    # Text stays a dictionary until that is known to be short: a long one that every row names would fill the memory.
-    texts = [name for name in wanted.names if name in _TEXTS]
-    table = pq.ParquetFile(file, read_dictionary=texts).read(columns=wanted.names, use_threads=False)
-    missing = [name for name in wanted.names if name not in table.column_names]
-    for name in texts:
-        for part in [] if name in missing else table.column(name).chunks:
-            said = part.dictionary
-            if len(said) > len(_TEXTS[name]) or not {*said.to_pylist()} <= _TEXTS[name]:
-                raise ValueError(f"{name} says what no campaign writes")
-    for name in missing:
-        table = table.append_column(name, pa.nulls(len(table), wanted.field(name).type))
-    return table.select(wanted.names).cast(wanted).replace_schema_metadata(wanted.metadata)
 
 
 def numbers(table: Any, name: str) -> np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]:

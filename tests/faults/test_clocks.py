@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from experiments.campaigns.screen import campaign_progress
-from sim.stored_flight import Progress
+from sim.campaign import Progress
 from tests.faults.conftest import Infoset, need_whole
 
 YEAR_S = 365.25 * 86_400.0

@@ -16,7 +16,7 @@ import pytest
 from experiments.__main__ import main as beginning
 from experiments.campaigns.options import campaign_errors
 from sim import Campaign, CampaignNoise, Scenario
-from sim.storage import CampaignFolder
+from sim.storage import CampaignFolder, CampaignWriter
 from tests.faults.conftest import Infoset, Left, begin, ended, need_whole
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="POSIX signals")
@@ -44,9 +44,9 @@ def test_an_interrupt_says_how_to_go_on(
     command: str, infoset: Infoset, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stored: list[int] = []
-    write = CampaignFolder.write
+    write = CampaignWriter.write
 
-    def write_one(folder: CampaignFolder, *given: object) -> None:
+    def write_one(folder: CampaignWriter, *given: object) -> None:
         if stored:
             raise KeyboardInterrupt
         write(folder, *given)  # type: ignore[arg-type]
@@ -54,7 +54,7 @@ def test_an_interrupt_says_how_to_go_on(
 
     more = ["--vary", "thruster.budget_m_s=100:200:2"] if command == "sweep" else []
     asked = (command, file, "--runs", 16, "--chunk", 8, "--out", "runs", *more)
-    monkeypatch.setattr(CampaignFolder, "write", write_one)
+    monkeypatch.setattr(CampaignWriter, "write", write_one)
     left = infoset(*asked)
     assert (left.code, left.out) == (130, "")
     assert left.err.splitlines()[-1] == RESUME

@@ -57,7 +57,7 @@ def test_no_memory_is_a_message_that_says_how_to_go_on(
 
     asked = ("campaign", file, "--runs", 24, "--chunk", 8, "--out", "runs", "--workers", 1)
     with monkeypatch.context() as patched:
-        patched.setattr("sim.chunks_in_flight.fly_chunk", fly)
+        patched.setattr("sim.flights.fly_chunk", fly)
         left = infoset(*asked)
     assert (left.code, left.out) == (2, "")
     assert left.err.splitlines()[-1].startswith("error: there is not enough memory (Unable to allocate 7.45 GiB); ")
@@ -73,7 +73,7 @@ def test_python_that_fails_for_want_of_memory_is_one_message(
     def fly(*_: object) -> Results:
         raise error
 
-    monkeypatch.setattr("sim.chunks_in_flight.fly_chunk", fly)
+    monkeypatch.setattr("sim.flights.fly_chunk", fly)
     left = infoset("campaign", file, "--runs", 24, "--out", "runs", "--workers", 2)
     assert left.code == 2
     assert left.err.splitlines()[-1].startswith("error: there is not enough memory, or the installation is damaged")

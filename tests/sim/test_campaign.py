@@ -31,8 +31,9 @@ from sim import (
     fly_one,
     simulate,
 )
-from sim.chunk import Chunk, fly_chunk
-from sim.plan import Plan, chunk_size
+from sim.campaign import Progress
+from sim.chunk import Chunk, chunk_size, fly_chunk
+from sim.flights import worker_processes
 from sim.simulate import ENGAGEMENTS_AT_ONCE
 from sim.storage import (
     Axis,
@@ -43,11 +44,10 @@ from sim.storage import (
     OccupiedError,
     StorageError,
     read_manifest,
+    scenario_hash,
 )
 from sim.storage.manifest import checksum
-from sim.stored_flight import Progress
 from sim.versions import VersionError
-from sim.worker_processes import worker_processes
 
 COLUMNS = [
     *("run", "noise", "tie", "range_meter", "miss_m", "impulse_m_s", "guaranteed_miss_m", "outcome", "truth_margin_m"),
@@ -256,7 +256,7 @@ def test_more_runs_extend_a_campaign(brief: Scenario, reference: Any, tmp_path: 
     assert result.redone == ()
     assert result.table.equals(reference)
     assert read_manifest(tmp_path).runs == 96
-    with pytest.raises(ManifestError, match="it has 96 runs, now 90 are asked for"):
+    with pytest.raises(ManifestError, match="has 96 runs, and 90 are asked for"):
         mixed(brief, tmp_path, 90).run(resume=True)
 
 
@@ -294,7 +294,10 @@ def test_a_shard_that_lies_about_itself_is_flown_again(brief: Scenario, referenc
 
     mixed(brief, tmp_path).run()
     victim = shards(tmp_path)[2]
-    for content, reason in ((b"nothing", "is no Parquet file"), (shards(tmp_path)[3].read_bytes(), "another campaign")):
+    for content, reason in (
+        (b"nothing", "is not a Parquet file"),
+        (shards(tmp_path)[3].read_bytes(), "another campaign"),
+    ):
         victim.unlink()
         victim = victim.with_name(f"chunk-0000002-{zlib.crc32(content):08x}.parquet")
         victim.write_bytes(content)
@@ -388,7 +391,7 @@ def test_another_campaign_is_refused_and_every_difference_shown(brief: Scenario,
             ],
         ),
     ):
-        with pytest.raises(ManifestError, match="another campaign") as refused:
+        with pytest.raises(ManifestError, match="different settings") as refused:
             campaign.run(resume=True)
         assert str(refused.value).split("\n  ")[1:] == lines
     assert {each: each.read_bytes() for each in tmp_path.rglob("*") if each.is_file()} == before
@@ -434,14 +437,14 @@ def test_a_manifest_that_is_none_is_refused(change: Callable[[bytes], bytes], br
     text = file.read_bytes()
     assert change(text) != text
     file.write_bytes(change(text))
-    with pytest.raises(ManifestError, match=r"manifest\.json: is no manifest"):
+    with pytest.raises(ManifestError, match=r"manifest\.json: is not a readable manifest"):
         mixed(brief, tmp_path, 32).run(resume=True)
 
 
 def test_a_scenario_comes_back_whole(brief: Scenario, ranging: Scenario, comet: Scenario) -> None:
     from infoset import RateSensor
     from sim import Manoeuvre, Target
-    from sim.storage.scenario_json import scenario_from_json, scenario_to_json
+    from sim.storage.codec import from_json, to_json
 
     rich = replace(
         comet,
@@ -451,7 +454,27 @@ def test_a_scenario_comes_back_whole(brief: Scenario, ranging: Scenario, comet: 
         noise=NoiseKind.GAME,
     )
     for scenario in (brief, ranging, comet, rich):
-        assert scenario_from_json(json.loads(json.dumps(scenario_to_json(scenario)))) == scenario
+        assert from_json(Scenario, json.loads(json.dumps(to_json(scenario)))) == scenario
+
+
+def test_a_manifest_written_by_an_earlier_version_is_recognised(tmp_path: Path) -> None:
+    written = (Path(__file__).parent / "data" / "sweep-manifest.json").read_bytes()
+    (tmp_path / "manifest.json").write_bytes(written)
+    manifest = read_manifest(tmp_path)
+    assert manifest.identity == "1af348429b07e49e32c67f66d687b8c6"
+    assert manifest.to_json() == json.loads(written)
+    assert scenario_hash(manifest.scenario) == "b312cdb6a20cb115"
+
+
+@pytest.mark.parametrize("number", [2, np.float64(2.0), np.int64(2)])
+def test_numbers_of_other_types_are_the_same_campaign(number: Any, brief: Scenario, tmp_path: Path) -> None:
+    plain = replace(brief, thruster=replace(brief.thruster, greatest_impulse_m_s=2.0))
+    other = replace(brief, thruster=replace(brief.thruster, greatest_impulse_m_s=number))
+    assert scenario_hash(other) == scenario_hash(plain)
+    result = mixed(other, tmp_path, 8).run(workers=1)
+    assert CampaignFolder.read(tmp_path).damaged == []
+    assert result.folder.manifest.identity == mixed(plain, tmp_path, 8).manifest().identity
+    assert mixed(plain, tmp_path, 8).run(resume=True).complete
 
 
 def test_a_folder_that_holds_something_is_left_alone(brief: Scenario, tmp_path: Path) -> None:
@@ -474,22 +497,22 @@ def test_two_campaigns_in_one_folder_at_once(brief: Scenario, reference: Any, tm
 
     def meddle(progress: Progress) -> None:
         if not refused:
-            with pytest.raises(OccupiedError, match="another campaign is at work") as caught:
+            with pytest.raises(OccupiedError, match="another campaign is running") as caught:
                 mixed(brief, tmp_path).run(resume=True)
             refused.append(caught.value)
 
     assert mixed(brief, tmp_path).run(progress=meddle).table.equals(reference)
     assert refused
     script = (
-        "import sys; from pathlib import Path; from sim.storage.folder_lock import FolderLock\n"
-        "lock = FolderLock(Path(sys.argv[1])); lock.__enter__(); print('held', flush=True); sys.stdin.read()"
+        "import sys; from pathlib import Path; from sim.storage.files import locked\n"
+        "lock = locked(Path(sys.argv[1])); lock.__enter__(); print('held', flush=True); sys.stdin.read()"
     )
     with subprocess.Popen(
         [sys.executable, "-c", script, str(tmp_path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as other:
         assert other.stdout is not None
         assert other.stdout.readline() == "held\n"
-        with pytest.raises(OccupiedError, match="another campaign is at work"):
+        with pytest.raises(OccupiedError, match="another campaign is running"):
             mixed(brief, tmp_path).run(resume=True)
         other.kill()
         other.wait()
@@ -566,7 +589,7 @@ def test_results_that_are_no_numbers_are_not_stored(
         flown = fly_chunk(chunk)
         return replace(flown, miss_m=np.full(len(flown), np.inf))
 
-    monkeypatch.setattr("sim.chunks_in_flight.fly_chunk", overflow)
+    monkeypatch.setattr("sim.flights.fly_chunk", overflow)
     with pytest.raises(FloatingPointError, match="not finite"):
         mixed(brief, tmp_path).run()
     assert shards(tmp_path) == []
@@ -575,7 +598,7 @@ def test_results_that_are_no_numbers_are_not_stored(
 def test_a_chunk_of_another_version_is_refused_and_both_named(brief: Scenario) -> None:
     from sim.versions import calculating_versions
 
-    chunk = Plan((brief,), 4, 4, 0, CampaignNoise.RANDOM, True).chunk_at(0)
+    chunk = Chunk(0, 0, brief, range(4), 0, CampaignNoise.RANDOM)
     ours = dict(calculating_versions())
     other = tuple({**ours, "numpy": "1.0"}.items())
     with pytest.raises(VersionError, match=f"numpy 1.0 here, {ours['numpy']} there"):
@@ -584,8 +607,8 @@ def test_a_chunk_of_another_version_is_refused_and_both_named(brief: Scenario) -
 
 @pytest.mark.parametrize("wrong", [{"runs": 0}, {"seed": -1}, {"chunk": 0}])
 def test_numbers_that_make_no_campaign(wrong: dict[str, int], brief: Scenario, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="a campaign needs"):
-        replace(mixed(brief, tmp_path / "campaign"), **wrong).run()  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=f"{next(iter(wrong))} must be at least"):
+        replace(mixed(brief, tmp_path / "campaign"), **wrong)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="at least one worker"):
         mixed(brief, tmp_path / "campaign").run(workers=0)
 
@@ -620,7 +643,7 @@ def test_cells_of_a_sweep_are_campaigns_of_their_scenarios(brief: Scenario, tmp_
     other = replace(asked, cells=(cells[0], cells[2], cells[1]))
     with pytest.raises(ManifestError, match="cells_hash"):
         other.run(resume=True)
-    with pytest.raises(ManifestError, match="it has 40 runs a cell, now 50"):
+    with pytest.raises(ManifestError, match="has 40 runs a cell, and 50 are asked"):
         replace(asked, runs=50).run(resume=True)
     with pytest.raises(ValueError, match="a scenario for each combination"):
         replace(asked, cells=cells[:2])

@@ -20,7 +20,7 @@ from experiments.cli import main
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
 from guidance import NoiseKind
 from sim import Campaign, CampaignNoise, Scenario, fly_one
-from sim.plan import chunk_size
+from sim.chunk import chunk_size
 from sim.storage import CampaignFolder
 
 Infoset = Callable[..., tuple[int, str, str]]
@@ -202,7 +202,7 @@ def test_what_is_wrong_is_said_before_the_work(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("sim.chunks_in_flight.fly_chunk", lambda *_: pytest.fail("began to work"))
+    monkeypatch.setattr("sim.flights.fly_chunk", lambda *_: pytest.fail("began to work"))
     given = {"--runs": 10, "--out": "runs"}
     flags = [each for each in arguments if each == "--resume"]
     pairs = [each for each in arguments if each != "--resume"]
@@ -221,7 +221,7 @@ def test_resuming_another_campaign_shows_the_difference(infoset: Infoset, file: 
     assert infoset(*asked)[0] == 0
     code, _, err = infoset(*asked)
     assert code == 2
-    assert "holds a campaign already; go on with --resume" in err
+    assert "holds a campaign already; continue it with --resume" in err
     code, _, err = infoset(*asked, "--resume", "--seed", 3, "--noise", "game")
     assert code == 2
     assert "  seed: 0 in the folder, 3 now" in err
@@ -298,7 +298,7 @@ def test_the_rate_is_told_where_nobody_looks(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from experiments.campaigns.screen import campaign_progress
-    from sim.stored_flight import Progress
+    from sim.campaign import Progress
 
     clock = iter([0.0, 10.0, 61.0, 61.0, 70.0, 130.0, 130.0])
     monkeypatch.setattr("time.monotonic", lambda: next(clock))
@@ -390,7 +390,7 @@ def test_a_disk_that_fills_up(infoset: Infoset, brief: Scenario, file: Path, sma
     assert (code, out) == (2, "")
     assert err.startswith("error: ")
     assert "the disk is full" in err
-    assert "make room and resume it" in err
+    assert "free some space and run again with --resume" in err
     there = CampaignFolder.read(small_disk / "runs")
     assert there.damaged == []
     assert 0 < there.finished_runs < 1500
@@ -403,14 +403,14 @@ def test_a_disk_that_fills_up(infoset: Infoset, brief: Scenario, file: Path, sma
 
 
 def test_a_second_campaign_in_the_folder_is_refused(infoset: Infoset, file: Path, tmp_path: Path) -> None:
-    from sim.storage.folder_lock import FolderLock
+    from sim.storage.files import locked
 
     asked = ("campaign", file, "--runs", 8, "--out", tmp_path / "runs")
     assert infoset(*asked, "-q")[0] == 0
-    with FolderLock(tmp_path / "runs"):
+    with locked(tmp_path / "runs"):
         code, _, err = infoset(*asked, "--resume")
     assert code == 2
-    assert "another campaign is at work in this folder" in err
+    assert "another campaign is running in this folder" in err
 
 
 @pytest.mark.slow

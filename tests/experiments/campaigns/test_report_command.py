@@ -87,7 +87,7 @@ def test_a_report_writes_nothing_unasked(infoset: Infoset, folder: Path, tmp_pat
         ("missing", ["there is no such folder"]),
         (".", ["holds no campaign and no sweep"]),
         ("empty", ["no run is stored in it yet"]),
-        ("broken", ["is no manifest of a campaign"]),
+        ("broken", ["is not a readable manifest"]),
     ],
 )
 def test_what_cannot_be_reported(what: str, parts: list[str], infoset: Infoset, folder: Path, tmp_path: Path) -> None:

@@ -165,7 +165,7 @@ def test_what_is_wrong_is_said_before_the_work(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("sim.chunks_in_flight.fly_chunk", lambda *_: pytest.fail("began to work"))
+    monkeypatch.setattr("sim.flights.fly_chunk", lambda *_: pytest.fail("began to work"))
     given = {"--vary": TWO, "--runs": 10, "--out": "sweep"} | dict(zip(arguments[::2], arguments[1::2], strict=True))
     code, out, err = infoset("sweep", file, *[part for pair in given.items() for part in pair])
     assert (code, out) == (2, "")

@@ -1,0 +1,84 @@
+"""Frozen dataclasses as JSON and back, strictly: the one codec of manifests, record headers and fingerprints."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+from collections.abc import Callable, Hashable, Iterator
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from sim.scenario import Scenario
+
+Kind = TypeVar("Kind")
+_STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+
+@functools.cache
+def _adapter(kind: Hashable) -> TypeAdapter[Any]:
+    return TypeAdapter(tuple[kind], config=_STRICT)  # type: ignore[valid-type]  # pydantic takes no config for a dataclass
+
+
+def to_json(value: Any) -> dict[str, Any]:
+    """Return a dataclass as JSON values: enumerations by value, a number as the type of its field."""
+    adapter = _adapter(value.__class__)
+    text = adapter.dump_json((value,), fallback=lambda number: number.item())  # integers of NumPy
+    (plain,) = adapter.dump_python(adapter.validate_json(text), mode="json")
+    return dict(plain)
+
+
+def from_json(kind: Callable[..., Kind], value: object) -> Kind:
+    """Return the dataclass that JSON values were made of.
+
+    Raises
+    ------
+    ValueError
+        If a key is missing or unknown, or a value is not of its field's type; the message names the key. Text with
+        control characters, which could steer a terminal, is refused too.
+    """
+    if not all(map(str.isprintable, _texts(value))):
+        raise ValueError("holds text with control characters")
+    try:
+        (made,) = _adapter(kind).validate_json(json.dumps([value]))
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        key = ".".join(map(str, first["loc"][1:]))
+        message = first["msg"].removeprefix("Value error, ")
+        raise ValueError(f"{key}: {message}" if key else message) from None
+    return made  # type: ignore[no-any-return]
+
+
+def _texts(value: object) -> Iterator[str]:
+    """Yield every text in JSON values, keys included."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        yield from value
+        for inner in value.values():
+            yield from _texts(inner)
+    elif isinstance(value, list):
+        for inner in value:
+            yield from _texts(inner)
+
+
+def scenario_hash(scenario: Scenario) -> str:
+    """Return a fingerprint of every value of a scenario that can change a result: all but its name and description.
+
+    16 hexadecimal digits, the same for equal values on every machine.
+    """
+    values = _exact(to_json(replace(scenario, name="", description="")))
+    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def _exact(value: Any) -> Any:
+    """Replace numbers by their hexadecimal form, which is equal exactly when they are."""
+    if isinstance(value, dict):
+        return {key: _exact(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_exact(inner) for inner in value]
+    if isinstance(value, int | float):
+        return (float(value) + 0.0).hex()  # adding zero removes the sign of a negative zero
+    return value
