@@ -29,8 +29,8 @@ from rendezvous.reachability import (
     motion_of,
     solve,
 )
-from rendezvous.reachability.blocks import Block, split
 from rendezvous.reachability.exact_check import rational_sets
+from rendezvous.reachability.problem import Block, split
 from rendezvous.relative_motion import EllipticOrbit
 
 Floats = NDArray[np.float64]

@@ -37,6 +37,7 @@ from experiments.common.toml_values import (
 )
 from infoset.polytope import EmptyPolytopeError, Polytope, UnboundedPolytopeError, UncertainHullError
 from rendezvous.reachability import (
+    MOST_PERIODS,
     InadmissibleStartError,
     MotionModel,
     NonlinearMotion,
@@ -46,7 +47,6 @@ from rendezvous.reachability import (
     discretised,
     motion_of,
 )
-from rendezvous.reachability.problem import MOST_PERIODS
 from rendezvous.relative_motion import ConstantMotion, EllipticOrbit, TschaunerHempel
 
 Floats = NDArray[np.float64]

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from experiments.common.output import Cell
 from experiments.reachability.file import Rendezvous, load_rendezvous
 from experiments.reachability.report import Member, fly_members
-from rendezvous.reachability import OptimalControls, Solution
-from rendezvous.reachability.selection import minimum_energy, minimum_l1, nearest
+from rendezvous.reachability import OptimalControls, Solution, minimum_energy, minimum_l1, nearest
 
 Floats = NDArray[np.float64]
 

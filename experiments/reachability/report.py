@@ -14,28 +14,29 @@ from experiments.common.errors import InputError
 from experiments.reachability.file import KIND, Rendezvous
 from infoset.polytope import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
 from rendezvous.reachability import (
+    MOST_PERIODS,
     EmptyTubeError,
+    FeedbackPlan,
     Flight,
+    NoRobustPlanError,
     Route,
     SetKind,
     Solution,
     TooLargeError,
-    least_periods,
-    replan,
-    solve,
-)
-from rendezvous.reachability.problem import MOST_PERIODS
-from rendezvous.reachability.robust import FeedbackPlan, NoRobustPlanError, feedback_plan, tightened
-from rendezvous.reachability.sampling import samples
-from rendezvous.reachability.selection import (
     TooManyVerticesError,
     analytic_centre,
     chebyshev_centre,
     effort,
+    feedback_plan,
+    least_periods,
     minimum_energy,
     minimum_l1,
     minimum_norms,
     minimum_peak,
+    replan,
+    samples,
+    solve,
+    tightened,
     vertices,
 )
 

@@ -32,8 +32,7 @@ from experiments.reachability.report import (
     make_report,
     report_json,
 )
-from rendezvous.reachability import Route, SetKind
-from rendezvous.reachability.selection import effort
+from rendezvous.reachability import Route, SetKind, effort
 
 FIGURES = ("figure-positions", "figure-velocities", "figure-planes", "figure-controls")
 TABLES = "published-tables.csv"

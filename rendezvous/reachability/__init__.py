@@ -1,22 +1,41 @@
-"""Rendezvous through reachable sets: every optimal control of a linear system under constraints on its states."""
+"""Rendezvous through reachable sets: every optimal control of a linear system under constraints on its states.
 
-from rendezvous.reachability.block_sets import SetKind
+A problem is made of a motion; solving it gives the sets of states and the set of optimal controls, from which members
+are selected and flown.
+"""
+
 from rendezvous.reachability.closed_loop import Flight, replan
-from rendezvous.reachability.discretisation import MotionModel, between_periods, discretised, motion_of
-from rendezvous.reachability.exact_sets import Budget, TooLargeError
-from rendezvous.reachability.nonlinear import NonlinearMotion
-from rendezvous.reachability.optimal_controls import OptimalControls
+from rendezvous.reachability.motion import MotionModel, NonlinearMotion, between_periods, discretised, motion_of
 from rendezvous.reachability.optimum import EmptyTubeError
-from rendezvous.reachability.problem import InadmissibleStartError, ReachabilityProblem, ThrustShape
-from rendezvous.reachability.reachable_sets import ReachableSets, SetCounts
-from rendezvous.reachability.solve import Route, Solution, least_periods, solve
+from rendezvous.reachability.problem import MOST_PERIODS, InadmissibleStartError, ReachabilityProblem, ThrustShape
+from rendezvous.reachability.robust import FeedbackPlan, NoRobustPlanError, feedback_plan, tightened
+from rendezvous.reachability.selection import (
+    Effort,
+    TooManyVerticesError,
+    analytic_centre,
+    chebyshev_centre,
+    effort,
+    minimum_energy,
+    minimum_l1,
+    minimum_norms,
+    minimum_peak,
+    nearest,
+    samples,
+    vertices,
+)
+from rendezvous.reachability.sets import Budget, ReachableSets, SetCounts, SetKind, TooLargeError
+from rendezvous.reachability.solve import OptimalControls, Route, Solution, least_periods, solve
 
 __all__ = [
+    "MOST_PERIODS",
     "Budget",
+    "Effort",
     "EmptyTubeError",
+    "FeedbackPlan",
     "Flight",
     "InadmissibleStartError",
     "MotionModel",
+    "NoRobustPlanError",
     "NonlinearMotion",
     "OptimalControls",
     "ReachabilityProblem",
@@ -27,10 +46,23 @@ __all__ = [
     "Solution",
     "ThrustShape",
     "TooLargeError",
+    "TooManyVerticesError",
+    "analytic_centre",
     "between_periods",
+    "chebyshev_centre",
     "discretised",
+    "effort",
+    "feedback_plan",
     "least_periods",
+    "minimum_energy",
+    "minimum_l1",
+    "minimum_norms",
+    "minimum_peak",
     "motion_of",
+    "nearest",
     "replan",
+    "samples",
     "solve",
+    "tightened",
+    "vertices",
 ]

@@ -1,4 +1,4 @@
-"""Replanning: every period the rest of the problem is solved anew from where the craft truly is."""
+"""Closed loop: each period the rest of the problem is solved again from the estimated state."""
 
 from __future__ import annotations
 
@@ -8,18 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.reachability.blocks import split
-from rendezvous.reachability.optimal_controls import OptimalControls
-from rendezvous.reachability.optimum import EmptyTubeError, block_optimum
+from rendezvous.reachability.optimum import EmptyTubeError
 from rendezvous.reachability.problem import InadmissibleStartError, ReachabilityProblem
 from rendezvous.reachability.selection import minimum_energy
+from rendezvous.reachability.solve import OptimalControls, optimal_controls
 
 Floats = NDArray[np.float64]
 
 Truth = Callable[[int, Floats, Floats], Floats]
-"""Takes a period, the true state and the control, and returns the true state a period later."""
+"""Of a period, the true state and the control: the true state a period later."""
 Observer = Callable[[int, Floats], Floats]
-"""Takes a period and the true state, and returns the one that is believed."""
+"""Of a period and the true state: the estimated state."""
 
 _MORE = 1.001
 _LEAST_RELAXATION = 1e-9
@@ -33,13 +32,13 @@ class Flight:
     Parameters
     ----------
     states : ndarray, shape (T + 1, n)
-        True ones.
+        True states.
     controls : ndarray, shape (T, m)
-        Those applied.
+        Controls applied.
     expected_misses : ndarray, shape (T,)
-        The least terminal norm that each plan expected, in the units of the states.
+        The least terminal norm of each plan, in the units of the states.
     relaxations : ndarray, shape (T,)
-        By which fraction all constraints on states had to be relaxed to have a plan; 0 where they held.
+        Fraction by which all constraints on states were relaxed to find each plan; 0 where they held.
     """
 
     states: Floats
@@ -56,33 +55,30 @@ class Flight:
 def replan(
     problem: ReachabilityProblem, truth: Truth, observe: Observer | None = None, *, relative: bool = False
 ) -> Flight:
-    """Fly a problem with a new plan every period: of all optimal controls the one of least energy.
+    """Fly a problem in closed loop: each period, apply the first control of the optimal plan of least energy.
 
     Parameters
     ----------
     problem : ReachabilityProblem
-        The model that plans are made with.
+        The model used for planning.
     truth : callable
+        Returns the true state a period later, of the period, the true state and the control.
     observe : callable or None
-        None sees the true state.
+        Returns the estimated state, of the period and the true state; None for exact estimates.
     relative : bool
-        Whether plans that cannot reach zero, as those of the last period, minimise the norm of states divided by their
-        bounds, and not in the units of the problem.
-
-    Returns
-    -------
-    Flight
+        Whether plans that cannot reach zero, for example those of the last period, minimise the norm of states divided
+        by their bounds, and not in the units of the problem.
 
     Notes
     -----
-    T optima and as many quadratic programs. A state from which no control keeps the constraints gets a plan with all
-    of them relaxed alike, by as little as helps.
+    T optima and as many quadratic programs. From a state from which no control keeps the constraints, all of them are
+    relaxed by the same fraction, as little as helps.
     """
     state = problem.initial
     states, controls, misses, relaxations = [state], [], [], []
     for t in range(problem.periods):
-        believed = state if observe is None else observe(t, state)
-        optimal, relaxation = _plan(problem, t, believed, relative)
+        estimated = state if observe is None else observe(t, state)
+        optimal, relaxation = _plan(problem, t, estimated, relative)
         control = minimum_energy(optimal)[0]
         state = truth(t, state, control)
         states.append(state)
@@ -93,39 +89,24 @@ def replan(
 
 
 def relaxed(problem: ReachabilityProblem, fraction: float) -> ReachabilityProblem:
-    """Return a problem with every constraint on states relaxed.
-
-    Parameters
-    ----------
-    problem : ReachabilityProblem
-    fraction : float
-        Of the bounds on states.
-
-    Returns
-    -------
-    ReachabilityProblem
-    """
-    offsets = problem.offsets
-    if problem.normals is not None and offsets is not None:
-        offsets = offsets + fraction * np.linalg.norm(problem.normals * problem.state_bounds, axis=1)
+    """Return a problem with every constraint on states relaxed by a fraction of the bounds on states."""
+    offsets = None if problem.offsets is None else problem.offsets + fraction * _sizes(problem)
     return replace(problem, state_bounds=problem.state_bounds * (1.0 + fraction), offsets=offsets)
 
 
-def _plan(problem: ReachabilityProblem, start: int, believed: Floats, relative: bool) -> tuple[OptimalControls, float]:
+def _sizes(problem: ReachabilityProblem) -> Floats:
+    return np.asarray(np.linalg.norm(problem.further[0] * problem.state_bounds, axis=1))
+
+
+def _plan(problem: ReachabilityProblem, start: int, estimated: Floats, relative: bool) -> tuple[OptimalControls, float]:
     fraction = 0.0
     while True:
         wider = relaxed(problem, fraction) if fraction else problem
         try:
-            rest = wider.rest(start, believed)
-            return OptimalControls(
-                rest, tuple(block_optimum(each, relative=relative) for each in split(rest))
-            ), fraction
+            return optimal_controls(wider.rest(start, estimated), relative=relative), fraction
         except InadmissibleStartError as error:
-            sizes = [*problem.state_bounds]
-            if problem.normals is not None:
-                sizes += [*np.linalg.norm(problem.normals * problem.state_bounds, axis=1)]
-            missing = max(excess for _, excess in error.broken) / min(sizes)
-            fraction = max(2.0 * fraction, min(missing, _worst(problem, start, believed)) * _MORE, _LEAST_RELAXATION)
+            missing = max(excess for _, excess in error.broken) / min([*problem.state_bounds, *_sizes(problem)])
+            fraction = max(2.0 * fraction, min(missing, _worst(problem, start, estimated)) * _MORE, _LEAST_RELAXATION)
         except EmptyTubeError as error:
             fraction = (fraction + error.relaxation * (1.0 + fraction)) * _MORE + _LEAST_RELAXATION
         if fraction > _MOST_RELAXATION:
@@ -133,9 +114,7 @@ def _plan(problem: ReachabilityProblem, start: int, believed: Floats, relative: 
 
 
 def _worst(problem: ReachabilityProblem, time: int, state: Floats) -> float:
-    """By which fraction constraints must be relaxed to hold a state."""
-    worst = float((np.abs(state) / problem.state_bounds).max()) - 1.0
-    if problem.normals is not None and problem.offsets is not None:
-        sizes = np.linalg.norm(problem.normals * problem.state_bounds, axis=1)
-        worst = max(worst, float(((problem.normals @ state - problem.offsets[time]) / sizes).max()))
-    return worst
+    """Fraction by which constraints must be relaxed to hold at a state."""
+    normals, offsets = problem.further
+    beyond = (normals @ state - offsets[time]) / _sizes(problem)
+    return max(float((np.abs(state) / problem.state_bounds).max()) - 1.0, float(beyond.max(initial=-np.inf)))

@@ -1,4 +1,4 @@
-"""Linear, quadratic and second-order cone programs whose solutions are checked before they are returned."""
+"""Linear, quadratic and second-order cone programs, whose solutions are checked before they are returned."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _GAP = 1e-10
 _BROKEN, _APART = 1e-9, 1e-8
 """The greatest violation of a constraint, and the greatest duality gap, of an answer; both relative."""
 STEADY: dict[str, float] = {"static_regularization_constant": 1e-7}
-"""With cones a larger shift of the solver's systems than its default, 1e-8, which loses its way near the end."""
+"""Regularisation for programs with cones: with the solver's default, 1e-8, the last iterations often diverge."""
 _SETTINGS: tuple[dict[str, float], ...] = (
     {},
     STEADY,
@@ -29,7 +29,7 @@ _SETTINGS: tuple[dict[str, float], ...] = (
     {"static_regularization_constant": 1e-11, "dynamic_regularization_eps": 1e-15},
     {"max_step_fraction": 0.9, "iterative_refinement_max_iter": 50},
 )
-"""What is tried in turn: the defaults solve nearly all programs, and where they do not it is chance which ones do."""
+"""Settings tried in turn. The defaults solve nearly all programs; which others solve the rest cannot be predicted."""
 
 
 class NoSolutionError(ArithmeticError):
@@ -47,11 +47,8 @@ class Optimum:
 class ConeProgram:
     """Minimise v . matrix v / 2 + cost . v over rows, equations and second-order cones.
 
-    Parameters
-    ----------
-    cost : ndarray, shape (p,)
-    matrix : ndarray, shape (p, p), or None
-        Positive semidefinite.
+    `cost` has shape (p,); `matrix`, shape (p, p), is positive semidefinite, and zero where it is None. Rows with fewer
+    than p columns do not depend on the last variables.
     """
 
     def __init__(self, cost: Floats, matrix: Floats | None = None) -> None:
@@ -73,33 +70,29 @@ class ConeProgram:
 
     def bound(self, response: Floats, free: Floats, top: Floats, height: float = 0.0) -> ConeProgram:
         """Add |free + response v| <= top . v + height."""
-        block = np.vstack([-top[None, :], -response])
+        block = np.vstack([-top[None, :], -self._widened(response)])
         return self._add("cone", block, np.concatenate([[height], free]), clarabel.SecondOrderConeT(len(block)))
 
     def _add(self, kind: str, block: Floats, ends: Floats, cone: object) -> ConeProgram:
         if len(block):
-            self._blocks.append(block)
+            self._blocks.append(self._widened(block))
             self._ends.append(ends)
             self._cones.append(cone)
             self._kinds.append(kind)
             self._whole = None
         return self
 
-    def solve(self) -> Optimum:
-        """Return a solution.
+    def _widened(self, rows: Floats) -> Floats:
+        missing = len(self.cost) - rows.shape[1]
+        return np.hstack([rows, np.zeros((len(rows), missing))]) if missing else rows
 
-        Returns
-        -------
-        Optimum
+    def solve(self) -> Optimum:
+        """Return a solution, by an interior-point method (Clarabel).
 
         Raises
         ------
         NoSolutionError
-            If no answer passed the check of `broken_and_apart`.
-
-        Notes
-        -----
-        An interior point (Clarabel), with other settings where its answer fails the check.
+            If the answer fails the check of `need_solution` under all settings tried.
         """
         failed = NoSolutionError("a convex program was not solved")
         for point, multipliers in self.attempts():
@@ -111,18 +104,39 @@ class ConeProgram:
                 return Optimum(point, self.of_rows(multipliers))
         raise failed
 
-    def need_solution(self, point: Floats, multipliers: Floats, cost: Floats | None = None) -> None:
-        """Refuse an answer that breaks a constraint, or whose duality gap is open.
+    def vertex(self) -> Floats:
+        """Return a solution of a linear program, shape (p,): a vertex of its feasible set.
 
-        Parameters
-        ----------
-        point, multipliers, cost
-            As for `broken_and_apart`.
+        The simplex method (HiGHS) finds it, in rows scaled to a greatest entry of one; its answer is checked. Where
+        that fails, `solve` gives the point.
+        """
+        rows, limits = self._stacked("rows")
+        equal, levels = self._stacked("equations")
+        sizes = np.abs(rows).max(axis=1, initial=0.0)
+        sizes[sizes == 0.0] = 1.0
+        rows, limits = rows / sizes[:, None], limits / sizes
+        scaled = ConeProgram(self.cost).meet(equal, levels).keep(rows, limits)
+        equations = {"A_eq": equal, "b_eq": levels} if len(equal) else {}
+        found = linprog(
+            self.cost, A_ub=rows, b_ub=limits, bounds=(None, None), method="highs", options=HIGHS, **equations
+        )
+        if found.status == 0:
+            point = np.asarray(found.x)
+            try:
+                scaled.need_solution(point, -np.concatenate([found.eqlin.marginals, found.ineqlin.marginals]))
+            except NoSolutionError:
+                pass
+            else:
+                return point
+        return scaled.solve().point
+
+    def need_solution(self, point: Floats, multipliers: Floats, cost: Floats | None = None) -> None:
+        """Check the conditions of optimality: see `broken_and_apart` for the arguments.
 
         Raises
         ------
         NoSolutionError
-            If a constraint is broken by more than 1e-9, or the gap is over 1e-8.
+            If a constraint is broken by more than 1e-9, or the duality gap is over 1e-8.
         """
         broken, apart = self.broken_and_apart(point, multipliers, cost)
         if not (broken <= _BROKEN and apart <= _APART):
@@ -132,16 +146,15 @@ class ConeProgram:
             )
 
     def attempts(self) -> Iterator[tuple[Floats, Floats]]:
-        """Yield points and multipliers that a solver takes for a solution, unchecked."""
+        """Yield points and multipliers that the solver returns as solutions, unchecked."""
         for changes in _SETTINGS:
-            solver = self.solver(**changes)
-            solution = solver.solve()
+            solution = self.solver(**changes).solve()
             point, multipliers = np.array(solution.x), np.array(solution.z)
             if np.isfinite(point).all() and np.isfinite(multipliers).all():
                 yield point, multipliers
 
     def solver(self, **changes: float) -> clarabel.DefaultSolver:
-        """Return the solver itself, with some of its settings changed."""
+        """Return Clarabel's solver of the program, with some of its settings changed."""
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.presolve_enable = False
@@ -150,7 +163,7 @@ class ConeProgram:
         for name, value in changes.items():
             setattr(settings, name, value)
         upper = csc_matrix(np.triu(self._matrix.toarray())) if self._matrix.nnz else self._matrix
-        rows, ends = self._stacked()
+        rows, ends = self._all()
         return clarabel.DefaultSolver(upper, self.cost, csc_matrix(rows), ends, self._cones, settings)
 
     def of_rows(self, multipliers: Floats) -> Floats:
@@ -163,32 +176,24 @@ class ConeProgram:
         return [part for kind, part in self._parts(multipliers) if kind == "cone"]
 
     def broken_and_apart(self, point: Floats, multipliers: Floats, cost: Floats | None = None) -> tuple[float, float]:
-        """Return by how much a point breaks a constraint, and how far its value is from a lower bound, relatively.
+        """Return the violation of the constraints at a point, and its duality gap; both relative.
 
-        Parameters
-        ----------
-        point : ndarray, shape (p,)
-        multipliers : ndarray
-            Of all constraints, in their order; moved into the dual cone before they are used.
-        cost : ndarray, shape (p,), optional
-            In place of the program's.
-
-        Returns
-        -------
-        broken, apart : float
+        Multipliers, of all constraints in their order, are moved into the dual cone first. A `cost` is used in place of
+        the program's.
 
         Notes
         -----
-        The gap is relative to the value, or to what the violation that is forgiven may change of it. By weak duality no
-        solution y is below - v . matrix v / 2 - multipliers . limits - |residual| . |y|; y is taken
-        to be at most twice as large as the point.
+        The gap is relative to the value, or to the change of the value that the allowed violation can cause. By weak
+        duality no solution y is below - v . matrix v / 2 - multipliers . limits - |residual| . |y|; y is assumed to be
+        at most twice as large as the point.
         """
         linear = self.cost if cost is None else cost
-        rows, ends = self._stacked()
-        left = ends - rows @ point
+        rows, ends = self._all()
         dual, broken = [np.zeros(0)], 0.0
-        for (kind, slack), (_, given) in zip(self._parts(left), self._parts(multipliers), strict=True):
-            part = given.copy()
+        for (kind, slack), (_, multiplier) in zip(
+            self._parts(ends - rows @ point), self._parts(multipliers), strict=True
+        ):
+            part = multiplier.copy()
             if kind == "rows":
                 broken = max(broken, float(-slack.min()))
                 part = np.maximum(part, 0.0)
@@ -207,62 +212,18 @@ class ConeProgram:
         bound = -curved - float(held @ ends) - size * float(np.abs(residual).sum())
         return broken, abs(value - bound) / max(1.0, abs(value), _BROKEN / _APART * float(np.abs(held).sum()))
 
-    def _stacked(self) -> tuple[Floats, Floats]:
+    def _all(self) -> tuple[Floats, Floats]:
         if self._whole is None:
-            rows = np.vstack([np.zeros((0, len(self.cost))), *self._blocks])
-            self._whole = rows, np.concatenate([np.zeros(0), *self._ends])
+            self._whole = self._stacked()
         return self._whole
+
+    def _stacked(self, wanted: str | None = None) -> tuple[Floats, Floats]:
+        chosen = [i for i, kind in enumerate(self._kinds) if wanted in (None, kind)]
+        rows = np.vstack([np.zeros((0, len(self.cost))), *(self._blocks[i] for i in chosen)])
+        return rows, np.concatenate([np.zeros(0), *(self._ends[i] for i in chosen)])
 
     def _parts(self, values: Floats) -> Iterator[tuple[str, Floats]]:
         start = 0
         for kind, ends in zip(self._kinds, self._ends, strict=True):
             yield kind, values[start : start + len(ends)]
             start += len(ends)
-
-
-def linear(
-    cost: Floats, rows: Floats, limits: Floats, equal: Floats | None = None, levels: Floats | None = None
-) -> Floats:
-    """Minimise cost . v where rows v <= limits and equal v = levels.
-
-    Parameters
-    ----------
-    cost : ndarray, shape (p,)
-    rows : ndarray, shape (r, p)
-    limits : ndarray, shape (r,)
-    equal : ndarray, shape (e, p), optional
-    levels : ndarray, shape (e,), optional
-
-    Returns
-    -------
-    ndarray, shape (p,)
-        A vertex.
-
-    Raises
-    ------
-    NoSolutionError
-        If the program was not solved.
-
-    Notes
-    -----
-    The simplex method (HiGHS), checked as every other program; an interior point where that fails.
-    """
-    sizes = np.abs(rows).max(axis=1, initial=0.0)
-    sizes[sizes == 0.0] = 1.0
-    rows, limits = rows / sizes[:, None], limits / sizes
-    program = ConeProgram(cost)
-    given = {}
-    if equal is not None and levels is not None and len(equal):
-        program.meet(equal, levels)
-        given = {"A_eq": equal, "b_eq": levels}
-    program.keep(rows, limits)
-    found = linprog(cost, A_ub=rows, b_ub=limits, bounds=(None, None), method="highs", options=HIGHS, **given)
-    if found.status == 0:
-        point = np.asarray(found.x)
-        try:
-            program.need_solution(point, -np.concatenate([found.eqlin.marginals, found.ineqlin.marginals]))
-        except NoSolutionError:
-            pass
-        else:
-            return point
-    return program.solve().point

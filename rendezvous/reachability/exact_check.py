@@ -1,4 +1,4 @@
-"""The same sets in exact rational arithmetic, to check the others against; needs the extra `exact` (pplpy)."""
+"""Sets in exact rational arithmetic, for checks; needs the extra `exact` (pplpy)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.reachability.blocks import Block
+from rendezvous.reachability.problem import Block
 
 if TYPE_CHECKING:
     import ppl
@@ -21,7 +21,7 @@ Rationals = list[Fraction]
 
 @dataclass(frozen=True, eq=False)
 class RationalSet:
-    """A polytope in exact rationals, of which floats are told.
+    """A polytope computed in exact rationals, as floats.
 
     Parameters
     ----------
@@ -42,76 +42,29 @@ class RationalSet:
 
 
 def rational_hull(points: Floats) -> RationalSet:
-    """Return the convex hull of points, exactly.
-
-    Parameters
-    ----------
-    points : ndarray, shape (k, n)
-        Floats, taken as the rationals they are.
-
-    Returns
-    -------
-    RationalSet
-
-    Raises
-    ------
-    ModuleNotFoundError
-        Without the extra `exact`.
-
-    Notes
-    -----
-    The Parma Polyhedra Library's double description.
-    """
+    """Return the exact convex hull of points, shape (k, n), by the double description of the library PPL."""
     import ppl
 
     system = ppl.Generator_System()
     for point in points:
-        numerators, divisor = _whole([Fraction(float(each)) for each in point])
+        numerators, divisor = _whole([Fraction(float(value)) for value in point])
         system.insert(ppl.point(_expression(numerators), divisor))
-    return _told(ppl.C_Polyhedron(system), points.shape[1])
+    return _rounded(ppl.C_Polyhedron(system), points.shape[1])
 
 
 def rational_intersection(normals: Floats, offsets: Floats) -> RationalSet:
-    """Return {x: normals x <= offsets}, exactly.
-
-    Parameters
-    ----------
-    normals : ndarray, shape (m, n)
-    offsets : ndarray, shape (m,)
-
-    Returns
-    -------
-    RationalSet
-
-    Raises
-    ------
-    ModuleNotFoundError
-        Without the extra `exact`.
-    """
+    """Return {x: normals x <= offsets}, exactly, for normals of shape (m, n)."""
     import ppl
 
     found = ppl.C_Polyhedron(normals.shape[1], "universe")
     _cut(found, normals, offsets, range(normals.shape[1]))
-    return _told(found, normals.shape[1])
+    return _rounded(found, normals.shape[1])
 
 
 def rational_sets(block: Block) -> tuple[list[RationalSet], list[RationalSet]]:
-    """Return the forward sets of a block and its tube to zero, exactly.
+    """Return the exact forward sets of a block and its exact tube to zero, at t = 0..T.
 
-    Parameters
-    ----------
-    block : Block
-        With thrust in a box and constraints at whole periods; its floats are taken as the rationals they are.
-
-    Returns
-    -------
-    forward, tube : list of RationalSet
-        At t = 0..T.
-
-    Raises
-    ------
-    ModuleNotFoundError
-        Without the extra `exact`.
+    Thrust is in a box and constraints hold at whole periods; floats are taken as the rationals they are.
 
     Notes
     -----
@@ -142,7 +95,9 @@ def rational_sets(block: Block) -> tuple[list[RationalSet], list[RationalSet]]:
         both = ppl.C_Polyhedron(step)
         both.intersection_assign(forward[t])
         tube.append(both)
-    return [_told(each, size) for each in forward], [_told(each, size) for each in reversed(tube)]
+    return [_rounded(polyhedron, size) for polyhedron in forward], [
+        _rounded(polyhedron, size) for polyhedron in reversed(tube)
+    ]
 
 
 def _step(block: Block, period: int, before: int, after: int) -> ppl.C_Polyhedron:
@@ -156,7 +111,7 @@ def _step(block: Block, period: int, before: int, after: int) -> ppl.C_Polyhedro
         found.add_constraint(ppl.Variable(before + size + j) >= -1)
     for i in range(size):
         row = np.concatenate([block.transition[period, i], block.control[period, i]])
-        numerators, divisor = _whole([Fraction(float(each)) for each in row])
+        numerators, divisor = _whole([Fraction(float(value)) for value in row])
         found.add_constraint(divisor * ppl.Variable(after + i) == _expression(numerators, before))
     return found
 
@@ -176,7 +131,7 @@ def _cut(polyhedron: ppl.C_Polyhedron, normals: Floats, offsets: Floats, places:
 
     for normal, offset in zip(normals, offsets, strict=True):
         if np.isfinite(offset):
-            numerators, _ = _whole([Fraction(float(each)) for each in (*normal, offset)])
+            numerators, _ = _whole([Fraction(float(value)) for value in (*normal, offset)])
             total = sum((n * ppl.Variable(place) for n, place in zip(numerators, places, strict=False)), start=0)
             polyhedron.add_constraint(total <= numerators[-1])
 
@@ -189,25 +144,25 @@ def _fix(polyhedron: ppl.C_Polyhedron, state: Floats, places: range) -> None:
         polyhedron.add_constraint(exact.denominator * ppl.Variable(place) == exact.numerator)
 
 
-def _told(polyhedron: ppl.C_Polyhedron, size: int) -> RationalSet:
+def _rounded(polyhedron: ppl.C_Polyhedron, size: int) -> RationalSet:
     import ppl
 
     if polyhedron.is_empty():
         return RationalSet(np.zeros((0, size)), 0, -1, np.zeros((size, 2)))
     points = [
-        [Fraction(int(each.coefficient(ppl.Variable(i))), int(each.divisor())) for i in range(size)]
-        for each in polyhedron.minimized_generators()
+        [Fraction(int(generator.coefficient(ppl.Variable(i))), int(generator.divisor())) for i in range(size)]
+        for generator in polyhedron.minimized_generators()
     ]
-    facets = sum(1 for each in polyhedron.minimized_constraints() if each.is_inequality())
-    vertices = np.array([[float(each) for each in point] for point in points])
+    facets = sum(1 for row in polyhedron.minimized_constraints() if row.is_inequality())
+    vertices = np.array([[float(value) for value in point] for point in points])
     bounds = np.stack([vertices.min(axis=0), vertices.max(axis=0)], axis=-1)
     return RationalSet(vertices, facets, int(polyhedron.affine_dimension()), bounds)
 
 
 def _whole(values: Rationals) -> tuple[list[int], int]:
     """Numerators over a common denominator."""
-    divisor = lcm(*(each.denominator for each in values))
-    return [int(each * divisor) for each in values], divisor
+    divisor = lcm(*(value.denominator for value in values))
+    return [int(value * divisor) for value in values], divisor
 
 
 def _expression(numerators: list[int], first: int = 0) -> ppl.Linear_Expression:

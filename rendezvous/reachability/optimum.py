@@ -1,4 +1,4 @@
-"""The least terminal norm, and the polytope of all controls that reach it."""
+"""The least terminal norm of a block, and the set of all controls that reach it."""
 
 from __future__ import annotations
 
@@ -6,18 +6,32 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import lstsq
 
 from infoset.polytope import null_space_basis, relative_interior
-from rendezvous.reachability.blocks import Block
-from rendezvous.reachability.least_norm import least_norm, reaches_zero
-from rendezvous.reachability.lifted import Lifted, lift
-from rendezvous.reachability.programs import deep_point, least_relaxation
+from rendezvous.reachability.admissible import Lifted, deep_point, least_relaxation, lift
+from rendezvous.reachability.conic import ConeProgram, NoSolutionError
+from rendezvous.reachability.problem import Block
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Places = NDArray[np.int64]
 
 _REACHED = 1e-9
 """Constraints that are broken by less than this, relative to their sizes, count as kept."""
 _PRESSED = 1e-7
+_APART = 1e-8
+"""Greatest relative gap between the norm and its lower bound."""
+_CLOSE = 1e-13
+"""Gap at which the search stops, where rounding allows it."""
+_ZERO = 1e-11
+"""Norms below this part of the reach of the controls count as zero, unless their lower bound is above rounding."""
+_BROKEN = 1e-11
+_ULP = float(np.finfo(float).eps)
+_RANK = 1e-13
+_ROUNDS = 6
+_REACH = 1e4
+_NEWTON_STEPS, _IDLE = 16, 5
 
 
 class EmptyTubeError(ValueError):
@@ -26,11 +40,11 @@ class EmptyTubeError(ValueError):
     Parameters
     ----------
     time : int
-        The first t until which they cannot be kept.
+        The first time t such that the constraints up to t cannot all be kept.
     relaxation : float
-        By which fraction of its size every constraint on states must be relaxed until all can be kept.
+        Least relaxation of all constraints on states, as a fraction of their bounds, with which all can be kept.
     names : tuple of str
-        Constraints that conflict then.
+        Constraints that conflict at that time.
     """
 
     def __init__(self, time: int, relaxation: float, names: tuple[str, ...]) -> None:
@@ -53,13 +67,13 @@ class BlockOptimum:
     lifted : Lifted
         All admissible controls.
     terminal : ndarray, shape (n,)
-        The one terminal state of least norm, scaled; zero, exactly, where that is reachable.
+        The terminal state of least norm, which is unique, scaled; exactly zero where that is reachable.
     reached : bool
         Whether it is zero.
     optimal : Lifted
-        All optimal controls, in coordinates z of their affine hull; thrust in a ball stays a constraint of them.
+        All optimal controls, in coordinates z of their affine hull; thrust in a ball remains a constraint.
     centre : ndarray, shape (d,)
-        Deep inside, in these coordinates.
+        A point deep inside, in these coordinates.
     """
 
     block: Block
@@ -76,22 +90,10 @@ class BlockOptimum:
 
 
 def block_optimum(block: Block, *, relative: bool = False) -> BlockOptimum:
-    """Find the least terminal norm of a block, and all controls that reach it.
+    """Return the least terminal norm of a block, and all controls that reach it.
 
-    Parameters
-    ----------
-    block : Block
-    relative : bool
-        Whether the norm is of states divided by their bounds, and not in the units of the problem.
-
-    Returns
-    -------
-    BlockOptimum
-
-    Raises
-    ------
-    EmptyTubeError
-        If no control keeps the constraints.
+    If `relative`, the norm is of states divided by their bounds; otherwise in the units of the problem.
+    `EmptyTubeError` is raised where no control keeps the constraints.
 
     Notes
     -----
@@ -101,53 +103,43 @@ def block_optimum(block: Block, *, relative: bool = False) -> BlockOptimum:
     """
     block = admissible(block)
     lifted = lift(block)
-    found = least_norm(lifted, np.ones(block.size) if relative else block.scale / block.scale.max())
-    # The solution itself is never outside, by no rounding.
-    lifted = replace(lifted, limits=np.maximum(lifted.limits, lifted.rows @ found.point))
-    gaps = lifted.limits - lifted.rows @ found.point
-    most = max(float(found.multipliers.max(initial=0.0)), float(np.abs(found.pressures).max(initial=0.0)))
-    held = (found.multipliers > gaps) & (found.multipliers > _REACHED * most)
+    least = least_norm(lifted, np.ones(block.size) if relative else block.scale / block.scale.max())
+    # The solution itself must not be outside by rounding.
+    lifted = replace(lifted, limits=np.maximum(lifted.limits, lifted.rows @ least.point))
+    gaps = lifted.limits - lifted.rows @ least.point
+    most = max(float(least.multipliers.max(initial=0.0)), float(np.abs(least.pressures).max(initial=0.0)))
+    held = (least.multipliers > gaps) & (least.multipliers > _REACHED * most)
     fixed = np.zeros(len(lifted.control_free), dtype=bool)
     if lifted.ball:  # on the sphere the thrust of a period is unique
-        pressed = np.linalg.norm(found.pressures.reshape(-1, lifted.ball), axis=1)
+        pressed = np.linalg.norm(least.pressures.reshape(-1, lifted.ball), axis=1)
         fixed = np.repeat(pressed > max(_PRESSED * most, 1e-300), lifted.ball)
     across = np.vstack([lifted.rows[held], lifted.control_response[fixed]])
-    terminal = np.zeros(block.size) if found.reached else lifted.free[-1] + lifted.response[-1] @ found.point
-    face = lifted.where(lifted.response[-1], terminal - lifted.free[-1]).where(across, across @ found.point)
-    return _with_hull(block, lifted, terminal, found.reached, face, found.point)
+    terminal = np.zeros(block.size) if least.reached else lifted.free[-1] + lifted.response[-1] @ least.point
+    face = lifted.where(lifted.response[-1], terminal - lifted.free[-1]).where(across, across @ least.point)
+    if lifted.ball:
+        optimal = face.within(least.point, null_space_basis(face.equal))
+        optimal = optimal.only(np.flatnonzero(np.linalg.norm(optimal.rows, axis=1) > _REACHED))
+        return BlockOptimum(block, lifted, terminal, least.reached, optimal, deep_point(optimal)[0])
+    hull = relative_interior(face.rows, face.limits, face.equal, face.levels, bounded=True, member=least.point)
+    optimal = face.within(hull.point, hull.basis).only(hull.kept)
+    return BlockOptimum(block, lifted, terminal, least.reached, optimal, hull.centre)
 
 
 def block_reaches_zero(block: Block) -> bool:
-    """Return whether admissible controls lead a block to zero.
-
-    Parameters
-    ----------
-    block : Block
-
-    Returns
-    -------
-    bool
-    """
+    """Return whether admissible controls lead a block to zero."""
     relaxation = least_relaxation(lift(block))[0]
     return relaxation <= _REACHED and reaches_zero(lift(_relaxed(block, relaxation)))
 
 
 def admissible(block: Block) -> Block:
-    """Return a block that controls can keep in its constraints: itself, or relaxed by rounding.
+    """Return a block whose constraints some controls keep: itself, or relaxed by rounding.
 
-    Parameters
-    ----------
-    block : Block
-
-    Returns
-    -------
-    Block
-        Where no control keeps the constraints by 1e-9 of their sizes, all of them are relaxed until one does.
+    Where no control keeps the constraints by 1e-9 of their sizes, all of them are relaxed until one does.
 
     Raises
     ------
     EmptyTubeError
-        If that takes more than 1e-9, with the first time they conflict at, found by bisection, a linear program each.
+        If that takes more than 1e-9, with the first time at which they conflict, by bisection: a linear program each.
     """
     lifted = lift(block)
     relaxation = least_relaxation(lifted)[0]
@@ -175,14 +167,312 @@ def _relaxed(block: Block, relaxation: float) -> Block:
     return replace(block, offsets=block.offsets + margin) if margin > 0.0 else block
 
 
-def _with_hull(
-    block: Block, lifted: Lifted, terminal: Floats, reached: bool, face: Lifted, member: Floats
-) -> BlockOptimum:
-    """Find the affine hull of the optimal controls, through one of them."""
-    if lifted.ball:
-        optimal = face.within(member, null_space_basis(face.equal))
-        optimal = optimal.only(np.flatnonzero(np.linalg.norm(optimal.rows, axis=1) > _REACHED))
-        return BlockOptimum(block, lifted, terminal, reached, optimal, deep_point(optimal)[0])
-    hull = relative_interior(face.rows, face.limits, face.equal, face.levels, bounded=True, member=member)
-    optimal = face.within(hull.point, hull.basis).only(hull.kept)
-    return BlockOptimum(block, lifted, terminal, reached, optimal, hull.centre)
+@dataclass(frozen=True, eq=False)
+class LeastNorm:
+    """The controls of least terminal norm.
+
+    Parameters
+    ----------
+    point : ndarray, shape (p,)
+    value : float
+        The norm; exactly zero where it is below rounding.
+    bound : float
+        A lower bound on the norm over all admissible controls.
+    multipliers : ndarray, shape (r,)
+        Of the rows, those of a box included: derivative of the norm by a limit, sign reversed.
+    pressures : ndarray, shape (p,)
+        Derivative of the norm, without its constraints' part, by each control: the bounds on controls balance it.
+    """
+
+    point: Floats
+    value: float
+    bound: float
+    multipliers: Floats
+    pressures: Floats
+
+    @property
+    def reached(self) -> bool:
+        """Whether zero is reached."""
+        return self.value == 0.0
+
+
+def least_norm(lifted: Lifted, weights: Floats) -> LeastNorm:
+    """Minimise |weights x(T)| over all controls of a block, a set without equations; weights, shape (n,), are positive.
+
+    Raises
+    ------
+    NoSolutionError
+        If the norm found is not within 1e-8 of its lower bound, or its controls violate a constraint.
+
+    Notes
+    -----
+    The cone program minimises t with |weights x(T)| <= t, not the square of the norm, whose multipliers vanish with
+    it. A solver finds t to its tolerance times the size of the states; the program is therefore solved again about its
+    own solution, in units of the norm found, until both bounds meet (iterative refinement).
+
+    The lower bound is that of weak duality. For any direction d with |d| <= 1 and any multipliers l >= 0 of the
+    constraints on states, |y| >= d . y, and d . y is not below d . free - l . limits - the norm of
+    R' d + rows' l that is dual to the bound on the controls: a bound whether or not d and l are optimal. They are
+    first moved to where R' d + rows' l vanishes for each control that is not at its bound, so that the error of the
+    bound is of the order of the square of theirs.
+    """
+    search = _Search(lifted, weights)
+    search.solve()
+    return search.result()
+
+
+def reaches_zero(lifted: Lifted) -> bool:
+    """Return whether some controls of a block, a set without equations, reach zero.
+
+    `NoSolutionError` is raised where neither such a control nor a lower bound above zero was found.
+    """
+    search = _Search(lifted, np.ones(lifted.free.shape[1]))
+    search.solve()
+    return not search.above_zero and search.result().reached
+
+
+class _Search:
+    """The best point and the best lower bound so far."""
+
+    def __init__(self, lifted: Lifted, weights: Floats) -> None:
+        self._lifted = lifted
+        self._free = weights * lifted.free[-1]
+        self._response = weights[:, None] * lifted.response[-1]
+        self._soft = lifted.moments >= 0
+        self._size = lifted.size
+        self._group = lifted.ball or 1
+        self._point = np.zeros(self._size)
+        self.value = float(np.linalg.norm(self._free))
+        self._merit = np.inf
+        self._bound, self._error = -np.inf, 0.0
+        self._direction = np.zeros(len(self._free))
+        self._multipliers = np.zeros(len(lifted.rows))
+        reach = np.abs(self._free) + np.abs(self._response).sum(axis=1)
+        self._lengths = np.abs(lifted.rows).sum(axis=1)
+        self._reach = float(np.linalg.norm(reach))
+
+    @property
+    def at_zero(self) -> bool:
+        """Whether the norm at the point is zero to rounding."""
+        return self._outside(self._point) <= _BROKEN and self.value <= (
+            _ZERO * self._reach if not self.above_zero else 32.0 * _ULP * self._reach
+        )
+
+    @property
+    def _good(self) -> bool:
+        return self.at_zero or self._merit <= _APART * self.value + self._error
+
+    @property
+    def above_zero(self) -> bool:
+        """Whether the lower bound proves that zero is not reached."""
+        return self._bound > self._error
+
+    def solve(self) -> None:
+        """Solve the cone program, again about its solution where that is not accurate enough, and improve on it."""
+        if not self._size:
+            self._offer_point(self._point)
+            self._offer_bound(self._free / max(self.value, 1e-300), self._multipliers)
+            return
+        scale = 1.0
+        for _ in range(_ROUNDS):
+            start, before = self._point, self._merit
+            program, kept = self._program(start, scale)
+            for inner, dual in program.attempts():
+                multipliers = np.zeros(len(self._multipliers))
+                multipliers[kept] = program.of_rows(dual)[: len(kept)]
+                multipliers[~self._soft] = 0.0
+                guess = start + scale * inner[:-1], -program.of_cones(dual)[0][1:], multipliers
+                self._offer_point(guess[0])
+                self._offer_bound(guess[1], guess[2])
+                self._improve(*guess)
+                if self._good:
+                    return
+                if self._merit < 0.5 * before:
+                    break
+            scale = min(scale, self.value)
+
+    def result(self) -> LeastNorm:
+        """Return the solution, if it is accurate enough."""
+        if not self._good:
+            raise NoSolutionError(
+                f"the least terminal norm was not found: it lies between {self._bound:.6g} and {self.value:.6g} of the "
+                "largest bound on a state"
+            )
+        value = 0.0 if self.at_zero else self.value
+        residual = self._residual(self._direction, self._multipliers)
+        if self.at_zero and self._bound < -_ZERO * self._reach:
+            # Zero is inside the set reached: no constraint is active.
+            return LeastNorm(self._point, value, 0.0, np.zeros(len(self._multipliers)), np.zeros(self._size))
+        multipliers = self._multipliers.copy()
+        if not self._lifted.ball and self._size:
+            # The rows of a box, which hold a control at its bound.
+            hard = np.flatnonzero(~self._soft)
+            multipliers[hard] = np.maximum(-self._lifted.rows[hard] @ residual, 0.0)
+        return LeastNorm(self._point, value, min(self._bound, value), multipliers, residual)
+
+    def _program(self, start: Floats, scale: float) -> tuple[ConeProgram, NDArray[np.int64]]:
+        """The cone program in v = start + scale z, without the constraints that z cannot reach."""
+        lifted, size = self._lifted, self._size
+        slack = (lifted.limits - lifted.rows @ start) / scale
+        reach = _REACH if scale < 1.0 else np.inf
+        kept = np.flatnonzero(slack < reach) if scale == 1.0 else np.flatnonzero(slack < reach * self._lengths)
+        ends = slack[kept] if scale == 1.0 else np.maximum(slack[kept], 0.0)
+        cost = np.zeros(size + 1)
+        cost[-1] = 1.0
+        program = ConeProgram(cost).keep(lifted.rows[kept], ends)
+        if scale < 1.0:
+            unit = np.eye(size)
+            program.keep(np.vstack([unit, -unit]), np.full(2 * size, _REACH))
+        program.bound(self._response, (self._free + self._response @ start) / scale, cost)
+        if lifted.ball:
+            self._bound_thrust(program, start, scale, reach)
+        return program, kept
+
+    def _bound_thrust(self, program: ConeProgram, start: Floats, scale: float, reach: float) -> None:
+        """|start + scale z| <= 1 as |z|^2 <= 2 w with an affine w, which is accurate for any scale."""
+        group = self._lifted.ball
+        for first in range(0, self._size, group):
+            mine = slice(first, first + group)
+            room = 0.5 * (1.0 - float(start[mine] @ start[mine])) / scale
+            if room > group * reach + scale * group * reach**2:
+                continue
+            size = max(1.0, room)
+            top = np.zeros(self._size + 1)
+            top[mine] = -start[mine] / size
+            block = np.zeros((group + 1, self._size + 1))
+            block[:group, mine] = np.sqrt(scale / size) * np.eye(group)
+            block[group] = np.sqrt(0.5) * top
+            free = np.zeros(group + 1)
+            free[group] = np.sqrt(0.5) * (room / size - 1.0)
+            program.bound(block, free, np.sqrt(0.5) * top, float(np.sqrt(0.5) * (room / size + 1.0)))
+
+    def _residual(self, direction: Floats, multipliers: Floats) -> Floats:
+        """R' d + rows' l."""
+        return np.asarray(self._response.T @ direction + self._lifted.rows.T @ multipliers)
+
+    def _offer_bound(self, direction: Floats, multipliers: Floats) -> None:
+        length = float(np.linalg.norm(direction))
+        if length == 0.0:
+            return
+        direction = direction / length
+        multipliers = np.where(self._soft, np.maximum(multipliers, 0.0), 0.0) / length
+        residual = self._residual(direction, multipliers)
+        pressed = self._norms(residual)
+        bound = float(direction @ self._free - multipliers @ self._lifted.limits) - float(pressed.sum())
+        if bound > self._bound:
+            turned, held = np.abs(direction), np.abs(self._lifted.rows).T @ multipliers
+            parts = turned @ np.abs(self._free) + multipliers @ np.abs(self._lifted.limits)
+            self._error = 8.0 * _ULP * float(parts + (np.abs(self._response).T @ turned + held).sum() + self._reach)
+            self._bound, self._direction, self._multipliers = bound, direction, multipliers
+            self._merit = self._merit_of(self._point)
+
+    def _offer_point(self, point: Floats) -> None:
+        merit = self._merit_of(point)
+        if merit < self._merit or not np.isfinite(self._merit):
+            self._point, self._merit = point, merit
+            self.value = float(np.linalg.norm(self._free + self._response @ point))
+
+    def _merit_of(self, point: Floats) -> float:
+        value = float(np.linalg.norm(self._free + self._response @ point))
+        outside = self._outside(point)
+        # A violated constraint gains about as much; violated by more than rounding, the search goes on from the point.
+        return abs(value - max(self._bound, 0.0)) + outside * self._reach + (1.0 if outside > _BROKEN else 0.0)
+
+    def _outside(self, point: Floats) -> float:
+        broken = float((self._lifted.rows @ point - self._lifted.limits - 32.0 * _ULP * self._lengths).max(initial=0.0))
+        if self._lifted.ball and self._size:
+            broken = max(broken, float(self._norms(point).max()) - 1.0)
+        return broken
+
+    def _improve(self, point: Floats, direction: Floats, multipliers: Floats) -> None:
+        """Bring point and bound together: Newton's method on the conditions of optimality.
+
+        A bound is active in the next step where its multiplier is above its slack (a primal-dual active set). The
+        unknowns are the step, the direction y / |y| and the multipliers: the system stays well conditioned for small y.
+        """
+        pressed = self._norms(self._residual(direction, multipliers))
+        idle = 0
+        for _ in range(_NEWTON_STEPS):
+            before = self._merit
+            gaps = self._lifted.limits - self._lifted.rows @ point
+            active = np.flatnonzero(self._soft & (multipliers > gaps))
+            held = pressed > 1.0 - self._norms(point)
+            self._offer_bound(*self._sharpened(direction, multipliers, active, held))
+            step, turned, forces, pressed = self._newton(point, active, held, pressed)
+            point, multipliers = point + step, np.zeros(len(gaps))
+            multipliers[active] = forces
+            self._offer_point(point)
+            length = float(np.linalg.norm(turned))
+            if not length > _RANK:
+                return
+            direction, multipliers, pressed = turned / length, multipliers / length, pressed / length
+            self._offer_bound(direction, multipliers)
+            idle = 0 if self._merit < before else idle + 1
+            if self._merit <= _CLOSE * self.value or idle == _IDLE:
+                return
+            if idle > 1:
+                point = self._slid(point, direction, multipliers, pressed, held)
+
+    def _newton(
+        self, point: Floats, active: Places, held: Flags, pressed: Floats
+    ) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return a step, the terminal state after it in units of its norm before, and multipliers."""
+        size, count, group = self._size, len(self._free), self._group
+        normals = np.zeros((len(held), size))
+        for period in range(len(held)):
+            mine = slice(period * group, (period + 1) * group)
+            normals[period, mine] = point[mine]
+        normals = normals[held]
+        state = self._free + self._response @ point
+        tied = np.vstack([self._response, self._lifted.rows[active], normals])
+        system = np.zeros((size + len(tied),) * 2)
+        if self._lifted.ball:
+            system[:size, :size] = np.diag(np.repeat(np.where(held, np.maximum(pressed, 0.0), 0.0), group))
+        system[:size, size:], system[size:, :size] = tied.T, tied
+        system[size : size + count, size : size + count] = -max(float(np.linalg.norm(state)), 1e-300) * np.eye(count)
+        missing = self._lifted.limits[active] - self._lifted.rows[active] @ point
+        right = np.concatenate([np.zeros(size), -state, missing, 0.5 * (1.0 - (normals**2).sum(axis=1))])
+        solution = lstsq(system, right, cond=_RANK, lapack_driver="gelsy")[0]
+        step, turned, forces, norms = np.split(solution, np.cumsum([size, count, len(active)]))
+        after = np.zeros(len(held))
+        after[held] = norms
+        return step, turned, forces, after
+
+    def _slid(self, point: Floats, direction: Floats, multipliers: Floats, pressed: Floats, held: Flags) -> Floats:
+        """Move down a slope that Newton's method neglected, to the first bound, whose multiplier becomes positive.
+
+        The norm falls by rounding for a step of an ulp, and by more than rounding for the whole step.
+        """
+        slope = np.where(np.repeat(held, self._group), 0.0, self._residual(direction, multipliers))
+        steep = float(np.linalg.norm(slope))
+        if steep == 0.0:
+            return point
+        way = -slope / steep
+        rate, gaps = self._lifted.rows @ way, self._lifted.limits - self._lifted.rows @ point
+        ahead = np.flatnonzero(self._soft & (rate > _RANK) & (multipliers == 0.0))
+        lengths = np.maximum(gaps[ahead], 0.0) / rate[ahead]
+        a, b = self._norms(way) ** 2, (way * point).reshape(-1, self._group).sum(axis=1)
+        free = np.flatnonzero(~held & (a > _RANK**2))
+        c = np.minimum(self._norms(point)[free] ** 2 - 1.0, 0.0)
+        others = (np.sqrt(b[free] ** 2 - a[free] * c) - b[free]) / a[free]
+        far = min(lengths.min(initial=np.inf), others.min(initial=np.inf))
+        if not np.isfinite(far):
+            return point
+        multipliers[ahead[lengths <= far]] = steep
+        pressed[free[others <= far]] = steep
+        self._offer_point(point + far * way)
+        return np.asarray(point + far * way)
+
+    def _sharpened(self, direction: Floats, multipliers: Floats, active: Places, held: Flags) -> tuple[Floats, Floats]:
+        """Move multipliers to where controls that are not at their bounds are stationary."""
+        moving = np.repeat(~held, self._group)
+        system = np.hstack([self._response[:, moving].T, self._lifted.rows[np.ix_(active, moving)].T])
+        both = np.concatenate([direction, multipliers[active]])
+        both = both - np.linalg.lstsq(system, system @ both, rcond=_RANK)[0]
+        sharp = np.zeros(len(multipliers))
+        length = max(float(np.linalg.norm(both[: len(direction)])), 1e-300)
+        sharp[active] = both[len(direction) :] / length
+        return both[: len(direction)] / length, sharp
+
+    def _norms(self, controls: Floats) -> Floats:
+        return np.asarray(np.linalg.norm(controls.reshape(-1, self._group), axis=1))

@@ -1,37 +1,40 @@
-"""Terminal control of a linear system in discrete time under constraints on its states and controls."""
+"""Terminal control of a linear system in discrete time under constraints, and the independent blocks of a problem."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 Floats = NDArray[np.float64]
+Places = NDArray[np.int64]
 
 MOST_PERIODS = 256
 
 
 class ThrustShape(Enum):
-    """What the bounds on a control mean."""
+    """Meaning of the bounds on a control: of each component (box), or of its Euclidean norm (ball)."""
 
     BOX = "box"
     BALL = "ball"
 
 
 class InadmissibleStartError(ValueError):
-    """The initial state breaks a constraint.
+    """The initial state violates constraints.
 
     Parameters
     ----------
     broken : tuple of tuple of (str, float)
-        Each broken constraint, and by how much.
+        Names of the constraints, each with its violation.
     """
 
     def __init__(self, broken: tuple[tuple[str, float], ...]) -> None:
-        said = ", ".join(f"{name} by {excess:.6g}" for name, excess in broken)
-        super().__init__(f"the initial state is outside its constraints: {said}")
+        listed = ", ".join(f"{name} by {excess:.6g}" for name, excess in broken)
+        super().__init__(f"the initial state is outside its constraints: {listed}")
         self.broken = broken
 
 
@@ -52,16 +55,17 @@ class ReachabilityProblem:
     control_bounds : ndarray, shape (m,)
         |u_j| <= control_bounds_j for a box; for a ball the Euclidean norm is bounded and all must be equal.
     thrust : ThrustShape
+        Meaning of `control_bounds`.
     normals : ndarray, shape (k, n)
-        More constraints on states: normals x(t) <= offsets(t).
+        Further constraints on states: normals x(t) <= offsets(t).
     offsets : ndarray, shape (T + 1, k)
         In the units of normals x; infinite where a constraint does not hold.
     constraint_names : tuple of str
-        What to call these k in messages.
+        Names of these k constraints in messages.
     between : ndarray, shape (T, s, n, n + m) or None
-        States between the periods, x = between[t, i] (x(t), u(t)), at which the constraints are to hold too.
+        States within the periods, x = between[t, i] (x(t), u(t)), at which the constraints hold too.
     state_names : tuple of str
-        What to call the states in messages.
+        Names of the states in messages.
 
     Raises
     ------
@@ -134,20 +138,27 @@ class ReachabilityProblem:
     def _check_start(self) -> None:
         over = np.abs(self.initial) - self.state_bounds
         broken = [(self.state_name(i), float(over[i])) for i in np.flatnonzero(over > 0.0).tolist()]
-        if self.normals is not None and self.offsets is not None:
-            excess = self.normals @ self.initial - self.offsets[0]
-            slack = 1e-12 * np.abs(self.normals) @ self.state_bounds
-            broken += [(self.name_of(k), float(excess[k])) for k in np.flatnonzero(excess > slack).tolist()]
+        normals, offsets = self.further
+        excess = normals @ self.initial - offsets[0]
+        slack = 1e-12 * np.abs(normals) @ self.state_bounds
+        broken += [(self.name_of(k), float(excess[k])) for k in np.flatnonzero(excess > slack).tolist()]
         if broken:
             raise InadmissibleStartError(tuple(broken))
 
     def name_of(self, constraint: int) -> str:
-        """Return what to call a `constraint` beyond the bounds, by its place."""
+        """Return the name of a `constraint` beyond the bounds, by its index."""
         return self.constraint_names[constraint] if self.constraint_names else f"constraint {constraint + 1}"
 
     def state_name(self, state: int) -> str:
-        """Return what to call a state, by its place."""
+        """Return the name of a `state`, by its index."""
         return self.state_names[state] if self.state_names else f"state {state + 1}"
+
+    @property
+    def further(self) -> tuple[Floats, Floats]:
+        """`normals` and `offsets`, with k = 0 rows where there are none."""
+        if self.normals is None or self.offsets is None:
+            return np.zeros((0, self.states)), np.zeros((self.periods + 1, 0))
+        return self.normals, self.offsets
 
     @property
     def periods(self) -> int:
@@ -165,103 +176,167 @@ class ReachabilityProblem:
         return int(self.control.shape[2])
 
     def run(self, controls: ArrayLike) -> Floats:
-        """Return the states that controls lead through.
-
-        Parameters
-        ----------
-        controls : array_like, shape (..., T, m)
-
-        Returns
-        -------
-        ndarray, shape (..., T + 1, n)
-        """
-        given = np.asarray(controls, dtype=float)
-        states = [np.broadcast_to(self.initial, (*given.shape[:-2], self.states))]
+        """Return the states, shape (..., T + 1, n), under `controls`, shape (..., T, m)."""
+        thrust = np.asarray(controls, dtype=float)
+        states = [np.broadcast_to(self.initial, (*thrust.shape[:-2], self.states))]
         for t in range(self.periods):
-            states.append(states[-1] @ self.transition[t].T + given[..., t, :] @ self.control[t].T)
+            states.append(states[-1] @ self.transition[t].T + thrust[..., t, :] @ self.control[t].T)
         return np.stack(states, axis=-2)
 
     def excess(self, controls: ArrayLike) -> Floats:
-        """Return by how much controls break a constraint, relative to the bounds; at most 0 where they break none.
+        """Return the greatest violation of a constraint by `controls`, shape (..., T, m), relative to the bounds.
 
-        Parameters
-        ----------
-        controls : array_like, shape (..., T, m)
-
-        Returns
-        -------
-        ndarray, shape (...)
+        It is at most 0 where all constraints hold.
         """
-        given = np.asarray(controls, dtype=float)
+        thrust = np.asarray(controls, dtype=float)
         if self.thrust is ThrustShape.BALL:
-            worst = np.linalg.norm(given, axis=-1).max(axis=-1) / self.control_bounds[0] - 1.0
+            worst = np.linalg.norm(thrust, axis=-1).max(axis=-1) / self.control_bounds[0] - 1.0
         else:
-            worst = (np.abs(given) / self.control_bounds).max(axis=(-1, -2)) - 1.0
-        states = self.run(given)
+            worst = (np.abs(thrust) / self.control_bounds).max(axis=(-1, -2)) - 1.0
+        states = self.run(thrust)
         worst = np.maximum(worst, self._state_excess(states, np.arange(self.periods + 1)))
         if self.between is not None:
-            both = np.concatenate([states[..., :-1, :], given], axis=-1)
+            both = np.concatenate([states[..., :-1, :], thrust], axis=-1)
             inner = np.einsum("tsij,...tj->...tsi", self.between, both)
-            for place in range(self.between.shape[1]):
-                worst = np.maximum(worst, self._state_excess(inner[..., place, :], np.arange(self.periods)))
+            for instant in range(self.between.shape[1]):
+                worst = np.maximum(worst, self._state_excess(inner[..., instant, :], np.arange(self.periods)))
         return np.asarray(worst)
 
     def _state_excess(self, states: Floats, times: NDArray[np.int64]) -> Floats:
         """Worst over the last two axes (time, state); a constraint holds between t and t + 1 where it does at t."""
         worst = (np.abs(states) / self.state_bounds).max(axis=(-1, -2)) - 1.0
-        if self.normals is not None and self.offsets is not None:
-            sizes = np.abs(self.normals) @ self.state_bounds
-            beyond = (states @ self.normals.T - self.offsets[times]) / sizes
-            worst = np.maximum(worst, beyond.max(axis=(-1, -2)))
-        return np.asarray(worst)
+        normals, offsets = self.further
+        beyond = (states @ normals.T - offsets[times]) / (np.abs(normals) @ self.state_bounds)
+        return np.asarray(np.maximum(worst, beyond.max(axis=(-1, -2), initial=-np.inf)))
 
     def first(self, periods: int) -> ReachabilityProblem:
-        """Return the problem that ends after the first periods.
-
-        Parameters
-        ----------
-        periods : int
-            From 1 to T.
-
-        Returns
-        -------
-        ReachabilityProblem
-        """
+        """Return the problem that ends after the first `periods`, from 1 to T."""
         return self._part(0, periods, self.initial)
 
     def rest(self, start: int, state: ArrayLike) -> ReachabilityProblem:
-        """Return the problem that begins at a later time, from a state.
+        """Return the problem that begins at time `start`, from 0 to T - 1, in a `state`, shape (n,).
 
-        Parameters
-        ----------
-        start : int
-            From 0 to T - 1.
-        state : array_like, shape (n,)
-
-        Returns
-        -------
-        ReachabilityProblem
-
-        Raises
-        ------
-        InadmissibleStartError
-            If the state breaks a constraint.
+        `InadmissibleStartError` is raised where the state violates a constraint.
         """
         return self._part(start, self.periods, np.asarray(state, dtype=float))
 
     def _part(self, start: int, end: int, state: Floats) -> ReachabilityProblem:
         if not 0 <= start < end <= self.periods:
             raise ValueError(f"T = 0: from period {start} to {end} is no part of {self.periods} periods")
-        return ReachabilityProblem(
-            self.transition[start:end],
-            self.control[start:end],
-            state,
-            self.state_bounds,
-            self.control_bounds,
-            self.thrust,
-            self.normals,
-            None if self.offsets is None else self.offsets[start : end + 1],
-            self.constraint_names,
-            None if self.between is None else self.between[start:end],
-            self.state_names,
+        return replace(
+            self,
+            transition=self.transition[start:end],
+            control=self.control[start:end],
+            initial=state,
+            offsets=None if self.offsets is None else self.offsets[start : end + 1],
+            between=None if self.between is None else self.between[start:end],
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """States and controls that do not act on any others, divided by their bounds.
+
+    Parameters
+    ----------
+    states, controls : ndarray of int
+        Their indices in the problem.
+    scale : ndarray, shape (n,)
+        Bounds on the states, in their own units.
+    transition, control, initial
+        As in the problem, scaled.
+    normals : ndarray, shape (k, n)
+        All constraints on states, the bounds first; of unit length.
+    offsets : ndarray, shape (T + 1, k)
+    names : tuple of str
+        Names of these k constraints.
+    ball : bool
+        Whether |u(t)| <= 1 in the Euclidean norm; otherwise of each component.
+    between : ndarray, shape (T, s, n, n + m) or None
+    """
+
+    states: Places
+    controls: Places
+    scale: Floats
+    transition: Floats
+    control: Floats
+    initial: Floats
+    normals: Floats
+    offsets: Floats
+    names: tuple[str, ...]
+    ball: bool
+    between: Floats | None
+
+    @property
+    def periods(self) -> int:
+        """Number of periods T."""
+        return len(self.transition)
+
+    @property
+    def size(self) -> int:
+        """Number of states n."""
+        return len(self.states)
+
+    def first(self, periods: int) -> Block:
+        """Return the block that ends after the first periods."""
+        return replace(
+            self,
+            transition=self.transition[:periods],
+            control=self.control[:periods],
+            offsets=self.offsets[: periods + 1],
+            between=None if self.between is None else self.between[:periods],
+        )
+
+
+def split(problem: ReachabilityProblem) -> tuple[Block, ...]:
+    """Return the smallest blocks that a problem decomposes into, in the order of their first states.
+
+    Together they have all states, and all controls that act on any.
+    """
+    n, m = problem.states, problem.controls
+    linked = np.zeros((n + m, n + m), dtype=bool)
+    linked[:n, :n] = (problem.transition != 0.0).any(axis=0)
+    linked[:n, n:] = (problem.control != 0.0).any(axis=0)
+    if problem.between is not None:
+        linked[:n] |= (problem.between != 0.0).any(axis=(0, 1))
+    for normal in problem.further[0]:
+        acting = np.flatnonzero(normal)
+        linked[acting[0], acting] = True
+    if problem.thrust is ThrustShape.BALL:
+        linked[n, n:] = True
+    labels = connected_components(csr_array(linked), directed=False)[1]
+    order = list(dict.fromkeys(labels[:n].tolist()))
+    return tuple(_block(problem, np.flatnonzero(labels == label)) for label in order)
+
+
+def _block(problem: ReachabilityProblem, members: Places) -> Block:
+    n = problem.states
+    states, controls = members[members < n], members[members >= n] - n
+    scale, reach = problem.state_bounds[states], problem.control_bounds[controls]
+    square, oblong = np.ix_(states, states), np.ix_(states, controls)
+    transition = np.array([matrix[square] for matrix in problem.transition]) / scale[:, None] * scale
+    control = np.array([matrix[oblong] for matrix in problem.control]) / scale[:, None] * reach
+    unit = np.eye(len(states))
+    normals, offsets = problem.further
+    mine = np.flatnonzero(np.abs(normals[:, states]).max(axis=1, initial=0.0) > 0.0)
+    rows = normals[np.ix_(mine, states)] * scale
+    lengths = np.linalg.norm(rows, axis=1)
+    names = [f"the bound on {problem.state_name(i)}" for i in states.tolist()] * 2
+    names += [problem.name_of(k) for k in mine.tolist()]
+    between = None
+    if problem.between is not None:
+        inner = problem.between[:, :, states][:, :, :, members]
+        between = inner / scale[:, None] * np.concatenate([scale, reach])
+    return Block(
+        states,
+        controls,
+        scale,
+        transition,
+        control,
+        problem.initial[states] / scale,
+        np.vstack([unit, -unit, rows / lengths[:, None]]),
+        np.hstack([np.ones((problem.periods + 1, 2 * len(states))), offsets[:, mine] / lengths]),
+        tuple(names),
+        problem.thrust is ThrustShape.BALL,
+        between,
+    )

@@ -1,4 +1,4 @@
-"""Bounded disturbances: constraints tightened by what they add up to, and plans with feedback from them."""
+"""Bounded disturbances: constraints tightened by their accumulated effect, and plans with feedback from them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _TIDY = 1e-7
 
 
 class NoRobustPlanError(ValueError):
-    """No plan keeps the constraints whatever the disturbance does."""
+    """No plan keeps the constraints under every disturbance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,12 +29,13 @@ class FeedbackPlan:
     Parameters
     ----------
     problem : ReachabilityProblem
+        The problem without disturbance.
     disturbance : ndarray, shape (T, n, q)
-        x(t + 1) = A x + B u + disturbance[t] w(t), |w_k(t)| <= 1.
+        x(t + 1) = A x + B u + disturbance[t] w(t), |w_k(t)| <= 1, in the units of the states.
     nominal : ndarray, shape (T, m)
     gains : ndarray, shape (T, T, m, q)
     lower, upper : ndarray, shape (T + 1, n)
-        What each state stays between, whatever w does: the robust tube.
+        Bounds of each state over all disturbances: the robust tube.
     """
 
     problem: ReachabilityProblem
@@ -50,39 +51,23 @@ class FeedbackPlan:
         return float(np.linalg.norm(np.maximum(np.abs(self.lower[-1]), np.abs(self.upper[-1]))))
 
     def run(self, moves: ArrayLike) -> tuple[Floats, Floats]:
-        """Fly against a disturbance.
+        """Return the states, shape (T + 1, n), and controls, shape (T, m), under a disturbance.
 
-        Parameters
-        ----------
-        moves : array_like, shape (T, q)
-            w, each within 1.
-
-        Returns
-        -------
-        states : ndarray, shape (T + 1, n)
-        controls : ndarray, shape (T, m)
+        `moves`, shape (T, q), are the values of w, each within 1.
         """
-        given = np.asarray(moves, dtype=float)
-        controls = self.nominal + np.einsum("tsmq,sq->tm", self.gains, given)
+        w = np.asarray(moves, dtype=float)
+        controls = self.nominal + np.einsum("tsmq,sq->tm", self.gains, w)
         states = [self.problem.initial]
         for t in range(self.problem.periods):
-            pushed = self.disturbance[t] @ given[t]
+            pushed = self.disturbance[t] @ w[t]
             states.append(self.problem.transition[t] @ states[-1] + self.problem.control[t] @ controls[t] + pushed)
         return np.array(states), controls
 
 
 def accumulated(problem: ReachabilityProblem, disturbance: Floats) -> Floats:
-    """Return what each disturbance has become by each time, without feedback.
+    """Return the effect of each disturbance at each time, without feedback, shape (T + 1, T, n, q).
 
-    Parameters
-    ----------
-    problem : ReachabilityProblem
-    disturbance : ndarray, shape (T, n, q)
-
-    Returns
-    -------
-    ndarray, shape (T + 1, T, n, q)
-        Of w(s) at t: A(t - 1) ... A(s + 1) disturbance[s], zero for s >= t.
+    That of w(s) at t is A(t - 1) ... A(s + 1) disturbance[s], zero for s >= t.
     """
     periods = problem.periods
     effect = np.zeros((periods + 1, periods, *disturbance.shape[1:]))
@@ -93,23 +78,11 @@ def accumulated(problem: ReachabilityProblem, disturbance: Floats) -> Floats:
 
 
 def tightened(problem: ReachabilityProblem, disturbance: Floats) -> ReachabilityProblem:
-    """Return the problem whose controls keep the constraints whatever the disturbance does, without feedback.
+    """Return the problem whose controls keep the constraints of a `problem` under every disturbance, without feedback.
 
-    Parameters
-    ----------
-    problem : ReachabilityProblem
-        With constraints at whole periods only.
-    disturbance : ndarray, shape (T, n, q)
-        x(t + 1) = A x + B u + disturbance[t] w(t), |w_k(t)| <= 1.
-
-    Returns
-    -------
-    ReachabilityProblem
-        For the state without disturbance.
-
-    Notes
-    -----
-    Each constraint is tightened by the support of the accumulated disturbance along its normal, which is exact.
+    The problem has constraints at whole periods only. x(t + 1) = A x + B u + disturbance[t] w(t), |w_k(t)| <= 1, with a
+    `disturbance` of shape (T, n, q); states of the new problem are those without disturbance. Each constraint is
+    tightened by the support of the accumulated disturbance along its normal, which is exact.
     """
     _check(problem, disturbance)
     effect = accumulated(problem, disturbance)
@@ -119,18 +92,10 @@ def tightened(problem: ReachabilityProblem, disturbance: Floats) -> Reachability
 
 
 def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> FeedbackPlan:
-    """Plan with feedback from the disturbances seen so far, for the least worst terminal state.
+    """Return the plan with feedback from past disturbances whose worst terminal state is least.
 
-    Parameters
-    ----------
-    problem : ReachabilityProblem
-        With thrust in a box and constraints at whole periods only.
-    disturbance : ndarray, shape (T, n, q)
-        x(t + 1) = A x + B u + disturbance[t] w(t), |w_k(t)| <= 1; w(t) is known from t + 1 on, by the state.
-
-    Returns
-    -------
-    FeedbackPlan
+    The `problem`, with thrust in a box, and the `disturbance` are as for `tightened`; w(t) is known from t + 1 on, by
+    the state.
 
     Raises
     ------
@@ -141,7 +106,7 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
 
     Notes
     -----
-    Affine feedback makes every constraint linear in (nominal, gains) but for absolute values, one more variable each:
+    With affine feedback every constraint is linear in (nominal, gains) but for absolute values, one more variable each:
     one linear program (HiGHS) of some T^2 (n + m) q / 2 of them. It minimises the sum of the greatest terminal states,
     divided by their bounds.
     """
@@ -165,15 +130,13 @@ def _check(problem: ReachabilityProblem, disturbance: Floats) -> None:
 
 
 def _all_constraints(problem: ReachabilityProblem) -> tuple[Floats, Floats, tuple[str, ...]]:
-    """Constraints with the bounds on states among them."""
+    """Constraints with the bounds on states, which come first."""
     unit = np.eye(problem.states)
-    normals, names = [unit, -unit], [f"the bound on {problem.state_name(i)}" for i in range(problem.states)] * 2
-    offsets = [np.tile(np.concatenate([problem.state_bounds] * 2), (problem.periods + 1, 1))]
-    if problem.normals is not None and problem.offsets is not None:
-        normals.append(problem.normals)
-        offsets.append(problem.offsets)
-        names += [problem.name_of(k) for k in range(len(problem.normals))]
-    return np.vstack(normals), np.hstack(offsets), tuple(names)
+    normals, offsets = problem.further
+    names = [f"the bound on {problem.state_name(i)}" for i in range(problem.states)] * 2
+    names += [problem.name_of(k) for k in range(len(normals))]
+    bounds = np.tile(np.concatenate([problem.state_bounds] * 2), (problem.periods + 1, 1))
+    return np.vstack([unit, -unit, normals]), np.hstack([bounds, offsets]), tuple(names)
 
 
 class _Program:
@@ -185,7 +148,7 @@ class _Program:
         self.width = disturbance.shape[2]
         pairs = [(t, s) for t in range(self.periods) for s in range(t)]
         self.gain_at = {pair: place for place, pair in enumerate(pairs)}
-        self.gains = self.periods * self.group  # where they begin
+        self.gains = self.periods * self.group  # index of the first
         self.begin = self.size = self.gains + len(pairs) * self.group * self.width
         self.rows: list[dict[int, float]] = []
         self.limits: list[float] = []
@@ -219,7 +182,7 @@ class _Program:
                 entries[greatest[i]] = -1.0
                 self._add(entries, -constant)
         cost = np.zeros(self.size)
-        cost[self.begin :] = _TIDY  # of plans alike, the one with small gains
+        cost[self.begin :] = _TIDY  # of equally good plans, the one with small gains
         cost[greatest] = 1.0
         places = [(r, c, v) for r, entries in enumerate(self.rows) for c, v in entries.items()]
         r, c, v = zip(*places, strict=True)
@@ -227,7 +190,7 @@ class _Program:
         found = linprog(cost, A_ub=matrix, b_ub=self.limits, bounds=(None, None), method="highs-ipm", options=HIGHS)
         if found.status == 2:
             raise NoRobustPlanError(
-                "no plan with feedback keeps the constraints whatever the disturbance does; reduce the disturbance, "
+                "no plan with feedback keeps the constraints under every disturbance; reduce the disturbance, "
                 "or relax the bounds"
             )
         if found.status != 0:
@@ -243,7 +206,7 @@ class _Program:
             start = self.gains + place * block
             gains[t, s] = solution[start : start + block].reshape(self.group, self.width) * reach[:, None]
         centre = problem.run(nominal)
-        # What w(s) has become at t: by itself and by the controls it moves.
+        # Effect of w(s) at t, directly and through the controls.
         total = self.effect.copy()
         for s in range(self.periods):
             state = np.zeros((self.states, self.width))

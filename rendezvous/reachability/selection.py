@@ -1,4 +1,4 @@
-"""Members of the set of optimal controls, by choice."""
+"""Members of the set of optimal controls: those that minimise a cost, centres, vertices and random ones."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset.polytope import EmptyPolytopeError, Polytope, UncertainHullError, relative_interior
+from rendezvous.reachability.admissible import Lifted, least_l1, least_peak, least_sum_of_norms, quadratic
 from rendezvous.reachability.conic import NoSolutionError
-from rendezvous.reachability.lifted import Lifted
-from rendezvous.reachability.optimal_controls import OptimalControls
-from rendezvous.reachability.programs import least_l1, least_peak, least_sum_of_norms, quadratic
+from rendezvous.reachability.solve import OptimalControls
 
 Floats = NDArray[np.float64]
 
@@ -19,26 +18,29 @@ MOST_VERTICES = 2000
 _MOST_DIMENSIONS = 8
 _NEWTON_STEPS = 200
 _STILL = 1e-9
+_STEPS_A_DIMENSION = 20
+_INSIDE = 1.0 - 1e-12
+_FLATTEST = 1e-15
 
 
 class TooManyVerticesError(ValueError):
-    """The optimal controls have more vertices than can be listed, or, for thrust in a ball, no such thing."""
+    """The optimal controls have more vertices than can be listed, or none, for thrust in a ball."""
 
 
 @dataclass(frozen=True)
 class Effort:
-    """What a control costs.
+    """Costs of a control.
 
     Parameters
     ----------
     energy : float
-        Sum of squares of all components.
+        Sum of squares of all components, dimensionless.
     l1 : float
-        Sum of their absolute values.
+        Sum of their absolute values, dimensionless.
     norms : float
-        Sum of the Euclidean norms over the periods.
+        Sum of the Euclidean norms over the periods, dimensionless.
     peak : float
-        Greatest absolute value.
+        Greatest absolute value, dimensionless.
     """
 
     energy: float
@@ -48,16 +50,7 @@ class Effort:
 
 
 def effort(controls: Floats) -> Effort:
-    """Return what a control costs.
-
-    Parameters
-    ----------
-    controls : ndarray, shape (T, m)
-
-    Returns
-    -------
-    Effort
-    """
+    """Return the costs of `controls`, shape (T, m)."""
     return Effort(
         float((controls**2).sum()),
         float(np.abs(controls).sum()),
@@ -67,55 +60,19 @@ def effort(controls: Floats) -> Effort:
 
 
 def minimum_energy(optimal: OptimalControls) -> Floats:
-    """Return the optimal control of least sum of squares, which is unique.
-
-    Parameters
-    ----------
-    optimal : OptimalControls
-
-    Returns
-    -------
-    ndarray, shape (T, m)
-
-    Notes
-    -----
-    A quadratic program.
-    """
+    """Return the `optimal` control of least sum of squares, shape (T, m), which is unique, by a quadratic program."""
     return optimal.at(_least_energy(optimal.space, optimal.scale))
 
 
 def minimum_l1(optimal: OptimalControls) -> Floats:
-    """Return an optimal control of least sum of absolute values.
-
-    Parameters
-    ----------
-    optimal : OptimalControls
-
-    Returns
-    -------
-    ndarray, shape (T, m)
-
-    Notes
-    -----
-    A linear program.
-    """
+    """Return an `optimal` control of least sum of absolute values, shape (T, m), by a linear program."""
     return optimal.at(least_l1(optimal.space, optimal.scale) if optimal.dimension else np.zeros(0))
 
 
 def minimum_norms(optimal: OptimalControls) -> Floats:
-    """Return an optimal control of least sum, over the periods, of Euclidean norms: the propellant of one thruster.
+    """Return an `optimal` control of least sum, over the periods, of Euclidean norms, shape (T, m), by a cone program.
 
-    Parameters
-    ----------
-    optimal : OptimalControls
-
-    Returns
-    -------
-    ndarray, shape (T, m)
-
-    Notes
-    -----
-    A second-order cone program.
+    The sum is the propellant of a single thruster.
     """
     if not optimal.dimension:
         return optimal.at(np.zeros(0))
@@ -123,19 +80,10 @@ def minimum_norms(optimal: OptimalControls) -> Floats:
 
 
 def minimum_peak(optimal: OptimalControls) -> Floats:
-    """Return, of the optimal controls of least greatest component (norm, for a ball), the one of least energy.
+    """Return, of the `optimal` controls of least greatest component, the one of least energy, shape (T, m).
 
-    Parameters
-    ----------
-    optimal : OptimalControls
-
-    Returns
-    -------
-    ndarray, shape (T, m)
-
-    Notes
-    -----
-    A linear program for the bound; a quadratic one over the face that keeps it.
+    For thrust in a ball it is a control of least greatest norm. A linear program gives the bound, and a quadratic one
+    the control on the face of the set that keeps the bound.
     """
     space, scale = optimal.space, optimal.scale
     if not space.size:
@@ -153,21 +101,7 @@ def minimum_peak(optimal: OptimalControls) -> Floats:
 
 
 def nearest(optimal: OptimalControls, control: Floats) -> Floats:
-    """Return the optimal control nearest to another one.
-
-    Parameters
-    ----------
-    optimal : OptimalControls
-    control : ndarray, shape (T, m)
-
-    Returns
-    -------
-    ndarray, shape (T, m)
-
-    Notes
-    -----
-    A quadratic program.
-    """
+    """Return the `optimal` control nearest to a `control`, both of shape (T, m), by a quadratic program."""
     space, scale = optimal.space, optimal.scale
     turned = scale[:, None] * space.control_response
     away = scale * space.control_free - control.ravel()
@@ -175,53 +109,28 @@ def nearest(optimal: OptimalControls, control: Floats) -> Floats:
 
 
 def chebyshev_centre(optimal: OptimalControls) -> Floats:
-    """Return a centre of a largest ball of controls, within the affine hull, that are all optimal.
+    """Return a centre of a largest ball, within the affine hull, of `optimal` controls, shape (T, m).
 
-    Parameters
-    ----------
-    optimal : OptimalControls
-
-    Returns
-    -------
-    ndarray, shape (T, m)
-        Controls are compared after division by their bounds. For thrust in a ball the ball is inside, but perhaps not
-        the largest.
+    Controls are compared after division by their bounds. For thrust in a ball the ball is inside, but may not be the
+    largest.
     """
     return optimal.at(optimal.centre)
 
 
 def analytic_centre(optimal: OptimalControls) -> Floats:
-    """Return the optimal control of greatest product of slacks.
-
-    Parameters
-    ----------
-    optimal : OptimalControls
-
-    Returns
-    -------
-    ndarray, shape (T, m)
-    """
+    """Return the `optimal` control of greatest product of slacks, shape (T, m)."""
     return optimal.at(analytic_point(optimal.space, optimal.centre)[0])
 
 
 def analytic_point(space: Lifted, start: Floats) -> tuple[Floats, Floats]:
-    """Return the analytic centre of a set without equations, and the Hessian of its barrier there.
+    """Return the analytic centre, shape (d,), of a set without equations, and the Hessian of its barrier there.
 
-    Parameters
-    ----------
-    space : Lifted
-    start : ndarray, shape (d,)
-        Inside.
-
-    Returns
-    -------
-    point : ndarray, shape (d,)
-    hessian : ndarray, shape (d, d)
+    `start`, shape (d,), is inside.
 
     Raises
     ------
     NoSolutionError
-        If Newton's method does not reach it.
+        If Newton's method does not converge.
 
     Notes
     -----
@@ -249,56 +158,6 @@ def analytic_point(space: Lifted, start: Floats) -> tuple[Floats, Floats]:
     raise NoSolutionError("Newton's method did not reach the analytic centre")
 
 
-def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
-    """Return every vertex of the set of optimal controls.
-
-    Parameters
-    ----------
-    optimal : OptimalControls
-    most : int
-        How many at most.
-
-    Returns
-    -------
-    ndarray, shape (v, T, m)
-
-    Raises
-    ------
-    TooManyVerticesError
-        If there are more, if they are too many to look for, or if thrust is in a ball.
-    UncertainHullError
-        If rounding decides which points are vertices.
-    """
-    parts = []
-    for each in optimal.blocks:
-        if each.optimal.ball:
-            raise TooManyVerticesError("with thrust in a ball the optimal controls have no vertices; choose a box")
-        if each.optimal.size > _MOST_DIMENSIONS:
-            raise TooManyVerticesError(
-                f"the optimal controls of a block span {each.optimal.size} dimensions; vertices are listed to "
-                f"{_MOST_DIMENSIONS}: choose samples"
-            )
-        if not each.optimal.size:
-            parts.append(np.zeros((1, 0)))
-            continue
-        try:
-            parts.append(Polytope.from_halfspaces(each.optimal.rows, each.optimal.limits, bounded=True).vertices)
-        except EmptyPolytopeError as error:  # the centre is inside
-            raise UncertainHullError("the optimal controls of a block are so thin that rounding hides them") from error
-    count = int(np.prod([len(part) for part in parts]))
-    if count > most:
-        raise TooManyVerticesError(f"the optimal controls have {count} vertices, over {most}: choose samples")
-    points = parts[0]
-    for part in parts[1:]:
-        points = np.hstack([np.repeat(points, len(part), axis=0), np.tile(part, (len(points), 1))])
-    return optimal.at(points)
-
-
-def _least_energy(space: Lifted, scale: Floats) -> Floats:
-    turned = scale[:, None] * space.control_response
-    return quadratic(space, turned.T @ turned, turned.T @ (scale * space.control_free)).point
-
-
 def _barrier(space: Lifted, point: Floats) -> tuple[float, Floats, Floats]:
     """Value, gradient and Hessian; infinite outside."""
     size = space.size
@@ -321,3 +180,98 @@ def _barrier(space: Lifted, point: Floats) -> tuple[float, Floats, Floats]:
         gradient = gradient + pull.sum(axis=0)
         hessian = hessian + pull.T @ pull + 2.0 * np.einsum("tmd,tme,t->de", turned, turned, 1.0 / left)
     return value, gradient, hessian
+
+
+def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
+    """Return every vertex of the set of `optimal` controls, shape (v, T, m).
+
+    Raises
+    ------
+    TooManyVerticesError
+        If there are more than `most`, if the set has too many dimensions, or if thrust is in a ball.
+    UncertainHullError
+        If rounding decides which points are vertices.
+    """
+    corners = []
+    for part in optimal.blocks:
+        if part.optimal.ball:
+            raise TooManyVerticesError("with thrust in a ball the optimal controls have no vertices; choose a box")
+        if part.optimal.size > _MOST_DIMENSIONS:
+            raise TooManyVerticesError(
+                f"the optimal controls of a block span {part.optimal.size} dimensions; vertices are listed to "
+                f"{_MOST_DIMENSIONS}: choose samples"
+            )
+        if not part.optimal.size:
+            corners.append(np.zeros((1, 0)))
+            continue
+        try:
+            corners.append(Polytope.from_halfspaces(part.optimal.rows, part.optimal.limits, bounded=True).vertices)
+        except EmptyPolytopeError as error:  # the centre is inside
+            raise UncertainHullError("the optimal controls of a block are so thin that rounding hides them") from error
+    count = int(np.prod([len(block) for block in corners]))
+    if count > most:
+        raise TooManyVerticesError(f"the optimal controls have {count} vertices, over {most}: choose samples")
+    points = corners[0]
+    for block in corners[1:]:
+        points = np.hstack([np.repeat(points, len(block), axis=0), np.tile(block, (len(points), 1))])
+    return optimal.at(points)
+
+
+def samples(optimal: OptimalControls, count: int, generator: np.random.Generator) -> Floats:
+    """Draw `count` random members, at least 1, of the set of `optimal` controls, shape (count, T, m).
+
+    Raises
+    ------
+    ValueError
+        If the count is less than 1.
+
+    Notes
+    -----
+    Hit-and-run: a chain for each from the analytic centre, 20 d steps long; the `generator` draws directions, scaled by
+    the Hessian of the barrier. Uniform in the limit; O(count r d) a step.
+    """
+    if count < 1:
+        raise ValueError(f"at least one sample must be drawn, not {count}")
+    space = optimal.space
+    start, hessian = analytic_point(space, optimal.centre)
+    points = np.repeat(start[None, :], count, axis=0)
+    if not space.size:
+        return optimal.at(points)
+    try:
+        rounding = np.linalg.inv(np.linalg.cholesky(hessian)).T
+    except np.linalg.LinAlgError:  # the set is so thin that the Hessian is singular to rounding
+        steep, ways = np.linalg.eigh(hessian)
+        rounding = ways / np.sqrt(np.maximum(steep, _FLATTEST * steep[-1]))
+    for _ in range(_STEPS_A_DIMENSION * space.size):
+        directions = generator.standard_normal(points.shape) @ rounding.T
+        directions /= np.linalg.norm(directions, axis=1)[:, None]
+        least, most = _chord(space, points, directions)
+        along = least + (most - least) * generator.random(count)
+        points = points + (_INSIDE * along)[:, None] * directions
+    return optimal.at(points)
+
+
+def _chord(space: Lifted, points: Floats, directions: Floats) -> tuple[Floats, Floats]:
+    """Lengths of lines through points inside the set, backward and forward."""
+    slack = space.limits - points @ space.rows.T
+    speed = directions @ space.rows.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = slack / speed
+    most = np.where(speed > 0.0, reach, np.inf).min(axis=1, initial=np.inf)
+    least = np.where(speed < 0.0, reach, -np.inf).max(axis=1, initial=-np.inf)
+    if space.ball:
+        shape = (len(points), -1, space.ball)
+        thrust = (space.control_free + points @ space.control_response.T).reshape(shape)
+        change = (directions @ space.control_response.T).reshape(shape)
+        a, b, c = (change**2).sum(axis=2), (thrust * change).sum(axis=2), (thrust**2).sum(axis=2) - 1.0
+        moving = a > 1e-18
+        root = np.sqrt(np.maximum(b * b - a * c, 0.0))
+        divisor = np.where(moving, a, 1.0)
+        most = np.minimum(most, np.where(moving, (root - b) / divisor, np.inf).min(axis=1))
+        least = np.maximum(least, np.where(moving, (-root - b) / divisor, -np.inf).max(axis=1))
+    return np.minimum(least, 0.0), np.maximum(most, 0.0)
+
+
+def _least_energy(space: Lifted, scale: Floats) -> Floats:
+    turned = scale[:, None] * space.control_response
+    return quadratic(space, turned.T @ turned, turned.T @ (scale * space.control_free)).point

@@ -1,27 +1,37 @@
-"""Which route a problem takes, and all that is found on it."""
+"""Solution of a problem: the least terminal norm, all controls that reach it, and the sets of states on the way."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from infoset.polytope import EmptyPolytopeError, UncertainHullError
-from rendezvous.reachability.block_sets import BlockSets, SetKind
-from rendezvous.reachability.blocks import Block, split
-from rendezvous.reachability.exact_sets import Budget, ExactSets, Meter, TooLargeError
-from rendezvous.reachability.lifted_sets import LiftedSets
-from rendezvous.reachability.optimal_controls import OptimalControls
+from rendezvous.reachability.admissible import Lifted, Maximiser, joined
 from rendezvous.reachability.optimum import BlockOptimum, block_optimum, block_reaches_zero
-from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
-from rendezvous.reachability.reachable_sets import ReachableSets
+from rendezvous.reachability.problem import Block, ReachabilityProblem, ThrustShape, split
+from rendezvous.reachability.sets import (
+    BlockSets,
+    Budget,
+    ExactSets,
+    LiftedSets,
+    Meter,
+    ReachableSets,
+    SetKind,
+    TooLargeError,
+    optimal_set,
+)
+
+Floats = NDArray[np.float64]
 
 MOST_STATES_BY_CHOICE = 4
-"""Blocks of more states than this are not tried on the exact route unless it is asked for."""
+"""Greatest number of states of a block for which the exact route is tried without being asked for."""
 MOST_PERIODS_BY_CHOICE = 16
 AGREEMENT = 1e-9
-"""How far the bounds of both routes may be apart, relative to the bounds on states."""
+"""Greatest difference between the bounds of both routes, relative to the bounds on states."""
 
 
 class Route(Enum):
@@ -32,14 +42,97 @@ class Route(Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
-    """What there is to know of a problem.
+class OptimalControls:
+    """{u: |x(T)| is least and every constraint kept}: a polytope for thrust in a box.
 
     Parameters
     ----------
     problem : ReachabilityProblem
+        The problem solved.
+    blocks : tuple of BlockOptimum
+        Optima of the independent parts of the problem.
+    """
+
+    problem: ReachabilityProblem
+    blocks: tuple[BlockOptimum, ...]
+
+    @cached_property
+    def space(self) -> Lifted:
+        """The set in coordinates z of its affine hull; controls divided by their bounds."""
+        return joined(
+            [part.optimal for part in self.blocks],
+            [part.block.controls for part in self.blocks],
+            self.problem.periods,
+            self.problem.controls,
+        )
+
+    @property
+    def centre(self) -> Floats:
+        """A point deep inside, in these coordinates, shape (dimension,)."""
+        return np.concatenate([part.centre for part in self.blocks])
+
+    @property
+    def scale(self) -> Floats:
+        """Units of the controls: their bounds, shape (T m,)."""
+        return np.tile(self.problem.control_bounds, self.problem.periods)
+
+    @property
+    def dimension(self) -> int:
+        """Dimension of the set; 0 where the optimal control is unique."""
+        return sum(part.optimal.size for part in self.blocks)
+
+    @property
+    def miss(self) -> float:
+        """The least terminal norm, in the units of the problem."""
+        return float(np.linalg.norm([part.miss for part in self.blocks]))
+
+    def at(self, point: Floats) -> Floats:
+        """Return the controls, shape (..., T, m), of a `point` z of the set, shape (..., dimension)."""
+        scaled = self.space.control_free + np.asarray(point) @ self.space.control_response.T
+        return np.asarray((scaled * self.scale).reshape(*np.shape(point)[:-1], self.problem.periods, -1))
+
+    def excess(self, controls: ArrayLike) -> Floats:
+        """Return how far `controls`, shape (..., T, m), are from optimal, relative to the bounds; shape (...).
+
+        It is the greatest violation of a constraint or distance of the terminal state from the best one: at most
+        rounding for members of the set.
+        """
+        thrust = np.asarray(controls, dtype=float)
+        best = np.zeros(self.problem.states)
+        for part in self.blocks:
+            best[part.block.states] = part.terminal * part.block.scale
+        last = self.problem.run(thrust)[..., -1, :]
+        away = (np.abs(last - best) / self.problem.state_bounds).max(axis=-1)
+        return np.asarray(np.maximum(self.problem.excess(thrust), away))
+
+    def ranges(self) -> Floats:
+        """Return the least and greatest of each control over the set, shape (T, m, 2), by 2 T m linear programs."""
+        periods = self.problem.periods
+        result = np.zeros((periods, self.problem.controls, 2))
+        for part in self.blocks:
+            lifted = optimal_set(part)
+            costs = np.vstack([-lifted.control_response, lifted.control_response])
+            moving = np.abs(costs).max(axis=1, initial=0.0) > 1e-12
+            best = np.zeros(len(costs))
+            best[moving] = np.einsum("kp,kp->k", costs[moving], Maximiser(lifted).maximise_all(costs[moving]))
+            count = len(lifted.control_free)
+            ends = np.stack([lifted.control_free - best[:count], lifted.control_free + best[count:]], axis=-1)
+            result[:, part.block.controls] = ends.reshape(periods, -1, 2)
+        return result * self.problem.control_bounds[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A problem solved.
+
+    Parameters
+    ----------
+    problem : ReachabilityProblem
+        The problem solved.
     optimal : OptimalControls
+        All controls of least terminal norm.
     sets : ReachableSets
+        Forward sets and the tube.
     route : Route
         EXACT where every block has its vertices and facets.
     reason : str
@@ -53,55 +146,57 @@ class Solution:
     reason: str
 
 
+def optimal_controls(problem: ReachabilityProblem, *, relative: bool = False) -> OptimalControls:
+    """Return all controls of least terminal norm; see `block_optimum` for `relative` and errors."""
+    return OptimalControls(problem, tuple(block_optimum(block, relative=relative) for block in split(problem)))
+
+
 def solve(problem: ReachabilityProblem, route: Route | None = None, budget: Budget | None = None) -> Solution:
     """Find the least terminal norm, all controls that reach it, and the sets they lead through.
 
     Parameters
     ----------
     problem : ReachabilityProblem
+        In any units.
     route : Route or None
-        None leaves it to the solver: exact where blocks are small, thrust is in a box, constraints hold at whole
-        periods and the sets are expected within the budget; lifted everywhere else.
+        None chooses: exact where blocks are small, thrust is in a box, constraints hold at whole periods and the sets
+        are expected within the budget; lifted otherwise.
     budget : Budget or None
-        What the exact route may take.
-
-    Returns
-    -------
-    Solution
+        Limits of the exact route.
 
     Raises
     ------
     EmptyTubeError
         If no control keeps the constraints.
     TooLargeError, UncertainHullError
-        If the exact route was asked for and cannot be gone.
+        If the exact route was asked for and cannot be taken.
     """
     blocks = split(problem)
-    optima = tuple(block_optimum(each) for each in blocks)
+    optima = tuple(block_optimum(block) for block in blocks)
     optimal = OptimalControls(problem, optima)
-    lifted: tuple[BlockSets, ...] = tuple(LiftedSets(each) for each in optima)
+    lifted: tuple[BlockSets, ...] = tuple(LiftedSets(optimum) for optimum in optima)
     meter = Meter(budget or Budget())
-    refused = None if route is Route.LIFTED else _refusal(problem, blocks, asked=route is Route.EXACT)
-    if route is Route.EXACT and refused is not None:
-        raise TooLargeError(refused)
-    if route is Route.LIFTED or refused is not None:
-        why = "as asked" if refused is None else refused
-        return Solution(problem, optimal, ReachableSets(problem, blocks, lifted), Route.LIFTED, why)
-    try:
-        exact = _exact(optima, meter)
-        _need_agreement(exact, lifted)
-    except (TooLargeError, UncertainHullError) as error:
-        if route is Route.EXACT:
-            raise
-        return Solution(problem, optimal, ReachableSets(problem, blocks, lifted), Route.LIFTED, str(error))
-    why = "as asked" if route is Route.EXACT else f"blocks of {', '.join(str(each.size) for each in blocks)} states"
-    return Solution(problem, optimal, ReachableSets(problem, blocks, exact), Route.EXACT, why)
+    reason = "as asked" if route is Route.LIFTED else _refusal(problem, blocks, asked=route is Route.EXACT)
+    if reason is None:
+        try:
+            exact = _exact(optima, meter)
+            _need_agreement(exact, lifted)
+        except (TooLargeError, UncertainHullError) as error:
+            if route is Route.EXACT:
+                raise
+            reason = str(error)
+        else:
+            why = "as asked" if route else f"blocks of {', '.join(str(block.size) for block in blocks)} states"
+            return Solution(problem, optimal, ReachableSets(problem, blocks, exact), Route.EXACT, why)
+    elif route is Route.EXACT:
+        raise TooLargeError(reason)
+    return Solution(problem, optimal, ReachableSets(problem, blocks, lifted), Route.LIFTED, reason)
 
 
 def _exact(optima: tuple[BlockOptimum, ...], meter: Meter) -> tuple[BlockSets, ...]:
     try:
-        return tuple(ExactSets(each, meter) for each in optima)
-    except EmptyPolytopeError as error:  # what is not empty by the programs
+        return tuple(ExactSets(optimum, meter) for optimum in optima)
+    except EmptyPolytopeError as error:  # the programs show that it is not empty
         raise UncertainHullError("a set is so thin that rounding leaves nothing of it") from error
 
 
@@ -114,41 +209,6 @@ def _need_agreement(exact: tuple[BlockSets, ...], lifted: tuple[BlockSets, ...])
                 raise UncertainHullError(f"{kind.value} sets by hulls and by programs are {apart:.2g} of a bound apart")
 
 
-def least_periods(problem: ReachabilityProblem) -> int | None:
-    """Return the least number of periods after which zero can be reached, with every constraint kept.
-
-    Parameters
-    ----------
-    problem : ReachabilityProblem
-        Its T is the most that is looked at.
-
-    Returns
-    -------
-    int or None
-        None if there is none.
-
-    Notes
-    -----
-    Where zero keeps all constraints it can be kept once reached, and the least is found by bisection; else all are
-    tried. A linear program a block and try.
-    """
-    blocks = split(problem)
-    waits = all((each.offsets >= 0.0).all() for each in blocks)
-
-    def reached(periods: int) -> bool:
-        return all(block_reaches_zero(each.first(periods)) for each in blocks)
-
-    if not waits:
-        return next((each for each in range(1, problem.periods + 1) if reached(each)), None)
-    if not reached(problem.periods):
-        return None
-    low, high = 0, problem.periods
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if reached(middle) else (middle, high)
-    return high
-
-
 def _refusal(problem: ReachabilityProblem, blocks: tuple[Block, ...], *, asked: bool) -> str | None:
     """Why exact sets are not tried, or None."""
     if problem.thrust is ThrustShape.BALL:
@@ -157,9 +217,33 @@ def _refusal(problem: ReachabilityProblem, blocks: tuple[Block, ...], *, asked: 
         return "constraints between the periods bind states and controls together"
     if asked:
         return None
-    largest = max(each.size for each in blocks)
+    largest = max(block.size for block in blocks)
     if largest > MOST_STATES_BY_CHOICE:
         return f"the constraints couple {largest} states, whose hulls lose facets to rounding"
     if problem.periods > MOST_PERIODS_BY_CHOICE:
         return f"over {MOST_PERIODS_BY_CHOICE} periods hulls lose facets to rounding"
     return None
+
+
+def least_periods(problem: ReachabilityProblem) -> int | None:
+    """Return the least number of periods, at most those of the `problem`, in which zero can be reached, or None.
+
+    Notes
+    -----
+    Where zero keeps all constraints it can be kept once reached, and the least is found by bisection; otherwise all
+    numbers are tried. A linear program for each block and number.
+    """
+    blocks = split(problem)
+
+    def reached(periods: int) -> bool:
+        return all(block_reaches_zero(block.first(periods)) for block in blocks)
+
+    if not all((block.offsets >= 0.0).all() for block in blocks):
+        return next((periods for periods in range(1, problem.periods + 1) if reached(periods)), None)
+    if not reached(problem.periods):
+        return None
+    low, high = 0, problem.periods
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if reached(middle) else (middle, high)
+    return high

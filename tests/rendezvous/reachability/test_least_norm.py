@@ -18,23 +18,21 @@ from rendezvous.reachability import (
     Route,
     SetKind,
     ThrustShape,
-    between_periods,
-    least_periods,
-    solve,
-)
-from rendezvous.reachability.blocks import split
-from rendezvous.reachability.conic import NoSolutionError
-from rendezvous.reachability.optimal_controls import OptimalControls
-from rendezvous.reachability.optimum import block_optimum
-from rendezvous.reachability.sampling import samples
-from rendezvous.reachability.selection import (
     analytic_centre,
+    between_periods,
     chebyshev_centre,
+    least_periods,
     minimum_energy,
     minimum_l1,
     minimum_norms,
     minimum_peak,
+    samples,
+    solve,
 )
+from rendezvous.reachability.conic import NoSolutionError
+from rendezvous.reachability.optimum import block_optimum
+from rendezvous.reachability.problem import split
+from rendezvous.reachability.solve import OptimalControls
 
 from .high_precision import Dense, cone_program, precise_least_norm
 from .random_rendezvous import random_rendezvous

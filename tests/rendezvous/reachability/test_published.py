@@ -17,15 +17,13 @@ from rendezvous.reachability import (
     SetKind,
     Solution,
     ThrustShape,
-    least_periods,
-    solve,
-)
-from rendezvous.reachability.selection import (
     effort,
+    least_periods,
     minimum_energy,
     minimum_l1,
     minimum_norms,
     minimum_peak,
+    solve,
 )
 from rendezvous.relative_motion import EllipticOrbit
 

@@ -20,12 +20,6 @@ from rendezvous.reachability import (
     SetKind,
     ThrustShape,
     TooLargeError,
-    solve,
-)
-from rendezvous.reachability.blocks import split
-from rendezvous.reachability.exact_check import rational_sets
-from rendezvous.reachability.sampling import samples
-from rendezvous.reachability.selection import (
     TooManyVerticesError,
     analytic_centre,
     chebyshev_centre,
@@ -34,8 +28,12 @@ from rendezvous.reachability.selection import (
     minimum_l1,
     minimum_norms,
     minimum_peak,
+    samples,
+    solve,
     vertices,
 )
+from rendezvous.reachability.exact_check import rational_sets
+from rendezvous.reachability.problem import split
 
 Floats = NDArray[np.float64]
 Paper = Callable[..., ReachabilityProblem]

@@ -1,0 +1,428 @@
+"""The admissible controls of a block as one convex set, and convex programs over it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import clarabel
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from rendezvous.reachability.conic import STEADY, ConeProgram, NoSolutionError, Optimum
+from rendezvous.reachability.problem import Block
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Places = NDArray[np.int64]
+Constraints = tuple[Floats, Floats, Places, Places]
+
+_BROKEN = 3e-10
+_NEAR = 2
+_MANY_ROWS = 200
+_STILL = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Lifted:
+    """{v: rows v <= limits, equal v = levels}, with |u(t)| <= 1 for a ball; states and controls are affine in v.
+
+    Parameters
+    ----------
+    free : ndarray, shape (T + 1, n)
+    response : ndarray, shape (T + 1, n, p)
+        x(t) = free[t] + response[t] v.
+    control_free : ndarray, shape (T m,)
+    control_response : ndarray, shape (T m, p)
+        The same for all controls, those of the first period first.
+    rows : ndarray, shape (r, p)
+    limits : ndarray, shape (r,)
+    moments : ndarray of int, shape (r,)
+        Time that each row refers to; -1 for a bound on a control.
+    labels : ndarray of int, shape (r,)
+        Index of the block's constraint in each row; -1 for a bound on a control.
+    equal : ndarray, shape (e, p)
+    levels : ndarray, shape (e,)
+    ball : int
+        Number m of controls a period where their norm is bounded; 0 for a box, whose bounds are among the rows.
+    """
+
+    free: Floats
+    response: Floats
+    control_free: Floats
+    control_response: Floats
+    rows: Floats
+    limits: Floats
+    moments: Places
+    labels: Places
+    equal: Floats
+    levels: Floats
+    ball: int
+
+    @property
+    def size(self) -> int:
+        """Number p of variables."""
+        return int(self.rows.shape[1])
+
+    def controls(self, point: Floats) -> Floats:
+        """Return the controls of a point, shape (T m,)."""
+        return np.asarray(self.control_free + self.control_response @ point)
+
+    def until(self, time: int) -> Lifted:
+        """Return the set without constraints on states after a time."""
+        return self.only(np.flatnonzero(self.moments <= time))
+
+    def only(self, kept: Places) -> Lifted:
+        """Return the set with some of its rows."""
+        return replace(
+            self,
+            rows=self.rows[kept],
+            limits=self.limits[kept],
+            moments=self.moments[kept],
+            labels=self.labels[kept],
+        )
+
+    def where(self, equal: Floats, levels: Floats) -> Lifted:
+        """Return the set with more equations."""
+        return replace(self, equal=np.vstack([self.equal, equal]), levels=np.concatenate([self.levels, levels]))
+
+    def within(self, point: Floats, basis: Floats) -> Lifted:
+        """Return the set in coordinates z of an affine subspace v = point + basis z in which the equations hold."""
+        return Lifted(
+            self.free + self.response @ point,
+            self.response @ basis,
+            self.control_free + self.control_response @ point,
+            self.control_response @ basis,
+            self.rows @ basis,
+            self.limits - self.rows @ point,
+            self.moments,
+            self.labels,
+            np.zeros((0, basis.shape[1])),
+            np.zeros(0),
+            self.ball,
+        )
+
+
+def lift(block: Block) -> Lifted:
+    """Return the admissible controls of a block, v = all its controls; O(T^2 n^2 m), dense."""
+    periods, n, m = block.periods, block.size, len(block.controls)
+    width = periods * m
+    free, response = np.zeros((periods + 1, n)), np.zeros((periods + 1, n, width))
+    free[0] = block.initial
+    for t in range(periods):
+        free[t + 1] = block.transition[t] @ free[t]
+        response[t + 1] = block.transition[t] @ response[t]
+        response[t + 1][:, t * m : (t + 1) * m] += block.control[t]
+    whole, between = _state_constraints(block, free, response)
+    constraints = [*whole, *(rows for period in between for rows in period)]
+    return _lifted(block, free, response, constraints, np.zeros((0, width)), np.zeros(0))
+
+
+def lift_with_states(block: Block) -> Lifted:
+    """Return the set of `lift` with v = all controls, then all states x(1)..x(T), which T n equations determine.
+
+    Its rows are sparse, which speeds up an interior-point method.
+    """
+    periods, n, m = block.periods, block.size, len(block.controls)
+    width = periods * m
+    total = width + periods * n
+    free, response = np.zeros((periods + 1, n)), np.zeros((periods + 1, n, total))
+    free[0] = block.initial
+    for t in range(1, periods + 1):
+        response[t][:, width + (t - 1) * n : width + t * n] = np.eye(n)
+    equal, levels = np.zeros((periods, n, total)), np.zeros((periods, n))
+    for t in range(periods):
+        equal[t] = response[t + 1] - block.transition[t] @ response[t]
+        equal[t][:, t * m : (t + 1) * m] = -block.control[t]
+    levels[0] = block.transition[0] @ block.initial
+    whole, between = _state_constraints(block, free, response)
+    constraints = [rows for at_end, inner in zip(whole, between, strict=True) for rows in (at_end, *inner)]
+    return _lifted(block, free, response, constraints, equal.reshape(-1, total), levels.ravel())
+
+
+def _state_constraints(
+    block: Block, free: Floats, response: Floats
+) -> tuple[list[Constraints], list[list[Constraints]]]:
+    """Constraints on the states at the end of each period, and at the instants within each."""
+    periods, n, m = block.periods, block.size, len(block.controls)
+    whole: list[Constraints] = []
+    between: list[list[Constraints]] = []
+    for t in range(periods):
+        held = np.flatnonzero(np.isfinite(block.offsets[t + 1]))
+        normals = block.normals[held]
+        limits = block.offsets[t + 1, held] - normals @ free[t + 1]
+        whole.append((normals @ response[t + 1], limits, np.full(len(held), t + 1), held))
+        between.append([])
+        held = np.flatnonzero(np.isfinite(block.offsets[t]))
+        normals = block.normals[held]
+        thrust = np.eye(m, response.shape[2], t * m)
+        for inner in () if block.between is None else block.between[t]:
+            limits = block.offsets[t, held] - normals @ inner[:, :n] @ free[t]
+            rows = normals @ (inner[:, :n] @ response[t] + inner[:, n:] @ thrust)
+            between[t].append((rows, limits, np.full(len(held), t + 1), held))
+    return whole, between
+
+
+def _lifted(
+    block: Block, free: Floats, response: Floats, constraints: list[Constraints], equal: Floats, levels: Floats
+) -> Lifted:
+    """Add the bounds on controls, the first variables."""
+    width = block.periods * len(block.controls)
+    unit = np.eye(width, response.shape[2])
+    if not block.ball:
+        hard = np.full(2 * width, -1)
+        constraints = [*constraints, (np.vstack([unit, -unit]), np.ones(2 * width), hard, hard)]
+    rows, limits, moments, labels = (np.concatenate(parts) for parts in zip(*constraints, strict=True))
+    ball = len(block.controls) if block.ball else 0
+    return Lifted(free, response, np.zeros(width), unit, rows, limits, moments, labels, equal, levels, ball)
+
+
+def joined(parts: Sequence[Lifted], controls: Sequence[Places], periods: int, total: int) -> Lifted:
+    """Return several blocks as one set; controls in the order of the problem, states in the order of the blocks.
+
+    `controls` are the indices of each block's controls among the `total` of the problem; those of no block are zero.
+    """
+    order = [t * total + int(j) for places in controls for t in range(periods) for j in places]
+    control_free, control_response = np.zeros(periods * total), np.zeros((periods * total, sum(p.size for p in parts)))
+    control_free[order] = np.concatenate([part.control_free for part in parts])
+    control_response[order] = block_diag(*[part.control_response for part in parts])
+    return Lifted(
+        np.hstack([part.free for part in parts]),
+        np.array([block_diag(*[part.response[t] for part in parts]) for t in range(periods + 1)]),
+        control_free,
+        control_response,
+        block_diag(*[part.rows for part in parts]),
+        np.concatenate([part.limits for part in parts]),
+        np.concatenate([part.moments for part in parts]),
+        np.concatenate([part.labels for part in parts]),
+        block_diag(*[part.equal for part in parts]),
+        np.concatenate([part.levels for part in parts]),
+        max(part.ball for part in parts),
+    )
+
+
+def with_thrust(program: ConeProgram, lifted: Lifted, *, deep: bool = False) -> ConeProgram:
+    """Add |u(t)| <= 1 to a program whose first variables are those of the set; nothing where thrust is in a box.
+
+    If `deep`, the last variable of the program is the radius of a ball that must be inside too.
+    """
+    if lifted.ball and lifted.size:
+        free = lifted.control_free.reshape(-1, lifted.ball)
+        for fixed, turned in zip(free, lifted.control_response.reshape(-1, lifted.ball, lifted.size), strict=True):
+            if np.linalg.norm(turned) > _STILL:  # a thrust that does not depend on v is within its bound already
+                top = np.zeros(len(program.cost))
+                top[-1] = -np.linalg.norm(turned, ord=2) if deep else 0.0
+                program.bound(turned, fixed, top, 1.0)
+    return program
+
+
+def least_relaxation(lifted: Lifted) -> tuple[float, Floats]:
+    """Return the least relaxation of all rows on states and of the equations that leaves a point, and that point.
+
+    It is not below -1, where the search stops, and not positive where the set is not empty. Bounds on controls are not
+    relaxed. The relaxation of equations is not negative; without equations a negative relaxation is a margin.
+    """
+    soft = lifted.moments >= 0
+    misfit = -np.ones((len(lifted.equal), 1))
+    cost = np.zeros(lifted.size + 1)
+    cost[-1] = 1.0
+    rows = np.vstack(
+        [
+            np.column_stack([lifted.rows, -soft.astype(float)]),
+            np.hstack([lifted.equal, misfit]),
+            np.hstack([-lifted.equal, misfit]),
+            -cost,
+        ]
+    )
+    limits = np.concatenate([lifted.limits, lifted.levels, -lifted.levels, [0.0 if len(lifted.equal) else 1.0]])
+    point = _solution(ConeProgram(cost).keep(rows, limits), lifted)
+    return float(point[-1]), point[:-1]
+
+
+def quadratic(lifted: Lifted, matrix: Floats, vector: Floats) -> Optimum:
+    """Minimise v . matrix v / 2 + vector . v over a set of controls without equations, `matrix` positive semidefinite.
+
+    For a box the solution is moved to where its active rows meet, which makes it exact to rounding.
+    """
+    if not lifted.size:
+        return Optimum(np.zeros(0), np.zeros(len(lifted.limits)))
+    program = ConeProgram(vector, matrix).keep(lifted.rows, lifted.limits)
+    optimum = with_thrust(program, lifted).solve()
+    return optimum if lifted.ball else _polished(optimum, matrix, vector, lifted.rows, lifted.limits)
+
+
+def least_sum_of_norms(lifted: Lifted, scale: Floats, group: int) -> Floats:
+    """Minimise the sum over the periods of the norms of the `group` controls of a period; `scale` is their units."""
+    periods = len(lifted.control_free) // group
+    tops = np.hstack([np.zeros((periods, lifted.size)), np.eye(periods)])
+    program = with_thrust(ConeProgram(tops.sum(axis=0)).keep(lifted.rows, lifted.limits), lifted)
+    return _with_norms_below(program, lifted, scale, tops).solve().point[: lifted.size]
+
+
+def least_peak(lifted: Lifted, scale: Floats, group: int) -> tuple[float, Floats]:
+    """Return the least bound that all controls can keep, and where they keep it.
+
+    It bounds each component, or the norm of the `group` controls of a period for thrust in a ball; `scale` is the units
+    of the controls.
+    """
+    cost = np.concatenate([np.zeros(lifted.size), [1.0]])
+    if lifted.ball:
+        program = with_thrust(ConeProgram(cost).keep(lifted.rows, lifted.limits), lifted)
+        tops = np.repeat(cost[None, :], len(lifted.control_free) // group, axis=0)
+        point = _with_norms_below(program, lifted, scale, tops).solve().point
+    else:
+        program = ConeProgram(cost).keep(lifted.rows, lifted.limits)
+        point = program.keep(*_absolute(lifted, scale, np.ones((len(scale), 1)))).vertex()
+    return float(point[-1]), point[:-1]
+
+
+def least_l1(lifted: Lifted, scale: Floats) -> Floats:
+    """Minimise the sum of the absolute values of all controls, whose units are `scale`."""
+    rows, limits = _absolute(lifted, scale, np.eye(len(scale)))
+    cost = np.concatenate([np.zeros(lifted.size), np.ones(len(scale))])
+    wide = np.hstack([lifted.rows, np.zeros((len(lifted.rows), len(scale)))])
+    program = ConeProgram(cost).keep(np.vstack([wide, rows]), np.concatenate([lifted.limits, limits]))
+    return _solution(program, lifted)[: lifted.size]
+
+
+def deep_point(lifted: Lifted) -> tuple[Floats, float]:
+    """Return a point deep inside a set with thrust in a ball, and the radius of a ball about it that is inside.
+
+    The effect of the radius on the thrust of a period is bounded by the norm of its response: the ball is inside, but
+    may not be the largest.
+    """
+    if not lifted.size:
+        return np.zeros(0), 0.0
+    cost = np.concatenate([np.zeros(lifted.size), [-1.0]])
+    rows = np.column_stack([lifted.rows, np.linalg.norm(lifted.rows, axis=1)])
+    # The least bound on the radius keeps the program bounded where no row depends on v.
+    program = ConeProgram(cost).keep(np.vstack([rows, -cost]), np.concatenate([lifted.limits, [1.0]]))
+    optimum = with_thrust(program, lifted, deep=True).solve()
+    return optimum.point[:-1], float(optimum.point[-1])
+
+
+def _solution(program: ConeProgram, lifted: Lifted) -> Floats:
+    return with_thrust(program, lifted).solve().point if lifted.ball else program.vertex()
+
+
+def _absolute(lifted: Lifted, scale: Floats, tops: Floats) -> tuple[Floats, Floats]:
+    """Rows for |controls| <= tops w, in the units of the controls, w being the variables after those of the set."""
+    turned, fixed = scale[:, None] * lifted.control_response, scale * lifted.control_free
+    return np.vstack([np.hstack([turned, -tops]), np.hstack([-turned, -tops])]), np.concatenate([-fixed, fixed])
+
+
+def _with_norms_below(program: ConeProgram, lifted: Lifted, scale: Floats, tops: Floats) -> ConeProgram:
+    """Add |u(t)| <= tops[t] . v, in the units of the controls."""
+    group = len(scale) // len(tops)
+    for t, top in enumerate(tops):
+        mine = slice(t * group, (t + 1) * group)
+        program.bound(scale[mine, None] * lifted.control_response[mine], scale[mine] * lifted.control_free[mine], top)
+    return program
+
+
+def _polished(optimum: Optimum, matrix: Floats, vector: Floats, rows: Floats, limits: Floats) -> Optimum:
+    """Solve for the point where the active rows hold with equality; keep it if it is a solution."""
+    active = optimum.multipliers > limits - rows @ optimum.point
+    held = rows[active]
+    count = len(vector)
+    system = np.zeros((count + len(held), count + len(held)))
+    system[:count, :count] = matrix
+    system[:count, count:], system[count:, :count] = held.T, held
+    right = np.concatenate([-vector - matrix @ optimum.point, limits[active] - held @ optimum.point])
+    step = np.linalg.lstsq(system, right, rcond=1e-13)[0]
+    point, pressed = optimum.point + step[:count], step[count:]
+    size = max(1.0, float(np.abs(pressed).max(initial=0.0)))
+    if float((limits - rows @ point).min(initial=0.0)) < -1e-10 or float(pressed.min(initial=0.0)) < -1e-9 * size:
+        return optimum
+    multipliers = np.zeros(len(rows))
+    multipliers[active] = np.maximum(pressed, 0.0)
+    return Optimum(point, multipliers)
+
+
+class Maximiser:
+    """Maximise many linear functions over one set of controls, which is not empty.
+
+    Notes
+    -----
+    An interior-point method (Clarabel) reuses what depends on the constraints alone; the simplex method (HiGHS) solves
+    the programs that it does not. Most constraints on states are never active: where they are many, it begins without
+    them, and adds one, at the times near by, once a solution breaks it.
+    """
+
+    def __init__(self, lifted: Lifted) -> None:
+        self._lifted = lifted
+        soft = lifted.moments >= 0
+        self._use(np.ones(len(soft), dtype=bool) if soft.sum() < _MANY_ROWS else ~soft)
+
+    def maximise(self, cost: Floats) -> Floats:
+        """Return a maximiser of a linear function, both of shape (p,)."""
+        return self._solved(cost).point
+
+    def maximise_all(self, costs: Floats) -> Floats:
+        """Return a maximiser of each function, both of shape (k, p)."""
+        return np.array([self.maximise(cost) for cost in costs]).reshape(costs.shape)
+
+    def maximise_sharply(self, cost: Floats) -> Floats:
+        """Return a maximiser that is on its active rows to rounding; for thrust in a ball, to the program's tolerance.
+
+        The solution takes the shortest step onto the rows whose multipliers are above their slacks: one more
+        least-squares problem.
+        """
+        optimum = self._solved(cost)
+        if not self._lifted.size or self._lifted.ball:
+            return optimum.point
+        rows, limits = self._lifted.rows[self._used], self._lifted.limits[self._used]
+        active = optimum.multipliers > limits - rows @ optimum.point
+        held = np.vstack([self._lifted.equal, rows[active]])
+        missing = np.concatenate([self._lifted.levels, limits[active]]) - held @ optimum.point
+        moved = optimum.point + np.linalg.lstsq(held, missing, rcond=1e-12)[0]
+        kept = float((self._lifted.limits - self._lifted.rows @ moved).min(initial=0.0)) > -_BROKEN
+        return moved if kept else optimum.point
+
+    def _use(self, used: Flags) -> None:
+        self._used = used
+        self._program = self._with_cost(np.zeros(self._lifted.size))
+        if self._lifted.size:
+            # Every answer is checked; for a box, refinement would take a third of the time.
+            changes = STEADY if self._lifted.ball else {"iterative_refinement_enable": False}
+            self._solver = self._program.solver(**changes)
+
+    def _with_cost(self, cost: Floats) -> ConeProgram:
+        lifted, used = self._lifted, self._used
+        program = ConeProgram(cost).meet(lifted.equal, lifted.levels).keep(lifted.rows[used], lifted.limits[used])
+        return with_thrust(program, lifted)
+
+    def _solved(self, cost: Floats) -> Optimum:
+        lifted = self._lifted
+        if not lifted.size:
+            return Optimum(np.zeros(0), np.zeros(int(self._used.sum())))
+        while True:
+            optimum = self._with_rows_used(cost)
+            used = self._used
+            if used.all():
+                return optimum
+            broken = (lifted.rows @ optimum.point - lifted.limits > _BROKEN) & ~used
+            if not broken.any():
+                return optimum
+            for row in np.flatnonzero(broken):
+                near = np.abs(lifted.moments - lifted.moments[row]) <= _NEAR
+                used = used | (near & (lifted.labels == lifted.labels[row]))
+            self._use(used)
+
+    def _with_rows_used(self, cost: Floats) -> Optimum:
+        size = float(np.abs(cost).max())
+        down = -cost / (size if size > 0.0 else 1.0)
+        self._solver.update(q=down)
+        solution = self._solver.solve()
+        if solution.status == clarabel.SolverStatus.Solved:
+            point, multipliers = np.array(solution.x), np.array(solution.z)
+            try:
+                self._program.need_solution(point, multipliers, down)
+            except NoSolutionError:
+                pass
+            else:
+                return Optimum(point, self._program.of_rows(multipliers))
+        if self._lifted.ball:
+            return self._with_cost(down).solve()
+        return Optimum(self._with_cost(down).vertex(), np.zeros(int(self._used.sum())))

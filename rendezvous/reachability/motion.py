@@ -1,0 +1,170 @@
+"""Motion about an elliptic orbit: a linear system in discrete time, and the nonlinear motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import solve_ivp
+
+from rendezvous.relative_motion import ORBITAL, ConstantMotion, EllipticOrbit, TschaunerHempel
+
+Floats = NDArray[np.float64]
+
+_RELATIVE = 1e-12
+_ABSOLUTE = 1e-9
+
+
+class MotionModel(Enum):
+    """Linear model: A(t) constant, as at t = 0, or following the ellipse."""
+
+    FROZEN = "frozen"
+    TIME_VARYING = "time-varying"
+
+
+def motion_of(orbit: EllipticOrbit, model: MotionModel) -> ConstantMotion | TschaunerHempel:
+    """Return the linear motion about an `orbit` by a `model`, in axes x against the motion, y outward.
+
+    Notes
+    -----
+    Equation (2) of Shorikov and Goranov (2021); their numbers are of the frozen model.
+    """
+    return orbit.frozen(0.0, ORBITAL) if model is MotionModel.FROZEN else TschaunerHempel(orbit, ORBITAL)
+
+
+def discretised(
+    motion: ConstantMotion | TschaunerHempel, periods: int, period_s: float, acceleration_m_s2: float
+) -> tuple[Floats, Floats]:
+    """Return A(t) and B(t) of x(t + 1) = A(t) x(t) + B(t) u(t), exact for controls held over a period.
+
+    A(t), shape (periods, 6, 6), is of states in m and m/s of the `motion`; B(t), shape (periods, 6, 3), is in m and m/s
+    for a unit control, of acceleration `acceleration_m_s2`.
+
+    Raises
+    ------
+    ValueError
+        If `periods` is less than 1.
+
+    Notes
+    -----
+    Equation (3). A block exponential for the frozen model, closed forms and quadrature for the other.
+    """
+    if periods < 1:
+        raise ValueError("T = 0: there must be at least one period")
+    starts = period_s * np.arange(periods if isinstance(motion, TschaunerHempel) else 1)
+    transition = motion.transition(starts, starts + period_s)
+    control = acceleration_m_s2 * motion.held_input(starts, starts + period_s)
+    return _repeated(transition, periods), _repeated(control, periods)
+
+
+def between_periods(
+    motion: ConstantMotion | TschaunerHempel,
+    periods: int,
+    period_s: float,
+    acceleration_m_s2: float,
+    instants: int,
+) -> Floats:
+    """Return the matrices of states within the periods, x = matrix (x(t), u(t)), shape (periods, instants, 6, 9).
+
+    `motion`, `periods`, `period_s` and `acceleration_m_s2` are those of `discretised`; `instants` are evenly spaced
+    within a period.
+    """
+    if isinstance(motion, ConstantMotion):
+        step_s = period_s / (instants + 1)
+        step = motion.transition(0.0, step_s)
+        inner = [np.hstack([step, acceleration_m_s2 * motion.held_input(0.0, step_s)])]
+        for _ in range(instants - 1):
+            inner.append(step @ inner[-1])
+            inner[-1][:, 6:] += inner[0][:, 6:]
+        return _repeated(np.array(inner)[None], periods)
+    starts = period_s * np.arange(periods)[:, None]
+    ends = starts + period_s * np.arange(1, instants + 1) / (instants + 1)
+    moved, held = motion.transition(starts, ends), motion.held_input(starts, ends)
+    return np.concatenate([moved, acceleration_m_s2 * held], axis=-1)
+
+
+def _repeated(matrices: Floats, periods: int) -> Floats:
+    """Repeat the matrices of one period, where A is constant."""
+    return np.repeat(matrices, periods, axis=0) if len(matrices) < periods else matrices
+
+
+@dataclass(frozen=True)
+class NonlinearMotion:
+    """Relative motion in a central field, in the orbital frame: x against the motion, y outward, z completes.
+
+    Parameters
+    ----------
+    orbit : EllipticOrbit
+        Orbit of the passive craft.
+    semi_major_axis_m : float
+        Semi-major axis of that orbit.
+
+    Notes
+    -----
+    Equations (1) of Shorikov and Goranov (2021), with w^2 r^4 / p = mu; DOP853 to 1e-12.
+    """
+
+    orbit: EllipticOrbit
+    semi_major_axis_m: float
+
+    def paths(self, start_s: float, states: ArrayLike, accelerations: ArrayLike, times_s: ArrayLike) -> Floats:
+        """Return the states at `times_s`, shape (k, s, 6), of motion under constant accelerations.
+
+        Initial `states` have shape (k, 6), in m and m/s; `accelerations`, in the rotating axes, shape (k, 3), m/s^2;
+        `times_s`, shape (s,), rise and are not before `start_s`.
+
+        Raises
+        ------
+        ArithmeticError
+            If a path cannot be integrated, for example because it passes too near the centre.
+        """
+        initial, push = np.atleast_2d(np.asarray(states, float)), np.atleast_2d(np.asarray(accelerations, float))
+        times = np.asarray(times_s, dtype=float)
+        count = len(initial)
+        e, k2 = self.orbit.eccentricity, self.orbit.semi_latus_rate_rad_s
+        parameter = self.semi_major_axis_m * (1.0 - e * e)
+        gravity = k2 * k2 * parameter**3
+
+        def slope(_time: float, flat: Floats) -> Floats:
+            anomaly, state = flat[0], flat[1:].reshape(6, count)
+            rho = 1.0 + e * np.cos(anomaly)
+            r, w = parameter / rho, k2 * rho * rho
+            w_dot = -2.0 * k2 * k2 * e * np.sin(anomaly) * rho**3
+            x, y, z, vx, vy, vz = state
+            pull = gravity / (x * x + (r + y) ** 2 + z * z) ** 1.5
+            result = np.empty(1 + 6 * count)
+            result[0] = w
+            rates = result[1:].reshape(6, count)
+            rates[:3] = vx, vy, vz
+            rates[3] = 2.0 * w * vy + w * w * x + w_dot * y - pull * x + push[:, 0]
+            rates[4] = -2.0 * w * vx + w * w * y - w_dot * x + gravity / r**2 - pull * (r + y) + push[:, 1]
+            rates[5] = -pull * z + push[:, 2]
+            return result
+
+        begin = np.concatenate([[float(self.orbit.true_anomaly(start_s))], initial.T.ravel()])
+        if times[-1] == start_s:
+            return np.repeat(initial[:, None, :], len(times), axis=1)
+        found = solve_ivp(
+            slope, (start_s, times[-1]), begin, method="DOP853", t_eval=times, rtol=_RELATIVE, atol=_ABSOLUTE
+        )
+        if not found.success:
+            raise ArithmeticError(f"the motion could not be integrated: {found.message}")
+        return np.asarray(found.y[1:].reshape(6, count, len(times)).transpose(1, 2, 0))
+
+    def fly(self, start: ArrayLike, accelerations: ArrayLike, period_s: float, points: int = 1) -> Floats:
+        """Return the states of craft that hold an acceleration during each period, shape (k, T points + 1, 6).
+
+        All start in the state `start`, shape (6,), at t = 0; `accelerations` have shape (k, T, 3), in m/s^2; `points`
+        instants of each period are returned. Errors are those of `paths`.
+        """
+        push = np.asarray(accelerations, dtype=float)
+        state = np.broadcast_to(np.asarray(start, dtype=float), (len(push), 6))
+        path = [state[:, None, :]]
+        for t in range(push.shape[1]):
+            times = period_s * (t + np.arange(1, points + 1) / points)
+            found = self.paths(period_s * t, state, push[:, t], times)
+            path.append(found)
+            state = found[:, -1]
+        return np.concatenate(path, axis=1)

@@ -1,0 +1,385 @@
+"""Forward sets and the tube of a problem: exact polytopes, or sets known by programs over the admissible controls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from time import perf_counter
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infoset.polytope import Polytope, cut, intersection, linear_image, shadow
+from rendezvous.reachability.admissible import Lifted, Maximiser, lift, lift_with_states
+from rendezvous.reachability.optimum import BlockOptimum
+from rendezvous.reachability.problem import Block, ReachabilityProblem
+
+Floats = NDArray[np.float64]
+
+_FEW_CONTROLS = 24
+_AT_BOUND = 1.0 - 1e-10
+_SHARP = 1e-7
+
+
+class SetKind(Enum):
+    """Set of states at a time: all that admissible controls reach (forward), or that optimal controls pass (tube)."""
+
+    FORWARD = "forward"
+    TUBE = "tube"
+
+
+class TooLargeError(ArithmeticError):
+    """The exact route would exceed its budget."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Limits of the exact route.
+
+    Parameters
+    ----------
+    seconds : float
+        Time, s, for all blocks together; a step that is expected to exceed it is not begun.
+    megabytes : float
+        Memory, MB, for one step.
+    dimension : int
+        Largest block.
+    """
+
+    seconds: float = 5.0
+    megabytes: float = 500.0
+    dimension: int = 6
+
+
+class BlockSets(Protocol):
+    """Sets of states of a block, at t = 0..T, scaled."""
+
+    def support(self, kind: SetKind, time: int, directions: Floats) -> Floats:
+        """Return the support function along directions, shape (k, n), as an array of shape (k,)."""
+
+    def bounds(self, kind: SetKind) -> Floats:
+        """Return the least and greatest value of each state at each time, shape (T + 1, n, 2)."""
+
+    def shadow(self, kind: SetKind, time: int, rows: Floats, tolerance: float = 1e-9) -> Polytope:
+        """Return the image of a set under a matrix, shape (d, n), of few rows."""
+
+    def polytope(self, kind: SetKind, time: int) -> Polytope | None:
+        """Return the set itself, where it is known."""
+
+
+@dataclass(frozen=True)
+class SetCounts:
+    """Size and dimension of a polytope.
+
+    Parameters
+    ----------
+    vertices : int
+        Those nearer to each other than 1e-7 of the bounds count once.
+    facets : int
+        Of all blocks together.
+    dimension : int
+        Of the affine hull.
+    """
+
+    vertices: int
+    facets: int
+    dimension: int
+
+
+@dataclass(frozen=True, eq=False)
+class ReachableSets:
+    """Sets of states at t = 0..T, in the units of the problem.
+
+    Parameters
+    ----------
+    problem : ReachabilityProblem
+        The problem whose states these are.
+    blocks : tuple of Block
+        The independent parts of the problem.
+    parts : tuple of BlockSets
+        Sets of each block.
+    """
+
+    problem: ReachabilityProblem
+    blocks: tuple[Block, ...]
+    parts: tuple[BlockSets, ...]
+
+    def bounds(self, kind: SetKind) -> Floats:
+        """Return the least and greatest value of each state at each time, shape (T + 1, n, 2), of sets of a `kind`."""
+        result = np.zeros((self.problem.periods + 1, self.problem.states, 2))
+        for block, part in zip(self.blocks, self.parts, strict=True):
+            result[:, block.states] = part.bounds(kind) * block.scale[:, None]
+        return result
+
+    def support(self, kind: SetKind, time: int, directions: Floats) -> Floats:
+        """Return the maximum of direction . x over the set of a `kind` at a `time`, shape (k,).
+
+        `directions`, shape (k, n), are such that direction . x is taken in the units of the problem.
+        """
+        total = np.zeros(len(directions))
+        for block, part in zip(self.blocks, self.parts, strict=True):
+            total += part.support(kind, time, directions[:, block.states] * block.scale)
+        return total
+
+    def counts(self, kind: SetKind, time: int) -> SetCounts | None:
+        """Return the counts of the set of a `kind` at a `time`, or None where it is known by programs only."""
+        sets = [polytope for part in self.parts if (polytope := part.polytope(kind, time)) is not None]
+        if len(sets) < len(self.parts):
+            return None
+        return SetCounts(
+            int(np.prod([polytope.essential_vertices() for polytope in sets])),
+            sum(len(polytope.normals) for polytope in sets),
+            sum(polytope.dimension for polytope in sets),
+        )
+
+    def shadow(self, kind: SetKind, time: int, axes: Sequence[int], tolerance: float = 1e-9) -> Floats:
+        """Return the vertices of the projection of a set on two or three states, shape (v, len(axes)), in no order.
+
+        Parameters
+        ----------
+        kind : SetKind
+            Forward set or tube.
+        time : int
+            From 0 to T.
+        axes : sequence of int
+            Indices of the states.
+        tolerance : float
+            Relative error of the projection of a set that is known by programs only.
+        """
+        wanted = list(axes)
+        order: list[int] = []
+        points = np.zeros((1, 0))
+        for block, part in zip(self.blocks, self.parts, strict=True):
+            mine = [int(np.flatnonzero(block.states == axis)[0]) for axis in wanted if axis in block.states]
+            if not mine:
+                continue
+            order += [int(block.states[index]) for index in mine]
+            scaled = part.shadow(kind, time, np.eye(block.size)[mine], tolerance).vertices * block.scale[mine]
+            points = np.hstack([np.repeat(points, len(scaled), axis=0), np.tile(scaled, (len(points), 1))])
+        return points[:, [order.index(axis) for axis in wanted]]
+
+
+class Meter:
+    """Measures the time that hulls take, and refuses a hull that is expected to exceed the budget.
+
+    Notes
+    -----
+    Qhull's time for k points in R^d grows as k^(d/2) at worst, and the memory of the check as vertices times facets.
+    Both are extrapolated from the last hull of that dimension, the first one from figures of a slow machine.
+    """
+
+    def __init__(self, budget: Budget) -> None:
+        self.budget = budget
+        self._began_s = perf_counter()
+        self._last: dict[int, tuple[int, float, int]] = {}
+
+    def hull(self, points: Floats) -> Polytope:
+        """Return the hull of points, shape (k, n); `TooLargeError` is raised where it would exceed the budget."""
+        count, size = points.shape
+        if size > 2:
+            self._check(count, size)
+        began_s = perf_counter()
+        hull = Polytope.from_vertices(points)
+        self._last[size] = (count, perf_counter() - began_s, len(hull.normals))
+        return hull
+
+    def _check(self, count: int, size: int) -> None:
+        power = max(1.0, size / 2.0)
+        last_count, last_s, facets = self._last.get(size, (1000, 0.02 * 4.0 ** (size - 2), 50 * 4 ** (size - 2)))
+        growth = (count / last_count) ** power
+        expected_s = perf_counter() - self._began_s + growth * last_s
+        expected_mb = 1e-6 * growth * facets * (8.0 * count + 4.0 * growth * facets)
+        if expected_s > self.budget.seconds:
+            raise TooLargeError(
+                f"a hull of {count} points in R^{size} is expected to bring the exact sets to {expected_s:.3g} s, over "
+                f"the {self.budget.seconds:g} s they may take"
+            )
+        if expected_mb > self.budget.megabytes:
+            raise TooLargeError(
+                f"a hull of {count} points in R^{size} is expected to take {expected_mb:.3g} MB, over the "
+                f"{self.budget.megabytes:g} MB it may take"
+            )
+
+
+class ExactSets:
+    """Sets of a block with all vertices and facets, for thrust in a box and constraints at whole periods only.
+
+    Raises
+    ------
+    TooLargeError
+        If the block exceeds the budget of the meter, or a hull is expected to.
+    UncertainHullError
+        If rounding decides which points are vertices of a set.
+
+    Notes
+    -----
+    Shorikov and Goranov (2021): G+(t + 1) = (A G+(t) + B U) cut by X; G-(t) = {x in X: A x in G-(t + 1) - B U}, whose
+    half-spaces need no inverse of A; the tube is the intersection of both. Where zero is not reached the tube is a face
+    of G+ that rounding would lose; it is then the image of the vertices of the optimal controls.
+    """
+
+    def __init__(self, optimum: BlockOptimum, meter: Meter) -> None:
+        block = optimum.block
+        if block.size > meter.budget.dimension:
+            raise TooLargeError(f"a block of {block.size} states is over the {meter.budget.dimension} of exact sets")
+        self._optimum, self._meter = optimum, meter
+        reach = np.ones(len(block.controls))
+        corners = Polytope.box(-reach, reach).vertices if len(reach) else np.zeros((1, 0))
+        forward = [Polytope.from_vertices(block.initial[None, :])]
+        for t in range(block.periods):
+            moved = forward[-1].vertices @ block.transition[t].T
+            reached = meter.hull(_sums(moved, corners @ block.control[t].T))
+            forward.append(cut(reached, *_finite(block.normals, block.offsets[t + 1])))
+        tube = self._both_ways(corners, forward) if optimum.reached else self._of_controls()
+        self._sets = {SetKind.FORWARD: forward, SetKind.TUBE: tube}
+
+    def support(self, kind: SetKind, time: int, directions: Floats) -> Floats:
+        """Return the support function along directions, shape (k, n), as an array of shape (k,)."""
+        return self.polytope(kind, time).support(directions)
+
+    def bounds(self, kind: SetKind) -> Floats:
+        """Return the least and greatest value of each state at each time, shape (T + 1, n, 2)."""
+        return np.array([np.stack(polytope.bounds, axis=-1) for polytope in self._sets[kind]])
+
+    def shadow(self, kind: SetKind, time: int, rows: Floats, tolerance: float = 1e-9) -> Polytope:
+        """Return the image of a set under a matrix, shape (d, n), of few rows."""
+        return linear_image(self.polytope(kind, time), rows, np.zeros(len(rows)))
+
+    def polytope(self, kind: SetKind, time: int) -> Polytope:
+        """Return the set itself."""
+        return self._sets[kind][time]
+
+    def _both_ways(self, corners: Floats, forward: list[Polytope]) -> list[Polytope]:
+        block = self._optimum.block
+        backward = Polytope.from_vertices(np.zeros((1, block.size)))
+        tube = [backward]
+        for t in range(block.periods - 1, 0, -1):
+            before = self._meter.hull(_sums(backward.vertices, -corners @ block.control[t].T))
+            rows, ends = _finite(block.normals, block.offsets[t])
+            backward = Polytope.from_halfspaces(
+                np.vstack([before.normals @ block.transition[t], rows]),
+                np.concatenate([before.offsets, ends]),
+                before.across @ block.transition[t],
+                before.levels,
+                bounded=True,
+            )
+            tube.append(intersection(forward[t], backward))
+        return [forward[0], *reversed(tube)]
+
+    def _of_controls(self) -> list[Polytope]:
+        optimal = self._optimum.optimal
+        corners = np.zeros((1, 0))
+        if optimal.size:
+            corners = Polytope.from_halfspaces(optimal.rows, optimal.limits, bounded=True).vertices
+        return [
+            self._meter.hull(free + corners @ response.T)
+            for free, response in zip(optimal.free, optimal.response, strict=True)
+        ]
+
+
+def _sums(first: Floats, second: Floats) -> Floats:
+    return np.asarray((first[:, None, :] + second[None, :, :]).reshape(-1, first.shape[1]))
+
+
+def _finite(normals: Floats, offsets: Floats) -> tuple[Floats, Floats]:
+    held = np.isfinite(offsets)
+    return normals[held], offsets[held]
+
+
+class LiftedSets:
+    """Sets of a block that are known by programs over its admissible controls.
+
+    Notes
+    -----
+    A linear program a direction, or one with cones for thrust in a ball; the only error is the tolerance of the
+    programs, at most 1e-8 of the bounds. The variables are the controls, and where these are many the states too, since
+    the rows are sparse then.
+    """
+
+    def __init__(self, optimum: BlockOptimum) -> None:
+        self._optimum = optimum
+        self._known: dict[tuple[SetKind, int], tuple[Lifted, Maximiser]] = {}
+
+    def support(self, kind: SetKind, time: int, directions: Floats) -> Floats:
+        """Return the support function along directions, shape (k, n), as an array of shape (k,)."""
+        lifted, program = self._set(kind, time)
+        costs = directions @ lifted.response[time]
+        points = program.maximise_all(costs)
+        return np.asarray(directions @ lifted.free[time] + np.einsum("kp,kp->k", costs, points))
+
+    def bounds(self, kind: SetKind) -> Floats:
+        """Return the least and greatest value of each state at each time, shape (T + 1, n, 2)."""
+        size, periods = self._optimum.block.size, self._optimum.block.periods
+        unit = np.eye(size)
+        result = np.zeros((periods + 1, size, 2))
+        result[0] = self._optimum.block.initial[:, None]
+        if kind is SetKind.FORWARD:
+            for t in range(1, periods + 1):
+                ends = self.support(kind, t, np.vstack([-unit, unit])).reshape(2, size)
+                result[t, :, 0], result[t, :, 1] = -ends[0], ends[1]
+            return result
+        # A state on the path of one optimal control is reached: where it is at its bound, there is nothing to solve.
+        lifted, program = self._set(kind, periods)
+        best = np.full((periods + 1, size, 2), -np.inf)
+        for t in _coarse_first(periods):
+            for i in range(size):
+                for side, sign in enumerate((-1.0, 1.0)):
+                    if best[t, i, side] < _AT_BOUND:
+                        point = program.maximise(sign * lifted.response[t, i])
+                        states = lifted.free + lifted.response @ point
+                        best[t, i, side] = sign * states[t, i]
+                        np.maximum(best, np.stack([-states, states], axis=-1), out=best)
+        result[1:, :, 0], result[1:, :, 1] = -best[1:, :, 0], best[1:, :, 1]
+        result[periods] = self._optimum.terminal[:, None]
+        return result
+
+    def shadow(self, kind: SetKind, time: int, rows: Floats, tolerance: float = 1e-9) -> Polytope:
+        """Return the image of a set under a matrix, shape (d, n), of few rows."""
+        if time == 0:
+            return Polytope.from_vertices((rows @ self._optimum.block.initial)[None, :])
+        lifted, program = self._set(kind, time)
+        free, response = rows @ lifted.free[time], rows @ lifted.response[time]
+        solve = program.maximise if tolerance > _SHARP else program.maximise_sharply
+
+        def furthest(direction: Floats) -> Floats:
+            return np.asarray(free + response @ solve(direction @ response))
+
+        return shadow(furthest, len(rows), tolerance)
+
+    def polytope(self, kind: SetKind, time: int) -> Polytope | None:
+        """Return None: the vertices are not known."""
+        return None
+
+    def _set(self, kind: SetKind, time: int) -> tuple[Lifted, Maximiser]:
+        key = kind, 0 if kind is SetKind.TUBE else time
+        if key not in self._known:
+            if kind is SetKind.TUBE:
+                lifted = optimal_set(self._optimum)
+            else:
+                block = self._optimum.block.first(max(time, 1))
+                few = block.periods * len(block.controls) <= _FEW_CONTROLS
+                lifted = lift(block) if few else lift_with_states(block)
+            self._known[key] = lifted, Maximiser(lifted)
+        return self._known[key]
+
+
+def optimal_set(optimum: BlockOptimum) -> Lifted:
+    """Return the optimal controls of a block in the variables that suit many linear programs."""
+    if optimum.optimal.size <= _FEW_CONTROLS or not optimum.reached:
+        return optimum.optimal
+    lifted = lift_with_states(optimum.block)
+    return lifted.where(lifted.response[-1], -lifted.free[-1])
+
+
+def _coarse_first(periods: int) -> list[int]:
+    """Times 1..T - 1 in an order whose every beginning is spread over all."""
+    order: list[int] = []
+    step = 1
+    while step < periods:
+        step *= 2
+    while step >= 1:
+        order += [t for t in range(step, periods, step) if t not in set(order)]
+        step //= 2
+    return order
