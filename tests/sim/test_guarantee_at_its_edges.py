@@ -145,10 +145,11 @@ def test_round_numbers_give_no_warning_and_finite_results(first: int, number: in
 # The band of a measured rate --------------------------------------------------------------------------------------
 
 
-def flat_law(error_rad: float) -> tuple[SetModel, SectionLaw]:
+def flat_law(error_rad: float, rising: bool) -> tuple[SetModel, SectionLaw]:
+    """A model whose error bound at zero range is half (rising) or twice that at the nominal range."""
     box = StateBox((-1e4, 1e4), (4e5, 6e5), (-300.0, 300.0), (-5e3, -5e3))
     model = SetModel(
-        5e3, 1.0, box, AngleSensor(1.0, error_rad, 2.0 * error_rad, 5e5), 0.05, 0.0, 5, 2, InitialSet.BOX,
+        5e3, 1.0, box, AngleSensor(1.0, error_rad, (0.5 if rising else 2.0) * error_rad, 5e5), 0.05, 0.0, 5, 2, InitialSet.BOX,
         Model.GUARANTEED, execution_error_relative=0.02,
     )  # fmt: skip
     return model, section_law(model)
@@ -160,16 +161,19 @@ SIDES = st.sampled_from([-1.0, 1.0]) | st.floats(-1.0, 1.0)
 @settings(max_examples=1000, deadline=None)
 @given(
     st.floats(-0.02, 0.02), st.floats(-40.0, 40.0), st.integers(0, 6), SIDES, SIDES, st.floats(-8.0, -2.0),
-    st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(-5.0, 5.0), SIDES,
+    st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(-5.0, 5.0), SIDES, st.booleans(), st.booleans(),
 )  # fmt: skip
 def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(
     slope: float, v: float, ago: int, angle_draw: float, rate_draw: float,
-    log_error: float, place: float, width: float, impulse: float, push: float,
+    log_error: float, place: float, width: float, impulse: float, push: float, rising: bool, measured: bool,
 ) -> None:  # fmt: skip
-    """A motion that is integrated in closed form: what was measured of it admits z + V x_c/e for every window."""
+    """The measured rate of a motion in closed form admits z + V x_c/e for every window of labels.
+
+    The last angle was measured `ago` steps before the rate, or never: then the initial box stands for it.
+    """
     error = 10.0**log_error
-    model, law = flat_law(error)
-    e, step, elapsed = law.closing_speed, law.step, 60
+    model, law = flat_law(error, rising)
+    e, step, elapsed = law.closing_speed, law.step, 60 if measured else ago
     label = 4.2e5 + 1.5e5 * place
     near, far = label - 8e4 * width * place, label + 8e4 * width * (1.0 - place)
     # The last angle, `ago` steps before; an impulse in the middle, with an error; a push all the way.
@@ -187,9 +191,9 @@ def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(
     omega = omega_true + rate_draw * 1e-9
     size = abs(impulse) if ago else 0.0
     sight = LastSight(
-        True, alpha, ago, impulse * fired_after if ago else 0.0, size * law.impulse_error * fired_after, size
+        measured, alpha, ago, impulse * fired_after if ago else 0.0, size * law.impulse_error * fired_after, size
     )
-    if abs(v) + size + law.disturbance * time > 300.0:
+    if abs(v) + size + law.disturbance * time > 300.0 or abs(z_then) > 1e4:
         return
     middle = 0.5 * (near + far) - e * step * elapsed
     lower, upper = rate_band(label, near, far, elapsed, omega, rate_error, sight, law)
