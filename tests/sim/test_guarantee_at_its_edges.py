@@ -149,8 +149,8 @@ def flat_law(error_rad: float, rising: bool) -> tuple[SetModel, SectionLaw]:
     """A model whose error bound at zero range is half (rising) or twice that at the nominal range."""
     box = StateBox((-1e4, 1e4), (4e5, 6e5), (-300.0, 300.0), (-5e3, -5e3))
     model = SetModel(
-        5e3, 1.0, box, AngleSensor(1.0, error_rad, (0.5 if rising else 2.0) * error_rad, 5e5), 0.05, 0.0, 5, 2, InitialSet.BOX,
-        Model.GUARANTEED, execution_error_relative=0.02,
+        5e3, 1.0, box, AngleSensor(1.0, error_rad, (0.5 if rising else 2.0) * error_rad, 5e5), 0.05, 0.0, 5, 2,
+        InitialSet.BOX, Model.GUARANTEED, execution_error_relative=0.02,
     )  # fmt: skip
     return model, section_law(model)
 
