@@ -16,21 +16,8 @@ from experiments.campaigns.options import (
     Resume,
     Workers,
 )
-from experiments.common.options import (
-    MOST_RUNS,
-    Json,
-    ModelName,
-    Overwrite,
-    Quiet,
-    RangeMeter,
-    ScenarioName,
-    Seed,
-    StrategyName,
-    TieName,
-    scenario_with,
-    whole_number,
-    with_range_meter,
-)
+from experiments.common.options import Json, Overwrite, Quiet, Seed, whole_number
+from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, ScenarioName, StrategyName, TieName
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -92,6 +79,7 @@ def campaign(
     )
     from experiments.common.output import STDOUT, checked_destinations, deliver, to_json, write_file
     from experiments.common.screen import say_warnings, tell_of_compiling
+    from experiments.interception.choices import scenario_with
 
     whole_number("--runs", runs, 1, MOST_RUNS, 10_000)
     whole_number("--seed", seed, 0, None, 0)
@@ -104,7 +92,7 @@ def campaign(
     from sim.storage import need_free
 
     named = checked_noise(noise)
-    given = with_range_meter(scenario_with(scenario, strategy=strategy, model=model, tie=tie), range_meter)
+    given = scenario_with(scenario, strategy=strategy, model=model, tie=tie, range_meter=range_meter)
     asked = Campaign(
         given,
         runs,

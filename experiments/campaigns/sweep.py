@@ -18,21 +18,8 @@ from experiments.campaigns.options import (
     Resume,
     Workers,
 )
-from experiments.common.options import (
-    MOST_RUNS,
-    Json,
-    ModelName,
-    Overwrite,
-    Quiet,
-    RangeMeter,
-    ScenarioName,
-    Seed,
-    StrategyName,
-    TieName,
-    scenario_with,
-    whole_number,
-    with_range_meter,
-)
+from experiments.common.options import Json, Overwrite, Quiet, Seed, whole_number
+from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, ScenarioName, StrategyName, TieName
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -118,6 +105,7 @@ def sweep(
     )
     from experiments.common.output import STDOUT, checked_destinations, deliver, to_json, write_file
     from experiments.common.screen import figure_files, say, say_warnings, tell_of_compiling
+    from experiments.interception.choices import scenario_with
 
     whole_number("--runs", runs, 1, MOST_RUNS, 200)
     whole_number("--seed", seed, 0, None, 0)
@@ -133,7 +121,7 @@ def sweep(
     required = requirement(require)
     shown = chosen_quantiles(show, required)
     named = checked_noise(noise)
-    given = with_range_meter(scenario_with(scenario, strategy=strategy, model=model, tie=tie), range_meter)
+    given = scenario_with(scenario, strategy=strategy, model=model, tie=tie, range_meter=range_meter)
     axes = sweep_axes(vary, given)
     asked = Sweep(
         given,

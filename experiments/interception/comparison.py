@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance import NoiseKind, TieRule
+from guidance import NoiseKind, Strategy, TieRule
 from sim import Results, Scenario, quantiles
 
 Floats = NDArray[np.float64]
@@ -57,17 +57,18 @@ class Comparison:
         return np.ma.MaskedArray(held.filled(True).all(axis=0), mask=np.ma.getmaskarray(held).all(axis=0))
 
 
-def flights(scenario: Scenario, strategies: Sequence[str]) -> list[tuple[str, TieRule | None, Scenario]]:
+def flights(
+    scenario: Scenario, strategies: Mapping[str, Strategy | None]
+) -> list[tuple[str, TieRule | None, Scenario]]:
     """What a comparison flies: strategy, tie rule (None is random noise) and scenario."""
     return [
         (
             name,
             tie,
-            replace(scenario, strategy=name, noise=NoiseKind.RANDOM)
-            if tie is None
-            else replace(scenario, strategy=name, noise=NoiseKind.GAME, tie=tie),
+            replace(flown, noise=NoiseKind.RANDOM) if tie is None else replace(flown, noise=NoiseKind.GAME, tie=tie),
         )
-        for name in strategies
+        for name, own in strategies.items()
+        for flown in (scenario if own is not None else replace(scenario, strategy=name),)
         for tie in (None, *TieRule)
     ]
 

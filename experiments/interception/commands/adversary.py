@@ -8,22 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from experiments.common.display_units import M_PER_KM
-from experiments.common.options import (
-    MOST_RUNS,
-    Json,
-    ModelName,
-    Overwrite,
-    Quiet,
-    RangeMeter,
-    ScenarioName,
-    Seed,
-    StrategyName,
-    scenario_with,
-    whole_number,
-    with_range_meter,
-)
+from experiments.common.options import Json, Overwrite, Quiet, Seed, whole_number
+from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, ScenarioName, StrategyName
 
 if TYPE_CHECKING:
+    from guidance import Strategy
     from sim import Scenario
     from sim.adversary import WorstEngagement
 
@@ -55,6 +44,7 @@ def adversary(
     """
     from experiments.common.output import STDOUT, checked_destinations, deliver, to_json
     from experiments.common.screen import say_warnings, tell_of_compiling
+    from experiments.interception.choices import own_strategy, scenario_with
     from experiments.interception.record_file import record_path, write_record
     from experiments.interception.scenario_file import scenario_warnings
 
@@ -62,14 +52,15 @@ def adversary(
     whole_number("--seed", seed, 0, None, 0)
     if record is not None:
         record_path("--record", record)
-    given = with_range_meter(scenario_with(scenario, strategy=strategy, model=model), range_meter)
+    given = scenario_with(scenario, strategy=strategy, model=model, range_meter=range_meter)
+    own = own_strategy(strategy)
     with checked_destinations(files={"--json": json_, "--record": record}, overwrite=overwrite):
         warnings = scenario_warnings(given)
         say_warnings(warnings, quiet)
         tell_of_compiling(quiet)
-        worst, elapsed_s = _search(given, budget, seed, keep_set, quiet)
+        worst, elapsed_s = _search(given, own, budget, seed, keep_set, quiet)
         if record is not None:
-            write_record(worst.record(), record, overwrite=overwrite)
+            write_record(worst.record(own), record, overwrite=overwrite)
         if json_ is not None:
             text = to_json(_summary(given, worst, keep_set, record, elapsed_s, warnings))
             deliver(json_, text, overwrite=overwrite)
@@ -77,24 +68,28 @@ def adversary(
         _show(given, worst, keep_set, record, elapsed_s, str(json_) == STDOUT)
 
 
-def _search(scenario: Scenario, budget: int, seed: int, keep_set: bool, quiet: bool) -> tuple[WorstEngagement, float]:
+def _search(
+    scenario: Scenario, own: Strategy | None, budget: int, seed: int, keep_set: bool, quiet: bool
+) -> tuple[WorstEngagement, float]:
     import os
     from time import perf_counter
 
     from experiments.common.errors import InputError
     from experiments.common.screen import progress_bar
     from sim.adversary import NothingCountsError, find_worst
+    from sim.scenario import strategy_name
 
     began_s = perf_counter()
     with progress_bar(quiet) as begin:
         try:
             worst = find_worst(
                 scenario,
+                strategy=own,
                 budget=budget,
                 seed=seed,
                 keep_set=keep_set,
                 threads=os.cpu_count() or 1,
-                progress=begin(f"worst against {scenario.strategy}"),
+                progress=begin(f"worst against {strategy_name(scenario, own)}"),
             )
         except NothingCountsError as error:
             raise InputError(

@@ -2,30 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from experiments.common.display_units import M_PER_KM
-from experiments.common.options import (
-    Json,
-    ModelName,
-    Out,
-    Overwrite,
-    Quiet,
-    ScenarioName,
-    Seed,
-    Strategies,
-    chosen_strategies,
-    scenario_with,
-    whole_number,
-)
+from experiments.common.options import Json, Out, Overwrite, Quiet, Seed, whole_number
+from experiments.interception.options import ModelName, ScenarioName, Strategies
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from guidance import Strategy
     from sim import Record, Results, Scenario
     from sim.bound import LowerBound, TruthPair
     from sim.pair import PairFlight
@@ -92,18 +82,19 @@ def bound(
     """
     from experiments.common.output import STDOUT, checked_destinations, deliver, to_json
     from experiments.common.screen import figure_files, say_warnings, tell_of_compiling
+    from experiments.interception.choices import chosen_strategies, scenario_with
     from experiments.interception.scenario_file import scenario_warnings
 
     whole_number("--budget", budget, 0, MOST_EVALUATIONS, 500)
     whole_number("--seed", seed, 0, None, 0)
-    names = chosen_strategies(strategies)
     given = scenario_with(scenario, model=model)
+    chosen = chosen_strategies(given, strategies)
     files = ("scenario.toml", "results.json", *figure_files(FIGURE))
     with checked_destinations(folder=out, names=files, files={"--json": json_}, overwrite=overwrite):
         warnings = scenario_warnings(given)
         say_warnings(warnings, quiet)
         tell_of_compiling(quiet)
-        lower, found, elapsed_s = _find(given, names, budget, seed, quiet)
+        lower, found, elapsed_s = _find(given, chosen, budget, seed, quiet)
         json_text = to_json(_summary(given, lower, found, elapsed_s, warnings))
         deliver(json_, json_text, overwrite=overwrite)
         if out is not None:
@@ -113,7 +104,7 @@ def bound(
 
 
 def _find(
-    scenario: Scenario, names: Sequence[str], budget: int, seed: int, quiet: bool
+    scenario: Scenario, chosen: Mapping[str, Strategy | None], budget: int, seed: int, quiet: bool
 ) -> tuple[LowerBound, list[Found], float]:
     import contextlib
     import os
@@ -122,7 +113,6 @@ def _find(
 
     from experiments.common.errors import InputError
     from experiments.common.screen import need_finite, progress_bar
-    from guidance import make_strategy
     from sim.adversary import NothingCountsError, find_worst
     from sim.bound import BoundError, lower_bound
     from sim.pair import fly_pair
@@ -137,10 +127,11 @@ def _find(
                 "scenario with: infoset scenarios check FILE"
             ) from None
         found = []
-        for name in names:
+        for name, own in chosen.items():
             report, flights = begin(name), []
+            flown = scenario if own is not None else replace(scenario, strategy=name)
             for index, pair in enumerate(lower.pairs):
-                flight = fly_pair(scenario, pair, make_strategy(name))
+                flight = fly_pair(flown, pair, own)
                 need_finite(flight.results)
                 flights.append((pair, flight))
                 report((index + 1) / len(lower.pairs))
@@ -148,13 +139,14 @@ def _find(
             if budget > 0:
                 with contextlib.suppress(NothingCountsError):
                     searched = find_worst(
-                        replace(scenario, strategy=name),
+                        flown,
+                        strategy=own,
                         budget=budget,
                         seed=seed,
                         keep_set=not scenario.set_model.is_guaranteed,
                         threads=os.cpu_count() or 1,
                         progress=begin(f"worst against {name}"),
-                    ).record()
+                    ).record(own)
             found.append(Found(name, tuple(flights), searched))
     return lower, found, perf_counter() - began_s
 

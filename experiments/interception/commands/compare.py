@@ -3,35 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from experiments.common.options import (
-    MOST_RUNS,
-    Csv,
-    Json,
-    ModelName,
-    Out,
-    Overwrite,
-    Quiet,
-    RangeMeter,
-    ScenarioName,
-    Seed,
-    Strategies,
-    chosen_strategies,
-    scenario_with,
-    whole_number,
-    with_range_meter,
-)
+from experiments.common.options import Csv, Json, Out, Overwrite, Quiet, Seed, whole_number
+from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, ScenarioName, Strategies
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from experiments.common.output import Cell
     from experiments.interception.comparison import Comparison
-    from guidance import TieRule
+    from guidance import Strategy, TieRule
     from sim import Results, Scenario
 
 FIGURE = "figure-comparison"
@@ -59,18 +44,19 @@ def compare(
     """
     from experiments.common.output import STDOUT, checked_destinations, deliver, to_csv, to_json
     from experiments.common.screen import figure_files, say_warnings, tell_of_compiling
+    from experiments.interception.choices import chosen_strategies, scenario_with
     from experiments.interception.scenario_file import scenario_warnings
 
     whole_number("--runs", runs, 1, MOST_RUNS, 50)
     whole_number("--seed", seed, 0, None, 0)
-    names = chosen_strategies(strategies)
-    given = with_range_meter(scenario_with(scenario, model=model), range_meter)
+    given = scenario_with(scenario, model=model, range_meter=range_meter)
+    chosen = chosen_strategies(given, strategies)
     files = ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE))
     with checked_destinations(folder=out, names=files, files={"--json": json_, "--csv": csv}, overwrite=overwrite):
         warnings = scenario_warnings(given)
         say_warnings(warnings, quiet)
         tell_of_compiling(quiet)
-        compared, elapsed_s = _fly(given, names, runs, seed, quiet)
+        compared, elapsed_s = _fly(given, chosen, runs, seed, quiet)
         json_text = to_json(_summary(given, runs, seed, elapsed_s, compared, warnings))
         csv_text = to_csv(COLUMNS, _rows(compared)) if csv is not None or out is not None else ""
         deliver(json_, json_text, overwrite=overwrite)
@@ -81,7 +67,9 @@ def compare(
         _show(given, compared, STDOUT in (str(json_), str(csv)))
 
 
-def _fly(scenario: Scenario, names: Sequence[str], runs: int, seed: int, quiet: bool) -> tuple[list[Comparison], float]:
+def _fly(
+    scenario: Scenario, chosen: Mapping[str, Strategy | None], runs: int, seed: int, quiet: bool
+) -> tuple[list[Comparison], float]:
     from concurrent.futures import ThreadPoolExecutor
     from threading import Event
     from time import perf_counter
@@ -92,10 +80,10 @@ def _fly(scenario: Scenario, names: Sequence[str], runs: int, seed: int, quiet: 
 
     began_s = perf_counter()
     stopped = Event()
-    wanted = flights(scenario, names)
+    wanted = flights(scenario, chosen)
     with progress_bar(quiet) as begin:
-        reports = {name: begin(name) for name in names}
-        done = {name: {tie: 0.0 for each, tie, _ in wanted if each == name} for name in names}
+        reports = {name: begin(name) for name in chosen}
+        done = {name: {tie: 0.0 for each, tie, _ in wanted if each == name} for name in chosen}
 
         def fly(name: str, tie: TieRule | None, flown: Scenario) -> tuple[str, TieRule | None, Results]:
             def progress(share: float) -> None:
@@ -104,7 +92,7 @@ def _fly(scenario: Scenario, names: Sequence[str], runs: int, seed: int, quiet: 
                 done[name][tie] = share
                 reports[name](sum(done[name].values()) / len(done[name]))
 
-            results = simulate(flown, runs, seed=seed, progress=progress)
+            results = simulate(flown, runs, seed=seed, strategy=chosen[name], progress=progress)
             need_finite(results)
             return name, tie, results
 

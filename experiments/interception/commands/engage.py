@@ -8,27 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from experiments.common.options import (
-    MOST_RUNS,
-    Csv,
-    Json,
-    ModelName,
-    Out,
-    Overwrite,
-    Quiet,
-    RangeMeter,
-    ScenarioName,
-    Seed,
-    StrategyName,
-    TieName,
-    choice,
-    scenario_with,
-    whole_number,
-    with_range_meter,
-)
+from experiments.common.options import Csv, Json, Out, Overwrite, Quiet, Seed, choice, whole_number
+from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, ScenarioName, StrategyName, TieName
 
 if TYPE_CHECKING:
     from experiments.common.output import Cell
+    from guidance import Strategy
     from sim import Inconsistency, Record, Scenario
 
 BOTH = "both"
@@ -79,11 +64,13 @@ def engage(
     """
     from experiments.common.output import STDOUT, checked_destinations, deliver, library_version, to_csv, to_json
     from experiments.common.screen import say_warnings, tell_of_compiling
+    from experiments.interception.choices import own_strategy, scenario_with
     from experiments.interception.scenario_file import scenario_hash, scenario_warnings
 
     whole_number("--seed", seed, 0, None, 0)
     whole_number("--run", run, 0, MOST_RUNS - 1, 0)
-    given = with_range_meter(scenario_with(scenario, strategy=strategy, model=model, tie=tie), range_meter)
+    given = scenario_with(scenario, strategy=strategy, model=model, tie=tie, range_meter=range_meter)
+    own = own_strategy(strategy)
     flown = _with_noise(given, noise)
     records_at = [] if record is None else _record_paths(record, [each.noise.value for each in flown])
     files = {"--json": json_, "--csv": csv} | {f"--record ({each.name})": each for each in records_at}
@@ -91,7 +78,7 @@ def engage(
         warnings = scenario_warnings(given)
         say_warnings(warnings, quiet)
         tell_of_compiling(quiet)
-        flights = _fly(flown, seed, run, quiet)
+        flights = _fly(flown, own, seed, run, quiet)
         summaries = {each.scenario.noise.value: _summary(each, took_s, warnings) for each, took_s in flights}
         if noise == BOTH:
             whole: dict[str, object] = {
@@ -144,7 +131,9 @@ def _names(flown: Sequence[Scenario]) -> list[str]:
     return ["scenario.toml", "results.json", "steps.csv", *records, *figure_files(FIGURE_2, FIGURE_3)]
 
 
-def _fly(flown: Sequence[Scenario], seed: int, run: int, quiet: bool) -> list[tuple[Record, float]]:
+def _fly(
+    flown: Sequence[Scenario], own: Strategy | None, seed: int, run: int, quiet: bool
+) -> list[tuple[Record, float]]:
     from time import perf_counter
 
     from experiments.common.screen import need_finite, progress_bar
@@ -154,7 +143,7 @@ def _fly(flown: Sequence[Scenario], seed: int, run: int, quiet: bool) -> list[tu
     with progress_bar(quiet) as begin:
         for each in flown:
             began_s = perf_counter()
-            record = fly_one(each, run, seed=seed, progress=begin(f"{each.noise.value} noise"))
+            record = fly_one(each, run, seed=seed, strategy=own, progress=begin(f"{each.noise.value} noise"))
             need_finite(record.result)
             flights.append((record, perf_counter() - began_s))
     return flights

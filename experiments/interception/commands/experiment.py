@@ -9,27 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from experiments.common.options import (
-    MOST_RUNS,
-    Csv,
-    Json,
-    ModelName,
-    Out,
-    Overwrite,
-    Quiet,
-    ScenarioName,
-    Seed,
-    StrategyName,
-    TieName,
-    scenario_with,
-    whole_number,
-)
+from experiments.common.options import Csv, Json, Out, Overwrite, Quiet, Seed, whole_number
+from experiments.interception.options import MOST_RUNS, ModelName, ScenarioName, StrategyName, TieName
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from experiments.common.output import Cell
     from experiments.interception.curves import Curve
+    from guidance import Strategy
     from sim import Scenario
 
 FIGURE = "figure-4-distributions"
@@ -59,15 +47,17 @@ def experiment(
     """
     from experiments.common.output import checked_destinations
     from experiments.common.screen import figure_files, tell_of_compiling
+    from experiments.interception.choices import own_strategy, scenario_with
 
     whole_number("--runs", runs, 1, MOST_RUNS, 50)
     whole_number("--seed", seed, 0, None, 0)
     given = scenario_with(scenario, strategy=strategy, model=model, tie=tie, sections=sections)
+    own = own_strategy(strategy)
     names = ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE))
     with checked_destinations(folder=out, names=names, files={"--json": json_, "--csv": csv}, overwrite=overwrite):
         warnings = _warn(given, quiet)
         tell_of_compiling(quiet)
-        curves, elapsed_s = _fly(given, runs, seed, quiet)
+        curves, elapsed_s = _fly(given, own, runs, seed, quiet)
         from experiments.common.output import STDOUT, deliver, to_json
 
         json_text = to_json(_summary(given, runs, seed, elapsed_s, curves, warnings))
@@ -91,7 +81,7 @@ def _warn(scenario: Scenario, quiet: bool) -> list[str]:
     return warnings
 
 
-def _fly(scenario: Scenario, runs: int, seed: int, quiet: bool) -> tuple[list[Curve], float]:
+def _fly(scenario: Scenario, own: Strategy | None, runs: int, seed: int, quiet: bool) -> tuple[list[Curve], float]:
     from concurrent.futures import ThreadPoolExecutor
     from threading import Event
     from time import perf_counter
@@ -112,7 +102,7 @@ def _fly(scenario: Scenario, runs: int, seed: int, quiet: bool) -> tuple[list[Cu
                     raise InterruptedError
                 report(share)
 
-            results = simulate(flown, runs, seed=seed, progress=progress)
+            results = simulate(flown, runs, seed=seed, strategy=own, progress=progress)
             need_finite(results)
             return Curve(number, flown.noise, flown.range_sensor is not None, results)
 

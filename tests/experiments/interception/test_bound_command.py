@@ -121,7 +121,7 @@ def test_help_has_an_example(infoset: Infoset) -> None:
         (["--strategies", "patent"], ["--strategies", "did you mean patient?"]),
         (["--strategies", "patient,patient"], ["named twice"]),
         (["--budget", -1], ["--budget", "must be"]),
-        (["--model", "papr"], ["--model", "did you mean paper?"]),
+        (["--model", "papr"], ["--model", "'papr' is not one of 'paper', 'guaranteed'"]),
         (["--json", "missing/x.json"], ["there is no folder missing"]),
         (["--out", "/dev/null"], ["is a file"]),
         (["--json", "out/results.json", "--out", "out"], ["also a file of --out"]),
@@ -133,10 +133,11 @@ def test_what_is_wrong_is_said_before_the_work(
     monkeypatch.setattr("sim.bound.lower_bound", lambda *_, **__: pytest.fail("began to work"))
     code, out, err = infoset(*arguments)
     assert (code, out) == (2, "")
-    assert err.startswith("error: ")
-    assert err.count("error: ") == 1
+    assert err.startswith(("error: ", "Usage: "))
+    assert err.lower().count("error: ") <= 1
+    message = " ".join(err.replace("│", " ").split())
     for part in parts:
-        assert part in err
+        assert part in message
     assert list(tmp_path.iterdir()) == []
 
 

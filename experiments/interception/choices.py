@@ -1,0 +1,102 @@
+"""The scenario and the strategies that the options of a command choose."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from experiments.common.errors import InputError
+from experiments.common.options import choice
+from experiments.interception.own_strategy import is_own_strategy, load_strategy
+from experiments.interception.scenario_file import default_initial_set, load_scenario
+from guidance import Strategy, TieRule, strategy_names
+from infoset import Model
+from infoset.model import MOST_SECTIONS
+from sim import Scenario
+from sim.scenario import strategy_name
+
+
+def scenario_with(
+    name: str,
+    *,
+    strategy: str | None = None,
+    model: str | None = None,
+    tie: str | None = None,
+    sections: int | None = None,
+    range_meter: bool | None = None,
+) -> Scenario:
+    """Read a scenario and replace what the options set; None keeps the value of the scenario.
+
+    Parameters
+    ----------
+    name : str
+        A built-in name or a path.
+    strategy : str or None
+        A built-in name. ``FILE.py:CLASS`` leaves the strategy of the scenario; `own_strategy` returns it.
+    sections : int or None
+        Number of sections at the start.
+
+    Raises
+    ------
+    InputError
+        If the scenario is unsound, or an option does not fit it.
+    """
+    scenario = load_scenario(name)
+    if strategy is not None and not is_own_strategy(strategy):
+        scenario = replace(scenario, strategy=choice("--strategy", strategy, strategy_names()))
+    if tie is not None:
+        scenario = replace(scenario, tie=TieRule(tie))
+    if range_meter and scenario.range_sensor is None:
+        raise InputError(
+            f"--range-meter: the scenario {scenario.name} has no [range_sensor]; add that table to its file, for "
+            "example period_s = 2.0 and relative_error = 0.05, or leave --range-meter out"
+        )
+    if range_meter is False:
+        scenario = replace(scenario, range_sensor=None)
+    set_model = scenario.set_model
+    if model is not None and Model(model) is not set_model.kind:
+        set_model = replace(set_model, kind=Model(model), initial_set=default_initial_set(Model(model)))
+    if sections is not None:
+        fewest = set_model.fewest_sections
+        if not fewest <= sections <= MOST_SECTIONS:
+            raise InputError(
+                f"--sections: must be from {fewest}, the scenario's information_set.fewest_sections, to "
+                f"{MOST_SECTIONS}, found {sections}; for example --sections {max(29, fewest)}"
+            )
+        set_model = replace(set_model, sections=sections)
+    return replace(scenario, set_model=set_model)
+
+
+def own_strategy(text: str | None) -> Strategy | None:
+    """Return the strategy that ``--strategy FILE.py:CLASS`` names; None for a built-in name.
+
+    Raises
+    ------
+    InputError
+        If the file has no such strategy, or its code raises an exception.
+    """
+    return load_strategy(text) if text is not None and is_own_strategy(text) else None
+
+
+def chosen_strategies(scenario: Scenario, names: str | None) -> Mapping[str, Strategy | None]:
+    """Return the strategies of a list: by name, with the strategy of a Python file, None for a built-in one.
+
+    Parameters
+    ----------
+    names : str or None
+        Built-in names and ``FILE.py:CLASS``, separated by commas; None chooses all built-in strategies.
+
+    Raises
+    ------
+    InputError
+        If there is no such strategy, or one is named twice.
+    """
+    valid = strategy_names()
+    chosen: dict[str, Strategy | None] = {}
+    for text in valid if names is None else [part.strip() for part in names.split(",")]:
+        own = load_strategy(text, "--strategies") if is_own_strategy(text) else None
+        name = choice("--strategies", text, valid) if own is None else strategy_name(scenario, own)
+        if name in chosen:
+            raise InputError(f"--strategies: {name} is named twice; name each strategy once")
+        chosen[name] = own
+    return chosen

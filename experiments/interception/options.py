@@ -1,0 +1,45 @@
+"""Options and arguments of the commands that simulate interceptions."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import typer
+
+MOST_RUNS = 10_000_000
+
+ScenarioName = Annotated[
+    str, typer.Argument(metavar="[SCENARIO]", help="A built-in scenario (see: infoset scenarios), or a scenario file.")
+]
+StrategyName = Annotated[
+    str | None,
+    typer.Option(
+        "--strategy",
+        metavar="NAME",
+        help="Guidance strategy, in place of the scenario's. FILE.py:CLASS is a class in a Python file.",
+    ),
+]
+Strategies = Annotated[
+    str | None,
+    typer.Option(
+        "--strategies",
+        metavar="A,B,C",
+        help="Strategies, separated by commas; FILE.py:CLASS is a class in a file. Default: all built-in ones.",
+    ),
+]
+ModelName = Annotated[
+    Literal["paper", "guaranteed"] | None,
+    typer.Option(
+        "--model",
+        help="Model of the information set, in place of the scenario's. Another model starts from its default "
+        "initial set.",
+    ),
+]
+TieName = Annotated[
+    Literal["upper", "lower", "alternate", "random"] | None,
+    typer.Option("--tie", help="How game noise breaks ties."),
+]
+RangeMeter = Annotated[
+    bool | None,
+    typer.Option("--range-meter/--no-range-meter", help="Simulate with or without the scenario's range meter."),
+]

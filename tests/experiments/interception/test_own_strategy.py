@@ -1,0 +1,169 @@
+from __future__ import annotations
+
+import json
+import pickle
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.cli import main
+from experiments.common.errors import InputError
+from experiments.interception.choices import chosen_strategies, own_strategy, scenario_with
+from experiments.interception.own_strategy import load_strategy
+from guidance import SymmetricMiss
+from sim import Scenario, simulate
+
+LIKE_PUBLISHED = """
+from dataclasses import dataclass
+from half import HALF
+from guidance import symmetric_impulse
+
+@dataclass(frozen=True)
+class Mine:
+    share: float = 2 * HALF
+    def start(self, batch):
+        return None
+    def decide(self, situation, state):
+        return self.share * symmetric_impulse(situation.predicted_miss, situation.closing_speed_m_s)
+"""
+
+
+@pytest.fixture(autouse=True)
+def _modules_are_put_back(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    yield
+    for name, module in list(sys.modules.items()):
+        if str(getattr(module, "__file__", None)).startswith(str(tmp_path)):
+            del sys.modules[name]
+
+
+@pytest.fixture
+def mine(tmp_path: Path) -> Path:
+    (tmp_path / "half.py").write_text("HALF = 0.5\n")
+    file = tmp_path / "mine.py"
+    file.write_text(LIKE_PUBLISHED)
+    return file
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as left:
+        main([str(each) for each in arguments])
+    captured = capsys.readouterr()
+    assert "Traceback" not in captured.err
+    return int(left.value.code or 0), captured.out, captured.err
+
+
+def test_a_strategy_of_a_file_is_simulated_and_can_be_pickled(mine: Path, brief: Scenario) -> None:
+    own = own_strategy("mine.py:Mine")
+    assert own is not None
+    expected = simulate(brief, 2, strategy=SymmetricMiss()).impulse_m_s
+    for strategy in (own, pickle.loads(pickle.dumps(own))):
+        assert (type(strategy).__module__, type(strategy).__qualname__) == ("mine", "Mine")
+        assert (simulate(brief, 2, strategy=strategy).impulse_m_s == expected).all()
+    assert own_strategy("patient") is None
+    assert own_strategy(None) is None
+
+
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [("engage", "--strategy"), ("experiment", "--strategy"), ("compare", "--strategies"), ("bound", "--strategies"),
+     ("adversary", "--strategy")],
+)  # fmt: skip
+def test_every_command_takes_a_strategy_of_a_file(
+    command: str, option: str, mine: Path, brief_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    few = {
+        "experiment": ["--runs", 2],
+        "compare": ["--runs", 2],
+        "bound": ["--budget", 20],
+        "adversary": ["--budget", 20],
+    }
+    numbers: list[Any] = []
+    for strategy in ("mine.py:Mine", "symmetric-miss"):
+        code, out, err = run(capsys, command, brief_file, option, strategy, *few.get(command, []), "--json", "-")
+        assert code == 0, err
+        text = out.replace("mine.Mine", "symmetric-miss")
+        numbers.append({key: value for key, value in json.loads(text).items() if key not in {"elapsed_s", "strategy"}})
+    assert numbers[0] == numbers[1]
+
+
+def test_strategies_of_files_and_built_in_ones_are_compared(mine: Path, brief: Scenario) -> None:
+    chosen = chosen_strategies(brief, "patient, mine.py:Mine")
+    assert list(chosen) == ["patient", "mine.Mine"]
+    assert chosen["patient"] is None
+    with pytest.raises(InputError, match=r"mine\.Mine is named twice"):
+        chosen_strategies(brief, "mine.py:Mine,mine.py:Mine")
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("no.py:Mine", ['there is no file "no.py"', "check the path"]),
+        ("mine.txt:Mine", ['"mine.txt" must be a Python file', "--strategy mine.py:Mine"]),
+        ("mine.py", ["name a class of mine.py", "--strategy mine.py:Mine"]),
+        ("mine.py:Mone", ['mine.py has no class "Mone"', "did you mean mine.py:Mine?"]),
+        ("mine.py:HALF", ['mine.py has no class "HALF"', "did you mean mine.py:Mine?"]),
+        ("bare.py:Bare", ["bare.py:Bare is not a strategy", "define its methods start and decide"]),
+        ("typo.py:Mine", ["typo.py, line 2: SyntaxError: ", "correct the file"]),
+        ("broken.py:Mine", ["broken.py, line 3: ZeroDivisionError: division by zero", "correct the file"]),
+        ("leaving.py:Mine", ["leaving.py, line 2: SystemExit: 3"]),
+        ("needs.py:Mine", ["needs.py", "TypeError", "missing 1 required positional argument"]),
+        ("random.py:Mine", ["random.py has the name of another Python module", "rename the file"]),
+        ("a.b.py:Mine", ["a.b.py has the name of another Python module"]),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_said(text: str, parts: list[str], mine: Path) -> None:
+    files = {
+        "bare": "class Bare:\n    def start(self, batch): ...\n",
+        "typo": "\nclass Mine\n",
+        "broken": "def half(x):\n\n    return x / 0\nhalf(1)\n",
+        "leaving": "import sys\nsys.exit(3)\n",
+        "needs": "class Mine:\n  def __init__(self, x): ...\n  def start(self, n): ...\n"
+        "  def decide(self, s, t): ...\n",
+        "random": LIKE_PUBLISHED,
+        "a.b": LIKE_PUBLISHED,
+    }
+    for name, code in files.items():
+        Path(f"{name}.py").write_text(code)
+    Path("mine.txt").write_text(LIKE_PUBLISHED)
+    with pytest.raises(InputError) as refused:
+        load_strategy(text)
+    for part in parts:
+        assert part in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("method", "body", "message"),
+    [
+        ("decide", "return situation.nothing", "line 5: AttributeError"),
+        ("decide", "return [1.0, 2.0, 3.0]", "must return 1 finite impulses"),
+        ("decide", "return [float('nan')]", "must return 1 finite impulses"),
+        ("start", "raise RuntimeError('no state')", "line 3: RuntimeError: no state"),
+    ],
+)
+def test_failures_of_a_flight_are_said_without_a_traceback(
+    method: str, body: str, message: str, brief_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bodies = {"start": "return None", "decide": "return [0.0]"} | {method: body}
+    Path(f"flying_{method}.py").write_text(
+        f"class Mine:\n  def start(self, batch):\n    {bodies['start']}\n"
+        f"  def decide(self, situation, state):\n    {bodies['decide']}\n"
+    )
+    code, out, err = run(capsys, "engage", brief_file, "--strategy", f"flying_{method}.py:Mine")
+    assert (code, out) == (2, "")
+    assert f"error: --strategy: flying_{method}.py" in err
+    assert message in err
+    assert err.endswith("correct the file\n")
+
+
+def test_a_scenario_file_cannot_name_python_code(mine: Path, brief_file: Path) -> None:
+    hostile = Path("hostile.toml")
+    hostile.write_text(brief_file.read_text().replace('"symmetric-miss"', '"mine.py:Mine"'))
+    with pytest.raises(InputError, match=r"guidance\.strategy: must be one of"):
+        scenario_with("hostile.toml")
+    assert "mine" not in sys.modules
