@@ -67,6 +67,7 @@ nitpick_ignore = [
         "rendezvous.reachability.problem": ("Block",),
         "rendezvous.reachability.admissible": ("Lifted",),
         "rendezvous.reachability.optimum": ("BlockOptimum",),
+        "sim.chunk": ("Chunk",),
         "sim.storage.campaign_folder": ("CampaignFolder", "Damage"),
         "sim.storage.manifest": ("Axis", "Manifest"),
         "sim.campaign": ("Progress",),
