@@ -1,4 +1,4 @@
-"""How hard a thruster is driven at most: the greatest size of a control over a time."""
+"""The greatest magnitude of a control over a time."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ _HALVES = [_FIT @ chebyshev.chebvander(0.5 * chebyshev_points(_DEGREE + 1) + mid
 
 
 def greatest_control(control: Callable[[Floats], Floats], breaks_s: Floats) -> float:
-    """Return the greatest |u| of a control that is smooth between breaks, m/s^2.
+    """Return the greatest |u| of a control, m/s^2.
 
     Parameters
     ----------
     control : callable
-        u, shape (k, 3), m/s^2, at times of shape (k,), s. It may jump at breaks.
+        u, shape (k, 3), m/s^2, at times of shape (k,), s; smooth between breaks, where it may jump.
     breaks_s : ndarray, shape (P + 1,)
-        From the first time to the last, not decreasing, s; the control's motion turns by about a radian at most between
-        two of them (`LinearMotion.breaks`).
+        From the first time to the last, not decreasing, s; between two of them the motion turns by about a radian at
+        most (`LinearMotion.breaks`).
 
     Returns
     -------
     float
-        Within 1e-9 of the greatest, relative; between short panels at late times within what the rounding of times
-        leaves.
+        Within 1e-9 of the greatest, relative; between short panels at late times within the effect of the rounding of
+        times.
 
     Raises
     ------
@@ -50,9 +50,9 @@ def greatest_control(control: Callable[[Floats], Floats], breaks_s: Floats) -> f
     -----
     On panels u is a polynomial of degree 11 to 1e-11 (`rendezvous.piecewise`), |u|^2 one of degree 22. A polynomial p
     of degree d is bounded by its values at the zeros of the Chebyshev polynomial of degree M > d (Ehlich and Zeller,
-    1964): max |p| <= max_j |p(x_j)| / cos(pi d / (2 M)). Taken of |u|^2 less the middle of its samples, this bounds
-    each panel from above; panels that may hold the greatest are halved until bound and sample agree to 1e-11. No peak
-    between samples is missed.
+    1964): max |p| <= max_j |p(x_j)| / cos(pi d / (2 M)). Applied to |u|^2 minus the middle of its samples, this bounds
+    each panel from above; panels that may contain the greatest are halved until bound and sample agree to 1e-11. No
+    peak between samples is missed.
     """
     pieces = resolve(control, breaks_s)
     squares = _FIT @ ((_AT_SQUARES @ pieces.coefficients) ** 2).sum(axis=2)[..., None]

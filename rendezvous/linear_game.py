@@ -1,9 +1,9 @@
-"""Pursuit-evasion games that are linear, solved nearly in closed form: free space, loss of mass, a circular orbit.
+"""Pursuit-evasion games with linear dynamics, solved nearly in closed form: free space, loss of mass, a circular orbit.
 
-In each the pursuer hastens and the evader delays the time at which they meet; both thrust fully all the time. It is the
-game of Wang's slides (Bauman University), after Shen and Casalino, Journal of Guidance, Control, and Dynamics 41(8),
-2018, p. 1823, with gravity left out or linear: in free space lambda_v = (t_f - t) lambda_r, and both hold their
-direction. The answers are not from there; the orbital game is checked against them.
+The pursuer minimises and the evader maximises the time of capture; both use full thrust. It is the game of Wang's
+slides (Bauman University), after Shen and Casalino, Journal of Guidance, Control, and Dynamics 41(8), 2018, p. 1823,
+with gravity omitted or linear: in free space lambda_v = (t_f - t) lambda_r, and both thrust in a constant direction.
+The solutions are not from there; the orbital game is checked against them.
 """
 
 from __future__ import annotations
@@ -34,23 +34,25 @@ _GREATEST_VELOCITY_GAIN = math.sqrt(50.0)
 
 
 class LinearGameError(RuntimeError):
-    """The first contact of a linear game could not be computed to its tolerance."""
+    """The first contact of a linear game was not computed to its tolerance."""
 
 
 @dataclass(frozen=True)
 class Thruster:
-    """Thrust of a craft in free space.
+    """Constant thrust of a craft in free space.
 
     Parameters
     ----------
     thrust_n, mass_kg : float
+        At the start of the game.
     exhaust_speed_m_s : float
         Specific impulse times standard gravity.
 
     Raises
     ------
     ValueError
-        If the thrust is negative, or mass or exhaust speed is not positive.
+        If the thrust is negative, or mass or exhaust speed is not positive. The methods raise it if all the mass is
+        burnt before `time_s`.
     """
 
     thrust_n: float
@@ -58,31 +60,16 @@ class Thruster:
     exhaust_speed_m_s: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no thruster."""
         if not (self.thrust_n >= 0.0 and self.mass_kg > 0.0 and self.exhaust_speed_m_s > 0.0):
             raise ValueError("thrust must not be negative, mass and exhaust speed must be positive")
 
     def travel_m(self, time_s: float) -> float:
-        """Return how far full thrust along a line carries it.
-
-        Parameters
-        ----------
-        time_s : float
-            Below the time at which all the mass would be burnt.
-
-        Returns
-        -------
-        float
-
-        Raises
-        ------
-        ValueError
-            If all the mass would be burnt by then.
+        """Return the distance covered from rest by full thrust along a line.
 
         Notes
         -----
-        c [t - (tau - t) ln(tau / (tau - t))] with tau the time that all its mass would last; a series where t / tau is
-        small, for there the difference loses its digits.
+        c [t - (tau - t) ln(tau / (tau - t))], tau = m c / T; a series where t / tau is small, as the difference cancels
+        there.
         """
         share = self._burnt(time_s)
         if share < 0.05:
@@ -92,47 +79,17 @@ class Thruster:
         return self.thrust_n / self.mass_kg * time_s * time_s * part
 
     def speed_m_s(self, time_s: float) -> float:
-        """Return the speed that full thrust along a line gives.
-
-        Parameters
-        ----------
-        time_s : float
-            Below the time at which all the mass would be burnt.
-
-        Returns
-        -------
-        float
-
-        Raises
-        ------
-        ValueError
-            If all the mass would be burnt by then.
-        """
+        """Return the speed reached from rest by full thrust along a line."""
         share = self._burnt(time_s)
         return self.thrust_n / self.mass_kg * time_s * (-math.log1p(-share) / share if share > 0.0 else 1.0)
 
     def acceleration_m_s2(self, time_s: float) -> float:
-        """Return the acceleration of full thrust.
-
-        Parameters
-        ----------
-        time_s : float
-            Below the time at which all the mass would be burnt.
-
-        Returns
-        -------
-        float
-
-        Raises
-        ------
-        ValueError
-            If all the mass would be burnt by then.
-        """
+        """Return the acceleration of full thrust."""
         return self.thrust_n / self.mass_kg / (1.0 - self._burnt(time_s))
 
     @property
     def lasts_s(self) -> float:
-        """The time at which all the mass would be burnt: infinite without thrust, or with an infinite exhaust speed."""
+        """Time tau = m c / T at which all the mass is burnt; infinite without thrust or with an infinite c."""
         return self.mass_kg * self.exhaust_speed_m_s / self.thrust_n if self.thrust_n > 0.0 else math.inf
 
     def _burnt(self, time_s: float) -> float:
@@ -144,24 +101,26 @@ class Thruster:
 
 @dataclass(frozen=True)
 class LinearCapture:
-    """When and where along a linear game ends.
+    """Capture in a linear game.
 
     Parameters
     ----------
     time_s : float
+        First zero of the gap.
     direction : ndarray, shape (3,)
-        nu, in the axes of the given positions.
+        nu, in the axes of the positions.
     is_grazing : bool
-        Whether the gap only comes within the tolerance of zero (see Notes).
+        Whether the gap comes within the tolerance of zero, but not clearly below it (see Notes).
 
     Notes
     -----
-    The gap is how far the evader can keep away at a time; capture is its first zero. The search begins at t = 0. Value,
-    slope and a bound of the curvature give a lower bound of the gap; a step ends before that bound is zero. So no pass
-    is missed, however short. The tolerance is `CONTACT` times the lengths in the gap: distance and travels. A gap above
-    twice the tolerance is no contact. A contact is grazing if the gap does not fall below minus the tolerance when it
-    goes on at its rate: errors of that size in the data decide whether there is a capture. Relative to itself the time
-    is right to 1e-12, and rounding of the gap over its rate; that of a grazing contact to the square root of `CONTACT`.
+    The gap is the greatest distance that the evader can keep at a time. The search begins at t = 0. Value, slope and a
+    bound of the curvature give a lower bound of the gap; a step ends before that bound is zero, so that no contact is
+    missed, however short. The tolerance is `CONTACT` times the lengths in the gap: distance and travels. A gap above
+    twice the tolerance is no contact. A contact is grazing if the gap, extrapolated at its rate, does not fall below
+    minus the tolerance: errors of that size in the data decide whether there is a capture. The time is accurate to
+    1e-12, relative, and to the rounding of the gap over its rate; that of a grazing contact to the square root of
+    `CONTACT`.
     """
 
     time_s: float
@@ -171,7 +130,7 @@ class LinearCapture:
 
 @dataclass(frozen=True)
 class _Gap:
-    """The gap at one time: value, rate, the evader's direction, and the lengths that it is the difference of."""
+    """The gap at one time: value, rate, the evader's direction, and the sum of the lengths whose difference it is."""
 
     value: float
     rate: float
@@ -194,7 +153,7 @@ def free_space_capture(
     Returns
     -------
     LinearCapture or None
-        None where the evader gets away: its acceleration is not the lesser, and they are not on a collision course.
+        None if the evader escapes: its acceleration is not the smaller one, and they are not on a collision course.
 
     Raises
     ------
@@ -216,7 +175,7 @@ def free_space_capture(
         gain = 0.5 * advantage * t * t
         return _Gap(distance - gain, float(direction @ velocity) - advantage * t, direction, length + speed * t + gain)
 
-    # By then the pursuer is past |r| + |v| t; or, without an advantage, the nearest pass is over.
+    # By then the pursuer has covered |r| + |v| t; without an advantage, the closest approach is over.
     root = math.sqrt(speed * speed + 2.0 * advantage * length)
     end = 1.001 * (speed + root) / advantage if advantage > 0.0 else 2.0 * length / speed
     return _first_contact(gap, lambda _from, _to: advantage, end)
@@ -225,18 +184,19 @@ def free_space_capture(
 def mass_loss_capture(
     position_m: Floats, velocity_m_s: Floats, pursuer: Thruster, evader: Thruster
 ) -> LinearCapture | None:
-    """Solve the game in free space with masses that fall as they burn.
+    """Solve the game in free space with the loss of mass.
 
     Parameters
     ----------
     position_m, velocity_m_s : ndarray, shape (3,)
         The evader's, relative to the pursuer.
     pursuer, evader : Thruster
+        At t = 0.
 
     Returns
     -------
     LinearCapture or None
-        None where there is no capture before a craft has burnt all its mass.
+        None if there is no capture before a craft has burnt all its mass.
 
     Raises
     ------
@@ -246,7 +206,7 @@ def mass_loss_capture(
     Notes
     -----
     The first root of |r + v t| = S_P(t) - S_E(t), S the travel of full thrust. The distance is convex; the second
-    derivative of the rest is bounded by S_P'' at the end of a step less S_E'' at its begin.
+    derivative of the rest is bounded by S_P'' at the end of a step minus S_E'' at its start.
     """
     position, velocity = _relative(position_m, velocity_m_s)
     last = min(pursuer.lasts_s, evader.lasts_s)
@@ -284,27 +244,27 @@ def circular_orbit_capture(
     pursuer_m_s2, evader_m_s2 : float
         Greatest accelerations.
     rate_rad_s : float
-        Mean motion.
+        Mean motion n.
     longest_s : float or None, optional
-        None looks for 50 revolutions.
+        End of the search; None searches 50 revolutions.
 
     Returns
     -------
     LinearCapture or None
-        None where there is no capture by then, or the evader's acceleration is not the lesser.
+        None if there is no capture by then, or the evader's acceleration is not the smaller one.
 
     Raises
     ------
     ValueError
         If position or velocity are not three finite numbers, the position is zero, or the mean motion is not positive.
     LinearGameError
-        If the greatest distance is not found to its tolerance.
+        If the greatest distance is not computed to its tolerance.
 
     Notes
     -----
-    The first root of l(T) = max over |nu| <= 1 of nu . (Phi x)_r - (a_P - a_E) int |Phi_rv(T - t)^T nu| dt: a concave
-    function of nu, hence one maximum. The evader's greatest distance at T, as the two reachable sets are alike. With
-    nu held it is a lower bound at other times, whose second derivative is at least -|x''| - (a_P - a_E) |Phi_vv|.
+    The first root of l(T) = max over |nu| <= 1 of nu . (Phi x)_r - (a_P - a_E) int |Phi_rv(T - t)^T nu| dt, a concave
+    function of nu with one maximum: the evader's greatest distance at T, as both reachable sets have the same shape.
+    With nu fixed it is a lower bound at other times, whose second derivative is at least -|x''| - (a_P - a_E) |Phi_vv|.
     """
     position, velocity = _relative(position_m, velocity_m_s)
     if not rate_rad_s > 0.0:
@@ -319,7 +279,7 @@ def circular_orbit_capture(
 
 
 class _HillDistance:
-    """l(T), by Newton's method on the sphere from the direction of the time before.
+    """l(T), by Newton's method on the sphere from the direction at the previous time.
 
     The integral is by Gauss and Legendre's rule, on panels that shrink toward the times at which Phi_rv is singular:
     there |Phi_rv^T nu| can have a kink.
@@ -370,7 +330,7 @@ class _HillDistance:
             now = float(nu @ there - weights @ size)
             shares = weights / size
             drift = np.einsum("kij,kj->ki", effects, along)
-            # Its length is a distance that the pursuer can come to, so that an upper bound is at hand too.
+            # Its length is a distance that the pursuer can reach: an upper bound.
             gradient = there - shares @ drift
             plane = np.linalg.svd(nu[None, :])[2][1:]
             slope = plane @ gradient
@@ -416,10 +376,10 @@ def _graded_breaks(angle: float) -> Floats:
 def _first_contact(
     gap: Callable[[float], _Gap], bend: Callable[[float, float], float], end: float, dry: float = math.inf
 ) -> LinearCapture | None:
-    """Return the first contact by a time.
+    """Return the first contact up to `end`.
 
-    From one time to a later one the gap is at least value + rate dt - bend dt^2 / 2. Steps stay well before the time at
-    which a craft is dry, where the bend is infinite.
+    From one time to a later one the gap is at least value + rate dt - bend dt^2 / 2. Steps end well before the time
+    `dry` at which a craft has burnt its mass, where the bend is infinite.
     """
     t, window = 0.0, math.inf
     for _ in range(_MOST_STEPS):
@@ -429,7 +389,7 @@ def _first_contact(
         if t >= end:
             return None
         window = min(window, end - t, 0.5 * (dry - t))
-        # Below the value by the tolerance, so that a pass that only grazes is not stepped over.
+        # Below the value by the tolerance, so that a grazing contact is not stepped over.
         step = min(window, _safe_step(here.value - CONTACT * here.lengths, here.rate, bend(t, t + window)))
         t, window = min(end, t + max(step, _LEAST_STEP * t)), 2.0 * step
     raise LinearGameError("the gap is nearly zero for too long a time to tell the first contact")
@@ -438,8 +398,8 @@ def _first_contact(
 def _contact(
     gap: Callable[[float], _Gap], bend: Callable[[float, float], float], t: float, here: _Gap, end: float
 ) -> LinearCapture:
-    """Close in on the zero from a time at which the gap is within its tolerance, and look how deep the pass is."""
-    first, at_first = t, here
+    """Compute the zero from a time at which the gap is within its tolerance, and whether the contact is grazing."""
+    contact_s, at_contact = t, here
     most = 2.0 * CONTACT * here.lengths
     for _ in range(_MOST_CLOSING_STEPS):
         if here.value <= 0.0 or here.value > most or t >= end:
@@ -449,10 +409,10 @@ def _contact(
         t = min(end, t + max(step, _LEAST_STEP * t))
         here = gap(t)
         if here.value <= 0.0:
-            first, at_first = before + (t - before) * value / (value - here.value), here
-    probe = first - most / at_first.rate if at_first.rate < 0.0 else math.inf
+            contact_s, at_contact = before + (t - before) * value / (value - here.value), here
+    probe = contact_s - most / at_contact.rate if at_contact.rate < 0.0 else math.inf
     is_deep = probe <= end and gap(probe).value <= -0.5 * most
-    return LinearCapture(first, at_first.direction, not is_deep)
+    return LinearCapture(contact_s, at_contact.direction, not is_deep)
 
 
 def _safe_step(value: float, rate: float, bend: float) -> float:
@@ -464,10 +424,10 @@ def _safe_step(value: float, rate: float, bend: float) -> float:
 
 
 def _line_of_sight(position: Floats, velocity: Floats, time_s: float) -> tuple[float, Floats]:
-    """Return distance and direction without thrust; where they meet, the direction is that of the start."""
-    place = position + velocity * time_s
-    distance = float(np.linalg.norm(place))
-    return distance, place / distance if distance > 0.0 else _unit(position)
+    """Return distance and direction without thrust; at zero distance, the direction at the start."""
+    relative = position + velocity * time_s
+    distance = float(np.linalg.norm(relative))
+    return distance, relative / distance if distance > 0.0 else _unit(position)
 
 
 def _relative(position_m: Floats, velocity_m_s: Floats) -> tuple[Floats, Floats]:

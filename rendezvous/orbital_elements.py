@@ -13,11 +13,12 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class OrbitalElements:
-    """Elements of an ellipse, and where on it.
+    """Elements of an ellipse, and the true anomaly of a point on it.
 
     Parameters
     ----------
     semi_major_axis_m : float
+        a.
     eccentricity : float
         From 0, below 1.
     inclination_rad, raan_rad, argument_of_perigee_rad, true_anomaly_rad : float
@@ -37,7 +38,6 @@ class OrbitalElements:
     true_anomaly_rad: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no ellipse."""
         if not (self.semi_major_axis_m > 0.0 and 0.0 <= self.eccentricity < 1.0):
             raise ValueError(
                 f"an ellipse has a semi-major axis above 0 and an eccentricity from 0 to below 1, not "
@@ -45,16 +45,7 @@ class OrbitalElements:
             )
 
     def state(self, gravitational_parameter_m3_s2: float) -> tuple[Floats, Floats]:
-        """Return position (m) and velocity (m/s) in the inertial frame of the elements.
-
-        Parameters
-        ----------
-        gravitational_parameter_m3_s2 : float
-
-        Returns
-        -------
-        tuple of ndarray, each of shape (3,)
-        """
+        """Return position (m) and velocity (m/s), shapes (3,), in the inertial frame of the elements."""
         latus_rectum = self.semi_major_axis_m * (1.0 - self.eccentricity**2)
         cosine, sine = np.cos(self.true_anomaly_rad), np.sin(self.true_anomaly_rad)
         radius = latus_rectum / (1.0 + self.eccentricity * cosine)
@@ -75,34 +66,13 @@ class OrbitalElements:
 
 
 def semi_major_axis_m(position_m: Floats, velocity_m_s: Floats, gravitational_parameter_m3_s2: float) -> float:
-    """Return the osculating semi-major axis, m: negative for a hyperbola.
-
-    Parameters
-    ----------
-    position_m, velocity_m_s : ndarray, shape (3,)
-    gravitational_parameter_m3_s2 : float
-
-    Returns
-    -------
-    float
-        Infinite for a parabola.
-    """
+    """Return the osculating semi-major axis, m: negative for a hyperbola, infinite for a parabola."""
     inverse = 2.0 / np.linalg.norm(position_m) - velocity_m_s @ velocity_m_s / gravitational_parameter_m3_s2
     return float(1.0 / inverse) if inverse != 0.0 else float("inf")
 
 
 def perigee_m(position_m: Floats, velocity_m_s: Floats, gravitational_parameter_m3_s2: float) -> float:
-    """Return the least distance from the planet's centre on the osculating orbit, m; zero for a fall along a line.
-
-    Parameters
-    ----------
-    position_m, velocity_m_s : ndarray, shape (3,)
-    gravitational_parameter_m3_s2 : float
-
-    Returns
-    -------
-    float
-    """
+    """Return the least distance from the planet's centre on the osculating orbit, m; zero for a radial fall."""
     inward = float(position_m @ velocity_m_s)
     momentum_squared = float((position_m @ position_m) * (velocity_m_s @ velocity_m_s)) - inward * inward
     latus_rectum = max(0.0, momentum_squared) / gravitational_parameter_m3_s2

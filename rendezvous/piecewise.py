@@ -1,4 +1,4 @@
-"""Smooth functions of time as polynomials on panels, as fine as the functions need."""
+"""Smooth functions of time as polynomials on panels that are refined until the functions are resolved."""
 
 from __future__ import annotations
 
@@ -18,30 +18,12 @@ _AT_ONCE = 2048
 
 
 def chebyshev_points(count: int) -> Floats:
-    """Return the zeros of the Chebyshev polynomial of a degree, on [-1, 1].
-
-    Parameters
-    ----------
-    count : int
-
-    Returns
-    -------
-    ndarray, shape (count,)
-    """
+    """Return the zeros of the Chebyshev polynomial of degree `count`, on [-1, 1]."""
     return np.asarray(np.cos(np.pi * (np.arange(count) + 0.5) / count))
 
 
 def chebyshev_fit(count: int) -> Floats:
-    """Return what turns values at the zeros of a Chebyshev polynomial into Chebyshev coefficients.
-
-    Parameters
-    ----------
-    count : int
-
-    Returns
-    -------
-    ndarray, shape (count, count)
-    """
+    """Return the matrix that turns values at `chebyshev_points(count)` into Chebyshev coefficients."""
     matrix = (2.0 / count) * chebyshev.chebvander(chebyshev_points(count), count - 1).T
     matrix[0] *= 0.5
     return np.asarray(matrix)
@@ -57,9 +39,9 @@ class Piecewise:
     Parameters
     ----------
     starts_s, ends_s : ndarray, shape (P,)
-        In no order.
+        Of the panels, in no order.
     coefficients : ndarray, shape (P, 12, m)
-        Of Chebyshev polynomials of the place in the panel, -1 to 1.
+        Of Chebyshev polynomials of the position in the panel, -1 to 1.
     """
 
     starts_s: Floats
@@ -68,19 +50,14 @@ class Piecewise:
 
 
 def resolve(function: Callable[[Floats], Floats], breaks_s: Floats) -> Piecewise:
-    """Represent functions of time on panels.
+    """Represent m functions of time, of similar magnitude, by polynomials on panels.
 
     Parameters
     ----------
     function : callable
-        Values of m functions of one size, shape (k, m), at times of shape (k,), s. They may jump at breaks, where they
-        are not evaluated.
+        Values, shape (k, m), at times of shape (k,), s. They may jump at breaks, where they are not evaluated.
     breaks_s : ndarray, shape (P + 1,)
-        Ends of the panels to begin with, not decreasing, s.
-
-    Returns
-    -------
-    Piecewise
+        Ends of the initial panels, not decreasing, s.
 
     Raises
     ------
@@ -89,16 +66,16 @@ def resolve(function: Callable[[Floats], Floats], breaks_s: Floats) -> Piecewise
 
     Notes
     -----
-    A panel is halved until the last two Chebyshev coefficients are below 1e-11 of the greatest value anywhere, or below
-    1e-7 of it and no longer fall (that is rounding), or below what the rounding of times leaves. Sinusoids on panels of
-    one radian have an error below 1e-13 at once: the remainder of the interpolation is at most
-    (1/2)^12 / (2^11 12!) = 2.5e-16 of their amplitude.
+    A panel is halved until the last two Chebyshev coefficients are below 1e-11 of the greatest value on all panels, or
+    below 1e-7 of it and no longer decreasing (rounding), or below the effect of the rounding of times. Sinusoids on
+    panels of one radian have an error below 1e-13 at once: the remainder of the interpolation is at most (1/2)^12 /
+    (2^11 12!) = 2.5e-16 of their amplitude.
     """
     starts, ends = breaks_s[:-1], breaks_s[1:]
     starts, ends = starts[ends > starts], ends[ends > starts]
     latest = float(np.abs(breaks_s).max())
     before, scale = np.full(len(starts), np.inf), 0.0
-    found: list[tuple[Floats, Floats, Floats]] = []
+    pieces: list[tuple[Floats, Floats, Floats]] = []
     if not len(starts):
         raise ValueError("no break is later than another")
     while len(starts):
@@ -110,12 +87,12 @@ def resolve(function: Callable[[Floats], Floats], breaks_s: Floats) -> Piecewise
         resolved = (tails <= scale * np.maximum(RESOLVED, rounding)) | (
             (tails <= ROUNDING * scale) & (tails > 0.2 * before)
         )
-        found.append((starts[resolved], ends[resolved], coefficients[resolved]))
+        pieces.append((starts[resolved], ends[resolved], coefficients[resolved]))
         starts, ends, before = starts[~resolved], ends[~resolved], tails[~resolved]
         middles = 0.5 * (starts + ends)
         starts, ends = np.concatenate([starts, middles]), np.concatenate([middles, ends])
         before = np.tile(before, 2)
-    return Piecewise(*(np.concatenate(each) for each in zip(*found, strict=True)))
+    return Piecewise(*(np.concatenate(part) for part in zip(*pieces, strict=True)))
 
 
 def _fitted(function: Callable[[Floats], Floats], starts: Floats, ends: Floats) -> Floats:

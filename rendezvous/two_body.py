@@ -11,28 +11,16 @@ Floats = NDArray[np.float64]
 
 
 def coast(states: Floats, duration_s: ArrayLike, gravitational_parameter_m3_s2: float) -> Floats:
-    """Return where states are after coasting.
-
-    Parameters
-    ----------
-    states : ndarray, shape (..., 6)
-        (position, velocity) about the attracting point, m and m/s.
-    duration_s : array_like
-        Of the shape in front; may be negative.
-    gravitational_parameter_m3_s2 : float
-
-    Returns
-    -------
-    ndarray, shape (..., 6)
+    """Return `states` (r, v), shape (..., 6), about the attracting point, after coasting; `duration_s` may be negative.
 
     Raises
     ------
     ValueError
-        If a state lies on no ellipse.
+        If a state is not on an ellipse.
 
     Notes
     -----
-    Lagrange's f and g functions of the eccentric anomaly passed.
+    Lagrange's f and g functions of the change of the eccentric anomaly.
     """
     mu = gravitational_parameter_m3_s2
     position, velocity = states[..., :3], states[..., 3:]
@@ -64,35 +52,14 @@ def coast(states: Floats, duration_s: ArrayLike, gravitational_parameter_m3_s2: 
 
 
 def coasting_rates(states: Floats, gravitational_parameter_m3_s2: float) -> Floats:
-    """Return the time derivatives of coasting states.
-
-    Parameters
-    ----------
-    states : ndarray, shape (..., 6)
-    gravitational_parameter_m3_s2 : float
-
-    Returns
-    -------
-    ndarray, shape (..., 6)
-        (v, -mu r / |r|^3).
-    """
+    """Return (v, -mu r / |r|^3), the time derivatives of coasting `states`, shape (..., 6)."""
     position = states[..., :3]
     cube = np.linalg.norm(position, axis=-1, keepdims=True) ** 3
     return np.concatenate([states[..., 3:], -gravitational_parameter_m3_s2 * position / cube], axis=-1)
 
 
 def gravity_gradient(position_m: Floats, gravitational_parameter_m3_s2: float) -> Floats:
-    """Return A = d(v, g) / d(r, v) at positions.
-
-    Parameters
-    ----------
-    position_m : ndarray, shape (..., 3)
-    gravitational_parameter_m3_s2 : float
-
-    Returns
-    -------
-    ndarray, shape (..., 6, 6)
-    """
+    """Return A = d(v, g) / d(r, v), shape (..., 6, 6), at positions of shape (..., 3)."""
     squared = (position_m**2).sum(axis=-1)[..., None, None]
     outer = position_m[..., :, None] * position_m[..., None, :]
     matrix = np.zeros((*position_m.shape[:-1], 6, 6))

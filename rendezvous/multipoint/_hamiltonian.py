@@ -1,4 +1,4 @@
-"""Kernel of the nonlinear two-body problem: states and costates, and how they depend on where they start.
+"""Kernel of the nonlinear two-body problem: states and costates, and their derivatives by initial values.
 
 Lengths and times are such that the gravitational parameter is one.
 """
@@ -18,12 +18,12 @@ ROWS = 13
 STEP_RAD = 0.1
 MOST_STEPS = 50_000
 LEAST_RADIUS = 0.02
-"""Nearer to the centre than this share of where it starts a trajectory counts as falling into it."""
+"""A trajectory nearer to the centre, relative to its initial distance, counts as falling into it."""
 
 
 @allocation_free
 def _rates(_time: float, _y: Floats, z: Floats, _parameters: tuple[()], _dy: Floats, slope: Floats) -> None:
-    """Time derivatives: of z in column 0, of its variations in the others."""
+    """Time derivatives of z in column 0, and of its variations in the others."""
     r0, r1, r2 = z[0, 0], z[1, 0], z[2, 0]
     l0, l1, l2 = z[9, 0], z[10, 0], z[11, 0]
     squared = r0 * r0 + r1 * r1 + r2 * r2
@@ -58,19 +58,21 @@ _step = step_of(_rates)
 
 @compiled
 def propagate(z: Floats, variations: Floats, duration: float) -> bool:
-    """Carry (r, v, lambda_r, lambda_v, energy) and variations of all but the energy on, in place.
+    """Propagate (r, v, lambda_r, lambda_v, energy), and variations of all but the energy, in place.
 
     Parameters
     ----------
     z : ndarray, shape (13,)
+        The state; the energy is int |u|^2 dt / 2.
     variations : ndarray, shape (12, m)
-        Derivatives of z by what the caller likes; m may be zero.
+        Derivatives of z; m may be zero.
     duration : float
+        In time units.
 
     Returns
     -------
     bool
-        False where the trajectory falls into the centre or never ends.
+        False if the trajectory falls into the centre or takes too many steps.
 
     Notes
     -----

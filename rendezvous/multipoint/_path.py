@@ -63,26 +63,29 @@ def solve_path(
     before: Floats,
     at_start: Floats,
 ) -> tuple[bool, float]:
-    """Fill in the velocities at flybys and the costates.
+    """Solve for the velocities at flybys and the costates.
 
     Parameters
     ----------
     transition, gramian : ndarray, shape (N, 6, 6)
         Of the segments.
     drift : ndarray, shape (N, 6)
+        Of the segments.
     durations : ndarray, shape (N,)
+        Of the segments.
     begin, arrive : ndarray, shape (N, 6)
         States at both ends of each segment; velocities at flybys are filled in.
     pinned : ndarray of bool, shape (N,)
         Whether the velocity at the end is given.
     before, at_start : ndarray, shape (N, 6)
-        Filled: the costates at the end and at the start of each segment.
+        Output: the costates at the end and at the start of each segment.
 
     Returns
     -------
     solved : bool
-        False where a Gramian or a block is not positive definite: nothing that was filled in then counts.
+        False if a Gramian or a block is not positive definite; the outputs are then invalid.
     cost : float
+        I.
 
     Notes
     -----
@@ -145,7 +148,7 @@ def solve_path(
 
 @compiled
 def _eliminate(ahead: Floats, behind: Floats, effort: Floats, pinned: Flags, velocities: Floats) -> bool:
-    """Solve the block-tridiagonal normal equations; velocities that are given stay zero."""
+    """Solve the block-tridiagonal normal equations; given velocities stay zero."""
     count = len(effort)
     lower, coupled = np.zeros((count, 3, 3)), np.zeros((count, 3, 3))
     right, block = np.zeros((count, 3, 1)), np.zeros((3, 3))

@@ -21,6 +21,17 @@ MOST_MIXED = 6
 _SAMPLES = 64
 
 
+def _chebyshev() -> tuple[Floats, Floats]:
+    """Return increasing Chebyshev points on [0, 1], and their barycentric weights."""
+    index = np.arange(NODES)
+    weights = np.where(index % 2 == 0, 1.0, -1.0)
+    weights[[0, -1]] *= 0.5
+    return 0.5 - 0.5 * np.cos(np.pi * index / (NODES - 1)), weights
+
+
+_POINTS, _WEIGHTS = _chebyshev()
+
+
 @dataclass(frozen=True, eq=False)
 class Panels:
     """A function of time, by polynomials.
@@ -30,102 +41,87 @@ class Panels:
     breaks_s : ndarray, shape (P + 1,)
         Ends of the panels.
     values : ndarray, shape (P, 12, m)
-        At the Chebyshev points of each panel, both ends among them.
+        At the Chebyshev points of each panel, both ends included.
     """
 
     breaks_s: Floats
     values: Floats
 
     def __call__(self, time_s: Floats) -> Floats:
-        """Return values at times of shape (k,), shape (k, m); at a break those of the panel that begins there."""
+        """Return values, shape (k, m), at k times; at a break those of the panel that begins there."""
         inside = np.clip(time_s, self.breaks_s[0], self.breaks_s[-1])
         panel = np.clip(np.searchsorted(self.breaks_s, inside, side="right") - 1, 0, len(self.values) - 1)
         width = self.breaks_s[panel + 1] - self.breaks_s[panel]
-        places, weights = _chebyshev()
-        apart = (inside - self.breaks_s[panel])[:, None] / width[:, None] - places
+        apart = (inside - self.breaks_s[panel])[:, None] / width[:, None] - _POINTS
         exact = apart == 0.0
-        shares = weights / np.where(exact, 1.0, apart)
+        shares = _WEIGHTS / np.where(exact, 1.0, apart)
         hit = exact.any(axis=1)
         shares[hit] = exact[hit]
         return np.asarray(np.einsum("kj,kja->ka", shares / shares.sum(axis=1, keepdims=True), self.values[panel]))
 
 
 @dataclass(frozen=True, eq=False)
-class Reference:
-    """States as functions of time.
+class Reference(Panels):
+    """States as functions of time; coasting after the last panel.
 
     Parameters
     ----------
     breaks_s : ndarray, shape (P + 1,)
         Ends of the panels.
     values : ndarray, shape (P, 12, 6)
-        States at the Chebyshev points of each panel, both ends among them.
+        States at the Chebyshev points of each panel, both ends included.
     gravitational_parameter_m3_s2 : float
-        For times after the last panel, where it coasts.
+        mu.
     """
 
-    breaks_s: Floats
-    values: Floats
     gravitational_parameter_m3_s2: float
 
     def __call__(self, time_s: Floats) -> Floats:
-        """States at times of shape (k,), shape (k, 6)."""
-        states = Panels(self.breaks_s, self.values)(time_s)
+        """Return states, shape (k, 6), at k times."""
+        states = super().__call__(time_s)
         after = time_s > self.breaks_s[-1]
         if after.any():
             last = np.broadcast_to(self.values[-1, -1], (int(after.sum()), 6))
             states[after] = coast(last, time_s[after] - self.breaks_s[-1], self.gravitational_parameter_m3_s2)
         return states
 
-    def edges(self, start_s: float, end_s: float) -> Floats:
-        """Ends of the panels from one break to another."""
-        return self.breaks_s[(self.breaks_s >= start_s) & (self.breaks_s <= end_s)]
-
     @property
     def least_radius(self) -> float:
         """The least distance from the centre at its points, m."""
         return float(np.linalg.norm(self.values[..., :3], axis=-1).min())
 
+    @property
+    def greatest_speed(self) -> float:
+        """The greatest speed at its points, m/s."""
+        return float(np.linalg.norm(self.values[..., 3:], axis=-1).max())
+
     def change_from(self, other: Reference) -> float:
-        """Return the greatest difference from another one at this one's points, of distance and of speed."""
-        places = _chebyshev()[0]
-        times = self.breaks_s[:-1, None] + np.diff(self.breaks_s)[:, None] * places
-        apart = self.values - other(times.ravel()).reshape(self.values.shape)
-        distance = np.linalg.norm(self.values[..., :3], axis=-1).min()
-        speed = np.linalg.norm(self.values[..., 3:], axis=-1).max()
-        return float(max(np.abs(apart[..., :3]).max() / distance, np.abs(apart[..., 3:]).max() / speed))
+        """Return the greatest difference from `other` at this one's points, relative, of positions and velocities."""
+        apart = self.values - other(_points(self.breaks_s)).reshape(self.values.shape)
+        distance, speed = np.abs(apart[..., :3]).max(), np.abs(apart[..., 3:]).max()
+        return float(max(distance / self.least_radius, speed / self.greatest_speed))
 
     @classmethod
     def of_states(
         cls, states: Callable[[Floats], Floats], starts_s: Floats, nodes: Nodes, gravitational_parameter_m3_s2: float
     ) -> Reference:
-        """Represent states that are known at all times, over the segments and the stays between them."""
-        pieces = [(start, end) for start, end in zip(starts_s, nodes.arrive_s, strict=True)]
+        """Represent known `states` over the segments, which start at `starts_s`, and the stays between them."""
+        mu = gravitational_parameter_m3_s2
+        pieces = list(zip(starts_s, nodes.arrive_s, strict=True))
         pieces += [(start, end) for start, end in zip(nodes.arrive_s, nodes.leave_s, strict=True) if end > start]
-        breaks = np.concatenate(
-            [
-                np.linspace(start, end, _panels(states, start, end, gravitational_parameter_m3_s2) + 1)
-                for start, end in pieces
-            ]
-        )
-        breaks = np.unique(breaks)
-        times = breaks[:-1, None] + np.diff(breaks)[:, None] * _chebyshev()[0]
-        values = states(times.ravel()).reshape(len(breaks) - 1, NODES, 6)
-        return cls(breaks, values, gravitational_parameter_m3_s2)
+        breaks = np.unique(np.concatenate([_breaks(states, start, end, mu) for start, end in pieces]))
+        return cls(breaks, states(_points(breaks)).reshape(len(breaks) - 1, NODES, 6), mu)
 
     @classmethod
-    def of_path(
-        cls, path: Path, gravitational_parameter_m3_s2: float, before: Reference, *, keep: bool = False
-    ) -> Reference:
-        """Represent the trajectory of a path whose motion is linear about another one, on its panels or on new ones."""
-        mu = gravitational_parameter_m3_s2
-        found = panels_of(path, mu, before, keep=keep)
-        return cls(found.breaks_s, found.values[..., :6], mu)
+    def of_path(cls, path: Path, before: Reference, *, keep: bool = False) -> Reference:
+        """Represent the trajectory of a path whose motion is linear about `before`, as `panels_of` does."""
+        panels = panels_of(path, before, keep=keep)
+        return cls(panels.breaks_s, panels.values[..., :6], before.gravitational_parameter_m3_s2)
 
 
 @dataclass(frozen=True, eq=False)
 class TracedPath(Path):
-    """A path whose states and costates are known at all times.
+    """A path with known states and costates at all times.
 
     Parameters
     ----------
@@ -140,63 +136,43 @@ class TracedPath(Path):
         return self.trace.breaks_s
 
     def along(self, time_s: Floats) -> tuple[Floats, Floats]:
-        """Return states and costates at times.
-
-        Parameters
-        ----------
-        time_s : ndarray, shape (k,)
-            From the start to the last node.
-
-        Returns
-        -------
-        tuple of ndarray, each of shape (k, 6)
-        """
-        found = self.trace(np.asarray(time_s, dtype=np.float64))
-        return found[:, :6], found[:, 6:]
+        """Return states and costates, shapes (k, 6), at k times from the start to the last node."""
+        values = self.trace(np.asarray(time_s, dtype=np.float64))
+        return values[:, :6], values[:, 6:]
 
 
-def panels_of(path: Path, gravitational_parameter_m3_s2: float, before: Reference, *, keep: bool = False) -> Panels:
-    """Represent states and costates of a path whose motion is linear about a reference.
-
-    Parameters
-    ----------
-    path : Path
-    gravitational_parameter_m3_s2 : float
-    before : Reference
-    keep : bool
-        Whether its panels are the reference's.
-
-    Returns
-    -------
-    Panels
-    """
+def panels_of(path: Path, before: Reference, *, keep: bool = False) -> Panels:
+    """Represent states and costates of a path whose motion is linear about `before`; `keep` keeps its panels."""
     assert isinstance(path.motion, TimeVaryingMotion)
-    mu, places = gravitational_parameter_m3_s2, _chebyshev()[0]
+    mu = before.gravitational_parameter_m3_s2
+
+    def edges_of(states: Callable[[Floats], Floats], start_s: float, end_s: float) -> Floats:
+        if keep:
+            return before.breaks_s[(before.breaks_s >= start_s) & (before.breaks_s <= end_s)]
+        return _breaks(states, start_s, end_s, mu)
+
     breaks: list[Floats] = []
     values: list[Floats] = []
     for segment, (start, end) in enumerate(zip(path.starts_s, path.nodes.arrive_s, strict=True)):
-        edges = before.edges(start, end) if keep else np.linspace(start, end, _panels(before, start, end, mu) + 1)
+        edges = edges_of(before, start, end)
         breaks.append(edges[:-1])
         values.append(_segment_values(path.motion, edges, path.start_states[segment], path.costate_before[segment]))
         leave = path.nodes.leave_s[segment]
         if leave > end:
-            stay = path.nodes.arrive[segment]
 
-            def staying(times: Floats, state: Floats = stay, since: float = end) -> Floats:
+            def staying(times: Floats, state: Floats = path.nodes.arrive[segment], since: float = end) -> Floats:
                 return coast(np.broadcast_to(state, (len(times), 6)), times - since, mu)
 
-            fresh = np.linspace(end, leave, _panels(staying, end, leave, mu) + 1)
-            edges = before.edges(end, leave) if keep else fresh
-            times = edges[:-1, None] + np.diff(edges)[:, None] * places
+            edges = edges_of(staying, end, leave)
             breaks.append(edges[:-1])
-            states = staying(times.ravel()).reshape(len(edges) - 1, NODES, 6)
+            states = staying(_points(edges)).reshape(len(edges) - 1, NODES, 6)
             values.append(np.concatenate([states, np.zeros_like(states)], axis=2))
     last = max(float(path.nodes.leave_s[-1]), float(path.nodes.arrive_s[-1]))
     return Panels(np.append(np.concatenate(breaks), last), np.concatenate(values))
 
 
 class Mixture:
-    """Mixes the last few rounds of an iteration x -> g(x) of references on the same panels.
+    """Mixes the last rounds of an iteration x -> g(x) of references on the same panels.
 
     Notes
     -----
@@ -207,52 +183,49 @@ class Mixture:
         self._values: list[Floats] = []
         self._residuals: list[Floats] = []
 
-    def mix(self, tried: Reference, found: Reference) -> Reference:
-        """Take a round in, and return what to try next."""
-        scale = np.array([1.0] * 3 + [found.least_radius / np.linalg.norm(found.values[..., 3:], axis=-1).max()] * 3)
-        self._values.append(found.values)
-        self._residuals.append(((found.values - tried.values) * scale).ravel())
+    def mix(self, x: Reference, g: Reference) -> Reference:
+        """Add a round, and return the next x."""
+        scale = np.array([1.0] * 3 + [g.least_radius / g.greatest_speed] * 3)
+        self._values.append(g.values)
+        self._residuals.append(((g.values - x.values) * scale).ravel())
         del self._values[:-MOST_MIXED], self._residuals[:-MOST_MIXED]
         last = self._residuals[-1]
         if len(self._residuals) == 1:
-            return found
-        steps = np.stack([each - last for each in self._residuals[:-1]], axis=1)
+            return g
+        steps = np.stack([residual - last for residual in self._residuals[:-1]], axis=1)
         shares = np.linalg.lstsq(steps, -last, rcond=1e-10)[0]
-        values = found.values + sum(
-            share * (each - found.values) for share, each in zip(shares, self._values[:-1], strict=True)
+        values = g.values + sum(
+            share * (earlier - g.values) for share, earlier in zip(shares, self._values[:-1], strict=True)
         )
-        return Reference(found.breaks_s, np.asarray(values), found.gravitational_parameter_m3_s2)
+        return Reference(g.breaks_s, np.asarray(values), g.gravitational_parameter_m3_s2)
 
 
-def _panels(states: Callable[[Floats], Floats], start_s: float, end_s: float, mu: float) -> int:
-    """How many panels of at most 0.6 radians a stretch takes."""
+def _breaks(states: Callable[[Floats], Floats], start_s: float, end_s: float, mu: float) -> Floats:
+    """Ends of equal panels of at most 0.6 radians of a trajectory."""
     radii = np.linalg.norm(states(np.linspace(start_s, end_s, _SAMPLES))[:, :3], axis=1)
     radians = float(np.sqrt(mu / radii.min() ** 3)) * (end_s - start_s)
     even = float(np.sqrt(mu / radii**3).mean()) * (end_s - start_s)
-    # Where the orbit is far from round, panels are as narrow as its nearest point needs.
+    # On an eccentric orbit, panels are as narrow as its nearest point needs.
     count = np.ceil((radians if radians < 3.0 * even else 3.0 * even) / PANEL_RAD)
     if not np.isfinite(count) or count > MOST_PANELS:
         raise ValueError(f"a trajectory of {radians:.3g} radians between two visits is too long to follow; check units")
-    return max(1, int(count))
+    return np.linspace(start_s, end_s, max(1, int(count)) + 1)
 
 
-def _chebyshev() -> tuple[Floats, Floats]:
-    """Chebyshev points on [0, 1], rising, and their barycentric weights."""
-    index = np.arange(NODES)
-    weights = np.where(index % 2 == 0, 1.0, -1.0)
-    weights[[0, -1]] *= 0.5
-    return 0.5 - 0.5 * np.cos(np.pi * index / (NODES - 1)), weights
+def _points(breaks: Floats) -> Floats:
+    """Times of the Chebyshev points of panels, shape (12 P,)."""
+    return (breaks[:-1, None] + np.diff(breaks)[:, None] * _POINTS).ravel()
 
 
 def _segment_values(motion: TimeVaryingMotion, edges: Floats, start: Floats, costate_end: Floats) -> Floats:
     """States and costates at the points of a segment's panels, shape (P, 12, 12)."""
-    count, places = len(edges) - 1, _chebyshev()[0][1:]
+    count, inner = len(edges) - 1, _POINTS[1:]
     begins = np.repeat(edges[:-1], NODES - 1)
-    ends = (edges[:-1, None] + np.diff(edges)[:, None] * places).ravel()
-    found = motion.short_segment(begins, ends)
-    transition = found.transition.reshape(count, NODES - 1, 6, 6)
-    gramian = found.gramian.reshape(count, NODES - 1, 6, 6)
-    drift = found.drift.reshape(count, NODES - 1, 6)
+    ends = (edges[:-1, None] + np.diff(edges)[:, None] * inner).ravel()
+    short = motion.short_segment(begins, ends)
+    transition = short.transition.reshape(count, NODES - 1, 6, 6)
+    gramian = short.gramian.reshape(count, NODES - 1, 6, 6)
+    drift = short.drift.reshape(count, NODES - 1, 6)
     values = np.empty((count, NODES, 12))
     costate = costate_end
     for panel in range(count - 1, -1, -1):

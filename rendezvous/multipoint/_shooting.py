@@ -1,22 +1,24 @@
-"""A first trajectory far from the coasting orbit: the nonlinear conditions, followed as targets move away from it."""
+"""Paths under the gravity of one point by shooting, continued from the coasting orbit as targets move away from it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rendezvous.multipoint._hamiltonian import propagate
 from rendezvous.multipoint.segments import Nodes, Path
+from rendezvous.two_body import coast
 
 Floats = NDArray[np.float64]
 
 TOLERANCE = 1e-11
 ON_THE_WAY = 1e-4
 ROUNDING = 1e-8
-"""What is left and falls no more is rounding, if it is less than this."""
+"""A smaller residual that no longer decreases is rounding."""
 LEAST_STEP = 1.0 / 64.0
 LEAST_STEP_FROM_NEAR = 1.0 / 8.0
 _ROUNDS = 12
@@ -28,17 +30,22 @@ _NONE: Floats = np.zeros((12, 0))
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Visits up to the next rendezvous, with what is known of their start.
+    """Visits up to the next rendezvous, from a known state.
 
     Parameters
     ----------
     start_s : float
+        Time of `start_state`.
     start_state : ndarray, shape (6,)
+        m and m/s.
     time_s : ndarray, shape (k,)
+        Of the visits.
     goal : ndarray, shape (k, 6)
         States of the targets.
     rendezvous : bool
-        Whether the last one is.
+        Whether the last visit is one.
+    gravitational_parameter_m3_s2 : float
+        mu.
     """
 
     start_s: float
@@ -46,229 +53,263 @@ class Block:
     time_s: Floats
     goal: Floats
     rendezvous: bool
+    gravitational_parameter_m3_s2: float
+
+    @cached_property
+    def units(self) -> tuple[float, float]:
+        """Units of length and time in which mu is one: the distance at the start, and its rate's inverse."""
+        length = float(np.linalg.norm(self.start_state[:3]))
+        return length, float(np.sqrt(length**3 / self.gravitational_parameter_m3_s2))
+
+    @cached_property
+    def state_units(self) -> Floats:
+        """Units of a state, shape (6,)."""
+        length, duration = self.units
+        return np.array([length] * 3 + [length / duration] * 3)
+
+    @cached_property
+    def costate_units(self) -> Floats:
+        """Units of a costate, shape (6,)."""
+        length, duration = self.units
+        return np.array([length / duration**3] * 3 + [length / duration**2] * 3)
+
+    @cached_property
+    def durations(self) -> Floats:
+        """Durations of the segments, shape (k,), in units of the block."""
+        return np.diff(self.time_s, prepend=self.start_s) / self.units[1]
 
 
-def blocks_of(start_s: float, start_state: Floats, nodes: Nodes) -> list[Block]:
-    """Split visits after every rendezvous: what follows starts from a known state."""
+def blocks_of(start_s: float, start_state: Floats, nodes: Nodes, gravitational_parameter_m3_s2: float) -> list[Block]:
+    """Split visits after every rendezvous: the next ones start from a known state."""
     blocks, first = [], 0
     for node in range(len(nodes.arrive_s)):
         if nodes.rendezvous[node] or node == len(nodes.arrive_s) - 1:
-            own = slice(first, node + 1)
-            blocks.append(
-                Block(start_s, start_state, nodes.arrive_s[own], nodes.arrive[own], bool(nodes.rendezvous[node]))
-            )
+            times, goal = nodes.arrive_s[first : node + 1], nodes.arrive[first : node + 1]
+            is_met = bool(nodes.rendezvous[node])
+            blocks.append(Block(start_s, start_state, times, goal, is_met, gravitational_parameter_m3_s2))
             start_s, start_state, first = float(nodes.leave_s[node]), nodes.leave[node], node + 1
     return blocks
 
 
 def unknowns_of(path: Path, gravitational_parameter_m3_s2: float) -> list[Floats]:
     """Return the unknowns of each block of a known path."""
-    found, first = [], 0
-    for block in blocks_of(float(path.starts_s[0]), path.start_states[0], path.nodes):
-        length, duration = _units(block, gravitational_parameter_m3_s2)
-        scale = np.array([length / duration**3] * 3 + [length / duration**2] * 3)
+    unknowns, first = [], 0
+    for block in blocks_of(float(path.starts_s[0]), path.start_states[0], path.nodes, gravitational_parameter_m3_s2):
+        scale = block.costate_units
         start = path.costate_start if first == 0 else path.costate_after[first - 1]
         last = first + len(block.time_s) - 1
-        found.append(np.concatenate([start / scale, (path.jumps[first:last, :3] / scale[:3]).ravel()]))
+        unknowns.append(np.concatenate([start / scale, (path.jumps[first:last, :3] / scale[:3]).ravel()]))
         first = last + 1
-    return found
+    return unknowns
 
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """A block's trajectory: the costates at its start, and their jumps.
+    """A block's trajectory.
 
     Parameters
     ----------
     block : Block
+        Its visits.
     unknowns : ndarray, shape (3 + 3 k,)
-        lambda at the start, then the jumps at the nodes but the last; in the block's own units.
-    gravitational_parameter_m3_s2 : float
+        lambda at the start, then the jumps at all nodes but the last; in units of the block.
     """
 
     block: Block
     unknowns: Floats
-    gravitational_parameter_m3_s2: float
 
     def along(self, time_s: Floats) -> tuple[Floats, Floats]:
-        """Return states and costates at increasing times of the block, those after the jump at a node.
-
-        Parameters
-        ----------
-        time_s : ndarray, shape (k,)
-
-        Returns
-        -------
-        tuple of ndarray, each of shape (k, 6)
-            m, m/s; m/s^3, m/s^2.
-        """
-        _, duration = _units(self.block, self.gravitational_parameter_m3_s2)
-        z, now, node = self._begin(), self.block.start_s, 0
-        found = np.empty((len(time_s), 12))
+        """Return states and costates in SI, shapes (k, 6), at k increasing times; after the jump at a node."""
+        block, duration = self.block, self.block.units[1]
+        z, now, node = self._begin(), block.start_s, 0
+        rows = np.empty((len(time_s), 12))
         for row, time in enumerate(time_s):
-            while node < len(self.block.time_s) - 1 and self.block.time_s[node] <= time:
-                _advance(z, _NONE, (self.block.time_s[node] - now) / duration)
+            while node < len(block.time_s) - 1 and block.time_s[node] <= time:
+                _advance(z, (block.time_s[node] - now) / duration)
                 self._jump(z, node)
-                now, node = self.block.time_s[node], node + 1
-            _advance(z, _NONE, (time - now) / duration)
+                now, node = block.time_s[node], node + 1
+            _advance(z, (time - now) / duration)
             now = time
-            found[row] = z[:12]
-        return self._in_si(found)
+            rows[row] = z[:12]
+        return rows[:, :6] * block.state_units, rows[:, 6:] * block.costate_units
 
+    @cached_property
     def ends(self) -> tuple[Floats, Floats, Floats, float]:
-        """Return states and costates where each segment ends, costates where each starts, and the energy spent.
-
-        Returns
-        -------
-        states : ndarray, shape (k, 6)
-        before, starting : ndarray, shape (k, 6)
-        energy : float
-            m^2/s^3.
-        """
-        length, duration = _units(self.block, self.gravitational_parameter_m3_s2)
-        count = len(self.block.time_s)
-        z, starting, ending = self._begin(), np.empty((count, 12)), np.empty((count, 12))
-        for node, (start, end) in enumerate(zip(starts_of(self.block), self.block.time_s, strict=True)):
-            starting[node] = z[:12]
-            _advance(z, _NONE, (float(end) - start) / duration)
-            ending[node] = z[:12]
+        """States and costates at the end of each segment, costates at its start, and the energy spent, in SI."""
+        block, count = self.block, len(self.block.time_s)
+        z, starts, ends = self._begin(), np.empty((count, 12)), np.empty((count, 12))
+        for node in range(count):
+            starts[node] = z[:12]
+            _advance(z, block.durations[node])
+            ends[node] = z[:12]
             if node < count - 1:
                 self._jump(z, node)
-        states, before = self._in_si(ending)
-        return states, before, self._in_si(starting)[1], float(z[12]) * length**2 / duration**3
+        (length, duration), costate = block.units, block.costate_units
+        energy = float(z[12]) * length**2 / duration**3
+        return ends[:, :6] * block.state_units, ends[:, 6:] * costate, starts[:, 6:] * costate, energy
 
     def _begin(self) -> Floats:
-        length, duration = _units(self.block, self.gravitational_parameter_m3_s2)
-        state = self.block.start_state / np.array([length] * 3 + [length / duration] * 3)
-        return np.concatenate([state, self.unknowns[:6], [0.0]])
+        return np.concatenate([self.block.start_state / self.block.state_units, self.unknowns[:6], [0.0]])
 
     def _jump(self, z: Floats, node: int) -> None:
         z[6:9] -= self.unknowns[6 + 3 * node : 9 + 3 * node]
 
-    def _in_si(self, z: Floats) -> tuple[Floats, Floats]:
-        length, duration = _units(self.block, self.gravitational_parameter_m3_s2)
-        states = z[:, :6] * np.array([length] * 3 + [length / duration] * 3)
-        return states, z[:, 6:] * np.array([length / duration**3] * 3 + [length / duration**2] * 3)
+
+@dataclass(frozen=True, eq=False)
+class ShotPath:
+    """Trajectories that were shot, one after another, and the stays between them.
+
+    Parameters
+    ----------
+    nodes : Nodes
+        Of all blocks.
+    shots : tuple of Shot
+        One for each block of visits.
+    settle : callable
+        Makes a `Path` of this.
+    """
+
+    nodes: Nodes
+    shots: tuple[Shot, ...]
+    settle: Callable[[ShotPath], Path]
+
+    @property
+    def cost(self) -> float:
+        """I = 1/2 int |u|^2 dt, m^2/s^3."""
+        return sum(shot.ends[3] for shot in self.shots)
+
+    @property
+    def time_gradient(self) -> Floats:
+        """Slopes dI / dt_i, shape (N,).
+
+        Notes
+        -----
+        D'(V_i - V) at a flyby; at a rendezvous H - lambda' x_i' is the power 1/2 |u|^2, after minus before.
+        """
+        states, before, starts = (np.concatenate([shot.ends[part] for shot in self.shots]) for part in range(3))
+        after = np.concatenate([starts[1:], np.zeros((1, 6))])
+        gradient = ((before - after)[:, :3] * (self.nodes.arrive[:, 3:] - states[:, 3:])).sum(axis=1)
+        power = 0.5 * (after[:, 3:] ** 2).sum(axis=1) - 0.5 * (before[:, 3:] ** 2).sum(axis=1)
+        return np.asarray(np.where(self.nodes.rendezvous, power, gradient))
+
+    def settled(self) -> Path:
+        """Return the path that re-linearising about this one gives."""
+        return self.settle(self)
+
+    def states(self, time_s: Floats) -> Floats:
+        """Return states, shape (k, 6), at k times; those of the target during a stay."""
+        states = np.empty((len(time_s), 6))
+        which = np.searchsorted(np.array([shot.block.start_s for shot in self.shots]), time_s, side="right") - 1
+        for index, shot in enumerate(self.shots):
+            rows, end = np.flatnonzero(which == index), float(shot.block.time_s[-1])
+            rows = rows[np.argsort(time_s[rows], kind="stable")]
+            states[rows] = shot.along(np.minimum(time_s[rows], end))[0]
+            stays = rows[time_s[rows] > end]
+            met = np.broadcast_to(shot.block.goal[-1], (len(stays), 6))
+            states[stays] = coast(met, time_s[stays] - end, shot.block.gravitational_parameter_m3_s2)
+        return states
 
 
-def shoot(block: Block, gravitational_parameter_m3_s2: float, near: Floats | None = None) -> Shot | None:
-    """Find a block's trajectory by Newton's method, as what the nodes are missed by is taken away in steps.
+def shoot(block: Block, near: Floats | None = None) -> Shot | None:
+    """Find a block's trajectory by Newton's method, as the residual at the nodes is reduced in steps.
 
     Parameters
     ----------
     block : Block
-    gravitational_parameter_m3_s2 : float
+        Its visits.
     near : ndarray, shape (3 + 3 k,), or None
-        Unknowns of other times, to begin from; where that leads nowhere, and with None, it begins from the coasting
-        orbit.
+        Initial unknowns, of other times. If they fail, or with None, the initial trajectory is the coasting orbit.
 
     Returns
     -------
     Shot or None
-        None where it leads nowhere.
+        None if no trajectory is found.
     """
-    mu = gravitational_parameter_m3_s2
     coasting = np.zeros(3 + 3 * len(block.time_s))
-    begins = [] if near is None else [(near, LEAST_STEP_FROM_NEAR)]
-    for begin, least_step in (*begins, (coasting, LEAST_STEP)):
-        found = _follow(block, mu, begin, least_step)
-        if found is not None:
-            return Shot(block, found, mu)
+    initials = [] if near is None else [(near, LEAST_STEP_FROM_NEAR)]
+    for initial, least_step in (*initials, (coasting, LEAST_STEP)):
+        unknowns = _follow(block, initial, least_step)
+        if unknowns is not None:
+            return Shot(block, unknowns)
     return None
 
 
-def starts_of(block: Block) -> Iterator[float]:
-    """When each segment of a block starts."""
-    yield block.start_s
-    yield from (float(each) for each in block.time_s[:-1])
-
-
-def _units(block: Block, mu: float) -> tuple[float, float]:
-    length = float(np.linalg.norm(block.start_state[:3]))
-    return length, float(np.sqrt(length**3 / mu))
-
-
-def _advance(z: Floats, variations: Floats, duration: float) -> None:
-    if duration > 0.0 and not propagate(z, variations, duration):
+def _advance(z: Floats, duration: float) -> None:
+    if duration > 0.0 and not propagate(z, _NONE, duration):
         raise ValueError("a trajectory falls into the centre")
 
 
-def _missed(block: Block, mu: float, unknowns: Floats, slopes: Floats | None = None) -> Floats | None:
-    """What the nodes are missed by; None where there is no trajectory. Its derivatives are filled in, if asked for."""
-    length, duration = _units(block, mu)
-    scale = np.array([length] * 3 + [length / duration] * 3)
+def _residual(block: Block, unknowns: Floats, slopes: Floats | None = None) -> Floats | None:
+    """Return the residual at the nodes, or None if there is no trajectory; fill in its derivatives `slopes`."""
+    scale = block.state_units
     goals = block.goal / scale
     size, last = len(unknowns), len(block.time_s) - 1
     z = np.concatenate([block.start_state / scale, unknowns[:6], [0.0]])
     variations = np.zeros((12, size))
     variations[6:, :6] = np.eye(6)
-    missed = np.empty(size)
-    for node, (start, end) in enumerate(zip(starts_of(block), block.time_s, strict=True)):
-        known = 0 if slopes is None else 6 + 3 * node  # columns of jumps still ahead are zero
+    residual = np.empty(size)
+    for node, duration in enumerate(block.durations):
+        known = 0 if slopes is None else 6 + 3 * node  # columns of later jumps are zero
         varied = np.ascontiguousarray(variations[:, :known])
-        try:
-            _advance(z, varied, (float(end) - start) / duration)
-        except ValueError:
+        if duration > 0.0 and not propagate(z, varied, duration):
             return None
         variations[:, :known] = varied
         rows, jump = slice(3 * node, 3 * node + 3), slice(6 + 3 * node, 9 + 3 * node)
-        missed[rows] = z[:3] - goals[node, :3]
+        residual[rows] = z[:3] - goals[node, :3]
         if slopes is not None:
             slopes[rows] = variations[:3]
         if node < last:
             z[6:9] -= unknowns[jump]
             variations[6:9, jump] -= np.eye(3)
-    missed[-3:] = z[3:6] - goals[last, 3:] if block.rendezvous else z[9:12]
+    residual[-3:] = z[3:6] - goals[last, 3:] if block.rendezvous else z[9:12]
     if slopes is not None:
         slopes[-3:] = variations[3:6] if block.rendezvous else variations[9:]
-    return missed if np.isfinite(missed).all() and (slopes is None or np.isfinite(slopes).all()) else None
+    return residual if np.isfinite(residual).all() and (slopes is None or np.isfinite(slopes).all()) else None
 
 
-def _follow(block: Block, mu: float, begin: Floats, least_step: float) -> Floats | None:
-    """Go from unknowns that miss the nodes to such that do not, in steps as long as Newton's method bears."""
-    slopes = np.empty((len(begin), len(begin)))
-    first = _missed(block, mu, begin, slopes)
+def _follow(block: Block, initial: Floats, least_step: float) -> Floats | None:
+    """Continue unknowns to a residual of zero, in steps as long as Newton's method converges."""
+    slopes = np.empty((len(initial), len(initial)))
+    first = _residual(block, initial, slopes)
     if first is None:
         return None
-    unknowns, done, step = begin, 0.0, min(1.0, _FIRST_STEP / max(float(np.abs(first).max()), _FIRST_STEP))
+    unknowns, done, step = initial, 0.0, min(1.0, _FIRST_STEP / max(float(np.abs(first).max()), _FIRST_STEP))
     while True:
         ahead = _solved(slopes, -first)
         if ahead is None:
             return None
         while True:
             share = min(done + step, 1.0)
-            tried = _newton(block, mu, unknowns + (share - done) * ahead, share, (1.0 - share) * first, slopes.copy())
-            if tried is not None:
+            solved = _newton(block, unknowns + (share - done) * ahead, share, (1.0 - share) * first, slopes.copy())
+            if solved is not None:
                 break
             step *= 0.5
             if step < least_step:
                 return None
-        unknowns, rounds = tried
+        unknowns, rounds = solved
         if share == 1.0:
             return unknowns
         done, step = share, step * (2.0 if rounds <= 2 else 1.5 if rounds <= 4 else 1.0)
-        if _missed(block, mu, unknowns, slopes) is None:
+        if _residual(block, unknowns, slopes) is None:
             return None
 
 
-def _newton(
-    block: Block, mu: float, unknowns: Floats, share: float, goal: Floats, slopes: Floats
-) -> tuple[Floats, int] | None:
-    """Newton's method towards a residual, with derivatives as old as they may be; None where it is not fast."""
+def _newton(block: Block, unknowns: Floats, share: float, goal: Floats, slopes: Floats) -> tuple[Floats, int] | None:
+    """Newton's method to a residual `goal`; derivatives are renewed where it is slow. None if it does not converge."""
     before, fresh = np.inf, False
     for rounds in range(_ROUNDS):
-        found = _missed(block, mu, unknowns)
-        if found is None:
+        residual = _residual(block, unknowns)
+        if residual is None:
             return None
-        size = float(np.abs(found - goal).max())
+        size = float(np.abs(residual - goal).max())
         if size <= (TOLERANCE if share == 1.0 else ON_THE_WAY) or (fresh and size <= ROUNDING and size > 0.3 * before):
             return unknowns, rounds
         if size > _GREATEST_CORRECTION or size > 2.0 * before:
             return None
         fresh = size > _FAST * before
-        if fresh and _missed(block, mu, unknowns, slopes) is None:
+        if fresh and _residual(block, unknowns, slopes) is None:
             return None
-        move = _solved(slopes, found - goal)
+        move = _solved(slopes, residual - goal)
         if move is None:
             return None
         unknowns, before = unknowns - move, size

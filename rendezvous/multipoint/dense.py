@@ -1,4 +1,4 @@
-"""The paper's dense system for the costates and their jumps: a validator of the segment solver."""
+"""The paper's dense system for the costates and their jumps: a check of the segment solver."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class DenseSolution:
-    """What the dense system gives.
+    """Solution of the dense system.
 
     Parameters
     ----------
     costate_start : ndarray, shape (6,)
         (lambda_r, lambda_V) at the start.
     jumps : ndarray, shape (N, 3)
-        D_i = lambda_r before less after, the last one with nothing after.
+        D_i = lambda_r before minus after node i; after the last it is zero.
     velocities : ndarray, shape (N, 3)
         The chaser's at the nodes, m/s.
     cost : float
@@ -39,29 +39,17 @@ class DenseSolution:
 
 
 def solve_dense(motion: LinearMotion, start_s: float, start_state: Floats, nodes: Nodes) -> DenseSolution:
-    """Solve Q P = Delta, (14) of Mironov and Mironov (2007), for flybys only.
-
-    Parameters
-    ----------
-    motion : LinearMotion
-    start_s : float
-    start_state : ndarray, shape (6,)
-    nodes : Nodes
-        Without a rendezvous or a dwell.
-
-    Returns
-    -------
-    DenseSolution
+    """Solve Q P = Delta, (14) of Mironov and Mironov (2007), from the `start_state`, for `nodes` without a rendezvous.
 
     Raises
     ------
     ValueError
-        If a node is a rendezvous.
+        If a node is a rendezvous, or times do not increase.
 
     Notes
     -----
     Q12(t, s) = G(t, s) Phi(s, t)' gives R13 and R14, Q22(t, s) = Phi(s, t)' gives R43 and R44. O(N^2) Gramians, O(N^3)
-    time: a check up to N about 100, for the condition number grows as N^6 or so.
+    time: a check up to N about 100, as the condition number grows approximately as N^6. `motion` is the chaser's.
     """
     if nodes.rendezvous.any():
         raise ValueError("the dense system of the paper knows flybys only")

@@ -29,19 +29,20 @@ class BestOrder:
     Parameters
     ----------
     order : tuple of int
-        Which target first, second and so on.
+        Numbers of the targets, first to last.
     path : Path
+        In this order.
     objective : float
         Energy, and the price of the time, m^2/s^3.
     nodes : int
-        How many beginnings of orders were looked at.
+        Number of partial orders examined.
     evaluations : int
-        How many paths were computed.
+        Number of paths computed.
     lost : tuple of tuple of int
-        Beginnings of orders that were left out, for no path was found.
+        Partial orders that were left out because no path was found.
     unfit : int
-        How many orders do not fit: a stay ends after the next of given times, or stays leave no time for travelling
-        before the latest time.
+        Number of orders that do not fit: a stay ends after the next of the given times, or stays leave no time for
+        travel before the latest time.
     """
 
     order: tuple[int, ...]
@@ -61,29 +62,27 @@ def best_order(
     Parameters
     ----------
     tour : Visits
+        At most 9 targets.
     limits : TimeLimits
+        Of the times.
     guesses : sequence of ndarray, shape (n,)
-        Times to start from, s, whatever the order, beside those of its own.
+        Additional initial times, s, of any order.
     progress : callable or None
-        Told the share of orders that are decided.
-
-    Returns
-    -------
-    BestOrder
+        Called with the share of orders that are decided.
 
     Raises
     ------
     ValueError
         If there are more than 9 targets, or they do not fit before the latest time.
     NotSettledError
-        If no order has a path that is found.
+        If no path is found for any order.
 
     Notes
     -----
-    Depth first, the cheapest beginning first. A beginning costs, at its own best times, no more than any order that
-    goes on from it: what it costs bounds them all, and warms their start. That holds of global minima. The minima that
-    are found are local, so that the order is the best of those found: a beginning is dropped only where more starts
-    find no lower minimum, in Kepler's motion with a factor too (`ruggedness`).
+    Depth first, the cheapest partial order first. At its best times, a partial order costs no more than any order that
+    begins with it: its cost is a bound of theirs, and its times are their initial times. This holds for global minima.
+    The computed minima are local, so that the result is the best order found: a partial order is dropped only if more
+    starts find no lower minimum, for Kepler's motion also with a factor (`ruggedness`).
     """
     count = _checked_count(tour)
     dwell = tour.dwell_s
@@ -94,7 +93,7 @@ def best_order(
         complete, held, enough = len(order) == count, limits, -np.inf
         if not complete:
             if horizon is not None:
-                rest = [each for each in range(count) if each not in order]
+                rest = [target for target in range(count) if target not in order]
                 later = dwell[order[-1]] + dwell[rest].sum() - dwell[rest].max() + len(rest) * limits.least_gap_s
                 held = TimeLimits(horizon - float(later), limits.least_gap_s, limits.price_per_s)
             if np.isfinite(search.best_objective):
@@ -103,54 +102,43 @@ def best_order(
         if careful:
             effort = Effort.RUGGED if tour.ruggedness > SMOOTH else Effort.ORDER
         begins = [*warm, *guesses] if complete else warm
-        found = optimise_times(
+        times = optimise_times(
             tour.flyer(order), tour.start_s, dwell[list(order)], held, begins, effort=effort, enough=enough
         )
-        return found.objective, found.flown, found.evaluations
+        return times.objective, times.flown, times.evaluations
 
-    # Where local minima lie far apart a beginning's is no bound, and is taken for one that much lower.
+    # A local minimum of a partial order is no bound: it is taken as one that many times greater than the minimum.
     slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0 / (1.0 - _MARGIN)
-    search = _Search(solve, count, progress or (lambda _: None), tour.start_s, horizon, slack, looks_twice=True)
-    search.branch((), None)
-    best = search.found()
-    final = optimise_times(
-        tour.flyer(search.best),
-        tour.start_s,
-        dwell[list(search.best)],
-        limits,
-        [best.nodes.arrive_s, *guesses],
-    )
+    search = _Search(solve, count, progress, tour.start_s, horizon, slack, looks_twice=True)
+    best = search.run()
+    final = best_times(tour, search.best, limits, [best.nodes.arrive_s, *guesses])
     evaluations = search.evaluations + final.evaluations
-    lost = tuple(search.lost)
-    return BestOrder(search.best, final.path, final.objective, search.nodes, evaluations, lost, unfit)
+    return BestOrder(search.best, final.path, final.objective, search.nodes, evaluations, tuple(search.lost), unfit)
 
 
 def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | None = None) -> BestOrder:
-    """Find the best order where the times of the first, second and so on visit are given.
+    """Find the best order for given times of the first, second and so on visit.
 
     Parameters
     ----------
     tour : Visits
+        At most 9 targets.
     time_s : array_like, shape (n,)
         Increasing.
     progress : callable or None
-        Told the share of orders that are decided.
-
-    Returns
-    -------
-    BestOrder
+        Called with the share of orders that are decided.
 
     Raises
     ------
     ValueError
         If there are more than 9 targets, times do not increase, or no order fits them.
     NotSettledError
-        If no order that fits has a path that is found.
+        If no path is found for any order that fits.
 
     Notes
     -----
-    Dynamic programming over (visited, last) where every visit is a rendezvous, for then a leg's cost depends on its two
-    ends alone; else branch and bound. Orders in which a stay ends after the next visit do not fit and are left out.
+    Dynamic programming over (visited, last) if every visit is a rendezvous, as a leg's cost then depends on its two
+    ends only; otherwise branch and bound. Orders in which a stay ends after the next visit do not fit and are left out.
     """
     count, times = _checked_count(tour), np.asarray(time_s, dtype=np.float64)
     if times.shape != (count,):
@@ -164,7 +152,7 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
             "no order fits the times: in each one a stay ends after the next visit; make times farther apart, or "
             "stays shorter"
         )
-    if isinstance(tour, Tour) and all(each.meet is Meet.RENDEZVOUS for each in tour.targets.targets):
+    if isinstance(tour, Tour) and all(target.meet is Meet.RENDEZVOUS for target in tour.targets.targets):
         return _by_dynamic_programming(tour, times, fits, unfit)
 
     def solve(order: tuple[int, ...], _warm: Sequence[Floats], _careful: bool) -> tuple[float, Flown, int]:
@@ -172,13 +160,9 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
         return flown.cost, flown, 1
 
     slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0
-    search = _Search(
-        solve, count, progress or (lambda _: None), tour.start_s, None, slack, looks_twice=False, fits=fits
-    )
-    search.branch((), None)
-    path = search.found().settled()
-    lost = tuple(search.lost)
-    return BestOrder(search.best, path, path.cost, search.nodes, search.evaluations, lost, unfit)
+    search = _Search(solve, count, progress, tour.start_s, None, slack, looks_twice=False, fits=fits)
+    path = search.run().settled()
+    return BestOrder(search.best, path, path.cost, search.nodes, search.evaluations, tuple(search.lost), unfit)
 
 
 def best_times(
@@ -189,39 +173,32 @@ def best_times(
     *,
     progress: Report | None = None,
 ) -> BestTimes:
-    """Find the best times of one order.
+    """Find the best times of one `order`, as `optimise_times`.
 
     Parameters
     ----------
     tour : Visits
+        The targets.
     order : sequence of int
+        Numbers of targets, first to last.
     limits : TimeLimits
+        Of the times.
     guesses : sequence of ndarray, shape (N,)
-        Times to start from, beside those of its own.
+        Additional initial times, s.
     progress : callable or None
-        Told the share of starts that are followed.
-
-    Returns
-    -------
-    BestTimes
+        Called with the share of starts that are followed.
     """
-    return optimise_times(
-        tour.flyer(order),
-        tour.start_s,
-        tour.dwell_s[list(order)],
-        limits,
-        guesses,
-        progress=progress,
-    )
+    dwell = tour.dwell_s[list(order)]
+    return optimise_times(tour.flyer(order), tour.start_s, dwell, limits, guesses, progress=progress)
 
 
 @dataclass
 class _Search:
-    """Depth first through beginnings of orders."""
+    """A depth-first search through partial orders."""
 
     solve: Callable[[tuple[int, ...], Sequence[Floats], bool], tuple[float, Flown, int]]
     count: int
-    progress: Report
+    progress: Report | None
     start_s: float
     horizon_s: float | None
     slack: float
@@ -235,16 +212,17 @@ class _Search:
     decided: int = 0
     lost: list[tuple[int, ...]] = field(default_factory=list)
 
-    def found(self) -> Flown:
-        """The path of the best order."""
+    def run(self) -> Flown:
+        """Search all orders, and return the path of the best one."""
+        self._branch((), None)
         if self.best_path is None:
             raise NotSettledError("no order has a path that was found; give visits more time")
         return self.best_path
 
-    def branch(self, beginning: tuple[int, ...], before: Flown | None) -> None:
-        """Look at all orders that go on from a beginning."""
+    def _branch(self, beginning: tuple[int, ...], before: Flown | None) -> None:
+        """Examine all orders that begin with a partial order."""
         children = []
-        for target in (each for each in range(self.count) if each not in beginning):
+        for target in (target for target in range(self.count) if target not in beginning):
             order = (*beginning, target)
             if self.fits is not None and not self.fits[len(beginning), target]:
                 self._done(order)
@@ -259,11 +237,11 @@ class _Search:
                 self._done(order)
             else:
                 children.append((objective, order, path))
-        for objective, order, path in sorted(children, key=lambda each: each[:2]):
+        for objective, order, path in sorted(children, key=lambda child: child[:2]):
             complete = len(order) == self.count
             lowest, best_path = objective, path
             if self.looks_twice and (complete or objective >= self.slack * self.best_objective):
-                # What was found is a local minimum: more starts before an order is taken, or a beginning dropped.
+                # This is a local minimum: try more starts before an order is accepted, or a partial order is dropped.
                 with suppress(NotSettledError):
                     again, other = self._look(order, [path.nodes.arrive_s], careful=True)
                     if again < objective:
@@ -273,7 +251,7 @@ class _Search:
                 if lowest < self.best_objective:
                     self.best, self.best_path, self.best_objective = order, best_path, lowest
             elif lowest < self.slack * self.best_objective:
-                self.branch(order, best_path)
+                self._branch(order, best_path)
             else:
                 self._done(order)
 
@@ -284,10 +262,11 @@ class _Search:
 
     def _done(self, order: tuple[int, ...]) -> None:
         self.decided += factorial(self.count - len(order))
-        self.progress(self.decided / factorial(self.count))
+        if self.progress is not None:
+            self.progress(self.decided / factorial(self.count))
 
     def _warm(self, before: Flown | None) -> list[Floats]:
-        """Times to start from: those before, drawn together to leave room, and one more gap."""
+        """Initial times: those of the previous visits, contracted to leave room, and one more gap."""
         if before is None:
             return []
         times = before.nodes.arrive_s
@@ -309,7 +288,8 @@ def _checked_count(tour: Visits) -> int:
 
 
 def _orders_without_room(start_s: float, dwell_s: Floats, limits: TimeLimits) -> int:
-    """How many orders do not fit before the latest time, which depends on the last target alone: its stay is free.
+    """Count the orders that do not fit before the latest time; this depends on the last target, whose stay may end
+    later.
 
     Raises
     ------
@@ -327,30 +307,31 @@ def _orders_without_room(start_s: float, dwell_s: Floats, limits: TimeLimits) ->
 
 
 def _orders_that_fit(fits: NDArray[np.bool_]) -> int:
-    """How many orders use only pairs of places and targets that fit, shape (place, target)."""
+    """Count the orders that use only pairs of slots and targets that fit, shape (slot, target)."""
     ways = {frozenset[int](): 1}
-    for place in fits:
+    for slot in fits:
         longer: dict[frozenset[int], int] = {}
         for visited, number in ways.items():
-            for target in (each for each in _indices(place) if each not in visited):
+            for target in _unvisited(slot, visited):
                 longer[visited | {target}] = longer.get(visited | {target}, 0) + number
         ways = longer
     return sum(ways.values())
 
 
-def _indices(flags: NDArray[np.bool_]) -> list[int]:
-    return [int(each) for each in np.flatnonzero(flags)]
+def _unvisited(slot: NDArray[np.bool_], visited: frozenset[int]) -> list[int]:
+    """Targets that fit a slot and are not visited yet."""
+    return [target for target in np.flatnonzero(slot).tolist() if target not in visited]
 
 
 def _by_dynamic_programming(tour: Tour, times: Floats, fits: NDArray[np.bool_], unfit: int) -> BestOrder:
     """Held and Karp's recursion over sets of visited targets."""
     count, targets, dwell = len(times), tour.targets, tour.dwell_s
-    found: dict[tuple[frozenset[int], int], tuple[float, tuple[int, ...]]] = {}
+    best: dict[tuple[frozenset[int], int], tuple[float, tuple[int, ...]]] = {}
     lost: list[tuple[int, ...]] = []
     evaluations = 0
 
     def leg_cost(start_s: float, start: Floats, target: int, slot: int) -> float:
-        """What a leg costs; infinite where no path is found."""
+        """Return the cost of a leg; infinite if no path is found."""
         nonlocal evaluations
         evaluations += 1
         try:
@@ -360,24 +341,24 @@ def _by_dynamic_programming(tour: Tour, times: Floats, fits: NDArray[np.bool_], 
             lost.append((target,))
             return np.inf
 
-    for target in _indices(fits[0]):
-        found[frozenset([target]), target] = leg_cost(tour.start_s, tour.start_state, target, 0), (target,)
+    for target in _unvisited(fits[0], frozenset()):
+        best[frozenset([target]), target] = leg_cost(tour.start_s, tour.start_state, target, 0), (target,)
     for slot in range(1, count):
         legs = {}
-        for first in _indices(fits[slot - 1]):
+        for first in _unvisited(fits[slot - 1], frozenset()):
             leave_s = float(times[slot - 1] + dwell[first])
             start = targets.states(np.array([first]), np.array([leave_s]))[0]
-            for second in (each for each in _indices(fits[slot]) if each != first):
+            for second in _unvisited(fits[slot], frozenset([first])):
                 legs[first, second] = leg_cost(leave_s, start, second, slot)
         longer: dict[tuple[frozenset[int], int], tuple[float, tuple[int, ...]]] = {}
-        for (visited, last), (cost, order) in found.items():
-            for target in (each for each in _indices(fits[slot]) if each not in visited):
+        for (visited, last), (cost, order) in best.items():
+            for target in _unvisited(fits[slot], visited):
                 key, total = (visited | {target}, target), cost + legs[last, target]
                 if key not in longer or total < longer[key][0]:
                     longer[key] = total, (*order, target)
-        found = longer
-    cost, best = min(found.values())
+        best = longer
+    cost, order = min(best.values())
     if not np.isfinite(cost):
         raise NotSettledError("no order has a path that was found; give visits more time")
-    path = tour.fly(best, times)
-    return BestOrder(best, path, path.cost, len(found), evaluations + 1, tuple(lost), unfit)
+    path = tour.fly(order, times)
+    return BestOrder(order, path, path.cost, len(best), evaluations + 1, tuple(lost), unfit)

@@ -17,18 +17,18 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """Where and when the path must pass, in order.
+    """States through which a path must pass, and their times, in order.
 
     Parameters
     ----------
     arrive_s, leave_s : ndarray, shape (N,)
-        Equal, but where the chaser stays with a target.
+        Equal, except where the chaser stays with a target.
     arrive, leave : ndarray, shape (N, 6)
-        States of the targets then.
+        States of the targets at these times.
     arrive_rate, leave_rate : ndarray, shape (N, 6)
         Their time derivatives.
     rendezvous : ndarray of bool, shape (N,)
-        Whether the velocity is met too.
+        Whether the velocity must agree too.
     """
 
     arrive_s: Floats
@@ -41,15 +41,15 @@ class Nodes:
 
 
 class NotSettledError(ValueError):
-    """No path of least energy was found, which does not say that there is none."""
+    """No path of least energy was found; one may still exist."""
 
 
 class Flown(Protocol):
-    """A path as far as the choice of times needs it."""
+    """The properties of a path that the choice of times uses."""
 
     @property
     def nodes(self) -> Nodes:
-        """Where and when it passes."""
+        """Its nodes."""
 
     @property
     def cost(self) -> float:
@@ -60,7 +60,7 @@ class Flown(Protocol):
         """Slopes dI / dt_i, shape (N,)."""
 
     def settled(self) -> Path:
-        """Return the path with everything that can be asked of one."""
+        """Return the complete path."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,19 +70,17 @@ class Path:
     Parameters
     ----------
     motion : LinearMotion
+        Of the chaser.
     nodes : Nodes
+        N of them.
     cost : float
         I = 1/2 int |u|^2 dt, m^2/s^3.
     starts_s : ndarray, shape (N,)
-        When each segment starts.
-    start_states : ndarray, shape (N, 6)
-        The chaser's state then.
-    arrival_states : ndarray, shape (N, 6)
-        The chaser's state at each node.
-    costate_before : ndarray, shape (N, 6)
-        lambda at the end of each segment.
-    costate_after : ndarray, shape (N, 6)
-        lambda at the start of the segment that follows; zeros after the last.
+        Start of each segment.
+    start_states, arrival_states : ndarray, shape (N, 6)
+        The chaser's states at the start of each segment and at each node.
+    costate_before, costate_after : ndarray, shape (N, 6)
+        lambda at the end of each segment, and at the start of the next one; zeros after the last.
     costate_start : ndarray, shape (6,)
         lambda at the start.
     time_gradient : ndarray, shape (N,)
@@ -102,7 +100,7 @@ class Path:
 
     @property
     def jumps(self) -> Floats:
-        """Costate before less costate after, shape (N, 6): dI / d(target's state); zero in the velocity of a flyby."""
+        """Costate before minus costate after, shape (N, 6): dI / d(target's state); zero in the velocity of a flyby."""
         return self.costate_before - self.costate_after
 
     def settled(self) -> Path:
@@ -110,20 +108,11 @@ class Path:
         return self
 
     def costate(self, time_s: Floats) -> Floats:
-        """Return lambda (m/s^3, m/s^2) at times, those after the jump at a node.
-
-        Parameters
-        ----------
-        time_s : ndarray, shape (k,)
-            From the start to the last node; zero while the chaser stays with a target.
-
-        Returns
-        -------
-        ndarray, shape (k, 6)
+        """Return lambda (m/s^3, m/s^2), shape (k, 6), at k times: after the jump at a node, zero during a stay.
 
         Notes
         -----
-        From the end of each segment where the motion has a closed form; else along with the states.
+        From the end of each segment where the motion has a closed form; else together with the states.
         """
         if isinstance(self.motion, TimeVaryingMotion):
             return self.along(time_s)[1]
@@ -133,68 +122,32 @@ class Path:
         return np.asarray(np.where(moving[:, None], np.einsum("kba,kb->ka", back, self.costate_before[which]), 0.0))
 
     def control(self, time_s: Floats) -> Floats:
-        """Return u = B' lambda at times.
-
-        Parameters
-        ----------
-        time_s : ndarray, shape (k,)
-            From the start to the last node.
-
-        Returns
-        -------
-        ndarray, shape (k, 3)
-            m/s^2.
-        """
+        """Return u = B' lambda, m/s^2, shape (k, 3), at k times."""
         return np.asarray(np.einsum("kai,ka->ki", self.motion.input_map(time_s), self.costate(time_s)))
 
     def breaks(self) -> Floats:
-        """Return times from the start to the last node between which the control is smooth and turns by about a radian.
-
-        Returns
-        -------
-        ndarray
-            The times of all arrivals and departures among them, not decreasing, s.
-        """
+        """Return times, s, not decreasing, between which the control is smooth and turns by about a radian."""
         legs = zip(self.starts_s, self.nodes.arrive_s, strict=True)
         return np.concatenate([self.motion.breaks(float(start), float(end)) for start, end in legs])
 
     def state(self, time_s: Floats) -> Floats:
-        """Return the chaser's state at times.
-
-        Parameters
-        ----------
-        time_s : ndarray, shape (k,)
-            From the start to the last node.
-
-        Returns
-        -------
-        ndarray, shape (k, 6)
-        """
+        """Return the chaser's states, shape (k, 6), at k times."""
         return self.along(time_s)[0]
 
     def along(self, time_s: Floats) -> tuple[Floats, Floats]:
-        """Return states and costates at times.
-
-        Parameters
-        ----------
-        time_s : ndarray, shape (k,)
-            From the start to the last node.
-
-        Returns
-        -------
-        tuple of ndarray, each of shape (k, 6)
+        """Return states and costates, shapes (k, 6), at k times from the start to the last node.
 
         Notes
         -----
-        From each time to the next one of its segment: long intervals of a motion that varies are dear.
+        From each time to the next one of its segment: long intervals of a time-varying motion are expensive.
         """
         times = np.asarray(time_s, dtype=np.float64)
         which, moving = self._segment_of(times)
         states, costates = np.empty((len(times), 6)), np.zeros((len(times), 6))
         order = np.argsort(times, kind="stable")
         for segment in np.unique(which):
-            mine = order[which[order] == segment]
-            flying, staying = mine[moving[mine]], mine[~moving[mine]]
+            members = order[which[order] == segment]
+            flying, staying = members[moving[members]], members[~moving[members]]
             end = float(self.nodes.arrive_s[segment])
             if len(flying):
                 start, last = self.start_states[segment], self.costate_before[segment]
@@ -206,7 +159,7 @@ class Path:
         return states, costates
 
     def _segment_of(self, time_s: Floats) -> tuple[NDArray[np.intp], Flags]:
-        """Which segment each time belongs to, and whether it is under way rather than staying at its end."""
+        """The segment of each time, and whether the chaser is in motion to its end rather than staying there."""
         which = np.searchsorted(self.nodes.leave_s, time_s, side="right")
         last = len(self.nodes.leave_s) - 1
         ended = (which > last) & (time_s <= self.nodes.arrive_s[last])
@@ -215,20 +168,7 @@ class Path:
 
 
 def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, nodes: Nodes) -> Path:
-    """Find the minimum-energy path through nodes.
-
-    Parameters
-    ----------
-    motion : LinearMotion
-    start_s : float
-    start_state : ndarray, shape (6,)
-        m and m/s.
-    nodes : Nodes
-        In order of time.
-
-    Returns
-    -------
-    Path
+    """Find the minimum-energy path of a `motion` from the `start_state` (m, m/s) through `nodes`.
 
     Raises
     ------
@@ -239,10 +179,10 @@ def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, no
 
     Notes
     -----
-    Unknown are the velocities at flybys. The cost is the sum of 1/2 |L_k^-1 e_k|^2, e_k = x_k - Phi_k x_(k-1) - d_k,
+    Unknowns are the velocities at flybys. The cost is the sum of 1/2 |L_k^-1 e_k|^2, e_k = x_k - Phi_k x_(k-1) - d_k,
     with L_k the Cholesky factor of the Gramian, in states divided by (T, T, T, 1, 1, 1): a least-squares problem whose
-    normal equations are symmetric positive definite with 3 x 3 blocks on three diagonals. No block is inverted that may
-    be singular in a well-posed problem, as R13 of the paper's elimination is. O(N) time and memory.
+    normal equations are symmetric positive definite with 3 x 3 blocks on three diagonals. In contrast to R13 in the
+    paper's elimination, no inverted block is singular in a well-posed problem. O(N) time and memory.
     """
     starts = np.concatenate([[start_s], nodes.leave_s[:-1]])
     durations = nodes.arrive_s - starts
@@ -250,17 +190,8 @@ def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, no
     segment = motion.segment(starts, nodes.arrive_s)
     arrive, begin = nodes.arrive.copy(), np.concatenate([start_state[None], nodes.leave[:-1]])
     before, at_start, after = np.empty_like(arrive), np.empty_like(arrive), np.zeros_like(arrive)
-    solved, cost = solve_path(
-        segment.transition,
-        segment.gramian,
-        segment.drift,
-        durations,
-        begin,
-        arrive,
-        nodes.rendezvous,
-        before,
-        at_start,
-    )
+    blocks = segment.transition, segment.gramian, segment.drift
+    solved, cost = solve_path(*blocks, durations, begin, arrive, nodes.rendezvous, before, at_start)
     if not solved or not np.isfinite(cost):
         raise NotSettledError(
             "the numbers of the path overflow, or a segment is too short or too long for its Gramian; check the units"
@@ -286,26 +217,23 @@ def _carried(motion: LinearMotion, grid: Floats, start: Floats, costate_end: Flo
 
 
 def check_times(start_s: float, arrive_s: Floats, leave_s: Floats) -> None:
-    """Refuse times that do not increase.
-
-    Parameters
-    ----------
-    start_s : float
-    arrive_s, leave_s : ndarray, shape (N,)
+    """Check that the times of the start, of arrivals and of departures increase.
 
     Raises
     ------
     ValueError
-        If one is not finite, or not after the one before.
+        If one is not finite, or not after the previous one.
     """
     if not (np.isfinite(start_s) and np.isfinite(arrive_s).all() and np.isfinite(leave_s).all()):
         raise ValueError("a time is not finite")
     before = np.concatenate([[start_s], leave_s[:-1]])
     late = np.flatnonzero(~(arrive_s > before))
     if len(late):
-        at = int(late[0])
-        what = f"{before[at]:g} s, when the chaser leaves the one before" if at else f"the start at {start_s:g} s"
-        raise ValueError(f"times must increase: visit {at + 1} is at {arrive_s[at]:g} s, not after {what}")
+        index = int(late[0])
+        limit = (
+            f"{before[index]:g} s, when the chaser leaves the one before" if index else f"the start at {start_s:g} s"
+        )
+        raise ValueError(f"times must increase: visit {index + 1} is at {arrive_s[index]:g} s, not after {limit}")
 
 
 def _time_gradient(motion: LinearMotion, nodes: Nodes, arrive: Floats, before: Floats, after: Floats) -> Floats:
@@ -324,5 +252,4 @@ def _time_gradient(motion: LinearMotion, nodes: Nodes, arrive: Floats, before: F
 
 def _hamiltonian(motion: LinearMotion, times: Floats, states: Floats, costates: Floats) -> Floats:
     control = (costates[:, None, :] @ motion.input_map(times))[:, 0]
-    rates = (motion.dynamics(times) @ states[:, :, None])[:, :, 0] + motion.forcing(times)
-    return np.asarray((costates * rates).sum(axis=1) + 0.5 * (control**2).sum(axis=1))
+    return np.asarray((costates * motion.rates(times, states)).sum(axis=1) + 0.5 * (control**2).sum(axis=1))

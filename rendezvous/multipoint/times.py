@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 FlyAt = Callable[[Floats], Flown]
 
 LEAST_SHARE = 1e-6
-"""The least gap, as a share of the time there is, where none is given: a visit takes time."""
+"""The least gap, as a share of the available time, where none is given."""
 _POLISH_ROUNDS = 8
 _DIFFERENCE = 1e-5
 _WALL = 20.0
@@ -28,54 +28,54 @@ _MOST_RESTARTS = 4
 _SETTLED = 1e-3
 _ROUNDING = 1e-26
 _CLOCK = 1e-9
-"""Time for travelling, as a share of the times themselves, that is none: rounding of times leaves no gaps in it."""
+"""Travel time, as a share of the times themselves, within their rounding: it leaves no gaps."""
 
 
 class Effort(Enum):
-    """How hard the best times are looked for: (starts of its own, how many are followed, relative tolerance)."""
+    """Effort of a search for best times: (its own starts, the number followed, relative tolerance)."""
 
     BOUND = (1, 1, 1e-5)
-    """For a bound on a beginning of an order, from times known to be good."""
+    """A bound of a partial order, from good times."""
     ORDER = (6, 2, 1e-7)
-    """For comparing orders."""
+    """Comparison of orders."""
     RUGGED = (14, 5, 1e-5)
-    """For comparing orders whose cost has many local minima."""
+    """Comparison of orders whose cost has many local minima."""
     FINAL = (48, 6, 1e-9)
-    """For the answer, to the last digits."""
+    """The final answer, to the last digits."""
 
     @property
     def spread(self) -> int:
-        """How many starts are made up, beside those given."""
+        """Number of starts besides the guesses."""
         return int(self.value[0])
 
     @property
     def followed(self) -> int:
-        """How many starts, the best ones, are followed downhill."""
+        """Number of starts, the best ones, from which the objective is minimised."""
         return int(self.value[1])
 
     @property
     def tolerance(self) -> float:
-        """Relative change of the cost at which a descent ends."""
+        """Relative change of the objective at which a descent ends."""
         return float(self.value[2])
 
 
 @dataclass(frozen=True)
 class TimeLimits:
-    """What holds the times.
+    """Limits of the times.
 
     Parameters
     ----------
     latest_s : float or None
-        When the last visit must be over at the latest.
+        Latest end of the last visit.
     least_gap_s : float
         Between a departure and the next arrival.
     price_per_s : float
-        kappa: what a second from the start to the last visit costs, added to the energy, m^2/s^4; not negative.
+        kappa, m^2/s^4, not negative: times the duration it is added to the energy.
 
     Raises
     ------
     ValueError
-        If nothing holds the last time: the energy falls to zero as it grows, and there is no best.
+        If nothing limits the last time: the energy falls to zero as it grows, and there is no minimum.
     """
 
     latest_s: float | None = None
@@ -102,10 +102,11 @@ class BestTimes:
     Parameters
     ----------
     flown : Flown
+        The path at these times.
     objective : float
         Energy, and the price of the time, m^2/s^3.
     evaluations : int
-        How many paths were computed.
+        Number of paths computed.
     """
 
     flown: Flown
@@ -114,18 +115,18 @@ class BestTimes:
 
     @cached_property
     def path(self) -> Path:
-        """The path, settled at the first call."""
+        """The settled path, computed at the first access."""
         return self.flown.settled()
 
     @property
     def time_s(self) -> Floats:
-        """When the targets are reached, shape (N,)."""
+        """Times of arrival, shape (N,)."""
         return self.flown.nodes.arrive_s
 
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
-    """Gaps, the path they give, what it costs and the slope of that along the gaps."""
+    """Gaps, the path at their times, its objective and the slope of the objective along the gaps."""
 
     gaps: Floats
     flown: Flown
@@ -138,33 +139,48 @@ class NoRoomError(ValueError):
 
 
 class _StoppedError(Exception):
-    """A descent that finds no paths around it, or is low enough."""
+    """A descent has no paths around it, or its objective is low enough."""
 
 
 @dataclass
 class _Trials:
-    """Paths of gaps, counted."""
+    """The objective as a function of gaps, with the limits of the gaps; it counts its evaluations."""
 
     fly: FlyAt
     shifts_s: Floats
     price_per_s: float
-    flown: int = 0
+    least: float
+    """The least gap, s."""
+    total: float
+    """The available travel time, s; infinite without a latest time."""
+    scale: float
+    """A typical travel time, s."""
+    evaluations: int = 0
 
     def __call__(self, gaps: Floats) -> _Trial:
         times = self.shifts_s + np.cumsum(gaps)
-        self.flown += 1
-        found = self.fly(times)
-        gradient = found.time_gradient.copy()
+        self.evaluations += 1
+        flown = self.fly(times)
+        gradient = flown.time_gradient.copy()
         gradient[-1] += self.price_per_s
         slope = np.cumsum(gradient[::-1])[::-1]
-        return _Trial(gaps, found, found.cost + self.price_per_s * float(times[-1] - self.shifts_s[0]), slope)
+        return _Trial(gaps, flown, flown.cost + self.price_per_s * float(times[-1] - self.shifts_s[0]), slope)
 
     def attempt(self, gaps: Floats) -> _Trial | None:
-        """Fly, or return None where there is no path of such times."""
+        """Return None instead of an error if there is no path at such times."""
         try:
             return self(gaps)
         except ValueError:
             return None
+
+    def within(self, gaps: Floats) -> Floats:
+        """Return gaps within the limits, to undo the rounding of a descent."""
+        gaps = np.maximum(gaps, self.least)
+        excess = gaps - self.least
+        over = gaps.sum() - self.total
+        if over > 0.0 and excess.sum() > 0.0:
+            gaps = gaps - over * excess / excess.sum()
+        return np.asarray(gaps)
 
 
 def optimise_times(
@@ -178,115 +194,107 @@ def optimise_times(
     enough: float = -np.inf,
     progress: Callable[[float], None] | None = None,
 ) -> BestTimes:
-    """Find the times of least energy, or energy and price, of visits in one order.
+    """Minimise the energy, or energy and price, over the times of visits in one order.
 
     Parameters
     ----------
     fly : callable
-        The path of given times.
+        Returns the path of given times.
     start_s : float
+        Of the first segment.
     dwell_s : ndarray, shape (N,)
-        How long the chaser stays with each target.
+        Duration of the stay with each target.
     limits : TimeLimits
+        Of the times.
     guesses : sequence of ndarray, shape (N,)
-        Times to start from, beside those of its own; unsound ones are left out.
+        Additional initial times, s; those outside the limits are ignored.
     effort : Effort
+        The default is for the final answer.
     enough : float
-        An objective, in its own units, below which nobody asks how low it gets: the descent stops there.
+        Objective, m^2/s^3, below which a descent stops.
     progress : callable or None
-        Told the share of starts that are followed.
+        Called with the share of starts that are followed.
 
     Returns
     -------
     BestTimes
-        A local minimum, the best of those found.
+        The best local minimum found.
 
     Raises
     ------
     NoRoomError
         If the visits do not fit before the latest time.
     NotSettledError
-        If the conditions of a minimum are not met by what is found; with the final effort alone.
+        If the conditions of a minimum are not satisfied; with the final effort only.
 
     Notes
     -----
-    The problem is not convex: of many starts those are followed first that cost no more than their neighbours, and no
-    lower minimum elsewhere is ruled out. Sequential quadratic programming in the gaps, on the logarithm of the cost,
-    with the exact gradient dI/dt; then Newton's method with differences of it on the gaps that no limit holds. Each
-    step is one path.
+    The problem is not convex: of many starts, those that cost no more than their neighbours are followed first; a lower
+    minimum elsewhere is not excluded. Sequential quadratic programming in the gaps, on the logarithm of the objective,
+    with the exact gradient dI/dt; then Newton's method, with differences of the gradient, on the gaps that no limit
+    holds. Each step computes one path.
     """
     count = len(dwell_s)
     shifts = start_s + np.concatenate([[0.0], np.cumsum(dwell_s[:-1])])
     total = room_s(start_s, dwell_s, limits)
     scale = total if np.isfinite(total) else _longest(guesses, start_s, count)
     least = max(limits.least_gap_s, LEAST_SHARE * scale)
-    trials = _Trials(fly, shifts, limits.price_per_s)
-    candidates = [np.diff(np.concatenate([[0.0], np.asarray(each) - shifts])) for each in guesses]
+    trials = _Trials(fly, shifts, limits.price_per_s, least, total, scale)
+    candidates = [np.diff(np.concatenate([[0.0], np.asarray(guess) - shifts])) for guess in guesses]
     candidates += _spread(count, scale, least, bounded=np.isfinite(total), most=effort.spread)
-    sound = [each for each in candidates if (each >= least * (1 - 1e-9)).all() and each.sum() <= total * (1 + 1e-12)]
-    begun = [each for each in map(trials.attempt, sound) if each is not None]
-    if not begun:
-        trials(sound[0])  # says why
-    followed = _valleys(begun, effort.followed)
-    ended = []
-    for index, each in enumerate(followed):
-        ended.append(_descend(trials, each, least, total, scale, effort.tolerance, enough))
+    sound = [gaps for gaps in candidates if (gaps >= least * (1 - 1e-9)).all() and gaps.sum() <= total * (1 + 1e-12)]
+    starts = [trial for trial in map(trials.attempt, sound) if trial is not None]
+    if not starts:
+        trials(sound[0])  # raises the reason
+    followed = _valleys(starts, effort.followed)
+    ends = []
+    for index, start in enumerate(followed):
+        ends.append(_descend(trials, start, scale, effort.tolerance, enough))
         if progress is not None:
             progress((index + 1) / len(followed))
-        if ended[-1].objective < enough:
+        if ends[-1].objective < enough:
             break
-    best = min(ended, key=lambda each: each.objective)
+    best = min(ends, key=lambda trial: trial.objective)
     if effort is Effort.FINAL:
-        best = _polish(trials, best, least, total, scale)
+        best = _polish(trials, best)
         for _ in range(_MOST_RESTARTS):
-            if _unsettled(best, least, total) <= _SETTLED:
+            if _unsettled(trials, best) <= _SETTLED:
                 break
-            again = _descend(trials, best, least, total, best.gaps, effort.tolerance, enough)
-            best = _polish(trials, again, least, total, scale)
-        if not _unsettled(best, least, total) <= _SETTLED:
+            best = _polish(trials, _descend(trials, best, best.gaps, effort.tolerance, enough))
+        if not _unsettled(trials, best) <= _SETTLED:
             raise NotSettledError(
                 f"the best times that were found cost {best.objective:.6g} m^2/s^3 and are no minimum: a change of a "
                 "gap would still lower that; start from other times, or give visits more time"
             )
-    return BestTimes(best.flown, best.objective, trials.flown)
+    return BestTimes(best.flown, best.objective, trials.evaluations)
 
 
-def _unsettled(best: _Trial, least: float, total: float) -> float:
-    """By how much the conditions of a minimum are missed, relative to the objective.
+def _unsettled(trials: _Trials, best: _Trial) -> float:
+    """Return the residual of the conditions of a minimum, relative to the objective.
 
-    To first order, by what share of the objective a change of one gap by its own length, or down to the least one,
-    would lower it, or as far as the limits let it change; where the latest time holds, at the cost of the others.
+    To first order, the share of the objective by which a change of one gap by its length, or down to the least one,
+    would lower it, as far as the limits let it change; at the latest time, at the cost of the other gaps.
     """
-    gaps, excess = best.gaps, np.maximum(best.gaps - least, 0.0)
+    gaps, excess = best.gaps, np.maximum(best.gaps - trials.least, 0.0)
     slope = best.slope
-    full = bool(np.isfinite(total)) and total - gaps.sum() <= 1e-9 * total
+    full = bool(np.isfinite(trials.total)) and trials.total - gaps.sum() <= 1e-9 * trials.total
     if full and excess.sum() > 0.0:
         slope = slope + max(0.0, -float(excess @ slope) / float(excess.sum()))
-    farthest = max(total - gaps.sum(), 0.0) + excess.sum()
+    farthest = max(trials.total - gaps.sum(), 0.0) + excess.sum()
     gain = np.maximum(-slope * np.minimum(gaps, farthest), slope * excess)
-    # A path that costs nothing is one up to the rounding of states.
+    # The objective of a path that costs nothing is the rounding of states.
     states = best.flown.nodes.arrive
     size = (states[:, :3] ** 2).sum(axis=1) / gaps**3 + (states[:, 3:] ** 2).sum(axis=1) / gaps
     return float(gain.max() / (best.objective + _ROUNDING * size.sum()))
 
 
 def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
-    """Return the time there is for travelling, s; infinite without a latest time.
-
-    Parameters
-    ----------
-    start_s : float
-    dwell_s : ndarray, shape (N,)
-    limits : TimeLimits
-
-    Returns
-    -------
-    float
+    """Return the time available for travel, s; infinite without a latest time.
 
     Raises
     ------
     NoRoomError
-        If the visits do not fit before the latest time.
+        If the visits, with stays `dwell_s`, do not fit into the `limits`.
     """
     if limits.latest_s is None:
         return float(np.inf)
@@ -304,114 +312,97 @@ def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
 
 
 def _longest(guesses: Sequence[Floats], start_s: float, count: int) -> float:
-    """A length of time to start from, where nothing bounds it: that of the guesses."""
-    ends = [float(each[-1]) - start_s for each in guesses if len(each) == count]
+    """Return the longest duration of the guesses, s."""
+    ends = [float(guess[-1]) - start_s for guess in guesses if len(guess) == count]
     if not ends or max(ends) <= 0.0:
         raise ValueError("with the last time free, times to start from are needed")
     return max(ends)
 
 
 def _spread(count: int, scale: float, least: float, bounded: bool, most: int) -> list[Floats]:
-    """Gaps to start from: even, rising and falling, over all the time and over half of it, and a Halton sequence."""
+    """Return initial gaps: even, rising and falling, over all the time and over half of it, and a Halton sequence."""
     rising = np.arange(1.0, count + 1.0)
     lengths = (1.0, 0.5) if bounded else (0.5, 1.0, 2.0, 4.0, 8.0)
     extra = max(scale - count * least, 0.0) if bounded else scale
-    shares = [length * each / each.sum() for each in (np.ones(count), rising, rising[::-1]) for length in lengths]
-    for each in qmc.Halton(count + 1, scramble=False).random(most + 1)[1:]:
-        weights = 0.2 - np.log(each)
+    shapes = (np.ones(count), rising, rising[::-1])
+    shares = [length * shape / shape.sum() for shape in shapes for length in lengths]
+    for point in qmc.Halton(count + 1, scramble=False).random(most + 1)[1:]:
+        weights = 0.2 - np.log(point)
         if bounded:  # the last weight is that of the time that is left at the end
             shares.append((weights / weights.sum())[:count])
         else:
-            shares.append(0.5 * 16.0 ** each[count] * weights[:count] / weights[:count].sum())
-    return [least + extra * each for each in shares[:most]]
+            shares.append(0.5 * 16.0 ** point[count] * weights[:count] / weights[:count].sum())
+    return [least + extra * share for share in shares[:most]]
 
 
-def _valleys(begun: Sequence[_Trial], most: int) -> list[_Trial]:
-    """Starts that cost no more than those nearest to them, the cheapest first: one start in each valley.
+def _valleys(starts: Sequence[_Trial], most: int) -> list[_Trial]:
+    """Return one start of each valley, the cheapest first: those that cost no more than the ones nearest to them.
 
     References
     ----------
     Toern and Viitanen, "Topographical global optimization using pre-sampled points", J. Global Optim. 5 (1994) 267-276.
     """
-    ranked = sorted(begun, key=lambda each: each.objective)
-    places = np.stack([each.gaps for each in ranked])
-    nearest = cKDTree(places).query(places, k=min(len(ranked), places.shape[1] + 2))[1].reshape(len(ranked), -1)
+    ranked = sorted(starts, key=lambda trial: trial.objective)
+    gaps = np.stack([trial.gaps for trial in ranked])
+    nearest = cKDTree(gaps).query(gaps, k=min(len(ranked), gaps.shape[1] + 2))[1].reshape(len(ranked), -1)
     lowest = (nearest >= np.arange(len(ranked))[:, None]).all(axis=1)
-    return [ranked[at] for at in np.argsort(~lowest, kind="stable")[:most]]
+    return [ranked[index] for index in np.argsort(~lowest, kind="stable")[:most]]
 
 
-def _descend(
-    trials: _Trials,
-    begin: _Trial,
-    least: float,
-    total: float,
-    scale: float | Floats,
-    tolerance: float,
-    enough: float,
-) -> _Trial:
-    """Follow one start downhill; where there are no paths all around, only so far, and no farther than enough."""
-    if begin.objective < enough:
-        return begin
-    floor = 1e-30 * max(begin.objective, 1e-270)
-    shares = np.broadcast_to(scale, begin.gaps.shape) / total
-    walls, lowest = 0, begin
+def _descend(trials: _Trials, start: _Trial, scale: float | Floats, tolerance: float, enough: float) -> _Trial:
+    """Minimise from a start, in gaps over `scale`; stop below `enough`, or after a few points without a path."""
+    if start.objective < enough:
+        return start
+    floor = 1e-30 * max(start.objective, 1e-270)
+    shares = np.broadcast_to(scale, start.gaps.shape) / trials.total
+    walls, lowest = 0, start
 
     def value(x: Floats) -> tuple[float, Floats]:
         nonlocal walls, lowest
-        gaps = np.maximum(x * scale, 0.5 * least)
-        found = trials.attempt(gaps)
-        if found is None:
+        gaps = np.maximum(x * scale, 0.5 * trials.least)
+        trial = trials.attempt(gaps)
+        if trial is None:
             walls += 1
             if walls > _MOST_WALLS:
                 raise _StoppedError
-            return float(np.log(begin.objective)) + _WALL, np.zeros_like(x)
-        if found.objective < lowest.objective and (gaps == _within(gaps, least, total)).all():
-            lowest = found
+            return float(np.log(start.objective)) + _WALL, np.zeros_like(x)
+        if trial.objective < lowest.objective and (gaps == trials.within(gaps)).all():
+            lowest = trial
             if lowest.objective < enough:
                 raise _StoppedError
-        size = max(found.objective, floor)
-        return float(np.log(size)), found.slope * (scale / size)
+        size = max(trial.objective, floor)
+        return float(np.log(size)), trial.slope * (scale / size)
 
     constraints = (
-        {"type": "ineq", "fun": lambda x: 1.0 - (x * scale).sum() / total, "jac": lambda _: -shares}
-        if np.isfinite(total)
+        {"type": "ineq", "fun": lambda x: 1.0 - (x * scale).sum() / trials.total, "jac": lambda _: -shares}
+        if np.isfinite(trials.total)
         else ()
     )
     try:
-        found = minimize(
+        minimum = minimize(
             value,
-            begin.gaps / scale,
+            start.gaps / scale,
             jac=True,
-            bounds=[(float(each), None) for each in np.broadcast_to(least / scale, begin.gaps.shape)],
+            bounds=[(float(bound), None) for bound in np.broadcast_to(trials.least / scale, start.gaps.shape)],
             constraints=constraints,
             method="SLSQP",
             options={"ftol": tolerance, "maxiter": 100},
         )
     except _StoppedError:
         return lowest
-    ended = trials.attempt(_within(np.asarray(found.x) * scale, least, total))
-    return ended if ended is not None and ended.objective <= lowest.objective else lowest
+    end = trials.attempt(trials.within(np.asarray(minimum.x) * scale))
+    return end if end is not None and end.objective <= lowest.objective else lowest
 
 
-def _within(gaps: Floats, least: float, total: float) -> Floats:
-    """Take back what rounding put outside."""
-    gaps = np.maximum(gaps, least)
-    excess = gaps - least
-    over = gaps.sum() - total
-    if over > 0.0 and excess.sum() > 0.0:
-        gaps = gaps - over * excess / excess.sum()
-    return np.asarray(gaps)
-
-
-def _polish(trials: _Trials, best: _Trial, least: float, total: float, scale: float) -> _Trial:
-    """Newton's method on the gaps that no limit holds, with the sum held where the latest time does."""
-    near = 1e-5 * scale
+def _polish(trials: _Trials, best: _Trial) -> _Trial:
+    """Newton's method on the gaps above the least one; at the latest time their sum is fixed."""
+    least, total, near = trials.least, trials.total, 1e-5 * trials.scale
     gaps = best.gaps
     full = total - gaps.sum() <= near
     held = gaps - least <= near
     if held.all():
         return best
-    if full:  # exactly at the latest time, whatever else moves
+    if full:  # exactly at the latest time
         gaps = gaps.copy()
         gaps[gaps.argmax()] += total - gaps.sum()
     directions = np.eye(len(gaps))[:, ~held]
@@ -421,19 +412,19 @@ def _polish(trials: _Trials, best: _Trial, least: float, total: float, scale: fl
     step = _DIFFERENCE * float(gaps.min())
     for _ in range(_POLISH_ROUNDS if directions.shape[1] else 0):
         slopes = [trials(here.gaps + step * way).slope - trials(here.gaps - step * way).slope for way in directions.T]
-        bend = directions.T @ np.stack(slopes, axis=1) / (2.0 * step)
-        bend = 0.5 * (bend + bend.T)
-        if not np.isfinite(bend).all() or np.linalg.eigvalsh(bend)[0] <= 0.0:
+        hessian = directions.T @ np.stack(slopes, axis=1) / (2.0 * step)
+        hessian = 0.5 * (hessian + hessian.T)
+        if not np.isfinite(hessian).all() or np.linalg.eigvalsh(hessian)[0] <= 0.0:
             break
-        move = -directions @ np.linalg.solve(bend, directions.T @ here.slope)
-        there = here.gaps + move
-        outside = bool((there < least * (1.0 - 1e-12)).any() or there.sum() > total * (1.0 + 1e-12))
+        move = -directions @ np.linalg.solve(hessian, directions.T @ here.slope)
+        moved = here.gaps + move
+        outside = bool((moved < least * (1.0 - 1e-12)).any() or moved.sum() > total * (1.0 + 1e-12))
         if outside or np.abs(move).max() > 0.1 * float(here.gaps.min()):
             break
-        found = trials(there)
-        if found.objective > here.objective * (1.0 + 1e-12):
+        trial = trials(moved)
+        if trial.objective > here.objective * (1.0 + 1e-12):
             break
-        here = found
-        if np.abs(move).max() <= 1e-11 * scale:
+        here = trial
+        if np.abs(move).max() <= 1e-11 * trials.scale:
             break
     return here if here.objective <= best.objective * (1.0 + 1e-12) else best

@@ -1,16 +1,17 @@
-"""The problem: a chaser that visits moving targets, and the path for given order and times."""
+"""A chaser that visits moving targets, and the path for given order and times."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rendezvous.multipoint.segments import Flown, Nodes, Path, solve_segments
-from rendezvous.multipoint.targets import Meet, MovingTargets, dwells
+from rendezvous.multipoint.targets import Meet, MovingTargets
 from rendezvous.relative_motion import LinearMotion
 
 Floats = NDArray[np.float64]
@@ -18,34 +19,43 @@ Floats = NDArray[np.float64]
 SMOOTH = 4.0 / 3.0
 
 
-class Visits(Protocol):
-    """Targets to be visited from a start, and what finds paths to them."""
+class Visits(ABC):
+    """A chaser's start (`start_s`, `start_state`) and its targets.
 
-    @property
-    def targets(self) -> MovingTargets:
-        """What is visited."""
+    Raises
+    ------
+    ValueError
+        If the start is not finite.
+    """
 
-    @property
-    def start_s(self) -> float:
-        """When the chaser starts."""
+    targets: MovingTargets
+    start_state: Floats
+    start_s: float = 0.0
+    ruggedness: ClassVar[float]
+    """Ratio up to which local minima of one order may differ; used to compare orders."""
+
+    def __post_init__(self) -> None:
+        if np.shape(self.start_state) != (6,) or not np.isfinite(self.start_state).all():
+            raise ValueError("the chaser's state must be six finite numbers")
+        if not np.isfinite(self.start_s):
+            raise ValueError("the start is not finite")
 
     @property
     def dwell_s(self) -> Floats:
-        """How long the chaser stays with each target, shape (n,)."""
+        """Duration of the stay with each target, shape (n,)."""
+        return self.targets.dwell_s
 
-    @property
-    def ruggedness(self) -> float:
-        """By how many times the local minima that are found of one order may differ: orders are compared with that."""
-
+    @abstractmethod
     def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
-        """Find the path of least energy to targets in an order at times of shape (N,)."""
+        """Return the path of least energy that reaches targets in an `order`, some or all, each once, at N times."""
 
+    @abstractmethod
     def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Flown]:
-        """Return what finds paths of one order for times asked in turn, the first near a known one."""
+        """Return a function of N times that finds paths of one `order`, the first one near a known path `near`."""
 
 
 @dataclass(frozen=True, eq=False)
-class Tour:
+class Tour(Visits):
     """A chaser and the targets it visits, in linear motion.
 
     Parameters
@@ -53,9 +63,11 @@ class Tour:
     motion : LinearMotion
         Of the chaser.
     targets : MovingTargets
+        In the same motion.
     start_state : ndarray, shape (6,)
         The chaser's, m and m/s.
     start_s : float
+        Its time.
 
     Raises
     ------
@@ -68,90 +80,25 @@ class Tour:
     start_state: Floats
     start_s: float = 0.0
 
-    def __post_init__(self) -> None:
-        check_start(self.start_state, self.start_s)
-
-    @property
-    def dwell_s(self) -> Floats:
-        """How long the chaser stays with each target, shape (n,)."""
-        return dwells(self.targets.targets)
-
-    @property
-    def ruggedness(self) -> float:
-        """Little: paths of given times are unique, and the costs of an order's few local minima near one another."""
-        return SMOOTH
+    ruggedness = SMOOTH
+    """Small: the path of given times is unique, and the costs of an order's few local minima are close."""
 
     def fly(self, order: Sequence[int], time_s: ArrayLike) -> Path:
-        """Find the minimum-energy path.
-
-        Parameters
-        ----------
-        order : sequence of int
-            Which targets, first to last; some or all, each once.
-        time_s : array_like, shape (N,)
-            When each is reached, in that order.
-
-        Returns
-        -------
-        Path
-        """
+        """Return the path of least energy that reaches targets in an `order`, some or all, each once, at N times."""
         return solve_segments(self.motion, self.start_s, self.start_state, nodes_of(self.targets, order, time_s))
 
     def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Flown]:
-        """Return what finds the path of times of shape (N,), for one order.
-
-        Parameters
-        ----------
-        order : sequence of int
-        near : Path or None
-            Does not count: the path is one.
-
-        Returns
-        -------
-        callable
-        """
+        """Return `fly` for one `order`; the path is unique, so `near` has no effect."""
         return lambda time_s: self.fly(order, time_s)
 
 
-def check_start(start_state: Floats, start_s: float) -> None:
-    """Refuse a start that is none.
-
-    Parameters
-    ----------
-    start_state : ndarray, shape (6,)
-    start_s : float
-
-    Raises
-    ------
-    ValueError
-        If a number is not finite.
-    """
-    if np.shape(start_state) != (6,) or not np.isfinite(start_state).all():
-        raise ValueError("the chaser's state must be six finite numbers")
-    if not np.isfinite(start_s):
-        raise ValueError("the start is not finite")
-
-
 def nodes_of(targets: MovingTargets, order: Sequence[int], time_s: ArrayLike) -> Nodes:
-    """Return where and when a path must pass.
-
-    Parameters
-    ----------
-    targets : MovingTargets
-    order : sequence of int
-        Which targets, first to last.
-    time_s : array_like, shape (N,)
-        When each is reached.
-
-    Returns
-    -------
-    Nodes
+    """Return the nodes of a path that reaches `targets` in an `order`, first to last, at N times.
 
     Raises
     ------
     ValueError
-        If there is no visit, a visit is of no target, a target is visited twice, or there are not as many times as
-        visits.
+        If there is no visit, a target does not exist or is visited twice, or the number of times is not that of visits.
     """
     which, times = np.asarray(order), np.asarray(time_s, dtype=np.float64)
     if not len(which) or times.shape != which.shape:
@@ -162,10 +109,9 @@ def nodes_of(targets: MovingTargets, order: Sequence[int], time_s: ArrayLike) ->
         raise ValueError("a target is visited twice")
     if not np.isfinite(times).all():
         raise ValueError("a time is not finite")
-    described = tuple(targets.targets[each] for each in order)
-    rendezvous = np.array([each.meet is Meet.RENDEZVOUS for each in described])
-    leave_s = times + dwells(described)
-    if not rendezvous.any():  # rates and departures do not count
+    rendezvous = np.array([targets.targets[index].meet is Meet.RENDEZVOUS for index in order])
+    leave_s = times + targets.dwell_s[which]
+    if not rendezvous.any():  # rates and departures are not used
         arrive = targets.states(which, times)
         return Nodes(times, times, arrive, arrive, arrive, arrive, rendezvous)
     if (leave_s == times).all():

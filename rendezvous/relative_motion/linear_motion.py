@@ -79,6 +79,10 @@ class LinearMotion(ABC):
         """w(t), shape (..., 6)."""
         return np.zeros((*np.shape(time_s), 6))
 
+    def rates(self, time_s: Floats, states: Floats) -> Floats:
+        """A(t) x + w(t) at times and `states` of shapes (k,) and (k, 6)."""
+        return np.asarray((self.dynamics(time_s) @ states[:, :, None])[:, :, 0] + self.forcing(time_s))
+
     def drift(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Effect of w alone, int Phi(end, t) w dt, shape (..., 6)."""
         return np.zeros((*np.broadcast_shapes(np.shape(start_s), np.shape(end_s)), 6))

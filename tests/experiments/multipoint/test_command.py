@@ -193,7 +193,7 @@ def test_the_asteroid_tour(infoset: Infoset, mine: Callable[[str], Path]) -> Non
     # Elements or the state they mean: the same.
     lines = TOUR.splitlines()
     place = next(place for place, line in enumerate(lines) if line.startswith("elements"))
-    problem_start = load_multipoint("asteroid-tour").tour.start_state / 1e3  # type: ignore[attr-defined]
+    problem_start = load_multipoint("asteroid-tour").tour.start_state / 1e3
     position, velocity = ([float(each) for each in part] for part in np.split(problem_start, 2))
     lines[place] = f"position_km = {position}\nvelocity_km_s = {velocity}"
     assert told(infoset, mine("\n".join(lines)))["cost_m2_s3"] == pytest.approx(found["cost_m2_s3"], rel=1e-9)
