@@ -16,7 +16,7 @@ from scipy.optimize import linprog
 
 from benchmarks.conftest import LINES
 from experiments.reachability.file import load_rendezvous
-from experiments.reachability.printed_tables import compare_published, comparison_rows
+from experiments.reachability.printed_tables import compare_published
 from experiments.reachability.report import SINGLE, make_report, report_json
 from infoset.polytope import Polytope, cut
 from rendezvous.reachability import (
@@ -30,7 +30,7 @@ from rendezvous.reachability import (
     solve,
 )
 from rendezvous.reachability.exact_check import rational_sets
-from rendezvous.reachability.problem import Block, split
+from rendezvous.reachability.problem import Block
 from rendezvous.relative_motion import EllipticOrbit
 
 Floats = NDArray[np.float64]
@@ -62,7 +62,7 @@ def test_the_papers_case_with_everything_it_prints(under: Check) -> None:
         given = load_rendezvous("rendezvous-2021")
         report = make_report(given, [*SINGLE])
         report_json(report)
-        comparison_rows(compare_published(given, report.solution))
+        [each.rows for each in compare_published(given, report.solution)]
 
     under("the paper's case: sets, ranges, six controls flown, tables 1-3", best_s(work, 7), PAPER_S, "s")
 
@@ -157,7 +157,7 @@ STEPS: dict[str, tuple[str, Callable[[Block, Floats, int], Floats]]] = {
 @pytest.mark.parametrize("which", [0, 1], ids=["x-y block, 4-D", "z block, 2-D"])
 def test_forward_sets_beside_other_libraries(pytestconfig: pytest.Config, which: int, first: int) -> None:
     """Time, whether each finishes, and whether its vertex counts are those of exact rationals."""
-    block = split(paper(4))[which]
+    block = paper(4).blocks[which]
     exact = [each.vertices for each in rational_sets(block)[0]]
     right = [essential(each) for each in exact[first + 1 :]]
     lines = [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -150,6 +149,27 @@ class Comparison:
         """Greatest difference of a control."""
         return float(np.abs(self.ours.controls - self.printed.controls).max())
 
+    @property
+    def rows(self) -> list[list[Cell]]:
+        """Rows of `COLUMNS`: every printed number, its correction, if it has one, and the computed number."""
+        table, ours = self.table, self.ours
+        corrections = {(quantity, t, component): value for quantity, t, component, value in table.misprints}
+        blocks = (
+            ("u", 0, table.controls, ours.controls),
+            ("linear x", 1, table.linear, ours.linear[1:]),
+            ("nonlinear x", 1, table.nonlinear, ours.nonlinear[1:]),
+        )
+        rows: list[list[Cell]] = []
+        for quantity, first, printed, computed in blocks:
+            for t, (known, ours_then) in enumerate(zip(printed, computed, strict=True), start=first):
+                for component, (number, value) in enumerate(zip(known, ours_then, strict=True), start=1):
+                    correction = corrections.get((quantity, t, component))
+                    name = f"{quantity}{component}"
+                    rows.append([table.number, table.ours, name, t, number, correction, float(value)])
+        miss = float(np.linalg.norm(ours.nonlinear[-1]))
+        rows.append([table.number, table.ours, "nonlinear miss", 4, table.nonlinear_miss, None, miss])
+        return rows
+
 
 def is_published(rendezvous: Rendezvous) -> bool:
     """Return whether a problem has the values of the published one."""
@@ -185,38 +205,6 @@ def corrected(table: PrintedTable) -> Floats:
         if quantity == "u":
             controls[t, component - 1] = value
     return controls
-
-
-def comparison_rows(comparisons: Sequence[Comparison]) -> list[list[Cell]]:
-    """Return every printed number beside its correction, if it has one, and what is computed.
-
-    Parameters
-    ----------
-    comparisons : sequence of Comparison
-
-    Returns
-    -------
-    list of list
-        Rows of `COLUMNS`.
-    """
-    rows: list[list[Cell]] = []
-    for each in comparisons:
-        table, ours = each.table, each.ours
-        mended = {(quantity, t, component): value for quantity, t, component, value in table.misprints}
-        blocks = (
-            ("u", 0, table.controls, ours.controls),
-            ("linear x", 1, table.linear, ours.linear[1:]),
-            ("nonlinear x", 1, table.nonlinear, ours.nonlinear[1:]),
-        )
-        for quantity, first, printed, computed in blocks:
-            for t, (known, found) in enumerate(zip(printed, computed, strict=True), start=first):
-                for component, (one, other) in enumerate(zip(known, found, strict=True), start=1):
-                    name = f"{quantity}{component}"
-                    correction = mended.get((quantity, t, component))
-                    rows.append([table.number, table.ours, name, t, one, correction, float(other)])
-        miss = float(np.linalg.norm(ours.nonlinear[-1]))
-        rows.append([table.number, table.ours, "nonlinear miss", 4, table.nonlinear_miss, None, miss])
-    return rows
 
 
 def _ours(table: PrintedTable, optimal: OptimalControls, printed: Floats) -> Floats:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from experiments.common.output import Cell
 from experiments.common.published_number import Progress, PublishedNumber, Reference, Reproduction
 from experiments.reachability.file import Rendezvous, load_rendezvous
-from experiments.reachability.printed_tables import PROBLEM, Comparison, compare_published, comparison_rows, corrected
+from experiments.reachability.printed_tables import PROBLEM, Comparison, compare_published, corrected
 from experiments.reachability.report import fly_members
 from rendezvous.reachability import ReachabilityProblem, solve
 
@@ -102,7 +102,7 @@ def _inverse(problem: ReachabilityProblem) -> Floats:
 
 
 def _table(comparison: Comparison, problem: ReachabilityProblem) -> list[PublishedNumber]:
-    return [_number(row, comparison, problem) for row in comparison_rows([comparison])]
+    return [_number(row, comparison, problem) for row in comparison.rows]
 
 
 def _number(row: list[Cell], comparison: Comparison, problem: ReachabilityProblem) -> PublishedNumber:

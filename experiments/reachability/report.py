@@ -222,7 +222,10 @@ def _report(
 ) -> Report:
     solution = solve(rendezvous.problem, route)
     progress(0.2)
-    searched, least = _least_periods(rendezvous, solution)
+    searched = rendezvous.problem
+    if solution.optimal.miss > 0.0:
+        searched = rendezvous.lasting(min(_LONGER * searched.periods, MOST_PERIODS))
+    least = least_periods(searched)
     progress(0.3)
     forward, tube = (solution.sets.bounds(kind) for kind in (SetKind.FORWARD, SetKind.TUBE))
     progress(0.5)
@@ -243,7 +246,7 @@ def _report(
         rendezvous,
         solution,
         least,
-        searched,
+        searched.periods,
         forward,
         tube,
         ranges,
@@ -404,15 +407,6 @@ def fly_members(rendezvous: Rendezvous, names: Sequence[str], controls: Floats) 
         Member(*each)
         for each in zip(names, controls, linear, nonlinear, (float(each) for each in between), strict=True)
     )
-
-
-def _least_periods(rendezvous: Rendezvous, solution: Solution) -> tuple[int, int | None]:
-    """Look for the least T within the problem's, and if zero is not reached there, a few times further."""
-    periods = rendezvous.problem.periods
-    if solution.optimal.miss == 0.0:
-        return periods, least_periods(rendezvous.problem)
-    further = min(_LONGER * periods, MOST_PERIODS)
-    return further, least_periods(rendezvous.lasting(further))
 
 
 def _fly(rendezvous: Rendezvous, generator: np.random.Generator | None) -> Flight:

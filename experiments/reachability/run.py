@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from rich.console import Console
@@ -10,7 +10,7 @@ from rich.table import Table
 
 from experiments.common.errors import InputError
 from experiments.common.options import choice, whole_number
-from experiments.common.output import Output, output, to_csv, to_json
+from experiments.common.output import output, to_csv, to_json
 from experiments.common.screen import figure_files, number, progress_bar, table_console
 from experiments.reachability.command import Reach
 from experiments.reachability.figures import draw_reach
@@ -20,7 +20,6 @@ from experiments.reachability.printed_tables import (
     COLUMNS,
     Comparison,
     compare_published,
-    comparison_rows,
     is_published,
 )
 from experiments.reachability.report import (
@@ -64,14 +63,23 @@ def run(options: Reach) -> None:
             noisy_flights=options.noisy_flights,
             progress=begin(rendezvous.name),
         )
+        numbers = report_json(report)
         comparisons = compare_published(rendezvous, report.solution) if published else ()
-        written.save("results.json", to_json(report_json(report)), "--json")
+        written.save("results.json", to_json(numbers), "--json")
+        if comparisons:
+            written.save(TABLES, to_csv(COLUMNS, [row for comparison in comparisons for row in comparison.rows]))
         if options.html is not None:
             written.deliver("--html", reachability_page(report))
-        if comparisons:
-            written.save(TABLES, to_csv(COLUMNS, comparison_rows(comparisons)))
         if options.out is not None:
-            _draw(written, report, begin("figures"))
+            progress = begin("figures")
+            try:
+                figures = list(draw_reach(report, progress))
+            except ArithmeticError as error:
+                numbers_file = f"{written.folder}/results.json"
+                raise InputError(f"cannot draw the tube: {error}; the numbers are in {numbers_file}") from None
+            for i, (name, figure) in enumerate(zip(FIGURES, figures, strict=True)):
+                written.figure(name, figure)
+                progress(0.8 + 0.2 * (i + 1) / len(FIGURES))
     if not options.quiet:
         _show(table_console(written.stdout_taken), report, comparisons)
 
@@ -94,16 +102,6 @@ def _selection(text: str) -> tuple[list[str], int]:
         (twice, *_) = [each for each in names if names.count(each) > 1]
         raise InputError(f"--select: {twice} is named twice; name each choice once")
     return names, count
-
-
-def _draw(written: Output, report: Report, progress: Callable[[float], None]) -> None:
-    try:
-        figures = list(draw_reach(report, progress))
-    except ArithmeticError as error:
-        raise InputError(f"cannot draw the tube: {error}; the numbers are in {written.folder}/results.json") from None
-    for i, (name, figure) in enumerate(zip(FIGURES, figures, strict=True)):
-        written.figure(name, figure)
-        progress(0.8 + 0.2 * (i + 1) / len(FIGURES))
 
 
 def _show(console: Console, report: Report, comparisons: Sequence[Comparison]) -> None:

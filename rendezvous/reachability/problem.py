@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -160,6 +161,27 @@ class ReachabilityProblem:
             return np.zeros((0, self.states)), np.zeros((self.periods + 1, 0))
         return self.normals, self.offsets
 
+    @cached_property
+    def blocks(self) -> tuple[Block, ...]:
+        """The smallest parts that do not act on each other, in the order of their first states.
+
+        Together they have all states, and all controls that act on any.
+        """
+        n, m = self.states, self.controls
+        linked = np.zeros((n + m, n + m), dtype=bool)
+        linked[:n, :n] = (self.transition != 0.0).any(axis=0)
+        linked[:n, n:] = (self.control != 0.0).any(axis=0)
+        if self.between is not None:
+            linked[:n] |= (self.between != 0.0).any(axis=(0, 1))
+        for normal in self.further[0]:
+            acting = np.flatnonzero(normal)
+            linked[acting[0], acting] = True
+        if self.thrust is ThrustShape.BALL:
+            linked[n, n:] = True
+        labels = connected_components(csr_array(linked), directed=False)[1]
+        order = list(dict.fromkeys(labels[:n].tolist()))
+        return tuple(_block(self, np.flatnonzero(labels == label)) for label in order)
+
     @property
     def periods(self) -> int:
         """Number of periods T."""
@@ -286,27 +308,6 @@ class Block:
             offsets=self.offsets[: periods + 1],
             between=None if self.between is None else self.between[:periods],
         )
-
-
-def split(problem: ReachabilityProblem) -> tuple[Block, ...]:
-    """Return the smallest blocks that a problem decomposes into, in the order of their first states.
-
-    Together they have all states, and all controls that act on any.
-    """
-    n, m = problem.states, problem.controls
-    linked = np.zeros((n + m, n + m), dtype=bool)
-    linked[:n, :n] = (problem.transition != 0.0).any(axis=0)
-    linked[:n, n:] = (problem.control != 0.0).any(axis=0)
-    if problem.between is not None:
-        linked[:n] |= (problem.between != 0.0).any(axis=(0, 1))
-    for normal in problem.further[0]:
-        acting = np.flatnonzero(normal)
-        linked[acting[0], acting] = True
-    if problem.thrust is ThrustShape.BALL:
-        linked[n, n:] = True
-    labels = connected_components(csr_array(linked), directed=False)[1]
-    order = list(dict.fromkeys(labels[:n].tolist()))
-    return tuple(_block(problem, np.flatnonzero(labels == label)) for label in order)
 
 
 def _block(problem: ReachabilityProblem, members: Places) -> Block:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from infoset.polytope import Polytope, cut, intersection, linear_image, shadow
 from rendezvous.reachability.admissible import Lifted, Maximiser, lift, lift_with_states
 from rendezvous.reachability.optimum import BlockOptimum
-from rendezvous.reachability.problem import Block, ReachabilityProblem
+from rendezvous.reachability.problem import ReachabilityProblem
 
 Floats = NDArray[np.float64]
 
@@ -96,20 +96,17 @@ class ReachableSets:
     ----------
     problem : ReachabilityProblem
         The problem whose states these are.
-    blocks : tuple of Block
-        The independent parts of the problem.
     parts : tuple of BlockSets
-        Sets of each block.
+        Sets of each block of the problem.
     """
 
     problem: ReachabilityProblem
-    blocks: tuple[Block, ...]
     parts: tuple[BlockSets, ...]
 
     def bounds(self, kind: SetKind) -> Floats:
         """Return the least and greatest value of each state at each time, shape (T + 1, n, 2), of sets of a `kind`."""
         result = np.zeros((self.problem.periods + 1, self.problem.states, 2))
-        for block, part in zip(self.blocks, self.parts, strict=True):
+        for block, part in zip(self.problem.blocks, self.parts, strict=True):
             result[:, block.states] = part.bounds(kind) * block.scale[:, None]
         return result
 
@@ -119,7 +116,7 @@ class ReachableSets:
         `directions`, shape (k, n), are such that direction . x is taken in the units of the problem.
         """
         total = np.zeros(len(directions))
-        for block, part in zip(self.blocks, self.parts, strict=True):
+        for block, part in zip(self.problem.blocks, self.parts, strict=True):
             total += part.support(kind, time, directions[:, block.states] * block.scale)
         return total
 
@@ -151,7 +148,7 @@ class ReachableSets:
         wanted = list(axes)
         order: list[int] = []
         points = np.zeros((1, 0))
-        for block, part in zip(self.blocks, self.parts, strict=True):
+        for block, part in zip(self.problem.blocks, self.parts, strict=True):
             mine = [int(np.flatnonzero(block.states == axis)[0]) for axis in wanted if axis in block.states]
             if not mine:
                 continue

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from infoset.polytope import EmptyPolytopeError, UncertainHullError
 from rendezvous.reachability.admissible import Lifted, Maximiser, joined
 from rendezvous.reachability.optimum import BlockOptimum, block_optimum, block_reaches_zero
-from rendezvous.reachability.problem import Block, ReachabilityProblem, ThrustShape, split
+from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
 from rendezvous.reachability.sets import (
     BlockSets,
     Budget,
@@ -148,7 +148,7 @@ class Solution:
 
 def optimal_controls(problem: ReachabilityProblem, *, relative: bool = False) -> OptimalControls:
     """Return all controls of least terminal norm; see `block_optimum` for `relative` and errors."""
-    return OptimalControls(problem, tuple(block_optimum(block, relative=relative) for block in split(problem)))
+    return OptimalControls(problem, tuple(block_optimum(block, relative=relative) for block in problem.blocks))
 
 
 def solve(problem: ReachabilityProblem, route: Route | None = None, budget: Budget | None = None) -> Solution:
@@ -171,26 +171,24 @@ def solve(problem: ReachabilityProblem, route: Route | None = None, budget: Budg
     TooLargeError, UncertainHullError
         If the exact route was asked for and cannot be taken.
     """
-    blocks = split(problem)
-    optima = tuple(block_optimum(block) for block in blocks)
-    optimal = OptimalControls(problem, optima)
-    lifted: tuple[BlockSets, ...] = tuple(LiftedSets(optimum) for optimum in optima)
+    optimal = optimal_controls(problem)
+    lifted: tuple[BlockSets, ...] = tuple(LiftedSets(optimum) for optimum in optimal.blocks)
     meter = Meter(budget or Budget())
-    reason = "as asked" if route is Route.LIFTED else _refusal(problem, blocks, asked=route is Route.EXACT)
+    reason = "as asked" if route is Route.LIFTED else _refusal(problem, asked=route is Route.EXACT)
     if reason is None:
         try:
-            exact = _exact(optima, meter)
+            exact = _exact(optimal.blocks, meter)
             _need_agreement(exact, lifted)
         except (TooLargeError, UncertainHullError) as error:
             if route is Route.EXACT:
                 raise
             reason = str(error)
         else:
-            why = "as asked" if route else f"blocks of {', '.join(str(block.size) for block in blocks)} states"
-            return Solution(problem, optimal, ReachableSets(problem, blocks, exact), Route.EXACT, why)
+            why = "as asked" if route else f"blocks of {', '.join(str(block.size) for block in problem.blocks)} states"
+            return Solution(problem, optimal, ReachableSets(problem, exact), Route.EXACT, why)
     elif route is Route.EXACT:
         raise TooLargeError(reason)
-    return Solution(problem, optimal, ReachableSets(problem, blocks, lifted), Route.LIFTED, reason)
+    return Solution(problem, optimal, ReachableSets(problem, lifted), Route.LIFTED, reason)
 
 
 def _exact(optima: tuple[BlockOptimum, ...], meter: Meter) -> tuple[BlockSets, ...]:
@@ -209,7 +207,7 @@ def _need_agreement(exact: tuple[BlockSets, ...], lifted: tuple[BlockSets, ...])
                 raise UncertainHullError(f"{kind.value} sets by hulls and by programs are {apart:.2g} of a bound apart")
 
 
-def _refusal(problem: ReachabilityProblem, blocks: tuple[Block, ...], *, asked: bool) -> str | None:
+def _refusal(problem: ReachabilityProblem, *, asked: bool) -> str | None:
     """Why exact sets are not tried, or None."""
     if problem.thrust is ThrustShape.BALL:
         return "thrust in a ball has sets that are no polytopes"
@@ -217,7 +215,7 @@ def _refusal(problem: ReachabilityProblem, blocks: tuple[Block, ...], *, asked: 
         return "constraints between the periods bind states and controls together"
     if asked:
         return None
-    largest = max(block.size for block in blocks)
+    largest = max(block.size for block in problem.blocks)
     if largest > MOST_STATES_BY_CHOICE:
         return f"the constraints couple {largest} states, whose hulls lose facets to rounding"
     if problem.periods > MOST_PERIODS_BY_CHOICE:
@@ -233,12 +231,11 @@ def least_periods(problem: ReachabilityProblem) -> int | None:
     Where zero keeps all constraints it can be kept once reached, and the least is found by bisection; otherwise all
     numbers are tried. A linear program for each block and number.
     """
-    blocks = split(problem)
 
     def reached(periods: int) -> bool:
-        return all(block_reaches_zero(block.first(periods)) for block in blocks)
+        return all(block_reaches_zero(block.first(periods)) for block in problem.blocks)
 
-    if not all((block.offsets >= 0.0).all() for block in blocks):
+    if not all((block.offsets >= 0.0).all() for block in problem.blocks):
         return next((periods for periods in range(1, problem.periods + 1) if reached(periods)), None)
     if not reached(problem.periods):
         return None

@@ -31,7 +31,6 @@ from rendezvous.reachability import (
 )
 from rendezvous.reachability.conic import NoSolutionError
 from rendezvous.reachability.optimum import block_optimum
-from rendezvous.reachability.problem import split
 from rendezvous.reachability.solve import OptimalControls
 
 from .high_precision import Dense, cone_program, precise_least_norm
@@ -48,7 +47,7 @@ ZERO = 1e-11
 
 
 def optimal_controls(problem: ReachabilityProblem) -> OptimalControls:
-    return OptimalControls(problem, tuple(block_optimum(each) for each in split(problem)))
+    return OptimalControls(problem, tuple(block_optimum(each) for each in problem.blocks))
 
 
 def size_of(problem: ReachabilityProblem) -> float:

@@ -33,7 +33,6 @@ from rendezvous.reachability import (
     vertices,
 )
 from rendezvous.reachability.exact_check import rational_sets
-from rendezvous.reachability.problem import split
 
 Floats = NDArray[np.float64]
 Paper = Callable[..., ReachabilityProblem]
@@ -68,7 +67,7 @@ def test_exact_route_has_the_vertices_of_exact_rationals(random_problem: Random,
         exact = solve(problem, Route.EXACT)
     except (EmptyTubeError, TooLargeError, UncertainHullError):
         reject()
-    for block, part, optimum in zip(split(problem), exact.sets.parts, exact.optimal.blocks, strict=True):
+    for block, part, optimum in zip(problem.blocks, exact.sets.parts, exact.optimal.blocks, strict=True):
         forward, tube = rational_sets(block)
         for t, expected in enumerate(forward):
             found = part.polytope(SetKind.FORWARD, t)
