@@ -29,8 +29,7 @@ from experiments.interception.commands.scenarios import app as scenarios
 from experiments.multipoint.command import multipoint
 from experiments.pareto.command import pareto
 from experiments.problem_list import app as problems
-from experiments.pursuit.command import pursuit
-from experiments.pursuit.map_command import pursuit_map
+from experiments.pursuit.command import pursuit, pursuit_map
 from experiments.reachability.command import reach
 from experiments.reproduce import reproduce
 

@@ -27,12 +27,16 @@ def command(run: Callable[[Options], None]) -> Callable[..., None]:
     ...     print("hello", options.name)
     """
     (options,) = (hint for name, hint in get_type_hints(run).items() if name != "return")
+    hints = get_type_hints(options, include_extras=True)
+    parameters = inspect.signature(options).parameters.values()
 
     def registered(**values: Any) -> None:
         run(options(**values))
 
     registered.__name__ = run.__name__
     registered.__doc__ = inspect.getdoc(options)
-    registered.__signature__ = inspect.signature(options, eval_str=True)  # type: ignore[attr-defined]
-    registered.__annotations__ = get_type_hints(options, include_extras=True)
+    registered.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [each.replace(annotation=hints[each.name]) for each in parameters]
+    )
+    registered.__annotations__ = hints
     return registered

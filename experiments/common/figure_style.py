@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,15 @@ CURVE_LOOKS: dict[int, dict[str, Any]] = {
     4: {"color": "#f08a24", "linestyle": (0, (4, 1.5))},
 }
 """Dark and solid without the range meter, light and dashed with it; blue random, brown game."""
+
+LINE_LOOKS: tuple[dict[str, Any], ...] = (
+    {"color": TRUTH, "linestyle": "-", "marker": "o"},
+    {"color": MEASURED, "linestyle": (0, (5, 1.5)), "marker": "s"},
+    {"color": "#7f2704", "linestyle": (0, (1.2, 1.0)), "marker": "^"},
+    {"color": "#5a9bd4", "linestyle": (0, (5, 1, 1, 1)), "marker": "D"},
+    {"color": "#4d4d4d", "linestyle": (0, (3, 1, 1, 1, 1, 1)), "marker": "v"},
+)
+"""Lines and marks that stay apart in grey, for craft, optimal controls and components."""
 
 _STYLE: dict[Any, Any] = {
     "font.family": "sans-serif",
@@ -63,9 +73,11 @@ _STYLE: dict[Any, Any] = {
 _MM_PER_INCH = 25.4
 
 
-def style() -> AbstractContextManager[None]:
-    """Return the context in which every figure is built and saved."""
-    return mpl.rc_context(_STYLE)
+@contextlib.contextmanager
+def style() -> Iterator[None]:
+    """Apply the style of the figures: a context, or with ``@style()`` a decorator."""
+    with mpl.rc_context(_STYLE):
+        yield
 
 
 def new_figure(height_mm: float, width_mm: float = WIDTH_MM) -> Figure:
@@ -126,6 +138,19 @@ def place_axes(
         ]
         for row in range(rows)
     ]
+
+
+def figure_grid(
+    height_mm: float,
+    rows: int,
+    columns: int,
+    margins_mm: tuple[float, float, float, float],
+    gaps_mm: tuple[float, float],
+) -> tuple[Figure, list[Axes]]:
+    """Return a new figure with a grid of axes, row by row; the parameters are those of `place_axes`."""
+    figure = new_figure(height_mm)
+    grid = place_axes(figure, rows, columns, margins_mm=margins_mm, gaps_mm=gaps_mm)
+    return figure, [axes for row in grid for axes in row]
 
 
 def plain(text: str) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +17,13 @@ def _page_path(path: Path | None) -> Path | None:
     if path is not None and path.suffix != ".html":
         raise InputError(f"--html: {path} must end in .html; for example --html page.html")
     return path
+
+
+def finite(value: float | None) -> float | None:
+    """Refuse infinity and NaN, which ``min`` and ``max`` of an option accept."""
+    if value is not None and not math.isfinite(value):
+        raise typer.BadParameter("must be a finite number")
+    return value
 
 
 ProblemName = Annotated[
@@ -43,6 +52,16 @@ Html = Annotated[
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files, and write into a folder that has some.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress and no tables.")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileOptions:
+    """Options of a command that writes files; a command adds its own ``csv`` and ``html``."""
+
+    out: Out = None
+    json: Json = None
+    overwrite: Overwrite = False
+    quiet: Quiet = False
 
 
 def choice(option: str, name: str, valid: Sequence[str]) -> str:

@@ -8,10 +8,12 @@ import io
 import json
 import os
 import secrets
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import is_dataclass
+from enum import Enum
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -20,7 +22,7 @@ from experiments.common.errors import InputError, on_a_screen
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-if TYPE_CHECKING:
+    from experiments.common.options import FileOptions
     from sim import Results
 
 STDOUT = "-"
@@ -137,6 +139,12 @@ class Output:
             for kind, content in figure_bytes(figure):
                 self._write(self.folder / f"{name}.{kind}", content)
 
+    def draw(self, drawings: Mapping[str, Callable[[], Figure]], progress: Callable[[float], None]) -> None:
+        """Draw figures by name and write them into the folder; without a folder, draw nothing."""
+        for done, (name, draw) in enumerate(drawings.items() if self.folder is not None else (), start=1):
+            self.figure(name, draw())
+            progress(done / len(drawings))
+
     def _write(self, file: Path, content: str | bytes) -> None:
         write_file(file, content, overwrite=self._overwrite)
         self.written.append(file)
@@ -176,6 +184,12 @@ def output(
         yield opened
     if opened.written and not quiet:
         typer.echo(on_a_screen("\n".join(_listed(opened.written))), err=True)
+
+
+def output_of(options: FileOptions, names: Sequence[str]) -> contextlib.AbstractContextManager[Output]:
+    """Return the `output` of a command that writes files of these names with ``--out``."""
+    files = {f"--{option}": getattr(options, option, None) for option in ("json", "csv", "html")}
+    return output(folder=options.out, names=names, files=files, overwrite=options.overwrite, quiet=options.quiet)
 
 
 def _listed(files: Sequence[Path]) -> Iterator[str]:
@@ -292,19 +306,21 @@ def to_json(value: object) -> str:
     Parameters
     ----------
     value : object
-        Of dicts, lists, strings, finite numbers, booleans and None.
-
-    Returns
-    -------
-    str
-        Ends with a new line.
+        Dicts, lists, strings, finite numbers, booleans and None; arrays become lists, enumerations their values.
 
     Raises
     ------
     ValueError
         If a number is not finite: JSON has no NaN and no infinity.
     """
-    return json.dumps(value, indent=2, allow_nan=False) + "\n"
+    return json.dumps(value, indent=2, allow_nan=False, default=json_value) + "\n"
+
+
+def json_value(value: Any) -> object:
+    """Return the JSON form of an array, an enumeration or a dataclass, for `json.dumps`."""
+    if isinstance(value, Enum):
+        return value.value
+    return vars(value) if is_dataclass(value) else value.tolist()
 
 
 def to_csv(columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:

@@ -18,7 +18,7 @@ from importlib import resources
 from pathlib import Path
 
 from experiments.common.errors import InputError
-from experiments.common.output import library_version
+from experiments.common.output import json_value, library_version
 
 BLOCKS = ("dom.js", "chart.js", "scene.js", "player.js")
 """What every page is built from, in this order."""
@@ -37,7 +37,7 @@ def page(title: str, scripts: Sequence[str], data: Mapping[str, object]) -> str:
     scripts : sequence of str
         Names of the page's own scripts, after the common blocks.
     data : mapping
-        What the scripts draw: dicts, lists, strings, finite numbers, booleans and None. The keys ``heading`` and
+        What the scripts draw, as in `experiments.common.output.to_json`. The keys ``heading`` and
         ``about`` (a list of lines) stand at the top of the page.
 
     Returns
@@ -68,14 +68,14 @@ def embedded_json(value: object) -> str:
     Parameters
     ----------
     value : object
-        Of dicts, lists, strings, finite numbers, booleans and None.
+        As in `experiments.common.output.to_json`; a dataclass becomes an object of its fields.
 
     Returns
     -------
     str
         Without ``<``, ``>``, ``&`` and the line separators that scripts stumble over; reads back as the same value.
     """
-    text = json.dumps(value, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+    text = json.dumps(value, allow_nan=False, ensure_ascii=False, separators=(",", ":"), default=json_value)
     # A half of a surrogate pair is no character that a file can hold.
     return text.translate(_ESCAPES).encode("utf-8", "backslashreplace").decode("utf-8")
 

@@ -1,4 +1,4 @@
-"""What pages of craft in motion show: paths in views, sets they lead through, and curves over time."""
+"""Pages of moving craft: paths in views, reachable sets, and curves over time."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class Track:
     ----------
     name : str
     look : int
-        Which of the looks of lines and marks.
+        Index of the line style and the mark.
     points : ndarray, shape (n, 3)
-        At the page's times, SI; a path that ends sooner has fewer.
+        Points at the times of the page, SI; a path that ends earlier has fewer.
     choice : int or None
-        Which of the page's choices it belongs to; None belongs to all.
+        Index of the choice that the path belongs to; None belongs to all choices.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Mark:
-    """A point: its name (empty to leave it out of the legend), its place (3,) in SI, and a cross, square or diamond."""
+    """A point in SI; an empty name is left out of the legend, ``kind`` is cross, square or diamond."""
 
     name: str
     point: Floats
@@ -50,15 +50,15 @@ class Mark:
 
 @dataclass(frozen=True, eq=False)
 class Sets:
-    """Sets that a view shows, one at a time clearly.
+    """A set that changes with time.
 
     Parameters
     ----------
     name : str
     faces : sequence of sequence of ndarray
-        Of each set its faces, polygons of shape (k, 3) in space or (k, 2) in a view's plane, SI.
+        The faces of each set: polygons of shape (k, 3) in space, or (k, 2) in the plane of the view, SI.
     of_frame : sequence of int
-        Which set belongs to each of the page's times.
+        Index of the set at each of the times of the page.
     """
 
     name: str
@@ -68,7 +68,7 @@ class Sets:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Paths seen in space or in a plane.
+    """Paths in space or in a plane.
 
     Parameters
     ----------
@@ -79,9 +79,9 @@ class View:
     tracks : sequence of Track
     marks : sequence of Mark
     plane : tuple of int, or None
-        Which axes go across and up; None is space.
+        The horizontal and the vertical axis; None is space.
     equal : bool
-        Whether a unit is as long along every axis.
+        Whether all axes have the same scale.
     sets : Sets or None
     """
 
@@ -97,7 +97,7 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Values at the page's times, SI; name, look and choice are a track's."""
+    """Values at the times of the page, SI; the other fields are those of a `Track`."""
 
     name: str
     look: int
@@ -111,16 +111,18 @@ class Graph:
 
     Parameters
     ----------
-    caption, title : str
-        Over the graph, and beside its axis.
+    caption : str
+        Text above the graph.
+    title : str
+        Name of the vertical axis.
     unit : tuple
     curves : sequence of Curve
     levels : sequence of float
-        Lines at these values, SI.
+        Values at which horizontal lines are drawn, SI.
     band : ndarray, shape (n, 2), or None
-        Least and greatest values that there can be.
+        Smallest and largest possible value at each time, SI.
     stairs : bool
-        Whether values stay until the next one.
+        Whether the values are constant between the times.
     """
 
     caption: str
@@ -132,40 +134,15 @@ class Graph:
     stairs: bool = False
 
 
-@dataclass(frozen=True)
-class Choices:
-    """Names to choose among, and what to call the choice."""
-
-    name: str = ""
-    names: tuple[str, ...] = ()
-
-
 def motion_page(
     heading: str,
     about: Sequence[str],
     time_s: Floats,
     views: Sequence[View],
     graphs: Sequence[Graph],
-    choices: Choices = Choices(),
+    choices: Sequence[str] = (),
 ) -> str:
-    """Return a page of craft in motion.
-
-    Parameters
-    ----------
-    heading : str
-    about : sequence of str
-        Lines under the heading.
-    time_s : ndarray, shape (n,)
-        The moments that the page can show.
-    views : sequence of View
-    graphs : sequence of Graph
-    choices : Choices
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Return a page of moving craft as HTML; the parameters are those of `motion_data`."""
     data = motion_data(heading, about, time_s, views, graphs, choices)
     return page(heading, ["motion.js", "start-motion.js"], data)
 
@@ -176,42 +153,44 @@ def motion_data(
     time_s: Floats,
     views: Sequence[View],
     graphs: Sequence[Graph],
-    choices: Choices = Choices(),
+    choices: Sequence[str] = (),
 ) -> dict[str, object]:
-    """Return what the scripts of a page of craft in motion draw; parameters are those of `motion_page`."""
+    """Return the data that the scripts of a page of moving craft draw.
+
+    Parameters
+    ----------
+    heading : str
+    about : sequence of str
+        Lines below the heading.
+    time_s : ndarray, shape (n,)
+        The times that the page shows.
+    views : sequence of View
+    graphs : sequence of Graph
+    choices : sequence of str
+        Names of alternative controls, to show one of them.
+    """
     name, factor = time_unit(float(np.ptp(time_s)))
     return {
         "heading": heading,
         "about": list(about),
-        "time_s": time_s.tolist(),
+        "time_s": time_s,
         "time_unit": name,
         "time_factor": factor,
-        "speeds": list(_SPEEDS),
-        "views": [_view_data(each) for each in views],
-        "graphs": [_graph_data(each) for each in graphs],
-        "choices_name": choices.name,
-        "choices": list(choices.names),
+        "speeds": _SPEEDS,
+        "views": views,
+        "graphs": graphs,
+        "choices": choices,
     }
 
 
 def faces_of(points: Floats) -> list[Floats]:
-    """Return the faces of the convex hull of points in space, or its outline in a plane; of a flat set itself.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n, 2) or (n, 3)
-
-    Returns
-    -------
-    list of ndarray, shape (k, 2) or (k, 3)
-        Polygons.
-    """
+    """Return the faces of the convex hull of points in space, or its outline in a plane or of a flat set."""
     if points.shape[1] == 2 or len(points) < 4:
-        return [_around(points)]
+        return [outline(points)]
     try:
         hull = ConvexHull(points / max(float(np.ptp(points, axis=0).max()), 1e-300))
     except QhullError:
-        return [_around(points)]
+        return [outline(points)]
     # Triangles of one plane are one face: equal normals, to a few degrees where facets are tiny.
     faces: list[tuple[Floats, set[int]]] = []
     for simplex, equation in zip(hull.simplices, hull.equations, strict=True):
@@ -220,11 +199,11 @@ def faces_of(points: Floats) -> list[Floats]:
             faces.append((equation[:3], set(simplex.tolist())))
         else:
             mine.update(simplex.tolist())
-    return [_around(points[sorted(corners)]) for _, corners in faces]
+    return [outline(points[sorted(corners)]) for _, corners in faces]
 
 
-def _around(points: Floats) -> Floats:
-    """Points of a flat convex set in the order round it, those inside left out in a plane."""
+def outline(points: Floats) -> Floats:
+    """Return the vertices of a flat convex set in order; in a plane, without interior points."""
     if points.shape[1] == 2 and len(points) > 3:
         try:
             return np.asarray(points[ConvexHull(points / np.maximum(np.ptp(points, axis=0), 1e-300)).vertices])
@@ -235,38 +214,3 @@ def _around(points: Floats) -> Floats:
     if len(across) < 2:
         return points
     return np.asarray(points[np.argsort(np.arctan2(centred @ across[1], centred @ across[0]))])
-
-
-def _view_data(view: View) -> dict[str, object]:
-    name, factor = view.unit
-    return {
-        "caption": view.caption,
-        "axes": [f"{each}, {name}" for each in view.axes],
-        "factor": factor,
-        "plane": view.plane,
-        "equal": view.equal,
-        "tracks": [
-            {"name": each.name, "look": each.look, "points": each.points.tolist(), "choice": each.choice}
-            for each in view.tracks
-        ],
-        "marks": [{"name": each.name, "point": each.point.tolist(), "kind": each.kind} for each in view.marks],
-        "sets": None if view.sets is None else [[face.tolist() for face in faces] for faces in view.sets.faces],
-        "sets_name": "" if view.sets is None else view.sets.name,
-        "set_of_frame": [] if view.sets is None else list(view.sets.of_frame),
-    }
-
-
-def _graph_data(graph: Graph) -> dict[str, object]:
-    return {
-        "caption": graph.caption,
-        "title": graph.title,
-        "unit": graph.unit[0],
-        "factor": graph.unit[1],
-        "curves": [
-            {"name": each.name, "look": each.look, "values": each.values.tolist(), "choice": each.choice}
-            for each in graph.curves
-        ],
-        "levels": list(graph.levels),
-        "stairs": graph.stairs,
-        "band": None if graph.band is None else graph.band.tolist(),
-    }

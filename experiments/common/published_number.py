@@ -1,8 +1,8 @@
-"""A published number beside ours, and what follows from the two."""
+"""Published numbers compared with computed ones."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from enum import Enum
@@ -10,68 +10,59 @@ from enum import Enum
 Progress = Callable[[float], None]
 
 ROUNDED = 0.5
-"""Units of the last printed digit that a rounded number may be off."""
+"""Error of a rounded number, in units of its last printed digit."""
 CUT_OR_ROUNDED = 1.0
-"""The same where a paper rounds some numbers and cuts others off."""
+"""The same if a paper rounds some numbers and truncates others."""
 
 COMPUTED = 1.0
-"""The same of a reference value of ten digits or more, whose own last one has the error of another computation."""
+"""The same for a reference value of ten or more digits, whose last digit has the error of another computation."""
 
 
 class Verdict(Enum):
-    """What a published number beside ours comes to."""
+    """Result of the comparison of a published number with ours."""
 
     AGREED = "agreed"
-    """Ours is the printed number, to its last digit."""
+    """Ours is the printed number, to the last digit."""
     MISPRINT = "misprint"
-    """It is known what should have been printed, and that is ours."""
+    """The correct number is known, and it is ours."""
     NOT_EXPLAINED = "not explained"
-    """The numbers differ, and it is not known why."""
+    """The numbers differ for an unknown reason."""
     DISAGREED = "disagreed"
-    """The numbers should agree, and do not."""
+    """The numbers should agree and do not."""
 
 
 @dataclass(frozen=True)
 class Band:
-    """Where a number must lie.
-
-    Parameters
-    ----------
-    lowest, highest : float
-    """
+    """An interval of numbers."""
 
     lowest: float
     highest: float
 
     def __contains__(self, value: float) -> bool:
-        """Whether a number lies there; what is not finite never does."""
+        """Whether a number lies in the interval; a number that is not finite does not."""
         return self.lowest <= value <= self.highest
 
     @classmethod
     def of_digits(cls, text: str, units: float, beyond: float = 0.0) -> Band:
-        """Return the numbers that a text stands for.
+        """Return the numbers that a printed number stands for.
 
         Parameters
         ----------
         text : str
             Digits as printed.
         units : float
-            Of its last digit.
+            Half width, in units of the last digit.
         beyond : float
-            What is added, for the rounding of what the number was computed from.
-
-        Returns
-        -------
-        Band
+            Added half width, for the rounding of the inputs of the computation.
         """
-        # A few ulp more, so that a number on the edge is inside.
+        # A few ulp more, so that a number on the boundary is inside.
         half_width = (units * last_digit(text) + beyond) * (1.0 + 1e-9)
         return cls(float(text) - half_width, float(text) + half_width)
 
 
 @dataclass(frozen=True)
 class PublishedNumber:
-    """A published number beside ours.
+    """A published number and ours.
 
     Parameters
     ----------
@@ -79,24 +70,24 @@ class PublishedNumber:
     source : str
         Table or equation.
     name : str
-        Of what, with its unit.
+        Quantity, with its unit.
     printed : str
         Digits as printed.
     ours : float or None
-        None where the computation has no answer.
+        None if the computation has no result.
     band : Band
-        Where ours must lie to agree with what is printed.
+        Interval in which ours agrees with the printed number.
     right : Band or None
-        Where ours must lie although the printed number is another one.
+        Interval in which ours must lie although the printed number is a different one.
     corrected : str or None
-        What should have been printed, where that is known.
+        The correct number, if known.
     unexplained : bool
-        Whether it is known to differ without a known reason.
+        Whether the numbers are known to differ for an unknown reason.
     note : str
-        Of a misprint what is right and why; of what is not explained what was tried.
+        Explanation of a misprint, or what was tried to explain a difference.
     spread : Band or None
-        Where most of ours lie, where ours is the median of many runs and the printed number is one run: that must lie
-        there then, in place of ours in the band.
+        Interval of most of our values, if ours is the median of many runs and the printed number is one run. The
+        printed number must then lie in this interval.
     """
 
     paper: str
@@ -113,7 +104,7 @@ class PublishedNumber:
 
     @property
     def verdict(self) -> Verdict:
-        """What it comes to."""
+        """Return the result of the comparison."""
         if self.ours is None or not abs(self.ours) < float("inf"):
             return Verdict.DISAGREED
         known = Verdict.NOT_EXPLAINED if self.unexplained else Verdict.MISPRINT
@@ -131,13 +122,13 @@ class Reproduction:
     Parameters
     ----------
     paper : str
-        Name for the command line.
+        Name on the command line.
     title : str
     problems : tuple of (str, str)
-        Name and hash of the problems or scenarios that ours were computed from.
+        Name and hash of the problems or scenarios of the computation.
     numbers : tuple of PublishedNumber
     remarks : tuple of str
-        What is printed wrong or left out beside numbers.
+        Misprints and omissions other than numbers.
     """
 
     paper: str
@@ -153,14 +144,7 @@ class Reproduction:
 
 @dataclass(frozen=True)
 class Reference:
-    """A paper and how it prints its numbers: makes published numbers of it.
-
-    Parameters
-    ----------
-    paper : str
-    units : float
-        Of the last printed digit that ours may be off.
-    """
+    """A paper and the rounding of its numbers, in units of the last printed digit."""
 
     paper: str
     units: float = ROUNDED
@@ -177,42 +161,31 @@ class Reference:
         beyond: float = 0.0,
         note: str = "",
     ) -> PublishedNumber:
-        """Return a number whose tolerance is that of its last printed digit.
+        """Return a number whose tolerance is the rounding of its last printed digit.
 
         Parameters
         ----------
-        source, name, printed : str
-        ours : float or None
+        source, name, printed, ours, unexplained, note
+            As in `PublishedNumber`.
         corrected : str or None
-            What should have been printed; its own last digit is the tolerance then.
-        unexplained : bool
+            The correct number, whose last digit then sets the tolerance.
         beyond : float
-            Added to the tolerance, for the rounding of what the number was computed from.
-        note : str
-
-        Returns
-        -------
-        PublishedNumber
+            Added to the tolerance, for the rounding of the inputs of the computation.
         """
         band = Band.of_digits(printed, self.units, beyond)
         right = None if corrected is None else Band.of_digits(corrected, self.units, beyond)
         found = None if ours is None else float(ours)
         return PublishedNumber(self.paper, source, name, printed, found, band, right, corrected, unexplained, note)
 
+    def numbers(self, source: str, printed: Mapping[str, str], ours: Iterable[float | None]) -> list[PublishedNumber]:
+        """Return the numbers of a table, printed ones by name."""
+        pairs = zip(printed.items(), ours, strict=True)
+        return [self.number(source, name, text, value) for (name, text), value in pairs]
+
 
 def last_digit(text: str) -> float:
-    """Return one unit of the last digit of a number.
-
-    Parameters
-    ----------
-    text : str
-        For example ``0.0690``, whose last digit is worth 0.0001.
-
-    Returns
-    -------
-    float
-    """
+    """Return one unit of the last digit of a number: 0.0001 for ``0.0690``."""
     exponent = Decimal(text).as_tuple().exponent
     if not isinstance(exponent, int):
-        raise ValueError(f"{text} is no finite number")
+        raise ValueError(f"{text} is not a finite number")
     return float(Decimal(1).scaleb(exponent))

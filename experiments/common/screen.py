@@ -12,6 +12,7 @@ import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.table import Table
 
     from sim import Results, Scenario
 
@@ -45,7 +46,23 @@ def table_console(stdout_taken: bool) -> Console:
     """Return where tables go: stdout, or stderr where a file is printed on stdout."""
     from rich.console import Console
 
-    return Console(stderr=stdout_taken, highlight=False, markup=False)
+    return Console(stderr=stdout_taken, highlight=False, markup=False, emoji=False)
+
+
+def print_lines(console: Console, lines: Iterable[str]) -> None:
+    """Print lines that the terminal wraps."""
+    for line in lines:
+        console.print(line, soft_wrap=True)
+
+
+def number_table(*titles: str, left: int = 1) -> Table:
+    """Return an empty table whose first ``left`` columns are text and whose other columns are numbers."""
+    from rich.table import Table
+
+    table = Table(*titles[:left], box=None, pad_edge=False)
+    for title in titles[left:]:
+        table.add_column(title, justify="right")
+    return table
 
 
 def tell_of_compiling(quiet: bool) -> None:

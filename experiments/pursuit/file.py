@@ -1,55 +1,136 @@
-"""Pursuit-evasion problems: TOML as a person writes it, to the game in SI."""
+"""Problem files of kind `pursuit-evasion`: tables, checks, and the game in SI.
+
+Numbers stay decimal, as written: they are rounded once, when they are converted to SI.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
-from typing import Any
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import PlainValidator
 
 from experiments.common.errors import InputError
 from experiments.common.problem_file import problem_form, problem_hash
 from experiments.common.toml_file import Known, Problem, load_tables, read_tables
-from experiments.common.toml_values import KILO, LARGEST, nearest, quoted_text, radians, shown, si
-from experiments.pursuit.tables import ELEMENTS, KIND, STATE, PlayerTable, PursuitTables
+from experiments.common.toml_values import (
+    KILO,
+    LARGEST,
+    NUMBER,
+    ONE,
+    ZERO,
+    Degrees,
+    Description,
+    Name,
+    NotNegative,
+    Number,
+    Positive,
+    Table,
+    Vector,
+    key,
+    nearest,
+    quoted_text,
+    radians,
+    shown,
+    si,
+    wrong,
+)
 from rendezvous.orbital_elements import OrbitalElements, perigee_m, semi_major_axis_m
 from rendezvous.pursuit_evasion import Game, Gravity, Player
 
+KIND = "pursuit-evasion"
 SUSPICIOUSLY_SMALL_KM = Decimal(100)
 SUSPICIOUSLY_GREAT_KM = Decimal(10_000_000)
 SUSPICIOUSLY_GREAT_MU = Decimal("1e12")
+EARTH_RADIUS_KM = Decimal("6378.137")
 
 PLAYERS = ("pursuer", "evader")
 RATIOS = ("phase_deg", "thrust_ratio", "mass_ratio")
-"""What a map may vary beside the keys: the evader's lead in true longitude, its thrust and mass by the pursuer's."""
-
+"""Parameters of a map in addition to the keys: lead of the evader in true longitude, its thrust and mass by the
+pursuer's."""
+STATE = ("position_km", "velocity_km_s")
+_LONGITUDE = ("raan_deg", "argument_of_perigee_deg", "true_anomaly_deg")
+ELEMENTS = ("semi_major_axis_km", "eccentricity", "inclination_deg", *_LONGITUDE)
 _TOP = ("capture_radius_km", "gravitational_parameter_km3_s2", "j2", "longest_s")
-_OWN = (*ELEMENTS, "mass_kg", "dry_mass_kg", "thrust_N", "specific_impulse_s")
+_OF_PLAYER = (*ELEMENTS, "mass_kg", "dry_mass_kg", "thrust_N", "specific_impulse_s")
+_SETTABLE = (*_TOP, *(f"{player}.{name}" for player in PLAYERS for name in _OF_PLAYER))
+
+
+def _ellipse_axis(value: object) -> Decimal:
+    number = NUMBER(value)
+    if number <= ZERO:
+        raise wrong("must be greater than 0: a negative one is a hyperbola, and each player must start on an ellipse")
+    return number
+
+
+def _ellipse_eccentricity(value: object) -> Decimal:
+    number = Number(least=ZERO)(value)
+    if number >= ONE:
+        raise wrong("must be less than 1: from 1 on the orbit is a parabola, a hyperbola or a fall along a line")
+    return number
+
+
+Axis = Annotated[Decimal, PlainValidator(_ellipse_axis)]
+Eccentricity = Annotated[Decimal, PlainValidator(_ellipse_eccentricity)]
+Inclination = Annotated[Decimal, PlainValidator(Number(least=ZERO, most=Decimal(180)))]
+Oblateness = Annotated[Decimal, PlainValidator(Number(least=Decimal("-0.1"), most=Decimal("0.1")))]
+Constant = Annotated[Any, PlainValidator(lambda value: value)]
+
+
+class PlayerTable(Table):
+    """[pursuer] and [evader]."""
+
+    semi_major_axis_km: Axis | None = key("semi-major axis", "42166.0", default=None)
+    eccentricity: Eccentricity | None = key("eccentricity", "0.00013", default=None)
+    inclination_deg: Inclination | None = key("inclination", "1.565", default=None)
+    raan_deg: Degrees | None = key("right ascension of the ascending node", "47.0", default=None)
+    argument_of_perigee_deg: Degrees | None = key("argument of perigee", "0.0", default=None)
+    true_anomaly_deg: Degrees | None = key("true anomaly", "350.0", default=None)
+    position_km: Vector | None = key("position, in place of the elements", "[42166.0, 0.0, 0.0]", default=None)
+    velocity_km_s: Vector | None = key("velocity, in place of the elements", "[0.0, 3.07, 0.0]", default=None)
+    mass_kg: Positive = key("initial mass, with propellant", "2000.0")
+    dry_mass_kg: NotNegative = key("mass without propellant", "1000.0")
+    thrust_newton: NotNegative = key("thrust; 0 for an evader that coasts", "20.0", alias="thrust_N")
+    specific_impulse_s: Positive = key("specific impulse", "350.0")
+
+
+class PursuitTables(Table):
+    """A problem file of kind `pursuit-evasion`."""
+
+    schema_number: Constant = key("version of this file format", "1", alias="schema", default=1)
+    kind: Constant = key("kind of problem", f'"{KIND}"')
+    name: Name = key("name of the results", '"my-pursuit"', default="pursuit")
+    description: Description = key("one line for `infoset problems list`", '"Who pursues whom"', default="")
+    gravitational_parameter_km3_s2: Positive = key("gravitational parameter of the planet", "398600.4418")
+    planet_radius_km: NotNegative = key("the orbits stay above it", "6378.137", default=EARTH_RADIUS_KM)
+    j2: Oblateness = key("second zonal harmonic", "1.08262668e-3", default=ZERO)
+    equatorial_radius_km: Positive | None = key("radius that j2 refers to", "6378.1363", default=None)
+    capture_radius_km: NotNegative = key("distance of a capture; 0 for the same point", "1.0", default=ZERO)
+    longest_s: Positive | None = key("longest game searched; 15 revolutions by default", "200000.0", default=None)
+    pursuer: PlayerTable = key("minimizes the time of capture", "")
+    evader: PlayerTable = key("maximizes the time of capture", "")
 
 
 @dataclass(frozen=True)
 class PursuitProblem:
-    """A problem as read.
-
-    Parameters
-    ----------
-    tables : PursuitTables
-    source : str
-        What to call it in messages.
-    """
+    """A problem as read, with the name of its file for messages."""
 
     tables: PursuitTables
     source: str
 
     @property
     def name(self) -> str:
-        """Return its name."""
+        """Return the name of the results."""
         return self.tables.name
 
     @property
     def hash(self) -> str:
-        """Return a fingerprint of its values."""
+        """Return a fingerprint of the values."""
         return problem_hash(self.tables)
 
     def game(self, changes: Mapping[str, float] | None = None) -> Game:
@@ -58,60 +139,65 @@ class PursuitProblem:
         Parameters
         ----------
         changes : mapping of str to float, optional
-            Values in place of the file's, by parameter, in the unit of its name.
-
-        Returns
-        -------
-        Game
+            Values in place of those of the file, by parameter, in the unit of its name.
 
         Raises
         ------
         ValueError
-            If that is no game.
+            If a value is impossible.
         """
         return _game(self.tables, changes or {})
 
-    def with_values(self, values: Mapping[str, str]) -> PursuitProblem:
-        """Return the problem with some keys set, checked as a file is.
+    def with_settings(self, settings: Sequence[str]) -> PursuitProblem:
+        """Return the problem with the values of ``--set``, checked like those of a file.
 
         Parameters
         ----------
-        values : mapping of str to str
-            Numbers as TOML, by key: ``evader.thrust_N``.
-
-        Returns
-        -------
-        PursuitProblem
+        settings : sequence of str
+            KEY=VALUE, for example ``evader.thrust_N=5``.
 
         Raises
         ------
         InputError
-            If there is no such key, or the problem is not sound with them.
+            If a setting has another form, a key is unknown, or the problem is not sound.
         """
-        if not values:
-            return self
+        values: dict[str, str] = {}
         document = _document(self.tables)
-        for name, text in values.items():
-            table, _, own = name.rpartition(".")
-            valid = [*_TOP, *(f"{player}.{each}" for player in PLAYERS for each in _OWN)]
-            if name not in valid:
-                guess = nearest(name, valid)
-                hint = f"did you mean {guess}?" if guess else f"for example {valid[-2]}=5"
+        for setting in settings:
+            name, mark, text = (part.strip() for part in setting.partition("="))
+            if not mark or not name or not text:
+                raise InputError(
+                    f"--set: must be KEY=VALUE, found {shown(setting)}; for example --set evader.thrust_N=5"
+                )
+            if name in values:
+                raise InputError(f"--set: {name} is set twice; set each key once")
+            if name not in _SETTABLE:
+                guess = nearest(name, list(_SETTABLE))
+                hint = f"did you mean {guess}?" if guess else "for example evader.thrust_N=5"
                 raise InputError(f"--set: there is no {shown(name)} to set; {hint}")
-            (document[table] if table else document)[own] = _number_text(name, text)
-        return read_problem(_toml(document), f"{self.source} with --set")
+            table, _, own = name.rpartition(".")
+            values[name] = (document[table] if table else document)[own] = _number_text(name, text)
+        return read_problem(_toml(document), f"{self.source} with --set") if values else self
 
     def to_toml(self) -> str:
-        """Return it as a file that reads back as the same problem."""
+        """Return a file that reads back as the same problem."""
         return _toml(_document(self.tables))
 
-    def warnings(self) -> list[str]:
-        """Return what is allowed but probably not meant, a line each."""
-        return list(_suspicions(self.tables))
+    def warnings(self) -> Iterator[str]:
+        """Yield a line for each value that is allowed but probably in a wrong unit."""
+        mu = self.tables.gravitational_parameter_km3_s2
+        if mu > SUSPICIOUSLY_GREAT_MU:
+            yield f"gravitational_parameter_km3_s2 is {mu}, larger than that of the Sun; is it in m^3/s^2?"
+        for name in PLAYERS:
+            axis = getattr(self.tables, name).semi_major_axis_km
+            if axis is not None and axis < SUSPICIOUSLY_SMALL_KM:
+                yield f"{name}.semi_major_axis_km is {axis}, less than 100 km; is it in another unit?"
+            if axis is not None and axis > SUSPICIOUSLY_GREAT_KM:
+                yield f"{name}.semi_major_axis_km is {axis}, more than ten million; is it in metres?"
 
 
 def _checks(known: Known) -> Iterator[Problem]:
-    """Check what values must be to one another."""
+    """Check the values against each other."""
     for name in PLAYERS:
         if not isinstance(known.document.get(name), dict):
             continue
@@ -121,115 +207,100 @@ def _checks(known: Known) -> Iterator[Problem]:
             yield Problem(
                 (name, "dry_mass_kg"),
                 f"must be below {name}.mass_kg, {mass}, found {dry}",
-                "mass_kg is that of the start, propellant and all",
+                "mass_kg is the initial mass, with propellant",
             )
     if known.number("pursuer", "thrust_N") == 0:
-        yield Problem(("pursuer", "thrust_N"), "must be greater than 0, found 0", "without thrust there is no pursuit")
-    j2 = known.number("j2")
-    if j2 is not None and j2 != 0 and known.value("equatorial_radius_km") is None:
-        path = ("equatorial_radius_km",)
-        if path not in known.bad:
-            yield Problem(path, "is missing", "j2 refers to it, for example equatorial_radius_km = 6378.1363")
+        yield Problem(("pursuer", "thrust_N"), "must be greater than 0, found 0", "the pursuer needs thrust")
+    path = ("equatorial_radius_km",)
+    if known.number("j2") and known.value(*path) is None and path not in known.bad:
+        yield Problem(path, "is missing", "j2 refers to it, for example equatorial_radius_km = 6378.1363")
     yield from _check_orbits(known)
 
 
 def _check_start(known: Known, name: str) -> Iterator[Problem]:
-    """A start is given by elements or by a state, and wholly."""
+    """Check that a start is complete, by elements or by a state."""
     table = known.document[name]
-    elements = [each for each in ELEMENTS if each in table]
-    state = [each for each in STATE if each in table]
+    elements = [element for element in ELEMENTS if element in table]
+    state = [vector for vector in STATE if vector in table]
     if elements and state:
         yield Problem(
             (name, state[0]),
-            f"is given beside {elements[0]}",
-            "give the start by orbital elements or by position_km and velocity_km_s, not by both",
+            f"is given together with {elements[0]}",
+            "give either the orbital elements or position_km and velocity_km_s",
         )
         return
-    wanted = STATE if state else ELEMENTS
-    missing = [each for each in wanted if each not in table]
+    missing = [wanted for wanted in (STATE if state else ELEMENTS) if wanted not in table]
     if missing:
-        yield Problem(
-            (name, missing[0]),
-            "is missing" if len(missing) == 1 else f"is missing, and so are {', '.join(missing[1:])}",
-            f"a start is {', '.join(ELEMENTS)}, or position_km and velocity_km_s",
-        )
+        others = f", and so are {', '.join(missing[1:])}" if len(missing) > 1 else ""
+        remedy = f"give {', '.join(ELEMENTS)}, or position_km and velocity_km_s"
+        yield Problem((name, missing[0]), f"is missing{others}", remedy)
 
 
 def _check_orbits(known: Known) -> Iterator[Problem]:
-    """Check both orbits, and one against the other, as far as their values are sound."""
+    """Check both orbits, and the distance between the players."""
     mu, planet = known.number("gravitational_parameter_km3_s2"), known.number("planet_radius_km")
     if mu is None or ("planet_radius_km",) in known.bad:
         return
-    mu_si = si(mu, 3 * KILO)
-    planet_m = si(planet if planet is not None else PursuitTables.model_fields["planet_radius_km"].default, KILO)
-    states = {}
+    mu_si, planet_m = si(mu, 3 * KILO), si(EARTH_RADIUS_KM if planet is None else planet, KILO)
+    positions = {}
     for name in PLAYERS:
         start = _start(known, name, mu_si)
         if start is None:
             continue
-        states[name] = start
-        where = (name, "semi_major_axis_km" if known.value(name, "semi_major_axis_km") is not None else "position_km")
-        problem = _orbit_problem(start, mu_si, planet_m)
+        position, velocity = (np.asarray(vector, dtype=float) for vector in start)
+        positions[name] = position
+        axis_km = known.number(name, "semi_major_axis_km")
+        problem = _orbit_problem(position, velocity, mu_si, planet_m)
         if problem is not None:
-            remedy = "give an orbit above the planet, or its planet_radius_km"
-            axis = known.number(name, "semi_major_axis_km")
-            if axis is not None and axis < SUSPICIOUSLY_SMALL_KM:
-                problem += f"; a semi-major axis of {axis} km is suspiciously small"
-                remedy = "is it in other units? planets' radii, for one, or thousands of kilometres: write kilometres"
-            yield Problem(where, problem, remedy)
-    if len(states) < 2:
+            remedy = "choose an orbit above the planet, or correct planet_radius_km"
+            if axis_km is not None and axis_km < SUSPICIOUSLY_SMALL_KM:
+                problem += f"; a semi-major axis of {axis_km} km is suspiciously small"
+                remedy = "write it in kilometres, not in planet radii or thousands of kilometres"
+            yield Problem((name, "position_km" if axis_km is None else "semi_major_axis_km"), problem, remedy)
+    if len(positions) < len(PLAYERS):
         return
-    (p, _), (e, _) = states["pursuer"], states["evader"]
-    apart_m = math.dist(p, e)
-    radius = known.number("capture_radius_km")
-    if apart_m == 0.0:
-        where = (
-            "evader",
-            "true_anomaly_deg" if known.value("evader", "true_anomaly_deg") is not None else "position_km",
-        )
-        yield Problem(where, "puts the evader where the pursuer is", "the game is over then: change one of the two")
-    elif radius is not None and apart_m <= si(radius, KILO):
+    distance_m, radius = math.dist(*positions.values()), known.number("capture_radius_km")
+    if distance_m == 0.0:
+        by_state = known.value("evader", "true_anomaly_deg") is None
+        where = ("evader", "position_km" if by_state else "true_anomaly_deg")
+        yield Problem(where, "puts the evader where the pursuer is", "move one of the two")
+    elif radius is not None and distance_m <= si(radius, KILO):
         yield Problem(
             ("capture_radius_km",),
-            f"must be below the distance at the start, {apart_m / 1e3:.6g} km, found {radius}",
-            "make it smaller, or begin farther apart",
+            f"must be below the distance at the start, {distance_m / 1e3:.6g} km, found {radius}",
+            "make it smaller, or start farther apart",
         )
 
 
-def _start(known: Known, name: str, mu_si: float) -> tuple[Any, Any] | None:
-    """Return position and velocity of a player, in SI, if they are sound."""
-    if not isinstance(known.document.get(name), dict):
+def _start(known: Known, name: str, mu_si: float) -> tuple[ArrayLike, ArrayLike] | None:
+    """Return position and velocity of a player in SI, or None if a value is not sound."""
+    table = known.document.get(name)
+    if not isinstance(table, dict):
         return None
-    if all(each in known.document[name] for each in STATE):
-        vectors = [known.value(name, each) for each in STATE]
-        if not all(isinstance(vector, list) for vector in vectors):
+    if all(vector in table for vector in STATE):
+        position, velocity = (known.value(name, vector) for vector in STATE)
+        if not isinstance(position, list) or not isinstance(velocity, list):
             return None
-        position, velocity = (
-            [si(Decimal(each), KILO) for each in vector] for vector in vectors if isinstance(vector, list)
-        )
-        return position, velocity
-    numbers = {each: known.number(name, each) for each in ELEMENTS}
+        return [si(Decimal(x), KILO) for x in position], [si(Decimal(v), KILO) for v in velocity]
+    numbers = {element: known.number(name, element) for element in ELEMENTS}
     if any(value is None for value in numbers.values()):
         return None
-    return _state({each: float(value or 0) for each, value in numbers.items()}, mu_si)
+    return _state({element: float(value or 0) for element, value in numbers.items()}, mu_si)
 
 
-def _orbit_problem(start: tuple[Any, Any], mu_si: float, planet_m: float) -> str | None:
-    import numpy as np
-
-    position, velocity = np.asarray(start[0], dtype=float), np.asarray(start[1], dtype=float)
-    if not position.any():
+def _orbit_problem(position_m: np.ndarray, velocity_m_s: np.ndarray, mu_si: float, planet_m: float) -> str | None:
+    if not position_m.any():
         return "is the centre of the planet"
-    axis = semi_major_axis_m(position, velocity, mu_si)
-    if not 0.0 < axis < math.inf:
-        return "is a start on a parabola or a hyperbola: the velocity is that of escape or more"
-    perigee = perigee_m(position, velocity, mu_si)
-    if perigee <= 1e-6 * axis:
-        return "is a start of a fall along a line through the planet's centre"
+    axis_m = semi_major_axis_m(position_m, velocity_m_s, mu_si)
+    if not 0.0 < axis_m < math.inf:
+        return "starts on a parabola or a hyperbola: the velocity is not below the escape velocity"
+    perigee = perigee_m(position_m, velocity_m_s, mu_si)
+    if perigee <= 1e-6 * axis_m:
+        return "starts a fall along a line through the planet's centre"
     if perigee <= planet_m:
         return (
             f"gives an orbit into the planet: its perigee is {perigee / 1e3:.6g} km from the centre, and the planet's "
-            f"radius {planet_m / 1e3:.6g} km"
+            f"radius is {planet_m / 1e3:.6g} km"
         )
     return None
 
@@ -240,14 +311,6 @@ FORM = problem_form(KIND, PursuitTables, _checks)
 def load_pursuit(name_or_path: str) -> PursuitProblem:
     """Read a built-in problem or a file.
 
-    Parameters
-    ----------
-    name_or_path : str
-
-    Returns
-    -------
-    PursuitProblem
-
     Raises
     ------
     InputError
@@ -257,18 +320,7 @@ def load_pursuit(name_or_path: str) -> PursuitProblem:
 
 
 def read_problem(text: str, source: str) -> PursuitProblem:
-    """Check the text of a problem.
-
-    Parameters
-    ----------
-    text : str
-        TOML.
-    source : str
-        What to call it in messages.
-
-    Returns
-    -------
-    PursuitProblem
+    """Read a problem from TOML; ``source`` is its name in messages.
 
     Raises
     ------
@@ -279,36 +331,32 @@ def read_problem(text: str, source: str) -> PursuitProblem:
 
 
 def parameter_names() -> list[str]:
-    """Return what a map may vary."""
-    return [*RATIOS, *_TOP, *(f"{player}.{each}" for player in PLAYERS for each in _OWN)]
+    """Return the parameters that a map may vary."""
+    return [*RATIOS, *_SETTABLE]
 
 
-def _state(elements: Mapping[str, float], mu_si: float) -> tuple[Any, Any]:
-    angles = [radians(Decimal(repr(float(elements[each])))) for each in ELEMENTS[2:]]
+def _state(elements: Mapping[str, float], mu_si: float) -> tuple[ArrayLike, ArrayLike]:
+    angles = [radians(Decimal(repr(float(elements[name])))) for name in ELEMENTS[2:]]
     orbit = OrbitalElements(elements["semi_major_axis_km"] * 1e3, elements["eccentricity"], *angles)
     return orbit.state(mu_si)
 
 
 def _game(tables: PursuitTables, changes: Mapping[str, float]) -> Game:
-    top = {
-        "gravitational_parameter_km3_s2": float(tables.gravitational_parameter_km3_s2),
-        "j2": float(tables.j2),
-        "capture_radius_km": float(tables.capture_radius_km),
-        "longest_s": math.inf if tables.longest_s is None else float(tables.longest_s),
+    document = tables.model_dump(by_alias=True)
+    top = {name: math.inf if document[name] is None else float(document[name]) for name in _TOP}
+    of_player = {
+        player: {name: float(document[player][name]) for name in _OF_PLAYER if document[player][name] is not None}
+        for player in PLAYERS
     }
-    own = {"pursuer": _values(tables.pursuer), "evader": _values(tables.evader)}
     for name, value in changes.items():
-        table, _, field = name.rpartition(".")
-        if table:
-            own[table][field] = value
-        elif name in top:
-            top[name] = value
-    pursuer, evader = own["pursuer"], own["evader"]
-    longitude = ("raan_deg", "argument_of_perigee_deg", "true_anomaly_deg")
+        if name not in RATIOS:
+            table, _, own = name.rpartition(".")
+            (of_player[table] if table else top)[own] = value
+    pursuer, evader = of_player.values()
     if "phase_deg" in changes:
-        if not all(each in player for player in (pursuer, evader) for each in longitude):
+        if not all(angle in player for player in (pursuer, evader) for angle in _LONGITUDE):
             raise InputError("phase_deg: both players must be given by orbital elements; vary other keys instead")
-        lead = sum(pursuer[each] for each in longitude) + changes["phase_deg"]
+        lead = sum(pursuer[angle] for angle in _LONGITUDE) + changes["phase_deg"]
         evader["true_anomaly_deg"] = (lead - evader["raan_deg"] - evader["argument_of_perigee_deg"]) % 360.0
     if "thrust_ratio" in changes:
         evader["thrust_N"] = changes["thrust_ratio"] * pursuer["thrust_N"]
@@ -331,40 +379,20 @@ def _game(tables: PursuitTables, changes: Mapping[str, float]) -> Game:
     )
 
 
-def _values(table: PlayerTable) -> dict[str, float]:
-    named = {"thrust_N": table.thrust_newton}
-    values = {each: named.get(each, getattr(table, each, None)) for each in _OWN}
-    return {each: float(value) for each, value in values.items() if value is not None}
-
-
 def _player(table: PlayerTable, values: Mapping[str, float], mu_si: float) -> Player:
     if table.position_km is not None and table.velocity_km_s is not None:
-        position = [si(each, KILO) for each in table.position_km]
-        velocity = [si(each, KILO) for each in table.velocity_km_s]
+        start: tuple[Any, Any] = (table.position_km, table.velocity_km_s)
+        (x, y, z), (vx, vy, vz) = ([si(value, KILO) for value in vector] for vector in start)
     else:
-        position, velocity = _state(values, mu_si)
+        (x, y, z), (vx, vy, vz) = (np.asarray(vector).tolist() for vector in _state(values, mu_si))
     return Player(
-        position_m=(float(position[0]), float(position[1]), float(position[2])),
-        velocity_m_s=(float(velocity[0]), float(velocity[1]), float(velocity[2])),
+        position_m=(x, y, z),
+        velocity_m_s=(vx, vy, vz),
         mass_kg=values["mass_kg"],
         dry_mass_kg=values["dry_mass_kg"],
         thrust_n=values["thrust_N"],
         specific_impulse_s=values["specific_impulse_s"],
     )
-
-
-def _suspicions(tables: PursuitTables) -> Iterator[str]:
-    if tables.gravitational_parameter_km3_s2 > SUSPICIOUSLY_GREAT_MU:
-        yield (
-            f"gravitational_parameter_km3_s2 is {tables.gravitational_parameter_km3_s2}, more than the Sun's: "
-            "is it in m^3/s^2?"
-        )
-    for name in PLAYERS:
-        axis = getattr(tables, name).semi_major_axis_km
-        if axis is not None and axis < SUSPICIOUSLY_SMALL_KM:
-            yield f"{name}.semi_major_axis_km is {axis}, less than 100 km: is it in other units?"
-        if axis is not None and axis > SUSPICIOUSLY_GREAT_KM:
-            yield f"{name}.semi_major_axis_km is {axis}, more than ten million: is it in metres?"
 
 
 def _number_text(name: str, text: str) -> str:
@@ -373,20 +401,20 @@ def _number_text(name: str, text: str) -> str:
     except InvalidOperation:
         raise InputError(f"--set: {name} must be a number, found {shown(text)}; for example --set {name}=1.5") from None
     if not number.is_finite() or number.copy_abs() > LARGEST:
-        raise InputError(f"--set: {name} must be a finite number of ordinary size, found {shown(text)}")
+        raise InputError(f"--set: {name} must be a finite number of at most {LARGEST:g} in size, found {shown(text)}")
     return str(number)
 
 
 def _document(tables: PursuitTables) -> dict[str, Any]:
-    """Return a problem as the texts of its values."""
+    """Return the values of a problem as TOML, by table and key."""
     return {name: _written(value) for name, value in tables.model_dump(by_alias=True, exclude_none=True).items()}
 
 
 def _written(value: Any) -> Any:
     if isinstance(value, dict):
-        return {name: _written(each) for name, each in value.items()}
-    if isinstance(value, tuple | list):
-        return "[" + ", ".join(str(each) for each in value) + "]"
+        return {name: _written(inner) for name, inner in value.items()}
+    if isinstance(value, tuple):
+        return "[" + ", ".join(str(number) for number in value) + "]"
     return quoted_text(value) if isinstance(value, str) else str(value)
 
 

@@ -1,11 +1,13 @@
-"""Slides of Wang, after Shen and Casalino (2018): the orbital pursuit-evasion game."""
+"""Numbers of the slides of Wang, after Shen and Casalino (2018): the orbital pursuit-evasion game."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
+from experiments.common.display_units import M_PER_KM
 from experiments.common.published_number import COMPUTED, Progress, PublishedNumber, Reference, Reproduction
 from experiments.pursuit.file import load_pursuit
 from rendezvous.linear_game import (
@@ -14,16 +16,16 @@ from rendezvous.linear_game import (
     free_space_capture,
     mass_loss_capture,
 )
-from rendezvous.pursuit_evasion import Capture, Game, Gravity, Player, Policy, certify, fly, solve
+from rendezvous.pursuit_evasion import Capture, Game, Gravity, Player, Policy, Solution, certify, fly, solve
 
 PAPER = "pursuit"
 TITLE = "slides of Wang, after Shen and Casalino (2018), pursuit and evasion in orbit"
 PROBLEM = "geo-pursuit"
 REMARKS = (
-    "The slides print the input and a picture, no number of the result. Those here are reference values, from two "
+    "The slides print the input and a picture, but no numerical result. The numbers here are reference values from two "
     "independent integrators.",
     "c = 350 s is the specific impulse; the exhaust speed is 350 x 9.80665 m/s.",
-    "The equation of lambda_r lost the factor (lambda_v . r), that of lambda_m lost k.",
+    "The equation of lambda_r lacks the factor (lambda_v . r), that of lambda_m lacks k.",
 )
 _REFERENCE = Reference(PAPER, COMPUTED)
 _MU_M3_S2 = 398600.4418e9
@@ -35,13 +37,17 @@ _TABLE = {
     10.0: ("45343.620266", "264.21499851", "132.10749926", "0.2891199953", "0.05030", "0.69579"),
     15.0: ("61490.673989", "358.30306979", "268.72730234", "0.1973907350", "0.04421", "1.09635"),
 }
-"""Capture time, propellant of both, closing speed, curvatures; by the evader's thrust, N."""
+"""Numbers of `_NAMES`, by the thrust of the evader in N."""
 _NAMES = ("t_f (s)", "propellant P (kg)", "propellant E (kg)", "closing (km/s)", "curvature 1", "curvature 2")
 _END = {
-    "r_f (km)": ("-39420.497090", "-19052.538637", "604.130676"),
-    "nu": ("0.250766441", "0.966273907", "0.058574134"),
-    "v_P (km/s)": ("1.612976850", "-2.237162348", "-0.068126510"),
-    "v_E (km/s)": ("1.436953246", "-2.493381998", "-0.023752323"),
+    f"{name}, {axis}": text
+    for name, texts in {
+        "r_f (km)": ("-39420.497090", "-19052.538637", "604.130676"),
+        "nu": ("0.250766441", "0.966273907", "0.058574134"),
+        "v_P (km/s)": ("1.612976850", "-2.237162348", "-0.068126510"),
+        "v_E (km/s)": ("1.436953246", "-2.493381998", "-0.023752323"),
+    }.items()
+    for axis, text in zip("xyz", texts, strict=True)
 }
 _RADII = {1.0: "45340.161530", 100.0: "44998.078864"}
 _FEEDBACK = {"optimal": "45343.6", Policy.COAST: "34632.0", Policy.PROGRADE: "34947.7", Policy.NORMAL: "36473.4"}
@@ -49,83 +55,63 @@ _SHARES = {1.0: "-4.278e-3", 0.1: "-4.566e-4", 0.01: "-4.595e-5"}
 
 
 def reproduce(progress: Progress) -> Reproduction:
-    """Compute the numbers.
-
-    Parameters
-    ----------
-    progress : callable
-        Told the fraction done.
-
-    Returns
-    -------
-    Reproduction
-    """
+    """Compute the numbers."""
     problem = load_pursuit(PROBLEM)
     numbers: list[PublishedNumber] = []
     for done, (thrust_n, printed) in enumerate(_TABLE.items(), start=1):
         capture = solve(problem.game({"evader.thrust_N": thrust_n})).capture
-        rows = zip(_NAMES, printed, _row(capture), strict=True)
-        numbers += [_REFERENCE.number(f"reference, T_E = {thrust_n:g} N", *row) for row in rows]
+        source = f"reference, T_E = {thrust_n:g} N"
+        numbers += _REFERENCE.numbers(source, dict(zip(_NAMES, printed, strict=True)), _row(capture))
         if thrust_n == 10.0:
-            numbers += _end(capture)
+            numbers += _REFERENCE.numbers(source, _END, _end(capture))
         progress(0.1 * done)
     for radius_km, text in _RADII.items():
         capture = solve(problem.game({"capture_radius_km": radius_km})).capture
         ours = None if capture is None else capture.time_s
         numbers.append(_REFERENCE.number(f"reference, capture radius {radius_km:g} km", "t_f (s)", text, ours))
-    numbers += _deviation(problem.game())
+    solution = solve(problem.game())
+    numbers.append(_deviation(solution))
     progress(0.5)
-    numbers += _feedback(problem.game())
+    numbers += _feedback(solution)
     progress(0.9)
     numbers += _analytic()
     progress(1.0)
     return Reproduction(PAPER, TITLE, ((problem.name, problem.hash),), tuple(numbers), REMARKS)
 
 
-def _row(capture: Capture | None) -> tuple[float | None, ...]:
+def _row(capture: Capture | None) -> Sequence[float | None]:
     if capture is None:
-        return (None,) * len(_NAMES)
+        return [None] * len(_NAMES)
     spent = capture.pursuer.propellant_kg, capture.evader.propellant_kg
-    return (capture.time_s, *spent, capture.closing_speed_m_s / 1e3, *(float(each) for each in capture.curvature))
+    return [capture.time_s, *spent, capture.closing_speed_m_s / M_PER_KM, *capture.curvature]
 
 
-def _end(capture: Capture | None) -> list[PublishedNumber]:
-    found = (
-        [None] * 12
-        if capture is None
-        else [
-            *capture.position_m / 1e3,
-            *capture.direction,
-            *capture.pursuer.velocity_m_s / 1e3,
-            *capture.evader.velocity_m_s / 1e3,
-        ]
-    )
-    rows = [(f"{name}, {axis}", text) for name, texts in _END.items() for axis, text in zip("xyz", texts, strict=True)]
-    return [
-        _REFERENCE.number("reference, T_E = 10 N", name, text, ours)
-        for (name, text), ours in zip(rows, found, strict=True)
-    ]
+def _end(capture: Capture | None) -> Sequence[float | None]:
+    if capture is None:
+        return [None] * len(_END)
+    velocities = (capture.pursuer.velocity_m_s, capture.evader.velocity_m_s)
+    position, velocities_km_s = capture.position_m / M_PER_KM, np.concatenate(velocities) / M_PER_KM
+    return [*position, *capture.direction, *velocities_km_s]
 
 
-def _deviation(game: Game) -> list[PublishedNumber]:
-    """The evader coasts against its optimum: how much earlier it is captured."""
-    solution = solve(game)
+def _deviation(solution: Solution) -> PublishedNumber:
+    """Return how much earlier the evader is captured if it coasts."""
     ours = None
     if solution.capture is not None:
-        coast = next(each for each in certify(solution).evader_deviations if each.name == Policy.COAST.value)
-        ours = None if coast.capture_s is None else coast.capture_s - solution.capture.time_s
-    return [_REFERENCE.number("reference, the evader coasts", "capture less t_f (s)", "-11055.906", ours)]
+        deviations = {deviation.name: deviation.capture_s for deviation in certify(solution).evader_deviations}
+        coast_s = deviations[Policy.COAST.value]
+        ours = None if coast_s is None else coast_s - solution.capture.time_s
+    return _REFERENCE.number("reference, the evader coasts", "capture less t_f (s)", "-11055.906", ours)
 
 
-def _feedback(game: Game) -> list[PublishedNumber]:
-    """The pursuer plans anew every 600 s: what its last plan predicts."""
-    solution = solve(game)
+def _feedback(solution: Solution) -> list[PublishedNumber]:
+    """Return the capture times that the last plan predicts, with a plan every 600 s."""
     numbers = []
     for policy, text in _FEEDBACK.items():
         steering = policy.direction if isinstance(policy, Policy) else None
-        predicted = fly(game, steering, replan_s=600.0, solution=solution).predicted_s
+        predicted_s = fly(solution.game, steering, replan_s=600.0, solution=solution).predicted_s
         name = policy.value if isinstance(policy, Policy) else policy
-        numbers.append(_REFERENCE.number(f"reference, replanned, E {name}", "t_f (s)", text, float(predicted[-1])))
+        numbers.append(_REFERENCE.number(f"reference, replanned, E {name}", "t_f (s)", text, float(predicted_s[-1])))
     return numbers
 
 
@@ -143,8 +129,8 @@ def _analytic() -> list[PublishedNumber]:
         ("linear game about a circle", "21366.29566606", linear),
     )
     numbers = [
-        _REFERENCE.number(f"closed form, {name}", "t_f (s)", text, None if found is None else found.time_s)
-        for name, text, found in cases
+        _REFERENCE.number(f"closed form, {name}", "t_f (s)", text, None if capture is None else capture.time_s)
+        for name, text, capture in cases
     ]
     for share, text in _SHARES.items():
         small = circular_orbit_capture(share * about, share * speed, share * 0.01, share * 0.005, rate)
@@ -156,7 +142,7 @@ def _analytic() -> list[PublishedNumber]:
 
 
 def _small_game(share: float, offset: np.ndarray, drift: np.ndarray, rate: float) -> Game:
-    """A share of the linear game's offset and thrust, in true gravity, masses that stay."""
+    """Return a game with a share of the linear game's offset and thrust, in central gravity, with constant masses."""
     (x, y, z), (vx, vy, vz) = offset, drift
     angle, radius = y / _GEO_M, _GEO_M + x
     outward = np.array([math.cos(angle), math.sin(angle), 0.0])

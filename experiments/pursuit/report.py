@@ -1,138 +1,119 @@
-"""What `infoset pursuit` found, as JSON."""
+"""Results of `infoset pursuit`, as JSON and as text."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+
+import numpy as np
+from rich.console import Console
 
 from experiments.common.display_units import M_PER_KM
 from experiments.common.output import library_version
+from experiments.common.screen import number_table, print_lines
 from experiments.pursuit.file import PursuitProblem
 from rendezvous.pursuit_evasion import (
     Capture,
-    CaptureMap,
     Certificate,
     Ended,
     Flight,
+    Observation,
     PlayerEnd,
-    PointStatus,
     Solution,
+    Verdict,
     capture_quantiles_s,
 )
 
 
 @dataclass(frozen=True)
 class Feedback:
-    """Flights with feedback, and how they were asked for.
+    """Simulations with feedback, and their settings.
 
     Parameters
     ----------
     policy : str
-        The evader's, or the file of its script.
-    replan_s, delay_s : float
-    position_noise_m, velocity_noise_m_s : float
+        The policy of the evader, or the file of its script.
+    replan_s : float
+        Time between plans.
+    observation : Observation
     seed : int
     flights : tuple of Flight
     """
 
     policy: str
     replan_s: float
-    delay_s: float
-    position_noise_m: float
-    velocity_noise_m_s: float
+    observation: Observation
     seed: int
     flights: tuple[Flight, ...]
 
 
-def counted(found: CaptureMap) -> str:
-    """Return how many points of a map came out how, the words of a terminal and of a figure.
+@dataclass(frozen=True)
+class Report:
+    """Results of one command; the certificate is None without a capture."""
 
-    Parameters
-    ----------
-    found : CaptureMap
-
-    Returns
-    -------
-    str
-    """
-    return ", ".join(f"{found.count(status)} {status.value}" for status in PointStatus if found.count(status))
+    problem: PursuitProblem
+    solution: Solution
+    certificate: Certificate | None
+    feedback: Feedback | None
+    elapsed_s: float
 
 
-def report_json(
-    problem: PursuitProblem,
-    solution: Solution,
-    certificate: Certificate | None,
-    feedback: Feedback | None,
-    elapsed_s: float,
-) -> dict[str, object]:
-    """Return what was found as it is written.
-
-    Parameters
-    ----------
-    problem : PursuitProblem
-    solution : Solution
-    certificate : Certificate or None
-        Where there is a capture.
-    feedback : Feedback or None
-        Where flights were asked for.
-    elapsed_s : float
-
-    Returns
-    -------
-    dict
-    """
-    capture = solution.capture
+def report_json(report: Report) -> dict[str, object]:
+    """Return the results for `experiments.common.output.to_json`."""
+    problem, solution, certificate = report.problem, report.solution, report.certificate
+    warnings = list(problem.warnings())
     return {
         "version": library_version(),
         "problem": problem.name,
         "problem_hash": problem.hash,
-        **({"warnings": problem.warnings()} if problem.warnings() else {}),
-        "elapsed_s": elapsed_s,
-        "verdict": solution.verdict.value,
-        **_captured(capture),
-        "route": solution.route.value,
+        **({"warnings": warnings} if warnings else {}),
+        "elapsed_s": report.elapsed_s,
+        "verdict": solution.verdict,
+        **_capture_json(solution.capture),
+        "route": solution.route,
         "looked_at_s": solution.looked_at_s,
         "propellant_exhausted_by": solution.exhausted,
         "fallback_capture_time_s": None if solution.fallback is None else solution.fallback.time_s,
-        "fallback_route": None if solution.fallback_route is None else solution.fallback_route.value,
+        "fallback_route": solution.fallback_route,
         "units": {"length_km": solution.units.length_m / M_PER_KM, "time_s": solution.units.time_s},
-        "certificate": None if certificate is None else _certified(certificate),
+        "certificate": None if certificate is None else _certificate_json(certificate),
         "distance_curve": {
-            "duration_s": solution.curve.duration_s.tolist(),
-            "distance_km": (solution.curve.distance_m / M_PER_KM).tolist(),
-            "least_curvature": solution.curve.least_curvature.tolist(),
+            "duration_s": solution.curve.duration_s,
+            "distance_km": solution.curve.distance_m / M_PER_KM,
+            "least_curvature": solution.curve.least_curvature,
         },
-        **({"feedback": _flown(feedback)} if feedback is not None else {}),
+        **({"feedback": _feedback_json(report.feedback)} if report.feedback is not None else {}),
     }
 
 
-def _captured(capture: Capture | None) -> dict[str, object]:
+def _capture_json(capture: Capture | None) -> dict[str, object]:
     if capture is None:
         keys = ("capture_time_s", "capture_position_km", "direction", "pursuer", "evader")
         return dict.fromkeys((*keys, "closing_speed_km_s", "curvature"))
     return {
         "capture_time_s": capture.time_s,
-        "capture_position_km": (capture.position_m / M_PER_KM).tolist(),
-        "direction": capture.direction.tolist(),
-        "pursuer": _player(capture.pursuer),
-        "evader": _player(capture.evader),
+        "capture_position_km": capture.position_m / M_PER_KM,
+        "direction": capture.direction,
+        "pursuer": _player_json(capture.pursuer),
+        "evader": _player_json(capture.evader),
         "closing_speed_km_s": capture.closing_speed_m_s / M_PER_KM,
-        "curvature": capture.curvature.tolist(),
+        "curvature": capture.curvature,
     }
 
 
-def _player(end: PlayerEnd) -> dict[str, object]:
+def _player_json(end: PlayerEnd) -> dict[str, object]:
     return {
         "propellant_kg": end.propellant_kg,
-        "final_position_km": (end.position_m / M_PER_KM).tolist(),
-        "final_velocity_km_s": (end.velocity_m_s / M_PER_KM).tolist(),
-        "costate0": end.costate_at_start.tolist(),
+        "final_position_km": end.position_m / M_PER_KM,
+        "final_velocity_km_s": end.velocity_m_s / M_PER_KM,
+        "costate0": end.costate_at_start,
     }
 
 
-def _certified(certificate: Certificate) -> dict[str, object]:
+def _certificate_json(certificate: Certificate) -> dict[str, object]:
     return {
         "saddle_point": certificate.claims_saddle_point,
-        "failures": list(certificate.failures),
+        "failures": certificate.failures,
         "residual": certificate.residual,
         "hamiltonian_drift": certificate.hamiltonian_drift,
         "second_integrator_gap_m": certificate.integrator_gap_m,
@@ -144,8 +125,8 @@ def _certified(certificate: Certificate) -> dict[str, object]:
         "above_the_planet": certificate.above_the_planet,
         "pursuer_alone_s": certificate.pursuer_alone_s,
         "evader_deviations": [
-            {"policy": each.name, "capture_time_s": each.capture_s, "conclusive": each.conclusive}
-            for each in certificate.evader_deviations
+            {"policy": deviation.name, "capture_time_s": deviation.capture_s, "conclusive": deviation.conclusive}
+            for deviation in certificate.evader_deviations
         ],
         "directions_found": certificate.directions_found,
         "directions_tried": certificate.directions_tried,
@@ -153,25 +134,116 @@ def _certified(certificate: Certificate) -> dict[str, object]:
     }
 
 
-def _flown(feedback: Feedback) -> dict[str, object]:
+def _feedback_json(feedback: Feedback) -> dict[str, object]:
     quantiles = capture_quantiles_s(feedback.flights)
     return {
         "policy": feedback.policy,
         "replan_s": feedback.replan_s,
-        "delay_s": feedback.delay_s,
-        "position_noise_m": feedback.position_noise_m,
-        "velocity_noise_m_s": feedback.velocity_noise_m_s,
+        "delay_s": feedback.observation.delay_s,
+        "position_noise_m": feedback.observation.position_error_m,
+        "velocity_noise_m_s": feedback.observation.velocity_error_m_s,
         "seed": feedback.seed,
         "runs": len(feedback.flights),
-        "captured": sum(flight.ended is Ended.CAPTURED for flight in feedback.flights),
+        "captured": _captured(feedback),
         "capture_time_quantiles_s": dict(zip(("least", "10%", "50%", "90%", "greatest"), quantiles, strict=False)),
         "flights": [
             {
-                "ended": flight.ended.value,
+                "ended": flight.ended,
                 "time_s": flight.time_s,
                 "distance_m": flight.distance_m,
-                "last_predicted_capture_s": float(flight.predicted_s[-1]),
+                "last_predicted_capture_s": flight.predicted_s[-1],
             }
             for flight in feedback.flights
         ],
     }
+
+
+def _captured(feedback: Feedback) -> int:
+    return sum(flight.ended is Ended.CAPTURED for flight in feedback.flights)
+
+
+def print_report(console: Console, report: Report) -> None:
+    """Print the verdict, the players, the certificate and the simulations."""
+    print_lines(console, [f"{report.problem.name}: {_verdict(report.solution)}"])
+    capture = report.solution.capture
+    if capture is not None:
+        table = number_table("player", "propellant\nkg", "final velocity\nkm/s")
+        for name, end in (("pursuer", capture.pursuer), ("evader", capture.evader)):
+            table.add_row(name, f"{end.propellant_kg:.8f}", _listed(end.velocity_m_s / M_PER_KM, 9))
+        console.print(table)
+        console.print(f"position of the capture, km: {_listed(capture.position_m / M_PER_KM, 6)}")
+        console.print(f"direction from pursuer to evader: {_listed(capture.direction, 9)}")
+        speed_km_s, curvature = capture.closing_speed_m_s / M_PER_KM, _listed(capture.curvature, 5)
+        console.print(f"closing speed {speed_km_s:.10f} km/s, curvature {curvature}")
+    if report.certificate is not None:
+        print_lines(console, (f"  {line}" for line in _certificate_lines(report.certificate)))
+    if report.feedback is not None:
+        print_lines(console, [_feedback_line(report.feedback)])
+
+
+def _listed(values: np.ndarray, digits: int) -> str:
+    return ", ".join(f"{value:.{digits}f}" for value in values)
+
+
+def _verdict(solution: Solution) -> str:
+    until = f"{solution.looked_at_s:.1f} s" if solution.looked_at_s >= 1.0 else f"{solution.looked_at_s:.3g} s"
+    if solution.capture is not None and solution.verdict is Verdict.CAPTURED:
+        return f"captured at {solution.capture.time_s:.6f} s ({solution.route.value})"
+    if solution.verdict is Verdict.PROPELLANT_EXHAUSTED:
+        return f"propellant-exhausted: the {solution.exhausted} has no propellant after {until}; no capture before"
+    if solution.verdict is Verdict.ESCAPES:
+        why = f"the {solution.exhausted} has no propellant" if solution.exhausted else "the end of the time searched"
+        return f"escapes: no capture until {why}, {until}"
+    if solution.looked_at_s == 0.0:
+        return "branch-not-certified: no game could be followed, not even a short one; check the units of the values"
+    text = f"branch-not-certified: the extremals are a saddle up to a duration of {until}; no claim for longer ones"
+    if solution.fallback is not None and solution.fallback_route is not None:
+        text += f" ({solution.fallback_route.value} finds an extremal at {solution.fallback.time_s:.3f} s)"
+    return text
+
+
+def _certificate_lines(certificate: Certificate) -> Iterator[str]:
+    yield (
+        f"residual {certificate.residual:.1e}, Hamiltonian constant to {certificate.hamiltonian_drift:.1e}, "
+        f"second integrator differs by {certificate.integrator_gap_m:.2g} m"
+    )
+    yield (
+        f"no earlier capture: {'confirmed' if certificate.no_earlier_capture else 'not confirmed'}; smallest distance "
+        f"from the planet's centre {certificate.least_distance_m / M_PER_KM:.1f} km"
+    )
+    if certificate.pursuer_alone_s is not None:
+        yield f"if only the pursuer deviates: capture at {certificate.pursuer_alone_s:.3f} s at the earliest"
+    answers = [
+        f"{deviation.name} {'not known' if deviation.capture_s is None else f'{deviation.capture_s:.1f} s'}"
+        for deviation in certificate.evader_deviations
+    ]
+    if answers:
+        yield f"if the evader deviates and the pursuer responds, capture at: {', '.join(answers)}"
+    if certificate.directions_tried:
+        excess = certificate.greatest_excess_m
+        largest = "no other extremal" if excess is None else f"largest excess over the capture radius {excess:.2g} m"
+        yield (
+            f"directions: {certificate.directions_found} of {certificate.directions_tried} compared; {largest}, "
+            f"tolerance {certificate.excess_tolerance_m:.2g} m"
+        )
+        if missing := certificate.directions_tried - certificate.directions_found:
+            yield f"{missing} directions inconclusive: no farthest extremal of both craft was found"
+    failures = "; ".join(certificate.failures)
+    yield f"saddle point: {f'not claimed: {failures}' if failures else 'all checks hold'}"
+
+
+def _feedback_line(feedback: Feedback) -> str:
+    flights = feedback.flights
+    heading = f"feedback, a plan every {feedback.replan_s:g} s, evader {feedback.policy}: "
+    if len(flights) == 1:
+        (flight,) = flights
+        return (
+            f"{heading}{flight.ended.value} at {flight.time_s:.1f} s, distance {flight.distance_m:.4g} m; "
+            f"last predicted capture {flight.predicted_s[-1]:.1f} s"
+        )
+    text = f"{heading}{_captured(feedback)} of {len(flights)} captured"
+    if quantiles := capture_quantiles_s(flights):
+        names = ("smallest", "10 %", "median", "90 %", "largest")
+        times = ", ".join(f"{name} {time_s:.1f}" for name, time_s in zip(names, quantiles, strict=True))
+        text += f"; capture time, s: {times}"
+    return text

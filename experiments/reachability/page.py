@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.common.display_units import length_unit
-from experiments.common.page_motion import Choices, Curve, Graph, Mark, Sets, Track, View, faces_of, motion_page
+from experiments.common.page_motion import Curve, Graph, Mark, Sets, Track, View, faces_of, motion_page
 from experiments.reachability.report import POINTS, Report
 from rendezvous.reachability import SetKind
 
@@ -83,7 +83,7 @@ def reachability_page(report: Report) -> str:
             view("Positions in the plane of x and z", 0, (0, 2)),
         ],
         graphs,
-        Choices("Control", tuple(each.name for each in members)),
+        [member.name for member in members],
     )
 
 

@@ -44,5 +44,5 @@ def test_a_pursuit_is_written_and_an_escape_has_no_page(tmp_path: Path, capsys: 
     assert "leo-pursuit" in (tmp_path / "page.html").read_text(encoding="utf-8")
     stronger = ["--set", "evader.thrust_N=20", "--html", tmp_path / "none.html", "--json", tmp_path / "none.json"]
     assert run("pursuit", "leo-pursuit", *stronger, "--quiet") == 2
-    assert "has no flight to show" in capsys.readouterr().err
+    assert "there is no trajectory to show" in capsys.readouterr().err
     assert [each.name for each in tmp_path.iterdir()] == ["page.html"]

@@ -246,7 +246,7 @@ def _expressions() -> tuple[Parse, Mutate, list[bytes]]:
     from experiments.common.errors import InputError
     from experiments.interception.scenario_file import load_scenario
     from experiments.pursuit.file import load_pursuit
-    from experiments.pursuit.map_command import _axis
+    from experiments.pursuit.map import read_axis
     from sim.stopping_rule import QuantileName, Requirement, StoppingRule
 
     from .mutations import mutated_bytes
@@ -266,10 +266,10 @@ def _expressions() -> tuple[Parse, Mutate, list[bytes]]:
             axes = sweep_axes(text, scenario)
             sweep_cells(scenario, [_first(axes[0])])
         elif option == b"x":
-            _axis("--x", text)
+            read_axis("--x", text)
         elif option == b"s":
             name, _, value = text.partition("=")
-            game.with_values({name: value})
+            game.with_settings([f"{name}={value}"])
 
     def _first(axis: Any) -> Any:
         return type(axis)(axis.key, axis.values[:3], axis.scale)

@@ -1,6 +1,6 @@
 
 "use strict";
-// Craft that move: paths in space and in planes, sets they lead through, and curves over time.
+// Moving craft: paths in space and in planes, reachable sets, and curves over time.
 
 const LOOKS = [
   { colour: "set", dash: [], mark: "dot" },
@@ -18,7 +18,7 @@ const lookKey = (name, index) => [name, (context) => {
   drawMark(context, 11, 6, lookOf(index).mark, colourOf(index), 3);
 }];
 
-let chosen = null; // the one choice that is shown; null shows all
+let chosen = null; // index of the choice shown; null shows all of them
 const isShown = ({ choice }) => chosen === null || choice === null || choice === undefined || choice === chosen;
 
 /** A view of paths: in space, or in the plane of two of its axes. */
@@ -34,7 +34,7 @@ class View {
         ...named.map((track) => lookKey(track.name, track.look)),
         ...view.marks.filter(({ name }) => name).map(({ name, kind }) =>
           [name, (context) => drawMark(context, 11, 6, kind, theme.colours.ink, 4)]),
-        ...(view.sets ? [[view.sets_name, (context) => drawPath(context, [[1, 1], [21, 1], [21, 11], [1, 11]],
+        ...(view.sets ? [[view.sets.name, (context) => drawPath(context, [[1, 1], [21, 1], [21, 11], [1, 11]],
           { fill: theme.colours.set, stroke: theme.colours.set, width: 1, opacity: 0.25, closed: true })]] : []),
       ],
       draw: () => this.draw(),
@@ -45,25 +45,25 @@ class View {
     this.fit();
   }
 
-  /** Make room for everything that is shown. */
+  /** Set the limits of the axes so that everything fits. */
   fit() {
     const { view } = this;
     this.limits = this.axes.map((axis) => limitsOf([
       ...view.tracks.flatMap(({ points }) => points.map((point) => point[axis])),
       ...view.marks.map(({ point }) => point[axis]),
-      ...(view.sets ?? []).flat().flatMap((face) => face.map((point) => point[view.plane ? this.axes.indexOf(axis) : axis])),
-    ].map((value) => value * view.factor)));
+      ...(view.sets?.faces ?? []).flat().flatMap((face) => face.map((point) => point[view.plane ? this.axes.indexOf(axis) : axis])),
+    ].map((value) => value * view.unit[1])));
   }
 
-  /** Where a point (SI) is seen. */
+  /** Return the position on the screen of a point in SI units. */
   place(point) {
-    const scaled = this.axes.map((axis) => point[axis] * this.view.factor);
+    const scaled = this.axes.map((axis) => point[axis] * this.view.unit[1]);
     return this.view.plane ? [this.panel.across(scaled[0]), this.panel.up(scaled[1])] : this.panel.at(scaled);
   }
 
   draw() {
     const { panel, view, limits, axes } = this;
-    const titles = axes.map((axis) => view.axes[axis]);
+    const titles = axes.map((axis) => `${view.axes[axis]}, ${view.unit[0]}`);
     if (view.plane) {
       panel.begin({ x: limits[0], y: limits[1], xTitle: titles[0], yTitle: titles[1], equal: view.equal });
     } else {
@@ -85,17 +85,17 @@ class View {
     if (view.plane) panel.end();
   }
 
-  /** The sets of all times faintly, the present one clearly. */
+  /** Draw the sets of all times faintly and the set of the present time clearly. */
   drawSets() {
     const { view, panel } = this;
-    const now = view.set_of_frame[this.frame];
-    view.sets.forEach((faces, index) => {
+    const now = view.sets.of_frame[this.frame];
+    view.sets.faces.forEach((faces, index) => {
       const look = { fill: theme.colours.set, opacity: index === now ? 0.18 : 0.04, closed: true,
         stroke: index === now ? theme.colours.set : (faces.length > 12 ? null : theme.colours.line), width: index === now ? 1.2 : 0.5 };
       for (const face of faces) {
         panel.path(face.map((point) => (view.plane
-          ? [panel.across(point[0] * view.factor), panel.up(point[1] * view.factor)]
-          : panel.at(point.map((value) => value * view.factor)))), look);
+          ? [panel.across(point[0] * view.unit[1]), panel.up(point[1] * view.unit[1])]
+          : panel.at(point.map((value) => value * view.unit[1])))), look);
       }
     });
   }
@@ -112,10 +112,8 @@ class View {
     }
     const [, track, index] = best;
     if (!track) return null;
-    return [track.name, `t = ${clock(index)}`, ...view.axes.map((title, axis) => {
-      const [name, unit] = title.split(", ");
-      return `${name} = ${shown(track.points[index][axis] * view.factor, unit)}`;
-    })];
+    return [track.name, `t = ${clock(index)}`, ...view.axes.map((name, axis) =>
+      `${name} = ${shown(track.points[index][axis] * view.unit[1], view.unit[0])}`)];
   }
 }
 
@@ -131,7 +129,7 @@ class Graph {
       draw: () => this.draw(),
       tell: (x) => this.tell(x),
     });
-    const { factor } = graph;
+    const [, factor] = graph.unit;
     this.limits = limitsOf([...graph.curves.flatMap(({ values }) => values.map((value) => value * factor)),
       ...graph.levels.map((value) => value * factor), ...(graph.band ?? []).flat().map((value) => value * factor)], 0.08);
     this.times = DATA.time_s.map((time) => time * DATA.time_factor);
@@ -140,13 +138,13 @@ class Graph {
 
   draw() {
     const { panel, graph, times } = this;
-    panel.begin({ x: this.span, y: this.limits, xTitle: `time, ${DATA.time_unit}`, yTitle: `${graph.title}${graph.unit ? `, ${graph.unit}` : ""}` });
+    panel.begin({ x: this.span, y: this.limits, xTitle: `time, ${DATA.time_unit}`, yTitle: `${graph.title}${graph.unit[0] ? `, ${graph.unit[0]}` : ""}` });
     const at = (values) => values.flatMap((value, index) => [
-      ...(graph.stairs && index ? [[times[index], values[index - 1] * graph.factor]] : []), [times[index], value * graph.factor]]);
+      ...(graph.stairs && index ? [[times[index], values[index - 1] * graph.unit[1]]] : []), [times[index], value * graph.unit[1]]]);
     if (graph.band) {
       panel.area(at(graph.band.map(([low]) => low)), at(graph.band.map(([, high]) => high)), { fill: theme.colours.set, opacity: 0.15 });
     }
-    for (const level of graph.levels) panel.level(level * graph.factor, { stroke: theme.colours.line, width: 1.2, dash: [5, 3] });
+    for (const level of graph.levels) panel.level(level * graph.unit[1], { stroke: theme.colours.line, width: 1.2, dash: [5, 3] });
     for (const curve of graph.curves.filter(isShown)) {
       panel.curve(at(curve.values), { stroke: colourOf(curve.look), width: 1.8, dash: lookOf(curve.look).dash });
     }
@@ -158,7 +156,7 @@ class Graph {
   rows(frame) {
     const { graph } = this;
     const named = ({ name }) => (name.startsWith(graph.title) ? name : `${graph.title}, ${name}`);
-    return graph.curves.filter(isShown).map((curve) => [named(curve), shown(curve.values[frame] * graph.factor, graph.unit)]);
+    return graph.curves.filter(isShown).map((curve) => [named(curve), shown(curve.values[frame] * graph.unit[1], graph.unit[0])]);
   }
 
   tell(x) {
@@ -169,8 +167,8 @@ class Graph {
   }
 }
 
-/** Build the page of `DATA`: its views, its graphs, its numbers, and time. `changed` is told each frame. */
-function buildMotion(main, changed = () => {}) {
+/** Build the page of `DATA`: its views, graphs, table of numbers, and the time slider. */
+function buildMotion(main) {
   const clock = (frame) => shown(DATA.time_s[frame] * DATA.time_factor, DATA.time_unit);
   const host = element("div", { class: "columns" });
   const panels = [
@@ -188,13 +186,12 @@ function buildMotion(main, changed = () => {}) {
         each.frame = frame;
         each.panel.draw();
       }
-      changed(frame);
       fillTable(numbers, [["time", clock(frame)], ...panels.flatMap((each) => (each.rows ? each.rows(frame) : []))]);
     },
   });
   if (DATA.choices.length > 1) {
     const names = [["", "all"], ...DATA.choices.map((name, index) => [String(index), name])];
-    main.append(element("div", { class: "choices" }, choice(DATA.choices_name, names, "", (value) => {
+    main.append(element("div", { class: "choices" }, choice("Control", names, "", (value) => {
       chosen = value === "" ? null : Number(value);
       built.show(built.frame);
     })));
@@ -202,6 +199,6 @@ function buildMotion(main, changed = () => {}) {
   main.append(host);
   if (DATA.graphs.length) main.append(element("figure", {}, element("figcaption", {}, "Numbers at this time"), numbers));
   main.append(
-    element("p", {}, "Keys: space plays and pauses; left and right go one on; Home and End go to the ends."));
+    element("p", {}, "Keys: Space starts and pauses; the left and right arrows move by one step; Home and End jump to the ends."));
   return { player: built, panels };
 }

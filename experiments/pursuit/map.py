@@ -1,0 +1,143 @@
+"""`infoset pursuit-map`: computation, files and tables."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.common.display_units import M_PER_KM
+from experiments.common.errors import InputError
+from experiments.common.options import choice
+from experiments.common.output import Cell, library_version, output_of, to_csv, to_json
+from experiments.common.screen import figure_files, print_lines, progress_bar, say_warnings, table_console
+from experiments.common.screen import tell_of_compiling_pursuit as tell_of_compiling
+from experiments.common.toml_values import shown
+from experiments.pursuit.command import ROWS, PursuitMap
+from experiments.pursuit.file import PursuitProblem, load_pursuit, parameter_names
+from experiments.pursuit.map_figure import counted, draw_map
+from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus, capture_map
+
+FIGURE = "figure-map"
+MOST_VALUES, MOST_POINTS = 2000, 100_000
+COLUMNS = "phase_deg=-30:30:61"
+COLUMNS_OF_STATES = "mass_ratio=0.5:1.5:21"
+PHASE_BY_THRUST = 12.0
+"""Half the span of the columns in radians, per thrust acceleration over gravity: about the change of phase in one
+revolution."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A parameter of the map and its values, in the unit of its name."""
+
+    parameter: str
+    values: NDArray[np.float64]
+
+
+def run(options: PursuitMap) -> None:
+    """Solve the games of the grid, write the files and print a summary."""
+    problem = load_pursuit(options.problem).with_settings(options.settings or ())
+    x = read_axis("--x", _columns(problem) if options.columns is None else options.columns)
+    y = read_axis("--y", options.rows)
+    if x.parameter == y.parameter:
+        raise InputError(f"--y: {y.parameter} is also the parameter of --x; choose another, for example --y {ROWS}")
+    points = len(x.values) * len(y.values)
+    if points > MOST_POINTS:
+        raise InputError(f"--x and --y: {points} points are over {MOST_POINTS}; choose fewer")
+    with output_of(options, ("problem.toml", "results.json", "map.csv", *figure_files(FIGURE))) as written:
+        say_warnings(problem.warnings(), options.quiet)
+        tell_of_compiling(options.quiet)
+        began_s = perf_counter()
+        with progress_bar(options.quiet) as begin:
+            solved = capture_map(
+                lambda column, row: problem.game({x.parameter: column, y.parameter: row}),
+                x.values,
+                y.values,
+                follow_all=options.certify,
+                progress=begin("map"),
+            )
+        elapsed_s = perf_counter() - began_s
+        written.save("problem.toml", problem.to_toml())
+        written.save("results.json", to_json(_summary(problem, x, y, solved, elapsed_s)), "--json")
+        written.save("map.csv", to_csv(*_table(x, y, solved)), "--csv")
+        if options.out is not None:
+            written.figure(FIGURE, draw_map(solved, x.parameter, y.parameter))
+    if options.quiet:
+        return
+    lines = [f"{problem.name}: {points} points in {elapsed_s:.1f} s: {counted(solved)}"]
+    if solved.capture_s.count():
+        lines.append(f"capture times from {solved.capture_s.min():.1f} to {solved.capture_s.max():.1f} s")
+    if solved.count(PointStatus.NEIGHBOUR):
+        lines.append(
+            "neighbour: a local saddle continued from a neighbour, earlier captures not excluded at the point itself; "
+            "--certify solves every point from scratch"
+        )
+    print_lines(table_console(written.stdout_taken), lines)
+
+
+def _columns(problem: PursuitProblem) -> str:
+    """Return the default columns."""
+    if problem.tables.pursuer.position_km is not None or problem.tables.evader.position_km is not None:
+        return COLUMNS_OF_STATES
+    game = problem.game()
+    gravity_m_s2 = game.gravity.parameter_m3_s2 / math.hypot(*game.pursuer.position_m) ** 2
+    half = math.degrees(PHASE_BY_THRUST * game.pursuer.acceleration_m_s2 / gravity_m_s2)
+    # One digit, for round ticks.
+    half = float(f"{min(90.0, max(1e-6, half)):.0e}")
+    return f"phase_deg={-half!r}:{half!r}:61"
+
+
+def read_axis(option: str, text: str) -> Axis:
+    """Read KEY=FROM:TO:N.
+
+    Raises
+    ------
+    InputError
+        If the text has another form, the parameter is unknown, or a value is out of range.
+    """
+    example = f"for example {option} {COLUMNS if option == '--x' else ROWS}"
+    key, _, span = text.partition("=")
+    choice(option, key, parameter_names())
+    parts = span.split(":")
+    try:
+        if len(parts) != 3:
+            raise ValueError
+        low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
+    except ValueError:
+        raise InputError(f"{option}: must be KEY=FROM:TO:N, found {shown(text)}; {example}") from None
+    if not (math.isfinite(low) and math.isfinite(high) and low < high and max(abs(low), abs(high)) <= 1e15):
+        raise InputError(f"{option}: must go from a number to a larger one, found {shown(span)}; {example}")
+    if not 2 <= count <= MOST_VALUES:
+        raise InputError(f"{option}: must have from 2 to {MOST_VALUES} values, found {shown(parts[2])}; {example}")
+    return Axis(key, np.linspace(low, high, count))
+
+
+def _summary(problem: PursuitProblem, x: Axis, y: Axis, solved: CaptureMap, elapsed_s: float) -> dict[str, object]:
+    return {
+        "version": library_version(),
+        "problem": problem.name,
+        "problem_hash": problem.hash,
+        "elapsed_s": elapsed_s,
+        "x": x,
+        "y": y,
+        "points": solved.status.size,
+        "counts": {status.value: solved.count(status) for status in PointStatus},
+        "solved_from_nothing": solved.solved_from_nothing,
+        "capture_time_s": solved.capture_s,
+        "closing_speed_km_s": solved.closing_speed_m_s / M_PER_KM,
+        "status": [[STATUSES[status] for status in row] for row in solved.status],
+    }
+
+
+def _table(x: Axis, y: Axis, solved: CaptureMap) -> tuple[list[str], list[list[Cell]]]:
+    times, speeds = solved.capture_s.tolist(), (solved.closing_speed_m_s / M_PER_KM).tolist()
+    rows: list[list[Cell]] = [
+        [float(column), float(row), times[j][i], speeds[j][i], STATUSES[solved.status[j, i]].value]
+        for j, row in enumerate(y.values)
+        for i, column in enumerate(x.values)
+    ]
+    return [x.parameter, y.parameter, "capture_time_s", "closing_speed_km_s", "status"], rows

@@ -1,0 +1,126 @@
+"""`infoset pursuit`: computation, files and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from time import perf_counter
+
+from matplotlib.figure import Figure
+
+from experiments.common.errors import InputError
+from experiments.common.output import output_of, to_json
+from experiments.common.screen import figure_files, progress_bar, say, say_warnings, table_console
+from experiments.common.screen import tell_of_compiling_pursuit as tell_of_compiling
+from experiments.pursuit.command import Pursuit
+from experiments.pursuit.evader import EvaderPolicy, evader_policy
+from experiments.pursuit.figures import draw_control, draw_distance, draw_feedback, draw_orbits, draw_relative
+from experiments.pursuit.file import PursuitProblem, load_pursuit
+from experiments.pursuit.page import pursuit_page
+from experiments.pursuit.report import Feedback, Report, print_report, report_json
+from rendezvous.pursuit_evasion import Observation, PathError, Solution, certify, fly_many, history, solve
+
+FIGURES = ("figure-orbits", "figure-relative", "figure-control", "figure-distance")
+FEEDBACK_FIGURE = "figure-feedback"
+REPLAN_S, LEAST_PLANS, MOST_PLANS = 600.0, 50, 2000
+"""Default time between plans, and the smallest and largest number of plans in a game."""
+
+Begin = Callable[[str], Callable[[float], None]]
+
+
+def run(options: Pursuit) -> None:
+    """Solve the game, simulate it with feedback, write the files and print the results."""
+    _check_feedback(options)
+    problem = load_pursuit(options.problem).with_settings(options.settings or ())
+    evader = None if options.feedback is None else evader_policy(options.feedback, options.seed)
+    names = FIGURES if evader is None else (*FIGURES, FEEDBACK_FIGURE)
+    with output_of(options, ("problem.toml", "results.json", *figure_files(*names))) as written:
+        say_warnings(problem.warnings(), options.quiet)
+        tell_of_compiling(options.quiet)
+        with progress_bar(options.quiet) as begin:
+            report = _solve(problem, options, evader, begin)
+            page = "" if options.html is None else _page(report)
+            written.save("results.json", to_json(report_json(report)), "--json")
+            written.deliver("--html", page)
+            if options.out is not None:
+                written.save("problem.toml", problem.to_toml())
+                written.draw(_drawings(report), begin("figures"))
+    if not options.quiet:
+        print_report(table_console(written.stdout_taken), report)
+
+
+def _check_feedback(options: Pursuit) -> None:
+    changed = (options.delay_s, options.position_noise_m, options.velocity_noise_m_s)
+    if options.feedback is None and (options.runs > 1 or any(changed) or options.replan_s is not None):
+        raise InputError(
+            "--runs, --replan-s, --delay-s and the noise options need a policy of the evader; "
+            "add one, for example --feedback random"
+        )
+
+
+def _solve(problem: PursuitProblem, options: Pursuit, evader: EvaderPolicy | None, begin: Begin) -> Report:
+    began_s, progress = perf_counter(), begin("solve")
+    try:
+        solution = solve(problem.game(), all_directions=options.certify)
+    except ValueError as error:
+        raise InputError(f"{problem.source}: {error}; correct the problem") from None
+    progress(0.5)
+    certificate = None if solution.capture is None else certify(solution, all_directions=options.certify)
+    progress(1.0)
+    elapsed_s = perf_counter() - began_s
+    feedback = None if evader is None else _fly(solution, options, evader, begin)
+    return Report(problem, solution, certificate, feedback, elapsed_s)
+
+
+def _fly(solution: Solution, options: Pursuit, evader: EvaderPolicy, begin: Begin) -> Feedback | None:
+    if solution.capture is None:
+        say(f"no feedback: there is no plan to start from, the result is {solution.verdict.value}", options.quiet)
+        return None
+    replan_s = _time_between_plans(solution.capture.time_s, options.replan_s)
+    observation = Observation(options.delay_s, options.position_noise_m, options.velocity_noise_m_s)
+    try:
+        flights = fly_many(
+            solution.game,
+            lambda run: evader(run, replan_s),
+            options.runs,
+            replan_s=replan_s,
+            observation=observation,
+            seed=options.seed,
+            progress=begin("feedback"),
+            solution=solution,
+        )
+    except PathError as error:
+        raise InputError(f"--feedback: {error}; choose another policy, or check the units of the problem") from None
+    return Feedback(str(options.feedback), replan_s, observation, options.seed, tuple(flights))
+
+
+def _time_between_plans(game_s: float, asked_s: float | None) -> float:
+    if asked_s is None:
+        return max(min(REPLAN_S, game_s / LEAST_PLANS), game_s / MOST_PLANS)
+    if asked_s * MOST_PLANS < game_s:
+        raise InputError(
+            f"--replan-s: {asked_s:g} makes more than {MOST_PLANS} plans in a game of {game_s:.6g} s; "
+            f"choose {game_s / MOST_PLANS:.3g} or more"
+        )
+    return asked_s
+
+
+def _page(report: Report) -> str:
+    solution = report.solution
+    if solution.capture is None and solution.fallback is None:
+        raise InputError(f"--html: there is no trajectory to show, the result is {solution.verdict.value}; omit --html")
+    return pursuit_page(report.problem.name, report.problem.tables.description, solution)
+
+
+def _drawings(report: Report) -> dict[str, Callable[[], Figure]]:
+    solution = report.solution
+    drawings: dict[str, Callable[[], Figure]] = {}
+    if solution.capture is not None:
+        sampled = history(solution)
+        for name, draw in zip(FIGURES[:3], (draw_orbits, draw_relative, draw_control), strict=True):
+            drawings[name] = partial(draw, sampled)
+    if len(solution.curve.duration_s) > 1:
+        drawings[FIGURES[3]] = partial(draw_distance, solution)
+    if report.feedback is not None:
+        drawings[FEEDBACK_FIGURE] = partial(draw_feedback, solution, report.feedback.flights)
+    return drawings
