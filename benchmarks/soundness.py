@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from benchmarks.random_scenarios import random_scenario
 from experiments.interception.scenario_file import load_scenario
-from guidance import GameNoise, LineOfSight, Measurement, MeasurementNoise, NoiseKind, RandomNoise, TieRule
+from guidance import GameNoise, LineOfSight, MeasurementNoise, NoiseKind, RandomNoise, TieRule
 from guidance.pair_noise import middle
 from infoset import InformationSetView, InitialSet, Model
 from sim import Manoeuvre, Outcome, Scenario, Target
@@ -40,15 +40,13 @@ KINDS = ("random", "game, upper", "game, lower", "game, alternate", "game, rando
 class BoundedPairNoise:
     """Engagements 2 k and 2 k + 1 are shown the angle between their two, as far as both bounds allow."""
 
-    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
+    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> dict[str, Floats]:
         """Show each the middle."""
-        bound = sight.angle_sensor.error_bound(sight.range_m)
-        alpha = np.clip(middle(sight.alpha_rad), sight.alpha_rad - bound, sight.alpha_rad + bound)
-        omega = None
-        if sight.omega_rad_s is not None and sight.rate_error_rad_s is not None:
-            error = sight.rate_error_rad_s
-            omega = np.clip(middle(sight.omega_rad_s), sight.omega_rad_s - error, sight.omega_rad_s + error)
-        return Measurement(alpha, None if sight.range_error is None else sight.range_m.copy(), omega)
+        measured = {}
+        for name, sensor in sight.sensors.items():
+            true, bound = sensor.true_value(sight), sensor.bound(sight)
+            measured[name] = true.copy() if name == "range" else np.clip(middle(true), true - bound, true + bound)
+        return measured
 
 
 @dataclass(frozen=True)
@@ -57,14 +55,11 @@ class MixedNoise:
 
     parts: tuple[MeasurementNoise, ...]
 
-    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
+    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> dict[str, Floats]:
         """Ask all, and give to each engagement its own."""
         kind = kind_of(sight.alpha_rad.size)
         given = [part.measure(sight, predicted) for part in self.parts]
-        alpha = np.choose(kind, [each.alpha_rad for each in given])
-        ranges = None if sight.range_error is None else np.choose(kind, [each.range_m for each in given])
-        omega = None if sight.rate_error_rad_s is None else np.choose(kind, [each.omega_rad_s for each in given])
-        return Measurement(alpha, ranges, omega)
+        return {name: np.choose(kind, [measured[name] for measured in given]) for name in sight.sensors}
 
 
 def kind_of(batch: int) -> NDArray[np.int64]:
@@ -78,15 +73,14 @@ def every_noise(draws: Draws) -> MixedNoise:
     # Half of them at the bound, half anywhere.
     bias = np.where(np.arange(len(signs)) % 4 < 2, signs[:, 0], draws.tie[:, 0])
     constant = np.broadcast_to(bias[:, None], signs.shape)
-    range_signs = np.where(draws.range >= 0.0, 1.0, -1.0)
-    rate = np.zeros(signs.shape) if draws.rate is None else draws.rate
-    rate_signs = np.where(rate >= 0.0, 1.0, -1.0)
+    extremal = {name: np.where(errors >= 0.0, 1.0, -1.0) for name, errors in draws.errors.items()}
+    constants = {name: errors[:, :1] + np.zeros_like(signs) for name, errors in extremal.items()}
     return MixedNoise(
         (
-            RandomNoise(draws.angle, draws.range, rate),
+            RandomNoise(draws.errors),
             *(GameNoise(tie, draws.tie) for tie in (TieRule.UPPER, TieRule.LOWER, TieRule.ALTERNATE, TieRule.RANDOM)),
-            RandomNoise(signs, range_signs, rate_signs),
-            RandomNoise(constant, range_signs[:, :1] + np.zeros_like(signs), rate_signs[:, :1] + np.zeros_like(signs)),
+            RandomNoise({**extremal, "angle": signs}),
+            RandomNoise({**constants, "angle": constant}),
             BoundedPairNoise(),
         )
     )

@@ -29,12 +29,12 @@ HALF_PERIODS = (1, 2, 3, 4, 6, 10, 20, 40, 80, 1000)
 def worst(scenario: Scenario, name: str, runs: int, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Greatest miss (m) and greatest impulse (m/s) of each start over all square waves."""
     draws = draw(scenario, range(runs), seed)
-    steps = draws.angle.shape[1]
+    steps = draws.steps
     misses, impulses = [], []
     for half_period in HALF_PERIODS:
         wave = np.where(np.arange(steps) // half_period % 2 == 0, 1.0, -1.0)
         for sign in (1.0, -1.0):
-            noise = ScriptedNoise(np.tile(sign * wave, (runs, 1)), None, None)
+            noise = ScriptedNoise({"angle": np.tile(sign * wave, (runs, 1))})
             flight = Engagements(scenario, draws, make_strategy(name), noise=noise)
             while flight.flying:
                 flight.advance()

@@ -67,8 +67,8 @@ def flight(curve: Scenario) -> Flight:
         if step.step == STEP:
             caught.append(step.information.copy())
             caught[0].shift(step.impulse_m_s)
-        elif step.step > STEP and step.measured_angle_rad is not None:
-            stretch.append((step.measured_angle_rad, step.impulse_m_s))
+        elif step.step > STEP and "angle" in step.measured:
+            stretch.append((step.measured["angle"], step.impulse_m_s))
 
     while flown.step <= STEP + STRETCH:
         flown.advance(catch)

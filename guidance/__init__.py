@@ -3,7 +3,7 @@
 from guidance.game_noise import GameNoise
 from guidance.kalman import Kalman
 from guidance.least_squares import LeastSquares
-from guidance.noise import LineOfSight, Measurement, MeasurementNoise, NoiseKind, TieRule
+from guidance.noise import LineOfSight, MeasurementNoise, NoiseKind, TieRule
 from guidance.patient import Patient
 from guidance.predicted_miss import symmetric_impulse, zero_effort_miss
 from guidance.random_noise import RandomNoise
@@ -20,7 +20,6 @@ __all__ = [
     "Kalman",
     "LeastSquares",
     "LineOfSight",
-    "Measurement",
     "MeasurementNoise",
     "NoiseKind",
     "Patient",

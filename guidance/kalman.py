@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from guidance.estimated_miss import impulse_beyond_dead_zone
 from guidance.situation import Situation
+from infoset import RangeSensor
 from infoset.limits import COUNT, NOT_NEGATIVE
 
 Floats = NDArray[np.float64]
@@ -150,18 +151,19 @@ def _learn(situation: Situation, state: KalmanState) -> None:
     """Take in the measurements of this step."""
     nearest = situation.closing_speed_m_s * situation.step_s * 0.1
     z, x = state.mean[..., Z], np.maximum(state.mean[..., X], nearest)
-    if situation.range_is_new and situation.measured_range_m is not None and situation.range_sensor is not None:
+    meter, angle_sensor = situation.sensors.get("range"), situation.information.model.angle_sensor
+    if "range" in situation.new and isinstance(meter, RangeSensor):
         gradient = np.zeros_like(state.mean)
         gradient[..., X] = 1.0
-        variance = (situation.range_sensor.relative_error * x) ** 2 / 3.0
-        _update(state, situation.measured_range_m[:, None] - state.mean[..., X], gradient, variance)
+        variance = (meter.relative_error * x) ** 2 / 3.0
+        _update(state, situation.measured["range"][:, None] - state.mean[..., X], gradient, variance)
         z, x = state.mean[..., Z], np.maximum(state.mean[..., X], nearest)
-    if situation.angle_is_new and situation.measured_angle_rad is not None:
+    if "angle" in situation.new:
         gradient = np.zeros_like(state.mean)
         square = z * z + x * x
         gradient[..., Z], gradient[..., X] = x / square, -z / square
-        variance = situation.information.model.angle_sensor.error_bound(x) ** 2 / 3.0
-        _update(state, situation.measured_angle_rad[:, None] - np.arctan2(z, x), gradient, variance)
+        variance = angle_sensor.error_bound(x) ** 2 / 3.0
+        _update(state, situation.measured["angle"][:, None] - np.arctan2(z, x), gradient, variance)
 
 
 def _update(state: KalmanState, innovation: Floats, gradient: Floats, variance: Floats) -> None:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from guidance.estimated_miss import impulse_beyond_dead_zone
 from guidance.situation import Situation
+from infoset import RangeSensor
 from infoset.limits import COUNT, NOT_NEGATIVE
 
 Floats = NDArray[np.float64]
@@ -140,10 +141,9 @@ def _note(situation: Situation, state: LeastSquaresState) -> None:
     if situation.step > 0:
         state.speed_given_m_s = state.speed_given_m_s + situation.last_impulse_m_s
         state.offset_given_m = state.offset_given_m + situation.step_s * state.speed_given_m_s
-    if situation.angle_is_new and situation.measured_angle_rad is not None:
-        state.angles.add(situation.time_s, situation.measured_angle_rad, state.offset_given_m)
-    if situation.range_is_new and situation.measured_range_m is not None:
-        state.ranges.add(situation.time_s, situation.measured_range_m, state.offset_given_m)
+    for name, kept in (("angle", state.angles), ("range", state.ranges)):
+        if name in situation.new:
+            kept.add(situation.time_s, situation.measured[name], state.offset_given_m)
 
 
 def _prior(situation: Situation) -> tuple[Floats, Floats]:
@@ -175,9 +175,10 @@ def _improve(situation: Situation, state: LeastSquaresState, centre: Floats, var
             bound, residual = model.angle_sensor.error_bound(x), measured - np.arctan2(z, x)
             by_z, by_x = x / square, -z / square
         else:
-            assert situation.range_sensor is not None
+            meter = situation.sensors["range"]
+            assert isinstance(meter, RangeSensor)
             distance = np.sqrt(square)
-            bound, residual = situation.range_sensor.relative_error * distance, measured - distance
+            bound, residual = meter.relative_error * distance, measured - distance
             by_z, by_x = z / distance, x / distance
         jacobian = np.stack([by_z, by_z * times, by_x, -by_x * times], axis=-1)
         weighted = jacobian * (3.0 / bound**2)[..., None]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
@@ -9,14 +10,15 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset import AngleSensor, InformationSetView
+from infoset import InformationSetView
 from infoset.limits import real_array, real_values, shown
+from infoset.sensors import Measurements, Sensor
 
 Floats = NDArray[np.float64]
 
 
 class NoiseKind(Enum):
-    """How nature chooses the measurement errors within their bounds."""
+    """How measurement errors are chosen within their bounds."""
 
     RANDOM = "random"
     GAME = "game"
@@ -33,101 +35,68 @@ class TieRule(Enum):
 
 @dataclass(frozen=True)
 class LineOfSight:
-    """What the sensors look at in one step: the truth, and what they can tell of it.
+    """True line of sight in one step, and the sensors that measure it.
 
     Parameters
     ----------
     step : int
         Number of the step.
-    alpha_rad, range_m : ndarray, shape (B,)
-        True line-of-sight angle and range.
-    angle_sensor : AngleSensor
-        Error law of the angle.
-    range_error : float or None
-        Relative error bound b of the range meter; None where it does not measure in this step.
-    omega_rad_s : ndarray, shape (B,), or None
-        True rate of the line of sight.
-    rate_error_rad_s : float or None
-        Error bound of the rate sensor; None where it does not measure in this step.
+    alpha_rad, omega_rad_s, range_m : ndarray, shape (B,)
+        True line-of-sight angle (rad), its rate (rad/s) and range (m).
+    sensors : mapping of str to Sensor
+        Sensors that measure in this step, by name: "angle", "range", "rate".
     """
 
     step: int
     alpha_rad: Floats
+    omega_rad_s: Floats
     range_m: Floats
-    angle_sensor: AngleSensor
-    range_error: float | None
-    omega_rad_s: Floats | None = None
-    rate_error_rad_s: float | None = None
+    sensors: Mapping[str, Sensor]
 
 
-@dataclass(frozen=True)
-class Measurement:
-    """What the sensors give.
+def checked_measurements(measured: Measurements, sight: LineOfSight, noise: object) -> dict[str, Floats]:
+    """Return the measurements of a noise as arrays of shape (B,), if they are finite and of sensors that measure.
 
     Parameters
     ----------
-    alpha_rad : ndarray, shape (B,), or None
-        Measured line-of-sight angle, rad; None where there was none: the sensor has dropped out.
-    range_m : ndarray, shape (B,), or None
-        Measured range, m; None where it was not measured.
-    omega_rad_s : ndarray, shape (B,), or None
-        Measured rate, rad/s; None where it was not measured.
-    """
-
-    alpha_rad: Floats | None
-    range_m: Floats | None
-    omega_rad_s: Floats | None = None
-
-
-def checked_measurement(measurement: Measurement, sight: LineOfSight, noise: object) -> Measurement:
-    """Return what a noise has measured, with arrays of shape (B,), if the sensors that measure in a step can give it.
-
-    Parameters
-    ----------
-    measurement : Measurement
+    measured : mapping of str to ndarray
+        Values that the noise returned, by sensor.
     sight : LineOfSight
-        What the noise was given.
+        Argument of the noise.
     noise : object
         The noise, for the message.
-
-    Returns
-    -------
-    Measurement
 
     Raises
     ------
     TypeError
-        If it is no measurement, or holds anything but real numbers.
+        If the noise returned no mapping, or a value is not a real number.
     ValueError
-        If a number is not finite, a shape is wrong, or a sensor was not asked.
+        If a number is not finite, a shape is wrong, or a sensor does not measure in this step.
     """
     where = f"noise {type(noise).__name__} at step {sight.step}"
-    if not isinstance(measurement, Measurement):
-        raise TypeError(f"{where} must return a Measurement: got {type(measurement).__name__}")
-    asked = {
-        "alpha_rad": (measurement.alpha_rad, True),
-        "range_m": (measurement.range_m, sight.range_error is not None),
-        "omega_rad_s": (measurement.omega_rad_s, sight.rate_error_rad_s is not None),
-    }
-    for name, (value, measures) in asked.items():
-        if value is not None and not measures:
+    if not isinstance(measured, Mapping):
+        raise TypeError(
+            f"{where} must return a mapping from sensor names to measured values, for example "
+            f'{{"angle": sight.alpha_rad}}: got {type(measured).__name__}'
+        )
+    for name, values in measured.items():
+        if name not in sight.sensors:
             raise ValueError(
-                f"{where}: {name} must be None, because that sensor does not measure then: got {shown(value)}"
+                f"{where}: sensor {name!r} does not measure at this step, only {sorted(sight.sensors)}; leave it out: "
+                f"got {shown(values)}"
             )
-    shape = sight.alpha_rad.shape
-    return Measurement(
-        *(None if value is None else real_array(f"{where}: {name}", value, shape) for name, (value, _) in asked.items())
-    )
+    return {name: real_array(f"{where}: {name}", values, sight.alpha_rad.shape) for name, values in measured.items()}
 
 
 def need_draws(name: str, draws: Floats) -> None:
-    """Refuse errors, in units of their bounds, that are not of shape (B, steps) and within [-1, 1].
+    """Refuse errors, in units of their bounds, that are not of shape (B, steps) or not within [-1, 1].
 
     Parameters
     ----------
     name : str
-        Of the parameter, for the message.
+        Name of the parameter, for the message.
     draws : ndarray, shape (B, steps)
+        Errors, or choices between ties.
 
     Raises
     ------
@@ -141,20 +110,20 @@ def need_draws(name: str, draws: Floats) -> None:
 
 
 class MeasurementNoise(Protocol):
-    """A rule that chooses the errors within their bounds."""
+    """A rule that chooses measurement errors within their bounds."""
 
-    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
+    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
         """Choose the measurements of a step.
 
         Parameters
         ----------
         sight : LineOfSight
-            The truth.
+            True line of sight, and the sensors that measure.
         predicted : InformationSetView
             The set before the measurement.
 
         Returns
         -------
-        Measurement
-            Within the bounds; None for a sensor that does not measure in this step.
+        mapping of str to ndarray, shape (B,)
+            Measured values by sensor. A sensor that is left out gives no measurement in this step.
         """

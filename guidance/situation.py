@@ -1,14 +1,16 @@
-"""What a strategy may know when it decides."""
+"""Input of a strategy."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from guidance.thruster import Thruster
-from infoset import InformationSetView, PredictedMiss, RangeSensor
+from infoset import InformationSetView, PredictedMiss
+from infoset.sensors import Measurements, Sensor
 
 Floats = NDArray[np.float64]
 
@@ -26,27 +28,24 @@ class Situation:
     step_s : float
         Time between steps, s.
     predicted_miss : PredictedMiss
-        Misses still possible without control, with the points that reach the ends of the interval.
+        Interval of the miss without further impulses, with the points of the set that reach its ends.
     budget_left_m_s : ndarray, shape (B,)
-        What is left of the impulse budget, m/s.
+        Impulse budget left, m/s.
     thruster : Thruster
-        Limits of the engine; whatever a strategy wants is limited by them.
+        Limits of the engine; they are applied to what the strategy returns.
     closing_speed_m_s : float
         The nominal closing speed e, m/s.
-    measured_angle_rad : ndarray, shape (B,), or None
-        Last measured line-of-sight angle; None before the first.
-    measured_range_m : ndarray, shape (B,), or None
-        Last measured range; None before the first or without a range meter.
-    measured_rate_rad_s : ndarray, shape (B,), or None
-        Last measured line-of-sight rate; None before the first or without such a sensor.
+    measured : mapping of str to ndarray, shape (B,)
+        Last measured values by sensor, "angle" (rad), "range" (m) and "rate" (rad/s); a sensor that has not measured
+        yet is missing.
     last_impulse_m_s : ndarray, shape (B,)
-        Impulses of the step before, m/s.
+        Impulses of the previous step, m/s.
     information : InformationSetView
         The information set itself, read-only.
-    angle_is_new, range_is_new : bool
-        Whether the angle, or the range, was measured in this step.
-    range_sensor : RangeSensor or None
-        Error law of the range meter; None without one.
+    new : frozenset of str
+        Sensors that measured in this step.
+    sensors : mapping of str to Sensor
+        All sensors on board by name, with their error bounds.
     """
 
     time_s: float
@@ -56,11 +55,8 @@ class Situation:
     budget_left_m_s: Floats
     thruster: Thruster
     closing_speed_m_s: float
-    measured_angle_rad: Floats | None
-    measured_range_m: Floats | None
+    measured: Measurements
     last_impulse_m_s: Floats
     information: InformationSetView
-    measured_rate_rad_s: Floats | None = None
-    angle_is_new: bool = True
-    range_is_new: bool = False
-    range_sensor: RangeSensor | None = None
+    new: frozenset[str] = frozenset()
+    sensors: Mapping[str, Sensor] = field(default_factory=dict)

@@ -1,21 +1,98 @@
-"""Bounded sensor errors: nothing is known of their distribution."""
+"""Sensors with bounded errors, of unknown distribution, and how their measurements cut an information set.
+
+A kind of sensor is one class here: what it measures, its error bound, and the cut that it makes.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import ClassVar, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from infoset.limits import Fraction, Positive, check_fields
 
+Floats = NDArray[np.float64]
 RangeOrRanges = TypeVar("RangeOrRanges", float, NDArray[np.float64])
+Measurements = Mapping[str, Floats]
+"""Measured values of a batch by the name of the sensor; a sensor that does not measure in a step is left out."""
+
+
+class Geometry(Protocol):
+    """True geometry of a batch of engagements: line-of-sight angle, its rate and range, shape (B,)."""
+
+    @property
+    def alpha_rad(self) -> Floats:
+        """Line-of-sight angle, rad."""
+
+    @property
+    def omega_rad_s(self) -> Floats:
+        """Its rate, rad/s."""
+
+    @property
+    def range_m(self) -> Floats:
+        """Distance, m."""
+
+
+class Cuttable(Protocol):
+    """A batch of sets that measurements cut; `InformationSet` describes the methods."""
+
+    def measure_angle(self, alpha_rad: Floats, where: NDArray[np.bool_]) -> None:
+        """Cut by a line-of-sight angle."""
+
+    def measure_range(
+        self, range_m: Floats, relative_error: float, where: NDArray[np.bool_], *, alpha_rad: ArrayLike | None
+    ) -> None:
+        """Cut by a range."""
+
+    def measure_rate(self, omega_rad_s: Floats, error_rad_s: float, where: NDArray[np.bool_]) -> None:
+        """Cut by a rate of the line of sight."""
+
+
+class Sensor:
+    """A sensor that measures one quantity of the line of sight, with a bounded error.
+
+    Attributes
+    ----------
+    name : str
+        Key of its measurements and errors.
+    quantity : str
+        What it measures, with the unit: ``measured_<quantity>`` is its column in files.
+    stream : int
+        Its stream of random numbers (`sim.draws`), different for each kind.
+    """
+
+    name: ClassVar[str]
+    quantity: ClassVar[str]
+    stream: ClassVar[int]
+    period_s: float
+
+    def true_value(self, sight: Geometry) -> Floats:
+        """Return the measured quantity without error, shape (B,)."""
+        raise NotImplementedError
+
+    def bound(self, sight: Geometry) -> Floats | float:
+        """Return the greatest size of the error, in the unit of the quantity."""
+        raise NotImplementedError
+
+    def cut(self, sets: Cuttable, measured: Measurements, where: NDArray[np.bool_]) -> None:
+        """Cut sets, where flagged, by this sensor's measurement among those of one step."""
+        raise NotImplementedError
+
+    def measured(self, sight: Geometry, error: Floats | float) -> Floats:
+        """Return the value measured with an error in units of the bound, from -1 to 1."""
+        return self.true_value(sight) + self.bound(sight) * error
+
+    def error(self, sight: Geometry, measured: Floats) -> Floats:
+        """Return the error of a measured value in units of the bound."""
+        return (measured - self.true_value(sight)) / self.bound(sight)
 
 
 @dataclass(frozen=True)
-class AngleSensor:
-    """A line-of-sight angle sensor whose error bound is a straight line in the range.
+class AngleSensor(Sensor):
+    """A line-of-sight angle sensor whose error bound is linear in the range.
 
     Parameters
     ----------
@@ -36,6 +113,10 @@ class AngleSensor:
     Kumkov and Patsko (1997), equations (4) and (10).
     """
 
+    name: ClassVar[str] = "angle"
+    quantity: ClassVar[str] = "angle_rad"
+    stream: ClassVar[int] = 1
+
     period_s: Positive
     error_at_nominal_range_rad: Fraction
     error_at_zero_range_rad: Fraction
@@ -50,12 +131,24 @@ class AngleSensor:
         return (self.error_at_nominal_range_rad - self.error_at_zero_range_rad) / self.nominal_range_m
 
     def error_bound(self, range_m: RangeOrRanges) -> RangeOrRanges:
-        """Greatest modulus of the error at a range (m), rad."""
+        """Return the greatest size of the error at a range (m), rad."""
         return self.error_at_zero_range_rad + self.error_slope_rad_per_m * range_m
+
+    def true_value(self, sight: Geometry) -> Floats:
+        """Return the line-of-sight angle, rad."""
+        return sight.alpha_rad
+
+    def bound(self, sight: Geometry) -> Floats:
+        """Return the error bound at the true range, rad."""
+        return self.error_bound(sight.range_m)
+
+    def cut(self, sets: Cuttable, measured: Measurements, where: NDArray[np.bool_]) -> None:
+        """Cut by the angle."""
+        sets.measure_angle(measured[self.name], where)
 
 
 @dataclass(frozen=True)
-class RangeSensor:
+class RangeSensor(Sensor):
     """A range meter with a bounded relative error.
 
     Parameters
@@ -75,15 +168,39 @@ class RangeSensor:
     Kumkov and Patsko (1997), equations (5) and (11).
     """
 
+    name: ClassVar[str] = "range"
+    quantity: ClassVar[str] = "range_m"
+    stream: ClassVar[int] = 2
+
     period_s: Positive
     relative_error: Fraction
 
     def __post_init__(self) -> None:
         check_fields(self)
 
+    def true_value(self, sight: Geometry) -> Floats:
+        """Return the range, m."""
+        return sight.range_m
+
+    def bound(self, sight: Geometry) -> Floats:
+        """Return the error bound, m."""
+        return self.relative_error * sight.range_m
+
+    def cut(self, sets: Cuttable, measured: Measurements, where: NDArray[np.bool_]) -> None:
+        """Cut by the range; an angle measured in the same step sharpens the cut."""
+        sets.measure_range(measured[self.name], self.relative_error, where, alpha_rad=measured.get(AngleSensor.name))
+
+    def measured(self, sight: Geometry, error: Floats | float) -> Floats:
+        """Return d (1 + error b), m."""
+        return sight.range_m * (1.0 + self.relative_error * error)
+
+    def error(self, sight: Geometry, measured: Floats) -> Floats:
+        """Return (d_m / d - 1) / b."""
+        return (measured / sight.range_m - 1.0) / self.relative_error
+
 
 @dataclass(frozen=True)
-class RateSensor:
+class RateSensor(Sensor):
     """A sensor of the line of sight's angular rate with a bounded error.
 
     Parameters
@@ -103,8 +220,28 @@ class RateSensor:
     Kumkov and Patsko (2001).
     """
 
+    name: ClassVar[str] = "rate"
+    quantity: ClassVar[str] = "rate_rad_s"
+    stream: ClassVar[int] = 4
+
     period_s: Positive
     error_rad_s: Positive
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+    def true_value(self, sight: Geometry) -> Floats:
+        """Return the rate of the line of sight, rad/s."""
+        return sight.omega_rad_s
+
+    def bound(self, sight: Geometry) -> float:
+        """Return the error bound, rad/s."""
+        return self.error_rad_s
+
+    def cut(self, sets: Cuttable, measured: Measurements, where: NDArray[np.bool_]) -> None:
+        """Cut by the rate."""
+        sets.measure_rate(measured[self.name], self.error_rad_s, where)
+
+
+SENSORS: tuple[type[Sensor], ...] = (AngleSensor, RangeSensor, RateSensor)
+"""All kinds, in the order of their columns in files."""

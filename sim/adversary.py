@@ -5,9 +5,9 @@ What is found bounds from below what the strategy can guarantee. It is no proof 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,9 +15,9 @@ from guidance import Strategy, TieRule, make_strategy
 from guidance.scripted_noise import ScriptedNoise
 from infoset import StateBox
 from infoset.limits import INTEGER
-from sim.draws import corners, draw
+from sim.draws import Draws, corners, draw
 from sim.engagement import Engagements
-from sim.planned_flights import ANGLE, RANGE, RATE, Floats, Flown, PlannedNoise, Plans
+from sim.planned_flights import ANGLE, ROWS, Floats, Flown, PlannedNoise, Plans
 from sim.record import Record, fly_one
 from sim.results import Outcome
 from sim.scenario import Scenario
@@ -65,10 +65,9 @@ class WorstEngagement:
         Whether the truth was inside its own section after every measurement.
     position_m, velocity_m_s : ndarray, shape (2,)
         Start: (z, x) and (V_z, V_x).
-    angle_errors : ndarray, shape (steps,)
-        Errors of the angle in units of the bound, for `ScriptedNoise`: they fly this engagement again bit by bit.
-    range_errors, rate_errors : ndarray, shape (steps,)
-        The same of the range and of the angular rate; zeros where they were not measured.
+    errors : mapping of str to ndarray, shape (steps,)
+        Measurement errors by sensor in units of their bounds, zero where nothing was measured. `ScriptedNoise` with
+        them flies this engagement again, bit for bit.
     construction : str
         The first plan that the search made it from.
     changes : int
@@ -87,9 +86,7 @@ class WorstEngagement:
     truth_kept: bool
     position_m: Floats
     velocity_m_s: Floats
-    angle_errors: Floats
-    range_errors: Floats
-    rate_errors: Floats
+    errors: Mapping[str, Floats]
     construction: str
     changes: int
     evaluations: int
@@ -97,7 +94,7 @@ class WorstEngagement:
 
     def noise(self) -> ScriptedNoise:
         """The errors as the noise of a batch of one."""
-        return ScriptedNoise(self.angle_errors[None], self.range_errors[None], self.rate_errors[None])
+        return ScriptedNoise({name: errors[None] for name, errors in self.errors.items()})
 
     def record(self, strategy: Strategy | None = None) -> Record:
         """Fly it once more and keep everything.
@@ -189,12 +186,13 @@ class _Search:
         self.history: list[tuple[int, float]] = []
         self._seed, self._keep_set = seed, keep_set
         self._strategy = strategy or make_strategy(scenario.strategy)
-        self._name = scenario.strategy if strategy is None else type(strategy).__name__
+        self._strategy_name = scenario.strategy if strategy is None else type(strategy).__name__
         self._lower, self._upper = corners(scenario.set_model.bounds)
         self._random = np.random.default_rng(seed)
         # What else is random is that of run 0 in every engagement, so that the worst can be flown again alone.
         self._draws = draw(self.scenario, [0], seed)
-        self._steps: int = self._draws.angle.shape[1]
+        self._steps = self._draws.steps
+        self._names = tuple(dict.fromkeys((*ROWS, *scenario.sensors)))
         self._constructions: list[str] = []
         self._elite: Flown | None = None
 
@@ -217,15 +215,13 @@ class _Search:
         return WorstEngagement(
             scenario=replace(self.scenario, dispersion=StateBox(z, x, vz, vx)),
             seed=self._seed,
-            strategy=self._name,
+            strategy=self._strategy_name,
             miss_m=float(elite.value[0]),
             outcome=elite.outcomes[0],
             truth_kept=bool(elite.truth_kept[0]),
             position_m=start[:2],
             velocity_m_s=start[2:],
-            angle_errors=elite.errors[0, ANGLE],
-            range_errors=elite.errors[0, RANGE],
-            rate_errors=elite.errors[0, RATE],
+            errors=dict(zip(self._names, elite.errors[0], strict=True)),
             construction=self._constructions[int(elite.plans.lineage[0])],
             changes=int(elite.plans.changes[0]),
             evaluations=self.evaluations,
@@ -234,14 +230,13 @@ class _Search:
 
     def _fly(self, plans: Plans, tie: TieRule | None) -> Flown:
         size = len(plans)
-        alike = {
-            each.name: np.repeat(value, size, axis=0)
-            for each in fields(self._draws)
-            if (value := getattr(self._draws, each.name)) is not None
-        }
-        alike |= {"position_m": plans.start[:, :2].copy(), "velocity_m_s": plans.start[:, 2:].copy()}
-        draws = replace(self._draws, **alike)
-        noise = PlannedNoise(plans, tie)
+        execution, target = (
+            None if drawn is None else np.repeat(drawn, size, axis=0)
+            for drawn in (self._draws.execution, self._draws.target)
+        )
+        tie_draws = np.repeat(self._draws.tie, size, axis=0)
+        draws = Draws(plans.start[:, :2].copy(), plans.start[:, 2:].copy(), {}, tie_draws, execution, target)
+        noise = PlannedNoise(plans, tie, self._names)
         flight = Engagements(self.scenario, draws, self._strategy, noise=noise, guarantee=False)
         while flight.flying:
             flight.advance()
@@ -293,7 +288,9 @@ class _Search:
                 continue
             start = self._starts(share)
             angle, given = maker(share, start)
-            others = np.repeat(self._random.choice([-1.0, 0.0, 1.0], (share, 2, 1)), self._steps, axis=2)
+            others = np.repeat(
+                self._random.choice([-1.0, 0.0, 1.0], (share, len(self._names) - 1, 1)), self._steps, axis=2
+            )
             sequence = np.concatenate([angle[:, None], others], axis=1)
             lineage = len(self._constructions) + np.arange(share)
             self._constructions += [name] * share
@@ -400,12 +397,14 @@ class _Search:
         else:
             plans.given[i, span] = True
             anything = self._random.uniform(-1.0, 1.0)
-            plans.sequence[i, :, span] = self._random.choice([-1.0, 0.0, 1.0, anything], (3, 1))
+            plans.sequence[i, :, span] = self._random.choice([-1.0, 0.0, 1.0, anything], (len(self._names), 1))
 
     def _move_error(self, plans: Plans, i: int) -> None:
         """Change the size of the given errors of a block."""
         span = self._span(plans, i)
-        moved = plans.sequence[i, :, span] + 10.0 ** self._random.uniform(-2.0, 0.0) * self._random.normal(size=(3, 1))
+        moved = plans.sequence[i, :, span] + 10.0 ** self._random.uniform(-2.0, 0.0) * self._random.normal(
+            size=(len(self._names), 1)
+        )
         given = plans.given[i, span]
         plans.sequence[i, :, span] = np.where(given, np.clip(moved, -1.0, 1.0), plans.sequence[i, :, span])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,8 @@ from sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-START, ANGLE, RANGE, TIE, RATE, EXECUTION, TARGET = range(7)
+START, TIE, EXECUTION, TARGET = 0, 3, 5, 6
+"""Streams of a run; each kind of sensor has its own as well (`Sensor.stream`)."""
 MOST_STEPS = 100_000
 """Steps of a flight: what is random in it is drawn before it begins."""
 
@@ -28,21 +29,26 @@ class Draws:
     ----------
     position_m, velocity_m_s : ndarray, shape (B, 2)
         Relative (z, x) and (V_z, V_x) of the truth at t = 0.
-    angle, range, tie : ndarray, shape (B, steps)
-        Uniform in [-1, 1]: errors of the angle and of the range in units of their bounds, and choices between ties.
-        Zeros where the scenario has no range meter, or does not choose between ties at random.
-    rate, execution, target : ndarray, shape (B, steps), or None
-        The same for the angular rate, the size of impulses, and the target's changes of side; None is zero.
+    errors : mapping of str to ndarray, shape (B, steps)
+        Measurement errors by sensor, uniform in [-1, 1], in units of their bounds.
+    tie : ndarray, shape (B, steps)
+        Choices between ties, uniform in [-1, 1]; zeros if the scenario does not choose at random.
+    execution, target : ndarray, shape (B, steps), or None
+        Errors of the impulses in units of their bound, and the target's changes of side, uniform in [-1, 1]; None
+        is zero.
     """
 
     position_m: Floats
     velocity_m_s: Floats
-    angle: Floats
-    range: Floats
+    errors: Mapping[str, Floats]
     tie: Floats
-    rate: Floats | None = None
     execution: Floats | None = None
     target: Floats | None = None
+
+    @property
+    def steps(self) -> int:
+        """Number of steps for which numbers are drawn."""
+        return int(self.tie.shape[1])
 
 
 def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
@@ -78,10 +84,8 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
     return Draws(
         states[:, :2],
         states[:, 2:],
-        angle=uniform(ANGLE),
-        range=uniform(RANGE) if scenario.range_sensor is not None else nothing,
+        errors={name: uniform(sensor.stream) for name, sensor in scenario.sensors.items()},
         tie=uniform(TIE) if scenario.noise is NoiseKind.GAME and scenario.tie is TieRule.RANDOM else nothing,
-        rate=uniform(RATE) if scenario.rate_sensor is not None else None,
         execution=uniform(EXECUTION) if scenario.thruster.execution_error_relative > 0.0 else None,
         target=uniform(TARGET) if scenario.target is not None else None,
     )

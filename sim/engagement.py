@@ -18,10 +18,11 @@ from guidance import (
     Strategy,
     make_strategy,
 )
-from guidance.noise import checked_measurement
+from guidance.noise import checked_measurements
 from guidance.strategy import checked_impulses
 from infoset import InformationSet, InformationSetView, PredictedMiss
 from infoset.information_set_view import MaskedFloats, MaskedIntegers
+from infoset.sensors import Measurements
 from sim.draws import Draws
 from sim.gravity import on_board_model
 from sim.kepler import KeplerMotion, Sight, TrueMotion
@@ -48,8 +49,8 @@ class Step:
         Engagements whose truth had not passed its closest approach.
     sight : Sight
         True geometry.
-    measured_angle_rad, measured_range_m, measured_rate_rad_s : ndarray, shape (B,), or None
-        None where nothing was measured in this step.
+    measured : mapping of str to ndarray, shape (B,)
+        Values measured in this step, by sensor.
     predicted_miss : PredictedMiss
         After the measurement, before the impulse.
     impulse_m_s : ndarray, shape (B,)
@@ -63,9 +64,7 @@ class Step:
     tracking: Flags
     flying: Flags
     sight: Sight
-    measured_angle_rad: Floats | None
-    measured_range_m: Floats | None
-    measured_rate_rad_s: Floats | None
+    measured: Measurements
     predicted_miss: PredictedMiss
     impulse_m_s: Floats
     information: InformationSetView
@@ -116,12 +115,11 @@ class Engagements:
         arrival_s = self._truth.arrival_s()
         self._information = InformationSet(model, batch, guarantee=guarantee)
         self._view = self._information.view()
-        rate_error = scenario.rate_sensor.error_rad_s if scenario.rate_sensor is not None else 0.0
-        self._truth_section = TruthSection(model, rate_error)
+        self._truth_section = TruthSection(model)
         self._arrival_s = arrival_s
-        self._angle_every = scenario.set_model.steps_in(scenario.set_model.angle_sensor.period_s)
-        self._range_every = scenario.set_model.steps_in(scenario.range_sensor.period_s) if scenario.range_sensor else 0
-        self._rate_every = scenario.set_model.steps_in(scenario.rate_sensor.period_s) if scenario.rate_sensor else 0
+        self._sensors = scenario.sensors
+        self._every = {name: model.steps_in(sensor.period_s) for name, sensor in self._sensors.items()}
+        self._measured: dict[str, Floats] = {}
         self._flying = np.ones(batch, dtype=bool)
         self._arrived = np.zeros(batch, dtype=bool)
         self._tracking = np.ones(batch, dtype=bool)
@@ -131,14 +129,11 @@ class Engagements:
         self._spent = np.zeros(batch, dtype=bool)
         self._guaranteed = np.zeros(batch)
         self._finished_label = np.zeros(batch, dtype=bool)
-        self._measured_angle: Floats | None = None
-        self._measured_range: Floats | None = None
-        self._measured_rate: Floats | None = None
 
     @property
     def flying(self) -> bool:
         """Whether any truth has yet to pass its closest approach, or x = 0: until then its label may still leave."""
-        return bool((self._flying | ~self._arrived).any()) and self.step < self._draws.angle.shape[1]
+        return bool((self._flying | ~self._arrived).any()) and self.step < self._draws.steps
 
     @property
     def inconsistency(self) -> tuple[MaskedIntegers, MaskedFloats]:
@@ -156,10 +151,10 @@ class Engagements:
         model, thruster = self.scenario.set_model, self.scenario.thruster
         sight = self._truth.sight()
         self._tracking = self._flying & self._information.tracking
-        measured_angle, measured_range, measured_rate = self._measure(sight)
+        measured = self._measure(sight)
         miss = self._information.predicted_miss()
         tracking = self._tracking = self._tracking & self._information.tracking
-        wanted = np.where(tracking, self._decide(miss), 0.0)
+        wanted = np.where(tracking, self._decide(miss, measured), 0.0)
         self._spent |= (self._budget < thruster.least_impulse_m_s) & (np.abs(wanted) >= thruster.least_impulse_m_s)
         self._impulse = thruster.give(wanted, self._budget)
         if observe is not None:
@@ -170,9 +165,7 @@ class Engagements:
                     tracking,
                     self._flying.copy(),
                     sight,
-                    measured_angle,
-                    measured_range,
-                    measured_rate,
+                    measured,
                     miss,
                     self._impulse,
                     self._view,
@@ -210,47 +203,20 @@ class Engagements:
         ahead_s = self.step * self.scenario.set_model.step_s + self._truth.arrival_s()
         return np.where(self._flying, ahead_s, self._arrival_s)
 
-    def _measure(self, sight: Sight) -> tuple[Floats | None, Floats | None, Floats | None]:
-        """Measure what is due, cut the sets by it, and return angle, range and rate."""
-        if not self._tracking.any():
-            return None, None, None
-        sensor, rate_sensor = self.scenario.range_sensor, self.scenario.rate_sensor
-        looking = self.step % self._angle_every == 0
-        ranging = sensor is not None and self.step % self._range_every == 0
-        rating = rate_sensor is not None and self.step % self._rate_every == 0
-        if not (looking or ranging or rating):
-            return None, None, None
-        asked = LineOfSight(
-            self.step,
-            sight.alpha_rad,
-            sight.range_m,
-            self.scenario.set_model.angle_sensor,
-            sensor.relative_error if sensor is not None and ranging else None,
-            sight.omega_rad_s,
-            rate_sensor.error_rad_s if rate_sensor is not None and rating else None,
-        )
-        measurement = checked_measurement(self._noise.measure(asked, self._view), asked, self._noise)
-        if measurement.range_m is not None and sensor is not None:
-            self._information.measure_range(
-                measurement.range_m,
-                sensor.relative_error,
-                self._tracking,
-                alpha_rad=measurement.alpha_rad if looking else None,
-            )
-            self._measured_range = measurement.range_m
-        if looking and measurement.alpha_rad is not None:
-            self._information.measure_angle(measurement.alpha_rad, self._tracking)
-            self._measured_angle = measurement.alpha_rad
-        if measurement.omega_rad_s is not None and rate_sensor is not None:
-            self._information.measure_rate(measurement.omega_rad_s, rate_sensor.error_rad_s, self._tracking)
-            self._measured_rate = measurement.omega_rad_s
-        self._truth_section.measure(
-            measurement.alpha_rad if looking else None,
-            measurement.omega_rad_s,
-            self._tracking,
-            sight,
-        )
-        return measurement.alpha_rad if looking else None, measurement.range_m, measurement.omega_rad_s
+    def _measure(self, sight: Sight) -> Measurements:
+        """Measure with the sensors that are due, and cut the sets."""
+        due = {name: sensor for name, sensor in self._sensors.items() if self.step % self._every[name] == 0}
+        if not due or not self._tracking.any():
+            return {}
+        asked = LineOfSight(self.step, sight.alpha_rad, sight.omega_rad_s, sight.range_m, due)
+        measured = checked_measurements(self._noise.measure(asked, self._view), asked, self._noise)
+        self._truth_section.look(self._tracking, sight)
+        for name, sensor in due.items():
+            if name in measured:
+                sensor.cut(self._information, measured, self._tracking)
+                sensor.cut(self._truth_section, measured, self._tracking)
+        self._measured = self._measured | measured
+        return measured
 
     def _executed(self, impulse: Floats) -> Floats:
         """What becomes of commanded impulses."""
@@ -267,7 +233,7 @@ class Engagements:
         predicted = (sight.omega_rad_s * sight.range_m - self._impulse) * left
         return acceleration_m_s2(target, self._draws.target, self.step, step_s, predicted)
 
-    def _decide(self, miss: PredictedMiss) -> Floats:
+    def _decide(self, miss: PredictedMiss, measured: Measurements) -> Floats:
         situation = Situation(
             time_s=self.step * self.scenario.set_model.step_s,
             step=self.step,
@@ -276,14 +242,11 @@ class Engagements:
             budget_left_m_s=self._budget.copy(),
             thruster=self.scenario.thruster,
             closing_speed_m_s=self.scenario.set_model.closing_speed_m_s,
-            measured_angle_rad=self._measured_angle,
-            measured_range_m=self._measured_range,
-            measured_rate_rad_s=self._measured_rate,
+            measured=self._measured,
             last_impulse_m_s=self._impulse.copy(),
             information=self._view,
-            angle_is_new=self.step % self._angle_every == 0,
-            range_is_new=self._range_every > 0 and self.step % self._range_every == 0,
-            range_sensor=self.scenario.range_sensor,
+            new=frozenset(measured),
+            sensors=self._sensors,
         )
         wanted = self._strategy.decide(situation, self._state)
         return checked_impulses(wanted, self._tracking, self._strategy, self.step)
@@ -339,4 +302,4 @@ def _outcome(diverged: bool, lost: bool, spent: bool) -> Outcome:
 def _make_noise(scenario: Scenario, draws: Draws) -> MeasurementNoise:
     if scenario.noise is NoiseKind.GAME:
         return GameNoise(scenario.tie, draws.tie)
-    return RandomNoise(draws.angle, draws.range, draws.rate)
+    return RandomNoise(draws.errors)

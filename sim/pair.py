@@ -100,9 +100,8 @@ def fly_pair(
     """
     steps = pair.acceleration_m_s2.shape[1] + STEPS_BEYOND
     nothing = np.zeros((2, steps))
-    draws = Draws(pair.position_m, pair.velocity_m_s, nothing, nothing, nothing)
-    model = scenario.set_model
-    noise = PairNoise(pair.last_common_step, model.steps_in(model.angle_sensor.period_s))
+    draws = Draws(pair.position_m, pair.velocity_m_s, {}, nothing)
+    noise = PairNoise(pair.last_common_step)
     truth = ScheduledMotion(pair.position_m, pair.velocity_m_s, scenario.sun, pair.acceleration_m_s2)
     flight = Engagements(scenario, draws, strategy, truth, noise)
     impulses: list[Floats] = []

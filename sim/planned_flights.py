@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance import GameNoise, LineOfSight, Measurement, TieRule
+from guidance import GameNoise, LineOfSight, TieRule
 from guidance.scripted_noise import errors_made, measure_with_errors
 from guidance.switching_noise import SwitchingNoise
 from infoset import InformationSetView
+from infoset.sensors import Measurements
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Counts = NDArray[np.int64]
-ANGLE, RANGE, RATE = range(3)
+ROWS = ("angle", "range", "rate")
+"""Sensors of a sequence's first rows, on board or not: the random numbers of a search depend on the number of rows."""
+ANGLE = 0
 
 
 @dataclass(frozen=True)
@@ -26,8 +30,8 @@ class Plans:
     ----------
     start : ndarray, shape (n, 4)
         z, x, V_z, V_x at t = 0, m and m/s.
-    sequence : ndarray, shape (n, 3, steps)
-        For angle, range and rate: errors in units of their bounds.
+    sequence : ndarray, shape (n, rows, steps)
+        Errors in units of their bounds, one row per sensor, `ROWS` first.
     given : ndarray of bool, shape (n, steps)
         Whether the errors of a step are those of the sequence. Elsewhere the upper extreme of the predicted miss is
         kept where the angle's element is not negative, the lower one where it is.
@@ -60,17 +64,20 @@ class PlannedNoise:
     Parameters
     ----------
     plans : Plans
+    names : sequence of str
+        Sensors of the rows of a sequence.
     tie : TieRule or None
         How equals are told apart where an extreme is kept; None lets every step choose its side (`SwitchingNoise`).
 
     Attributes
     ----------
-    errors : ndarray, shape (n, 3, steps)
-        Made so far, in units of their bounds.
+    errors : ndarray, shape (n, rows, steps)
+        Errors made so far, in units of their bounds; zero where nothing was measured.
     """
 
     plans: Plans
     tie: TieRule | None
+    names: Sequence[str]
     errors: Floats = field(init=False)
 
     def __post_init__(self) -> None:
@@ -79,18 +86,15 @@ class PlannedNoise:
         tie = TieRule.RANDOM if self.tie is None else self.tie
         self._keeping = (SwitchingNoise if self.tie is None else GameNoise)(tie, sequence[:, ANGLE])
 
-    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
-        """Return what this step measures, shape (n,) each; where nothing is planned the set is looked at."""
-        step = sight.step
-        kept = np.stack(errors_made(sight, self._keeping.measure(sight, predicted)), axis=1)
-        errors = np.where(self.plans.given[:, None, step], self.plans.sequence[:, :, step], kept)
-        # What is not measured in this step has no error, whatever was planned.
-        if sight.range_error is None:
-            errors[:, RANGE] = 0.0
-        if sight.rate_error_rad_s is None:
-            errors[:, RATE] = 0.0
-        self.errors[:, :, step] = errors
-        return measure_with_errors(sight, errors[:, ANGLE], errors[:, RANGE], errors[:, RATE])
+    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
+        """Return the measurements of this step: with planned errors, or those that keep an extreme of the set."""
+        step, given = sight.step, self.plans.given[:, sight.step]
+        kept = errors_made(sight, self._keeping.measure(sight, predicted))
+        rows = {name: row for row, name in enumerate(self.names) if name in sight.sensors}
+        errors = {name: np.where(given, self.plans.sequence[:, row, step], kept[name]) for name, row in rows.items()}
+        for name, row in rows.items():
+            self.errors[:, row, step] = errors[name]
+        return measure_with_errors(sight, errors)
 
 
 @dataclass(frozen=True)
@@ -102,8 +106,8 @@ class Flown:
     plans : Plans
     value : ndarray, shape (n,)
         The miss, m, or -inf where the engagement does not count.
-    errors : ndarray, shape (n, 3, steps)
-        Made in units of their bounds.
+    errors : ndarray, shape (n, rows, steps)
+        Errors made, in units of their bounds.
     outcomes : ndarray of Outcome, shape (n,)
     truth_kept : ndarray of bool, shape (n,)
     """

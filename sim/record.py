@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance import MeasurementNoise, Strategy
 from infoset import Section
-from infoset.information_set_view import MaskedFloats
 from infoset.limits import WHOLE
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.pictures import course_html
 from sim.results import Results
 from sim.scenario import Scenario, strategy_name
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -28,8 +24,8 @@ class StepRecord:
     Parameters
     ----------
     time_s : float
-    measured_angle_rad, measured_range_m, measured_rate_rad_s : float or None
-        None where nothing was measured.
+    measured : mapping of str to float
+        Values measured in this step by sensor: "angle" (rad), "range" (m), "rate" (rad/s).
     true_angle_rad, true_rate_rad_s, true_range_m : float
         Line of sight of the truth.
     impulse_m_s : float
@@ -43,9 +39,7 @@ class StepRecord:
     """
 
     time_s: float
-    measured_angle_rad: float | None
-    measured_range_m: float | None
-    measured_rate_rad_s: float | None
+    measured: Mapping[str, float]
     true_angle_rad: float
     true_rate_rad_s: float
     true_range_m: float
@@ -134,9 +128,7 @@ class _Recorder:
         self.steps.append(
             StepRecord(
                 time_s=step.time_s,
-                measured_angle_rad=_first(step.measured_angle_rad),
-                measured_range_m=_first(step.measured_range_m),
-                measured_rate_rad_s=_first(step.measured_rate_rad_s),
+                measured={name: float(values[0]) for name, values in step.measured.items()},
                 true_angle_rad=float(step.sight.alpha_rad[0]),
                 true_rate_rad_s=float(step.sight.omega_rad_s[0]),
                 true_range_m=float(step.sight.range_m[0]),
@@ -146,10 +138,6 @@ class _Recorder:
                 sections=tuple(step.information.sections()),
             )
         )
-
-
-def _first(values: Floats | MaskedFloats | None) -> float | None:
-    return None if values is None else values[:1].tolist()[0]
 
 
 def fly_one(
@@ -192,13 +180,13 @@ def fly_one(
     while flight.flying:
         flight.advance(recorder)
         if progress is not None:
-            progress(min(1.0, flight.step / draws.angle.shape[1]))
+            progress(min(1.0, flight.step / draws.steps))
     name = strategy_name(scenario, strategy)
     own = None if noise is None else getattr(noise, "name", type(noise).__name__)
-    step, label = flight.inconsistency
-    found = Inconsistency(int(step[0]), float(label[0])) if step.count() else None
+    at_step, label = flight.inconsistency
+    found = Inconsistency(int(at_step[0]), float(label[0])) if at_step.count() else None
     margins = flight.truth_margins_m()
     steps = tuple(
-        replace(each, truth_margin_m=_first(margin)) for each, margin in zip(recorder.steps, margins, strict=True)
+        replace(step, truth_margin_m=margin.tolist()[0]) for step, margin in zip(recorder.steps, margins, strict=True)
     )
     return Record(scenario, seed, run, name, flight.results(np.array([run])), steps, own, found)

@@ -12,7 +12,7 @@ from guidance.strategy import Strategy
 from guidance.thruster import Thruster
 from infoset.limits import Limits, NotNegative, Positive, check_fields
 from infoset.model import SetModel, StateBox
-from infoset.sensors import RangeSensor, RateSensor
+from infoset.sensors import RangeSensor, RateSensor, Sensor
 
 _DIRECTION = Limits(least=-2.0 * math.pi, most=2.0 * math.pi)
 
@@ -144,6 +144,12 @@ class Scenario:
                 f"sun.distance_m must be greater than the greatest possible range, {greatest:g} m: "
                 f"got {self.sun.distance_m!r}"
             )
+
+    @property
+    def sensors(self) -> dict[str, Sensor]:
+        """Sensors on board by name, in the order in which a step applies their measurements."""
+        fitted = (self.range_sensor, self.set_model.angle_sensor, self.rate_sensor)
+        return {sensor.name: sensor for sensor in fitted if sensor is not None}
 
 
 def strategy_name(scenario: Scenario, own: Strategy | None) -> str:

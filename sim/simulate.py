@@ -68,7 +68,7 @@ def simulate(
         chunk = numbers[first : first + at_once]
         draws = draw(scenario, chunk.tolist(), seed)
         flight = Engagements(scenario, draws, strategy, guarantee=guarantee)
-        steps = draws.angle.shape[1]
+        steps = draws.steps
         while flight.flying:
             flight.advance()
             if progress is not None:

@@ -6,10 +6,10 @@ of time. So what happens is noted in flight, and judged afterwards.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from infoset import SetModel
 from infoset.history import History
@@ -30,10 +30,10 @@ class _Step:
     """What one step did to the sections, and where the truth was when it measured; None where it did not."""
 
     where: Flags | None = None
-    alpha_rad: Floats | None = None
-    omega_rad_s: Floats | None = None
     slope: Floats | None = None
     slope_rate_per_s: Floats | None = None
+    alpha_rad: Floats | None = None
+    rates: list[tuple[Floats, float]] = field(default_factory=list)
     impulse_m_s: Floats | None = None
 
 
@@ -43,8 +43,6 @@ class TruthSection:
     Parameters
     ----------
     model : SetModel
-    rate_error_rad_s : float
-        Error bound of a measured rate, rad/s; zero where there is no such sensor.
 
     Notes
     -----
@@ -52,20 +50,31 @@ class TruthSection:
     x / (1 + eta), so its label is e T with T the time when x = 0.
     """
 
-    def __init__(self, model: SetModel, rate_error_rad_s: float) -> None:
+    def __init__(self, model: SetModel) -> None:
         self._law = section_law(model)
         self._exact_angles = model.is_guaranteed
         self._least_range_m = model.least_range_m
-        self._rate_error = rate_error_rad_s * (1.0 + BOUND_SLACK)
         self._steps = [_Step()]
 
-    def measure(self, alpha_rad: Floats | None, omega_rad_s: Floats | None, where: Flags, sight: Sight) -> None:
-        """Note what was measured, of which flights, and where the truth was."""
+    def look(self, where: Flags, sight: Sight) -> None:
+        """Note which flights measure in this step, and where the true states are."""
         slope, rate = sight.alpha_rad, sight.omega_rad_s
         if self._exact_angles:
             slope, rate = sight.slope, sight.slope_rate_per_s
-        alpha, omega = (None if each is None else each.copy() for each in (alpha_rad, omega_rad_s))
-        self._steps[-1] = _Step(where.copy(), alpha, omega, slope, rate)
+        self._steps[-1] = _Step(where.copy(), slope, rate)
+
+    def measure_angle(self, alpha_rad: Floats, where: Flags) -> None:
+        """Note a measured angle."""
+        self._steps[-1].alpha_rad = alpha_rad.copy()
+
+    def measure_range(
+        self, range_m: Floats, relative_error: float, where: Flags, *, alpha_rad: ArrayLike | None
+    ) -> None:
+        """Do nothing: a range selects labels and leaves the true state's section as it is."""
+
+    def measure_rate(self, omega_rad_s: Floats, error_rad_s: float, where: Flags) -> None:
+        """Note a measured rate."""
+        self._steps[-1].rates.append((omega_rad_s.copy(), error_rad_s * (1.0 + BOUND_SLACK)))
 
     def shift(self, impulse_m_s: Floats) -> None:
         """Note an impulse."""
@@ -103,8 +112,8 @@ class TruthSection:
                 if step.alpha_rad is not None:
                     history.record(ANGLE, step.alpha_rad, where)
                     stack.measure_angle(where, step.alpha_rad, elapsed, elapsed)
-                if step.omega_rad_s is not None:
-                    stack.measure_rate(where, step.omega_rad_s, self._rate_error, elapsed, elapsed, history)
+                for omega, error in step.rates:
+                    stack.measure_rate(where, omega, error, elapsed, elapsed, history)
                 z = step.slope * ranges
                 v = step.slope_rate_per_s * ranges - self._law.closing_speed * step.slope
                 now = stack.margins(v, z, elapsed)

@@ -25,7 +25,6 @@ from guidance import (
     GameNoise,
     Kalman,
     LeastSquares,
-    Measurement,
     Patient,
     RandomNoise,
     ScriptedNoise,
@@ -384,13 +383,12 @@ def test_points_of_three_coordinates_are_no_points() -> None:
 )
 def test_what_are_no_errors_of_a_noise(draws: Any) -> None:
     zeros = np.zeros((1, 3))
-    refused(lambda: RandomNoise(draws, zeros), "angle_draws")
-    refused(lambda: RandomNoise(zeros, draws), "range_draws")
+    refused(lambda: RandomNoise({"angle": draws}), "errors['angle']")
+    refused(lambda: RandomNoise({"angle": zeros, "range": draws}), "errors['range']")
     refused(lambda: GameNoise(TieRule.UPPER, draws), "tie_draws")
     refused(lambda: GameNoise("upper", zeros), "tie")  # type: ignore[arg-type]
-    if draws is not None:
-        refused(lambda: ScriptedNoise(draws), "angle_errors")
-        refused(lambda: RandomNoise(zeros, zeros, draws), "rate_draws")
+    refused(lambda: ScriptedNoise({"angle": draws}), "errors['angle']")
+    refused(lambda: RandomNoise({"angle": zeros, "range": zeros, "rate": draws}), "errors['rate']")
 
 
 class Returns:
@@ -406,7 +404,7 @@ class Returns:
         return np.zeros(1) if situation.step == 0 else self.value
 
     def measure(self, sight: Any, predicted: Any) -> Any:
-        honest = Measurement(sight.alpha_rad, None)
+        honest = {"angle": sight.alpha_rad}
         return honest if sight.step == 0 else self.value(sight) if callable(self.value) else self.value
 
 
@@ -433,14 +431,15 @@ def test_what_a_strategy_must_not_want(wanted: Any, brief: Scenario) -> None:
 @pytest.mark.parametrize(
     ("measured", "name"),
     [
-        (None, "Measurement"),
-        (0.001, "Measurement"),
-        (Measurement(np.array([math.nan]), None), "alpha_rad"),
-        (Measurement(np.array([0.0, 0.0]), None), "alpha_rad"),
-        (Measurement(np.array([1j]), None), "alpha_rad"),
-        (Measurement(np.ma.masked_array([0.0], [True]), None), "alpha_rad"),
-        (lambda sight: Measurement(sight.alpha_rad, sight.range_m), "range_m must be None"),
-        (lambda sight: Measurement(sight.alpha_rad, None, sight.omega_rad_s), "omega_rad_s must be None"),
+        (None, "must return a mapping"),
+        (0.001, "must return a mapping"),
+        ({"angle": None}, "angle"),
+        ({"angle": np.array([math.nan])}, "angle"),
+        ({"angle": np.array([0.0, 0.0])}, "angle"),
+        ({"angle": np.array([1j])}, "angle"),
+        ({"angle": np.ma.masked_array([0.0], [True])}, "angle"),
+        (lambda sight: {"angle": sight.alpha_rad, "range": sight.range_m}, "sensor 'range' does not measure"),
+        (lambda sight: {"angle": sight.alpha_rad, "rate": sight.omega_rad_s}, "sensor 'rate' does not measure"),
     ],
 )
 def test_what_a_noise_must_not_measure(measured: Any, name: str, brief: Scenario) -> None:
@@ -452,22 +451,18 @@ def test_sensors_that_measure_now_and_then_are_asked_now_and_then(brief: Scenari
     scenario = replace(brief, range_sensor=RangeSensor(2 * step_s, 0.05), rate_sensor=RateSensor(3 * step_s, 1e-4))
 
     class Honest:
-        def measure(self, sight: Any, predicted: Any) -> Measurement:
-            asked_range, asked_rate = sight.range_error is not None, sight.rate_error_rad_s is not None
-            assert (asked_range, asked_rate) == (sight.step % 2 == 0, sight.step % 3 == 0)
-            return Measurement(
-                sight.alpha_rad, sight.range_m if asked_range else None, sight.omega_rad_s if asked_rate else None
-            )
+        def measure(self, sight: Any, predicted: Any) -> Any:
+            assert ("range" in sight.sensors, "rate" in sight.sensors) == (sight.step % 2 == 0, sight.step % 3 == 0)
+            return {name: sensor.true_value(sight) for name, sensor in sight.sensors.items()}
 
     record = fly_one(scenario, noise=Honest(), strategy=SymmetricMiss())
     for number, step in enumerate(record.steps):
-        if step.measured_angle_rad is not None:
-            assert (step.measured_range_m is None) == (number % 2 != 0)
-            assert (step.measured_rate_rad_s is None) == (number % 3 != 0)
+        if "angle" in step.measured:
+            assert ("range" in step.measured) == (number % 2 == 0)
+            assert ("rate" in step.measured) == (number % 3 == 0)
     always = replace(scenario, rate_sensor=None)
-    refused(
-        lambda: fly_one(always, noise=Returns(lambda s: Measurement(s.alpha_rad, s.range_m))), "range_m must be None"
-    )
+    both = Returns(lambda sight: {"angle": sight.alpha_rad, "range": sight.range_m})
+    refused(lambda: fly_one(always, noise=both), "sensor 'range' does not measure at this step, only ['angle']")
 
 
 @pytest.mark.parametrize("sample", [[], [math.nan], [1.0, math.inf], [1j], np.ma.masked_array([1.0], [True]), ["a"]])

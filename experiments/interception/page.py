@@ -12,6 +12,7 @@ from experiments.common.page_packing import packed_counts, packed_floats, packed
 from experiments.interception.record_titles import outcome_title, record_titles
 from experiments.interception.replayed_sets import replayed
 from infoset import Section
+from infoset.sensors import SENSORS
 from sim import Record
 
 MOST_RECORDS = 2
@@ -64,9 +65,7 @@ def _data(record: Record, title: str) -> dict[str, object]:
         "greatest_impulse_m_s": thruster.greatest_impulse_m_s,
         "budget_m_s": thruster.budget_m_s,
         "time_s": [step.time_s for step in steps],
-        "measured_angle_rad": [step.measured_angle_rad for step in steps],
-        "measured_range_m": [step.measured_range_m for step in steps],
-        "measured_rate_rad_s": [step.measured_rate_rad_s for step in steps],
+        **{f"measured_{kind.quantity}": [step.measured.get(kind.name) for step in steps] for kind in SENSORS},
         "true_angle_rad": [step.true_angle_rad for step in steps],
         "true_rate_rad_s": [step.true_rate_rad_s for step in steps],
         "true_range_m": [step.true_range_m for step in steps],

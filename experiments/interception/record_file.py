@@ -30,6 +30,7 @@ from experiments.common.toml_values import shown
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
 from infoset import ConvexPolygons, Section
 from infoset.limits import LARGEST, SMALLEST
+from infoset.sensors import SENSORS
 from sim import Inconsistency, Record, Results, Scenario, StepRecord
 from sim.columns import Column, columns_of, values_of
 
@@ -49,12 +50,11 @@ _FLOAT, _FLAG, _COUNT, _BYTE = "<f8", "|b1", "<i8", "|u1"
 _MEMBERS: Mapping[str, tuple[str, int]] = {
     "header": (_BYTE, _ANY),
     "time_s": (_FLOAT, _STEPS),
-    "angle_measured": (_FLAG, _STEPS),
-    "measured_angle_rad": (_FLOAT, _STEPS),
-    "range_measured": (_FLAG, _STEPS),
-    "measured_range_m": (_FLOAT, _STEPS),
-    "rate_measured": (_FLAG, _STEPS),
-    "measured_rate_rad_s": (_FLOAT, _STEPS),
+    **{
+        name: (kind, _STEPS)
+        for sensor in SENSORS
+        for name, kind in ((f"{sensor.name}_measured", _FLAG), (f"measured_{sensor.quantity}", _FLOAT))
+    },
     "true_angle_rad": (_FLOAT, _STEPS),
     "true_rate_rad_s": (_FLOAT, _STEPS),
     "true_range_m": (_FLOAT, _STEPS),
@@ -204,19 +204,15 @@ def _to_arrays(record: Record) -> Arrays:
     def optional(values: list[float | None]) -> tuple[NDArray[np.bool_], Floats]:
         return np.array([value is not None for value in values], dtype=bool), _floats(value or 0.0 for value in values)
 
-    angle_measured, measured_angle = optional([step.measured_angle_rad for step in steps])
-    range_measured, measured_range = optional([step.measured_range_m for step in steps])
-    rate_measured, measured_rate = optional([step.measured_rate_rad_s for step in steps])
+    measured: Arrays = {}
+    for sensor in SENSORS:
+        values = optional([step.measured.get(sensor.name) for step in steps])
+        measured[f"{sensor.name}_measured"], measured[f"measured_{sensor.quantity}"] = values
     miss_exists = np.array([step.predicted_miss_m is not None for step in steps], dtype=bool)
     margin_known, margin = optional([step.truth_margin_m for step in steps])
     return {
         "time_s": _floats(step.time_s for step in steps),
-        "angle_measured": angle_measured,
-        "measured_angle_rad": measured_angle,
-        "range_measured": range_measured,
-        "measured_range_m": measured_range,
-        "rate_measured": rate_measured,
-        "measured_rate_rad_s": measured_rate,
+        **measured,
         "true_angle_rad": _floats(step.true_angle_rad for step in steps),
         "true_rate_rad_s": _floats(step.true_rate_rad_s for step in steps),
         "true_range_m": _floats(step.true_range_m for step in steps),
@@ -485,11 +481,15 @@ def _to_steps(arrays: Arrays, scenario: Scenario) -> tuple[StepRecord, ...]:
             for known, value in zip(arrays[mask].tolist(), arrays[values].tolist(), strict=True)
         ]
 
+    measured: list[dict[str, float]] = [{} for _ in ends[1:]]
+    for sensor in SENSORS:
+        values = optional(f"{sensor.name}_measured", f"measured_{sensor.quantity}")
+        for step, value in zip(measured, values, strict=True):
+            if value is not None:
+                step[sensor.name] = value
     columns = zip(
         arrays["time_s"].tolist(),
-        optional("angle_measured", "measured_angle_rad"),
-        optional("range_measured", "measured_range_m"),
-        optional("rate_measured", "measured_rate_rad_s"),
+        measured,
         arrays["true_angle_rad"].tolist(),
         arrays["true_rate_rad_s"].tolist(),
         arrays["true_range_m"].tolist(),

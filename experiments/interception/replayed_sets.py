@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from experiments.common.errors import InputError
 from experiments.common.toml_values import shown
 from infoset import InformationSet, Section
@@ -57,14 +59,10 @@ def replayed(record: Record) -> Iterator[Stages]:
     information = InformationSet(on_board_model(scenario))
     for number, step in enumerate(record.steps):
         before = tuple(information.sections())
-        if step.measured_range_m is not None and scenario.range_sensor is not None:
-            information.measure_range(
-                step.measured_range_m, scenario.range_sensor.relative_error, alpha_rad=step.measured_angle_rad
-            )
-        if step.measured_angle_rad is not None:
-            information.measure_angle(step.measured_angle_rad)
-        if step.measured_rate_rad_s is not None and scenario.rate_sensor is not None:
-            information.measure_rate(step.measured_rate_rad_s, scenario.rate_sensor.error_rad_s)
+        values = {name: np.array([value]) for name, value in step.measured.items()}
+        for name, sensor in scenario.sensors.items():
+            if name in values:
+                sensor.cut(information, values, np.array([True]))
         measured = tuple(information.sections())
         if [section.label_m for section in measured] != [section.label_m for section in step.sections]:
             raise InputError(

@@ -93,13 +93,14 @@ def numbers(scenario: Scenario, seed: int, batch: int = 3) -> Draws:
         return np.clip(generator.uniform(-2.0, 2.0, (batch, steps)), -1.0, 1.0)
 
     states = least + (greatest - least) * generator.uniform(size=(batch, 4))
+    errors, tie = {name: uniform() for name in ("angle", "range")}, uniform()
+    if scenario.rate_sensor is not None:
+        errors["rate"] = uniform()
     return Draws(
         states[:, :2],
         states[:, 2:],
-        angle=uniform(),
-        range=uniform(),
-        tie=uniform(),
-        rate=uniform() if scenario.rate_sensor is not None else None,
+        errors=errors,
+        tie=tie,
         target=uniform() if scenario.target is not None else None,
     )
 
@@ -148,9 +149,8 @@ def mirrored(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
         draws,
         position_m=draws.position_m * flip,
         velocity_m_s=draws.velocity_m_s * flip,
-        angle=-draws.angle,
+        errors={name: errors if name == "range" else -errors for name, errors in draws.errors.items()},
         tie=-draws.tie,
-        rate=None if draws.rate is None else -draws.rate,
         target=None if draws.target is None else -draws.target,
     )
 

@@ -67,7 +67,7 @@ def sharp_sensor() -> Scenario:
 )
 def test_the_truth_is_kept(scenario: Scenario) -> None:
     draws = draw(scenario, range(20), 0)
-    extremal = replace(draws, angle=np.where(draws.angle < 0.0, -1.0, 1.0))
+    extremal = replace(draws, errors={**draws.errors, "angle": np.where(draws.errors["angle"] < 0.0, -1.0, 1.0)})
     there = fly(scenario, extremal, steps=20 if scenario.sun is not None else None)
     assert Outcome.SET_LOST not in there.results.outcomes
     assert there.results.truth_kept.all()
@@ -79,8 +79,7 @@ def test_the_predicted_miss_covers_the_section() -> None:
     scenario = engagement(1e-5, 1.0, 1.0, 1, step, Model.PAPER, error=0.1, speed_error=0.0)
     scenario = replace(scenario, rate_sensor=RateSensor(step, 1.0000000000000002e-06))
     draws = numbers(scenario, 0)
-    assert draws.rate is not None
-    draws = replace(draws, angle=0.99 * draws.angle, range=0.99 * draws.range, rate=0.99 * draws.rate)
+    draws = replace(draws, errors={name: 0.99 * errors for name, errors in draws.errors.items()})
     least: list[tuple[float, float]] = []
 
     def look(step: Step) -> None:

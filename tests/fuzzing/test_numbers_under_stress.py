@@ -237,8 +237,7 @@ def assert_scales(
 ) -> None:
     draws = numbers(scenario, seed)
     if tolerance > 0.0:
-        rate = None if draws.rate is None else 0.99 * draws.rate
-        draws = replace(draws, angle=0.99 * draws.angle, range=0.99 * draws.range, rate=rate)
+        draws = replace(draws, errors={name: 0.99 * errors for name, errors in draws.errors.items()})
     steps = max(3, int(2e2 / scenario.set_model.step_s))
     one = fly(scenario, draws, strategy_of(kind, 1.0), steps)
     other = fly(*scaled(scenario, draws, length, time), strategy_of(kind, time), steps)

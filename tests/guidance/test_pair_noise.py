@@ -8,6 +8,7 @@ from guidance.pair_noise import PairNoise, middle
 from guidance.situation import Situation
 from infoset import AngleSensor, InformationSet, InformationSetView, RangeSensor, RateSensor, SetModel, StateBox
 from infoset.model import InitialSet, Model
+from infoset.sensors import Sensor
 from sim import Scenario, Sun
 from sim.bound import TruthPair, lower_bound
 from sim.pair import PairFlight, ScheduledMotion, fly_pair
@@ -18,15 +19,16 @@ QUICK = 4
 SENSOR = AngleSensor(1.0, 0.001, 0.002, 1000.0)
 
 
-def sight(step: int, *, range_error: float | None = None, rate_error: float | None = None) -> LineOfSight:
+METER, RATE = RangeSensor(1.0, 0.1), RateSensor(1.0, 4.0)
+
+
+def sight(step: int, *sensors: Sensor) -> LineOfSight:
     return LineOfSight(
         step,
         np.array([0.010, 0.012, -0.5, -0.501]),
-        np.array([1000.0, 1000.0, 500.0, 502.0]),
-        SENSOR,
-        range_error,
         np.array([1.0, 2.0, 3.0, 5.0]),
-        rate_error,
+        np.array([1000.0, 1000.0, 500.0, 502.0]),
+        {sensor.name: sensor for sensor in sensors},
     )
 
 
@@ -38,32 +40,27 @@ def nothing_known() -> InformationSetView:
 
 def test_pairs_are_measured_in_the_middle_until_it_is_late(nothing_known: InformationSetView) -> None:
     noise = PairNoise(3)
-    common = noise.measure(sight(3, range_error=0.1, rate_error=4.0), nothing_known)
-    assert common.alpha_rad is not None
-    assert common.alpha_rad == pytest.approx([0.011, 0.011, -0.5005, -0.5005])
-    assert common.range_m == pytest.approx([1000.0, 1000.0, 501.0, 501.0])
-    assert common.omega_rad_s == pytest.approx([1.5, 1.5, 4.0, 4.0])
-    assert common.alpha_rad[0] == common.alpha_rad[1]
+    common = noise.measure(sight(3, SENSOR, METER, RATE), nothing_known)
+    assert common["angle"] == pytest.approx([0.011, 0.011, -0.5005, -0.5005])
+    assert common["range"] == pytest.approx([1000.0, 1000.0, 501.0, 501.0])
+    assert common["rate"] == pytest.approx([1.5, 1.5, 4.0, 4.0])
+    assert common["angle"][0] == common["angle"][1]
     assert noise.greatest_share == pytest.approx(1.0)  # the first pair, 0.001 of 0.001
-    honest = noise.measure(sight(4, range_error=0.1, rate_error=4.0), nothing_known)
-    assert honest.alpha_rad is not None
-    assert np.array_equal(honest.alpha_rad, sight(4).alpha_rad)
-    assert honest.range_m is not None
-    assert np.array_equal(honest.range_m, sight(4).range_m)
-    assert honest.omega_rad_s is not None
+    honest = noise.measure(sight(4, SENSOR, METER, RATE), nothing_known)
+    assert np.array_equal(honest["angle"], sight(4).alpha_rad)
+    assert np.array_equal(honest["range"], sight(4).range_m)
+    assert np.array_equal(honest["rate"], sight(4).omega_rad_s)
 
 
-def test_errors_of_angles_that_nobody_measures_do_not_count(nothing_known: InformationSetView) -> None:
-    noise = PairNoise(3, angle_every=2)
-    noise.measure(sight(3, range_error=0.1), nothing_known)
+def test_only_sensors_that_measure_count(nothing_known: InformationSetView) -> None:
+    noise = PairNoise(3)
+    noise.measure(sight(3, METER), nothing_known)
     assert noise.greatest_share == pytest.approx(1.0 / 50.0)  # 1 m of 50 m
 
 
 def test_what_is_not_measured_is_not_given(nothing_known: InformationSetView) -> None:
     for step in (0, 9):
-        found = PairNoise(3).measure(sight(step), nothing_known)
-        assert found.range_m is None
-        assert found.omega_rad_s is None
+        assert set(PairNoise(3).measure(sight(step, SENSOR), nothing_known)) == {"angle"}
 
 
 def test_middle_is_the_same_number_for_both() -> None:

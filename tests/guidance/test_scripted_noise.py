@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from guidance import GameNoise, LineOfSight, Measurement
+from guidance import GameNoise, LineOfSight
 from guidance.noise import TieRule
 from guidance.scripted_noise import ScriptedNoise, errors_made, measure_with_errors
 from guidance.switching_noise import SwitchingNoise
-from infoset import AngleSensor, InformationSet, SetModel, StateBox
+from infoset import AngleSensor, InformationSet, RangeSensor, RateSensor, SetModel, StateBox
+from infoset.sensors import Sensor
 
 SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)
 MODEL = SetModel(
@@ -36,15 +37,13 @@ def _compiled() -> None:
 
 def sight(alpha: Any, distance: Any, step: int = 0, ranging: bool = True, rating: bool = True) -> LineOfSight:
     alpha = np.atleast_1d(np.asarray(alpha, dtype=np.float64))
-    return LineOfSight(
-        step,
-        alpha,
-        np.broadcast_to(np.float64(distance), alpha.shape).copy(),
-        SENSOR,
-        0.05 if ranging else None,
-        0.1 * alpha,
-        1e-6 if rating else None,
-    )
+    sensors: dict[str, Sensor] = {"angle": SENSOR}
+    if ranging:
+        sensors["range"] = RangeSensor(0.5, 0.05)
+    if rating:
+        sensors["rate"] = RateSensor(0.5, 1e-6)
+    distance = np.broadcast_to(np.float64(distance), alpha.shape).copy()
+    return LineOfSight(step, alpha, 0.1 * alpha, distance, sensors)
 
 
 def looked_at() -> Any:
@@ -60,14 +59,12 @@ def test_what_is_measured_stays_within_the_bounds_to_rounding(
     alpha: float, distance: float, angle: float, far: float, fast: float
 ) -> None:
     seen = sight(alpha, distance)
-    found = ScriptedNoise(*(np.array([[each]]) for each in (angle, far, fast))).measure(seen, looked_at())
-    assert found.alpha_rad is not None
-    assert found.range_m is not None
-    assert found.omega_rad_s is not None
+    script = {name: np.array([[error]]) for name, error in (("angle", angle), ("range", far), ("rate", fast))}
+    found = ScriptedNoise(script).measure(seen, looked_at())
     bound = SENSOR.error_bound(distance)
-    assert abs(found.alpha_rad[0] - alpha) <= bound + ROUNDING * (abs(alpha) + bound)
-    assert abs(found.range_m[0] - distance) <= 0.05 * distance * (1.0 + 20.0 * ROUNDING)
-    assert abs(found.omega_rad_s[0] - 0.1 * alpha) <= 1e-6 + ROUNDING * (abs(alpha) + 1e-6)
+    assert abs(found["angle"][0] - alpha) <= bound + ROUNDING * (abs(alpha) + bound)
+    assert abs(found["range"][0] - distance) <= 0.05 * distance * (1.0 + 20.0 * ROUNDING)
+    assert abs(found["rate"][0] - 0.1 * alpha) <= 1e-6 + ROUNDING * (abs(alpha) + 1e-6)
 
 
 @given(st.floats(-0.01, 0.01), st.floats(1e3, 7e6), errors, errors, errors)
@@ -75,40 +72,41 @@ def test_errors_are_found_again_from_what_was_measured(
     alpha: float, distance: float, angle: float, far: float, fast: float
 ) -> None:
     seen = sight(alpha, distance)
-    given_errors = [np.array([each]) for each in (angle, far, fast)]
-    found = errors_made(seen, measure_with_errors(seen, *given_errors))
-    assert all(np.abs(each).max() <= 1.0 for each in found)
+    given_errors = {"angle": np.array([angle]), "range": np.array([far]), "rate": np.array([fast])}
+    found = errors_made(seen, measure_with_errors(seen, given_errors))
+    assert all(np.abs(error).max() <= 1.0 for error in found.values())
     # A rounding of the measured value, in units of the bound.
-    np.testing.assert_allclose(found[0], angle, atol=ROUNDING * (1.0 + abs(alpha) / SENSOR.error_bound(distance)))
-    np.testing.assert_allclose(found[1], far, atol=20.0 * ROUNDING)
-    np.testing.assert_allclose(found[2], fast, atol=ROUNDING * (1.0 + abs(alpha) / 1e-6))
+    np.testing.assert_allclose(found["angle"], angle, atol=ROUNDING * (1.0 + abs(alpha) / SENSOR.error_bound(distance)))
+    np.testing.assert_allclose(found["range"], far, atol=20.0 * ROUNDING)
+    np.testing.assert_allclose(found["rate"], fast, atol=ROUNDING * (1.0 + abs(alpha) / 1e-6))
 
 
 def test_extremal_errors_are_the_ends_of_what_the_truth_allows() -> None:
     seen = sight([0.001, -0.002], 3e6)
     for end in (-1.0, 1.0):
-        found = ScriptedNoise(np.full((2, 1), end), np.full((2, 1), end)).measure(seen, looked_at())
-        assert same(found.alpha_rad, seen.alpha_rad + end * SENSOR.error_bound(3e6))
-        assert same(found.range_m, seen.range_m * (1.0 + 0.05 * end))
+        script = np.full((2, 1), end)
+        found = ScriptedNoise({"angle": script, "range": script}).measure(seen, looked_at())
+        assert same(found["angle"], seen.alpha_rad + end * SENSOR.error_bound(3e6))
+        assert same(found["range"], seen.range_m * (1.0 + 0.05 * end))
 
 
 def test_each_step_and_engagement_has_its_own_error() -> None:
     script = np.array([[0.0, 0.25, -1.0], [1.0, -0.5, 0.125]])
-    noise = ScriptedNoise(script)
+    noise = ScriptedNoise({"angle": script})
     for step in range(3):
         seen = sight([0.0, 0.0], 3e6, step=step)
         found = noise.measure(seen, looked_at())
-        assert same(found.alpha_rad, SENSOR.error_bound(3e6) * script[:, step])
-        assert same(found.range_m, seen.range_m)
-        assert same(found.omega_rad_s, seen.omega_rad_s)
+        assert same(found["angle"], SENSOR.error_bound(3e6) * script[:, step])
+        assert same(found["range"], seen.range_m)
+        assert same(found["rate"], seen.omega_rad_s)
 
 
 def test_what_the_sensors_do_not_measure_is_not_given() -> None:
     seen = sight(0.001, 3e6, ranging=False, rating=False)
-    found = ScriptedNoise(np.ones((1, 1)), np.ones((1, 1)), np.ones((1, 1))).measure(seen, looked_at())
-    assert found.range_m is None
-    assert found.omega_rad_s is None
-    assert [each.tolist() for each in errors_made(seen, Measurement(seen.alpha_rad, None))] == [[0.0]] * 3
+    script = dict.fromkeys(("angle", "range", "rate"), np.ones((1, 1)))
+    assert set(ScriptedNoise(script).measure(seen, looked_at())) == {"angle"}
+    made = errors_made(seen, {"angle": seen.alpha_rad})
+    assert {name: error.tolist() for name, error in made.items()} == {"angle": [0.0]}
 
 
 @pytest.mark.parametrize("bad", [1.0 + 1e-15, -2.0, np.nan, np.inf])
@@ -116,24 +114,21 @@ def test_an_error_beyond_its_bound_is_refused(bad: float) -> None:
     good = np.zeros((2, 3))
     spoilt = good.copy()
     spoilt[1, 2] = bad
-    with pytest.raises(ValueError, match=r"angle_errors must lie within \[-1, 1\]"):
-        ScriptedNoise(spoilt)
-    with pytest.raises(ValueError, match=r"range_errors must lie within \[-1, 1\]"):
-        ScriptedNoise(good, spoilt)
-    with pytest.raises(ValueError, match=r"rate_errors must lie within \[-1, 1\]"):
-        ScriptedNoise(good, None, spoilt)
+    for name in ("angle", "range", "rate"):
+        with pytest.raises(ValueError, match=rf"errors\['{name}'\] must lie within \[-1, 1\]"):
+            ScriptedNoise({"angle": good} | {name: spoilt})
 
 
 def test_scripts_of_another_shape_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"range_errors must have the shape \(B, steps\), the same for all"):
-        ScriptedNoise(np.zeros((2, 3)), np.zeros((2, 4)))
-    with pytest.raises(ValueError, match="angle_errors must have the shape"):
-        ScriptedNoise(np.zeros(3))
+    with pytest.raises(ValueError, match=r"one shape \(B, steps\) for all sensors: got \[\(2, 3\), \(2, 4\)\]"):
+        ScriptedNoise({"angle": np.zeros((2, 3)), "range": np.zeros((2, 4))})
+    with pytest.raises(ValueError, match=r"errors\['angle'\] must have the shape"):
+        ScriptedNoise({"angle": np.zeros(3)})
 
 
 def test_a_script_that_ends_before_the_flight_is_refused() -> None:
-    with pytest.raises(ValueError, match="the errors are given for 3 steps, and step 3 has none"):
-        ScriptedNoise(np.zeros((1, 3))).measure(sight(0.0, 3e6, step=3), looked_at())
+    with pytest.raises(ValueError, match=r"errors\['angle'\] has 3 steps, none for step 3"):
+        ScriptedNoise({"angle": np.zeros((1, 3))}).measure(sight(0.0, 3e6, step=3), looked_at())
 
 
 def test_switching_noise_is_the_game_where_both_extremes_are_equally_bad_and_keeps_its_order_elsewhere() -> None:
@@ -141,9 +136,7 @@ def test_switching_noise_is_the_game_where_both_extremes_are_equally_bad_and_kee
     seen = sight(0.0, 5801.3e3, ranging=False, rating=False)
 
     def measured(noise: GameNoise) -> float:
-        alpha = noise.measure(seen, information.view()).alpha_rad
-        assert alpha is not None
-        return float(alpha[0])
+        return float(noise.measure(seen, information.view())["angle"][0])
 
     upper, lower = (SwitchingNoise(TieRule.RANDOM, np.array([[sign]])) for sign in (1.0, -1.0))
     unused = np.zeros((1, 1))

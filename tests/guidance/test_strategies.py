@@ -61,8 +61,7 @@ def situation(
         budget_left_m_s=np.array([budget]),
         thruster=THRUSTER,
         closing_speed_m_s=E,
-        measured_angle_rad=None,
-        measured_range_m=None,
+        measured={},
         last_impulse_m_s=np.zeros(1),
         information=InformationSet(MODEL).view(),
     )
@@ -155,25 +154,26 @@ SENSOR = RangeSensor(period_s=2.0, relative_error=0.05)
 
 def guide(strategy: Strategy, truth: Straight, meter: bool, sign: float = 1.0) -> tuple[Straight, list[float]]:
     """Guide along straight motion with measurements that do not err; the impulses given."""
-    state, given, impulses, angle = strategy.start(1), 0.0, [], None
-    distance = None
+    state, given, impulses = strategy.start(1), 0.0, []
+    measured: dict[str, np.ndarray[tuple[int], np.dtype[np.float64]]] = {}
     view = InformationSet(MODEL).view()
     nothing = situation(0.0, 0.0)
     step = 0
     while truth.x > 0.0:
         ranging = meter and step % 4 == 0
-        angle = np.array([np.arctan2(sign * truth.z, truth.x)])
-        distance = np.array([np.hypot(truth.z, truth.x)]) if ranging else distance
+        new = {"angle": np.array([np.arctan2(sign * truth.z, truth.x)])}
+        if ranging:
+            new["range"] = np.array([np.hypot(truth.z, truth.x)])
+        measured = measured | new
         now = replace(
             nothing,
             time_s=0.5 * step,
             step=step,
-            measured_angle_rad=angle,
-            measured_range_m=distance,
+            measured=measured,
             last_impulse_m_s=np.array([given]),
             information=view,
-            range_is_new=ranging,
-            range_sensor=SENSOR if meter else None,
+            new=frozenset(new),
+            sensors={"range": SENSOR} if meter else {},
         )
         given = float(THRUSTER.give(strategy.decide(now, state), np.array([1000.0]))[0])
         impulses.append(given)
@@ -202,12 +202,14 @@ def test_estimators_find_the_motion_without_noise(make: Callable[[], Strategy]) 
             situation(0.0, 0.0),
             time_s=0.5 * step,
             step=step,
-            measured_angle_rad=np.array([np.arctan2(truth.z, truth.x)]),
-            measured_range_m=np.array([np.hypot(truth.z, truth.x)]),
+            measured={
+                "angle": np.array([np.arctan2(truth.z, truth.x)]),
+                "range": np.array([np.hypot(truth.z, truth.x)]),
+            },
             last_impulse_m_s=np.array([last]),
             information=view,
-            range_is_new=step % 4 == 0,
-            range_sensor=SENSOR,
+            new=frozenset({"angle", "range"} if step % 4 == 0 else {"angle"}),
+            sensors={"range": SENSOR},
         )
         strategy.decide(now, state)
         last = 1.0 if step % 40 == 20 else 0.0
@@ -240,9 +242,9 @@ def test_estimators_mirror(make: Callable[[], Strategy], meter: bool) -> None:
 def test_an_angle_that_is_not_new_tells_nothing(make: Callable[[], Strategy]) -> None:
     strategy = make()
     state = strategy.start(1)
-    first = replace(situation(0.0, 0.0), measured_angle_rad=np.array([1e-3]))
+    first = replace(situation(0.0, 0.0), measured={"angle": np.array([1e-3])}, new=frozenset({"angle"}))
     strategy.decide(first, state)
-    again = replace(first, step=1, time_s=0.5, angle_is_new=False)
+    again = replace(first, step=1, time_s=0.5, new=frozenset())
     if isinstance(state, KalmanState):
         before = state.covariance[0, :, 0, 0].copy()
         strategy.decide(again, state)
@@ -290,7 +292,7 @@ def mirrored(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
         draws,
         position_m=draws.position_m * flip,
         velocity_m_s=draws.velocity_m_s * flip,
-        angle=-draws.angle,
+        errors={**draws.errors, "angle": -draws.errors["angle"]},
         tie=-draws.tie,
     )
 

@@ -38,12 +38,7 @@ def assert_flies_again(found: WorstEngagement) -> None:
     """Alone with everything kept, and in other company, to the last bit."""
     assert float(found.record().result.miss_m[0]) == found.miss_m
     company = 3
-    noise = ScriptedNoise(
-        *(
-            np.repeat(each[None], company, axis=0)
-            for each in (found.angle_errors, found.range_errors, found.rate_errors)
-        )
-    )
+    noise = ScriptedNoise({name: np.repeat(each[None], company, axis=0) for name, each in found.errors.items()})
     flight = Engagements(found.scenario, draw(found.scenario, [0] * company, found.seed), noise=noise)
     while flight.flying:
         flight.advance()
@@ -58,15 +53,15 @@ def assert_possible(found: WorstEngagement, scenario: Scenario) -> None:
     assert (start <= upper).all()
     assert corners(found.scenario.dispersion)[0].tolist() == corners(found.scenario.dispersion)[1].tolist()
     assert corners(found.scenario.dispersion)[0].tolist() == start.tolist()
-    for errors in (found.angle_errors, found.range_errors, found.rate_errors):
+    for errors in found.errors.values():
         assert np.abs(errors).max() <= 1.0
 
 
 def test_what_is_found_is_possible_and_flies_again(worst: WorstEngagement, coarse: Scenario) -> None:
     assert_possible(worst, coarse)
     assert_flies_again(worst)
-    assert np.abs(worst.angle_errors).max() == 1.0
-    assert not worst.range_errors.any()
+    assert np.abs(worst.errors["angle"]).max() == 1.0
+    assert not worst.errors["range"].any()
     assert worst.record().noise_name == "scripted"
 
 
@@ -74,9 +69,9 @@ def test_measurements_of_the_worst_lie_within_the_bounds_of_the_truth(worst: Wor
     record, sensor = worst.record(), worst.scenario.set_model.angle_sensor
     assert len(record.steps) > 150
     for step in record.steps:
-        if step.measured_angle_rad is not None:
+        if "angle" in step.measured:
             bound = sensor.error_bound(step.true_range_m)
-            assert abs(step.measured_angle_rad - step.true_angle_rad) <= bound * (1.0 + 1e-12)
+            assert abs(step.measured["angle"] - step.true_angle_rad) <= bound * (1.0 + 1e-12)
 
 
 @pytest.mark.parametrize("name", ["ranging", "comet"])
@@ -88,8 +83,8 @@ def test_with_all_sensors_in_the_guaranteed_model(name: str, request: pytest.Fix
     found = find_worst(scenario, budget=24, seed=2)
     assert_possible(found, scenario)
     assert_flies_again(found)
-    assert found.range_errors.any()
-    assert found.rate_errors.any()
+    assert found.errors["range"].any()
+    assert found.errors["rate"].any()
     assert found.truth_kept
 
 
@@ -106,7 +101,7 @@ def test_the_search_keeps_its_account(worst: WorstEngagement) -> None:
 def test_the_same_seed_finds_the_same_whatever_the_threads(worst: WorstEngagement, coarse: Scenario) -> None:
     again = find_worst(coarse, budget=BUDGET, seed=1, threads=2)
     assert (again.miss_m, again.history) == (worst.miss_m, worst.history)
-    assert np.array_equal(again.angle_errors, worst.angle_errors)
+    assert np.array_equal(again.errors["angle"], worst.errors["angle"])
     assert np.array_equal(again.position_m, worst.position_m)
     other = find_worst(coarse, budget=20, seed=2)
     assert other.history[0] != worst.history[0]

@@ -41,7 +41,8 @@ def mirror(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
         tie=swapped.get(scenario.tie, scenario.tie),
     )
     flip = np.array([-1.0, 1.0])
-    return mirrored, Draws(draws.position_m * flip, draws.velocity_m_s * flip, -draws.angle, draws.range, -draws.tie)
+    errors = {**draws.errors, "angle": -draws.errors["angle"]}
+    return mirrored, Draws(draws.position_m * flip, draws.velocity_m_s * flip, errors, -draws.tie)
 
 
 @pytest.mark.parametrize("name", ["asteroid", "ranging", "comet"])

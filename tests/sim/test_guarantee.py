@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from guidance import LineOfSight, Measurement, NoiseKind, RandomNoise
+from guidance import LineOfSight, NoiseKind, RandomNoise
 from infoset import InformationSetView, InitialSet, Model, RateSensor, StateBox
 from infoset.section_law import section_law
 from sim import Manoeuvre, Outcome, Results, Scenario, Sun, Target, simulate
@@ -214,21 +214,19 @@ class Faulty:
         self._inner, self._fault = inner, fault
         self._stuck: Floats | None = None
 
-    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
-        honest = self._inner.measure(sight, predicted)
-        assert honest.alpha_rad is not None
-        bound = sight.angle_sensor.error_bound(sight.range_m)
-        alpha: Floats | None = honest.alpha_rad
+    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> dict[str, Floats]:
+        measured = dict(self._inner.measure(sight, predicted))
+        bound, honest = sight.sensors["angle"].bound(sight), measured["angle"]
         if self._fault == "outlier" and sight.step == 100:
-            alpha = sight.alpha_rad + 5.0 * bound
+            measured["angle"] = sight.alpha_rad + 5.0 * bound
         elif self._fault == "bias":
-            alpha = honest.alpha_rad + 1.5 * bound
+            measured["angle"] = honest + 1.5 * bound
         elif self._fault == "stuck" and 60 <= sight.step < 120:
-            self._stuck = honest.alpha_rad if self._stuck is None else self._stuck
-            alpha = self._stuck
+            self._stuck = honest if self._stuck is None else self._stuck
+            measured["angle"] = self._stuck
         elif self._fault == "dropout" and 80 <= sight.step < 86:
-            alpha = None
-        return Measurement(alpha, honest.range_m)
+            del measured["angle"]
+        return measured
 
 
 @pytest.mark.parametrize("model", [Model.PAPER, Model.GUARANTEED])
@@ -242,7 +240,7 @@ def test_faulty_sensors_are_told_and_survived(
         box = replace(scenario.set_model, kind=model, initial_set=InitialSet.BOX)
         scenario = replace(scenario, set_model=box)
     draws = draw(scenario, range(30), 0)
-    flight = Engagements(scenario, draws, noise=Faulty(RandomNoise(draws.angle, draws.range), fault))
+    flight = Engagements(scenario, draws, noise=Faulty(RandomNoise(draws.errors), fault))
     while flight.flying:
         flight.advance()
     results = flight.results(np.arange(30))

@@ -230,8 +230,8 @@ def test_living_labels_of_the_published_model_may_form_two_intervals() -> None:
     )  # fmt: skip
     scenario = Scenario("", "", None, range_m, box, model, None, Thruster(0.0, 0.1, 1.0))
     draws = draw(scenario, range(6), 170)
-    signs = np.where(draws.angle >= 0.0, 1.0, -1.0)
-    flight = Engagements(scenario, draws, noise=RandomNoise(signs, draws.range))
+    signs = np.where(draws.errors["angle"] >= 0.0, 1.0, -1.0)
+    flight = Engagements(scenario, draws, noise=RandomNoise({**draws.errors, "angle": signs}))
     views: list[InformationSetView] = []
     while flight.step < 15:
         flight.advance(lambda step: views.append(step.information))

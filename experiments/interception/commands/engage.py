@@ -17,22 +17,6 @@ if TYPE_CHECKING:
     from sim import Inconsistency, Record, Scenario
 
 BOTH = "both"
-COLUMNS = (
-    "noise",
-    "step",
-    "time_s",
-    "measured_angle_rad",
-    "measured_range_m",
-    "measured_rate_rad_s",
-    "true_angle_rad",
-    "true_rate_rad_s",
-    "true_range_m",
-    "impulse_m_s",
-    "predicted_miss_lower_m",
-    "predicted_miss_upper_m",
-    "truth_margin_m",
-    "sections",
-)
 
 
 def engage(
@@ -62,7 +46,7 @@ def engage(
     Run K is the same engagement, number for number, as run K of: infoset experiment with the same seed.
     Without --out, --json, --csv or --record nothing is written.
     """
-    from experiments.common.output import STDOUT, checked_destinations, deliver, library_version, to_csv, to_json
+    from experiments.common.output import STDOUT, checked_destinations, deliver, library_version, to_json
     from experiments.common.screen import say_warnings, tell_of_compiling
     from experiments.interception.choices import own_strategy, scenario_with
     from experiments.interception.scenario_file import scenario_hash, scenario_warnings
@@ -89,7 +73,7 @@ def engage(
         else:
             (whole,) = summaries.values()
         records = [each for each, _ in flights]
-        json_text, csv_text = to_json(whole), to_csv(COLUMNS, _rows(records))
+        json_text, csv_text = to_json(whole), _to_csv(records)
         deliver(json_, json_text, overwrite=overwrite)
         deliver(csv, csv_text, overwrite=overwrite)
         _write_records(records, records_at, overwrite)
@@ -153,6 +137,7 @@ def _summary(record: Record, elapsed_s: float, warnings: Sequence[str]) -> dict[
     from experiments.common.output import library_version, outcome_columns
     from experiments.interception.scenario_file import scenario_hash
     from guidance import NoiseKind
+    from infoset.sensors import SENSORS
 
     scenario = record.scenario
     return {
@@ -172,9 +157,7 @@ def _summary(record: Record, elapsed_s: float, warnings: Sequence[str]) -> dict[
         "steps": [
             {
                 "time_s": step.time_s,
-                "measured_angle_rad": step.measured_angle_rad,
-                "measured_range_m": step.measured_range_m,
-                "measured_rate_rad_s": step.measured_rate_rad_s,
+                **{f"measured_{kind.quantity}": step.measured.get(kind.name) for kind in SENSORS},
                 "true_angle_rad": step.true_angle_rad,
                 "true_rate_rad_s": step.true_rate_rad_s,
                 "impulse_m_s": step.impulse_m_s,
@@ -192,7 +175,15 @@ def _where(record: Record, found: Inconsistency) -> dict[str, object]:
     return {"step": found.step, "time_s": record.steps[found.step].time_s, "label_m": found.label_m}
 
 
-def _rows(records: Sequence[Record]) -> list[list[Cell]]:
+def _to_csv(records: Sequence[Record]) -> str:
+    from experiments.common.output import to_csv
+    from infoset.sensors import SENSORS
+
+    columns = (
+        *("noise", "step", "time_s", *(f"measured_{kind.quantity}" for kind in SENSORS)),
+        *("true_angle_rad", "true_rate_rad_s", "true_range_m", "impulse_m_s"),
+        *("predicted_miss_lower_m", "predicted_miss_upper_m", "truth_margin_m", "sections"),
+    )
     rows: list[list[Cell]] = []
     for record in records:
         for number, step in enumerate(record.steps):
@@ -202,9 +193,7 @@ def _rows(records: Sequence[Record]) -> list[list[Cell]]:
                     record.scenario.noise.value,
                     number,
                     step.time_s,
-                    step.measured_angle_rad,
-                    step.measured_range_m,
-                    step.measured_rate_rad_s,
+                    *(step.measured.get(kind.name) for kind in SENSORS),
                     step.true_angle_rad,
                     step.true_rate_rad_s,
                     step.true_range_m,
@@ -215,7 +204,7 @@ def _rows(records: Sequence[Record]) -> list[list[Cell]]:
                     len(step.sections),
                 ]
             )
-    return rows
+    return to_csv(columns, rows)
 
 
 def _write_records(records: Sequence[Record], paths: Sequence[Path], overwrite: bool) -> None:

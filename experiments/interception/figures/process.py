@@ -90,7 +90,7 @@ def draw_process(records: Sequence[Record]) -> Figure:
 
 
 def _draw_angle(axes: Axes, record: Record) -> None:
-    measured = [(step.time_s, step.measured_angle_rad) for step in record.steps if step.measured_angle_rad is not None]
+    measured = [(step.time_s, step.measured["angle"]) for step in record.steps if "angle" in step.measured]
     if measured:
         times, angles = np.array(measured).T
         axes.plot(
@@ -101,9 +101,7 @@ def _draw_angle(axes: Axes, record: Record) -> None:
 
 def _draw_rate(axes: Axes, record: Record) -> None:
     axes.axhline(0.0, color=LIMIT, linewidth=0.6)
-    measured = [
-        (step.time_s, step.measured_rate_rad_s) for step in record.steps if step.measured_rate_rad_s is not None
-    ]
+    measured = [(step.time_s, step.measured["rate"]) for step in record.steps if "rate" in step.measured]
     if measured:
         times, rates = np.array(measured).T
         axes.plot(times, rates * 1e6, ".", color=MEASURED, markersize=3.0, markeredgewidth=0.0)
@@ -224,7 +222,7 @@ def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], records: Sequence[Re
             axes.set_ylabel(label)
             axes.yaxis.label.set_visible(axes is row[0])
         row[0].yaxis.set_label_coords(-12.5 / width_mm(row[0]), 0.5)
-    rated = any(step.measured_rate_rad_s is not None for record in records for step in record.steps)
+    rated = any("rate" in step.measured for record in records for step in record.steps)
     measured = "measured angle and rate" if rated else "measured angle"
     handles = [
         Line2D([], [], color=TRUTH, label="true angle and rate"),
@@ -262,23 +260,21 @@ def _far(record: Record, share: float) -> NDArray[np.bool_]:
 def _angle_extent(record: Record) -> tuple[float, float]:
     far = _far(record, ANGLE_RANGE_SHARE)
     seen = [step.true_angle_rad for step, use in zip(record.steps, far, strict=True) if use]
-    seen += [
-        step.measured_angle_rad
-        for step, use in zip(record.steps, far, strict=True)
-        if use and step.measured_angle_rad is not None
-    ]
+    seen += _measured_where(record, far, "angle")
     return min(seen), max(seen)
 
 
 def _rate_extent(record: Record) -> tuple[float, float]:
     far = _far(record, RATE_RANGE_SHARE)
     seen = _rates(record)[far].tolist()
-    seen += [
-        step.measured_rate_rad_s
-        for step, use in zip(record.steps, far, strict=True)
-        if use and step.measured_rate_rad_s is not None
-    ]
+    seen += _measured_where(record, far, "rate")
     return min(seen), max(seen)
+
+
+def _measured_where(record: Record, chosen: NDArray[np.bool_], name: str) -> list[float]:
+    """Return what a sensor measured in the chosen steps."""
+    steps = zip(record.steps, chosen, strict=True)
+    return [step.measured[name] for step, use in steps if use and name in step.measured]
 
 
 def _marker(record: Record) -> str:

@@ -146,8 +146,8 @@ def draw_step(axes: Axes, step: StepRecord, chosen: Sequence[Section]) -> None:
     _label(axes, chosen, outlines)
     halo = [patheffects.withStroke(linewidth=3.2, foreground="white")]
     rate = step.true_rate_rad_s * 1e6
-    if step.measured_angle_rad is not None:
-        axes.plot(rate, step.measured_angle_rad * 1e3, zorder=5, label=MEASUREMENT_MARK, **_MEASUREMENT_LOOK)
+    if "angle" in step.measured:
+        axes.plot(rate, step.measured["angle"] * 1e3, zorder=5, label=MEASUREMENT_MARK, **_MEASUREMENT_LOOK)
     axes.plot(rate, step.true_angle_rad * 1e3, zorder=6, label=TRUTH_MARK, path_effects=halo, **_TRUTH_LOOK)
     if not outlines:
         axes.text(0.5, 0.94, "no section is left", transform=axes.transAxes, ha="center", va="top")
@@ -155,11 +155,11 @@ def draw_step(axes: Axes, step: StepRecord, chosen: Sequence[Section]) -> None:
 
 def _shade_allowed(axes: Axes, record: Record, step: StepRecord, chosen: Sequence[Section]) -> None:
     """Shade the angles that the measurement allows at the nearest and at the farthest section drawn."""
-    if step.measured_angle_rad is None or not chosen:
+    if "angle" not in step.measured or not chosen:
         return
     for section in (chosen[0], chosen[-1]):
         error = float(record.scenario.set_model.angle_sensor.error_bound(section.range_m))
-        low, high = ((step.measured_angle_rad + sign * error) * 1e3 for sign in (-1.0, 1.0))
+        low, high = ((step.measured["angle"] + sign * error) * 1e3 for sign in (-1.0, 1.0))
         axes.axhspan(low, high, color=MEASURED, alpha=0.09, linewidth=0.0, zorder=0.4)
 
 
@@ -264,8 +264,8 @@ def extent_of(step: StepRecord, chosen: Sequence[Section]) -> Floats:
     """
     rate, angle = step.true_rate_rad_s * 1e6, step.true_angle_rad * 1e3
     marks = [[rate, angle]]
-    if step.measured_angle_rad is not None:
-        marks.append([rate, step.measured_angle_rad * 1e3])
+    if "angle" in step.measured:
+        marks.append([rate, step.measured["angle"] * 1e3])
     return np.concatenate([np.array(marks), *(_outline(section) for section in chosen)])
 
 

@@ -118,9 +118,8 @@ def test_sets_show_truth_measurement_and_labelled_sections(records: list[Record]
         step = records[position % 2].steps[(1, 8, 16)[position // 2]]
         truth, measurement = line(axes, TRUTH_MARK), line(axes, MEASUREMENT_MARK)
         assert (truth.get_marker(), measurement.get_marker()) == ("x", "s")
-        assert step.measured_angle_rad is not None
         np.testing.assert_allclose(place(truth), (step.true_rate_rad_s * 1e6, step.true_angle_rad * 1e3))
-        np.testing.assert_allclose(place(measurement), (step.true_rate_rad_s * 1e6, step.measured_angle_rad * 1e3))
+        np.testing.assert_allclose(place(measurement), (step.true_rate_rad_s * 1e6, step.measured["angle"] * 1e3))
         assert sum(isinstance(patch, Polygon) for patch in axes.patches) == 5
         labels = {text.get_text() for text in axes.texts}
         assert {f"{step.sections[end].range_m / 1e3:.0f} km" for end in (0, -1)} <= labels

@@ -18,7 +18,7 @@ from experiments.common.errors import InputError
 from experiments.interception import record_file
 from experiments.interception.record_file import read_record, write_record
 from experiments.interception.scenario_file import load_scenario
-from guidance import LineOfSight, Measurement, NoiseKind, Situation
+from guidance import LineOfSight, NoiseKind, Situation
 from infoset import InformationSetView, RateSensor
 from sim import Record, StepRecord, fly_one
 
@@ -39,10 +39,9 @@ OUTLIER_AT = 60
 class Outlier:
     """Measures truly, but for one angle that is wrong by five times its bound."""
 
-    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurement:
-        wrong = 5.0 * sight.angle_sensor.error_bound(sight.range_m) if sight.step == OUTLIER_AT else 0.0
-        rate = None if sight.rate_error_rad_s is None else sight.omega_rad_s
-        return Measurement(sight.alpha_rad + wrong, None, rate)
+    def measure(self, sight: LineOfSight, predicted: InformationSetView) -> dict[str, Any]:
+        errors = {"angle": 5.0 if sight.step == OUTLIER_AT else 0.0, "rate": 0.0}
+        return {name: sight.sensors[name].measured(sight, errors[name]) for name in sight.sensors if name in errors}
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +114,7 @@ def test_a_record_of_ones_own_strategy(tmp_path: Path) -> None:
 def test_measured_rates_and_where_data_contradict_the_model_come_back(tmp_path: Path) -> None:
     scenario = dataclasses.replace(load_scenario("asteroid-1997-single"), rate_sensor=RateSensor(1.0, 1e-6))
     flown = fly_one(scenario, noise=Outlier())
-    assert [step.measured_rate_rad_s is None for step in flown.steps[:4]] == [False, True, False, True]
+    assert ["rate" not in step.measured for step in flown.steps[:4]] == [False, True, False, True]
     assert flown.inconsistency is not None
     assert flown.inconsistency.step == OUTLIER_AT
     write_record(flown, tmp_path / "x.npz")
@@ -125,8 +124,7 @@ def test_measured_rates_and_where_data_contradict_the_model_come_back(tmp_path: 
 def test_what_is_not_known_comes_back_as_not_known(record: Record, tmp_path: Path) -> None:
     blank = dataclasses.replace(
         record.steps[0],
-        measured_angle_rad=None,
-        measured_range_m=None,
+        measured={},
         predicted_miss_m=None,
         truth_margin_m=None,
         sections=(),
