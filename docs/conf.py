@@ -60,7 +60,7 @@ nitpick_ignore = [
         "guidance.least_squares": ("LeastSquaresState",),
         "infoset.history": ("History",),
         "infoset.section_stack": ("SectionStack",),
-        "infoset.sensors": ("RangeOrRanges",),
+        "infoset.sensors": ("RangeOrRanges", "Measurements", "Geometry", "Cuttable"),
         "rendezvous.pursuit_evasion._pair": ("Node",),
         "rendezvous.pursuit_evasion.paths": ("SteeredPath",),
         "rendezvous.reachability.sets": ("BlockSets",),
@@ -69,7 +69,7 @@ nitpick_ignore = [
         "rendezvous.reachability.optimum": ("BlockOptimum",),
         "sim.chunk": ("Chunk",),
         "sim.storage.campaign_folder": ("CampaignFolder", "Damage"),
-        "sim.storage.manifest": ("Axis", "Manifest"),
+        "sim.storage.manifest": ("Manifest",),
         "sim.campaign": ("Progress",),
     }.items()
     for name in names

@@ -1,18 +1,70 @@
-"""What people run: the command line, scenarios, figures and files."""
+"""Public interface of the commands' side: files, functions that take scenarios by name, and figures.
+
+Every name is loaded when it is first used, so that the command line starts without heavy libraries.
+"""
 
 from __future__ import annotations
 
 TYPE_CHECKING = False  # `typing` takes longer to import than all else before an interrupt can be caught
 if TYPE_CHECKING:
+    from experiments.interception.figures.bound import draw_bound
+    from experiments.interception.figures.process import draw_process
+    from experiments.interception.figures.sets import draw_sets
+    from experiments.interception.python_interface import find_worst, fly_one, lower_bound, plot, save, simulate
+    from experiments.interception.record_file import load_record
     from experiments.interception.scenario_file import load_scenario
+    from experiments.multipoint.file import load_multipoint
+    from experiments.pareto.figures import draw_trajectories
+    from experiments.pareto.file import load_pareto
+    from experiments.pursuit.figures import draw_distance
+    from experiments.pursuit.file import load_pursuit
+    from experiments.pursuit.map_figure import draw_map
+    from experiments.reachability.file import load_rendezvous
 
-__all__ = ["load_scenario"]
+_NAMES = {
+    "interception.scenario_file": ("load_scenario",),
+    "interception.record_file": ("load_record",),
+    "interception.python_interface": ("find_worst", "fly_one", "lower_bound", "plot", "save", "simulate"),
+    "interception.figures.bound": ("draw_bound",),
+    "interception.figures.process": ("draw_process",),
+    "interception.figures.sets": ("draw_sets",),
+    "pareto.file": ("load_pareto",),
+    "pareto.figures": ("draw_trajectories",),
+    "multipoint.file": ("load_multipoint",),
+    "reachability.file": ("load_rendezvous",),
+    "pursuit.file": ("load_pursuit",),
+    "pursuit.figures": ("draw_distance",),
+    "pursuit.map_figure": ("draw_map",),
+}
+"""Public names by module."""
+
+__all__ = [
+    "draw_bound",
+    "draw_distance",
+    "draw_map",
+    "draw_process",
+    "draw_sets",
+    "draw_trajectories",
+    "find_worst",
+    "fly_one",
+    "load_multipoint",
+    "load_pareto",
+    "load_pursuit",
+    "load_record",
+    "load_rendezvous",
+    "load_scenario",
+    "lower_bound",
+    "plot",
+    "save",
+    "simulate",
+]
 
 
 def __getattr__(name: str) -> object:
-    """Load what is exported when it is first asked for: the command line must start without it."""
-    if name == "load_scenario":
-        from experiments.interception.scenario_file import load_scenario
+    """Load a public name when it is first used."""
+    for module, names in _NAMES.items():
+        if name in names:
+            from importlib import import_module
 
-        return load_scenario
+            return getattr(import_module(f"experiments.{module}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -125,5 +125,5 @@ class MeasurementNoise(Protocol):
         Returns
         -------
         mapping of str to ndarray, shape (B,)
-            Measured values by sensor. A sensor that is left out gives no measurement in this step.
+            Measured values by sensor, rad, m or rad/s. A sensor that is left out gives no measurement in this step.
         """

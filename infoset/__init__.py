@@ -4,13 +4,17 @@ Start with `InformationSet` (a batch of sets carried through measurements, impul
 `ConvexPolygons` (operations on batches of convex polygons).
 """
 
+from importlib.metadata import version
+
 from infoset.convex_polygons import ConvexPolygons
 from infoset.information_set import InformationSet
 from infoset.information_set_view import InformationSetView, Section, SetStatus, to_omega_alpha
 from infoset.model import InitialSet, Model, Recovery, SetModel, StateBox
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
-from infoset.sensors import AngleSensor, RangeSensor, RateSensor
-from infoset.shapes import to_shapely
+from infoset.sensors import AngleSensor, RangeSensor, RateSensor, Sensor
+from infoset.shapes import from_shapely, to_shapely
+
+__version__ = version("infoset")
 
 __all__ = [
     "AngleSensor",
@@ -25,9 +29,11 @@ __all__ = [
     "RateSensor",
     "Recovery",
     "Section",
+    "Sensor",
     "SetModel",
     "SetStatus",
     "StateBox",
+    "from_shapely",
     "to_omega_alpha",
     "to_shapely",
 ]

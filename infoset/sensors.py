@@ -5,6 +5,7 @@ A kind of sensor is one class here: what it measures, its error bound, and the c
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Protocol, TypeVar
@@ -51,7 +52,7 @@ class Cuttable(Protocol):
         """Cut by a rate of the line of sight."""
 
 
-class Sensor:
+class Sensor(ABC):
     """A sensor that measures one quantity of the line of sight, with a bounded error.
 
     Attributes
@@ -69,24 +70,62 @@ class Sensor:
     stream: ClassVar[int]
     period_s: float
 
+    @abstractmethod
     def true_value(self, sight: Geometry) -> Floats:
-        """Return the measured quantity without error, shape (B,)."""
-        raise NotImplementedError
+        """Return the measured quantity without error, shape (B,).
 
+        Parameters
+        ----------
+        sight : Geometry
+            True geometry, or any other points with angle, rate and range.
+        """
+
+    @abstractmethod
     def bound(self, sight: Geometry) -> Floats | float:
-        """Return the greatest size of the error, in the unit of the quantity."""
-        raise NotImplementedError
+        """Return the greatest size of the error, in the unit of the quantity.
 
+        Parameters
+        ----------
+        sight : Geometry
+            True geometry.
+        """
+
+    @abstractmethod
     def cut(self, sets: Cuttable, measured: Measurements, where: NDArray[np.bool_]) -> None:
-        """Cut sets, where flagged, by this sensor's measurement among those of one step."""
-        raise NotImplementedError
+        """Cut sets by the measurement of this sensor.
+
+        Parameters
+        ----------
+        sets : Cuttable
+            Sets of a batch, for example an `InformationSet`.
+        measured : mapping of str to ndarray, shape (B,)
+            All measurements of the step (rad, m, rad/s), that of this sensor among them.
+        where : ndarray of bool, shape (B,)
+            Engagements that have measured.
+        """
 
     def measured(self, sight: Geometry, error: Floats | float) -> Floats:
-        """Return the value measured with an error in units of the bound, from -1 to 1."""
+        """Return the measured value for an error.
+
+        Parameters
+        ----------
+        sight : Geometry
+            True geometry.
+        error : ndarray, shape (B,), or float
+            In units of the bound, from -1 to 1.
+        """
         return self.true_value(sight) + self.bound(sight) * error
 
     def error(self, sight: Geometry, measured: Floats) -> Floats:
-        """Return the error of a measured value in units of the bound."""
+        """Return the error of a measured value in units of the bound.
+
+        Parameters
+        ----------
+        sight : Geometry
+            True geometry.
+        measured : ndarray, shape (B,)
+            Measured values, in the unit of the quantity.
+        """
         return (measured - self.true_value(sight)) / self.bound(sight)
 
 

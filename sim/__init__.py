@@ -1,5 +1,7 @@
-"""The simulator: scenarios, the truth, the closed loop, records and statistics."""
+"""The simulator: scenarios, true motion, closed loop, records, campaigns, bounds and statistics."""
 
+from sim.adversary import NothingCountsError, WorstEngagement, find_worst
+from sim.bound import BoundError, LowerBound, lower_bound
 from sim.campaign import Campaign, CampaignResult, Sweep
 from sim.chunk import CampaignNoise
 from sim.record import Inconsistency, Record, StepRecord, fly_one
@@ -15,14 +17,19 @@ from sim.statistics import (
     quantiles,
 )
 from sim.stopping_rule import QuantileName, Requirement, StoppingRule
+from sim.storage import Axis
 
 __all__ = [
+    "Axis",
+    "BoundError",
     "Campaign",
     "CampaignNoise",
     "CampaignResult",
     "Distribution",
     "Inconsistency",
+    "LowerBound",
     "Manoeuvre",
+    "NothingCountsError",
     "Outcome",
     "QuantileEstimate",
     "QuantileName",
@@ -35,10 +42,13 @@ __all__ = [
     "Sun",
     "Sweep",
     "Target",
+    "WorstEngagement",
     "band_half_width",
     "empirical_distribution",
     "estimate_quantiles",
+    "find_worst",
     "fly_one",
+    "lower_bound",
     "quantiles",
     "simulate",
 ]

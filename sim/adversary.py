@@ -20,7 +20,7 @@ from sim.engagement import Engagements
 from sim.planned_flights import ANGLE, ROWS, Floats, Flown, PlannedNoise, Plans
 from sim.record import Record, fly_one
 from sim.results import Outcome
-from sim.scenario import Scenario
+from sim.scenario import Scenario, with_strategy
 
 CHUNK = 50
 """Engagements flown together."""
@@ -110,7 +110,7 @@ class WorstEngagement:
 def find_worst(
     scenario: Scenario,
     *,
-    strategy: Strategy | None = None,
+    strategy: Strategy | str | None = None,
     budget: int = 5000,
     seed: int = 0,
     keep_set: bool = False,
@@ -123,8 +123,8 @@ def find_worst(
     ----------
     scenario : Scenario
         Starts are sought in all of `set_model.bounds` (B x D), not in its dispersion.
-    strategy : Strategy or None
-        None is the scenario's own.
+    strategy : Strategy, str or None
+        A strategy of your own, the name of a registered one, or None for the scenario's.
     budget : int
         Engagements to fly.
     seed : int
@@ -167,7 +167,7 @@ def find_worst(
             f"need a positive budget and number of threads, and a seed not negative: got budget={budget}, "
             f"threads={threads}, seed={seed}"
         )
-    search = _Search(scenario, strategy, seed, keep_set)
+    search = _Search(*with_strategy(scenario, strategy), seed, keep_set)
     with ThreadPoolExecutor(threads) as pool:
         try:
             search.run(budget, pool, progress)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
-from scipy.sparse import csc_array
 
 from sim.scenario import Scenario
 
@@ -116,6 +115,11 @@ class LowerBound:
     pairs: tuple[TruthPair, ...]
     by_label: tuple[LabelBound, ...]
     disturbance_m_s2: float
+
+    def __repr__(self) -> str:
+        return (
+            f"<lower bound {self.bound_m:.4g} m from {len(self.by_label)} labels; best label {self.pair.label_m:.6g} m>"
+        )
 
     @property
     def bound_m(self) -> float:
@@ -368,6 +372,8 @@ class _Approach:
         as the steps about the last common measurement and coarser before: an acceleration constant over longer
         blocks is an admissible one, and measurements within a block are inequalities of their own.
         """
+        from scipy.optimize import linprog  # takes half a second to load
+
         box = self.scenario.set_model.bounds
         knots = self._knots(last_common_step)
         at_s, count = self.times_s[knots], len(knots)
@@ -461,8 +467,10 @@ def _motion(offset: float, velocity: float, acceleration: Floats, times_s: Float
     return offset + np.concatenate([[0.0], np.cumsum(ways)]), speeds
 
 
-def _sparse(shape: tuple[int, int], *entries: tuple[Integers, Integers, Floats | float]) -> csc_array:
+def _sparse(shape: tuple[int, int], *entries: tuple[Integers, Integers, Floats | float]) -> Any:
     """Return a sparse matrix of (rows, columns, values)."""
+    from scipy.sparse import csc_array
+
     rows = np.concatenate([each[0] for each in entries])
     columns = np.concatenate([each[1] for each in entries])
     values = np.concatenate([np.broadcast_to(each[2], each[0].shape) for each in entries])

@@ -14,7 +14,7 @@ from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.pictures import course_html
 from sim.results import Results
-from sim.scenario import Scenario, strategy_name
+from sim.scenario import Scenario, strategy_name, with_strategy
 
 
 @dataclass(frozen=True)
@@ -99,6 +99,16 @@ class Record:
         """What the noise is called that was flown."""
         return self.scenario.noise.value if self.noise is None else self.noise
 
+    def __repr__(self) -> str:
+        result = self.result
+        inside = "inside" if result.truth_kept[0] else "not inside"
+        return (
+            f"<engagement of {self.scenario.name}, seed {self.seed}, run {self.run}: {self.strategy}, "
+            f"{self.noise_name} noise, {len(self.steps)} steps\n {result.outcomes[0].value}, "
+            f"miss {result.miss_m[0]:.4g} m for {result.impulse_m_s[0]:.4g} m/s, "
+            f"true state {inside} its section at every step>"
+        )
+
     def _repr_html_(self) -> str:
         result, thruster = self.result, self.scenario.thruster
         known = [(step.time_s, step.predicted_miss_m) for step in self.steps if step.predicted_miss_m is not None]
@@ -145,23 +155,24 @@ def fly_one(
     run: int = 0,
     *,
     seed: int = 0,
-    strategy: Strategy | None = None,
+    strategy: Strategy | str | None = None,
     noise: MeasurementNoise | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Record:
-    """Fly one engagement and keep everything.
+    """Fly one engagement and keep its whole course.
 
     Parameters
     ----------
     scenario : Scenario
+        What is flown. `experiments.fly_one` also takes the name of a built-in scenario.
     run, seed : int
         Run `run` of `simulate(..., seed=seed)` is the same engagement, number for number.
-    strategy : Strategy or None
-        A strategy of your own; None is the scenario's.
+    strategy : Strategy, str or None
+        A strategy of your own, the name of a registered one, or None for the scenario's.
     noise : MeasurementNoise or None
         A noise of your own, for a batch of one; None is the scenario's.
     progress : callable or None
-        Is told the fraction done, from 0 to 1.
+        Called with the fraction done, from 0 to 1.
 
     Returns
     -------
@@ -170,18 +181,20 @@ def fly_one(
     Raises
     ------
     TypeError, ValueError
-        If `run` or `seed` is negative or no integer, or a strategy or noise of your own returns what it must not.
+        If `run` or `seed` is not a whole number, the strategy is not registered, or a strategy or noise of your own
+        returns a value that is not allowed.
     """
     WHOLE.need("run", run)
     WHOLE.need("seed", seed)
+    scenario, own_strategy = with_strategy(scenario, strategy)
     draws = draw(scenario, [run], seed)
-    flight = Engagements(scenario, draws, strategy, noise=noise)
+    flight = Engagements(scenario, draws, own_strategy, noise=noise)
     recorder = _Recorder()
     while flight.flying:
         flight.advance(recorder)
         if progress is not None:
             progress(min(1.0, flight.step / draws.steps))
-    name = strategy_name(scenario, strategy)
+    name = strategy_name(scenario, own_strategy)
     own = None if noise is None else getattr(noise, "name", type(noise).__name__)
     at_step, label = flight.inconsistency
     found = Inconsistency(int(at_step[0]), float(label[0])) if at_step.count() else None

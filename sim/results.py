@@ -98,6 +98,24 @@ class Results:
         """Return the columns by name as plain values, one per run: texts for outcomes, None where unknown."""
         return {column.name: values_of(self, column) for column in columns_of(Results)}
 
+    def to_pandas(self) -> Any:
+        """Return the columns as a pandas `DataFrame`, one row per run, with the units in ``frame.attrs["units"]``.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            If pandas is not installed.
+        """
+        try:
+            import pandas as pd
+        except ModuleNotFoundError:
+            raise ModuleNotFoundError(
+                "Results.to_pandas needs pandas: install it with `pip install pandas`, or use Results.to_dict"
+            ) from None
+        frame = pd.DataFrame(self.to_dict())
+        frame.attrs["units"] = {column.name: column.unit for column in columns_of(Results)}
+        return frame
+
     def take(self, indices: NDArray[np.intp]) -> Results:
         """Return the results at these indices, in their order."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Annotated
 
@@ -153,7 +153,14 @@ class Scenario:
 
 
 def strategy_name(scenario: Scenario, own: Strategy | None) -> str:
-    """Return what files call the strategy flown: its registered name, or module and class of one's own."""
+    """Return the name of a strategy in files: the registered name, or module and class of the user's own."""
     if own is None:
         return scenario.strategy
     return f"{type(own).__module__}.{type(own).__qualname__}"
+
+
+def with_strategy(scenario: Scenario, strategy: Strategy | str | None) -> tuple[Scenario, Strategy | None]:
+    """Return the scenario with a strategy that is given by its registered name; a strategy object is returned as is."""
+    if isinstance(strategy, str):
+        return replace(scenario, strategy=strategy), None
+    return scenario, strategy

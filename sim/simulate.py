@@ -11,7 +11,7 @@ from infoset.limits import WHOLE, shown
 from sim.draws import draw
 from sim.engagement import Engagements
 from sim.results import Results, join
-from sim.scenario import Scenario
+from sim.scenario import Scenario, with_strategy
 
 ENGAGEMENTS_AT_ONCE = 200
 SECTIONS_AT_ONCE = 6000
@@ -22,7 +22,7 @@ def simulate(
     runs: int | Sequence[int] = 50,
     *,
     seed: int = 0,
-    strategy: Strategy | None = None,
+    strategy: Strategy | str | None = None,
     guarantee: bool = True,
     progress: Callable[[float], None] | None = None,
 ) -> Results:
@@ -31,17 +31,17 @@ def simulate(
     Parameters
     ----------
     scenario : Scenario
-        The numbers of the engagement, noise and range meter included.
+        What is flown. `experiments.simulate` also takes the name of a built-in scenario.
     runs : int or sequence of int
-        How many, or which: run k of a seed is the same engagement in whatever company it is flown.
+        Number of runs, or the run numbers. Run k of a seed is the same engagement in every call.
     seed : int
-        The root seed.
-    strategy : Strategy or None
-        A strategy of your own; None is the scenario's.
+        Root seed.
+    strategy : Strategy, str or None
+        A strategy of your own, the name of a registered one, or None for the scenario's.
     guarantee : bool
-        Whether the guaranteed model keeps its guaranteed miss, which takes about as long as all the rest.
+        Compute the bound Phi in the guaranteed model; it doubles the run time.
     progress : callable or None
-        Is told the fraction done, from 0 to 1.
+        Called with the fraction done, from 0 to 1.
 
     Returns
     -------
@@ -51,10 +51,11 @@ def simulate(
     Raises
     ------
     TypeError, ValueError
-        If there is no run to fly, a number of a run or the seed is negative or no integer, or the strategy returns no
-        proper impulses.
+        If there are no runs, a run number or the seed is not a whole number, the strategy is not registered, or it
+        returns impulses that are not finite.
     """
     WHOLE.need("seed", seed)
+    scenario, own = with_strategy(scenario, strategy)
     numbers = np.asarray(runs)
     if isinstance(runs, bool) or numbers.ndim > 1 or (numbers.dtype.kind not in "iu" and numbers.size):
         raise TypeError(f"runs must be how many runs, or a sequence of run numbers, all integers: got {shown(runs)}")
@@ -62,12 +63,12 @@ def simulate(
     if numbers.size == 0 or numbers.min() < 0:
         raise ValueError(f"need at least one run, and run numbers not negative: got runs={runs}")
     parts = []
-    # Few enough at once to stay in the processor's cache, and in memory when sections are very many.
+    # Few engagements at once fit into the processor's cache, and into memory when there are very many sections.
     at_once = max(1, min(ENGAGEMENTS_AT_ONCE, SECTIONS_AT_ONCE // scenario.set_model.sections))
     for first in range(0, numbers.size, at_once):
         chunk = numbers[first : first + at_once]
         draws = draw(scenario, chunk.tolist(), seed)
-        flight = Engagements(scenario, draws, strategy, guarantee=guarantee)
+        flight = Engagements(scenario, draws, own, guarantee=guarantee)
         steps = draws.steps
         while flight.flying:
             flight.advance()

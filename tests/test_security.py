@@ -18,7 +18,7 @@ from experiments.cli import main
 from experiments.common.errors import on_a_screen
 from experiments.interception import record_file
 from experiments.interception.page import interception_page
-from experiments.interception.record_file import read_record, write_record
+from experiments.interception.record_file import load_record, write_record
 from experiments.interception.scenario_file import load_scenario, scenario_text
 from infoset import StateBox
 from sim import Campaign, Record, fly_one
@@ -214,7 +214,7 @@ def test_pages_show_names_as_text(record: Record, tmp_path: Path) -> None:
     scenario = dataclasses.replace(record.scenario, description=SCRIPT)
     file = tmp_path / "x.npz"
     write_record(dataclasses.replace(record, scenario=scenario, strategy=SCRIPT, noise=SCRIPT), file)
-    found = read_record(file)
+    found = load_record(file)
     assert found.strategy == SCRIPT
     for text in (interception_page([found]), found._repr_html_(), found.result._repr_html_()):
         assert "<script>alert" not in text

@@ -127,7 +127,7 @@ def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: boo
     write_file(file, content, overwrite=overwrite)
 
 
-def read_record(path: str | os.PathLike[str]) -> Record:
+def load_record(path: str | os.PathLike[str]) -> Record:
     """Read the record of an engagement.
 
     Parameters

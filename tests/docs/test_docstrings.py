@@ -16,6 +16,7 @@ import pytest
 PACKAGES = (
     *("infoset", "guidance", "sim", "rendezvous.relative_motion", "rendezvous.pareto", "rendezvous.multipoint"),
     *("rendezvous.reachability", "rendezvous.pursuit_evasion", "infoset.polytope", "rendezvous.linear_game"),
+    "experiments",
 )
 
 RAISES_CHECKED = ("infoset", "guidance", "sim", "rendezvous")
@@ -33,7 +34,12 @@ WITHOUT_UNITS = (
 )
 """Geometry and statistics: their numbers have the units of what they are given."""
 
-CONTRACTS = {"start": "guidance.Strategy", "decide": "guidance.Strategy", "measure": "guidance.MeasurementNoise"}
+CONTRACTS = {
+    "start": "guidance.Strategy",
+    "decide": "guidance.Strategy",
+    "measure": "guidance.MeasurementNoise",
+    **dict.fromkeys(("true_value", "bound", "cut", "measured", "error"), "infoset.Sensor"),
+}
 """Methods that many classes have for one contract, which describes their parameters."""
 
 _IN_NAME = re.compile(r"_(m|s|rad|km|deg|kg|n|m_s|km_s|rad_s|m_s2|m2_s3|m3_s2|kg_s|per_m|per_s|mb)$")

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from experiments.cli import main
-from experiments.interception.record_file import read_record
+from experiments.interception.record_file import load_record
 from experiments.interception.scenario_file import scenario_to_toml
 from sim import Scenario
 from sim.storage import CampaignFolder
@@ -111,7 +111,7 @@ def need_whole(folder: Path) -> None:
             case ".parquet":
                 assert content.endswith(b"PAR1"), path
             case ".npz":
-                read_record(path)
+                load_record(path)
             case ".csv" | ".toml":
                 assert content.endswith(b"\n"), path
             case other:

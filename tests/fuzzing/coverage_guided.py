@@ -161,7 +161,7 @@ def _subject(target: str, folder: Path) -> tuple[Parse, Mutate, list[bytes]]:
 def _record(folder: Path) -> tuple[Parse, Mutate, list[bytes]]:
     """Give a record as it comes, and one whose checksums have been made to fit."""
     from experiments.common.errors import InputError
-    from experiments.interception.record_file import read_record, write_record
+    from experiments.interception.record_file import load_record, write_record
 
     from .mutations import mutated_bytes
     from .subjects import attempted, remade_record, same_records, small_record
@@ -172,7 +172,7 @@ def _record(folder: Path) -> tuple[Parse, Mutate, list[bytes]]:
 
     def parse(content: bytes) -> None:
         file.write_bytes(content)
-        found, message = attempted(lambda: read_record(file), InputError)
+        found, message = attempted(lambda: load_record(file), InputError)
         assert found is not None or str(file) in message
 
     def mutate(content: bytes, draw: random.Random) -> bytes:
@@ -194,7 +194,7 @@ def _record(folder: Path) -> tuple[Parse, Mutate, list[bytes]]:
         except Exception:  # what has been damaged before can no longer be made to fit
             return remade_record(original, change)
 
-    assert same_records(read_record(file), record)
+    assert same_records(load_record(file), record)
     return parse, mutate, [original]
 
 

@@ -15,7 +15,7 @@ import json, sys, time
 from pathlib import Path
 
 from experiments.common.errors import InputError
-from experiments.interception.record_file import read_record
+from experiments.interception.record_file import load_record
 from experiments.interception.scenario_file import load_scenario
 from sim.storage import CampaignFolder, StorageError
 
@@ -30,7 +30,7 @@ def peak():
     (line,) = [line for line in open("/proc/self/status") if line.startswith("VmHWM")]
     return int(line.split()[1]) / 1024
 
-read = {"record": read_record, "campaign": campaign, "scenario": load_scenario}[sys.argv[1]]
+read = {"record": load_record, "campaign": campaign, "scenario": load_scenario}[sys.argv[1]]
 found = []
 for path in sys.argv[2:]:
     Path("/proc/self/clear_refs").write_text("5")  # the greatest size so far is forgotten

@@ -18,7 +18,7 @@ import pytest
 from experiments.cli import main
 from experiments.common.errors import InputError
 from experiments.interception import record_file
-from experiments.interception.record_file import read_record, write_record
+from experiments.interception.record_file import load_record, write_record
 from sim import Record
 
 from .measured import Measured, measured
@@ -51,7 +51,7 @@ def damage(content: bytes, draw: random.Random) -> bytes:
 
 
 def read_or_refused(file: Path) -> Record | None:
-    found, message = attempted(lambda: read_record(file), InputError)
+    found, message = attempted(lambda: load_record(file), InputError)
     if found is None:
         assert message.startswith(f"{file}: is not a readable record: ")
         assert message.endswith(REMEDY)
@@ -75,7 +75,7 @@ def attack(content: bytes, record: Record, file: Path, times: int, seed: int) ->
 
 def test_a_record_equals_itself_alone(record: Record, content: bytes, tmp_path: Path) -> None:
     (tmp_path / "x.npz").write_bytes(content)
-    found = read_record(tmp_path / "x.npz")
+    found = load_record(tmp_path / "x.npz")
     assert same_records(found, record)
     object.__setattr__(found.steps[3], "impulse_m_s", np.nextafter(found.steps[3].impulse_m_s, 9.0))
     assert not same_records(found, record)

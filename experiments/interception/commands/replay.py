@@ -50,7 +50,7 @@ def replay(
         draw_engagements,
         show_engagements,
     )
-    from experiments.interception.record_file import read_record
+    from experiments.interception.record_file import load_record
 
     if len(records) > MOST_RECORDS:
         raise InputError(f"replay draws one record or two, side by side; found {len(records)}: leave some out")
@@ -62,7 +62,7 @@ def replay(
     _check_animations(gif, mp4)
     files = {"--html": html, "--gif": gif, "--mp4": mp4}
     with checked_destinations(folder=out, names=figure_files(FIGURE_2, FIGURE_3), files=files, overwrite=overwrite):
-        found = [read_record(each) for each in records]
+        found = [load_record(each) for each in records]
         if html is not None:
             from experiments.common.output import write_file
             from experiments.interception.page import interception_page

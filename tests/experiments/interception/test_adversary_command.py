@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from experiments.cli import main
-from experiments.interception.record_file import read_record
+from experiments.interception.record_file import load_record
 from experiments.interception.scenario_file import load_scenario, scenario_hash
 from sim.adversary import find_worst
 
@@ -92,7 +92,7 @@ def test_the_worst_as_json_and_as_a_record_that_replays(infoset: Command, tmp_pa
     assert found["worst_miss_m"] == worst.miss_m == found["history"][-1]["worst_miss_m"]
     assert list(found["start"].values()) == [*worst.position_m.tolist(), *worst.velocity_m_s.tolist()]
 
-    record = read_record(tmp_path / "worst.npz")
+    record = load_record(tmp_path / "worst.npz")
     assert float(record.result.miss_m[0]) == worst.miss_m
     assert record.noise == record.noise_name == "scripted"
     assert record.result.position_m[0].tolist() == worst.position_m.tolist()
@@ -150,7 +150,7 @@ def test_what_is_refused_before_anything_is_flown(arguments: list[str], message:
 def test_an_existing_record_is_replaced_when_told(infoset: Command) -> None:
     Path("worst.npz").write_text("something")
     assert infoset("adversary", "--budget", 1, "--record", "worst.npz", "--overwrite", "-q")[0] == 0
-    assert read_record("worst.npz").noise == "scripted"
+    assert load_record("worst.npz").noise == "scripted"
 
 
 def test_where_no_engagement_counts_it_is_said(infoset: Command, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ import pytest
 
 from experiments.common.errors import InputError
 from experiments.interception import record_file
-from experiments.interception.record_file import read_record, write_record
+from experiments.interception.record_file import load_record, write_record
 from experiments.interception.scenario_file import load_scenario
 from guidance import LineOfSight, NoiseKind, Situation
 from infoset import InformationSetView, RateSensor
@@ -63,7 +63,7 @@ def refused(content: bytes, tmp_path: Path) -> str:
     file = tmp_path / "bad.npz"
     file.write_bytes(content)
     with pytest.raises(InputError) as refusal:
-        read_record(file)
+        load_record(file)
     message = str(refusal.value)
     assert message.startswith(f"{file}: is not a readable record: ")
     assert message.endswith("make a record with `infoset engage --record FILE.npz`")
@@ -99,14 +99,14 @@ def assert_same(one: Record, other: Record) -> None:
 def test_a_record_comes_back_bit_for_bit(name: str, noise: NoiseKind, tmp_path: Path) -> None:
     flown = fly_one(dataclasses.replace(load_scenario(name), noise=noise), 1, seed=2**70)
     write_record(flown, tmp_path / "x.npz")
-    assert_same(read_record(tmp_path / "x.npz"), flown)
+    assert_same(load_record(tmp_path / "x.npz"), flown)
     assert [each.name for each in tmp_path.iterdir()] == ["x.npz"]
 
 
 def test_a_record_of_ones_own_strategy(tmp_path: Path) -> None:
     flown = fly_one(load_scenario("asteroid-1997-single"), strategy=Idle())
     write_record(flown, tmp_path / "x.npz")
-    found = read_record(tmp_path / "x.npz")
+    found = load_record(tmp_path / "x.npz")
     assert (found.strategy, found.scenario.strategy) == (f"{Idle.__module__}.Idle", "symmetric-miss")
     assert_same(found, flown)
 
@@ -118,7 +118,7 @@ def test_measured_rates_and_where_data_contradict_the_model_come_back(tmp_path: 
     assert flown.inconsistency is not None
     assert flown.inconsistency.step == OUTLIER_AT
     write_record(flown, tmp_path / "x.npz")
-    assert_same(read_record(tmp_path / "x.npz"), flown)
+    assert_same(load_record(tmp_path / "x.npz"), flown)
 
 
 def test_what_is_not_known_comes_back_as_not_known(record: Record, tmp_path: Path) -> None:
@@ -136,7 +136,7 @@ def test_what_is_not_known_comes_back_as_not_known(record: Record, tmp_path: Pat
     )
     changed = dataclasses.replace(record, steps=(blank, *record.steps[1:3]), result=result)
     write_record(changed, tmp_path / "x.npz")
-    assert_same(read_record(tmp_path / "x.npz"), changed)
+    assert_same(load_record(tmp_path / "x.npz"), changed)
 
 
 def test_the_same_record_gives_the_same_bytes(record: Record, content: bytes, tmp_path: Path) -> None:
@@ -159,7 +159,7 @@ def test_nothing_is_replaced_unless_told(record: Record, tmp_path: Path) -> None
         write_record(record, file)
     assert file.read_text() == "precious"
     write_record(record, file, overwrite=True)
-    assert_same(read_record(file), record)
+    assert_same(load_record(file), record)
     with pytest.raises(InputError, match=r"must end in \.npz"):
         write_record(record, tmp_path / "x")
 
@@ -173,13 +173,13 @@ def test_a_scenario_that_no_file_can_hold(record: Record, tmp_path: Path) -> Non
 
 def test_what_is_no_file(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"there is no such file.*engage --record"):
-        read_record(tmp_path / "x.npz")
+        load_record(tmp_path / "x.npz")
     with pytest.raises(InputError, match="is a folder"):
-        read_record(tmp_path)
+        load_record(tmp_path)
     with pytest.raises(InputError, match="no ordinary file"):
-        read_record("/dev/null")
+        load_record("/dev/null")
     with pytest.raises(InputError, match="cannot be read"):
-        read_record("a\0b")
+        load_record("a\0b")
 
 
 def test_an_unreadable_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -189,14 +189,14 @@ def test_an_unreadable_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     (tmp_path / "x.npz").write_bytes(b"")
     monkeypatch.setattr(Path, "read_bytes", refuse)
     with pytest.raises(InputError, match="cannot be read: Permission denied"):
-        read_record(tmp_path / "x.npz")
+        load_record(tmp_path / "x.npz")
 
 
 def test_a_file_too_large_is_not_even_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(record_file, "LARGEST_FILE_BYTES", 10)
     (tmp_path / "x.npz").write_bytes(b"x" * 11)
     with pytest.raises(InputError, match="more than any record"):
-        read_record(tmp_path / "x.npz")
+        load_record(tmp_path / "x.npz")
 
 
 @pytest.mark.parametrize("foreign", [b"", b"x", b"PK\x03\x04", b"\x93NUMPY\x01\x00", b"\0" * 1000])
@@ -232,7 +232,7 @@ def test_a_flipped_bit_is_found_or_harmless(content: bytes, record: Record, tmp_
         flipped[at] ^= 1 << draw.randrange(8)
         file.write_bytes(flipped)
         with contextlib.suppress(InputError):
-            found = read_record(file)
+            found = load_record(file)
             harmless += 1
             if harmless % 20 == 1:
                 assert_same(found, record)
@@ -264,13 +264,13 @@ def remade(content: bytes, change: Callable[[Arrays], None], *, compression: int
 
 def test_remade_without_a_change_it_is_read(content: bytes, record: Record, tmp_path: Path) -> None:
     (tmp_path / "x.npz").write_bytes(remade(content, lambda arrays: None))
-    assert_same(read_record(tmp_path / "x.npz"), record)
+    assert_same(load_record(tmp_path / "x.npz"), record)
 
 
 def test_a_header_without_a_nullable_column_reads_as_unknown(content: bytes, tmp_path: Path) -> None:
     changed = remade(content, lambda arrays: arrays["json"]["result"].pop("guaranteed_miss_m"))
     (tmp_path / "x.npz").write_bytes(changed)
-    assert read_record(tmp_path / "x.npz").result.guaranteed_miss_m.mask.all()
+    assert load_record(tmp_path / "x.npz").result.guaranteed_miss_m.mask.all()
 
 
 def put(name: str, at: int, value: object) -> Callable[[Arrays], None]:
