@@ -1,4 +1,4 @@
-"""What coalitions would do on their own, what the common meeting costs them, and how costs could be shared."""
+"""Costs of coalitions, their regret at the common meeting, and the division of costs."""
 
 from __future__ import annotations
 
@@ -19,34 +19,34 @@ _RELATIVE = 1e-12
 
 
 class Core(Enum):
-    """Whether some division of the cost leaves no coalition better off alone."""
+    """Whether a division of the cost exists that no coalition can improve alone."""
 
     EMPTY = "empty"
     ZERO = "zero"
 
     @property
     def reason(self) -> str:
-        """Why, in a sentence."""
+        """The reason, in a sentence."""
         if self is Core.EMPTY:
             return (
-                "the core is empty: alone each craft has no excess, so each would have to pay at most nothing, "
-                "yet the cost of all together is positive; meeting together saves nobody anything here"
+                "the core is empty: alone each craft has no excess, so in the core each would pay at most zero, "
+                "but the cost of the common meeting is positive"
             )
-        return "all ideals coincide: nobody has an excess, and the core is the division in which nobody pays"
+        return "all ideals coincide: no craft has an excess, and the core is the division in which every cost is zero"
 
 
 @dataclass(frozen=True)
 class Coalition:
-    """Some of the craft.
+    """A coalition of craft.
 
     Parameters
     ----------
     members : tuple of int
-        Which.
+        Numbers of the craft.
     excess : float
-        c(S): their weighted sum of excesses at the meeting that is best for them alone, m^2/s^3.
+        c(S): their least weighted sum of excesses at a common meeting, m^2/s^3.
     regret : float
-        By how much their sum is greater at the common meeting, m^2/s^3.
+        Increase of their sum at the common meeting of all, m^2/s^3.
     """
 
     members: tuple[int, ...]
@@ -61,13 +61,14 @@ class Coalitions:
     Parameters
     ----------
     coalitions : tuple of Coalition
-        By size; single craft and all together among them.
+        By size, from single craft to the coalition of all.
     shapley : ndarray, shape (n,)
         The Shapley value of the cost game c, m^2/s^3.
     transfers : ndarray, shape (n,)
-        What each craft is owed by the others so that it bears its Shapley value: its own weighted excess less that,
-        m^2/s^3; of sum zero.
+        Payment to each craft that leaves it with its Shapley value: its weighted excess minus that value, m^2/s^3; of
+        sum zero.
     core : Core
+        Of the cost game.
     """
 
     coalitions: tuple[Coalition, ...]
@@ -77,21 +78,12 @@ class Coalitions:
 
 
 def analyse_coalitions(solution: EncounterSolution) -> Coalitions:
-    """Look at every coalition.
-
-    Parameters
-    ----------
-    solution : EncounterSolution
-        The common meeting is the best one for the group.
-
-    Returns
-    -------
-    Coalitions
+    """Analyse every coalition of a `solution`, whose meeting is the best one for the group.
 
     Raises
     ------
     ValueError
-        If there are more than 12 craft: coalitions are 2^n.
+        If there are more than 12 craft: there are 2^n coalitions.
 
     Notes
     -----
@@ -104,29 +96,29 @@ def analyse_coalitions(solution: EncounterSolution) -> Coalitions:
     weights = solution.encounter.weights
     common = weights * solution.excess()
     worth: dict[tuple[int, ...], float] = {(): 0.0}
-    found = []
+    coalitions = []
     for size in range(1, count + 1):
         for members in combinations(range(count), size):
             worth[members] = _worth(solution, members, weights)
             regret = max(float(common[list(members)].sum()) - worth[members], 0.0)
-            found.append(Coalition(members, worth[members], regret))
-    shapley = np.array([_shapley(each, count, worth) for each in range(count)])
-    # Relative to the scale of the ideals themselves: equal ideals come out equal only up to rounding.
-    scale = max(float(sum((each.root @ each.ideal) @ (each.root @ each.ideal) for each in solution.costs)), 0.0)
+            coalitions.append(Coalition(members, worth[members], regret))
+    shapley = np.array([_shapley(craft, count, worth) for craft in range(count)])
+    # Relative to the size of the ideals: equal ideals are equal up to rounding only.
+    scale = float(sum((cost.root @ cost.ideal) @ (cost.root @ cost.ideal) for cost in solution.costs))
     core = Core.EMPTY if worth[tuple(range(count))] > _RELATIVE * scale else Core.ZERO
-    return Coalitions(tuple(found), shapley, common - shapley - (common.sum() - shapley.sum()) / count, core)
+    return Coalitions(tuple(coalitions), shapley, common - shapley - (common.sum() - shapley.sum()) / count, core)
 
 
 def _worth(solution: EncounterSolution, members: tuple[int, ...], weights: Floats) -> float:
-    chosen = [solution.costs[each] for each in members]
+    costs = [solution.costs[member] for member in members]
     if len(members) == 1 or not (weights[list(members)] > 0.0).any():
         return 0.0
-    point = weighted_point(chosen, weights[list(members)])
-    return float(sum(weights[member] * each.excess(point) for member, each in zip(members, chosen, strict=True)))
+    point = weighted_point(costs, weights[list(members)])
+    return float(sum(weights[member] * cost.excess(point) for member, cost in zip(members, costs, strict=True)))
 
 
 def _shapley(craft: int, count: int, worth: dict[tuple[int, ...], float]) -> float:
-    others = [each for each in range(count) if each != craft]
+    others = [other for other in range(count) if other != craft]
     total = 0.0
     for size in range(count):
         share = factorial(size) * factorial(count - size - 1) / factorial(count)

@@ -1,4 +1,4 @@
-"""The problem: craft that meet at one time in one state, of which some components are free."""
+"""The problem: craft that meet at one time in one state, some of whose components are free."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Component(Enum):
 
 
 class Meeting(Enum):
-    """What the craft have in common when they meet."""
+    """The components that the craft have in common when they meet."""
 
     RENDEZVOUS = "rendezvous"
     """Position and velocity."""
@@ -40,13 +40,15 @@ class Craft:
     Parameters
     ----------
     name : str
+        Unique.
     state : ndarray, shape (6,)
         (x, y, z, vx, vy, vz) at its start, in the frame of its motion, m and m/s.
     motion : LinearMotion
+        Of the craft.
     weight : float
         Of its excess in the group's loss; not negative.
     start_s : float
-        When it starts; the meeting is later.
+        Before the meeting.
     """
 
     name: str
@@ -65,12 +67,13 @@ class Encounter:
     craft : tuple of Craft
         At least one, all in one frame.
     meeting_s : float
-        When they meet.
+        Time of the meeting.
     free : tuple of Component
-        What of the terminal state is open; at least one, of an intercept only of the position.
+        Free components of the terminal state; at least one, of an intercept only of the position.
     fixed : ndarray, shape (6,)
-        Values of the others, m and m/s; those of free components do not count.
+        Values of the others, m and m/s; those of free components are ignored.
     meeting : Meeting
+        Whether velocities must agree.
 
     Raises
     ------
@@ -88,25 +91,25 @@ class Encounter:
     def __post_init__(self) -> None:
         if not self.craft:
             raise ValueError("an encounter needs a craft")
-        names = [each.name for each in self.craft]
+        names = [craft.name for craft in self.craft]
         for name in names:
             if names.count(name) > 1:
-                raise ValueError(f"two craft are called {name!r}; a name tells one craft")
+                raise ValueError(f"two craft are called {name!r}; give each its own name")
         if not self.free:
             raise ValueError("no component of the terminal state is free; free one of x, y, z, vx, vy, vz")
         if len(set(self.free)) < len(self.free):
             raise ValueError("a free component is named twice")
-        if self.meeting is Meeting.INTERCEPT and any(each.value >= 3 for each in self.free):
+        if self.meeting is Meeting.INTERCEPT and any(component.value >= 3 for component in self.free):
             raise ValueError("the velocities of an intercept are each craft's own; free only x, y and z")
         if np.shape(self.fixed) != (6,) or not np.isfinite(self.fixed).all() or not np.isfinite(self.meeting_s):
             raise ValueError("the terminal state must be six finite numbers at a finite time")
-        for each in self.craft:
-            _check(each, self.meeting_s)
-            if each.motion.frame != self.frame:
+        for craft in self.craft:
+            _check(craft, self.meeting_s)
+            if craft.motion.frame != self.frame:
                 raise ValueError(
-                    f"craft {each.name!r} moves in frame {each.motion.frame.name}, others in {self.frame.name}"
+                    f"craft {craft.name!r} moves in frame {craft.motion.frame.name}, others in {self.frame.name}"
                 )
-        if not any(each.weight > 0.0 for each in self.craft):
+        if not any(craft.weight > 0.0 for craft in self.craft):
             raise ValueError("all weights are zero; give one craft a positive weight")
 
     @property
@@ -117,25 +120,25 @@ class Encounter:
     @property
     def weights(self) -> Floats:
         """Weights of the craft, shape (n,)."""
-        return np.array([each.weight for each in self.craft])
+        return np.array([craft.weight for craft in self.craft])
 
     @property
     def common(self) -> int:
-        """How many components of the terminal state the craft have in common: 6, or the 3 of the position."""
+        """Number of components of the terminal state that the craft have in common: 6, or the 3 of the position."""
         return 6 if self.meeting is Meeting.RENDEZVOUS else 3
 
     @property
     def base(self) -> Floats:
-        """The terminal state with zeros for what is free, shape (6,)."""
+        """The terminal state with zeros in its free components, shape (6,)."""
         state = np.array(self.fixed, dtype=np.float64)
-        state[[each.value for each in self.free]] = 0.0
+        state[[component.value for component in self.free]] = 0.0
         return state
 
     @property
     def opening(self) -> Floats:
-        """E: the free values' place in the terminal state, shape (6, f)."""
+        """E: the map from free values to the terminal state, shape (6, f)."""
         matrix = np.zeros((6, len(self.free)))
-        matrix[[each.value for each in self.free], range(len(self.free))] = 1.0
+        matrix[[component.value for component in self.free], range(len(self.free))] = 1.0
         return matrix
 
 

@@ -1,4 +1,4 @@
-"""How hard a flight drives its thruster: peak, total impulse, and whether a bound on the control can be met."""
+"""Peak control and total impulse of a flight, and whether a bound on the control can be met."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rendezvous.piecewise import NODES, resolve
 
 Floats = NDArray[np.float64]
 
-_PLACES, _WEIGHTS = (each.astype(np.float64) for each in np.polynomial.legendre.leggauss(NODES))
+_PLACES, _WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.leggauss(NODES))
 _IMPULSE = 1e-10
 _INTEGRAL, _DIRECTION, _GAP = 1e-10, 1e-9, 1e-6
 _MOST_STEPS = 60
@@ -25,11 +25,11 @@ _AT_ONCE = 20_000
 
 
 class NotCertifiedError(ValueError):
-    """The least control was not found to the stated tolerance."""
+    """The least peak control was not computed to its tolerance."""
 
 
 class Feasibility(Enum):
-    """Whether a meeting can be flown with |u| <= u_max."""
+    """Whether a meeting is possible with |u| <= u_max."""
 
     WITHIN = "within"
     """The minimum-energy control stays within the bound."""
@@ -41,15 +41,16 @@ class Feasibility(Enum):
 
 @dataclass(frozen=True)
 class BoundCheck:
-    """A meeting held against a bound on the control.
+    """The control of a meeting compared with a bound.
 
     Parameters
     ----------
     feasibility : Feasibility
+        The verdict.
     peak_m_s2 : float
         Greatest |u| of the minimum-energy control.
     least_peak_m_s2 : float
-        The least greatest |u| that any control needs for this meeting: a lower bound, to 1e-6.
+        The least greatest |u| of any control of this meeting: a lower bound, to 1e-6.
     """
 
     feasibility: Feasibility
@@ -58,56 +59,34 @@ class BoundCheck:
 
 
 def peak_control(plan: Plan) -> float:
-    """Return the greatest |u| of a flight, m/s^2.
-
-    Parameters
-    ----------
-    plan : Plan
-
-    Returns
-    -------
-    float
-    """
+    """Return the greatest |u| of a `plan`, m/s^2."""
     return greatest_control(plan.control, plan.breaks())
 
 
 def total_impulse(plan: Plan) -> float:
-    """Return int |u| dt of a flight, m/s.
-
-    Parameters
-    ----------
-    plan : Plan
-
-    Returns
-    -------
-    float
-        To 1e-9, relative.
-    """
+    """Return int |u| dt of a `plan`, m/s, to 1e-9, relative."""
     control = resolve(plan.control, plan.breaks())
     return integrate_size(control.coefficients, 0.5 * (control.ends_s - control.starts_s), _IMPULSE).value
 
 
 def check_bound(plan: Plan, greatest_m_s2: float, common: int = 6) -> BoundCheck:
-    """Hold a flight against a bound on the control.
+    """Compare a `plan` with a bound u_max > 0 on the control.
 
     Parameters
     ----------
     plan : Plan
+        The minimum-energy flight.
     greatest_m_s2 : float
-        u_max, positive.
+        u_max.
     common : int
-        How many components of the terminal state must be met: 6, or 3 for an intercept.
-
-    Returns
-    -------
-    BoundCheck
+        Number of components of the terminal state that must be met: 6, or 3 for an intercept.
 
     Raises
     ------
     ValueError
         If the bound is not positive and finite.
     NotCertifiedError
-        If the least peak is not found to 1e-6.
+        If the least peak is not computed to 1e-6.
 
     Notes
     -----
@@ -124,30 +103,30 @@ def check_bound(plan: Plan, greatest_m_s2: float, common: int = 6) -> BoundCheck
 
 
 def least_peak(plan: Plan, common: int = 6) -> float:
-    """Return the least greatest |u| with which a flight can do what it does, m/s^2.
+    """Return the least greatest |u| of a control with the effect of a `plan`, m/s^2.
 
     Parameters
     ----------
     plan : Plan
-        Its effect counts, not how it is reached.
+        Any flight with this effect.
     common : int
-        How many components of the terminal state must be met: 6, or 3 for an intercept.
+        Number of components of the terminal state that must be met: 6, or 3 for an intercept.
 
     Returns
     -------
     float
-        A lower bound of every control's peak; a control exists whose peak is at most 1e-6 above it, relative.
+        A lower bound of every control's peak, m/s^2; a control exists whose peak is at most 1e-6 above it, relative.
 
     Raises
     ------
     NotCertifiedError
-        If the two do not come that near to each other.
+        If the two bounds differ by more.
 
     Notes
     -----
     Krasovskii's problem of moments, by duality: the greatest l'e / int |B' Phi(T, t)' l| dt over directions l, where e
-    is what the control must achieve. The effect of the control is whitened by the Gramian, int E E' dt = 1, and e is of
-    unit length; Newton's method minimises I(l) = int |E' l| dt on l'e = 1. At its end two bounds are evaluated:
+    is the required effect of the control. The effect of the control is whitened by the Gramian, int E E' dt = 1, and e
+    is of unit length; Newton's method minimises I(l) = int |E' l| dt on l'e = 1. At its end two bounds are evaluated:
 
     * every l gives a lower bound, 1 / I(l), lowered by the error of the integral;
     * u = w / (|w| I) + E' r, w = E' l, achieves e if r = e - int E w / |w| dt / I, and |u| <= 1 / I + |r| max |E|.
@@ -167,7 +146,7 @@ def least_peak(plan: Plan, common: int = 6) -> float:
         if others.shape[1] == 0 or float(np.linalg.norm(rest)) * here.value * effect.greatest <= 0.3 * _GAP:
             break
         flat, bent = others.T @ slope, others.T @ bend @ others
-        # No step is longer than l itself: along a w of one direction throughout, nothing bends at first.
+        # No step is longer than l: if w has one direction at all times, the Hessian is zero at first.
         stiff = max(float(np.linalg.norm(flat) - np.linalg.eigvalsh(bent)[0]), 1e-14 * float(np.trace(bent)))
         step = -others @ np.linalg.solve(bent + stiff * np.eye(len(bent)), flat)
         there, share = effect.size_of(direction + step), 1.0
@@ -191,14 +170,16 @@ def least_peak(plan: Plan, common: int = 6) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Effect:
-    """E(t), what a unit control at a time does to the common components, whitened: int E E' dt = 1.
+    """E(t), the effect of a unit control at a time on the common components, whitened: int E E' dt = 1.
 
     Parameters
     ----------
     coefficients : ndarray, shape (P, 12, c, 3)
+        Of Chebyshev polynomials.
     half_s : ndarray, shape (P,)
+        Half the lengths of the panels.
     goal : ndarray, shape (c,)
-        What the control must achieve.
+        e, the required effect.
     """
 
     coefficients: Floats
@@ -220,7 +201,7 @@ class _Effect:
         pieces = resolve(effect, plan.breaks())
         half = 0.5 * (pieces.ends_s - pieces.starts_s)
         coefficients = pieces.coefficients.reshape(len(half), NODES, common, 3)
-        # Exactly white as it is represented: the Gramian's own rounding grows with its condition number.
+        # Whitened again as represented: the rounding of the Gramian grows with its condition number.
         at_nodes = np.einsum("kj,pjai->pkai", chebvander(_PLACES, NODES - 1), coefficients)
         square = np.einsum("p,k,pkai,pkbi->ab", half, _WEIGHTS, at_nodes, at_nodes)
         again = np.linalg.inv(np.linalg.cholesky(square))
@@ -229,7 +210,7 @@ class _Effect:
 
     @cached_property
     def greatest(self) -> float:
-        """A bound on |E(t)|: the norm of the sums of the sizes of its coefficients."""
+        """A bound on |E(t)|: the norm of the sums of the magnitudes of its coefficients."""
         return float(np.sqrt((np.abs(self.coefficients).sum(axis=1) ** 2).sum(axis=(1, 2)).max()))
 
     def size_of(self, direction: Floats) -> SizeIntegral:
@@ -242,12 +223,12 @@ class _Effect:
         common = self.coefficients.shape[2]
         slope, bend = np.zeros(common), np.zeros((common, common))
         for first in range(0, len(at.weight), _AT_ONCE):
-            some = slice(first, first + _AT_ONCE)
-            effect = np.einsum("nj,njai->nai", chebvander(at.place[some], NODES - 1), self.coefficients[at.panel[some]])
-            sizes = np.linalg.norm(at.vector[some], axis=1)
+            part = slice(first, first + _AT_ONCE)
+            effect = np.einsum("nj,njai->nai", chebvander(at.place[part], NODES - 1), self.coefficients[at.panel[part]])
+            sizes = np.linalg.norm(at.vector[part], axis=1)
             sizes = np.where(sizes > 0.0, sizes, np.inf)
-            along = np.einsum("nai,ni->na", effect, at.vector[some] / sizes[:, None])
-            weight = at.weight[some]
+            along = np.einsum("nai,ni->na", effect, at.vector[part] / sizes[:, None])
+            weight = at.weight[part]
             slope += weight @ along
             bend += np.einsum("n,nai,nbi->ab", weight / sizes, effect, effect, optimize=True)
             bend -= (weight / sizes * along.T) @ along

@@ -33,30 +33,20 @@ class ParetoSet:
 
 
 def pareto_set(solution: EncounterSolution, weights: Floats) -> ParetoSet:
-    """Return the Pareto-optimal meetings of given weights.
-
-    Parameters
-    ----------
-    solution : EncounterSolution
-    weights : ndarray, shape (k, n)
-        Not negative, each row with a positive sum.
-
-    Returns
-    -------
-    ParetoSet
+    """Return the Pareto-optimal meetings of a `solution` for k rows of `weights` (k, n), not negative and not all zero.
 
     Notes
     -----
-    (sum w_i M_i)^-1 sum w_i M_i p_i*: with one M the convex hull of the ideals, else curved. All weights together cover
-    the set, for the excesses are convex.
+    (sum w_i M_i)^-1 sum w_i M_i p_i*: with one M the convex hull of the ideals, otherwise curved. All weights together
+    cover the set, as the excesses are convex.
     """
     shares = weights / weights.sum(axis=1, keepdims=True)
     ideals = solution.ideals
     # About the mean of the ideals, scaled by the mean M: the systems are then of order one.
     middle = ideals.mean(axis=0)
-    root = np.linalg.cholesky(np.mean([each.matrix for each in solution.costs], axis=0)).T
+    root = np.linalg.cholesky(np.mean([cost.matrix for cost in solution.costs], axis=0)).T
     back = np.linalg.inv(root)
-    matrices = np.array([back.T @ each.matrix @ back for each in solution.costs])
+    matrices = np.array([back.T @ cost.matrix @ back for cost in solution.costs])
     scaled = (ideals - middle) @ root.T
     left = np.einsum("kn,nab->kab", shares, matrices)
     right = np.einsum("kn,nab,nb->ka", shares, matrices, scaled)
@@ -65,18 +55,9 @@ def pareto_set(solution: EncounterSolution, weights: Floats) -> ParetoSet:
 
 
 def simplex_weights(craft: int, count: int) -> Floats:
-    """Return weights spread evenly over all shares of so many craft.
+    """Return about `count` rows of weights, shape (k, craft), spread evenly over all shares of `craft` craft.
 
-    Parameters
-    ----------
-    craft : int
-    count : int
-        How many rows, about; those of single craft are among them.
-
-    Returns
-    -------
-    ndarray, shape (k, craft)
-        A lattice up to three craft, beyond that a low-discrepancy sequence; the same at every call.
+    Those of single craft are included. A lattice up to three craft, beyond that a low-discrepancy sequence.
     """
     if craft == 1:
         return np.ones((1, 1))
@@ -93,17 +74,7 @@ def simplex_weights(craft: int, count: int) -> Floats:
 
 
 def distances(solution: EncounterSolution) -> Floats:
-    """Return how far apart the ideals are in the norm of M.
-
-    Parameters
-    ----------
-    solution : EncounterSolution
-        With one M.
-
-    Returns
-    -------
-    ndarray, shape (n, n)
-        d_ij = |p_i* - p_j*|_M, m/s^1.5.
+    """Return d_ij = |p_i* - p_j*|_M of the ideals of a `solution` with one M, m/s^1.5, shape (n, n).
 
     Raises
     ------
@@ -117,25 +88,20 @@ def distances(solution: EncounterSolution) -> Floats:
 
 
 def front_of_two(distance: float, excess: ArrayLike) -> Floats:
-    """Return the second craft's excess along the Pareto front of two.
+    """Return e_2, m^2/s^3, along the Pareto front of two: sqrt(e_1) + sqrt(e_2) = d_12.
 
     Parameters
     ----------
     distance : float
         d_12, m/s^1.5.
     excess : array_like
-        Of the first, from 0 to d_12^2, m^2/s^3.
-
-    Returns
-    -------
-    ndarray
-        m^2/s^3; sqrt(e_1) + sqrt(e_2) = d_12.
+        e_1, from 0 to d_12^2, m^2/s^3.
     """
     return np.asarray((distance - np.sqrt(np.asarray(excess, dtype=np.float64))) ** 2)
 
 
 def front_of_three(between: Floats, first: ArrayLike, second: ArrayLike) -> Floats:
-    """Return the third craft's excess on the Pareto front of three.
+    """Return the third craft's excess e_3, m^2/s^3, on the Pareto front of three.
 
     Parameters
     ----------
@@ -144,15 +110,14 @@ def front_of_three(between: Floats, first: ArrayLike, second: ArrayLike) -> Floa
     first, second : array_like
         Excesses e_1 and e_2 of a point of the triangle of the ideals, m^2/s^3.
 
-    Returns
-    -------
-    ndarray
-        e_3, m^2/s^3: sides d_ij laid in a plane, the distances from two corners give the third.
-
     Raises
     ------
     ValueError
         If the first two ideals coincide.
+
+    Notes
+    -----
+    In a plane triangle with sides d_ij, the distances of a point from two corners give the third.
     """
     e1, e2 = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
     base = between[0, 1]

@@ -12,13 +12,14 @@ _MOST_ROUNDS = 1000
 
 
 def nearest_in_hull(points: Floats, target: Floats) -> Floats:
-    """Return the weights of the point of a convex hull that is nearest to a target.
+    """Return the point of a convex hull that is nearest to a target, as the weights of the points.
 
     Parameters
     ----------
     points : ndarray, shape (n, f)
-        What the hull is of; Euclidean distances count.
+        Their hull; distances are Euclidean.
     target : ndarray, shape (f,)
+        Any point.
 
     Returns
     -------
@@ -27,7 +28,7 @@ def nearest_in_hull(points: Floats, target: Floats) -> Floats:
 
     Notes
     -----
-    Wolfe (1976): a corral of affinely independent points grows by the point farthest ahead and sheds those that the
+    Wolfe (1976): a corral of affinely independent points grows by the farthest point ahead and drops those that the
     nearest point of their affine hull leaves behind. Finite; a few small least-squares problems in practice.
     """
     offsets = points - target
@@ -49,16 +50,16 @@ def nearest_in_hull(points: Floats, target: Floats) -> Floats:
                 weights = affine
                 break
             behind = affine <= 0.0
-            # A weight that is and stays zero leaves at once.
+            # A weight that stays zero is removed at once.
             step = float(np.min(weights[behind] / np.maximum(weights[behind] - affine[behind], np.finfo(float).tiny)))
             weights = weights + min(step, 1.0) * (affine - weights)
             leaving = int(np.where(behind, weights, np.inf).argmin())
             del corral[leaving]
             weights = np.delete(weights, leaving)
             weights /= weights.sum()
-    found = np.zeros(len(points))
-    found[corral] = weights
-    return found
+    all_weights = np.zeros(len(points))
+    all_weights[corral] = weights
+    return all_weights
 
 
 def _affine_nearest(offsets: Floats) -> Floats:

@@ -15,14 +15,16 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PlanSamples:
-    """A flight at given times.
+    """A flight sampled at k times.
 
     Parameters
     ----------
     time_s : ndarray, shape (k,)
+        From start to meeting.
     state : ndarray, shape (k, 6)
         m and m/s.
     control_m_s2 : ndarray, shape (k, 3)
+        u.
     """
 
     time_s: Floats
@@ -32,12 +34,14 @@ class PlanSamples:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The flight of one craft.
+    """The minimum-energy flight of one craft; times are from its start to the meeting.
 
     Parameters
     ----------
     craft : Craft
+        Its start.
     meeting_s : float
+        End of the flight.
     costate : ndarray, shape (6,)
         At the meeting.
     """
@@ -47,68 +51,25 @@ class Plan:
     costate: Floats
 
     def control(self, time_s: ArrayLike) -> Floats:
-        """Return u(t) = B' Phi(T, t)' lambda, (2.1) of the paper.
-
-        Parameters
-        ----------
-        time_s : array_like
-            Times from the craft's start to the meeting.
-
-        Returns
-        -------
-        ndarray, shape (..., 3)
-            m/s^2.
-        """
+        """Return u(t) = B' Phi(T, t)' lambda, m/s^2, shape (..., 3): (2.1) of the paper."""
         times = np.asarray(time_s, dtype=np.float64)
         costate = self._costate_at(times)
         return np.asarray(np.einsum("...ai,...a->...i", self.craft.motion.input_map(times), costate))
 
     def state(self, time_s: ArrayLike) -> Floats:
-        """Return x(t), (2.5) of the paper: Phi x0 + drift + G(t, t0) Phi(T, t)' lambda.
-
-        Parameters
-        ----------
-        time_s : array_like
-            Times from the craft's start to the meeting.
-
-        Returns
-        -------
-        ndarray, shape (..., 6)
-            m and m/s.
-        """
+        """Return x(t) = Phi x0 + drift + G(t, t0) Phi(T, t)' lambda, m and m/s, shape (..., 6): (2.5) of the paper."""
         times = np.asarray(time_s, dtype=np.float64)
         segment = self.craft.motion.segment(np.full(times.shape, self.craft.start_s), times)
         forced = np.einsum("...ab,...b->...a", segment.gramian, self._costate_at(times))
         return np.asarray(segment.transition @ self.craft.state + segment.drift + forced)
 
     def sample(self, count: int) -> PlanSamples:
-        """Return the flight at equally spaced times, both ends among them.
-
-        Parameters
-        ----------
-        count : int
-            At least 2.
-
-        Returns
-        -------
-        PlanSamples
-        """
+        """Return the flight at `count` >= 2 equally spaced times, both ends included."""
         times = np.linspace(self.craft.start_s, self.meeting_s, count)
         return PlanSamples(times, self.state(times), self.control(times))
 
     def effects(self, time_s: Floats) -> Floats:
-        """Return Phi(T, t) B(t), what a unit of control at a time does to the terminal state.
-
-        Parameters
-        ----------
-        time_s : ndarray, shape (k,)
-            Times from the craft's start to the meeting.
-
-        Returns
-        -------
-        ndarray, shape (k, 6, 3)
-            In states in m and m/s, of a control in m/s^2 for a second.
-        """
+        """Return Phi(T, t) B(t), shape (k, 6, 3), the effect of a unit control for a second on the terminal state."""
         return np.asarray(self._to_meeting(time_s) @ self.craft.motion.input_map(time_s))
 
     def breaks(self) -> Floats:
@@ -127,8 +88,8 @@ class Plan:
         order = np.argsort(times, axis=None, kind="stable")
         grid = np.append(times.ravel()[order], self.meeting_s)
         steps = motion.transition(grid[:-1], grid[1:])
-        found, ahead = np.empty((times.size, 6, 6)), np.eye(6)
-        for place in range(times.size - 1, -1, -1):
-            ahead = ahead @ steps[place]
-            found[order[place]] = ahead
-        return found.reshape(*times.shape, 6, 6)
+        matrices, ahead = np.empty((times.size, 6, 6)), np.eye(6)
+        for index in range(times.size - 1, -1, -1):
+            ahead = ahead @ steps[index]
+            matrices[order[index]] = ahead
+        return matrices.reshape(*times.shape, 6, 6)

@@ -1,4 +1,4 @@
-"""Ways to choose one meeting of the Pareto set."""
+"""Choices of one meeting from the Pareto set."""
 
 from __future__ import annotations
 
@@ -21,25 +21,16 @@ _NEAREST = 1e-6
 
 
 class NotOptimalError(ValueError):
-    """A choice was not found: what was computed does not satisfy the conditions of the best one."""
+    """The computed choice does not satisfy the conditions of the best one."""
 
 
 def least_sum_of_costs(solution: EncounterSolution) -> Floats:
-    """Return the meeting that minimises sum w_i J_i: impulse-like costs, not their squares.
-
-    Parameters
-    ----------
-    solution : EncounterSolution
-
-    Returns
-    -------
-    ndarray, shape (f,)
-        Free values.
+    """Return the free values, shape (f,), that minimise sum w_i J_i of a `solution`: costs like impulses.
 
     Notes
     -----
-    A sum of norms of affine functions, convex: damped Newton steps. Where an ideal costs nothing its norm has a corner
-    there, which is the answer if the others' slopes do not outweigh it.
+    A sum of norms of affine functions, convex: damped Newton steps. If an ideal costs nothing, its norm has a corner
+    there, which is the minimum if the others' slopes do not outweigh it.
     """
     roots, centres, floors, weights = _parts(solution)
     size = _size(roots, centres)
@@ -72,7 +63,7 @@ def least_sum_of_costs(solution: EncounterSolution) -> Floats:
         if abs(slope @ step) <= 1e-28 * lost or np.linalg.norm(roots[0] @ step) <= 1e-15 * size:
             break
         if slope @ step > 0.0 or not np.isfinite(step).all():
-            step = -np.linalg.solve(bend, slope)  # Weiszfeld's step, which always leads down
+            step = -np.linalg.solve(bend, slope)  # Weiszfeld's step, always a descent
         length = 1.0
         while length > 1e-12 and value(point + length * step) > lost + 1e-4 * length * (slope @ step):
             length *= 0.5
@@ -83,21 +74,12 @@ def least_sum_of_costs(solution: EncounterSolution) -> Floats:
 
 
 def least_greatest_excess(solution: EncounterSolution) -> Floats:
-    """Return the meeting that minimises the greatest weighted excess: with one M, the smallest enclosing ball's centre.
-
-    Parameters
-    ----------
-    solution : EncounterSolution
-
-    Returns
-    -------
-    ndarray, shape (f,)
-        Free values.
+    """Return the free values, shape (f,), that minimise the greatest weighted excess of a `solution`.
 
     Notes
     -----
-    Sequential quadratic programming on (p, t), least t with w_i e_i(p) <= t, then Newton's method on the conditions of
-    the craft that bind.
+    With one M, the centre of the smallest enclosing ball. Sequential quadratic programming on (p, t), least t with
+    w_i e_i(p) <= t, then Newton's method on the conditions of the active craft.
     """
     roots, centres, _, weights = _parts(solution)
     matrices = np.einsum("n,nca,ncb->nab", weights, roots, roots)
@@ -141,25 +123,26 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
     Parameters
     ----------
     solution : EncounterSolution
+        Of the encounter.
     preferred : ndarray, shape (f,)
         Free values.
 
     Returns
     -------
     ndarray, shape (f,)
-        Free values, nearest in the norm of M; of the weighted mean of the M where they differ.
+        Free values, nearest in the norm of M; of the weighted mean of the M if they differ.
 
     Raises
     ------
     ValueError
         If the preferred values are not f finite numbers.
     NotOptimalError
-        If the point that is found does not satisfy the conditions of the nearest one.
+        If the computed point does not satisfy the conditions of the nearest one.
 
     Notes
     -----
-    With one M, or multiples of one, a projection onto the convex hull of the ideals, exactly; else sequential quadratic
-    programming over the weights from the nearest of many meetings of the set, which finds a local minimum.
+    With one M, or multiples of one, an exact projection onto the convex hull of the ideals; otherwise sequential
+    quadratic programming over the weights from the nearest of many meetings of the set, which finds a local minimum.
     """
     preferred = np.asarray(preferred, dtype=np.float64)
     if preferred.shape != solution.point.shape or not np.isfinite(preferred).all():
@@ -173,7 +156,7 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
         return np.asarray(nearest_in_hull(ideals @ root.T, root @ preferred) @ ideals)
     root = np.linalg.cholesky(np.einsum("n,nab->ab", weights / weights.sum(), matrices)).T
     back = np.linalg.inv(root)
-    # In the norm's own coordinates, about the preferred meeting, with M of one size: shares are then of one size too.
+    # In coordinates of the norm, about the preferred meeting, with M of one size: shares are then of one size too.
     unit = np.einsum("ca,ncd,db->nab", back, unit, back)
     sizes *= np.trace(unit, axis1=1, axis2=2)
     unit /= np.trace(unit, axis1=1, axis2=2)[:, None, None]
@@ -195,17 +178,17 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
         return float(point @ point), 2.0 * np.einsum("nab,nb,a->n", unit, ideals - point, pull)
 
     count = len(ideals)
-    # Where the M differ much in shape, shares of a millionth still count.
+    # If the shapes of the M differ much, shares of a millionth matter.
     wide = 10.0 ** (-6.0 * qmc.Halton(count, scramble=False).random(3 * _TRIED)[1:])
     tried = np.concatenate([np.eye(count), np.full((1, count), 1.0 / count), simplex_weights(count, _TRIED), wide])
     nearest = np.argsort((places(tried) ** 2).sum(axis=1), kind="stable")
     shares, left = _least_share(distance, tried[nearest[0]]), np.inf
     for begin in tried[nearest[1:_FOLLOWED]]:
         other = _least_share(distance, begin)
-        shares = min(shares, other, key=lambda each: distance(each)[0])
+        shares = min(shares, other, key=lambda share: distance(share)[0])
     for _ in range(_MOST_ROUNDS):
-        # Shares count by their ratios alone, so each is bounded by zero and by nothing else: where none can be changed
-        # by itself so that the distance falls, the conditions of the least hold.
+        # The point depends on ratios of shares, so that zero is their only bound: if no change of a single share lowers
+        # the distance, the conditions of the minimum hold.
         probes = _changed(shares)
         squared = (places(probes) ** 2).sum(axis=1)
         here = float(np.sqrt(distance(shares)[0]))
@@ -220,7 +203,7 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
 
 
 def _least_share(distance: Callable[[Floats], tuple[float, Floats]], begin: Floats) -> Floats:
-    """Shares of sum one near to some at which a squared distance is least."""
+    """Shares of sum one, from initial ones, at which a squared distance is least."""
     scale = np.maximum(begin / begin.sum(), 1e-6)
 
     def scaled(x: Floats) -> tuple[float, Floats]:
@@ -231,7 +214,7 @@ def _least_share(distance: Callable[[Floats], tuple[float, Floats]], begin: Floa
         scaled,
         begin / scale,
         jac=True,
-        bounds=[(0.0, 1.0 / each) for each in scale],
+        bounds=[(0.0, 1.0 / size) for size in scale],
         constraints={"type": "eq", "fun": lambda x: x @ scale - 1.0, "jac": lambda _: scale},
         method="SLSQP",
         options={"ftol": 1e-16, "maxiter": 300},
@@ -241,26 +224,26 @@ def _least_share(distance: Callable[[Floats], tuple[float, Floats]], begin: Floa
 
 
 def _changed(shares: Floats) -> Floats:
-    """Shares of which one is greater, or less, by steps of all sizes, shape (k, n)."""
+    """Shares of which one is increased, or decreased, by steps of all sizes, shape (k, n)."""
     steps = 10.0 ** -np.arange(0.0, 13.0)
     greater = shares + steps[:, None, None] * np.eye(len(shares))
     less = shares * (1.0 - steps[:, None, None] * np.eye(len(shares)))
-    found = np.concatenate([greater, less]).reshape(-1, len(shares))
-    return np.asarray(found[found.sum(axis=1) > 0.0])
+    changed = np.concatenate([greater, less]).reshape(-1, len(shares))
+    return np.asarray(changed[changed.sum(axis=1) > 0.0])
 
 
 def _parts(solution: EncounterSolution) -> tuple[Floats, Floats, Floats, Floats]:
     """Roots of M, ideals, J*^2 and weights of the craft."""
     return (
-        np.array([each.root for each in solution.costs]),
+        np.array([cost.root for cost in solution.costs]),
         solution.ideals,
-        np.array([each.ideal_cost_squared for each in solution.costs]),
+        np.array([cost.ideal_cost_squared for cost in solution.costs]),
         solution.encounter.weights,
     )
 
 
 def _size(roots: Floats, centres: Floats) -> float:
-    """How far apart the ideals are, in the norms of M."""
+    """The greatest distance between ideals, in the norms of M."""
     apart = np.einsum("nab,nmb->nma", roots, centres[None] - centres[:, None])
     return float(np.sqrt((apart**2).sum(axis=-1).max()))
 
@@ -268,7 +251,7 @@ def _size(roots: Floats, centres: Floats) -> float:
 def _bound_craft(
     point: Floats, excess: Callable[[Floats], Floats], slopes: Callable[[Floats], Floats], matrices: Floats
 ) -> Floats:
-    """Polish a minimax point: equal excesses of the craft that bind, slopes that cancel."""
+    """Polish a minimax point: equal excesses of the active craft, slopes that cancel."""
     values = excess(point)
     bound = np.flatnonzero(values >= values.max() * (1.0 - 1e-5))
     count, free = len(bound), len(point)

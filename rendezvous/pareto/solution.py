@@ -21,8 +21,9 @@ class CraftCost:
     Parameters
     ----------
     craft : Craft
+        Of this cost.
     ideal : ndarray, shape (f,)
-        p*: the free values that are cheapest for this craft alone.
+        p*: the cheapest free values for this craft alone.
     ideal_cost_squared : float
         J*^2, m^2/s^3.
     root : ndarray, shape (f, f)
@@ -53,15 +54,17 @@ class CraftCost:
 
 @dataclass(frozen=True, eq=False)
 class EncounterSolution:
-    """An encounter solved: the meeting of least group loss, and what any other meeting costs.
+    """A solved encounter: the meeting of least group loss, and the costs of any other meeting.
 
     Parameters
     ----------
     encounter : Encounter
+        The problem.
     costs : tuple of CraftCost
-        One a craft, in order.
+        Of the craft, in order.
     point : ndarray, shape (f,)
-        The free values that minimise the weighted sum of excesses, the norm (1.7) of the paper.
+        The free values that minimise the weighted sum of excesses, the norm (1.7) of the paper. The methods use it
+        where their `point` is None.
     """
 
     encounter: Encounter
@@ -71,104 +74,40 @@ class EncounterSolution:
     @property
     def ideals(self) -> Floats:
         """p* of the craft, shape (n, f)."""
-        return np.array([each.ideal for each in self.costs])
+        return np.array([cost.ideal for cost in self.costs])
 
     @property
     def same_matrix(self) -> bool:
         """Whether all craft have one M: then the Pareto set is the convex hull of the ideals."""
         first = self.costs[0].matrix
-        return all(np.allclose(each.matrix, first, rtol=1e-12, atol=0.0) for each in self.costs[1:])
+        return all(np.allclose(cost.matrix, first, rtol=1e-12, atol=0.0) for cost in self.costs[1:])
 
     def meeting_state(self, point: Floats | None = None) -> Floats:
-        """Return the terminal state of free values.
-
-        Parameters
-        ----------
-        point : ndarray, shape (f,), or None
-            None: the best for the group.
-
-        Returns
-        -------
-        ndarray, shape (6,)
-            Of an intercept only the position is common.
-        """
-        chosen = self.point if point is None else point
-        return np.asarray(self.encounter.base + self.encounter.opening @ chosen)
+        """Return the terminal state, shape (6,), of a `point`, shape (f,); of an intercept only the position."""
+        return np.asarray(self.encounter.base + self.encounter.opening @ (self.point if point is None else point))
 
     def excess(self, point: Floats | None = None) -> Floats:
-        """Return J_i^2 - J_i*^2 of all craft, m^2/s^3.
-
-        Parameters
-        ----------
-        point : ndarray, shape (..., f), or None
-            None: the best for the group.
-
-        Returns
-        -------
-        ndarray, shape (..., n)
-        """
-        chosen = self.point if point is None else point
-        return np.asarray(np.stack([each.excess(chosen) for each in self.costs], axis=-1))
+        """Return J_i^2 - J_i*^2 of all craft, m^2/s^3, shape (..., n), at a `point`, shape (..., f)."""
+        point = self.point if point is None else point
+        return np.stack([cost.excess(point) for cost in self.costs], axis=-1)
 
     def cost_squared(self, point: Floats | None = None) -> Floats:
-        """Return J_i^2 of all craft, shape (..., n), m^2/s^3.
-
-        Parameters
-        ----------
-        point : ndarray, shape (..., f), or None
-            None: the best for the group.
-
-        Returns
-        -------
-        ndarray, shape (..., n)
-        """
-        return np.asarray(self.excess(point) + np.array([each.ideal_cost_squared for each in self.costs]))
+        """Return J_i^2 of all craft, m^2/s^3, shape (..., n), at a `point`, shape (..., f)."""
+        return np.asarray(self.excess(point) + np.array([cost.ideal_cost_squared for cost in self.costs]))
 
     def group_loss(self, point: Floats | None = None) -> Floats:
-        """Return the weighted sum of excesses, the norm (1.7), m^2/s^3.
-
-        Parameters
-        ----------
-        point : ndarray, shape (..., f), or None
-            None: the best for the group.
-
-        Returns
-        -------
-        ndarray, shape (...)
-        """
+        """Return the weighted sum of excesses, the norm (1.7), m^2/s^3, shape (...), at a `point`, shape (..., f)."""
         return np.asarray(self.excess(point) @ self.encounter.weights)
 
     def plan(self, index: int, point: Floats | None = None) -> Plan:
-        """Return how one craft flies to a meeting.
-
-        Parameters
-        ----------
-        index : int
-            Which craft.
-        point : ndarray, shape (f,), or None
-            Free values; None: the best for the group.
-
-        Returns
-        -------
-        Plan
-            Its control and trajectory as functions of time.
-        """
+        """Return the flight of craft number `index` to a `point`, shape (f,)."""
         cost = self.costs[index]
-        chosen = self.point if point is None else point
-        costate = cost.to_costate @ (cost.effort_base + cost.effort_slope @ chosen)
+        costate = cost.to_costate @ (cost.effort_base + cost.effort_slope @ (self.point if point is None else point))
         return Plan(cost.craft, self.encounter.meeting_s, costate)
 
 
 def solve_encounter(encounter: Encounter) -> EncounterSolution:
-    """Solve an encounter.
-
-    Parameters
-    ----------
-    encounter : Encounter
-
-    Returns
-    -------
-    EncounterSolution
+    """Solve an `encounter`.
 
     Raises
     ------
@@ -178,48 +117,38 @@ def solve_encounter(encounter: Encounter) -> EncounterSolution:
     Notes
     -----
     (2.1) to (2.7) of Barseghyan and Stepanyan (2008) for any free components. States are divided by (T, T, T, 1, 1, 1)
-    before the Cholesky factor of the Gramian is taken, and the ideal is a least-squares problem of that factor, so no
-    digits are lost to J*. O(n) small matrices.
+    before the Cholesky factor of the Gramian is computed, and the ideal is a least-squares problem of that factor, so
+    J* loses no digits. O(n) small matrices.
     """
     common, opening, base = encounter.common, encounter.opening, encounter.base
-    known: dict[tuple[int, float], tuple[Floats, Floats, Floats]] = {}
+    factors: dict[tuple[int, float], tuple[Floats, Floats, Floats]] = {}
     costs = []
     for craft in encounter.craft:
         key = (id(craft.motion), craft.start_s)
-        if key not in known:
-            known[key] = _factor(craft, encounter.meeting_s, common)
-        transition, drift, whiten = known[key]
+        if key not in factors:
+            factors[key] = _factor(craft, encounter.meeting_s, common)
+        transition, drift, whiten = factors[key]
         missing = (base - transition @ craft.state - drift)[:common]
         costs.append(_craft_cost(craft, whiten, missing, opening[:common]))
     return EncounterSolution(encounter, tuple(costs), weighted_point(costs, encounter.weights))
 
 
 def weighted_point(costs: Sequence[CraftCost], weights: ArrayLike) -> Floats:
-    """Return the free values that minimise a weighted sum of excesses.
-
-    Parameters
-    ----------
-    costs : sequence of CraftCost
-    weights : array_like, shape (n,)
-        Not negative, one positive.
-
-    Returns
-    -------
-    ndarray, shape (f,)
+    """Return the free values, shape (f,), that minimise the sum of excesses with `weights`, not negative, shape (n,).
 
     Notes
     -----
-    (sum w_i M_i)^-1 sum w_i M_i p_i*, as a least-squares problem of the roots of M_i.
+    (sum w_i M_i)^-1 sum w_i M_i p_i*, as a least-squares problem of the roots of M_i of the `costs`.
     """
     roots = np.sqrt(np.asarray(weights, dtype=np.float64))
-    rows = np.concatenate([root * each.root for root, each in zip(roots, costs, strict=True)])
-    right = np.concatenate([root * (each.root @ each.ideal) for root, each in zip(roots, costs, strict=True)])
+    rows = np.concatenate([root * cost.root for root, cost in zip(roots, costs, strict=True)])
+    right = np.concatenate([root * (cost.root @ cost.ideal) for root, cost in zip(roots, costs, strict=True)])
     orthogonal, upper = np.linalg.qr(rows)
     return np.asarray(np.linalg.solve(upper, orthogonal.T @ right))
 
 
 def _factor(craft: Craft, meeting_s: float, common: int) -> tuple[Floats, Floats, Floats]:
-    """Return Phi, the drift, and what turns a missing state into scaled effort: L^-1 S^-1."""
+    """Return Phi, the drift, and L^-1 S^-1, the map from the missing state to the scaled effort."""
     segment = craft.motion.segment(craft.start_s, meeting_s)
     scale = np.ones(common)
     scale[:3] = meeting_s - craft.start_s
@@ -242,8 +171,8 @@ def _craft_cost(craft: Craft, whiten: Floats, missing: Floats, opening: Floats) 
     base, slope = whiten @ missing, whiten @ opening
     orthogonal, upper = np.linalg.qr(slope)
     ideal = -np.linalg.solve(upper, orthogonal.T @ base)
-    # Without the part along the slope: base + slope p* would cancel where the ideal lies far away.
-    # Where all that is common is free there is no rest at all.
+    # Orthogonal to the slope: base + slope p* would cancel if the ideal is far away. If all components that are in
+    # common are free there is no rest.
     rest = base - orthogonal @ (orthogonal.T @ base) if len(base) > slope.shape[1] else np.zeros(0)
     to_costate = np.zeros((6, len(base)))
     to_costate[: len(base)] = whiten.T

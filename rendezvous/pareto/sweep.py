@@ -1,4 +1,4 @@
-"""How the costs of an encounter depend on how long it may take."""
+"""The costs of an encounter as functions of the meeting time."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class DurationSweep:
-    """An encounter at several meeting times.
+    """An encounter at k meeting times.
 
     Parameters
     ----------
     meeting_s : ndarray, shape (k,)
+        Times of the meeting.
     points : ndarray, shape (k, f)
-        Free values that are best for the group.
+        Free values that minimise the group loss.
     cost_squared, ideal_cost_squared : ndarray, shape (k, n)
         J_i^2 and J_i*^2, m^2/s^3.
     group_loss : ndarray, shape (k,)
@@ -36,24 +37,13 @@ class DurationSweep:
 
 
 def sweep_meeting_time(encounter: Encounter, meeting_s: ArrayLike) -> DurationSweep:
-    """Solve an encounter at several meeting times.
-
-    Parameters
-    ----------
-    encounter : Encounter
-    meeting_s : array_like, shape (k,)
-        Each after every craft's start.
-
-    Returns
-    -------
-    DurationSweep
-    """
+    """Solve an `encounter` at k meeting times, each after every craft's start."""
     times = np.atleast_1d(np.asarray(meeting_s, dtype=np.float64))
-    solved = [solve_encounter(replace(encounter, meeting_s=float(each))) for each in times]
+    solutions = [solve_encounter(replace(encounter, meeting_s=float(time))) for time in times]
     return DurationSweep(
         times,
-        np.array([each.point for each in solved]),
-        np.array([each.cost_squared() for each in solved]),
-        np.array([[cost.ideal_cost_squared for cost in each.costs] for each in solved]),
-        np.array([float(each.group_loss()) for each in solved]),
+        np.array([solution.point for solution in solutions]),
+        np.array([solution.cost_squared() for solution in solutions]),
+        np.array([[cost.ideal_cost_squared for cost in solution.costs] for solution in solutions]),
+        np.array([float(solution.group_loss()) for solution in solutions]),
     )
