@@ -1,6 +1,6 @@
-"""Make docs/flight.gif, the moving picture of the README: every fourth moment of a flight's animation, in few colours.
+"""Make docs/flight.gif, the animation in the README: every fourth frame of one engagement, in few colours.
 
-Run in the project's root: python docs/flight_gif.py --out docs/flight.gif
+Run in the root of the project: python docs/flight_gif.py --out docs/flight.gif
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ FRAME_MS = 400
 
 
 def main() -> None:
-    """Fly the paper's single engagement and write the picture."""
+    """Simulate the single engagement of the paper and write the animation."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True, help="the file to write")
-    asked = parser.parse_args()
-    film = Image.open(BytesIO(animate([fly_one(load_scenario("asteroid-1997-single"))], GIF)))
-    moments = [frame.convert("RGB") for frame in ImageSequence.Iterator(film)][::EVERY]
-    flat = [moment.quantize(COLOURS, dither=Image.Dither.NONE) for moment in moments]
-    flat[0].save(asked.out, save_all=True, append_images=flat[1:], duration=FRAME_MS, loop=0, optimize=True)
+    arguments = parser.parse_args()
+    animation = Image.open(BytesIO(animate([fly_one(load_scenario("asteroid-1997-single"))], GIF)))
+    frames = [frame.convert("RGB") for frame in ImageSequence.Iterator(animation)][::EVERY]
+    flat = [frame.quantize(COLOURS, dither=Image.Dither.NONE) for frame in frames]
+    flat[0].save(arguments.out, save_all=True, append_images=flat[1:], duration=FRAME_MS, loop=0, optimize=True)
 
 
 if __name__ == "__main__":

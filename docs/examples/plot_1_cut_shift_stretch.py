@@ -1,11 +1,11 @@
 """
-A set that is cut, shifted and stretched
-========================================
+One step of a set: cut, shift, stretch
+======================================
 
-One step of guidance, as a section of the set sees it.
+How a measurement, an impulse and time change one section of the set.
 
-A target comes head-on at 58 km/s from some 5800 km. All that is known at first is a box of positions and velocities;
-the angle of the line of sight is measured to within 0.15 mrad.
+A target approaches head-on at 58 km/s from a range of about 5800 km. At first only a box of positions and velocities is
+known. The angle of the line of sight is measured with an error of at most 0.15 mrad.
 """
 
 import matplotlib.pyplot as plt
@@ -22,8 +22,8 @@ information = InformationSet(model)
 information
 
 # %%
-# A stage of a step is a list of sections. This draws the middle one of each stage in the (omega, alpha) plane, the one
-# before it in grey.
+# A stage of a step is a list of sections. These functions draw the middle section of a stage in the (ω, α) plane, with
+# the previous stage in grey.
 
 
 def outline(stage):
@@ -40,7 +40,7 @@ def draw(axes, title, now, before=None):
 
 
 # %%
-# The set after some twenty steps, in which the truth was at z = 300 m and moved across at 20 m/s:
+# The set after twenty steps. The true state starts at z = 300 m with a lateral velocity of 20 m/s:
 
 z_m, vz_m_s = 300.0, 20.0
 rng = np.random.default_rng(4)
@@ -52,8 +52,8 @@ for step in range(20):
 information
 
 # %%
-# Now one step, drawn before and after each of its parts. The angle that is measured here errs by its greatest error, so
-# that the band cuts deep.
+# One step, drawn before and after each of its stages. The measurement has the greatest allowed error, so its band cuts
+# off a large part of the section.
 
 time_s = 10.0
 alpha = (z_m + vz_m_s * time_s) / (5.8e6 - 58e3 * time_s)
@@ -68,22 +68,22 @@ for _ in range(20):
 later = information.sections()
 
 figure, panels = plt.subplots(1, 3, figsize=(10, 3.6), layout="constrained")
-draw(panels[0], "a measurement cuts", measured, predicted)
-draw(panels[1], "an impulse of 7.5 m/s shifts", shifted, measured)
-draw(panels[2], "ten seconds stretch", later, shifted)
+draw(panels[0], "measurement: cut", measured, predicted)
+draw(panels[1], "impulse of 7.5 m/s: shift", shifted, measured)
+draw(panels[2], "ten seconds: stretch", later, shifted)
 panels[0].set_ylabel("angle α, mrad")
 plt.show()
 
 # %%
-# The cut is a band of alpha. The shift is along omega by -k/x: an impulse changes a velocity, and not yet a position.
-# Time shears the section, because a greater rate is a greater angle a moment later, and stretches it, because the
-# same offset is a greater angle from nearer. The unknown acceleration adds a short segment at every step, too short
-# to be seen here.
+# The measurement is a band of α. The impulse k shifts the section by -k/x along ω, because it changes the velocity but
+# not the position. Time shears the section, because a greater rate leads to a greater angle, and stretches it, because
+# the same offset is a greater angle at a shorter range. The unknown acceleration adds a short segment at every step,
+# which is too short to be visible here.
 #
-# Each section is a filter of its own: what happens to it depends on its range alone. That is why a section at *any*
-# range can be had exactly, by replaying what was measured and done:
+# Each section is an independent filter: it depends only on its range and on the history. A section at *any*
+# range can therefore be computed exactly by replaying the measurements and impulses:
 
 information.section_at(label_m=5.7e6).polygon
 
 # %%
-# `Sets, guarantee and limits <../interception.html>`_ says what the paper does with them.
+# `The interception of 1997 <../interception.html>`_ describes how the paper uses these sets.

@@ -1,11 +1,11 @@
 """
-The closing of the predicted miss
-=================================
+The predicted miss during an engagement
+=======================================
 
-What guidance reads off the set is one interval: the misses that are still possible if nothing more is done.
+Guidance uses one interval from the set: the misses that are possible without further impulses.
 
-Its ends are pi_* and pi^*, reached in two corners of the set. The symmetric-miss strategy keeps the interval symmetric
-about zero, so that the worse of its ends is as small as it can be.
+Its ends are attained at two corners of the set. The symmetric-miss strategy keeps the interval symmetric about zero, so
+that the greater modulus of its ends is as small as possible.
 """
 
 from dataclasses import replace
@@ -20,12 +20,12 @@ from sim import fly_one
 scenario = replace(load_scenario("asteroid-1997-single"), range_sensor=None)
 flights = {
     "random errors": fly_one(scenario),
-    "errors that play a game": fly_one(replace(scenario, noise=NoiseKind.GAME)),
+    "game noise": fly_one(replace(scenario, noise=NoiseKind.GAME)),
 }
 
 # %%
-# The paper's single engagement: 8 km aside, 100 s to go, impulses of up to 7.5 m/s. The interval shrinks by four
-# orders of magnitude, so that the axis is logarithmic outside of +-10 m.
+# The single engagement of the paper starts with a lateral offset of 8 km, 100 s before the meeting. Impulses are at
+# most 7.5 m/s. The interval shrinks by four orders of magnitude, so the axis is logarithmic outside ±10 m.
 
 figure, panels = plt.subplots(1, 2, figsize=(10, 4), sharey=True, layout="constrained")
 for axes, (title, record) in zip(panels, flights.items(), strict=True):
@@ -35,24 +35,24 @@ for axes, (title, record) in zip(panels, flights.items(), strict=True):
     axes.fill_between(times, lower, upper, color="#c6d9ec", edgecolor="#08306b", label="predicted-miss interval")
     axes.axhline(0.0, color="#1a1a1a", linewidth=0.8)
     axes.set_yscale("symlog", linthresh=10.0)
-    axes.set(title=f"{title}: misses by {record.result.miss_m[0]:.1f} m", xlabel="time t, s")
+    axes.set(title=f"{title}: miss {record.result.miss_m[0]:.1f} m", xlabel="time t, s")
     axes.legend(loc="upper right")
 panels[0].set_ylabel("predicted miss, m")
 plt.show()
 
 # %%
-# At first the interval is as wide as what is known at the start, and symmetric: nothing is to be corrected yet. Once a
-# measurement cuts off one end, impulses at their limit bring zero back into the middle. From then on it is measurements
-# that close it. Random errors now and then come close to their bounds and cut the set; errors that play a game are
-# chosen so that the worst corner of the set stays in it, and the interval closes late:
+# At first the interval is wide and symmetric, so no impulse is needed. When a measurement cuts off one end, impulses of
+# the greatest size bring zero back to the middle. Afterwards measurements shrink the interval. Random errors are
+# sometimes close to their bounds and then cut the set. Game noise is chosen so that the worst corner stays in the set,
+# and the interval shrinks late:
 
 for title, record in flights.items():
     spent = np.abs([step.impulse_m_s for step in record.steps]).sum()
     print(f"{title}: miss {record.result.miss_m[0]:.1f} m, impulse {spent:.0f} m/s")
 
 # %%
-# The sets themselves half a second, four and eight seconds after the start: the paper's figure 3, drawn by the function
-# that ``infoset engage`` uses. Crosses are the truth, which is inside, squares the measured angles.
+# The sets 0.5 s, 4 s and 8 s after the start are figure 3 of the paper, drawn with the function that ``infoset engage``
+# uses. Crosses are the true state, which is inside; squares are the measured angles.
 
 from experiments.interception.figures.sets import draw_sets
 

@@ -1,11 +1,11 @@
 """
-Fifty engagements a curve: the paper's figure 4
-===============================================
+Fifty engagements per curve: figure 4 of the paper
+==================================================
 
-How good is a strategy? Fly it many times, from starts spread at random, and look at the distribution of what comes out.
+The distribution of miss and impulse over many engagements with random starts shows how good a strategy is.
 
-The four curves are those of the paper: random errors (1), with a range meter too (2), errors that play a game (3), and
-those with a range meter (4). All have the same fifty starts.
+The four curves are those of the paper: random errors (1), random errors with a range meter (2), game noise (3), and
+game noise with a range meter (4). All have the same fifty starts.
 """
 
 import numpy as np
@@ -22,13 +22,13 @@ curves = [
 library_figure = draw_distributions(curves)
 
 # %%
-# Fifty runs tell a distribution function to within 0.19, at 95 % confidence: the bands are honest, and wide. The
-# paper's conclusion stands in spite of them: a range meter of 5 % helps little, and whether errors are random or
-# chosen matters much.
+# Fifty runs determine a distribution function to within 0.19 at 95 % confidence, so the bands are wide. The conclusion
+# of the paper holds nevertheless: a range meter of 5 % helps little, and the difference between random errors and game
+# noise is large.
 
 for curve in curves:
     miss, spent = np.median(curve.results.miss_m), np.median(curve.results.impulse_m_s)
     print(f"curve {curve.number}: median miss {miss:.1f} m for {spent:.0f} m/s")
 
 # %%
-# ``infoset experiment --out results`` does the same, and writes the figure, the numbers and the scenario to files.
+# ``infoset experiment --out results`` does the same and writes the figure, the numbers and the scenario to files.

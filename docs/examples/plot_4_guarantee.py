@@ -1,9 +1,11 @@
 """
-A miss that is known on board
-=============================
+A bound of the miss that is computed on board
+=============================================
 
-The published sets can lose the truth by a little. Those of the model ``guaranteed`` cannot, and so what leaves them
-bounds the true miss: Phi is known on board, without knowing the truth.
+With the model ``guaranteed`` the set always contains the true state, and Phi is a bound of the true miss.
+
+The published sets can lose the true state by a small amount. The sets of the model ``guaranteed`` cannot. Phi is
+computed from the sets alone, without the true state.
 """
 
 from dataclasses import replace
@@ -19,10 +21,11 @@ scenario = load_scenario("asteroid-1997")
 model = replace(scenario.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
 guaranteed = replace(scenario, set_model=model, noise=NoiseKind.GAME)
 results = simulate(guaranteed, runs=60)
-print(f"truth kept {results.truth_kept.sum()}/60, Phi held {results.phi_held.sum()}/60")
+print(f"true state inside the set at every step: {results.truth_kept.sum()} of 60 runs")
+print(f"miss at most Phi: {results.phi_held.sum()} of 60 runs")
 
 # %%
-# Each point is an engagement. Above the line the miss would exceed what was promised.
+# Each point is an engagement. A point above the line would violate the guarantee.
 
 figure, axes = plt.subplots(figsize=(5.5, 4.5), layout="constrained")
 axes.plot(results.guaranteed_miss_m, results.miss_m, "o", color="#08306b", markersize=4, label="engagement")
@@ -34,4 +37,4 @@ axes.legend(loc="upper left")
 plt.show()
 
 # %%
-# `The guarantee <../guarantee.html>`_ says what this assumes of sensors, engine and target, and proves it.
+# `The guarantee <../guarantee.html>`_ states the assumptions on sensors, engine and target, and the proof.
