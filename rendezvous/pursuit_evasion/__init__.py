@@ -1,20 +1,19 @@
 """The orbital pursuit-evasion game with free final time: solution, certificate, feedback and maps.
 
 Game and conditions are those of Wang Yanxin's slides (Bauman University), after Shen and Casalino, Journal of Guidance,
-Control, and Dynamics 41(8), 2018, p. 1823, with misprints mended; how they are solved and what certifies the answer is
+Control, and Dynamics 41(8), 2018, p. 1823, with misprints mended; the method of solution and the certificate are
 not from there.
 """
 
 from rendezvous.pursuit_evasion.certificate import Certificate, Deviation, certify
-from rendezvous.pursuit_evasion.fallbacks import solve_by_homotopy, solve_by_linear_game
 from rendezvous.pursuit_evasion.feedback import Ended, Flight, Observation, capture_quantiles_s, fly, fly_many
 from rendezvous.pursuit_evasion.game import Game, Gravity, Player
 from rendezvous.pursuit_evasion.history import History, PlayerHistory, history
 from rendezvous.pursuit_evasion.maps import STATUSES, CaptureMap, PointStatus, capture_map
-from rendezvous.pursuit_evasion.paths import PathError, Policy
+from rendezvous.pursuit_evasion.paths import PathError
 from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
-from rendezvous.pursuit_evasion.solver import solve, solve_near
-from rendezvous.pursuit_evasion.steering import RandomSteering, Script, Steering
+from rendezvous.pursuit_evasion.solver import solve, solve_by_homotopy, solve_by_linear_game, solve_near
+from rendezvous.pursuit_evasion.steering import Policy, RandomSteering, Script, Steering
 from rendezvous.pursuit_evasion.units import Units
 
 __all__ = [

@@ -1,9 +1,9 @@
 """One branch of the game's extremals: the distance l that the evader keeps at a time T, followed as T grows.
 
 At T -> 0 nu is the line of sight and l the distance, so no guess is needed. Capture is where l has fallen to the
-capture radius: l above it on the way says that there was none before, on this branch. Nondimensional.
+capture radius: l above it before then excludes an earlier capture on this branch. Nondimensional.
 
-This is not the way of Wang's slides, which shoot forward from a guess.
+Wang's slides shoot forward from a guess instead.
 """
 
 from __future__ import annotations
@@ -27,26 +27,27 @@ MOST_WORK = 20_000.0
 
 
 class Ending(Enum):
-    """Why a branch was followed no further."""
+    """Why a branch ends."""
 
     CAPTURE = "capture"
     TIME = "time"
     FOLD = "fold"
     WORK = "work"
-    """It would take too long."""
+    """The work limit is reached."""
 
 
 @dataclass(frozen=True)
 class Branch:
-    """A branch as far as it was followed.
+    """A branch of extremals.
 
     Parameters
     ----------
     nodes : tuple of Node
-        In the order they were found.
+        In the order in which they were found.
     ending : Ending
+        Why it ends.
     work : float
-        Radians of extremals that were tried.
+        Radians of extremals propagated.
     """
 
     nodes: tuple[Node, ...]
@@ -60,22 +61,10 @@ class Branch:
 
 
 def follow(pair: Pair, first: Node, radius: float, latest: float, most_work: float = MOST_WORK) -> Branch:
-    """Follow a branch as the duration grows, to the capture, to a time, or to where it folds.
+    """Follow a branch from its first extremal, as the duration grows, to the capture, to `latest`, or to a fold.
 
-    Parameters
-    ----------
-    pair : Pair
-    first : Node
-    radius : float
-        Distance that is capture; minus infinity to follow the branch beyond it.
-    latest : float
-    most_work : float, optional
-        Radians of extremals that may be tried: a bound that is the same on every machine.
-
-    Returns
-    -------
-    Branch
-        Ends with the capture at full precision, if that is its ending.
+    A `radius` of minus infinity follows the branch beyond the capture. `most_work` limits the radians of extremals
+    propagated: the same limit on every machine. A capture that ends the branch is computed to full precision.
 
     Notes
     -----
@@ -120,18 +109,9 @@ def follow(pair: Pair, first: Node, radius: float, latest: float, most_work: flo
 
 
 def polish(pair: Pair, guess: Floats, duration: float, radius: float, latest: float) -> Node | None:
-    """Find the capture near a guess, at full precision.
+    """Return the capture near a guess, shape (15,), at full precision, or None.
 
-    Parameters
-    ----------
-    pair : Pair
-    guess : ndarray, shape (15,)
-    duration, radius, latest : float
-
-    Returns
-    -------
-    Node or None
-        None where Newton's method does not converge, or to what misses the necessary conditions by `MOST_RESIDUAL`.
+    None stands for a failure of Newton's method, or a residual above `MOST_RESIDUAL`.
     """
     found = pair.solve(guess, duration, radius, time_free=True, tolerance=FINE, latest=latest)
     if found is None:
@@ -144,17 +124,7 @@ def polish(pair: Pair, guess: Floats, duration: float, radius: float, latest: fl
 
 
 def first_crossing(before: Node, after: Node, radius: float) -> float | None:
-    """Return when l first falls to a radius between two extremals, by the cubic through both; None if it does not.
-
-    Parameters
-    ----------
-    before, after : Node
-    radius : float
-
-    Returns
-    -------
-    float or None
-    """
+    """Return the time at which l first falls to a radius between two extremals, by the cubic through both, or None."""
     step = after.duration - before.duration
     # Between its ends a cubic falls below the lower one by no more than 4/27 of what its slopes are worth.
     dip = 4.0 / 27.0 * step * (abs(before.closing) + abs(after.closing))

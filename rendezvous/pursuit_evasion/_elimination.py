@@ -12,18 +12,9 @@ Floats = NDArray[np.float64]
 
 @allocation_free
 def eliminate(matrix: Floats, right: Floats) -> float:
-    """Solve matrix @ x = right by Gauss and Jordan's elimination with partial pivots; both are overwritten.
+    """Solve matrix @ x = right, shapes (n, n) and (n, m), by Gauss-Jordan elimination with partial pivoting.
 
-    Parameters
-    ----------
-    matrix : ndarray, shape (n, n)
-    right : ndarray, shape (n, m)
-        Becomes x.
-
-    Returns
-    -------
-    float
-        The determinant; zero where the matrix is singular, and `right` is then of no use.
+    Both are overwritten, `right` with x. Returns the determinant; where it is zero, `right` has no meaning.
 
     Notes
     -----

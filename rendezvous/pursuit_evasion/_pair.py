@@ -1,6 +1,6 @@
 """The extremals of both sides together, by Newton's method: at a duration T, or at a distance l. Nondimensional.
 
-At each duration T the evader strives along nu, the pursuer too, and r_E - r_P = l nu. At l = 0 these are the conditions
+At each duration T both sides go as far as they can along nu, and r_E - r_P = l nu. At l = 0 these are the conditions
 at the end of Wang's slides ("Optimal control"): r_P = r_E, lambda_rP + lambda_rE = 0, lambda_v = 0. Their last one,
 lambda_rP . (v_P - v_E) = 1, only fixes the scale of costates: here |nu| = 1, and the closing speed must be positive.
 """
@@ -19,13 +19,13 @@ from rendezvous.pursuit_evasion._side import KnownPath, Response, Side, across
 Floats = NDArray[np.float64]
 
 FINE, COARSE = 1e-13, 1e-9
-"""Tolerances of propagation: of what is kept, and on the way there."""
+"""Tolerances of propagation: of results, and of intermediate iterations."""
 
 MOST_RESIDUAL = 1e-9
-"""How far an answer may miss the necessary conditions: start states, and r_E - r_P = l nu."""
+"""Greatest error of a result in the necessary conditions: start states, and r_E - r_P = l nu."""
 
 CLOSE, ROUGH = 1e-7, 1e-4
-"""Last corrections of Newton's method, for the same; what is left of the error is about their square."""
+"""Greatest last corrections of Newton's method, for the same; the remaining error is about their square."""
 
 _MOST_ITERATIONS = 12
 _IDENTITY = np.eye(3)
@@ -43,22 +43,23 @@ class Node:
     duration, distance : float
         T and l.
     nu : ndarray, shape (3,)
+        Unit vector from the pursuer's end to the evader's.
     pursuer, evader : ndarray, shape (6,)
         End states.
     curvature : ndarray, shape (2,)
         Eigenvalues of the Hessian of h_P - h_E across nu, ascending.
     closing : float
-        nu . (v_P - v_E): l falls at this rate.
+        nu . (v_P - v_E), the rate at which l falls.
     regular : bool
-        Whether neither side's extremal shows a conjugate point.
+        Whether neither side's extremal has a conjugate point.
     slope : ndarray, shape (15,)
         d/dT of (pursuer, evader, nu) at l free; of the last guess, so to first order.
     correction : float
-        Size of the last step of Newton's method: the error that is left is about its square.
+        Size of the last step of Newton's method: the remaining error is about its square.
     costates : ndarray, shape (2, 6)
         p at the start, pursuer's and evader's, of the last guess that was linearised.
     residual : float
-        By how much that guess missed the start states, and the ends of this extremal r_E - r_P = l nu.
+        Error of the start states of that guess, and of r_E - r_P = l nu at the ends of this extremal.
     """
 
     duration: float
@@ -76,12 +77,12 @@ class Node:
 
     @property
     def is_saddle(self) -> bool:
-        """Whether no small change of nu gives the evader more, or a side's extremal less than it thinks."""
+        """Whether no small change of nu increases the evader's distance, and both sides' extremals are maxima."""
         return self.regular and bool(self.curvature[0] + self.distance > 0.0)
 
     @property
     def is_nearest(self) -> bool:
-        """Whether a pursuer alone can come no nearer by a small change, to an evader whose place is given.
+        """Whether no small change brings the pursuer nearer to an evader on a given path.
 
         Beyond a conjugate point its reachable set is hollow there: the radius of curvature of the set's edge has gone
         from plus to minus infinity, and must stay beyond -l.
@@ -142,27 +143,13 @@ class _Linear:
 
 @dataclass(frozen=True)
 class Pair:
-    """Both sides of a game.
-
-    Parameters
-    ----------
-    pursuer, evader : Side
-    """
+    """Both sides of a game."""
 
     pursuer: Side
     evader: Side
 
     def is_sound(self, node: Node) -> bool:
-        """Whether an extremal is what the sides want: a saddle, or a nearest one where the evader cannot choose.
-
-        Parameters
-        ----------
-        node : Node
-
-        Returns
-        -------
-        bool
-        """
+        """Return whether an extremal is a saddle, or a nearest one where the evader cannot choose."""
         return node.is_nearest if isinstance(self.evader, KnownPath) else node.is_saddle
 
     def solve(
@@ -177,28 +164,24 @@ class Pair:
         close: float = CLOSE,
         latest: float = math.inf,
     ) -> Node | None:
-        """Find the extremal near a guess, for a given duration, or for a given distance with the time free.
+        """Return the extremal near a guess, or None where Newton's method does not converge.
 
         Parameters
         ----------
         guess : ndarray, shape (15,)
             End states and nu.
         duration, distance : float
-            The guess of the one that is free, and the other.
+            A given value, and a guess of the free one.
         time_free : bool
+            Whether the duration is free; otherwise the distance is.
         tolerance : float
-            Of the propagation.
+            Tolerance of the propagation.
         linear_tolerance : float
-            Of the propagation of derivatives, where that is less fine.
+            Tolerance of the propagation of derivatives, where that is less fine.
         close : float
-            How small the last correction must be.
+            Greatest size of the last correction.
         latest : float
             Longest duration that can be propagated.
-
-        Returns
-        -------
-        Node or None
-            None where Newton's method does not converge.
 
         Notes
         -----
@@ -230,7 +213,7 @@ class Pair:
                 return None
             if correction < close:
                 return linear.node(state, correction)
-            # The first correction only brings both back to their start states: the second may be as great.
+            # The first correction only restores the start states: the second may be as great.
             uses = 0 if fresh else uses + 1
             if correction > _NEAR_ENOUGH or (uses > 1 and correction > _FRACTION * before):
                 linear = None
@@ -255,7 +238,7 @@ class Pair:
         outer[:, :2] = p.by_nu[:3] - e.by_nu[:3] + distance * plane.T
         outer[:, 2] = nu
         drift = e.by_time[:3] - p.by_time[:3]
-        # The inverse of the system at this duration, and what a longer one does to (nu, l).
+        # The inverse of the system at this duration, and the derivative of (nu, l) by the duration.
         at_time = np.concatenate([_IDENTITY, drift[:, None]], axis=1)
         if eliminate(outer.copy(), at_time) == 0.0:
             return None
@@ -268,17 +251,7 @@ class Pair:
         return _Linear(p, e, plane, time_free, at_distance, at_time[:, 3])
 
     def begin(self, latest: float) -> Node | None:
-        """Find the extremal of a short duration, where the line of sight is the guess.
-
-        Parameters
-        ----------
-        latest : float
-            The duration is no longer.
-
-        Returns
-        -------
-        Node or None
-        """
+        """Return the extremal of a short duration, at most `latest`, from the line of sight as a guess, or None."""
         duration = min(_FIRST_DURATION, 0.5 * latest)
         while duration > _LEAST_OF_FIRST:
             still = np.zeros(3)

@@ -1,7 +1,7 @@
-"""Every direction the evader might strive in, at one duration: is there one that keeps it farther away? Nondimensional.
+"""All directions of the evader at one duration: a search for one that keeps it farther away. Nondimensional.
 
-h(nu) is how far a side gets along nu. The evader keeps the greatest of h_E - h_P over all nu, so a branch of extremals
-that is not the greatest is not what a wise evader does.
+h(nu) is the distance that a side reaches along nu. The evader keeps the greatest of h_E - h_P over all nu: a branch of
+extremals that is not the greatest is not optimal for it.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ _CLIMBS, _MOST_CLIMBING, _APART, _LEAST_STRIDE = 4, 40, 0.9, 1e-4
 
 @dataclass(frozen=True)
 class Scan:
-    """What directions give the evader, at one duration.
+    """Distances along all directions, at one duration.
 
     Parameters
     ----------
     nu : ndarray, shape (n, 3)
-        Those for which both sides' extremals were found.
+        Directions for which both sides' extremals were found.
     distance : ndarray, shape (n,)
-        h_E - h_P.
+        h_E - h_P along them.
     tried : int
-        How many there were.
+        Number of directions tried.
     maxima : tuple of Node
-        The local maxima among them, found exactly, the greatest first.
+        Local maxima among them, computed exactly, the greatest first.
     """
 
     nu: Floats
@@ -57,15 +57,6 @@ class _End:
 
 def scan(pair: Pair, node: Node) -> Scan:
     """Look in all directions, at the duration of an extremal, from its own outward.
-
-    Parameters
-    ----------
-    pair : Pair
-    node : Node
-
-    Returns
-    -------
-    Scan
 
     Notes
     -----
@@ -89,17 +80,9 @@ def scan(pair: Pair, node: Node) -> Scan:
 
 
 def greater(pair: Pair, node: Node) -> Node | None:
-    """Return an extremal of the same duration that keeps the evader farther away, if one is found.
+    """Return an extremal of the same duration that keeps the evader farther away, or None where none is found.
 
-    Parameters
-    ----------
-    pair : Pair
-    node : Node
-
-    Returns
-    -------
-    Node or None
-        None for durations of more than six revolutions too: a scan would take minutes.
+    Durations of more than six revolutions are not scanned, which would take minutes.
     """
     if node.duration > _LONGEST:
         return None
@@ -117,7 +100,7 @@ def directions(count: int) -> Floats:
 
 
 def _fan(side: Side, state: Floats, nu: Floats, grid: Floats, duration: float) -> dict[int, _End]:
-    """Find the end states of one side for the directions of a grid, sorted from nu outward."""
+    """Find the end states of one side for the directions of a grid, which are sorted from nu outward."""
     first = _end(side, state, nu, duration)
     solved: dict[int, _End] = {}
     if first is None:
@@ -181,7 +164,7 @@ def _starts(nu: Floats, values: Floats) -> list[int]:
 
 
 def _climb(pair: Pair, pursuer: _End, evader: _End, duration: float) -> Node | None:
-    """Go up h_E - h_P, whose gradient is r_E - r_P, and end with Newton's method."""
+    """Climb h_E - h_P, whose gradient is r_E - r_P, and finish with Newton's method."""
     stride = 0.2
     for _ in range(_MOST_CLIMBING):
         rise = (evader.state - pursuer.state)[:3]

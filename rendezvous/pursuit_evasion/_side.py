@@ -1,4 +1,4 @@
-"""What one side can do by a time: how its end moves with the direction it strives in. Nondimensional."""
+"""One side of a game by a given time: the derivatives of its end state by the direction it goes in. Nondimensional."""
 
 from __future__ import annotations
 
@@ -20,23 +20,24 @@ _IDENTITY = np.eye(6)
 
 @dataclass(frozen=True)
 class Response:
-    """An end state's linear dependence, at a guess of it: rho + by_nu dnu + by_time dT leads to the true one.
+    """Linear dependence of an end state at a guess of it: rho + by_nu dnu + by_time dT leads to the true one.
 
     Parameters
     ----------
     rho : ndarray, shape (6,)
         Newton's correction of the guess.
     by_nu : ndarray, shape (6, 2)
-        Along two directions across nu.
+        Derivatives along two directions across nu.
     by_time : ndarray, shape (6,)
+        Derivative by the duration.
     regular : bool
-        Whether no conjugate point shows: the end states near by lead to start states one to one, unmirrored.
+        Whether there is no conjugate point: the map from end states near by to start states preserves orientation.
     inverse : ndarray, shape (6, 6)
-        Of the derivative of the start state by the end state.
+        Inverse of the derivative of the start state by the end state.
     costate : ndarray, shape (6,)
         p_r and p_v at the start.
     residual : float
-        Greatest component by which the start is missed.
+        Greatest component of the error of the start state.
     """
 
     rho: Floats
@@ -49,7 +50,7 @@ class Response:
 
 
 class Side(Protocol):
-    """One side of a game: a craft that can choose, or one whose path is known."""
+    """One side of a game: a craft that chooses its thrust, or one on a known path."""
 
     def respond(
         self, end_state: Floats, nu: Floats, plane: Floats, duration: float, tolerance: float
@@ -67,14 +68,7 @@ class Side(Protocol):
 
 @dataclass(frozen=True)
 class Craft:
-    """A side that thrusts as it likes; all nondimensional.
-
-    Parameters
-    ----------
-    start : ndarray, shape (6,)
-    thrust, mass, flow : float
-    mu, oblateness : float
-    """
+    """A side that chooses its direction of thrust; all nondimensional, `start` of shape (6,)."""
 
     start: Floats
     thrust: float
@@ -84,7 +78,7 @@ class Craft:
     oblateness: float
 
     def kernel_craft(self, duration: float) -> Floats:
-        """Return what `flow_back` wants to know of it."""
+        """Return the parameters of `flow_back` for a game of a duration."""
         return np.array([self.mu, self.oblateness, self.thrust, self.mass - self.flow * duration, self.flow])
 
     def respond(
@@ -133,13 +127,7 @@ class Craft:
 
 @dataclass(frozen=True)
 class KnownPath:
-    """A side that flies a path whatever the other does.
-
-    Parameters
-    ----------
-    state_at : callable
-        State (6,) and acceleration (3,) at a time.
-    """
+    """A side on a known path: `state_at` gives state, shape (6,), and acceleration, shape (3,), at a time."""
 
     state_at: Callable[[float], tuple[Floats, Floats]]
 
@@ -156,7 +144,7 @@ class KnownPath:
     def correct(
         self, response: Response, end_state: Floats, nu: Floats, duration: float, tolerance: float
     ) -> Floats | None:
-        """Return what is missing to the state on the path."""
+        """Return the difference to the state on the path."""
         return self.state_at(duration)[0] - end_state
 
     def ballistic(self, duration: float, nu: Floats) -> Floats:

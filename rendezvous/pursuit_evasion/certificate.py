@@ -1,4 +1,4 @@
-"""What speaks for a capture being a saddle point: checks that share as little as they can with the way it was found.
+"""Checks that a capture is a saddle point, which share as little as possible with the method that found it.
 
 The Hamiltonian is that of Wang's slides, "Optimal control": H_P + H_E, constant, and one in their scale. The other
 checks are not from there.
@@ -17,9 +17,10 @@ from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
 from rendezvous.pursuit_evasion._pair import MOST_RESIDUAL, Node, Pair
 from rendezvous.pursuit_evasion._scan import greater, scan
 from rendezvous.pursuit_evasion._side import Craft, KnownPath, Side
-from rendezvous.pursuit_evasion.paths import ExtremalPath, PathError, Policy, extremal_paths, steered_path
+from rendezvous.pursuit_evasion.paths import ExtremalPath, PathError, extremal_paths, steered_path
 from rendezvous.pursuit_evasion.solution import Capture, Solution
-from rendezvous.pursuit_evasion.units import scaled_craft
+from rendezvous.pursuit_evasion.steering import Policy
+from rendezvous.pursuit_evasion.units import scaled_game
 
 Floats = NDArray[np.float64]
 
@@ -37,11 +38,12 @@ _MOST_WORK = 2.0 * MOST_WORK
 
 @dataclass(frozen=True)
 class Deviation:
-    """One player does something else, and the other answers as well as it can.
+    """One player deviates, and the other answers optimally.
 
     Parameters
     ----------
     name : str
+        Policy of the player that deviates.
     capture_s : float or None
         None where there is no capture by the capture time of the game.
     conclusive : bool
@@ -60,32 +62,35 @@ class Certificate:
     Parameters
     ----------
     residual : float
-        Of the start states, nondimensional.
+        Error of the start states, nondimensional.
     hamiltonian_drift : float
-        Greatest relative change along the paths, of a Hamiltonian that is one.
+        Greatest relative change of the Hamiltonian, scaled to one, along the paths.
     integrator_gap_m : float
-        Distance of the ends that a second integrator, another method flown forward, finds.
+        Distance of the ends from those of a second integrator, another method in forward time.
     closing_speed_m_s : float
+        Speed at which the distance falls at the capture.
     least_curvature : float
-        Of h_P - h_E + R across nu, nondimensional; R is the capture radius.
+        Least eigenvalue of the Hessian of h_P - h_E + R across nu, nondimensional; R is the capture radius.
     no_conjugate_point : bool
+        Whether neither extremal has one.
     no_earlier_capture : bool
         Whether l was followed from the start of the game and stayed above the capture radius.
     least_distance_m : float
-        From the planet's centre, on both paths.
+        Least distance of both paths from the planet's centre.
     above_the_planet : bool
+        Whether that is above its radius.
     pursuer_alone_s : float or None
         Earliest capture of the evader on its fixed optimal path; None where it could not be followed.
     evader_deviations : tuple of Deviation
         The pursuer's best answers: each must capture by the capture time.
     capture_s : float
-        Of the game.
+        Capture time of the game.
     directions_found, directions_tried : int
-        Zero where directions were not looked at.
+        Zero where directions were not scanned.
     greatest_excess_m : float or None
-        By how much some direction keeps the evader farther than the capture radius, at the capture time.
+        Greatest distance beyond the capture radius that some direction keeps, at the capture time.
     unit_length_m : float
-        Of what is nondimensional.
+        Unit of nondimensional lengths.
     """
 
     residual: float
@@ -107,7 +112,7 @@ class Certificate:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """Return what speaks against a saddle point, a phrase each."""
+        """Return the checks that failed, a phrase each."""
         found = []
         if not self.residual < MOST_RESIDUAL:
             found.append(f"the residual is {self.residual:.1e}")
@@ -140,7 +145,7 @@ class Certificate:
 
     @property
     def excess_tolerance_m(self) -> float:
-        """Of `greatest_excess_m`: the scan finds maxima, the game's own among them, less exactly than the game does."""
+        """Return the tolerance of `greatest_excess_m`: the scan is less accurate than the solution of the game."""
         return MOST_EXCESS * self.unit_length_m
 
     @property
@@ -157,11 +162,7 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
     solution : Solution
         With a capture.
     all_directions : bool, optional
-        Whether to look in all directions at the capture time for one that keeps the evader farther away.
-
-    Returns
-    -------
-    Certificate
+        Whether to scan all directions at the capture time for one that keeps the evader farther away.
 
     Raises
     ------
@@ -170,23 +171,23 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
 
     Notes
     -----
-    A third of a second for one revolution; directions take another half and more. All deviations together may take
-    twice as long as solving a game ever does: in games of more than six revolutions the last ones may be inconclusive.
+    A third of a second for one revolution; directions take another half and more. All deviations together take at most
+    twice the work limit of a game: in games of more than six revolutions the last ones may be inconclusive.
     """
     capture = solution.capture
     if capture is None:
         raise ValueError(f"a game that ends as {solution.verdict.value} has no capture to certify")
     game, units, node = solution.game, solution.units, capture.extremal
-    pursuer, evader = (scaled_craft(player, game.gravity, units) for player in (game.pursuer, game.evader))
+    scaled = scaled_game(game, units)
+    pursuer, evader, radius = scaled.pursuer, scaled.evader, scaled.radius
     paths = extremal_paths(pursuer, evader, node)
-    radius = game.capture_radius_m / units.length_m
     drift, least_distance = _along(paths, node)
     alone, left = _best_answer(pursuer, KnownPath(paths[1].state_at), radius, node.duration, _MOST_WORK)
     deviations: list[Deviation] = []
     for policy in Policy if evader.thrust > 0.0 else ():
         deviation, left = _deviation(policy, pursuer, evader, radius, node.duration, units.time_s, left)
         deviations.append(deviation)
-    looked = scan(Pair(pursuer, evader), node) if all_directions else None
+    looked = scan(scaled.pair, node) if all_directions else None
     excess = None
     if looked is not None:
         excess = max([float(looked.distance.max(initial=-np.inf)), *(each.distance for each in looked.maxima)]) - radius
@@ -218,7 +219,7 @@ def _stayed_above(solution: Solution, capture: Capture) -> bool:
 def _followed(
     pursuer: Side, evader: Side, radius: float, latest: float, left: float
 ) -> tuple[float | None, bool, float]:
-    """Return the earliest capture, if any, whether the branch could be followed to its end, and the work still left."""
+    """Return the earliest capture, if any, whether the branch reached its end, and the remaining work."""
     pair = Pair(pursuer, evader)
     first = pair.begin(latest)
     if first is None:
@@ -239,7 +240,7 @@ def _followed(
 def _best_answer(
     pursuer: Side, evader: Side, radius: float, duration: float, left: float
 ) -> tuple[float | None, float]:
-    """Return the earliest capture, the end of the game if there is none before it, or None if it is not known."""
+    """Return the earliest capture, the end of the game if there is none before it, or None if unknown."""
     found, conclusive, left = _followed(pursuer, evader, radius, duration * _BEYOND, left)
     return found if found is not None else duration if conclusive else None, left
 
@@ -284,7 +285,7 @@ def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float,
 
 
 def _integrator_gap(pursuer: Craft, evader: Craft, node: Node) -> float:
-    """Fly both forward from their start states and costates with a multistep method, and see where they end."""
+    """Integrate both forward from their start states and costates by a multistep method, and compare the ends."""
     gaps = []
     for craft, costate, end in zip((pursuer, evader), node.costates, (node.pursuer, node.evader), strict=True):
         found = solve_ivp(

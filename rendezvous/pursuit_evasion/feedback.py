@@ -1,4 +1,4 @@
-"""Feedback: a pursuer that solves the game anew from time to time, against an evader that does as it likes."""
+"""Feedback: a pursuer that solves the game again from time to time, against an evader that steers as it chooses."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from rendezvous.pursuit_evasion.paths import ExtremalPath, SteeredPath, extremal
 from rendezvous.pursuit_evasion.solution import Solution
 from rendezvous.pursuit_evasion.solver import solve
 from rendezvous.pursuit_evasion.steering import Steering
-from rendezvous.pursuit_evasion.units import Units, scaled_craft
+from rendezvous.pursuit_evasion.units import Units, scaled_game
 
 Floats = NDArray[np.float64]
 PathNow = Callable[[float], Floats]
 
 HIT_M = 100.0
-"""A point is captured when it is passed within this: what a last leg flown without looking can reach."""
+"""A point counts as captured within this distance: the accuracy of a last leg without observation."""
 
 _LOOKS = 65
 _PAST, _WIDE, _PATIENCE = 1.05, 2.0, 1.0
@@ -34,19 +34,19 @@ _QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
 
 @dataclass(frozen=True)
 class Observation:
-    """What the pursuer sees of the evader when it plans.
+    """The pursuer's observation of the evader when it plans.
 
     Parameters
     ----------
     delay_s : float, optional
-        Age of what it sees; it assumes that the evader has played its best since.
+        Age of the observation; the pursuer assumes that the evader has been optimal since.
     position_error_m, velocity_error_m_s : float, optional
-        Standard deviations, a component.
+        Standard deviations of each component.
 
     Raises
     ------
     ValueError
-        If one is negative or not finite.
+        If a value is negative or not finite.
     """
 
     delay_s: float = 0.0
@@ -54,14 +54,14 @@ class Observation:
     velocity_error_m_s: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no observation."""
+        """Check the values."""
         values = (self.delay_s, self.position_error_m, self.velocity_error_m_s)
         if not all(np.isfinite(value) and value >= 0.0 for value in values):
             raise ValueError("delay and errors of the observation must be finite and not negative")
 
     @property
     def is_exact(self) -> bool:
-        """Whether the pursuer sees the evader as it is."""
+        """Whether the pursuer observes the evader exactly."""
         return self.delay_s == 0.0 and self.position_error_m == 0.0 and self.velocity_error_m_s == 0.0
 
 
@@ -70,29 +70,30 @@ class Ended(Enum):
 
     CAPTURED = "captured"
     MISSED = "missed"
-    """Passed, the last leg flown without looking, beyond what counts as a capture of a point."""
+    """The last leg, without observation, passes farther than counts as a capture of a point."""
     PROPELLANT_EXHAUSTED = "propellant-exhausted"
     NO_PLAN = "no-plan"
-    """The game could not be solved from where it had come to, or there had been too many plans."""
+    """The game could not be solved from the current states, or there were too many plans."""
 
 
 @dataclass(frozen=True)
 class Flight:
-    """A pursuit as it was flown.
+    """A pursuit with feedback.
 
     Parameters
     ----------
     ended : Ended
+        How it ends.
     time_s : float
-        Of the capture, of the closest approach, or of the end.
+        Time of the capture, of the closest approach, or of the end.
     distance_m : float
-        Then.
+        Distance at that time.
     planned_s, predicted_s : ndarray, shape (n,)
-        When plans were made, and the capture times that they predict.
+        Times of the plans, and the capture times that they predict.
     distances_m : ndarray, shape (n,)
-        When plans were made.
+        Distances at the times of the plans.
     pursuer_m, evader_m : ndarray, shape (n, 3)
-        Positions then.
+        Positions at the times of the plans.
     """
 
     ended: Ended
@@ -113,7 +114,7 @@ class _Log:
     evader: list[Floats] = field(default_factory=list)
 
     def flight(self, ended: Ended, time: float, distance: float, units: Units) -> Flight:
-        """Return what was noted, in SI units."""
+        """Return the flight in SI units."""
         pursuer, evader = np.array(self.pursuer).reshape(-1, 3), np.array(self.evader).reshape(-1, 3)
         return Flight(
             ended=ended,
@@ -137,39 +138,37 @@ def fly(
     solution: Solution | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Flight:
-    """Fly a pursuer that plans anew from time to time, and flies each plan until the next.
+    """Simulate a pursuer that plans again from time to time, and follows each plan until the next.
 
     Parameters
     ----------
     game : Game
+        The game at the start.
     steering : callable or None
-        The evader's; None plays its best against where the pursuer really is.
+        The evader's; None is optimal against where the pursuer really is.
     replan_s : float, optional
+        Time between plans.
     observation : Observation or None, optional
-        None sees the evader as it is.
+        None observes the evader exactly.
     seed : int or SeedSequence, optional
-        Of the errors of observation.
+        Seed of the errors of observation.
     solution : Solution or None, optional
-        Of the game, where it is known already.
+        Solution of the game, where it is known already.
     progress : callable, optional
-        Told the fraction of the predicted time that is flown.
-
-    Returns
-    -------
-    Flight
+        Called with the fraction of the predicted time that has passed.
 
     Raises
     ------
     ValueError
-        If the game ends in no capture, so that there is no plan to begin with, or replanning takes no time.
+        If the game ends in no capture, so that there is no first plan, or `replan_s` is not positive.
     PathError
         If the evader's path cannot be followed.
 
     Notes
     -----
-    Each plan starts Newton's method at the one before: 2 ms and, for a steered evader, 2 ms of its flight. The last leg
-    is flown without looking. Where the plan before does not lead to a new one, the game is solved from nothing;
-    the plan before is kept where that would take much longer.
+    Each plan starts Newton's method at the previous one: 2 ms and, for a steered evader, 2 ms of its flight. The last
+    leg is flown without observation. Where the previous plan does not lead to a new one, the game is solved from
+    scratch; the previous plan is kept where that would take much longer.
     """
     if not 0.0 < replan_s < np.inf:
         raise ValueError("the time between plans must be positive")
@@ -194,27 +193,20 @@ def fly_many(
     solution: Solution | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> list[Flight]:
-    """Fly a pursuit many times.
+    """Simulate a pursuit several times; flights are in the order of the runs.
 
     Parameters
     ----------
-    game : Game
+    game, replan_s, observation, solution
+        As for `fly`.
     steering : callable
-        Of the number of the run.
+        Returns the evader's steering, of the number of the run.
     runs : int
-    replan_s : float, optional
-    observation : Observation or None, optional
+        Number of flights.
     seed : int, optional
-        Root of what is drawn: each run has its own stream.
-    solution : Solution or None, optional
-        Of the game, where it is known already.
+        Root seed: each run has its own stream.
     progress : callable, optional
-        Told the fraction done.
-
-    Returns
-    -------
-    list of Flight
-        In the order of the runs.
+        Called with the fraction done.
     """
     solution = solve(game) if solution is None else solution
     flights = []
@@ -229,23 +221,16 @@ def fly_many(
 
 
 def capture_quantiles_s(flights: Sequence[Flight]) -> list[float]:
-    """Return quantiles of the capture times of those that captured, s; empty where none did.
+    """Return the least capture time of `flights`, the quantiles 0.1, 0.5 and 0.9, and the greatest, s.
 
-    Parameters
-    ----------
-    flights : sequence of Flight
-
-    Returns
-    -------
-    list of float
-        The least, the quantiles 0.1, 0.5 and 0.9, the greatest.
+    The list is empty where none captured.
     """
     times = [flight.time_s for flight in flights if flight.ended is Ended.CAPTURED]
     return [float(each) for each in np.quantile(times, _QUANTILES)] if times else []
 
 
 class _Pursuit:
-    """One pursuit under way, nondimensional."""
+    """One pursuit in progress, nondimensional."""
 
     def __init__(
         self,
@@ -256,17 +241,16 @@ class _Pursuit:
         random: np.random.Generator,
     ) -> None:
         self._units, self._steering, self._observation, self._random = units, steering, observation, random
-        self._radius = game.capture_radius_m / units.length_m
+        scaled = scaled_game(game, units)
+        self._radius, self._pursuer, self._evader = scaled.radius, scaled.pursuer, scaled.evader
         self._hit = HIT_M / units.length_m
-        self._pursuer = scaled_craft(game.pursuer, game.gravity, units)
-        self._evader = scaled_craft(game.evader, game.gravity, units)
         self._dry = game.pursuer.dry_mass_kg / units.mass_kg, game.evader.dry_mass_kg / units.mass_kg
         self._time, self._work = 0.0, MOST_WORK
         self._past: list[tuple[float, PathNow]] = []
         self._log = _Log()
 
     def run(self, plan: Node, leg: float, progress: Callable[[float], None] | None) -> Flight:
-        """Fly to the end."""
+        """Simulate to the end."""
         own = plan
         while len(self._log.planned) < _MOST_PLANS:
             self._log.planned.append(self._time)
@@ -299,7 +283,7 @@ class _Pursuit:
         return self._end(Ended.NO_PLAN)
 
     def _plan(self, before: Node, spell: float, evader: Craft) -> Node | None:
-        """Solve the game from here, from the plan before or from nothing."""
+        """Solve the game from the current states, from the previous plan or from scratch."""
         if _lasts(evader, self._dry[1]) < spell:
             evader = replace(evader, thrust=0.0, flow=0.0)
         pair = Pair(self._pursuer, evader)
@@ -341,7 +325,7 @@ class _Pursuit:
         return steered_path(craft, direction, spell)
 
     def _seen(self, plan: Node) -> Craft:
-        """Return the evader as the pursuer sees it."""
+        """Return the evader as the pursuer observes it."""
         seen = self._observation
         if seen.is_exact:
             return self._evader
@@ -356,14 +340,14 @@ class _Pursuit:
         )
         state = state + errors * self._random.standard_normal(6)
         if delay > 0.0:
-            # As the plan has it: full thrust, and the direction that it has now, which turns slowly.
+            # As in the plan: full thrust in its current direction, which turns slowly.
             believed = plan.costates[1][3:]
             since = steered_path(replace(self._evader, start=state), lambda _time, _state: believed, delay)
             state = since.state_at(delay)[0]
         return replace(self._evader, start=state)
 
     def _look(self, pursuer: ExtremalPath, evader: PathNow, spell: float, last: bool) -> Flight | None:
-        """See whether the leg ends the flight: a capture, or for a point the closest approach of the last leg."""
+        """Return the flight if the leg ends it: by a capture, or for a point by the closest approach, last leg only."""
 
         def distance(time: float) -> float:
             return float(np.linalg.norm(pursuer.at(time)[:3] - evader(time)[:3]))
@@ -389,7 +373,7 @@ class _Pursuit:
         return self._log.flight(ended, self._time + at, distance(at), self._units)
 
     def _drift(self, spell: float) -> float:
-        """How far the two drift against each other in a leg, about."""
+        """Approximate relative displacement of the two in a leg."""
         return spell * float(np.linalg.norm(self._pursuer.start[3:] - self._evader.start[3:]))
 
     def _end(self, ended: Ended) -> Flight:
@@ -398,7 +382,7 @@ class _Pursuit:
 
 
 def _lasts(craft: Craft, dry: float) -> float:
-    """Return how long the propellant lasts: not to the last drop of a craft without dry mass."""
+    """Return how long the propellant lasts; a little less for a craft without dry mass, whose acceleration diverges."""
     share = 1.0 if dry > 0.0 else 0.999
     return share * (craft.mass - dry) / craft.flow if craft.flow > 0.0 else np.inf
 

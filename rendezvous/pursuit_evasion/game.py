@@ -22,7 +22,7 @@ STANDARD_GRAVITY_M_S2 = 9.80665
 
 @dataclass(frozen=True)
 class Gravity:
-    """The planet.
+    """Gravity of the planet.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Gravity:
     j2 : float
         Second zonal harmonic, about the z axis; zero for a sphere.
     equatorial_radius_m : float
-        That J2 refers to.
+        Radius that J2 refers to.
 
     Raises
     ------
@@ -51,7 +51,7 @@ class Gravity:
     equatorial_radius_m: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no gravity."""
+        """Check the values."""
         _need(0.0 < self.parameter_m3_s2 < math.inf, "the gravitational parameter must be positive")
         _need(0.0 <= self.planet_radius_m < math.inf, "the radius of the planet must not be negative")
         _need(math.isfinite(self.j2) and abs(self.j2) < 0.1, "J2 must be small: that of the Earth is 1.0826e-3")
@@ -66,17 +66,18 @@ class Gravity:
 
 @dataclass(frozen=True)
 class Player:
-    """A craft that thrusts fully, in the direction it chooses, until its propellant is spent.
+    """A craft at full thrust, in the direction it chooses, until its propellant is spent.
 
     Parameters
     ----------
     position_m, velocity_m_s : tuple of float
         In an inertial frame whose z axis is the planet's.
     mass_kg, dry_mass_kg : float
+        At the start, and without propellant.
     thrust_n : float
         Zero for a craft that coasts.
     specific_impulse_s : float
-        Infinite for a craft whose mass stays.
+        Infinite for a craft of constant mass.
 
     Raises
     ------
@@ -98,7 +99,7 @@ class Player:
     specific_impulse_s: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no craft."""
+        """Check the values."""
         _need(np.isfinite((*self.position_m, *self.velocity_m_s)).all(), "position and velocity must be finite")
         _need(0.0 < self.mass_kg < math.inf, "the mass must be positive")
         _need(0.0 <= self.dry_mass_kg < self.mass_kg, "the dry mass must be at least 0 and below the mass")
@@ -112,7 +113,7 @@ class Player:
 
     @property
     def burn_time_s(self) -> float:
-        """Return how long the propellant lasts; infinite for a craft that does not burn any."""
+        """Return how long the propellant lasts; infinite without mass flow."""
         return (self.mass_kg - self.dry_mass_kg) / self.flow_kg_s if self.flow_kg_s > 0.0 else math.inf
 
     @property
@@ -123,23 +124,24 @@ class Player:
 
 @dataclass(frozen=True)
 class Game:
-    """A pursuer that hastens the capture and an evader that delays it.
+    """A pursuer that minimises the capture time and an evader that maximises it.
 
     Parameters
     ----------
     gravity : Gravity
+        Gravity of the planet.
     pursuer, evader : Player
         The pursuer's thrust must be positive.
     capture_radius_m : float
         Distance that counts as capture; zero for a point.
     longest_s : float
-        How long the game is looked at, at most; infinite for 15 revolutions of the pursuer.
+        Longest duration considered; infinite for 15 revolutions of the pursuer.
 
     Raises
     ------
     ValueError
         If the pursuer has no thrust, an orbit is no ellipse or reaches into the planet, the two are within the capture
-        radius at the start, or that radius or the time looked at is out of range.
+        radius at the start, or that radius or the longest duration is out of range.
 
     Notes
     -----
@@ -153,7 +155,7 @@ class Game:
     longest_s: float = math.inf
 
     def __post_init__(self) -> None:
-        """Refuse what is no game."""
+        """Check the values."""
         _need(self.pursuer.thrust_n > 0.0, "the pursuer's thrust must be positive")
         _need(0.0 <= self.capture_radius_m < math.inf, "the capture radius must not be negative")
         _need(self.longest_s > 0.0, "the time looked at must be positive")

@@ -1,4 +1,4 @@
-"""What both players do along an extremal, at times: for figures and tables."""
+"""States and thrust of both players along an extremal, at times, for figures and tables."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rendezvous.pursuit_evasion.paths import ExtremalPath, extremal_paths
 from rendezvous.pursuit_evasion.solution import Solution
-from rendezvous.pursuit_evasion.units import Units, scaled_craft
+from rendezvous.pursuit_evasion.units import Units, scaled_game
 
 Floats = NDArray[np.float64]
 
@@ -21,12 +21,14 @@ class PlayerHistory:
     Parameters
     ----------
     position_m, velocity_m_s : ndarray, shape (n, 3)
+        In the inertial frame.
     mass_kg : ndarray, shape (n,)
+        Mass with propellant.
     thrust_direction : ndarray, shape (n, 3)
         Unit vectors; zero for a craft without thrust.
     switching : ndarray, shape (n,)
-        |lambda_v| / m - k lambda_m / c over its value at the start: full thrust is best while it is positive. It is
-        what k T is multiplied by in the Hamiltonian of Wang's slides, "Optimal control".
+        |lambda_v| / m - k lambda_m / c over its value at the start: full thrust is optimal while it is positive. It is
+        the factor of k T in the Hamiltonian of Wang's slides, "Optimal control".
     """
 
     position_m: Floats
@@ -43,7 +45,9 @@ class History:
     Parameters
     ----------
     time_s : ndarray, shape (n,)
+        Times from the start.
     pursuer, evader : PlayerHistory
+        At these times.
     """
 
     time_s: Floats
@@ -52,47 +56,28 @@ class History:
 
 
 def history(solution: Solution, count: int = 400) -> History:
-    """Sample a capture.
-
-    Parameters
-    ----------
-    solution : Solution
-        With a capture, or with a fallback.
-    count : int, optional
-        Number of times, equally spaced from the start to the capture.
-
-    Returns
-    -------
-    History
+    """Sample the capture or the fallback of a `solution` at `count` equally spaced times, from the start to the end.
 
     Raises
     ------
     ValueError
-        If there is nothing to sample.
+        If the solution has neither.
     """
     capture = solution.capture or solution.fallback
     if capture is None:
         raise ValueError(f"a game that ends as {solution.verdict.value} has no capture to sample")
-    game, units, node = solution.game, solution.units, capture.extremal
+    units, node = solution.units, capture.extremal
     times = np.linspace(0.0, node.duration, count)
-    paths = extremal_paths(
-        scaled_craft(game.pursuer, game.gravity, units), scaled_craft(game.evader, game.gravity, units), node
-    )
+    scaled = scaled_game(solution.game, units)
+    paths = extremal_paths(scaled.pursuer, scaled.evader, node)
     pursuer, evader = (_sampled(path, times, units) for path in paths)
     return History(times * units.time_s, pursuer, evader)
 
 
 def orbital_axes(position_m: Floats, velocity_m_s: Floats) -> Floats:
-    """Return the axes radial, along the motion and normal at states.
+    """Return the axes radial, along the motion and normal at states, shape (n, 3, 3).
 
-    Parameters
-    ----------
-    position_m, velocity_m_s : ndarray, shape (n, 3)
-
-    Returns
-    -------
-    ndarray, shape (n, 3, 3)
-        Rows are the axes: the components of a vector are axes @ vector.
+    `position_m` and `velocity_m_s` have shape (n, 3). Rows are the axes: the components of a vector are axes @ vector.
     """
     radial = position_m / np.linalg.norm(position_m, axis=1, keepdims=True)
     normal = np.cross(position_m, velocity_m_s)

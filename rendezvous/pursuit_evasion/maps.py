@@ -1,4 +1,4 @@
-"""Capture time over two parameters, each point a first guess for the next."""
+"""Capture time over two parameters, each point started from its neighbours."""
 
 from __future__ import annotations
 
@@ -9,17 +9,16 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.pursuit_evasion._capture import horizon_s
 from rendezvous.pursuit_evasion._pair import Node
 from rendezvous.pursuit_evasion.game import Game
 from rendezvous.pursuit_evasion.solution import Verdict
 from rendezvous.pursuit_evasion.solver import solve
-from rendezvous.pursuit_evasion.units import Units, scaled_pair, units_of
+from rendezvous.pursuit_evasion.units import Units, scaled_game
 
 Floats = NDArray[np.float64]
 
 CHECKED_EVERY = 50
-"""Points of a row from one that is solved from nothing to the next; each row has them elsewhere."""
+"""Distance between points of a row that are solved from scratch; shifted from row to row."""
 
 _GOLDEN, _SURPRISE = 0.618, 0.05
 _PRECISE, _CLOSE = 1e-10, 1e-6
@@ -28,17 +27,17 @@ _SAME = 1e-6
 
 
 class PointStatus(Enum):
-    """What is known of a point of a map."""
+    """Status of a point of a map."""
 
     FOLLOWED = "followed"
-    """Solved from nothing: no earlier capture on its branch."""
+    """Solved from scratch: no earlier capture on its branch."""
     NEIGHBOUR = "neighbour"
-    """A local saddle found from a neighbour, in keeping with the points about it; earlier captures are not excluded."""
+    """A local saddle found from a neighbour; earlier captures are not excluded."""
     NOT_CERTIFIED = "not-certified"
     ESCAPES = "escapes"
     PROPELLANT_EXHAUSTED = "propellant-exhausted"
     NO_GAME = "no-game"
-    """The parameters are no game: the same position, for one."""
+    """The parameters define no game, for example equal positions."""
 
 
 STATUSES = tuple(PointStatus)
@@ -55,10 +54,11 @@ class CaptureMap:
     capture_s : masked array, shape (ny, nx)
         Masked where there is no capture, or none that is certified.
     status : ndarray of int, shape (ny, nx)
-        Places in `STATUSES`.
+        Indices in `STATUSES`.
     closing_speed_m_s : masked array, shape (ny, nx)
+        Masked as the capture times.
     solved_from_nothing : int
-        How many points were.
+        Number of points solved from scratch.
     """
 
     columns: Floats
@@ -69,16 +69,7 @@ class CaptureMap:
     solved_from_nothing: int
 
     def count(self, status: PointStatus) -> int:
-        """Return how many points have a status.
-
-        Parameters
-        ----------
-        status : PointStatus
-
-        Returns
-        -------
-        int
-        """
+        """Return the number of points with a `status`."""
         return int((self.status == STATUSES.index(status)).sum())
 
 
@@ -102,25 +93,21 @@ def capture_map(
     Parameters
     ----------
     game_at : callable
-        The game of a column's and a row's value; a ValueError says that there is none.
+        Returns the game of a column's and a row's value; a ValueError marks a point without a game.
     columns : ndarray, shape (nx,)
         Values of the first parameter, in its own units.
     rows : ndarray, shape (ny,)
-        Those of the second, in its own units.
+        Values of the second parameter, in its own units.
     follow_all : bool, optional
-        Whether to solve each point from nothing, with a change of branch where one folds: 20 ms to seconds each.
+        Whether to solve each point from scratch, with a change of branch where one folds: 20 ms to seconds each.
     progress : callable, optional
-        Told the fraction done.
-
-    Returns
-    -------
-    CaptureMap
+        Called with the fraction done.
 
     Notes
     -----
-    Along a row a point starts from the three before it: 1 to 2 ms. One in 50, and the last before the row has to start
-    anew, are solved from nothing, and so are those whose time is a surprise beside the rows before. Where that is
-    another answer, so are the points about it, and the points about those, until the answers are the same.
+    Along a row a point starts from the three before it: 1 to 2 ms. Solved from scratch are one point in 50, the last
+    point before the row has to start again, and points whose time differs from the extrapolation of the rows before.
+    Where that gives another answer, the neighbours are solved from scratch too, and theirs, until the answers agree.
     """
     grid = _Grid(game_at, np.asarray(columns, dtype=np.float64), np.asarray(rows, dtype=np.float64))
     for j in range(len(rows)):
@@ -135,7 +122,7 @@ def capture_map(
 
 
 class _Grid:
-    """What is known so far."""
+    """The points solved so far."""
 
     def __init__(self, game_at: Callable[[float, float], Game], columns: Floats, rows: Floats) -> None:
         self._game_at, self._columns, self._rows = game_at, columns, rows
@@ -146,7 +133,7 @@ class _Grid:
         self._afresh = 0
 
     def game(self, j: int, i: int) -> Game | None:
-        """Return the game of a point, if it is one."""
+        """Return the game of a point, or None."""
         try:
             return self._game_at(float(self._columns[i]), float(self._rows[j]))
         except ValueError:
@@ -157,7 +144,7 @@ class _Grid:
         return [self.game(j, i) for i in range(len(self._columns))]
 
     def put(self, j: int, i: int, point: _Point) -> None:
-        """Note a point."""
+        """Store a point."""
         self._afresh += point.status is not PointStatus.NEIGHBOUR
         self._status[j, i] = STATUSES.index(point.status)
         self._hidden[j, i] = point.node is None or point.units is None
@@ -166,7 +153,7 @@ class _Grid:
             self._closing[j, i] = point.node.closing * point.units.speed_m_s
 
     def surprises(self, j: int) -> list[int]:
-        """Return the columns at which a row is not what the one or two rows before lead one to expect."""
+        """Return the columns at which a row differs from the extrapolation of the one or two rows before."""
         if j == 0:
             return []
         now, expected = self._time[j], self._time[j - 1].copy()
@@ -178,12 +165,12 @@ class _Grid:
         return [int(i) for i in np.flatnonzero(unlike)]
 
     def about(self, j: int, i: int) -> list[tuple[int, int]]:
-        """Return the points beside a point."""
+        """Return the four neighbours of a point."""
         beside = ((j - 1, i), (j + 1, i), (j, i - 1), (j, i + 1))
         return [(k, h) for k, h in beside if 0 <= k < len(self._rows) and 0 <= h < len(self._columns)]
 
     def settle(self, doubted: list[tuple[int, int]]) -> None:
-        """Solve points that came from neighbours from nothing, and where that is another answer those about them."""
+        """Solve points that came from neighbours from scratch; where the answer changes, their neighbours too."""
         while doubted:
             j, i = doubted.pop()
             if STATUSES[self._status[j, i]] is not PointStatus.NEIGHBOUR:
@@ -194,7 +181,7 @@ class _Grid:
                 doubted += self.about(j, i)
 
     def map(self) -> CaptureMap:
-        """Return what is known."""
+        """Return the map."""
         return CaptureMap(
             self._columns,
             self._rows,
@@ -206,7 +193,7 @@ class _Grid:
 
 
 def _row(games: list[Game | None], follow_all: bool, offset: int) -> tuple[list[_Point], list[int]]:
-    """Solve a row, and return at which of its points a neighbour's answer was found not to be the first capture."""
+    """Solve a row, and return the indices of points where a neighbour's answer was not the first capture."""
     points: list[_Point] = []
     wrong: list[int] = []
     every = min(CHECKED_EVERY, len(games))
@@ -220,7 +207,7 @@ def _row(games: list[Game | None], follow_all: bool, offset: int) -> tuple[list[
     for i, game in enumerate(games):
         seeded = None if follow_all or game is None else _seeded(game, points)
         if seeded is None:
-            # The stretch before ends here: its last point has to stand for it.
+            # The sequence of seeded points ends here: check its last point.
             check()
         points.append(_from_nothing(game, follow_all) if seeded is None else seeded)
         if (i + offset) % every == 0 or i == len(games) - 1:
@@ -246,25 +233,25 @@ def _seeded(game: Game, points: list[_Point]) -> _Point | None:
     """Solve a game from the one, two or three before it."""
     if not points or points[-1].node is None:
         return None
-    units = units_of(game)
     known: list[Floats] = []
     for point in reversed(points[-3:]):
         if point.node is None:
             break
         known.append(np.append(point.node.vector, point.node.duration))
     guess = np.tensordot(_EXTRAPOLATIONS[len(known)], known, axes=1)
-    found = scaled_pair(game, units).solve(
+    scaled = scaled_game(game)
+    node = scaled.pair.solve(
         guess[:15],
         float(guess[15]),
-        game.capture_radius_m / units.length_m,
+        scaled.radius,
         time_free=True,
         tolerance=_PRECISE,
         close=_CLOSE,
-        latest=horizon_s(game) / units.time_s,
+        latest=scaled.latest,
     )
-    if found is None or not found.is_saddle or found.closing <= 0.0:
+    if node is None or not node.is_saddle or node.closing <= 0.0:
         return None
-    return _Point(PointStatus.NEIGHBOUR, units, found)
+    return _Point(PointStatus.NEIGHBOUR, scaled.units, node)
 
 
 def _agree(first: _Point, second: _Point) -> bool:

@@ -1,10 +1,9 @@
-"""Paths of the players: extremal, or under a policy."""
+"""Paths of the players: extremal, or steered by a rule."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,50 +25,11 @@ class PathError(ArithmeticError):
     """A path cannot be followed."""
 
 
-class Policy(Enum):
-    """Ways to steer that need no game; directions follow the craft."""
-
-    COAST = "coast"
-    PROGRADE = "prograde"
-    RETROGRADE = "retrograde"
-    NORMAL = "normal"
-    ANTINORMAL = "antinormal"
-    OUTWARD = "outward"
-    INWARD = "inward"
-
-    def direction(self, _time: float, state: Floats) -> Floats:
-        """Return the direction of thrust.
-
-        Parameters
-        ----------
-        _time : float
-        state : ndarray, shape (6,)
-            Position and velocity, in any units.
-
-        Returns
-        -------
-        ndarray, shape (3,)
-        """
-        sign = -1.0 if self in (Policy.RETROGRADE, Policy.ANTINORMAL, Policy.INWARD) else 1.0
-        if self is Policy.COAST:
-            return np.zeros(3)
-        if self in (Policy.PROGRADE, Policy.RETROGRADE):
-            return sign * state[3:]
-        if self in (Policy.NORMAL, Policy.ANTINORMAL):
-            return sign * np.cross(state[:3], state[3:])
-        return sign * state[:3]
-
-
 @dataclass(frozen=True)
 class ExtremalPath:
     """The path of one side of an extremal.
 
-    Parameters
-    ----------
-    craft : Craft
-    end_state : ndarray, shape (6,)
-    nu : ndarray, shape (3,)
-    duration : float
+    It ends in `end_state`, shape (6,), along `nu`, shape (3,), after `duration`.
     """
 
     craft: Craft
@@ -78,33 +38,14 @@ class ExtremalPath:
     duration: float
 
     def at(self, time: float) -> Floats:
-        """Return state and costate at a time, shape (12,); a little beyond the end too.
-
-        Parameters
-        ----------
-        time : float
-
-        Returns
-        -------
-        ndarray
-        """
+        """Return state and costate at a time, shape (12,); the time may be a little beyond the end."""
         y = np.zeros(STATES)
         y[:6], y[6:9] = self.end_state, self.nu
         self._carry(y, 0.0, self.duration - time)
         return y
 
     def sampled(self, times: Floats) -> Floats:
-        """Return states and costates at times, shape (n, 12).
-
-        Parameters
-        ----------
-        times : ndarray, shape (n,)
-            Rising.
-
-        Returns
-        -------
-        ndarray
-        """
+        """Return states and costates at rising times, shape (n, 12)."""
         out = np.empty((len(times), STATES))
         y = np.zeros(STATES)
         y[:6], y[6:9] = self.end_state, self.nu
@@ -116,16 +57,7 @@ class ExtremalPath:
         return out
 
     def state_at(self, time: float) -> tuple[Floats, Floats]:
-        """Return state (6,) and acceleration (3,) at a time.
-
-        Parameters
-        ----------
-        time : float
-
-        Returns
-        -------
-        tuple of ndarray
-        """
+        """Return state, shape (6,), and acceleration, shape (3,), at a time."""
         y = self.at(time)
         mass = self.craft.mass - self.craft.flow * time
         return y[:6], rate(y, self.craft.mu, self.craft.oblateness, self.craft.thrust / mass)[3:]
@@ -136,17 +68,7 @@ class ExtremalPath:
 
 
 def extremal_paths(pursuer: Craft, evader: Craft, node: Node) -> tuple[ExtremalPath, ExtremalPath]:
-    """Return the paths of both sides of an extremal.
-
-    Parameters
-    ----------
-    pursuer, evader : Craft
-    node : Node
-
-    Returns
-    -------
-    tuple of ExtremalPath
-    """
+    """Return the paths of both sides of an extremal."""
     return (
         ExtremalPath(pursuer, node.pursuer, node.nu, node.duration),
         ExtremalPath(evader, node.evader, node.nu, node.duration),
@@ -155,67 +77,29 @@ def extremal_paths(pursuer: Craft, evader: Craft, node: Node) -> tuple[ExtremalP
 
 @dataclass(frozen=True)
 class SteeredPath:
-    """The path of a craft that steers by a rule.
-
-    Parameters
-    ----------
-    craft : Craft
-    direction : callable
-        Of time and state.
-    solution : callable
-        State and mass, shape (7,), at a time.
-    """
+    """The path of a craft that steers by a rule: `solution` gives state and mass, shape (7,), at a time."""
 
     craft: Craft
     direction: Direction
     solution: Callable[[float], Floats]
 
     def state_at(self, time: float) -> tuple[Floats, Floats]:
-        """Return state (6,) and acceleration (3,) at a time.
-
-        Parameters
-        ----------
-        time : float
-
-        Returns
-        -------
-        tuple of ndarray
-        """
+        """Return state, shape (6,), and acceleration, shape (3,), at a time."""
         state = np.asarray(self.solution(time), dtype=np.float64)
         return state[:6], _rates(time, state, self.craft, self.direction)[3:6]
 
     def mass_at(self, time: float) -> float:
-        """Return the mass at a time.
-
-        Parameters
-        ----------
-        time : float
-
-        Returns
-        -------
-        float
-        """
+        """Return the mass at a time."""
         return float(self.solution(time)[6])
 
 
 def steered_path(craft: Craft, direction: Direction, duration: float) -> SteeredPath:
-    """Fly a craft by a rule: full thrust along the direction, or none where that is zero.
-
-    Parameters
-    ----------
-    craft : Craft
-    direction : callable
-        Of time and state.
-    duration : float
-
-    Returns
-    -------
-    SteeredPath
+    """Return the path of a craft that steers by a rule: full thrust along the direction, or none where that is zero.
 
     Raises
     ------
     PathError
-        If it turns so fast that it takes too long to follow.
+        If the direction turns so fast that integration takes too long, or the path comes too near the planet's centre.
 
     Notes
     -----

@@ -1,4 +1,4 @@
-"""What is known of a game once it is solved."""
+"""Solution of a game: its verdict, and the capture."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ Floats = NDArray[np.float64]
 
 
 class Verdict(Enum):
-    """How the game ends, as far as is known."""
+    """End of the game."""
 
     CAPTURED = "captured"
-    """The pursuer reaches the evader, at the capture time if both play their best."""
+    """The pursuer reaches the evader, at the capture time if both are optimal."""
     ESCAPES = "escapes"
-    """An evader at least as strong keeps away until the pursuer's propellant is spent, or for the time looked at."""
+    """An evader at least as strong keeps away until the pursuer's propellant is spent, or for the longest duration."""
     PROPELLANT_EXHAUSTED = "propellant-exhausted"
-    """A player's propellant is spent before a capture that the pursuer's greater thrust would come to."""
+    """A player's propellant is spent before the capture, although the pursuer's acceleration is greater."""
     BRANCH_NOT_CERTIFIED = "branch-not-certified"
-    """The extremals stop being a saddle before any of this: nothing is claimed."""
+    """The extremals are no saddle from some duration on: nothing is claimed."""
 
 
 class Route(Enum):
-    """How an extremal was come by."""
+    """Method that found an extremal."""
 
     CONTINUATION = "continuation in the duration"
     SWITCHED = "continuation, with a change to a branch that keeps the evader farther away"
@@ -44,8 +44,9 @@ class PlayerEnd:
     Parameters
     ----------
     propellant_kg : float
-        Spent.
+        Propellant spent.
     position_m, velocity_m_s : ndarray, shape (3,)
+        In the inertial frame.
     costate_at_start : ndarray, shape (6,)
         lambda_r, lambda_v at t = 0 in the units of the solution, scaled so that the Hamiltonian is one: H_f = 1 of
         Wang's slides, "Optimal control".
@@ -64,6 +65,7 @@ class DistanceCurve:
     Parameters
     ----------
     duration_s, distance_m : ndarray, shape (n,)
+        T, rising, and l.
     least_curvature : ndarray, shape (n,)
         Lesser eigenvalue of the Hessian of h_P - h_E + l across nu, in units of length: a saddle while it is positive.
     """
@@ -80,19 +82,22 @@ class Capture:
     Parameters
     ----------
     time_s : float
+        Capture time.
     position_m : ndarray, shape (3,)
-        Of the evader then.
+        Position of the evader at that time.
     direction : ndarray, shape (3,)
-        nu, toward which both strive; where there is a capture radius, from the pursuer to the evader. Along lambda_rP
-        at the end, which is -lambda_rE.
+        nu, along which both go as far as they can; with a capture radius, from the pursuer to the evader. It is that of
+        lambda_rP at the end, which is -lambda_rE.
     closing_speed_m_s : float
+        Speed at which the distance falls.
     curvature : ndarray, shape (2,)
         Eigenvalues of the Hessian of h_P - h_E on the plane normal to nu, in units of length, ascending.
     pursuer, evader : PlayerEnd
+        Both players.
     residual : float
-        Of the start states and of r_E - r_P = R nu, in units of length and speed: below 1e-9.
+        Error of the start states and of r_E - r_P = R nu, in units of length and speed: below 1e-9.
     extremal : Node
-        The same, nondimensional; a first guess for games near by.
+        The extremal, nondimensional; a first guess for games near by.
 
     Notes
     -----
@@ -123,21 +128,25 @@ class Solution:
     Parameters
     ----------
     game : Game
+        The game solved.
     units : Units
+        Its units.
     verdict : Verdict
+        End of the game.
     capture : Capture or None
         Where the verdict is captured.
     route : Route
         Continuation, or that with a change of branch.
     curve : DistanceCurve
+        Distances along the branch.
     looked_at_s : float
-        How long a game was followed.
+        Longest duration that was solved.
     exhausted : str or None
-        Whose propellant is spent at that time: pursuer or evader.
+        Player without propellant at that time: pursuer or evader.
     fallback : Capture or None
-        Where the branch is not certified: what another route found, without a claim.
+        Capture by another route, without a claim, where the branch is not certified.
     fallback_route : Route or None
-        Which one.
+        That route.
     """
 
     game: Game

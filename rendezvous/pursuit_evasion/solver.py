@@ -1,22 +1,35 @@
-"""Solving the game: the branch of extremals from T -> 0, changed for a better one where it folds, and other routes."""
+"""Solution of the game: the branch of extremals from T -> 0, changed for a better one where it folds, and other routes.
+
+Homotopy and the linear game give an extremal where its branch cannot be followed. Neither excludes an earlier capture.
+"""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
-from rendezvous.pursuit_evasion._capture import capture_of, horizon_s, near
-from rendezvous.pursuit_evasion._pair import Node
+from rendezvous.linear_game import LinearGameError, circular_orbit_capture
+from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow, polish
+from rendezvous.pursuit_evasion._pair import COARSE, Node
 from rendezvous.pursuit_evasion._scan import greater
-from rendezvous.pursuit_evasion.fallbacks import solve_by_homotopy, solve_by_linear_game
-from rendezvous.pursuit_evasion.game import Game
-from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, Route, Solution, Verdict
-from rendezvous.pursuit_evasion.units import Units, scaled_pair, units_of
+from rendezvous.pursuit_evasion._side import Craft, across
+from rendezvous.pursuit_evasion.game import Game, Player
+from rendezvous.pursuit_evasion.history import orbital_axes
+from rendezvous.pursuit_evasion.paths import steered_path
+from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
+from rendezvous.pursuit_evasion.steering import Policy
+from rendezvous.pursuit_evasion.units import ScaledGame, Units, horizon_s, scaled_game, units_of
 
 Floats = NDArray[np.float64]
 
 _MOST_BRANCHES = 6
+_REACH_STEP, _MOST_REACH_STEPS, _REACHED = 0.1, 400, 1e-6
+_MOST_ITERATIONS = 8
+_THRUST_STEP, _LEAST_THRUST_STEP = 0.25, 1e-3
+_LONGEST = 40.0
+"""Longest duration of the linear game, in radians."""
 
 
 def solve(game: Game, *, change_branch: bool = True, all_directions: bool = False) -> Solution:
@@ -25,26 +38,21 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
     Parameters
     ----------
     game : Game
+        The game to solve.
     change_branch : bool, optional
         Whether to look for another branch where the first one folds; seconds each.
     all_directions : bool, optional
         Whether to look, at the capture too, for a branch that keeps the evader farther away.
 
-    Returns
-    -------
-    Solution
-
     Notes
     -----
     The game of Wang's slides, after Shen and Casalino (2018); they shoot forward from a guess, which is not done here.
     At each duration the evader takes the branch with the greatest distance l; capture is the first time at which that
-    is the capture radius. 20 to 40 ms a revolution. A capture whose residual is not below 1e-9 is none: the verdict is
-    then that the branch is not certified.
+    is the capture radius. 20 to 40 ms a revolution. A capture whose residual is not below 1e-9 is rejected: the verdict
+    is then that the branch is not certified.
     """
-    units = units_of(game)
-    pair = scaled_pair(game, units)
-    radius = game.capture_radius_m / units.length_m
-    latest = horizon_s(game) / units.time_s
+    scaled = scaled_game(game)
+    units, pair, radius, latest = scaled.units, scaled.pair, scaled.radius, scaled.latest
     first = pair.begin(latest)
     if first is None:
         empty = DistanceCurve(np.zeros(0), np.zeros(0), np.zeros(0))
@@ -70,7 +78,7 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
     )
     looked_at_s = branch.last.duration * units.time_s
     if branch.ending is Ending.CAPTURE:
-        capture = capture_of(game, units, branch.last)
+        capture = _capture(game, units, branch.last)
         verdict = Verdict.CAPTURED if capture.is_local_saddle else Verdict.BRANCH_NOT_CERTIFIED
         return Solution(game, units, verdict, capture, route, curve, looked_at_s)
     if branch.ending is Ending.TIME:
@@ -82,26 +90,48 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
 
 
 def solve_near(game: Game, units: Units, guess: Node) -> Capture | None:
-    """Solve a game near one that is solved.
+    """Solve a `game` near one that is solved, whose `units` and extremal are the `guess`; 2 ms.
 
-    Parameters
-    ----------
-    game : Game
-    units : Units
-        Of the solved game: the guess is in them.
-    guess : Node
-
-    Returns
-    -------
-    Capture or None
-        A local saddle; None where Newton's method does not lead to one whose residual is below 1e-9.
-
-    Notes
-    -----
-    Two milliseconds. Whether there is an earlier capture is not looked at.
+    Returns a local saddle, or None where Newton's method does not lead to one whose residual is below 1e-9. Earlier
+    captures are not excluded.
     """
-    found = near(game, units, guess)
-    return None if found is None else capture_of(game, units, found)
+    node = _near(scaled_game(game, units), guess)
+    return None if node is None else _capture(game, units, node)
+
+
+def _near(scaled: ScaledGame, guess: Node) -> Node | None:
+    return _polished(scaled, guess.vector, guess.duration, scaled.radius)
+
+
+def _polished(scaled: ScaledGame, guess: Floats, duration: float, radius: float) -> Node | None:
+    """Find the extremal near a guess, with positive closing speed and curvature."""
+    node = polish(scaled.pair, guess, duration, radius, scaled.latest)
+    return node if node is not None and node.is_saddle and node.closing > 0.0 else None
+
+
+def _capture(game: Game, units: Units, node: Node) -> Capture:
+    """Return an extremal in SI units."""
+    time_s = node.duration * units.time_s
+
+    def end(player: Player, state: Floats, costate: Floats) -> PlayerEnd:
+        return PlayerEnd(
+            propellant_kg=player.flow_kg_s * time_s,
+            position_m=state[:3] * units.length_m,
+            velocity_m_s=state[3:] * units.speed_m_s,
+            costate_at_start=costate / node.closing,
+        )
+
+    return Capture(
+        time_s=time_s,
+        position_m=node.evader[:3] * units.length_m,
+        direction=node.nu,
+        closing_speed_m_s=node.closing * units.speed_m_s,
+        curvature=node.curvature,
+        pursuer=end(game.pursuer, node.pursuer, node.costates[0]),
+        evader=end(game.evader, node.evader, -node.costates[1]),
+        residual=node.residual,
+        extremal=node,
+    )
 
 
 def _by_another_route(game: Game) -> tuple[Capture | None, Route | None]:
@@ -123,3 +153,120 @@ def _uncaptured(game: Game) -> tuple[Verdict, str | None]:
     spent = "pursuer" if pursuer.burn_time_s * slack <= end_s else None
     stronger = pursuer.acceleration_m_s2 > evader.acceleration_m_s2
     return (Verdict.PROPELLANT_EXHAUSTED if spent and stronger else Verdict.ESCAPES), spent
+
+
+def solve_by_homotopy(game: Game) -> Capture | None:
+    """Solve a `game` by raising the evader's thrust from zero, in quarters, halved where Newton's method fails.
+
+    Returns a local saddle; earlier captures are not excluded.
+    """
+    units = units_of(game)
+    still = scaled_game(_with_thrust(game, 0.0), units)
+    first = still.pair.begin(still.latest)
+    if first is None:
+        return None
+    branch = follow(still.pair, first, still.radius, still.latest, 0.25 * MOST_WORK)
+    if branch.ending is not Ending.CAPTURE:
+        return None
+    node: Node = branch.last
+    done, step = 0.0, _THRUST_STEP
+    while done < 1.0 and step > _LEAST_THRUST_STEP:
+        to = min(1.0, done + step)
+        raised = _near(scaled_game(_with_thrust(game, to), units), node)
+        if raised is None:
+            step *= 0.5
+            continue
+        node, done = raised, to
+    if done < 1.0:
+        return None
+    fine = _polished(scaled_game(game, units), node.vector, node.duration, node.distance)
+    return None if fine is None else _capture(game, units, fine)
+
+
+def _with_thrust(game: Game, share: float) -> Game:
+    return replace(game, evader=replace(game.evader, thrust_n=share * game.evader.thrust_n))
+
+
+def solve_by_linear_game(game: Game) -> Capture | None:
+    """Solve a `game` from the solution of its linear game about the pursuer's circular orbit.
+
+    Returns a local saddle; earlier captures are not excluded.
+
+    Notes
+    -----
+    The relative state is curvilinear: along the motion it is the arc, which keeps the linear game near the real one for
+    long distances. Its duration and direction are the guess; each side's end is found by continuation in the duration.
+    """
+    scaled = scaled_game(game)
+    guess = _linear_guess(game, scaled)
+    if guess is None or guess[0] >= scaled.latest:
+        return None
+    duration, nu = guess
+    pursuer, evader = (_reached(craft, nu, duration) for craft in (scaled.pursuer, scaled.evader))
+    if pursuer is None or evader is None:
+        return None
+    fine = _polished(scaled, np.concatenate([pursuer, evader, nu]), duration, scaled.radius)
+    return None if fine is None else _capture(game, scaled.units, fine)
+
+
+def _linear_guess(game: Game, scaled: ScaledGame) -> tuple[float, Floats] | None:
+    """Return duration and direction of the linear game, nondimensional, in the inertial frame."""
+    units, p, e = scaled.units, scaled.pursuer.start, scaled.evader.start
+    axes = orbital_axes(p[None, :3], p[None, 3:])[0]
+    position, velocity = axes @ e[:3], axes @ e[3:]
+    angle, radius = np.arctan2(position[1], position[0]), np.hypot(position[0], position[1])
+    inward, ahead = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    own_radius = float(np.linalg.norm(p[:3]))
+    own_rate = float((axes @ p[3:])[1]) / own_radius
+    rate = float(velocity[:2] @ ahead) / radius
+    offset = np.array([radius - own_radius, angle, position[2]])
+    drift = np.array([velocity[:2] @ inward - (axes @ p[3:])[0], rate - own_rate, velocity[2]])
+    force = units.length_m / units.time_s**2
+    try:
+        capture = circular_orbit_capture(
+            offset,
+            drift,
+            game.pursuer.acceleration_m_s2 / force,
+            game.evader.acceleration_m_s2 / force,
+            1.0,
+            longest_s=min(_LONGEST, scaled.latest),
+        )
+    except LinearGameError:  # there is no guess then
+        return None
+    if capture is None:
+        return None
+    coast = steered_path(scaled.pursuer, Policy.COAST.direction, capture.time_s).state_at(capture.time_s)[0]
+    return capture.time_s, np.asarray(orbital_axes(coast[None, :3], coast[None, 3:])[0].T @ capture.direction)
+
+
+def _reached(craft: Craft, nu: Floats, duration: float) -> Floats | None:
+    """Return the end state of a craft's extremal along nu, by continuation in the duration from zero."""
+    plane = across(nu)
+    time = min(0.01, duration)
+    state, step = craft.ballistic(time, nu), _REACH_STEP
+    slope: Floats | None = None
+    for _ in range(_MOST_REACH_STEPS):
+        to = time if slope is None else min(duration, time + step)
+        guess = state if slope is None else state + (to - time) * slope
+        end = _end_near(craft, guess, nu, plane, to)
+        if end is None:
+            if slope is None or step < 1e-4:
+                return None
+            step *= 0.4
+            continue
+        (state, slope), time, step = end, to, min(2.0 * step, _REACH_STEP)
+        if time >= duration:
+            return state
+    return None
+
+
+def _end_near(craft: Craft, state: Floats, nu: Floats, plane: Floats, duration: float) -> tuple[Floats, Floats] | None:
+    """Return the end state near a guess, and its slope in time."""
+    for _ in range(_MOST_ITERATIONS):
+        response = craft.respond(state, nu, plane, duration, COARSE)
+        if response is None or np.abs(response.rho).max() > 0.5:
+            return None
+        state = state + response.rho
+        if np.abs(response.rho).max() < _REACHED:
+            return state, response.by_time
+    return None

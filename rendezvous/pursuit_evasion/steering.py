@@ -1,16 +1,15 @@
-"""Ways in which an evader steers that is not the optimal one."""
+"""Steering of an evader other than the optimal one."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-
-from rendezvous.pursuit_evasion.paths import Policy
 
 Floats = NDArray[np.float64]
 
@@ -18,15 +17,39 @@ Steering = Callable[[float, Floats], Floats]
 """Direction of thrust, shape (3,), of the time (s) and the evader's state (m, m/s): any length, zero to coast."""
 
 
+class Policy(Enum):
+    """Directions of thrust that depend on the craft's state alone."""
+
+    COAST = "coast"
+    PROGRADE = "prograde"
+    RETROGRADE = "retrograde"
+    NORMAL = "normal"
+    ANTINORMAL = "antinormal"
+    OUTWARD = "outward"
+    INWARD = "inward"
+
+    def direction(self, _time: float, state: Floats) -> Floats:
+        """Return the direction of thrust, shape (3,), at a `state` of position and velocity in any units."""
+        sign = -1.0 if self in (Policy.RETROGRADE, Policy.ANTINORMAL, Policy.INWARD) else 1.0
+        if self is Policy.COAST:
+            return np.zeros(3)
+        if self in (Policy.PROGRADE, Policy.RETROGRADE):
+            return sign * state[3:]
+        if self in (Policy.NORMAL, Policy.ANTINORMAL):
+            return sign * np.cross(state[:3], state[3:])
+        return sign * state[:3]
+
+
 @dataclass(frozen=True)
 class Script:
-    """Policies one after another.
+    """A sequence of policies.
 
     Parameters
     ----------
     begin_s : tuple of float
-        When each begins, rising, the first at zero.
+        Start of each policy, rising, the first at zero.
     policies : tuple of Policy
+        One for each start.
 
     Raises
     ------
@@ -38,7 +61,7 @@ class Script:
     policies: tuple[Policy, ...]
 
     def __post_init__(self) -> None:
-        """Refuse what is no script."""
+        """Check the values."""
         if not self.begin_s or len(self.begin_s) != len(self.policies):
             raise ValueError("a script needs as many times as policies, and one at least")
         if self.begin_s[0] != 0.0 or any(b <= a for a, b in zip(self.begin_s, self.begin_s[1:], strict=False)):
@@ -52,14 +75,14 @@ class Script:
 
 @dataclass(frozen=True)
 class RandomSteering:
-    """Directions drawn anew from time to time, all alike likely.
+    """Random directions, uniform over the sphere.
 
     Parameters
     ----------
     seed, run : int
         Each run of a seed has its own directions.
     hold_s : float
-        How long each is held.
+        How long each direction is held.
     """
 
     seed: int
@@ -67,7 +90,7 @@ class RandomSteering:
     hold_s: float
 
     def __call__(self, time_s: float, _state: Floats) -> Floats:
-        """Return the direction of that time: the same however often it is asked."""
+        """Return the direction at a time, which is the same in every call."""
         return _drawn(self.seed, self.run, max(0, int(time_s / self.hold_s + 1e-9)))
 
 

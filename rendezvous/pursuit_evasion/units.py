@@ -1,4 +1,4 @@
-"""Units in which the game is solved: its own length, time and mass, so that mu is one."""
+"""Nondimensional form of a game: its own units of length, time and mass, so that mu is one."""
 
 from __future__ import annotations
 
@@ -14,19 +14,22 @@ from rendezvous.pursuit_evasion.game import Game, Gravity, Player
 
 Floats = NDArray[np.float64]
 
+LONGEST_REVOLUTIONS = 15.0
+"""Longest duration of a game that does not state one, in revolutions of the pursuer."""
+
 
 @dataclass(frozen=True)
 class Units:
-    """What one is.
+    """Units of a game.
 
     Parameters
     ----------
     length_m : float
         The pursuer's semi-major axis at the start.
     time_s : float
-        Of a radian of a circular orbit of that size.
+        Time of a radian of a circular orbit of that size.
     mass_kg : float
-        The pursuer's at the start.
+        The pursuer's mass at the start.
     """
 
     length_m: float
@@ -39,49 +42,36 @@ class Units:
         return self.length_m / self.time_s
 
     def scaled(self, position_m: object, velocity_m_s: object) -> Floats:
-        """Return a state in these units.
-
-        Parameters
-        ----------
-        position_m, velocity_m_s : array_like, shape (3,)
-
-        Returns
-        -------
-        ndarray, shape (6,)
-        """
+        """Return a state in these units, shape (6,), from `position_m` and `velocity_m_s`, shape (3,)."""
         position, velocity = np.asarray(position_m, dtype=np.float64), np.asarray(velocity_m_s, dtype=np.float64)
         return np.concatenate([position / self.length_m, velocity / self.speed_m_s])
 
 
+@dataclass(frozen=True)
+class ScaledGame:
+    """A game in units; `latest` is the longest duration that it is followed to."""
+
+    units: Units
+    pursuer: Craft
+    evader: Craft
+    radius: float
+    latest: float
+
+    @property
+    def pair(self) -> Pair:
+        """Both sides."""
+        return Pair(self.pursuer, self.evader)
+
+
 def units_of(game: Game) -> Units:
-    """Return the units that suit a game.
-
-    Parameters
-    ----------
-    game : Game
-
-    Returns
-    -------
-    Units
-    """
+    """Return the units that suit a game."""
     mu = game.gravity.parameter_m3_s2
     length = semi_major_axis_m(np.array(game.pursuer.position_m), np.array(game.pursuer.velocity_m_s), mu)
     return Units(length, float(np.sqrt(length**3 / mu)), game.pursuer.mass_kg)
 
 
 def scaled_craft(player: Player, gravity: Gravity, units: Units) -> Craft:
-    """Return a player as a nondimensional craft.
-
-    Parameters
-    ----------
-    player : Player
-    gravity : Gravity
-    units : Units
-
-    Returns
-    -------
-    Craft
-    """
+    """Return a player as a nondimensional craft."""
     force = units.mass_kg * units.length_m / units.time_s**2
     return Craft(
         start=units.scaled(player.position_m, player.velocity_m_s),
@@ -93,16 +83,20 @@ def scaled_craft(player: Player, gravity: Gravity, units: Units) -> Craft:
     )
 
 
-def scaled_pair(game: Game, units: Units) -> Pair:
-    """Return both players as nondimensional sides.
+def scaled_game(game: Game, units: Units | None = None) -> ScaledGame:
+    """Return a game in units, its own where none are given."""
+    units = units or units_of(game)
+    pursuer, evader = (scaled_craft(player, game.gravity, units) for player in (game.pursuer, game.evader))
+    return ScaledGame(units, pursuer, evader, game.capture_radius_m / units.length_m, horizon_s(game) / units.time_s)
 
-    Parameters
-    ----------
-    game : Game
-    units : Units
 
-    Returns
-    -------
-    Pair
-    """
-    return Pair(scaled_craft(game.pursuer, game.gravity, units), scaled_craft(game.evader, game.gravity, units))
+def horizon_s(game: Game) -> float:
+    """Return the longest duration of a game, s: until a player's propellant is spent, or as long as it states."""
+    longest = game.longest_s
+    if not np.isfinite(longest):
+        longest = 2.0 * np.pi * LONGEST_REVOLUTIONS * units_of(game).time_s
+    # The acceleration of a craft without dry mass is infinite at the end of its propellant.
+    burns = [
+        player.burn_time_s * (1.0 if player.dry_mass_kg > 0.0 else 0.999) for player in (game.pursuer, game.evader)
+    ]
+    return float(min(longest, *burns))

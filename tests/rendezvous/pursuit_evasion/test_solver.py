@@ -26,7 +26,7 @@ from rendezvous.pursuit_evasion import (
 )
 from rendezvous.pursuit_evasion._branch import Ending, follow, polish
 from rendezvous.pursuit_evasion._pair import Node, Pair
-from rendezvous.pursuit_evasion.units import scaled_pair, units_of
+from rendezvous.pursuit_evasion.units import scaled_game, units_of
 
 from .conftest import EARTH_M, MU_M3_S2, MakeGame
 from .published import CASES, Case
@@ -83,7 +83,7 @@ def test_a_greater_radius_is_reached_earlier_by_the_closing_speed(slides: MakeGa
 
 def test_a_coasting_evader_is_captured_the_first_time_it_can_be(slides: MakeGame) -> None:
     game = slides(0.0)
-    capture, units, pair = captured(solve(game)), units_of(game), scaled_pair(game, units_of(game))
+    capture, units, pair = captured(solve(game)), units_of(game), scaled_game(game).pair
     first = pair.begin(10.0)
     assert first is not None
     # There is another extremal at 138928 s; before and after the first capture l changes its sign.
@@ -182,7 +182,7 @@ def rates(t: float, y: Floats, thrust: float, mass: float, flow: float) -> Float
 def independent_capture(game: Game, capture: Capture) -> float:
     """Shoot forward on 13 unknowns with SciPy from a guess a little off, nondimensional; return the capture time, s."""
     units = units_of(game)
-    pair = scaled_pair(game, units)
+    pair = scaled_game(game, units).pair
     crafts = (pair.pursuer, pair.evader)
     node = capture.extremal
 
@@ -276,7 +276,7 @@ def test_the_residual_of_a_neighbour_is_that_of_the_answer(thrust_n: float, slid
 
 def test_polishing_what_is_no_guess_gives_nothing(slides: MakeGame, solved: Solution) -> None:
     node = captured(solved).extremal
-    pair = scaled_pair(slides(), solved.units)
+    pair = scaled_game(slides(), solved.units).pair
     assert polish(pair, -node.vector, node.duration, 0.0, 20.0) is None
 
 
