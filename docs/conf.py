@@ -44,7 +44,7 @@ source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 nitpicky = True
 # Other projects' types are named and not linked: their inventories would have to be fetched.
 nitpick_ignore_regex = [
-    ("py:.*", r"(numpy|np|os|shapely|pyarrow|concurrent|collections|pathlib|enum|types|typing)\..*"),
+    ("py:.*", r"(numpy|np|os|shapely|pyarrow|matplotlib|concurrent|collections|pathlib|enum|types|typing)\..*"),
     (
         "py:.*",
         r"(ArrayLike|NDArray|Floats|Flags|Integers|Interval|RangeOrRanges|Callable|Sequence|Iterator|Mapping|Executor|Path"
@@ -67,6 +67,7 @@ nitpick_ignore = [
         "rendezvous.reachability.problem": ("Block",),
         "rendezvous.reachability.admissible": ("Lifted",),
         "rendezvous.reachability.optimum": ("BlockOptimum",),
+        "sim.bound": ("LabelBound", "TruthPair"),
         "sim.chunk": ("Chunk",),
         "sim.storage.campaign_folder": ("CampaignFolder", "Damage"),
         "sim.storage.manifest": ("Manifest",),
