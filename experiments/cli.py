@@ -14,9 +14,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
-from experiments.campaigns.campaign import campaign
-from experiments.campaigns.report import report
-from experiments.campaigns.sweep import sweep
+from experiments.campaigns.command import campaign, report, sweep
 from experiments.common.compile_cache import keep_kernels_somewhere
 from experiments.common.errors import INTERRUPTED, InputError, on_a_screen
 from experiments.interception.commands.adversary import adversary

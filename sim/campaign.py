@@ -63,7 +63,7 @@ class CampaignResult:
         return self.table.to_pandas()
 
     def quantile(self, quantity: str, level: float) -> QuantileEstimate:
-        """Return the quantile at a level in (0, 1) of a column of numbers, over all rows where it is known."""
+        """Return the quantile at a level in (0, 1) of a quantity, over all rows where it is known."""
         (estimate,) = estimate_quantiles(self.folder.numbers(quantity).compressed(), [level])
         return estimate
 
@@ -212,10 +212,15 @@ class Campaign:
         )
 
     def chunk_at(self, index: int, manifest: Manifest) -> Chunk:
-        """Return a chunk by its number in the campaign's manifest."""
+        """Return the chunk that has the number `index` in the campaign's manifest."""
         cell, runs = manifest.runs_of(index)
         scenario = self._noise.applied_to((self.cells or (self.scenario,))[cell])
         return Chunk(index, cell, scenario, runs, self.seed, self._noise, self.guarantee, self.strategy)
+
+    @property
+    def kind(self) -> str:
+        """`campaign` or `sweep`."""
+        return "sweep" if self.axes else "campaign"
 
     @property
     def engagements(self) -> int:
@@ -307,6 +312,11 @@ class Sweep(Campaign):
         Engagements of each cell.
     folder, seed, noise, guarantee, chunk, strategy, until
         As of `Campaign`; the guaranteed miss is not computed by default.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As of `Campaign`, or if there is no axis.
     """
 
     def __init__(

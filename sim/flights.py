@@ -63,6 +63,11 @@ def fly_on_threads(workers: int, chunks: Iterable[Chunk]) -> Flights:
 
     When it is closed, or an error or an interrupt ends it, chunks under way stop after their current step. After a
     MemoryError it does not wait for them: Numba keeps its lock where memory ends while it loads a kernel.
+
+    Raises
+    ------
+    InterruptedError
+        In a chunk under way, to stop it.
     """
     stopped = threading.Event()
 

@@ -1,4 +1,4 @@
-"""What the rows of a campaign come to: a sample a noise, quantiles with their intervals, the worst runs."""
+"""Summaries of the rows of a campaign: quantiles with their intervals for each noise, and the worst runs."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.table import Table
 
 from experiments.common.output import library_version
+from experiments.common.screen import number
 from sim import Outcome, QuantileEstimate, estimate_quantiles
 from sim.stopping_rule import QUANTITIES, level_name
 from sim.storage import CampaignFolder, scenario_hash
@@ -21,7 +23,7 @@ Floats = NDArray[np.float64]
 LEVELS = (0.1, 0.5, 0.9, 0.99, 0.999)
 START = ("z_km", "x_km", "vz_km_s", "vx_km_s")
 WORST = 10
-OUTCOMES = tuple(each.value for each in Outcome)
+OUTCOMES = tuple(outcome.value for outcome in Outcome)
 
 
 @dataclass(frozen=True)
@@ -31,16 +33,19 @@ class Sample:
     Parameters
     ----------
     noise : str
+        Name of the noise.
     runs : int
+        Number of engagements.
     quantiles : mapping of str to sequence of QuantileEstimate
-        By quantity, those of `LEVELS`; without the guaranteed miss where it is never known.
+        By quantity; without the guaranteed miss where it is never known.
     worst : mapping of str to float
-        The greatest of each quantity.
+        Largest value of each quantity.
     outcomes : mapping of str to int
+        Number of runs with each outcome.
     truth_kept : int
-        Runs whose truth stayed in its own section.
+        Runs whose true state stayed inside the set.
     phi_held, phi_known : int
-        Runs whose miss stayed within the guaranteed one, and runs that have one; 0 in a model that guarantees nothing.
+        Runs whose miss is at most Phi, and runs with a Phi; 0 in a model without a guarantee.
     """
 
     noise: str
@@ -54,52 +59,46 @@ class Sample:
 
 
 def noises_of(folder: CampaignFolder) -> list[str]:
-    """Return the noises that a campaign flies."""
+    """Return the noises of a campaign."""
     return [kind.value for kind in folder.manifest.noise.kinds]
 
 
 def noise_flags(folder: CampaignFolder) -> dict[str, NDArray[np.bool_] | slice]:
-    """Return which rows are of which noise; a slice where all are."""
+    """Return the rows of each noise, as flags, or as a slice where it has all rows."""
     noises = noises_of(folder)
     if len(noises) == 1:
         return {noises[0]: slice(None)}
     codes = folder.codes("noise", noises)
-    return {noise: codes == place for place, noise in enumerate(noises)}
+    return {noise: codes == code for code, noise in enumerate(noises)}
 
 
 def samples(folder: CampaignFolder, cell: int | None = None, levels: Sequence[float] = LEVELS) -> list[Sample]:
-    """Summarise what is stored, a sample a noise.
+    """Summarise the stored rows, a sample for each noise that has some.
+
+    One quantity of one noise is in memory at a time, 8 bytes an engagement, and a sorted copy of it.
 
     Parameters
     ----------
     folder : CampaignFolder
+        A campaign or a sweep, finished or not.
     cell : int or None
-        Of a sweep; None is all rows.
+        A cell of the sweep; None is all rows.
     levels : sequence of float
         Of the quantiles.
-
-    Returns
-    -------
-    list of Sample
-        Without those of which there is no row yet.
-
-    Notes
-    -----
-    One quantity of one noise is in memory at a time, 8 bytes an engagement, and a sorted copy of it.
     """
     noises = noises_of(folder)
-    told = {noise: _Tally() for noise in noises}
+    counts = {noise: _Counts() for noise in noises}
     guarantees = folder.manifest.guarantee and folder.manifest.scenario.set_model.is_guaranteed
     columns = ["truth_margin_m", *(("miss_m", "guaranteed_miss_m") if guarantees else ())]
     for numbers, codes in folder.shards(columns, {"noise": noises, "outcome": OUTCOMES}, cell):
-        for place, tally in enumerate(told.values()):
-            rows = codes["noise"] == place
-            tally.outcomes += np.bincount(codes["outcome"][rows], minlength=len(OUTCOMES))
-            tally.truth_kept += int((numbers["truth_margin_m"][rows].filled(0.0) >= 0.0).sum())
+        for code, count in enumerate(counts.values()):
+            rows = codes["noise"] == code
+            count.outcomes += np.bincount(codes["outcome"][rows], minlength=len(OUTCOMES))
+            count.truth_kept += int((numbers["truth_margin_m"][rows].filled(0.0) >= 0.0).sum())
             if guarantees:
                 guaranteed = numbers["guaranteed_miss_m"][rows]
-                tally.phi_known += int(guaranteed.count())
-                tally.phi_held += int((numbers["miss_m"][rows].data <= guaranteed.filled(-np.inf)).sum())
+                count.phi_known += int(guaranteed.count())
+                count.phi_held += int((numbers["miss_m"][rows].data <= guaranteed.filled(-np.inf)).sum())
     quantiles: dict[str, dict[str, list[QuantileEstimate]]] = {noise: {} for noise in noises}
     worst: dict[str, dict[str, float]] = {noise: {} for noise in noises}
     for quantity in QUANTITIES:
@@ -112,22 +111,22 @@ def samples(folder: CampaignFolder, cell: int | None = None, levels: Sequence[fl
     return [
         Sample(
             noise,
-            int(tally.outcomes.sum()),
+            int(count.outcomes.sum()),
             quantiles[noise],
             worst[noise],
-            {name: int(count) for name, count in zip(OUTCOMES, tally.outcomes, strict=True) if count},
-            tally.truth_kept,
-            tally.phi_held,
-            tally.phi_known,
+            {name: int(runs) for name, runs in zip(OUTCOMES, count.outcomes, strict=True) if runs},
+            count.truth_kept,
+            count.phi_held,
+            count.phi_known,
         )
-        for noise, tally in told.items()
-        if tally.outcomes.any()
+        for noise, count in counts.items()
+        if count.outcomes.any()
     ]
 
 
 @dataclass
-class _Tally:
-    """What is counted of the rows of a noise, shard by shard."""
+class _Counts:
+    """Counts over the rows of a noise."""
 
     outcomes: NDArray[np.int64] = field(default_factory=lambda: np.zeros(len(OUTCOMES), dtype=np.int64))
     truth_kept: int = 0
@@ -136,7 +135,7 @@ class _Tally:
 
 
 def heading(folder: CampaignFolder) -> dict[str, Any]:
-    """Return what every JSON of a campaign or a sweep begins with."""
+    """Return the first keys of every JSON of a campaign or a sweep."""
     manifest = folder.manifest
     return {
         "version": library_version(),
@@ -158,16 +157,7 @@ def heading(folder: CampaignFolder) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class WorstRun:
-    """One of the runs that missed by most.
-
-    Parameters
-    ----------
-    run : int
-    noise, outcome : str
-    miss_m, impulse_m_s : float
-    replay : str
-        The command that flies it again.
-    """
+    """One of the runs with the largest miss; `replay` is the command that flies it again."""
 
     run: int
     noise: str
@@ -178,18 +168,7 @@ class WorstRun:
 
 
 def worst_runs(folder: CampaignFolder, scenario_file: Path) -> list[WorstRun]:
-    """Return the runs of a campaign that missed by most, the worst first, each with how to fly it again.
-
-    Parameters
-    ----------
-    folder : CampaignFolder
-    scenario_file : Path
-        Of the campaign's scenario.
-
-    Returns
-    -------
-    list of WorstRun
-    """
+    """Return the runs of a campaign with the largest miss, the worst first."""
     miss = folder.numbers("miss_m").data
     count = min(WORST, miss.size)
     places = np.argpartition(-miss, count - 1)[:count] if count else np.zeros(0, dtype=np.int64)
@@ -212,23 +191,61 @@ def replay_line(scenario_file: Path, run: int, seed: int, noise: str) -> str:
     return f"infoset engage {shlex.quote(str(scenario_file))} --noise {noise} --seed {seed} --run {run}"
 
 
-def to_json(found: Sample) -> dict[str, Any]:
+def sample_json(sample: Sample) -> dict[str, Any]:
     """Return a sample as JSON values."""
     return {
-        "noise": found.noise,
-        "runs": found.runs,
-        "outcomes": dict(found.outcomes),
-        "truth_kept": found.truth_kept,
-        "phi_held": found.phi_held if found.phi_known else None,
-        "phi_known": found.phi_known,
+        "noise": sample.noise,
+        "runs": sample.runs,
+        "outcomes": dict(sample.outcomes),
+        "truth_kept": sample.truth_kept,
+        "phi_held": sample.phi_held if sample.phi_known else None,
+        "phi_known": sample.phi_known,
         **{
             quantity: {
                 **{
-                    level_name(each.level): {"value": each.value, "lower": each.lower, "upper": each.upper}
-                    for each in estimates
+                    level_name(estimate.level): {
+                        "value": estimate.value,
+                        "lower": estimate.lower,
+                        "upper": estimate.upper,
+                    }
+                    for estimate in estimates
                 },
-                "max": found.worst[quantity],
+                "max": sample.worst[quantity],
             }
-            for quantity, estimates in found.quantiles.items()
+            for quantity, estimates in sample.quantiles.items()
         },
     }
+
+
+def samples_table(found: Sequence[Sample], model: str) -> tuple[Table, list[str]]:
+    """Return the quantiles with their intervals, a block for each noise, and a line on the outcomes of each.
+
+    Parameters
+    ----------
+    found : sequence of Sample
+        At least one.
+    model : str
+        Of the information set: the paper's has no guarantee.
+    """
+    phi = "published Phi, m" if model == "paper" else "guaranteed miss, m"
+    names = {"miss_m": "miss, m", "impulse_m_s": "impulse, m/s", "guaranteed_miss_m": phi}
+    table = Table("noise", box=None, pad_edge=False)
+    table.add_column("quantity", no_wrap=True)
+    for estimate in found[0].quantiles["miss_m"]:
+        table.add_column(level_name(estimate.level), justify="right")
+    table.add_column("max", justify="right")
+    notes = []
+    for sample in found:
+        for place, (quantity, estimates) in enumerate(sample.quantiles.items()):
+            values = [number(estimate.value) for estimate in estimates]
+            first = sample.noise if place == 0 else ""
+            table.add_row(first, names[quantity], *values, number(sample.worst[quantity]))
+            table.add_row("", "  at least", *(number(estimate.lower) for estimate in estimates), "", style="dim")
+            table.add_row("", "  at most", *(number(estimate.upper) for estimate in estimates), "", style="dim")
+        others = [f"{count} {name}" for name, count in sample.outcomes.items() if name != Outcome.INTERCEPTED.value]
+        held = f", miss at most Phi in {sample.phi_held} of {sample.phi_known}" if sample.phi_known else ""
+        notes.append(
+            f"{sample.noise} noise, {sample.runs} runs: true state inside the set in {sample.truth_kept} of "
+            f"{sample.runs}{held}; not intercepted: {', '.join(others) or 'none'}"
+        )
+    return table, notes

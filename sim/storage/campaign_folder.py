@@ -274,7 +274,13 @@ def _by_noise(values: Numbers, codes: Codes, noises: int) -> list[NDArray[np.flo
 
 
 def need_arrow() -> ModuleType:
-    """Return the module that reads and writes tables; raise `MissingLibraryError` if pyarrow is not installed."""
+    """Return the module that reads and writes tables.
+
+    Raises
+    ------
+    MissingLibraryError
+        If pyarrow is not installed.
+    """
     try:
         from sim.storage import tables
     except ImportError:

@@ -117,7 +117,13 @@ class CampaignWriter(CampaignFolder):
 
 
 def need_free(path: Path, *, resume: bool) -> None:
-    """Raise `OccupiedError` if a folder holds anything but, on a resume, a campaign."""
+    """Check that a folder is empty or does not exist, or, on a resume, holds a campaign.
+
+    Raises
+    ------
+    OccupiedError
+        If it holds something else.
+    """
     with reporting(path):
         if not path.exists() and not path.is_symlink():
             return

@@ -89,7 +89,13 @@ def clear_leftovers(folder: Path) -> None:
 
 @contextlib.contextmanager
 def reporting(path: Path) -> Iterator[None]:
-    """Turn an `OSError` while `path` is read or written into a `StorageError` with a message for the user."""
+    """Turn an `OSError` while `path` is read or written into a message for the user.
+
+    Raises
+    ------
+    StorageError
+        `DiskFullError` where the disk is full.
+    """
     try:
         yield
     except OSError as error:
@@ -103,9 +109,14 @@ def reporting(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder, which ends with the process; raise `OccupiedError` if another campaign holds it.
+    """Hold the lock of a folder, which ends with the process.
 
     A forked child would keep the lock after its parent has ended: use process pools that spawn.
+
+    Raises
+    ------
+    OccupiedError
+        If another campaign holds it.
     """
     with contextlib.ExitStack() as stack, reporting(folder / LOCK):
         try:

@@ -43,6 +43,11 @@ class Axis:
         At least two, in the unit of the file.
     scale : str
         `linear` or `log`: the spacing of the values.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If there are fewer values, or one is out of range.
     """
 
     key: str
@@ -203,7 +208,13 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Read the manifest of a folder; raise `ManifestError` with the key at fault if this version cannot read it."""
+    """Read the manifest of a folder.
+
+    Raises
+    ------
+    ManifestError
+        If there is none, or this version cannot read it; the message names the key at fault.
+    """
     file = folder / MANIFEST
     if not file.is_file():
         raise ManifestError(f"{folder}: holds no campaign and no sweep: it has no {MANIFEST}")
@@ -228,7 +239,13 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def need_same(found: Manifest, asked: Manifest, folder: Path) -> None:
-    """Raise `ManifestError`, with every difference, if a folder's campaign has other decisive values than asked."""
+    """Compare the decisive values of a folder's campaign with those asked for.
+
+    Raises
+    ------
+    ManifestError
+        If they differ; all differences are listed.
+    """
     there, here = _flat(found.decisive()), _flat(asked.decisive())
     lines = [
         f"{key}: {_shown(there, key)} in the folder, {_shown(here, key)} now"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.campaigns.screen import campaign_progress
+from experiments.campaigns.flight import campaign_progress
 from sim.campaign import Progress
 from tests.faults.conftest import Infoset, need_whole
 

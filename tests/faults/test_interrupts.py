@@ -14,14 +14,14 @@ from pathlib import Path
 import pytest
 
 from experiments.__main__ import main as beginning
-from experiments.campaigns.options import campaign_errors
+from experiments.campaigns.flight import campaign_errors
 from sim import Campaign, CampaignNoise, Scenario
 from sim.storage import CampaignFolder, CampaignWriter
 from tests.faults.conftest import Infoset, Left, begin, ended, need_whole
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="POSIX signals")
 
-RESUME = "interrupted; what is stored is whole: go on with --resume"
+RESUME = "interrupted; the stored runs are complete: continue with --resume"
 
 
 def interrupted(*arguments: object, folder: Path, after_s: float) -> Left:

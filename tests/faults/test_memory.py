@@ -60,8 +60,8 @@ def test_no_memory_is_a_message_that_says_how_to_go_on(
         patched.setattr("sim.flights.fly_chunk", fly)
         left = infoset(*asked)
     assert (left.code, left.out) == (2, "")
-    assert left.err.splitlines()[-1].startswith("error: there is not enough memory (Unable to allocate 7.45 GiB); ")
-    assert left.err.splitlines()[-1].endswith("what is stored is whole: go on with --resume")
+    assert left.err.splitlines()[-1].startswith("error: not enough memory (Unable to allocate 7.45 GiB); ")
+    assert left.err.splitlines()[-1].endswith("the stored runs are complete: continue with --resume")
     need_whole(tmp_path / "runs")
     assert infoset(*asked, "--resume", "-q").code == 0
 

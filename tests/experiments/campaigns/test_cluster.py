@@ -140,11 +140,11 @@ def test_an_open_scheduler_is_warned_of(
 
     assert is_open(address) == warned
     (tmp_path / "brief.toml").write_text(scenario_to_toml(brief))
-    monkeypatch.setattr("experiments.campaigns.cluster.connected", refuse)
+    monkeypatch.setattr("experiments.campaigns.flight.connected", refuse)
     code, _, err = infoset("campaign", "brief.toml", "--runs", 8, "--out", "runs", "--dask", address)
     assert code == 2
     assert f"asked for {address}" in err
-    assert ("whoever reaches it can run programs there" in err) == warned
+    assert ("everyone who reaches that address can run programs there" in err) == warned
 
 
 class Processes:

@@ -57,7 +57,12 @@ def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
 def test_a_report_of_files_alone(infoset: Infoset, brief: Scenario, folder: Path, tmp_path: Path) -> None:
     before = sorted(each.name for each in folder.iterdir())
     code, out, err = infoset("report", folder, "--out", tmp_path / "report")
-    assert (code, err) == (0, "")
+    assert code == 0
+    assert sorted(err.removeprefix("wrote ").removesuffix(f" in {tmp_path / 'report'}\n").split(", ")) == [
+        *FIGURES,
+        "report.json",
+        "scenario.toml",
+    ]
     assert sorted(each.name for each in folder.iterdir()) == before == [".lock", "manifest.json", "shards"]
     assert sorted(each.name for each in (tmp_path / "report").iterdir()) == [*FIGURES, "report.json", "scenario.toml"]
     assert load_scenario(tmp_path / "report" / "scenario.toml") == brief
@@ -86,7 +91,7 @@ def test_a_report_writes_nothing_unasked(infoset: Infoset, folder: Path, tmp_pat
     [
         ("missing", ["there is no such folder"]),
         (".", ["holds no campaign and no sweep"]),
-        ("empty", ["no run is stored in it yet"]),
+        ("empty", ["contains no runs yet"]),
         ("broken", ["is not a readable manifest"]),
     ],
 )

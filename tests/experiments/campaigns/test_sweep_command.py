@@ -68,7 +68,10 @@ def test_a_sweep_of_two_keys(infoset: Infoset, brief: Scenario, file: Path, tmp_
     folder = tmp_path / "sweep"
     code, out, err = infoset("sweep", file, "--vary", TWO, "--runs", 30, "--out", folder, "--seed", 2)
     assert code == 0
-    assert "sweep.parquet, summary.json, figure-sweep.pdf, figure-sweep.png" in err
+    assert (
+        f"wrote shards, scenario.toml, sweep.parquet, figure-sweep.pdf, figure-sweep.png, summary.json in {folder}"
+        in err
+    )
     assert sorted(each.name for each in folder.iterdir()) == FILES
     table = pq.read_table(folder / "sweep.parquet")
     assert table.num_rows == 6
@@ -148,7 +151,7 @@ def test_three_keys_are_a_table_only(infoset: Infoset, file: Path, tmp_path: Pat
     [
         (["--vary", "thruster.budget=1:2:2"], ["did you mean thruster.budget_m_s?"]),
         (["--vary", "thruster.greatest_impulse_m_s=0.01:5:3"], ["brief with thruster.greatest_impulse_m_s = 0.01"]),
-        (["--runs", 0], ["--runs: must be from 1"]),
+        (["--runs", 0], ["--runs", "greater than or equal to 1"]),
         (["--require", "miss_m<10"], ["--require: must be a quantity, a quantile and a bound"]),
         (["--show", "miss_m p99,fuel p50"], ["--show: there is no quantity fuel"]),
         (["--show", ",".join(f"miss_m p{each}" for each in range(1, 20))], ["--show: at most 8"]),
@@ -169,7 +172,7 @@ def test_what_is_wrong_is_said_before_the_work(
     given = {"--vary": TWO, "--runs": 10, "--out": "sweep"} | dict(zip(arguments[::2], arguments[1::2], strict=True))
     code, out, err = infoset("sweep", file, *[part for pair in given.items() for part in pair])
     assert (code, out) == (2, "")
-    assert err.count("error: ") == 1
+    assert err.count("error: ") + err.count("─ Error ─") == 1
     for part in parts:
         assert part in err
     assert [each.name for each in tmp_path.iterdir()] == ["brief.toml"]
@@ -210,7 +213,7 @@ def test_a_large_sweep_asks_on_a_terminal(
             infoset(*asked)
     else:
         assert infoset(*asked)[0] == 2
-    assert questions == ["6 cells of 300000 runs are 1800000 engagements, more than a million. Go on?"]
+    assert questions == ["6 cells of 300000 runs are 1800000 engagements, more than a million. Continue?"]
 
 
 def test_where_a_quantile_crosses_its_bound_by_hand() -> None:

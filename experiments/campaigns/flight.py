@@ -1,0 +1,245 @@
+"""Flying a campaign or a sweep: where it is flown, its progress, and messages for what can go wrong."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, CancelledError, Executor
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
+from rich.progress import Progress as ProgressBars
+
+from experiments.campaigns.cluster import connected, is_open
+from experiments.campaigns.command import Flight
+from experiments.common.errors import InputError
+from experiments.common.screen import NOT_FINITE, number, say, tell_of_compiling
+from experiments.interception.choices import scenario_with
+from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
+from sim import Campaign, CampaignNoise, CampaignResult, Scenario
+from sim.campaign import Progress
+from sim.flights import fly_on_threads, worker_processes
+from sim.simulate import ENGAGEMENTS_AT_ONCE
+from sim.storage import StorageError, need_free
+from sim.versions import VersionError
+
+SCENARIO_FILE = "scenario.toml"
+"""In the folder of a campaign."""
+RESUME_HINT = "; the stored runs are complete: continue with --resume"
+ESTIMATED_FROM = 50_000
+"""Number of engagements from which time and disk space are estimated first."""
+
+MOST_WARNINGS = 5
+"""Warnings shown of a sweep; those of its cells are alike."""
+BYTES_A_RUN, BYTES_A_SHARD = 66, 6_000
+_LINE_EVERY_S = 60.0
+_WARM_UP = 8
+
+
+def scenario_of(options: Flight) -> Scenario:
+    """Return the scenario that the options describe, with the campaign's noise."""
+    scenario = scenario_with(
+        options.scenario,
+        strategy=options.strategy,
+        model=options.model,
+        tie=options.tie,
+        range_meter=options.range_meter,
+    )
+    return scenario if options.noise is None else CampaignNoise(options.noise).applied_to(scenario)
+
+
+@dataclass(frozen=True)
+class Flown:
+    """A campaign or a sweep that has been flown, the warnings on its scenarios, and the time of this session."""
+
+    result: CampaignResult
+    warnings: list[str]
+    elapsed_s: float
+
+
+def fly(asked: Campaign, options: Flight) -> Flown:
+    """Fly what the folder of a campaign lacks, with messages on stderr."""
+    need_free(options.out, resume=options.resume)
+    note = partial(say, quiet=options.quiet)
+    files = {SCENARIO_FILE: scenario_to_toml(asked.scenario)}
+    scenarios = asked.cells or (asked.scenario,)
+    warnings = list(dict.fromkeys(line for scenario in scenarios for line in scenario_warnings(scenario)))
+    for warning in warnings[: MOST_WARNINGS if asked.cells else None]:
+        note(f"warning: {warning}")
+    with _workers(options, note) as workers:
+        tell_of_compiling(options.quiet)
+        if asked.engagements >= ESTIMATED_FROM:
+            note(f"{_estimate(asked, workers.cores)}{' at most' if asked.until else ''}")
+        began_s = time.perf_counter()
+        with campaign_progress(asked.kind, options.quiet) as progress:
+            result = asked.run(
+                workers.executor, workers=workers.count, resume=options.resume, progress=progress, beside=files
+            )
+    for damage in result.redone:
+        note(f"{damage.file}: {damage.reason}; flown again")
+    return Flown(result, warnings, time.perf_counter() - began_s)
+
+
+@contextlib.contextmanager
+def campaign_errors(resume_hint: str = "") -> Iterator[None]:
+    """Turn errors of a campaign into messages for the user, with a hint where it can be resumed."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(resume_hint) from None
+    except MemoryError as error:
+        raise InputError(
+            f"not enough memory ({error}); free some, or give fewer --workers or a smaller --chunk{resume_hint}"
+        ) from None
+    except StorageError as error:
+        raise InputError(str(error)) from None
+    except VersionError as error:
+        raise InputError(
+            f"--dask: a worker has other versions of the packages, and its numbers may differ: {error}; install the "
+            f"same versions there{resume_hint}"
+        ) from None
+    except FloatingPointError:
+        raise InputError(NOT_FINITE) from None
+    except (CancelledError, BrokenExecutor) as error:
+        reason = f" ({str(error)[:200]})" if str(error) else ""
+        raise InputError(f"a worker process or the cluster has stopped{reason}{resume_hint}") from None
+    except Exception as error:
+        # The exceptions of a cluster can be named only where Dask is installed.
+        if not type(error).__module__.startswith(("distributed.", "dask.")):
+            raise
+        raise InputError(f"--dask: the cluster failed: {str(error)[:300]}{resume_hint}") from None
+
+
+@dataclass(frozen=True)
+class _Workers:
+    """Where engagements are flown.
+
+    Parameters
+    ----------
+    executor : Executor or None
+        None is threads of this process.
+    count : int or None
+        Number of threads, or of chunks that the executor gets at a time.
+    cores : int
+        Engagements flown at the same time.
+    """
+
+    executor: Executor | None
+    count: int | None
+    cores: int
+
+
+@contextlib.contextmanager
+def _workers(options: Flight, note: Callable[[str], None]) -> Iterator[_Workers]:
+    """Start the workers that the options name: threads or processes here, or those of a cluster."""
+    if sum(option is not None for option in (options.dask, options.workers, options.processes)) > 1:
+        raise InputError(
+            "--workers (threads here), --processes (here) and --dask (a cluster) exclude each other; give one of them"
+        )
+    if options.processes is not None:
+        with worker_processes(options.processes) as pool:
+            yield _Workers(pool, 2 * options.processes, options.processes)
+    elif options.dask is not None:
+        if is_open(options.dask):
+            note(
+                f"warning: --dask: the connection to {options.dask} is not encrypted, and everyone who reaches that "
+                "address can run programs there: use a private network, or tls:// (see the documentation, campaigns)"
+            )
+        with connected(options.dask) as cluster:
+            note(f"{cluster.workers} Dask workers, {cluster.threads} threads")
+            # Two chunks a thread keep all busy while results travel; workers that join later get some too.
+            yield _Workers(cluster.executor, max(2 * cluster.threads, 16), cluster.threads)
+    else:
+        yield _Workers(None, options.workers, options.workers or os.cpu_count() or 1)
+
+
+def _estimate(asked: Campaign, cores: int) -> str:
+    """Return a line with the time and the disk space of a campaign, measured on a few of its engagements.
+
+    Raises
+    ------
+    InputError
+        If the disk has less space.
+    """
+    manifest, folder = asked.manifest(), Path(asked.folder)
+    chunk = asked.chunk_at(manifest.chunks // 2, manifest)
+    pilot = range(min(ENGAGEMENTS_AT_ONCE, asked.runs))
+    list(fly_on_threads(1, [replace(chunk, runs=range(_WARM_UP))]))  # loads or compiles the kernels
+    began_s = time.perf_counter()
+    list(fly_on_threads(1, [replace(chunk, runs=pilot)]))
+    seconds = (time.perf_counter() - began_s) / len(pilot) * asked.engagements / cores
+    needed = BYTES_A_RUN * asked.engagements + BYTES_A_SHARD * manifest.chunks
+    existing = next(path for path in (folder, *folder.absolute().parents) if path.is_dir())
+    free = shutil.disk_usage(existing).free
+    line = (
+        f"{asked.engagements} engagements: about {duration(seconds)} on {cores} core{'s' if cores > 1 else ''}, and "
+        f"{size(needed)} in {manifest.chunks} shards"
+    )
+    if needed > free:
+        raise InputError(f"{folder}: {line}, but the disk has {size(free)} left; free some space, or give fewer --runs")
+    return line
+
+
+@contextlib.contextmanager
+def campaign_progress(name: str, quiet: bool) -> Iterator[Callable[[Progress], None]]:
+    """Yield a function that shows progress on stderr: as a bar on a terminal, else as a line a minute."""
+    if quiet:
+        yield lambda _: None
+    elif not sys.stderr.isatty():
+        last_s = time.monotonic()
+
+        def line(progress: Progress) -> None:
+            nonlocal last_s
+            if time.monotonic() - last_s >= _LINE_EVERY_S:
+                last_s = time.monotonic()
+                typer.echo(f"{name}: {progress.done} of {progress.total}, {_pace(progress)}", err=True)
+
+        yield line
+    else:
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[pace]}"),
+        )
+        with ProgressBars(*columns, console=Console(stderr=True), transient=True) as bars:
+            task = bars.add_task(name, total=None, pace="")
+            yield lambda progress: bars.update(
+                task, total=progress.total, completed=progress.done, pace=_pace(progress)
+            )
+
+
+def _pace(progress: Progress) -> str:
+    """Return the rate of this session, and the time left at this rate."""
+    if not progress.flown:
+        return "- runs/s"
+    rate = progress.flown / max(progress.elapsed_s, 1e-9)
+    return f"{number(rate)} runs/s, {duration((progress.total - progress.done) / rate)} left"
+
+
+def duration(seconds: float) -> str:
+    """Return a time in suitable units: 40 s, 3 min, 2 h 10 min, 5 days."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60.0)
+    if minutes < 100:
+        return f"{minutes} min"
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if hours < 48 else f"{hours / 24.0:.0f} days"
+
+
+def size(count: float) -> str:
+    """Return a number of bytes in suitable units."""
+    for unit in ("bytes", "kB", "MB", "GB"):
+        if count < 1000.0:
+            return f"{count:.3g} {unit}"
+        count /= 1000.0
+    return f"{count:.3g} TB"

@@ -1,0 +1,83 @@
+"""`infoset campaign`: flight, summary and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from experiments.campaigns.command import Campaign as Options
+from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, Flown, campaign_errors, duration, fly, scenario_of
+from experiments.campaigns.samples import heading, sample_json, samples, samples_table
+from experiments.common.errors import InputError
+from experiments.common.output import Output, output, to_json
+from experiments.common.screen import table_console
+from sim import Campaign, CampaignNoise, StoppingRule
+from sim.storage import need_arrow
+
+SUMMARY = "summary.json"
+
+
+def run(options: Options) -> None:
+    """Fly the campaign, write its summary and print the tables."""
+    with (
+        campaign_errors(RESUME_HINT),
+        output(files={"--json": options.json}, overwrite=options.overwrite, quiet=options.quiet) as written,
+    ):
+        need_arrow()
+        scenario = scenario_of(options)
+        asked = Campaign(
+            scenario,
+            options.runs,
+            options.out,
+            seed=options.seed,
+            noise=None if options.noise is None else CampaignNoise(options.noise),
+            guarantee=options.guarantee,
+            chunk=options.chunk,
+            until=_rule(options.until),
+        )
+        flown = fly(asked, options)
+        stored = flown.result.folder
+        found = samples(stored)
+        summary = {
+            **heading(stored),
+            **({"warnings": flown.warnings} if flown.warnings else {}),
+            "elapsed_s": flown.elapsed_s,
+            "redone": [{"file": damage.file.name, "reason": damage.reason} for damage in flown.result.redone],
+            "samples": [sample_json(sample) for sample in found],
+        }
+        tables = samples_table(found, stored.manifest.scenario.set_model.kind.value)
+        folder = Output(options.out, {}, overwrite=True)
+        folder.save(SUMMARY, to_json(summary))
+        written.written += [options.out / "shards", options.out / SCENARIO_FILE, *folder.written]
+        written.deliver("--json", to_json(summary))
+    if not options.quiet:
+        _show(table_console(written.stdout_taken), flown, *tables)
+
+
+def _rule(text: str | None) -> StoppingRule | None:
+    try:
+        return None if text is None else StoppingRule.parse(text)
+    except ValueError as error:
+        raise InputError(f"--until: {error}") from None
+
+
+def _show(console: Console, flown: Flown, table: Table, notes: Sequence[str]) -> None:
+    folder, manifest = flown.result.folder, flown.result.folder.manifest
+    stopped = "" if manifest.stopped_after is None else f" of {manifest.runs}, stopped by {manifest.until}"
+
+    def line(text: str) -> None:
+        console.print(Text(text), soft_wrap=True)
+
+    line(
+        f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}, {duration(flown.elapsed_s)}; quantiles, 95 % "
+        "intervals"
+    )
+    console.print(table)
+    for note in notes:
+        line(note)
+    if manifest.until is not None and manifest.stopped_after is None:
+        line(f"{manifest.until} was not met: give more --runs, with --resume")
+    line(f"see the results with: infoset report {folder.path}")

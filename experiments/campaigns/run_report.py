@@ -1,0 +1,161 @@
+"""`infoset report`: a campaign or a sweep, from its files only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from experiments.campaigns.campaign_figures import (
+    CampaignColumns,
+    correlations,
+    draw_campaign_distributions,
+    draw_convergence,
+    draw_dispersion,
+)
+from experiments.campaigns.command import Report
+from experiments.campaigns.flight import SCENARIO_FILE, campaign_errors
+from experiments.campaigns.samples import (
+    START,
+    Sample,
+    WorstRun,
+    heading,
+    noise_flags,
+    sample_json,
+    samples,
+    samples_table,
+    worst_runs,
+)
+from experiments.campaigns.sweep_report import FIGURE as SWEEP_FIGURE
+from experiments.campaigns.sweep_report import TABLE, quantile_options, sweep_report
+from experiments.common.errors import InputError
+from experiments.common.output import Output, output, to_json
+from experiments.common.screen import figure_files, number, say, table_console
+from experiments.interception.scenario_file import scenario_to_toml
+from sim.storage import CampaignFolder, need_arrow
+
+FIGURES = ("figure-distributions", "figure-convergence", "figure-dispersion")
+
+Correlations = Mapping[str, Mapping[str, Mapping[str, float | None]]]
+
+
+def run(options: Report) -> None:
+    """Read the folder, write the files and print the tables."""
+    with campaign_errors():
+        need_arrow()
+        folder = _read(options)
+        swept = bool(folder.manifest.axes)
+        figures = [*figure_files(SWEEP_FIGURE), TABLE] if swept else figure_files(*FIGURES)
+        with output(
+            folder=options.out,
+            names=[*figures, "report.json", SCENARIO_FILE],
+            files={"--json": options.json},
+            overwrite=options.overwrite,
+            quiet=options.quiet,
+        ) as written:
+            console = None if options.quiet else table_console(written.stdout_taken)
+            (_report_sweep if swept else _report_campaign)(folder, options, written, console)
+            written.save(SCENARIO_FILE, scenario_to_toml(folder.manifest.scenario))
+
+
+def _read(options: Report) -> CampaignFolder:
+    path = options.folder
+    if not path.is_dir():
+        raise InputError(f"{path}: there is no such folder; name the folder of infoset campaign or infoset sweep")
+    folder = CampaignFolder.read(path)
+    for damage in folder.damaged:
+        say(f"warning: {damage.file}: {damage.reason}; left out, fly it again with --resume", options.quiet)
+    if not folder.finished_runs:
+        raise InputError(f"{path}: contains no runs yet; continue with: infoset {folder.manifest.kind} --resume")
+    if not folder.complete:
+        say(
+            f"warning: {folder.finished_runs} of {folder.wanted_runs} runs are stored; the others are missing",
+            options.quiet,
+        )
+    return folder
+
+
+def _report_sweep(folder: CampaignFolder, options: Report, written: Output, console: Console | None) -> None:
+    report = sweep_report(folder, quantile_options(options.require, options.show))
+    written.save("report.json", to_json(report.to_json()), "--json")
+    if options.out is not None:
+        report.save(written)
+    if console is not None:
+        report.show(console)
+
+
+def _report_campaign(folder: CampaignFolder, options: Report, written: Output, console: Console | None) -> None:
+    columns = _columns(folder)
+    found = samples(folder)
+    # The replay lines name the scenario's file in the folder, or the one that the report writes.
+    scenario_file = folder.path / SCENARIO_FILE
+    if options.out is not None and not scenario_file.is_file():
+        scenario_file = options.out / SCENARIO_FILE
+    worst = worst_runs(folder, scenario_file)
+    related = {column.noise: correlations(column) for column in columns}
+    report = {
+        **heading(folder),
+        "damaged": [{"file": damage.file.name, "reason": damage.reason} for damage in folder.damaged],
+        "samples": [sample_json(sample) for sample in found],
+        "correlation_with_miss": related,
+        "worst": [asdict(flown) for flown in worst],
+    }
+    written.save("report.json", to_json(report), "--json")
+    if options.out is not None:
+        for name, draw in zip(FIGURES, (draw_campaign_distributions, draw_convergence, draw_dispersion), strict=True):
+            written.figure(name, draw(columns))
+    if console is not None:
+        _show(console, folder, found, related, worst)
+
+
+def _columns(folder: CampaignFolder) -> list[CampaignColumns]:
+    """Return all rows, an entry for each noise that has some."""
+    scenario = folder.manifest.scenario
+    miss, impulse, guaranteed = (folder.numbers(name) for name in ("miss_m", "impulse_m_s", "guaranteed_miss_m"))
+    start = {name: folder.numbers(name).data for name in START}
+    columns = [
+        CampaignColumns(
+            noise,
+            scenario.range_sensor is not None,
+            miss.data[rows],
+            impulse.data[rows],
+            guaranteed[rows].compressed(),
+            {name: values[rows] for name, values in start.items()},
+            scenario.set_model.is_guaranteed,
+        )
+        for noise, rows in noise_flags(folder).items()
+    ]
+    return [column for column in columns if column.miss_m.size]
+
+
+def _show(
+    console: Console, folder: CampaignFolder, found: Sequence[Sample], related: Correlations, worst: Sequence[WorstRun]
+) -> None:
+    def line(text: str) -> None:
+        console.print(Text(text), soft_wrap=True)
+
+    manifest = folder.manifest
+    stopped = "" if manifest.stopped_after is None else f", stopped by {manifest.until}"
+    line(f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}; quantiles, 95 % intervals")
+    table, notes = samples_table(found, manifest.scenario.set_model.kind.value)
+    console.print(table)
+    for note in notes:
+        line(note)
+    console.print()
+    table = Table("correlation of the miss with", box=None, pad_edge=False)
+    for noise in related:
+        table.add_column(f"{noise}\nPearson", justify="right")
+        table.add_column("\nSpearman", justify="right")
+    for name in next(iter(related.values())):
+        values = [columns[name][kind] for columns in related.values() for kind in ("pearson", "spearman")]
+        table.add_row(name, *(("-" if value is None else f"{value:+.2f}") for value in values))
+    console.print(table)
+    console.print()
+    line("the worst runs:")
+    for flown in worst:
+        line(f"  {number(flown.miss_m)} m for {number(flown.impulse_m_s)} m/s, {flown.outcome}: {flown.replay}")
+    if not (folder.path / SCENARIO_FILE).is_file():
+        line(f"(there is no {SCENARIO_FILE} in the folder: with --out the report writes one)")

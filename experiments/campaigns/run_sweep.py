@@ -1,0 +1,69 @@
+"""`infoset sweep`: flight, table, figure and answers."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from experiments.campaigns.command import Sweep as Options
+from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, scenario_of
+from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
+from experiments.campaigns.sweep_report import quantile_options, sweep_report
+from experiments.common.errors import InputError
+from experiments.common.output import Output, output, to_json
+from experiments.common.screen import say, table_console
+from sim import CampaignNoise, Sweep
+from sim.storage import need_arrow, need_free
+
+ASK_FROM = 1_000_000
+"""Number of engagements from which a sweep is started only after a question."""
+
+
+def run(options: Options) -> None:
+    """Fly the sweep, write its table and figure, and print where the requirement is met."""
+    with (
+        campaign_errors(RESUME_HINT),
+        output(files={"--json": options.json}, overwrite=options.overwrite, quiet=options.quiet) as written,
+    ):
+        need_arrow()
+        quantiles = quantile_options(options.require, options.show)
+        scenario = scenario_of(options)
+        axes = sweep_axes(options.vary, scenario)
+        asked = Sweep(
+            scenario,
+            axes,
+            sweep_cells(scenario, axes),
+            options.runs,
+            options.out,
+            seed=options.seed,
+            noise=None if options.noise is None else CampaignNoise(options.noise),
+            guarantee=options.guarantee,
+            chunk=options.chunk,
+        )
+        need_free(options.out, resume=options.resume)
+        if not options.yes:
+            _ask(asked)
+        flown = fly(asked, options)
+        report = sweep_report(flown.result.folder, quantiles)
+        summary = to_json(report.to_json(flown.elapsed_s))
+        folder = Output(options.out, {}, overwrite=True)
+        report.save(folder)
+        folder.save("summary.json", summary)
+        written.written += [options.out / "shards", options.out / SCENARIO_FILE, *folder.written]
+        written.deliver("--json", summary)
+    if not options.quiet:
+        report.show(table_console(written.stdout_taken))
+        if not report.is_drawn:
+            say("a figure shows one or two keys; three keys and more are not drawn", options.quiet)
+
+
+def _ask(asked: Sweep) -> None:
+    """Ask before a long sweep; refuse it where stdin is no terminal."""
+    if asked.engagements <= ASK_FROM:
+        return
+    question = f"{len(asked.cells)} cells of {asked.runs} runs are {asked.engagements} engagements, more than a million"
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        raise InputError(f"{question}; give --yes to start the sweep, or fewer --runs or values")
+    if not typer.confirm(f"{question}. Continue?", err=True):
+        raise InputError("the sweep was not started; give fewer --runs or values")
