@@ -1,4 +1,4 @@
-"""The affine hull of points, and coordinates in it in which the set is about as wide in every direction."""
+"""The affine hull of points, and coordinates in it in which the set has about the same width in every direction."""
 
 from __future__ import annotations
 
@@ -10,18 +10,19 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 FLAT = 1e-9
-"""A set is flat across a direction where it is this much thinner than it is long."""
+"""Relative thickness below which a set is flat."""
 ROUNDING = 1e-13
-"""What rounding leaves of zero, relative to the size of the coordinates."""
+"""Rounding of zero, relative to the size of the coordinates."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Coordinates y = (x - centre) basis / extents of a flat of dimension d in R^n.
+    """Coordinates y = (x - centre) basis / extents of an affine subspace of dimension d in R^n.
 
     Parameters
     ----------
     centre : ndarray, shape (n,)
+        Mean of the points.
     basis : ndarray, shape (n, d)
         Orthonormal columns.
     extents : ndarray, shape (d,)
@@ -37,7 +38,7 @@ class Frame:
 
     @property
     def dimension(self) -> int:
-        """Dimension d of the flat."""
+        """Dimension d of the subspace."""
         return int(self.basis.shape[1])
 
     def inward(self, points: Floats) -> Floats:
@@ -56,18 +57,7 @@ class Frame:
 
 
 def frame_of(points: Floats, flat: float = FLAT) -> Frame:
-    """Find the affine hull of points.
-
-    Parameters
-    ----------
-    points : ndarray, shape (k, n)
-        At least one.
-    flat : float
-        How much thinner than long a set is that counts as flat.
-
-    Returns
-    -------
-    Frame
+    """Return the frame of the affine hull of points, shape (k, n), at least one.
 
     Notes
     -----
@@ -76,7 +66,7 @@ def frame_of(points: Floats, flat: float = FLAT) -> Frame:
     """
     centre = points.mean(axis=0)
     centred = points - centre
-    # Fewer points than coordinates: all right singular vectors are wanted, and only then are all left ones few.
+    # With fewer points than coordinates all right singular vectors are needed, and the left ones are few.
     directions = np.linalg.svd(centred, full_matrices=len(points) < points.shape[1])[2]
     extents = np.abs(centred @ directions.T).max(axis=0)
     least = max(flat * float(extents.max()), ROUNDING * float(np.abs(points).max(initial=0.0)))

@@ -1,4 +1,4 @@
-"""Which points lie on which planes, and which of both are essential."""
+"""Incidence of points and planes, and which of both are essential."""
 
 from __future__ import annotations
 
@@ -17,47 +17,46 @@ Flags = NDArray[np.bool_]
 Places = NDArray[np.int64]
 
 MERGE = 1e-10
-"""Points nearer than this to each other are one, in coordinates in which the set is about one wide."""
+"""Points nearer than this are one point, in coordinates in which the width of the set is about one."""
 _APART = 1e-9
-"""How far both representations of a set may be apart."""
+"""Greatest distance between both representations of a set."""
 _LEAST_ON, _MOST_ON = 1e-14, 1e-7
-"""How near to a plane a point is on it, in the same coordinates, lies between these."""
+"""Limits of the distance, in the same coordinates, below which a point is on a plane."""
 _OTHERWISE_ON = (1e-11, 1e-10, 1e-12, 1e-13, 1e-9, 1e-8)
 _LEAST_RANK = 1e-11
 _ENTRIES = 4_000_000
 
 
 def essential(points: Floats, normals: Floats, offsets: Floats) -> tuple[Floats, Floats, Floats]:
-    """Keep the points that are vertices and the planes that are facets of a full-dimensional polytope.
+    """Return the points that are vertices and the planes that are facets of a full-dimensional polytope, d >= 2.
 
     Parameters
     ----------
     points : ndarray, shape (k, d)
-        All vertices, and perhaps others of the polytope, in coordinates in which it is about one wide; d >= 2.
+        All vertices, and perhaps other points of the polytope, in coordinates in which its width is about one.
     normals : ndarray, shape (m, d)
+        Of all facets, and perhaps of other half-spaces that contain the polytope.
     offsets : ndarray, shape (m,)
-        All facets, and perhaps other half-spaces that hold the polytope.
+        Of the same.
 
     Returns
     -------
-    vertices : ndarray, shape (v, d)
-    normals : ndarray, shape (f, d)
-        Of unit length.
-    offsets : ndarray, shape (f,)
+    tuple of ndarray
+        Vertices, shape (v, d), and the normals, of unit length, and offsets of the facets.
 
     Raises
     ------
     UncertainHullError
-        If a point is outside, or what is left is no polytope: then rounding has the better of the set.
+        If a point is outside, or the result is no polytope, because of rounding.
 
     Notes
     -----
     A plane is a facet where the points on it span d - 1 dimensions and are not among those of another one. A point is
     a vertex where the planes through it have only that in common. O(k m d^2) and O(m^2 k) of matrix products.
 
-    The hull of the vertices is then made once more: it must hold all points, and each simplex of its surface must lie
-    in a facet. Distances of points from planes are of two kinds, rounding and real ones: the widest gap between them
-    tells which points are on which planes. Should that not agree with itself, fixed tolerances are tried.
+    The hull of the vertices is computed again as a check: it must contain all points, and each simplex of its surface
+    must lie in a facet. Distances of points from planes are either rounding or real: the widest gap among them
+    separates the two. Where that fails the check, fixed tolerances are tried.
     """
     lengths = np.linalg.norm(normals, axis=1)
     normals, offsets = normals / lengths[:, None], offsets / lengths
@@ -69,7 +68,7 @@ def essential(points: Floats, normals: Floats, offsets: Floats) -> tuple[Floats,
     kept = np.unique(labels, return_index=True)[1]
     points = points[kept]
     for near in (_widest_gap(gaps), *_OTHERWISE_ON):
-        # What is on a plane with one of the points that are one is on it.
+        # A merged point is on the planes of all its points.
         on = np.zeros((len(kept), len(normals)), dtype=bool)
         np.logical_or.at(on, labels, gaps <= near)
         try:
@@ -161,8 +160,8 @@ def _ranks(rows: Floats, groups: Flags, negligible: float) -> Places:
 def _batched(count: int, height: int, stack: Callable[[slice], Floats], negligible: float) -> Places:
     """Return the ranks of matrices that are made some at a time."""
     size = max(1, _ENTRIES // max(1, height))
-    found = [np.zeros(0, np.int64)]
+    ranks = [np.zeros(0, np.int64)]
     for start in range(0, count, size):
         values = np.linalg.svd(stack(slice(start, start + size)), compute_uv=False)
-        found.append((values > negligible * np.maximum(values[:, :1], 1e-300)).sum(axis=1))
-    return np.concatenate(found)
+        ranks.append((values > negligible * np.maximum(values[:, :1], 1e-300)).sum(axis=1))
+    return np.concatenate(ranks)

@@ -1,8 +1,6 @@
-"""Facets from vertices and vertices from facets, by Qhull, checked."""
+"""Facets from vertices and vertices from facets, by Qhull, with checks."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,18 +17,11 @@ Floats = NDArray[np.float64]
 _OPTIONS = ("Qt", "QJ Pp")
 _APART = 1e-9
 _ROUND = 30.0
-"""Sets this many times longer than thin are intersected again in coordinates in which they are round."""
+"""Sets this many times longer than thin are intersected again, in coordinates in which they are round."""
 
 
-@dataclass(frozen=True)
-class Description:
-    """Both representations: vertices; facets normals x <= offsets; the affine hull across x = level."""
-
-    vertices: Floats
-    normals: Floats
-    offsets: Floats
-    across: Floats
-    levels: Floats
+Description = tuple[Floats, Floats, Floats, Floats, Floats]
+"""Vertices; facets normals x <= offsets; the affine hull across x = levels: the fields of a `Polytope`."""
 
 
 def hull_of_points(points: Floats, flat: float = FLAT) -> Description:
@@ -48,17 +39,18 @@ def hull_of_points(points: Floats, flat: float = FLAT) -> Description:
 def intersection_of_halfspaces(
     normals: Floats, offsets: Floats, across: Floats, levels: Floats, *, bounded: bool = False
 ) -> Description:
-    """Return both representations of {x: normals x <= offsets, across x = levels}, which may be known to be bounded.
+    """Return both representations of {x: normals x <= offsets, across x = levels}.
 
     Raises
     ------
     EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
+        If it is empty, unbounded where it is not known to be bounded, or decided by rounding.
     """
-    found = relative_interior(normals, offsets, across, levels, bounded=bounded)
-    if not found.dimension:
-        return _single(found.point)
-    corners, sides, ends = _corners(found.rows, found.limits, found.centre)
-    return _lifted(found.point, found.basis, corners, sides, ends)
+    inside = relative_interior(normals, offsets, across, levels, bounded=bounded)
+    if not inside.dimension:
+        return _single(inside.point)
+    corners, sides, ends = _corners(inside.rows, inside.limits, inside.centre)
+    return _lifted(inside.point, inside.basis, corners, sides, ends)
 
 
 def _hull(inner: Floats) -> tuple[Floats, Floats, Floats]:
@@ -73,9 +65,9 @@ def _hull(inner: Floats) -> tuple[Floats, Floats, Floats]:
     failed = UncertainHullError("no hull was found")
     for options in _OPTIONS:
         try:
-            found = ConvexHull(inner, qhull_options=options)
-            planes = np.unique(found.equations.round(13), axis=0)
-            vertices, normals, offsets = essential(inner[found.vertices], planes[:, :-1], -planes[:, -1])
+            hull = ConvexHull(inner, qhull_options=options)
+            planes = np.unique(hull.equations.round(13), axis=0)
+            vertices, normals, offsets = essential(inner[hull.vertices], planes[:, :-1], -planes[:, -1])
         except QhullError as error:
             failed = UncertainHullError(f"rounding decides which of {len(inner)} points are vertices")
             failed.__cause__ = error
@@ -128,15 +120,15 @@ def _outward(frame: Frame, vertices: Floats, normals: Floats, offsets: Floats) -
         return _single(frame.centre)
     turned, moved = frame.rows_outward(normals, offsets)
     across = frame.across.T
-    return Description(frame.outward(vertices), turned, moved, across, across @ frame.centre)
+    return frame.outward(vertices), turned, moved, across, across @ frame.centre
 
 
 def _lifted(point: Floats, basis: Floats, corners: Floats, sides: Floats, ends: Floats) -> Description:
     turned = sides @ basis.T
     across = null_space(basis.T).T if basis.shape[1] < len(point) else np.zeros((0, len(point)))
-    return Description(point + corners @ basis.T, turned, ends + turned @ point, across, across @ point)
+    return point + corners @ basis.T, turned, ends + turned @ point, across, across @ point
 
 
 def _single(point: Floats) -> Description:
     size = len(point)
-    return Description(point[None, :], np.zeros((0, size)), np.zeros(0), np.eye(size), point.copy())
+    return point[None, :], np.zeros((0, size)), np.zeros(0), np.eye(size), point.copy()

@@ -1,4 +1,4 @@
-"""The affine hull of a set that half-spaces and equations describe, and a point deep inside it."""
+"""The affine hull of a set given by half-spaces and equations, and a point deep inside it."""
 
 from __future__ import annotations
 
@@ -25,17 +25,19 @@ class RelativeInterior:
     Parameters
     ----------
     point : ndarray, shape (n,)
+        Origin of the coordinates z.
     basis : ndarray, shape (n, d)
         Orthonormal columns.
     rows : ndarray, shape (k, d)
         Of unit length.
     limits : ndarray, shape (k,)
+        Of the rows.
     kept : ndarray of int, shape (k,)
-        Which half-space each row was; the others are always tight, or do not depend on z.
+        Index of each row's half-space; the others are always tight, or do not depend on z.
     centre : ndarray, shape (d,)
         The Chebyshev centre.
     radius : float
-        Of a largest ball inside.
+        Radius of a largest ball inside.
     """
 
     point: Floats
@@ -61,35 +63,30 @@ def relative_interior(
     bounded: bool = False,
     member: Floats | None = None,
 ) -> RelativeInterior:
-    """Find the affine hull of {x: normals x <= offsets, across x = levels}.
+    """Return the affine hull of {x: normals x <= offsets, across x = levels}.
 
     Parameters
     ----------
-    normals : ndarray, shape (m, n)
-    offsets : ndarray, shape (m,)
-    across : ndarray, shape (e, n)
-    levels : ndarray, shape (e,)
+    normals, offsets, across, levels : ndarray
+        Of shapes (m, n), (m,), (e, n) and (e,).
     bounded : bool
-        Whether the set is known to be bounded, which spares a linear program.
+        Whether the set is known to be bounded, which saves a linear program.
     member : ndarray, shape (n,), optional
-        A point that is known to be in the set: it stays in, whatever rounding says of its rows, and the set is not
-        empty.
-
-    Returns
-    -------
-    RelativeInterior
+        A point that is known to be in the set: the rows are relaxed by its rounding.
 
     Raises
     ------
     EmptyPolytopeError
-        If no point meets all.
+        If no point satisfies all rows.
     UnboundedPolytopeError
-        If the set goes on without end.
+        If the set is unbounded.
+    UncertainHullError
+        If a linear program was not solved.
 
     Notes
     -----
-    Equations hidden among the half-spaces show themselves by a largest ball of no radius; linear programs (HiGHS) then
-    tell which rows no point can leave. A set is flat where it is thinner than 1e-9 of its width.
+    Where a largest ball has no radius there are equations hidden among the half-spaces; linear programs (HiGHS) find
+    the rows that are always tight. A set is flat where it is thinner than 1e-9 of its width.
     """
     lengths = np.linalg.norm(normals, axis=1)
     long = lengths > ROUNDING * float(lengths.max(initial=0.0))
@@ -97,7 +94,7 @@ def relative_interior(
     if member is not None:
         size = max(size, float(np.abs(member).max(initial=0.0)))
         offsets = np.maximum(offsets, normals @ member)
-    # A row that is as long as what rounding leaves of nothing has no direction.
+    # A row whose length is rounding has no direction.
     void = np.flatnonzero(~long & (offsets < -ROUNDING * size))
     if len(void):
         raise EmptyPolytopeError(float(-offsets[void].min()), void)
@@ -132,58 +129,32 @@ def relative_interior(
 
 
 def chebyshev_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
-    """Return the centre and radius of a largest ball in {z: rows z <= limits}.
+    """Return the centre, shape (d,), and radius of a largest ball in {z: rows z <= limits}, rows of unit length.
 
-    Parameters
-    ----------
-    rows : ndarray, shape (k, d)
-        Of unit length.
-    limits : ndarray, shape (k,)
-
-    Returns
-    -------
-    centre : ndarray, shape (d,)
-    radius : float
-        Negative where the set is empty: by so much the rows must be relaxed.
+    The radius is negative where the set is empty: the rows must be relaxed by its size.
 
     Raises
     ------
     UncertainHullError
-        If the program was not solved: the set has balls of any size, for one.
-
-    Notes
-    -----
-    A linear program (HiGHS).
+        If the linear program (HiGHS) was not solved, for example because the set has balls of any size.
     """
     size = rows.shape[1]
     matrix = np.column_stack([rows, np.ones(len(rows))])
     cost = np.zeros(size + 1)
     cost[-1] = -1.0
-    found = linprog(cost, A_ub=matrix, b_ub=limits, bounds=(None, None), method="highs", options=HIGHS)
-    if found.status != 0:
+    optimum = linprog(cost, A_ub=matrix, b_ub=limits, bounds=(None, None), method="highs", options=HIGHS)
+    if optimum.status != 0:
         raise UncertainHullError("no largest ball inside was found")
-    return found.x[:-1], float(found.x[-1])
+    return optimum.x[:-1], float(optimum.x[-1])
 
 
 def solutions(across: Floats, levels: Floats) -> tuple[Floats, Floats]:
-    """Return all solutions of equations, which may depend on each other.
-
-    Parameters
-    ----------
-    across : ndarray, shape (e, n)
-    levels : ndarray, shape (e,)
-
-    Returns
-    -------
-    point : ndarray, shape (n,)
-        The solution of least norm.
-    basis : ndarray, shape (n, d)
-        An orthonormal basis of the directions they leave free.
+    """Return all solutions of equations, which may be dependent: the one of least norm, and a basis of the null space.
 
     Raises
     ------
     EmptyPolytopeError
-        If they contradict each other.
+        If the equations are inconsistent.
     """
     if not len(across):
         return np.zeros(across.shape[1]), np.eye(across.shape[1])
@@ -195,17 +166,7 @@ def solutions(across: Floats, levels: Floats) -> tuple[Floats, Floats]:
 
 
 def null_space_basis(across: Floats) -> Floats:
-    """Return an orthonormal basis of the directions that equations leave free, columns of shape (n, d).
-
-    Parameters
-    ----------
-    across : ndarray, shape (e, n)
-        They may depend on each other.
-
-    Returns
-    -------
-    ndarray, shape (n, d)
-    """
+    """Return an orthonormal basis of the null space of `across`, shape (e, n), as columns of shape (n, d)."""
     if not across.any():
         return np.eye(across.shape[1])
     return np.asarray(null_space(across, rcond=FLAT))
@@ -215,9 +176,9 @@ def _need_bounded(rows: Floats, basis: Floats) -> None:
     """Refuse a set with a direction of recession: rows d <= 0 without d = 0."""
     if np.linalg.matrix_rank(rows, tol=FLAT) < rows.shape[1]:
         raise UnboundedPolytopeError(basis @ null_space(rows, rcond=FLAT)[:, 0])
-    found = linprog(rows.sum(axis=0), A_ub=rows, b_ub=np.zeros(len(rows)), bounds=(-1.0, 1.0), method="highs")
-    if found.status == 0 and found.fun < -1e-6:
-        raise UnboundedPolytopeError(basis @ found.x / np.linalg.norm(found.x))
+    optimum = linprog(rows.sum(axis=0), A_ub=rows, b_ub=np.zeros(len(rows)), bounds=(-1.0, 1.0), method="highs")
+    if optimum.status == 0 and optimum.fun < -1e-6:
+        raise UnboundedPolytopeError(basis @ optimum.x / np.linalg.norm(optimum.x))
 
 
 def _always_tight(rows: Floats, limits: Floats, tolerance: float) -> Places:
@@ -230,7 +191,7 @@ def _always_tight(rows: Floats, limits: Floats, tolerance: float) -> Places:
         slack[left, np.arange(len(left))] = 1.0
         cost = np.concatenate([np.zeros(size), -np.ones(len(left))])
         bounds = [(None, None)] * size + [(0.0, 1.0)] * len(left)
-        found = linprog(
+        optimum = linprog(
             cost,
             A_ub=np.hstack([rows, slack]),
             b_ub=limits + tolerance,
@@ -238,9 +199,9 @@ def _always_tight(rows: Floats, limits: Floats, tolerance: float) -> Places:
             method="highs",
             options=HIGHS,
         )
-        if found.status != 0:
+        if optimum.status != 0:
             raise UncertainHullError("the affine hull was not found")
-        new = left[found.x[size:] > 30.0 * tolerance]
+        new = left[optimum.x[size:] > 30.0 * tolerance]
         if not len(new):
             return left
         loose[new] = True

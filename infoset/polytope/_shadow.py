@@ -1,4 +1,4 @@
-"""A polytope in few dimensions from its support function alone."""
+"""A polytope in few dimensions from its support vectors alone."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ _FLAT = 1e-7
 def shadow(
     furthest: Callable[[Floats], Floats], space: int, tolerance: float = 1e-9, most_facets: int = 10_000
 ) -> Polytope:
-    """Return the polytope whose support vectors are known: a projection of one that is known only by programs over it.
+    """Return a polytope from its support vectors: a projection of a set that is known only by programs over it.
 
     Parameters
     ----------
     furthest : callable
-        Takes a direction, shape (space,), and returns a point of the set furthest along it, shape (space,).
+        Returns a point of the set furthest along a direction, both of shape (space,).
     space : int
-        2 or 3; more works but grows fast.
+        2 or 3; more works but the cost grows fast.
     tolerance : float
-        By how much, relative to its size, a facet found may be short of the set.
+        Greatest relative distance by which a facet may be inside the set.
     most_facets : int
-        Where to give up.
+        Limit of the number of facets.
 
     Returns
     -------
@@ -43,11 +43,12 @@ def shadow(
 
     Notes
     -----
-    The hull of the points known is widened: each facet (and each direction across it, where it is flat) that the set
-    goes beyond gives a new point. It ends when none does, after a program a facet and a vertex: exact, for a polytope.
+    The hull of the points known is enlarged: each facet (and each direction across it, where it is flat) beyond which
+    the set extends gives a new point. It ends when none does, after a program a facet and a vertex: exact, for a
+    polytope.
     """
     unit = np.eye(space)
-    points = np.array([furthest(each) for each in np.vstack([unit, -unit])])
+    points = np.array([furthest(direction) for direction in np.vstack([unit, -unit])])
     known: set[tuple[float, ...]] = set()
     for _ in range(_MOST_ROUNDS):
         hull = Polytope.from_vertices(points, _FLAT)

@@ -1,4 +1,4 @@
-"""Why a polytope could not be made."""
+"""Errors of polytopes."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ Floats = NDArray[np.float64]
 
 
 class EmptyPolytopeError(ValueError):
-    """Constraints that no point meets.
+    """No point satisfies the constraints.
 
     Parameters
     ----------
     relaxation : float
-        By how much every constraint, its normal of unit length, must be relaxed until a point meets them all.
+        Least relaxation of every constraint, its normal of unit length, with which a point satisfies all.
     rows : ndarray of int, shape (k,)
-        Constraints that conflict, by their place; of no entries where that is not known.
+        Indices of constraints that conflict; empty where they are not known.
     """
 
     def __init__(self, relaxation: float, rows: NDArray[np.int64] | None = None) -> None:
@@ -26,19 +26,19 @@ class EmptyPolytopeError(ValueError):
 
 
 class UnboundedPolytopeError(ValueError):
-    """Constraints that leave a direction free.
+    """The constraints do not bound a set.
 
     Parameters
     ----------
     direction : ndarray, shape (n,)
-        A direction in which the set goes on without end, of unit length.
+        A direction in which the set is unbounded, of unit length.
     """
 
     def __init__(self, direction: Floats) -> None:
-        shown = ", ".join(f"{each:.3g}" for each in direction)
+        shown = ", ".join(f"{component:.3g}" for component in direction)
         super().__init__(f"the polytope is unbounded: it goes on without end along ({shown})")
         self.direction = direction
 
 
 class UncertainHullError(ArithmeticError):
-    """Facets and vertices that do not agree with each other: the set is beyond what floating point can tell."""
+    """Facets and vertices do not agree because of rounding."""

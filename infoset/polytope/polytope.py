@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import ConvexHull
 
 from infoset.polytope._frame import FLAT, frame_of
 from infoset.polytope._incidence import together
-from infoset.polytope._qhull import Description, hull_of_points, intersection_of_halfspaces
+from infoset.polytope._qhull import hull_of_points, intersection_of_halfspaces
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -19,10 +20,10 @@ _TOGETHER = 1e-7
 
 @dataclass(frozen=True)
 class Polytope:
-    """A convex polytope that holds at least a point; it may be flat, a segment or a point.
+    """A convex polytope that contains at least a point; it may be flat, a segment or a point.
 
-    Make one with `from_vertices` or `from_halfspaces`. Coordinates should be of one size: scale before, for a set that
-    is 1e9 times thinner than it is long counts as flat.
+    Make one with `from_vertices` or `from_halfspaces`. Coordinates should be of one size: scale them first, since a set
+    that is 1e9 times thinner than it is long counts as flat.
 
     Parameters
     ----------
@@ -31,7 +32,7 @@ class Polytope:
     normals : ndarray, shape (f, n)
         Outward, of unit length, in the directions of the affine hull.
     offsets : ndarray, shape (f,)
-        normals x <= offsets, a row a facet.
+        normals x <= offsets, one row for each facet.
     across : ndarray, shape (n - dimension, n)
         Orthonormal rows.
     levels : ndarray, shape (n - dimension,)
@@ -53,18 +54,14 @@ class Polytope:
         points : array_like, shape (k, n)
             At least one.
         flat : float
-            How much thinner than long a set is that counts as flat: more for points that are known to fewer digits.
-
-        Returns
-        -------
-        Polytope
+            Relative thickness below which a set counts as flat: greater for points that are known to fewer digits.
 
         Raises
         ------
         ValueError
             If there is no point, or one is not finite.
         UncertainHullError
-            If rounding has the better of the set.
+            If rounding decides which points are vertices.
 
         Notes
         -----
@@ -76,7 +73,7 @@ class Polytope:
             raise ValueError("the hull needs points as an array of shape (k, n), with k and n at least 1")
         if not np.isfinite(array).all():
             raise ValueError("the hull needs finite points")
-        return cls._of(hull_of_points(array, flat))
+        return cls(*hull_of_points(array, flat))
 
     @classmethod
     def from_halfspaces(
@@ -92,28 +89,23 @@ class Polytope:
 
         Parameters
         ----------
-        normals : array_like, shape (m, n)
-        offsets : array_like, shape (m,)
-        across : array_like, shape (k, n), optional
-            Equations, if there are any.
-        levels : array_like, shape (k,), optional
+        normals, offsets : array_like
+            Of shapes (m, n) and (m,).
+        across, levels : array_like, optional
+            Equations, of shapes (k, n) and (k,).
         bounded : bool
-            Whether the set is known to be bounded, which spares a linear program.
-
-        Returns
-        -------
-        Polytope
+            Whether the set is known to be bounded, which saves a linear program.
 
         Raises
         ------
         ValueError
             If shapes do not fit, or a number is not finite.
         EmptyPolytopeError
-            If no point meets all; it says by how much the half-spaces must be relaxed.
+            If no point satisfies all; it holds the least relaxation of the half-spaces.
         UnboundedPolytopeError
-            If the set goes on without end; it says along what.
+            If the set is unbounded; it holds a direction.
         UncertainHullError
-            If rounding has the better of the set.
+            If rounding decides which points are vertices.
 
         Notes
         -----
@@ -127,22 +119,13 @@ class Polytope:
         heights = np.zeros(0) if levels is None else np.asarray(levels, dtype=float)
         if flat.ndim != 2 or flat.shape[1] != rows.shape[1] or heights.shape != (len(flat),):
             raise ValueError("equations need rows of shape (k, n) and levels of shape (k,)")
-        if not all(np.isfinite(each).all() for each in (rows, limits, flat, heights)):
+        if not all(np.isfinite(array).all() for array in (rows, limits, flat, heights)):
             raise ValueError("half-spaces and equations need finite numbers")
-        return cls._of(intersection_of_halfspaces(rows, limits, flat, heights, bounded=bounded))
+        return cls(*intersection_of_halfspaces(rows, limits, flat, heights, bounded=bounded))
 
     @classmethod
     def box(cls, lower: ArrayLike, upper: ArrayLike) -> Polytope:
-        """Return {x: lower <= x <= upper}.
-
-        Parameters
-        ----------
-        lower, upper : array_like, shape (n,)
-
-        Returns
-        -------
-        Polytope
-            Flat across the axes along which both are equal.
+        """Return {x: lower <= x <= upper}, flat across the axes along which `lower` and `upper`, shape (n,), are equal.
 
         Raises
         ------
@@ -156,10 +139,6 @@ class Polytope:
             )
         unit = np.eye(len(least))
         return cls.from_halfspaces(np.vstack([unit, -unit]), np.concatenate([most, -least]), bounded=True)
-
-    @classmethod
-    def _of(cls, found: Description) -> Polytope:
-        return cls(found.vertices, found.normals, found.offsets, found.across, found.levels)
 
     @property
     def space(self) -> int:
@@ -177,74 +156,29 @@ class Polytope:
         return self.vertices.min(axis=0), self.vertices.max(axis=0)
 
     def essential_vertices(self) -> int:
-        """Return the number of vertices, those that lie within 1e-7 in every coordinate counted once.
-
-        Returns
-        -------
-        int
-        """
+        """Return the number of vertices; those within 1e-7 of each other in every coordinate count once."""
         return int(together(self.vertices, _TOGETHER).max()) + 1
 
     def support(self, directions: ArrayLike) -> Floats:
-        """Return the support function: the maximum of direction . x over the set.
-
-        Parameters
-        ----------
-        directions : array_like, shape (..., n)
-
-        Returns
-        -------
-        ndarray, shape (...)
-
-        Notes
-        -----
-        O(v n) a direction.
-        """
+        """Return the maximum of direction . x over the set, shape (...), for `directions` of shape (..., n)."""
         return np.asarray((np.asarray(directions, dtype=float) @ self.vertices.T).max(axis=-1))
 
     def support_vector(self, direction: ArrayLike) -> Floats:
-        """Return a vertex that is furthest along a direction.
-
-        Parameters
-        ----------
-        direction : array_like, shape (n,)
-
-        Returns
-        -------
-        ndarray, shape (n,)
-        """
+        """Return a vertex furthest along a `direction`, both of shape (n,)."""
         return np.asarray(self.vertices[int((self.vertices @ np.asarray(direction, dtype=float)).argmax())])
 
     def excess(self, points: ArrayLike) -> Floats:
-        """Return how far points are outside: the greatest distance beyond a facet, or from the affine hull.
+        """Return the greatest distance of `points`, shape (..., n), beyond a facet or from the affine hull.
 
-        Parameters
-        ----------
-        points : array_like, shape (..., n)
-
-        Returns
-        -------
-        ndarray, shape (...)
-            At most 0 inside.
+        It has shape (...), and is at most 0 inside.
         """
-        given = np.asarray(points, dtype=float)
-        beyond = (given @ self.normals.T - self.offsets).max(axis=-1, initial=-np.inf)
-        away = np.abs(given @ self.across.T - self.levels).max(axis=-1, initial=-np.inf)
+        x = np.asarray(points, dtype=float)
+        beyond = (x @ self.normals.T - self.offsets).max(axis=-1, initial=-np.inf)
+        away = np.abs(x @ self.across.T - self.levels).max(axis=-1, initial=-np.inf)
         return np.asarray(np.maximum(beyond, away))
 
     def volume(self) -> float:
-        """Return the volume within the affine hull: of its dimension; 1 for a point.
-
-        Returns
-        -------
-        float
-
-        Notes
-        -----
-        Of Qhull's triangulation of the vertices.
-        """
-        from scipy.spatial import ConvexHull
-
+        """Return the volume within the affine hull, of its dimension; 1 for a point."""
         frame = frame_of(self.vertices)
         scale = float(np.prod(frame.extents))
         if frame.dimension < 2:

@@ -30,20 +30,18 @@ class Lifted:
 
     Parameters
     ----------
-    free : ndarray, shape (T + 1, n)
-    response : ndarray, shape (T + 1, n, p)
-        x(t) = free[t] + response[t] v.
-    control_free : ndarray, shape (T m,)
-    control_response : ndarray, shape (T m, p)
-        The same for all controls, those of the first period first.
-    rows : ndarray, shape (r, p)
-    limits : ndarray, shape (r,)
+    free, response : ndarray
+        x(t) = free[t] + response[t] v, of shapes (T + 1, n) and (T + 1, n, p).
+    control_free, control_response : ndarray
+        The same for all controls, those of the first period first, of shapes (T m,) and (T m, p).
+    rows, limits : ndarray
+        Inequalities, of shapes (r, p) and (r,).
     moments : ndarray of int, shape (r,)
         Time that each row refers to; -1 for a bound on a control.
     labels : ndarray of int, shape (r,)
         Index of the block's constraint in each row; -1 for a bound on a control.
-    equal : ndarray, shape (e, p)
-    levels : ndarray, shape (e,)
+    equal, levels : ndarray
+        Equations, of shapes (e, p) and (e,).
     ball : int
         Number m of controls a period where their norm is bounded; 0 for a box, whose bounds are among the rows.
     """

@@ -64,6 +64,7 @@ class BlockOptimum:
     Parameters
     ----------
     block : Block
+        The block, relaxed by rounding where needed.
     lifted : Lifted
         All admissible controls.
     terminal : ndarray, shape (n,)
@@ -174,6 +175,7 @@ class LeastNorm:
     Parameters
     ----------
     point : ndarray, shape (p,)
+        The controls, divided by their bounds.
     value : float
         The norm; exactly zero where it is below rounding.
     bound : float

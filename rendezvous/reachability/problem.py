@@ -265,16 +265,14 @@ class Block:
         Their indices in the problem.
     scale : ndarray, shape (n,)
         Bounds on the states, in their own units.
-    transition, control, initial
+    transition, control, initial, between
         As in the problem, scaled.
-    normals : ndarray, shape (k, n)
-        All constraints on states, the bounds first; of unit length.
-    offsets : ndarray, shape (T + 1, k)
+    normals, offsets : ndarray
+        All constraints on states, the bounds first, of shapes (k, n) and (T + 1, k); normals of unit length.
     names : tuple of str
         Names of these k constraints.
     ball : bool
         Whether |u(t)| <= 1 in the Euclidean norm; otherwise of each component.
-    between : ndarray, shape (T, s, n, n + m) or None
     """
 
     states: Places

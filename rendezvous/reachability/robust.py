@@ -33,7 +33,9 @@ class FeedbackPlan:
     disturbance : ndarray, shape (T, n, q)
         x(t + 1) = A x + B u + disturbance[t] w(t), |w_k(t)| <= 1, in the units of the states.
     nominal : ndarray, shape (T, m)
+        Controls without disturbance, in units of the problem.
     gains : ndarray, shape (T, T, m, q)
+        Change of the controls by past disturbances, in units of the problem.
     lower, upper : ndarray, shape (T + 1, n)
         Bounds of each state over all disturbances: the robust tube.
     """
