@@ -27,7 +27,7 @@ _MARKER = re.compile(r"\{\{(\w+)\}\}")
 _ESCAPES = str.maketrans({"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"})
 
 
-def page(title: str, scripts: Sequence[str], data: Mapping[str, object]) -> str:
+def page(title: str, scripts: Sequence[str], data: Mapping[str, object], own_script: str | None = None) -> str:
     """Return a page as HTML.
 
     Parameters
@@ -35,14 +35,13 @@ def page(title: str, scripts: Sequence[str], data: Mapping[str, object]) -> str:
     title : str
         Of the window; any text.
     scripts : sequence of str
-        Names of the page's own scripts, after the common blocks.
+        Names of scripts of the folder `assets`, after the common blocks.
     data : mapping
         What the scripts draw, as in `experiments.common.output.to_json`. The keys ``heading`` and
         ``about`` (a list of lines) stand at the top of the page.
 
-    Returns
-    -------
-    str
+    own_script : str, optional
+        Text of a script of this page only.
 
     Raises
     ------
@@ -50,7 +49,7 @@ def page(title: str, scripts: Sequence[str], data: Mapping[str, object]) -> str:
         If a number is not finite.
     """
     style = asset("page.css")
-    programs = [asset(name) for name in (*BLOCKS, *scripts)]
+    programs = [asset(name) for name in (*BLOCKS, *scripts)] + ([] if own_script is None else [own_script])
     parts = {
         "title": html.escape(title),
         "version": html.escape(library_version()),

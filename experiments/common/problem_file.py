@@ -106,6 +106,16 @@ def problem_hash(tables: Tables) -> str:
     return hashlib.sha256(json.dumps(values, sort_keys=True, default=_plain).encode()).hexdigest()[:16]
 
 
+def duplicate_names(known: Known, table: str, count: int) -> Iterator[Problem]:
+    """Yield a problem for each name that occurs twice in the first ``count`` tables of an array of tables."""
+    numbers: dict[object, int] = {}
+    for index in range(count):
+        name = known.value(table, str(index), "name")
+        first = numbers.setdefault(name, index + 1)
+        if isinstance(name, str) and first <= index:
+            yield Problem((table, str(index), "name"), f'"{name}" is also the name of {table} #{first}', "rename one")
+
+
 def _plain(value: object) -> str:
     if isinstance(value, Enum):
         return str(value.value)

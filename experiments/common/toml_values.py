@@ -280,6 +280,10 @@ Name = Annotated[str, PlainValidator(Line(LONGEST_NAME, empty=False, forbidden='
 Description = Annotated[str, PlainValidator(Line(LONGEST_DESCRIPTION, empty=True))]
 
 
+Constant = Annotated[Any, PlainValidator(lambda value: value)]
+"""A value that `experiments.common.toml_file.read_tables` checks: ``schema`` and ``kind``."""
+
+
 class Table(BaseModel):
     """A table of a file: no keys but its own."""
 

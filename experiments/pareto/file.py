@@ -1,4 +1,4 @@
-"""Problem files of kind `pareto-encounter`: their tables, and the encounter of the core that they describe."""
+"""Problem files of kind `pareto-encounter`: tables, checks, and the encounter in SI."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from pydantic import Field, PlainValidator
 
 from experiments.common.errors import InputError
 from experiments.common.orbit_angle import angle_problems
-from experiments.common.problem_file import problem_form, problem_hash
+from experiments.common.problem_file import duplicate_names, problem_form, problem_hash
 from experiments.common.toml_file import Known, Problem, load_tables
 from experiments.common.toml_values import (
     NUMBER,
     ZERO,
+    Constant,
     Description,
     Name,
     NotNegative,
@@ -37,7 +38,7 @@ Floats = NDArray[np.float64]
 
 KIND = "pareto-encounter"
 MOST_CRAFT = 50
-COMPONENTS = {each.name.lower(): each for each in Component}
+COMPONENTS = {component.name.lower(): component for component in Component}
 TERMINAL = {name: f"{name}_m" if component.value < 3 else f"{name}_m_s" for name, component in COMPONENTS.items()}
 
 Number = Annotated[Decimal, PlainValidator(NUMBER)]
@@ -47,15 +48,15 @@ def _free(value: object) -> tuple[Component, ...]:
     if not isinstance(value, list):
         raise wrong("must be an array of names")
     if not value:
-        raise wrong("frees no component", 'free at least one, for example free = ["y", "z"]')
-    names = [known_name(each, tuple(COMPONENTS)) for each in value]
+        raise wrong("has no component", 'name at least one, for example free = ["y", "z"]')
+    names = [known_name(name, tuple(COMPONENTS)) for name in value]
     if len(set(names)) < len(names):
         raise wrong("names a component twice", "name each once")
     return tuple(COMPONENTS[name] for name in names)
 
 
 class TerminalTable(Table):
-    """What the meeting's fixed components are."""
+    """[terminal]: the fixed components of the meeting."""
 
     x_m: Number = key("against the motion", "0.0", default=ZERO)
     y_m: Number = key("radially outward", "0.0", default=ZERO)
@@ -68,68 +69,57 @@ class TerminalTable(Table):
 class CraftTable(Table):
     """[[craft]]."""
 
-    name: Name = key("what the craft is called", '"first"')
+    name: Name = key("name of the craft", '"first"')
     position_m: Vector = key("x against the motion, y outward, z along the normal", "[0.0, 60.0, 80.0]")
-    velocity_m_s: Vector = key("of the same", "[-1.2, -4.1, 0.04]")
-    weight: NotNegative = key("of its excess in the group's loss", "1.0", default=Decimal(1))
-    start_s: NotNegative = key("when it starts", "0.0", default=ZERO)
+    velocity_m_s: Vector = key("velocity in the same axes", "[-1.2, -4.1, 0.04]")
+    weight: NotNegative = key("weight of its excess in the group loss", "1.0", default=Decimal(1))
+    start_s: NotNegative = key("start time", "0.0", default=ZERO)
 
 
 class ParetoTables(Table):
-    """A whole problem."""
+    """A problem file of kind `pareto-encounter`."""
 
-    schema_number: Annotated[int, PlainValidator(lambda value: value)] = key(
-        "version of this form of file", "1", alias="schema", default=1
-    )
-    kind: Annotated[str, PlainValidator(lambda value: value)] = key("what kind of problem it is", f'"{KIND}"')
-    name: Name = key("what results are called", '"my-encounter"', default="encounter")
-    description: Description = key("a line for `infoset problems list`", '"Who meets whom"', default="")
+    schema_number: Constant = key("version of this file format", "1", alias="schema", default=1)
+    kind: Constant = key("kind of problem", f'"{KIND}"')
+    name: Name = key("name of the results", '"my-encounter"', default="encounter")
+    description: Description = key("one line for `infoset problems list`", '"Who meets whom"', default="")
     orbit_rate_rad_s: Positive = key("mean motion of the circular reference orbit", "1.176e-3")
     duration_s: Positive = key("from t = 0 to the meeting", "30.0")
     free: Annotated[tuple[Component, ...], PlainValidator(_free)] = key(
-        "open components of the meeting's state, of x, y, z, vx, vy, vz", '["y", "z"]'
+        "free components of the meeting, of x, y, z, vx, vy, vz", '["y", "z"]'
     )
     meet: Annotated[Meeting, PlainValidator(OneOf(Meeting))] = key(
-        '"rendezvous", or "intercept": at one position with velocities of their own',
+        '"rendezvous", or "intercept" (the same position, any velocities)',
         '"rendezvous"',
         default=Meeting.RENDEZVOUS,
     )
     greatest_control_m_s2: Positive | None = key("bound on each craft's control", "1.0", default=None)
-    terminal: TerminalTable = key("fixed components of the meeting's state", "", default=TerminalTable())
+    terminal: TerminalTable = key("fixed components of the meeting", "", default=TerminalTable())
     craft: Annotated[list[CraftTable], Field(min_length=1, max_length=MOST_CRAFT)] = key("the craft", "")
 
 
 def _checks(known: Known) -> Iterator[Problem]:
-    """What the values must be to one another."""
-    free, given = known.value("free"), known.value("terminal")
-    if isinstance(free, list):
-        if known.value("meet") == Meeting.INTERCEPT.value:
-            for name in (each for each in free if str(each).startswith("v")):
-                yield Problem(
-                    ("free",), f"frees {name}, but velocities of an intercept are free anyway", "free x, y, z"
-                )
-        for name in (each for each in free if isinstance(given, dict) and TERMINAL.get(str(each)) in given):
+    """Check the values against each other."""
+    free, terminal, craft = known.value("free"), known.value("terminal"), known.value("craft")
+    for name in free if isinstance(free, list) else ():
+        if known.value("meet") == Meeting.INTERCEPT.value and str(name).startswith("v"):
+            yield Problem(("free",), f"lists {name}, but the velocities of an intercept are always free", "remove it")
+        if isinstance(terminal, dict) and TERMINAL.get(str(name)) in terminal:
             where = ("terminal", TERMINAL[str(name)])
-            yield Problem(where, f"fixes {name}, which free = [...] leaves open", "remove it, or do not free it")
-    craft = known.value("craft")
+            yield Problem(where, f"fixes {name}, which free = [...] lists as free", "remove one of the two")
     count = len(craft) if isinstance(craft, list) else 0
-    seen: set[object] = set()
-    for place in range(count):
-        name = known.value("craft", str(place), "name")
-        if isinstance(name, str) and name in seen:
-            yield Problem(("craft", str(place), "name"), f'calls a second craft "{name}"', "give each its own name")
-        seen.add(name if isinstance(name, str) else None)
-    weights = [known.value("craft", str(each), "weight") for each in range(count)]
-    if count and all(isinstance(each, int | Decimal) and each == 0 for each in weights):
+    yield from duplicate_names(known, "craft", count)
+    weights = [known.value("craft", str(index), "weight") for index in range(count)]
+    if count and all(isinstance(weight, int | Decimal) and weight == 0 for weight in weights):
         yield Problem(("craft", "0", "weight"), "is zero, and so are all others", "give one craft a positive weight")
     duration, rate = known.number("duration_s"), known.number("orbit_rate_rad_s")
     if duration is None or duration <= 0:
         return
     yield from angle_problems(("duration_s",), duration, rate)
-    for place in range(count):
-        start = known.number("craft", str(place), "start_s")
+    for index in range(count):
+        path = ("craft", str(index), "start_s")
+        start = known.number(*path)
         if start is not None and start >= duration:
-            path = ("craft", str(place), "start_s")
             yield Problem(path, f"must be before the meeting at {duration} s, found {start}", "start it earlier")
 
 
@@ -138,18 +128,7 @@ FORM = problem_form(KIND, ParetoTables, _checks)
 
 @dataclass(frozen=True, eq=False)
 class ParetoProblem:
-    """A problem as read.
-
-    Parameters
-    ----------
-    name : str
-    source : str
-        What it was read from.
-    hash : str
-        Of every value but name and description.
-    encounter : Encounter
-    greatest_control_m_s2 : float or None
-    """
+    """A problem as read; the source is the name of its file for messages."""
 
     name: str
     source: str
@@ -161,14 +140,6 @@ class ParetoProblem:
 def load_pareto(name_or_path: str) -> ParetoProblem:
     """Read a built-in problem or a file.
 
-    Parameters
-    ----------
-    name_or_path : str
-
-    Returns
-    -------
-    ParetoProblem
-
     Raises
     ------
     InputError
@@ -178,13 +149,13 @@ def load_pareto(name_or_path: str) -> ParetoProblem:
     motion = ClohessyWiltshire(si(tables.orbit_rate_rad_s), ORBITAL)
     craft = tuple(
         Craft(
-            each.name,
-            np.array([si(value) for value in (*each.position_m, *each.velocity_m_s)]),
+            table.name,
+            np.array([si(value) for value in (*table.position_m, *table.velocity_m_s)]),
             motion,
-            si(each.weight),
-            si(each.start_s),
+            si(table.weight),
+            si(table.start_s),
         )
-        for each in tables.craft
+        for table in tables.craft
     )
     fixed = np.array([si(getattr(tables.terminal, TERMINAL[name])) for name in COMPONENTS])
     try:

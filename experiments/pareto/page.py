@@ -1,8 +1,9 @@
-"""The page of an encounter: drag the meeting, and see what it costs each craft and the group."""
+"""Page of an encounter: the user drags the meeting, and costs and trajectories follow."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,78 +20,67 @@ _SET_POINTS = 600
 
 
 def pareto_page(name: str, solution: EncounterSolution, selections: Mapping[str, Floats]) -> str:
-    """Return the page of an encounter.
+    """Return the page of an encounter as HTML.
 
     Parameters
     ----------
     name : str
-        Of the problem.
+        Name of the problem.
     solution : EncounterSolution
     selections : mapping of str to ndarray, shape (f,)
-        Meetings chosen in several ways.
-
-    Returns
-    -------
-    str
-        HTML.
+        Pareto-optimal meetings by the rule of their choice.
     """
     encounter = solution.encounter
-    free = [each.name.lower() for each in encounter.free]
-    starts = [each.start_s for each in encounter.craft]
-    time_s = np.linspace(min(starts), encounter.meeting_s, MOMENTS)
-    flights = [_affine(solution, index, time_s) for index in range(len(solution.costs))]
-    unit = length_unit(max(float(np.abs(base + slope @ solution.point).max()) for base, slope in flights))
+    free = [component.name.lower() for component in encounter.free]
+    time_s = np.linspace(min(craft.start_s for craft in encounter.craft), encounter.meeting_s, MOMENTS)
+    paths = [_affine(solution, index, time_s) for index in range(len(solution.costs))]
     tracks = [
         Track(cost.craft.name, look, base + slope @ solution.point)
-        for look, (cost, (base, slope)) in enumerate(zip(solution.costs, flights, strict=True))
+        for look, (cost, (base, slope)) in enumerate(zip(solution.costs, paths, strict=True))
     ]
+    unit = length_unit(max(float(np.abs(track.points).max()) for track in tracks))
     meeting = Mark("meeting", solution.meeting_state()[:3], "diamond")
-    axes = ("x against the motion", "y outward", "z normal")
+    axes = ("x (against the motion)", "y (outward)", "z (normal)")
     views = [
-        View("Flights to the meeting", axes, unit, tracks, [meeting], equal=False),
-        View("Seen along the orbit's normal", axes, unit, tracks, [meeting], plane=(0, 1), equal=False),
+        View("Trajectories to the meeting", axes, unit, tracks, [meeting], equal=False),
+        View("Seen along the orbit normal", axes, unit, tracks, [meeting], plane=(0, 1), equal=False),
     ]
     hull = solution.same_matrix and len(free) == 2
-    weights = simplex_weights(len(tracks), _SET_POINTS)
-    heading = f"Encounter {name}"
     about = [
-        f"{len(tracks)} craft, {encounter.meeting.value} at {encounter.meeting_s:g} s; free: {', '.join(free)}",
-        "Drag the meeting, or type it, and see what it costs each craft and the group.",
+        f"{len(tracks)} craft, {encounter.meeting.value} at {encounter.meeting_s:g} s; "
+        f"free components: {', '.join(free)}",
+        "Drag the meeting, or type its components, to see the costs of the craft and the group loss.",
     ]
-    return page(
-        heading,
-        ["motion.js", "pareto.js"],
-        {
-            **motion_data(heading, about, time_s, views, ()),
-            "free": [{"name": each, "unit": "m" if each in "xyz" else "m/s"} for each in free],
-            "point": solution.point.tolist(),
-            "craft": [
-                {
-                    "name": cost.craft.name,
-                    "weight": cost.craft.weight,
-                    "ideal": cost.ideal.tolist(),
-                    "ideal_cost_squared": cost.ideal_cost_squared,
-                    "root": cost.root.tolist(),
-                    "path_base_m": base.tolist(),
-                    "path_slope": slope.tolist(),
-                }
-                for cost, (base, slope) in zip(solution.costs, flights, strict=True)
-            ],
-            "meeting_base_m": encounter.base[:3].tolist(),
-            "opening": encounter.opening[:3].tolist(),
-            "selections": [
-                {"name": each.replace("_", " "), "point": np.asarray(point).tolist()}
-                for each, point in selections.items()
-            ],
-            # With one M for all craft the Pareto set is the hull of the ideals; else it is curved, and shown by points.
-            "pareto_hull": faces_of(solution.ideals)[0].tolist() if hull else None,
-            "pareto_points": [] if hull else pareto_set(solution, weights).points.tolist(),
-        },
-    )
+    heading = f"Encounter {name}"
+    data = {
+        **motion_data(heading, about, time_s, views, ()),
+        "free": [{"name": name, "unit": "m" if len(name) == 1 else "m/s"} for name in free],
+        "point": solution.point,
+        "craft": [
+            {
+                "name": cost.craft.name,
+                "weight": cost.craft.weight,
+                "ideal": cost.ideal,
+                "ideal_cost_squared": cost.ideal_cost_squared,
+                "root": cost.root,
+                "path_base_m": base,
+                "path_slope": slope,
+            }
+            for cost, (base, slope) in zip(solution.costs, paths, strict=True)
+        ],
+        "meeting_base_m": encounter.base[:3],
+        "opening": encounter.opening[:3],
+        "selections": [{"name": rule.replace("_", " "), "point": point} for rule, point in selections.items()],
+        # If all craft have the same M, the Pareto set is the convex hull of the ideals; else it is shown as points.
+        "pareto_hull": faces_of(solution.ideals)[0] if hull else None,
+        "pareto_points": [] if hull else pareto_set(solution, simplex_weights(len(tracks), _SET_POINTS)).points,
+    }
+    script = (resources.files("experiments.pareto") / "page.js").read_text(encoding="utf-8")
+    return page(heading, ["motion.js"], data, script)
 
 
 def _affine(solution: EncounterSolution, index: int, time_s: Floats) -> tuple[Floats, Floats]:
-    """A craft's path as base + slope p at times, before its start where it starts: shapes (n, 3) and (n, 3, f)."""
+    """Return the path of a craft as base + slope p, with shapes (n, 3) and (n, 3, f); it waits until it starts."""
     times = np.maximum(time_s, solution.costs[index].craft.start_s)
     size = len(solution.point)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,31 +27,31 @@ PAPER = "pareto"
 TITLE = "Barseghyan and Stepanyan (2008), encounter of three craft"
 PROBLEM = "pareto-2008"
 RATE_RAD_S = 0.00117689
-"""What the paper computed with, below its controls; its text says 0.001176."""
+"""The rate used in the paper, printed below its controls; its text says 0.001176."""
 REMARKS = (
-    "The numbers follow from the rate 0.00117689 rad/s, which stands below the controls; the text says 0.001176.",
-    "They follow from start velocities of more digits than the four decimals that are printed: nine numbers, within "
-    "that rounding, found here by least squares from the laws of motion, (3.1) and the table. With the printed ones "
-    "all agree to about five digits.",
-    "A number is taken as cut off or rounded: the paper does both.",
-    "A has +-2 w where +-2 w^2 is printed, and H = Phi B, not B Phi.",
+    "The numbers follow from the rate 0.00117689 rad/s, printed below the controls; the text says 0.001176.",
+    "They follow from start velocities with more digits than the four decimals printed. The nine velocities used here "
+    "lie within that rounding and are found by least squares from the laws of motion, (3.1) and the table. With the "
+    "printed velocities all numbers agree to about five digits.",
+    "Each number may be truncated or rounded: the paper does both.",
+    "A contains +-2 w where +-2 w^2 is printed, and H = Phi B, not B Phi.",
     "(2.3): q11 = (14 theta + 3 theta^3 + 24 theta cos theta - 32 sin theta - 3 sin 2 theta) / w^3 and q44 = (10 theta "
     "- 3 sin 2 theta) / (4 w). (2.4), C1: the last bracket has +2 x2 sin theta.",
-    "x_5 of the second and third: the last term before sin has lost its t. The terms in t cos 2 lambda t, of 1e-11, "
-    "are rounding: no such terms exist.",
+    "x_5 of the second and third: the last term before sin lacks the factor t. The terms in t cos 2 lambda t, of "
+    "1e-11, are rounding errors: there are no such terms.",
 )
 _ROUNDED = Reference(PAPER)
 _REFERENCE = Reference(PAPER, CUT_OR_ROUNDED)
 _CRAFT = ("first", "second", "third")
-_SQUARES = "printed as J; it is J^2, a square root of (3.1) was left out"
-_ZERO = "rounding left in the paper's arithmetic: the meeting has x = 0 by definition"
-_LOST_DIGITS = "the last digits are lost: x_3(0) = 60 is this less 8.73290425e7"
+_SQUARES = "printed as J but equal to J^2: the square root in (3.1) is missing"
+_ZERO = "rounding error of the paper: the meeting has x = 0 by definition"
+_LOST_DIGITS = "the last digits are missing: x_3(0) = 60 is this number minus 8.73290425e7"
 
 _OFF, _MOST_OFF = ("21.929144", "4.514890997e8", "-4.514890597e8"), 2.0
 _LAST_DIGITS = (
-    "off by 1 to 2 of the last of eight or ten digits. Tried: start velocities for the least greatest miss (1.1 units "
-    "then, in twelve numbers), without (3.1) (6 units there); so the paper's arithmetic, or a digit beyond those of "
-    "its rate"
+    "differs by 1 to 2 units of the last of eight or ten digits. Tried: start velocities of the smallest largest "
+    "difference (1.1 units then, in twelve numbers), and without (3.1) (6 units there); so the cause is the paper's "
+    "arithmetic, or a further digit of its rate"
 )
 _VELOCITIES = (
     ("-1.2328", "-4.1115", "0.0369"),
@@ -178,17 +178,7 @@ _STEPS = 2
 
 
 def reproduce(progress: Progress) -> Reproduction:
-    """Compute the numbers.
-
-    Parameters
-    ----------
-    progress : callable
-        Told the fraction done.
-
-    Returns
-    -------
-    Reproduction
-    """
+    """Compute the numbers."""
     problem = load_pareto(PROBLEM)
     starts = _identified(problem.encounter, progress)
     numbers = (*_starts(starts), *_results(_solved(problem.encounter, starts)))
@@ -207,19 +197,18 @@ def _solved(encounter: Encounter, velocities: Floats) -> EncounterSolution:
 
 
 def _identified(encounter: Encounter, progress: Progress) -> Floats:
-    """Return the start velocities that the printed numbers follow from, by the method of Gauss and Newton.
+    """Return the start velocities that the printed numbers follow from, by the Gauss-Newton method.
 
     Notes
     -----
-    Each number weighs by its last digit. Laws and positions are linear in the velocities, (3.1) is nearly so: two
-    steps.
+    Each number has the weight of its last digit. Laws and positions are linear in the velocities and (3.1) is nearly
+    linear, so two steps suffice.
     """
 
     def misses(shift: Floats) -> Floats:
         numbers = _results(_solved(encounter, printed + _DECIMALS * shift.reshape(3, 3)))
         used = [each for each in numbers if each.source in _IDENTIFYING and each.corrected is None]
-        found = [((each.ours or 0.0) - float(each.printed)) / last_digit(each.printed) for each in used]
-        return np.array(found)
+        return np.array([((each.ours or 0.0) - float(each.printed)) / last_digit(each.printed) for each in used])
 
     printed, shift = np.array(_VELOCITIES, dtype=float), np.zeros(9)
     for step in range(_STEPS):
@@ -255,34 +244,23 @@ def _costs(solution: EncounterSolution) -> list[PublishedNumber]:
         quadratics.append([cost.matrix[1, 1], slope[1], cost.matrix[0, 0], slope[0], rest])
     numbers = [
         _number("(3.1)", f"{craft}, {term} (SI)", text, float(ours))
-        for craft, texts, found in zip(_CRAFT, _QUADRATICS, quadratics, strict=True)
-        for term, text, ours in zip(_TERMS, texts, found, strict=True)
+        for craft, texts, coefficients in zip(_CRAFT, _QUADRATICS, quadratics, strict=True)
+        for term, text, ours in zip(_TERMS, texts, coefficients, strict=True)
     ]
     norm = np.sum(quadratics, axis=0)
     norm[-1] -= sum(cost.ideal_cost_squared for cost in solution.costs)
-    numbers += [
-        _REFERENCE.number("(3.2)", f"norm, {term} (SI)", text, float(ours))
-        for term, text, ours in zip(_TERMS, _NORM, norm, strict=True)
-    ]
-    least = [cost.ideal_cost_squared for cost in solution.costs]
-    numbers += [
-        _square("section 3, J*", f"{craft}, J*^2 (m^2/s^3)", text, ours)
-        for craft, text, ours in zip(_CRAFT, _LEAST_COSTS, least, strict=True)
-    ]
-    numbers += [
-        _REFERENCE.number("section 3", name, text, float(ours))
-        for (name, text), ours in zip(_MEETING.items(), solution.point[::-1], strict=True)
-    ]
-    numbers += [
-        _square("section 3, J", f"{craft}, J^2 (m^2/s^3)", text, float(ours))
-        for craft, text, ours in zip(_CRAFT, _COSTS, solution.cost_squared(), strict=True)
-    ]
-    return numbers
+    numbers += _REFERENCE.numbers("(3.2)", {f"norm, {term} (SI)": _NORM[i] for i, term in enumerate(_TERMS)}, norm)
+    numbers += _squares("section 3, J*", "J*^2", _LEAST_COSTS, [cost.ideal_cost_squared for cost in solution.costs])
+    numbers += _REFERENCE.numbers("section 3", _MEETING, solution.point[::-1])
+    return numbers + _squares("section 3, J", "J^2", _COSTS, solution.cost_squared())
 
 
-def _square(source: str, name: str, printed: str, ours: float) -> PublishedNumber:
-    """Return a cost that is printed as J and is J^2."""
-    return _REFERENCE.number(source, name, printed, ours, corrected=f"{printed}", note=_SQUARES)
+def _squares(source: str, name: str, printed: Sequence[str], ours: Iterable[float]) -> list[PublishedNumber]:
+    """Return costs that are printed as J and are J^2."""
+    return [
+        _REFERENCE.number(source, f"{craft}, {name} (m^2/s^3)", text, value, corrected=text, note=_SQUARES)
+        for craft, text, value in zip(_CRAFT, printed, ours, strict=True)
+    ]
 
 
 def _basis(terms: Mapping[str, str] | tuple[str, ...], times: Floats) -> Floats:
@@ -303,45 +281,42 @@ def _basis(terms: Mapping[str, str] | tuple[str, ...], times: Floats) -> Floats:
 
 
 def _coefficients(terms: Mapping[str, str], times: Floats, values: Floats) -> Floats:
-    """Return the coefficients of a sum of terms that takes given values."""
+    """Return the coefficients of a sum of terms with these values."""
     basis = _basis(tuple(terms), times)
     size = np.abs(basis).max(axis=0)
     return np.asarray(np.linalg.lstsq(basis / size, values, rcond=None)[0] / size)
 
 
 def _over_orbits() -> Floats:
-    """Return times over two orbits: in the 30 s of the flight the terms of the laws are all but the same."""
+    """Return times over two orbits: in the 30 s of the flight the terms can hardly be told apart."""
     return np.linspace(0.0, 4.0 * np.pi / RATE_RAD_S, 200)
 
 
 def _controls(solution: EncounterSolution) -> list[PublishedNumber]:
     times, numbers = _over_orbits(), []
-    for place, components in enumerate(_CONTROLS):
-        values = solution.plan(place).control(times)
+    for craft, (name, components) in enumerate(zip(_CRAFT, _CONTROLS, strict=True)):
+        values = solution.plan(craft).control(times)
         for axis, terms in enumerate(components):
-            found = _coefficients(terms, times, values[:, axis])
-            numbers += [
-                _REFERENCE.number("u in section 3", f"{_CRAFT[place]}, u_{axis + 1}, {term} (SI)", text, float(ours))
-                for (term, text), ours in zip(terms.items(), found, strict=True)
-            ]
+            printed = {f"{name}, u_{axis + 1}, {term} (SI)": text for term, text in terms.items()}
+            numbers += _REFERENCE.numbers("u in section 3", printed, _coefficients(terms, times, values[:, axis]))
     return numbers
 
 
 def _laws(solution: EncounterSolution) -> list[PublishedNumber]:
     times, numbers = _over_orbits(), []
-    for place, components in enumerate(_LAWS):
-        values = solution.plan(place).state(times)
+    for craft, (name, components) in enumerate(zip(_CRAFT, _LAWS, strict=True)):
+        values = solution.plan(craft).state(times)
         for axis, terms in enumerate(components):
-            found = _coefficients(terms, times, values[:, axis])
+            coefficients = _coefficients(terms, times, values[:, axis])
             numbers += [
-                _number("x(t) in section 3", f"{_CRAFT[place]}, {_STATE_NAMES[axis]}, {term} (SI)", text, float(ours))
-                for (term, text), ours in zip(terms.items(), found, strict=True)
+                _number("x(t) in section 3", f"{name}, {_STATE_NAMES[axis]}, {term} (SI)", text, float(ours))
+                for (term, text), ours in zip(terms.items(), coefficients, strict=True)
             ]
     return numbers
 
 
 def _number(source: str, name: str, printed: str, ours: float) -> PublishedNumber:
-    """Return a number of (3.1) or of a law of motion, a few of which are known to be off."""
+    """Return a number of (3.1) or of a law of motion, a few of which are known to differ."""
     mended = {"8.7329105e7": "8.73291025e7"}.get(printed)
     if mended is not None:
         return _REFERENCE.number(source, name, printed, ours, corrected=mended, note=_LOST_DIGITS)
@@ -354,13 +329,10 @@ def _number(source: str, name: str, printed: str, ours: float) -> PublishedNumbe
 def _positions(solution: EncounterSolution) -> list[PublishedNumber]:
     numbers = []
     for time_s, rows in _POSITIONS.items():
-        for place, texts in enumerate(rows):
-            state = solution.plan(place).state(float(time_s))
+        for craft, texts in enumerate(rows):
+            state = solution.plan(craft).state(float(time_s))
             for axis, text in enumerate(texts):
-                name, ours = f"{_CRAFT[place]}, {_STATE_NAMES[axis]}({time_s}) (m)", float(state[axis])
-                if "e" in text:
-                    rounding = _REFERENCE.number("table", name, text, ours, corrected="0.0000000", note=_ZERO)
-                    numbers.append(rounding)
-                else:
-                    numbers.append(_REFERENCE.number("table", name, text, ours))
+                name, ours = f"{_CRAFT[craft]}, {_STATE_NAMES[axis]}({time_s}) (m)", float(state[axis])
+                zero, note = ("0.0000000", _ZERO) if "e" in text else (None, "")
+                numbers.append(_REFERENCE.number("table", name, text, ours, corrected=zero, note=note))
     return numbers

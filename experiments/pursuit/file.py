@@ -24,6 +24,7 @@ from experiments.common.toml_values import (
     NUMBER,
     ONE,
     ZERO,
+    Constant,
     Degrees,
     Description,
     Name,
@@ -79,7 +80,6 @@ Axis = Annotated[Decimal, PlainValidator(_ellipse_axis)]
 Eccentricity = Annotated[Decimal, PlainValidator(_ellipse_eccentricity)]
 Inclination = Annotated[Decimal, PlainValidator(Number(least=ZERO, most=Decimal(180)))]
 Oblateness = Annotated[Decimal, PlainValidator(Number(least=Decimal("-0.1"), most=Decimal("0.1")))]
-Constant = Annotated[Any, PlainValidator(lambda value: value)]
 
 
 class PlayerTable(Table):

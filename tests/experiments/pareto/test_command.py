@@ -195,14 +195,14 @@ def test_a_bound_that_another_control_meets(infoset: Infoset, mine: Callable[[st
         (["missing.toml"], ["missing.toml: there is no such file"]),
         (["x" * 5000], ["no file and no built-in problem"]),
         (["bad\x1b[31mname"], ["bad?[31mname"]),
-        (["--samples", "1"], ["--samples: must be from 2 to 10001, found 1"]),
-        (["--samples", "1" + "0" * 40], ["--samples", "a number of more than 20 digits"]),
+        (["--samples", "1"], ["Invalid value for '--samples'"]),
+        (["--samples", "1" + "0" * 40], ["Invalid value for '--samples'"]),
         (["--prefer", "y_m=0"], ["--prefer: z_m is missing", "for example --prefer y_m=0,z_m=0"]),
         (["--prefer", "y_m=0,z_m=1,x_m=2"], ["--prefer: give each of y_m, z_m once", '"x_m=2"']),
         (["--prefer", "y_m=0,y_m=1"], ["--prefer: give each of", '"y_m=1"']),
-        (["--prefer", "y_m=0,z_m=far"], ["--prefer", '"far" is no number']),
+        (["--prefer", "y_m=0,z_m=far"], ["--prefer", '"far" is not a number']),
         (["--prefer", "y_m=0,z_m=nan"], ["--prefer: values must be finite"]),
-        (["--prefer", "y_m=0,z_m=1e300"], ["--prefer: values must be finite and of ordinary size"]),
+        (["--prefer", "y_m=0,z_m=1e300"], ["--prefer: values must be finite and at most 1e+15 in size"]),
         (["--json", "missing/x.json"], ["there is no folder missing"]),
         (["--json", "out/results.json", "--out", "out"], ["also a file of --out"]),
         (["--out", "/dev/null"], ["is a file"]),
@@ -211,11 +211,11 @@ def test_a_bound_that_another_control_meets(infoset: Infoset, mine: Callable[[st
 def test_what_is_wrong_is_said_before_the_work(
     arguments: list[str], parts: list[str], infoset: Infoset, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("rendezvous.pareto.solve_encounter", lambda *_, **__: pytest.fail("began to work"))
+    monkeypatch.setattr("experiments.pareto.run.solve_encounter", lambda *_, **__: pytest.fail("began to work"))
     code, out, err = infoset(*arguments)
     assert (code, out) == (2, "")
-    assert err.startswith("error: ")
-    assert err.count("error: ") == 1
+    assert err.startswith(("error: ", "Usage: "))
+    assert err.count("error: ") <= 1
     assert "\x1b" not in err
     for part in parts:
         assert part in err
@@ -232,16 +232,16 @@ def test_what_is_wrong_is_said_before_the_work(
         (changed("duration_s = 30.0", "duration_s = 1e9"), ["radians of the orbit", "check the units"]),
         (changed("= 0.001176", "= 0.0"), ["orbit_rate_rad_s: must be greater than 0"]),
         (changed("= 0.001176", "= nan"), ["orbit_rate_rad_s: must be a finite number"]),
-        (changed('free = ["y", "z"]', "free = []"), ["free: frees no component", 'free = ["y", "z"]']),
+        (changed('free = ["y", "z"]', "free = []"), ["free: has no component", 'free = ["y", "z"]']),
         (changed('free = ["y", "z"]', 'free = ["y", "y"]'), ["free: names a component twice"]),
         (changed('free = ["y", "z"]', 'free = ["y", "altitude"]'), ["free: must be one of", '"vz"']),
-        (changed('free = ["y", "z"]', 'free = ["x"]'), ["terminal.x_m: fixes x, which free = [...] leaves open"]),
-        (changed('free = ["y", "z"]', 'free = ["vy"]\nmeet = "intercept"'), ["free: frees vy", "free anyway"]),
+        (changed('free = ["y", "z"]', 'free = ["x"]'), ["terminal.x_m: fixes x, which free = [...] lists as free"]),
+        (changed('free = ["y", "z"]', 'free = ["vy"]\nmeet = "intercept"'), ["free: lists vy", "always free"]),
         (EXAMPLE.replace("weight = 1.0", "").replace("velocity_m_s", "weight = 0\nvelocity_m_s"),
             ["craft #1.weight: is zero, and so are all others"]),
         (changed("weight = 1.0", "weight = -1.0"), ["craft #1.weight: must be at least 0, found -1.0"]),
         (changed("weight = 1.0", "start_s = 30.0"), ["craft #1.start_s: must be before the meeting at 30.0 s"]),
-        (changed('name = "second"', 'name = "first"'), ['craft #2.name: calls a second craft "first"']),
+        (changed('name = "second"', 'name = "first"'), ['craft #2.name: "first" is also the name of craft #1']),
         (changed('name = "second"', 'name = "a\\u001b[31m"'), ["craft #2.name: must be one line without control"]),
         (changed('name = "second"', f'name = "{"n" * 900}"'), ["craft #2.name: must be at most 100 characters"]),
         (changed("[0.0, 60.0, 80.0]", "[0.0, nan, 80.0]"), ["number 2 of the array must be a finite number"]),
@@ -271,7 +271,7 @@ def test_a_bound_that_no_control_meets_says_by_how_much(infoset: Infoset, mine: 
     code, out, err = infoset(mine(changed("duration_s", "greatest_control_m_s2 = 0.5\nduration_s")))
     assert (code, out) == (2, "")
     assert "no control of at most 0.5 m/s^2 brings the craft third to the meeting" in err
-    least = float(err.split("the least that any needs is ")[1].split(" m/s^2")[0])
+    least = float(err.split("at least ")[1].split(" m/s^2")[0])
     assert f"{least / 0.5:.4g} times the bound" in err
     # Just over what is said, it can be met.
     given = changed("duration_s", f"greatest_control_m_s2 = {least * 1.00001}\nduration_s")
@@ -300,7 +300,7 @@ def test_a_meeting_after_many_revolutions_is_not_refused(infoset: Infoset, mine:
     # 9.980e-6 m/s^2 suffices (test_choices.py); a fixed rule of quadrature said 1.14e-5.
     code, out, err = infoset(mine(LONG))
     assert (code, err) == (0, "")
-    assert "another control meets it" in out
+    assert "another control keeps the bound" in out
     assert infoset(mine(LONG.replace("1.05e-5", "9.97e-6")), "-q")[0] == 2
 
 
@@ -372,13 +372,12 @@ def test_many_craft_have_no_list_of_coalitions(infoset: Infoset, mine: Callable[
     )
     code, out, _ = infoset(mine(HEAD + tables), "--json", "found.json", "--samples", 2)
     assert code == 0
-    assert "too many" in out
+    assert "coalitions: not computed" in out
     found = strict(Path("found.json").read_text())
     assert (found["coalitions"], found["shapley_m2_s3"], found["core"]) == ({}, [], None)
 
 
-def test_nothing_is_replaced_unless_told(infoset: Infoset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("experiments.common.figure_style.save_figure", lambda *_: [])  # drawn, but not written
+def test_nothing_is_replaced_unless_told(infoset: Infoset, tmp_path: Path) -> None:
     precious, folder = tmp_path / "x.json", tmp_path / "folder"
     precious.write_text("precious")
     folder.mkdir()

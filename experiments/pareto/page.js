@@ -1,10 +1,10 @@
 
 "use strict";
-// The encounter: the meeting is dragged in the plane of its first two free values, and everything follows.
+// The encounter: the user drags the meeting in the plane of its first two free components; costs and paths follow.
 
 let point = DATA.point.slice();
 
-/** What a meeting costs a craft beyond its own cheapest one: |R (p - p*)|^2. */
+/** Return the excess of a craft, its cost minus that of its own cheapest meeting: |R (p - p*)|^2. */
 function excessOf({ root, ideal }, meeting) {
   const apart = meeting.map((value, index) => value - ideal[index]);
   return root.reduce((sum, row) => sum + row.reduce((dot, value, index) => dot + value * apart[index], 0) ** 2, 0);
@@ -13,7 +13,7 @@ function excessOf({ root, ideal }, meeting) {
 const costOf = (craft, meeting) => craft.ideal_cost_squared + excessOf(craft, meeting);
 const groupLoss = (meeting) => DATA.craft.reduce((sum, craft) => sum + craft.weight * excessOf(craft, meeting), 0);
 
-/** The meetings that cost a craft as much as this one, where two values are free: an ellipse about its ideal. */
+/** Return the meetings with the same cost for a craft, an ellipse around its ideal, if two components are free. */
 function equalCosts(craft, meeting) {
   const [[a, b], [, d]] = craft.root;
   const radius = Math.sqrt(excessOf(craft, meeting));
@@ -23,7 +23,7 @@ function equalCosts(craft, meeting) {
   });
 }
 
-/** A meeting as a place in the plane: a single free value lies on a line. */
+/** Return a meeting as a point of the plane; with one free component, a point of a line. */
 const flat = (meeting) => [meeting[0], meeting[1] ?? 0];
 
 const plane = {
@@ -59,7 +59,7 @@ const plane = {
   tell(x, y) {
     const chart = panel;
     const near = [
-      ...DATA.craft.map(({ name, ideal }) => [`cheapest for ${name}`, ideal]),
+      ...DATA.craft.map(({ name, ideal }) => [`cheapest meeting of ${name}`, ideal]),
       ...DATA.selections.map((each) => [each.name, each.point]),
       ["meeting", point],
     ].filter(([, at]) => Math.hypot(chart.across(flat(at)[0]) - x, chart.up(flat(at)[1]) - y) < 10);
@@ -67,7 +67,7 @@ const plane = {
   },
 };
 
-/** The numbers of the present meeting. */
+/** Return the numbers of the current meeting. */
 function rows() {
   return [
     ...DATA.free.map(({ name, unit }, index) => [`${name} of the meeting`, shown(point[index], unit)]),
@@ -89,25 +89,25 @@ const inputs = DATA.free.map(({ name, unit }, index) => {
 const top_ = element("div", { class: "columns" });
 const costs = element("table", { "aria-label": "Costs of this meeting", "aria-live": "polite" });
 const panel = new Chart(top_, {
-  caption: "The meeting: drag it",
-  label: "The plane of meetings",
+  caption: "Meeting (drag to move)",
+  label: "Plane of the meetings",
   ratio: 0.8,
   legend: [
     ["meeting", (context) => drawMark(context, 11, 6, "diamond", theme.colours.ink, 4)],
     ["Pareto-optimal meetings", (context) => drawPath(context, [[1, 1], [21, 1], [21, 11], [1, 11]],
       { fill: theme.colours.set, opacity: 0.25, stroke: theme.colours.line, width: 1, closed: true })],
-    ...DATA.craft.slice(0, 8).map(({ name }, index) => lookKey(`cheapest for ${name}, and its cost here`, index)),
+    ...DATA.craft.slice(0, 8).map(({ name }, index) => lookKey(`cheapest meeting of ${name}, and curve of equal cost`, index)),
     ["other choices", (context) => drawMark(context, 11, 6, "cross", theme.colours.quiet, 4)],
   ],
   draw: plane.draw,
   tell: plane.tell,
 });
-const side = element("figure", {}, element("figcaption", {}, "What this meeting costs"), costs);
+const side = element("figure", {}, element("figcaption", {}, "Costs of this meeting"), costs);
 top_.append(side);
 main.append(
   element("div", { class: "choices" }, ...inputs.map(({ label }) => label),
     choice("Go to", [["", "\u2026"], ...DATA.selections.map(({ name }, index) => [String(index), name]),
-      ...DATA.craft.map(({ name }, index) => [String(DATA.selections.length + index), `cheapest for ${name}`])], "", (value) => {
+      ...DATA.craft.map(({ name }, index) => [String(DATA.selections.length + index), `cheapest meeting of ${name}`])], "", (value) => {
       const places = [...DATA.selections.map((each) => each.point), ...DATA.craft.map(({ ideal }) => ideal)];
       if (value !== "") moveTo(places[Number(value)].slice());
     })),
@@ -115,7 +115,7 @@ main.append(
 );
 const { player, panels } = buildMotion(main);
 
-/** Take another meeting: costs, flights and pictures follow. `typed` is the field that it comes from. */
+/** Change the meeting and update costs, paths and drawings; `typed` is the input field of the change, if any. */
 function moveTo(meeting, typed = null) {
   point = meeting;
   const at = (base, slope) => base.map((value, axis) => value + slope[axis].reduce((sum, each, k) => sum + each * point[k], 0));

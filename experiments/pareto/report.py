@@ -1,0 +1,193 @@
+"""Results of `infoset pareto`, as JSON and as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+
+from experiments.common.output import library_version
+from experiments.common.screen import number, number_table, print_lines
+from experiments.pareto.file import TERMINAL, ParetoProblem
+from rendezvous.pareto import BoundCheck, Coalitions, DurationSweep, EncounterSolution, Feasibility, distances
+
+Floats = NDArray[np.float64]
+
+_ZERO = 1e-9
+"""Components of a meeting smaller than this part of the largest one are printed as zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """Results of one command.
+
+    Parameters
+    ----------
+    problem : ParetoProblem
+    solution : EncounterSolution
+    selections : mapping of str to ndarray, shape (f,)
+        Pareto-optimal meetings by the rule of their choice.
+    coalitions : Coalitions or None
+        None if there are too many craft.
+    bounds : tuple of BoundCheck
+        One per craft; empty if the problem has no bound.
+    peaks_m_s2, impulses_m_s : tuple of float
+        Largest control and total impulse of each craft.
+    sweep : DurationSweep
+    """
+
+    problem: ParetoProblem
+    solution: EncounterSolution
+    selections: Mapping[str, Floats]
+    coalitions: Coalitions | None
+    bounds: tuple[BoundCheck, ...]
+    peaks_m_s2: tuple[float, ...]
+    impulses_m_s: tuple[float, ...]
+    sweep: DurationSweep
+
+
+def report_json(report: Report, samples: int) -> dict[str, object]:
+    """Return the results for `experiments.common.output.to_json`, with trajectories at ``samples`` times."""
+    problem, solution = report.problem, report.solution
+    encounter = problem.encounter
+    return {
+        "version": library_version(),
+        "problem": problem.name,
+        "problem_hash": problem.hash,
+        "units": {
+            "axes": "x against the motion, y radially outward, z along the orbit's normal",
+            "costate_at_meeting": "m/s^3 of the position's three, m/s^2 of the velocity's",
+            "matrix": "m^2/s^3 over the units of two free components",
+            "distances": "m/s^1.5",
+        },
+        "meeting_time_s": encounter.meeting_s,
+        "meet": encounter.meeting,
+        "free": [component.name.lower() for component in encounter.free],
+        "meeting": _named_state(solution, solution.point),
+        "craft": [_craft_json(report, index) for index in range(len(solution.costs))],
+        "group_loss_m2_s3": solution.group_loss(),
+        "matrix": [cost.matrix for cost in solution.costs[: 1 if solution.same_matrix else None]],
+        **({"distances": distances(solution)} if solution.same_matrix else {}),
+        "selections": {
+            name: {
+                "meeting": _named_state(solution, point),
+                "cost_squared_m2_s3": solution.cost_squared(point),
+                "excess_m2_s3": solution.excess(point),
+                "group_loss_m2_s3": solution.group_loss(point),
+            }
+            for name, point in report.selections.items()
+        },
+        **_coalitions_json(report.coalitions, [cost.craft.name for cost in solution.costs]),
+        "sweep": {
+            "meeting_time_s": report.sweep.meeting_s,
+            "group_loss_m2_s3": report.sweep.group_loss,
+            "cost_squared_m2_s3": report.sweep.cost_squared,
+            "ideal_cost_squared_m2_s3": report.sweep.ideal_cost_squared,
+        },
+        "samples": [_trajectory_json(solution, index, samples) for index in range(len(solution.costs))],
+    }
+
+
+def _named_state(solution: EncounterSolution, point: Floats) -> dict[str, float]:
+    """Return the common components of a meeting by name; of an intercept, only the position."""
+    return dict(zip(TERMINAL.values(), solution.meeting_state(point)[: solution.encounter.common], strict=False))
+
+
+def _craft_json(report: Report, index: int) -> dict[str, object]:
+    solution = report.solution
+    cost = solution.costs[index]
+    bound: dict[str, object] = {}
+    if report.bounds:
+        check = report.bounds[index]
+        bound = {
+            "greatest_control_m_s2": report.problem.greatest_control_m_s2,
+            "least_peak_control_m_s2": check.least_peak_m_s2,
+            "feasibility": check.feasibility,
+        }
+    return {
+        "name": cost.craft.name,
+        "weight": cost.craft.weight,
+        "ideal": _named_state(solution, cost.ideal),
+        "ideal_cost_squared_m2_s3": cost.ideal_cost_squared,
+        "cost_squared_m2_s3": solution.cost_squared()[index],
+        "excess_m2_s3": solution.excess()[index],
+        "impulse_m_s": report.impulses_m_s[index],
+        "peak_control_m_s2": report.peaks_m_s2[index],
+        "costate_at_meeting": solution.plan(index).costate,
+        **bound,
+    }
+
+
+def _coalitions_json(coalitions: Coalitions | None, names: list[str]) -> dict[str, object]:
+    if coalitions is None:
+        return {"coalitions": {}, "shapley_m2_s3": [], "transfers_m2_s3": [], "core": None}
+    return {
+        "coalitions": {
+            "+".join(names[member] for member in coalition.members): {
+                "excess_m2_s3": coalition.excess,
+                "regret_m2_s3": coalition.regret,
+            }
+            for coalition in coalitions.coalitions
+        },
+        "shapley_m2_s3": coalitions.shapley,
+        "transfers_m2_s3": coalitions.transfers,
+        "core": {"verdict": coalitions.core, "reason": coalitions.core.reason},
+    }
+
+
+def _trajectory_json(solution: EncounterSolution, index: int, samples: int) -> dict[str, object]:
+    trajectory = solution.plan(index).sample(samples)
+    return {
+        "name": solution.costs[index].craft.name,
+        "time_s": trajectory.time_s,
+        "position_m": trajectory.state[:, :3],
+        "velocity_m_s": trajectory.state[:, 3:],
+        "control_m_s2": trajectory.control_m_s2,
+    }
+
+
+def print_report(console: Console, report: Report) -> None:
+    """Print the meeting, the costs, the choices and the coalitions."""
+    solution, encounter = report.solution, report.problem.encounter
+    names = [cost.craft.name for cost in solution.costs]
+    meeting = ", ".join(f"{key} = {value:.6g}" for key, value in _named_state(solution, solution.point).items())
+    heading = f"{report.problem.name}: {encounter.meeting.value} at {encounter.meeting_s:g} s: {meeting}"
+    print_lines(console, [heading])
+    table = number_table(
+        "craft", "ideal J*^2\nm^2/s^3", "J^2\nm^2/s^3", "excess\nm^2/s^3", "impulse\nm/s", "peak |u|\nm/s^2"
+    )
+    ideal = [cost.ideal_cost_squared for cost in solution.costs]
+    columns = (ideal, solution.cost_squared(), solution.excess(), report.impulses_m_s, report.peaks_m_s2)
+    for name, *row in zip(names, *columns, strict=True):
+        table.add_row(name, *(number(float(value)) for value in row))
+    console.print(table)
+    print_lines(console, [f"group loss {float(solution.group_loss()):.6g} m^2/s^3", *_exceeded(report), ""])
+    free = [component.name.lower() for component in encounter.free]
+    titles = [f"{name}, {'m' if len(name) == 1 else 'm/s'}" for name in free]
+    chosen = number_table("choice", *titles, "group loss\nm^2/s^3")
+    scale = max(float(abs(point).max()) for point in report.selections.values())
+    for name, point in report.selections.items():
+        values = (f"{value if abs(value) > _ZERO * scale else 0.0:.6g}" for value in point)
+        chosen.add_row(name.replace("_", " "), *values, number(float(solution.group_loss(point))))
+    console.print(chosen)
+    if report.coalitions is None:
+        print_lines(console, ["coalitions: not computed, the number of craft is too large"])
+        return
+    pairs = zip(names, report.coalitions.shapley, strict=True)
+    shares = ", ".join(f"{name} {number(float(value))}" for name, value in pairs)
+    print_lines(console, [f"Shapley value of the excess: {shares}", report.coalitions.core.reason])
+
+
+def _exceeded(report: Report) -> list[str]:
+    """Return a line for each craft whose minimum-energy control exceeds the bound."""
+    bound = report.problem.greatest_control_m_s2 or 0.0
+    return [
+        f"{cost.craft.name}: the minimum-energy control exceeds the bound {bound:g} m/s^2 by "
+        f"{check.peak_m_s2 / bound - 1.0:.2%}; another control keeps the bound, with a peak of at least "
+        f"{check.least_peak_m_s2:.6g} m/s^2"
+        for cost, check in zip(report.solution.costs, report.bounds, strict=False)
+        if check.feasibility is Feasibility.ANOTHER_CONTROL
+    ]

@@ -1,0 +1,162 @@
+"""`infoset pareto`: computation, files and tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from experiments.common.errors import InputError
+from experiments.common.output import output_of, to_json
+from experiments.common.screen import figure_files, progress_bar, table_console
+from experiments.common.screen import tell_of_compiling_rendezvous as tell_of_compiling
+from experiments.common.toml_values import LARGEST, shown
+from experiments.pareto.command import Pareto
+from experiments.pareto.figures import draw_controls, draw_costs, draw_front, draw_trajectories
+from experiments.pareto.file import TERMINAL, ParetoProblem, load_pareto
+from experiments.pareto.page import pareto_page
+from experiments.pareto.report import Report, print_report, report_json
+from rendezvous.pareto import (
+    BoundCheck,
+    EncounterSolution,
+    Feasibility,
+    Meeting,
+    NotCertifiedError,
+    NotOptimalError,
+    analyse_coalitions,
+    check_bound,
+    least_greatest_excess,
+    least_sum_of_costs,
+    nearest_to,
+    peak_control,
+    solve_encounter,
+    sweep_meeting_time,
+    total_impulse,
+)
+from rendezvous.pareto.coalitions import MOST_CRAFT
+
+Floats = NDArray[np.float64]
+
+FIGURES = ("figure-trajectories", "figure-controls", "figure-front", "figure-costs")
+SWEEP = (0.5, 2.0, 31)
+"""Smallest and largest duration of the sweep, relative to the duration of the problem, and their number."""
+
+
+def run(options: Pareto) -> None:
+    """Solve the problem, write the files and print the tables."""
+    problem = load_pareto(options.problem)
+    preferred = None if options.prefer is None else _preferred(options.prefer, problem)
+    with output_of(options, ("results.json", *figure_files(*FIGURES))) as written:
+        tell_of_compiling(options.quiet, visits=False)
+        with progress_bar(options.quiet) as begin:
+            report = _solve(problem, preferred, begin("meetings and coalitions"))
+            written.save("results.json", to_json(report_json(report, options.samples)), "--json")
+            if options.html is not None:
+                written.deliver("--html", pareto_page(problem.name, report.solution, report.selections))
+            written.draw(_drawings(report), begin("figures"))
+    if not options.quiet:
+        print_report(table_console(written.stdout_taken), report)
+
+
+def _preferred(text: str, problem: ParetoProblem) -> Floats:
+    """Read a preferred meeting: a value for each free component."""
+    keys = [TERMINAL[component.name.lower()] for component in problem.encounter.free]
+    example = "--prefer " + ",".join(f"{key}=0" for key in keys)
+    values: dict[str, float] = {}
+    for part in text.split(","):
+        key, mark, number = (piece.strip() for piece in part.partition("="))
+        if not mark or key not in keys or key in values:
+            raise InputError(
+                f"--prefer: give each of {', '.join(keys)} once, found {shown(part.strip())}; for example {example}"
+            )
+        try:
+            values[key] = float(number)
+        except ValueError:
+            raise InputError(f"--prefer: {shown(number)} is not a number; for example {example}") from None
+    missing = [key for key in keys if key not in values]
+    if missing:
+        raise InputError(f"--prefer: {' and '.join(missing)} is missing; for example {example}")
+    if not all(math.isfinite(value) and abs(value) <= LARGEST for value in values.values()):
+        raise InputError(f"--prefer: values must be finite and at most {LARGEST:g} in size; for example {example}")
+    return np.array([values[key] for key in keys])
+
+
+def _solve(problem: ParetoProblem, preferred: Floats | None, progress: Callable[[float], None]) -> Report:
+    encounter = problem.encounter
+    try:
+        solution = solve_encounter(encounter)
+    except ValueError as error:
+        raise InputError(f"{problem.source}: {error}") from None
+    if not (np.isfinite(solution.meeting_state()).all() and np.isfinite(solution.cost_squared()).all()):
+        raise InputError(f"{problem.source}: the numbers are so large that results are not finite; check the units")
+    selections = _selections(problem, solution, preferred)
+    progress(0.2)
+    bounds = _bounds(problem, solution)
+    progress(0.4)
+    plans = [solution.plan(index) for index in range(len(solution.costs))]
+    coalitions = analyse_coalitions(solution) if len(plans) <= MOST_CRAFT else None
+    progress(0.9)
+    latest_s = max(craft.start_s for craft in encounter.craft)
+    durations = latest_s + (encounter.meeting_s - latest_s) * np.linspace(*SWEEP)
+    return Report(
+        problem,
+        solution,
+        selections,
+        coalitions,
+        bounds,
+        peaks_m_s2=tuple(peak_control(plan) for plan in plans),
+        impulses_m_s=tuple(total_impulse(plan) for plan in plans),
+        sweep=sweep_meeting_time(encounter, durations),
+    )
+
+
+def _selections(problem: ParetoProblem, solution: EncounterSolution, preferred: Floats | None) -> dict[str, Floats]:
+    """Return Pareto-optimal meetings by the rule of their choice."""
+    selections = {
+        "least_group_loss": solution.point,
+        "least_sum_of_costs": least_sum_of_costs(solution),
+        "least_greatest_excess": least_greatest_excess(solution),
+    }
+    if preferred is not None:
+        try:
+            selections["preferred"] = nearest_to(solution, preferred)
+        except NotOptimalError as error:
+            raise InputError(f"{problem.source}: --prefer: {error}") from None
+    return selections
+
+
+def _bounds(problem: ParetoProblem, solution: EncounterSolution) -> tuple[BoundCheck, ...]:
+    """Return the check of the bound for each craft; refuse a bound that no control keeps."""
+    bound, encounter = problem.greatest_control_m_s2, problem.encounter
+    if bound is None:
+        return ()
+    common = 6 if encounter.meeting is Meeting.RENDEZVOUS else 3
+    where = f"{problem.source}: greatest_control_m_s2"
+    try:
+        checks = [check_bound(solution.plan(index), bound, common) for index in range(len(solution.costs))]
+    except NotCertifiedError as error:
+        raise InputError(f"{where}: {error}") from None
+    worst = max(range(len(checks)), key=lambda index: checks[index].least_peak_m_s2)
+    need = checks[worst].least_peak_m_s2
+    if checks[worst].feasibility is Feasibility.IMPOSSIBLE:
+        raise InputError(
+            f"{where}: no control of at most {bound:g} m/s^2 brings the craft {encounter.craft[worst].name} to the "
+            f"meeting; at least {need:.6g} m/s^2 is needed, {need / bound:.4g} times the bound; raise it, or make "
+            "duration_s longer"
+        )
+    return tuple(checks)
+
+
+def _drawings(report: Report) -> dict[str, Callable[[], Figure]]:
+    solution = report.solution
+    drawings: tuple[Callable[[], Figure], ...] = (
+        partial(draw_trajectories, solution),
+        partial(draw_controls, solution, report.problem.greatest_control_m_s2),
+        partial(draw_front, solution, report.selections, report.sweep),
+        partial(draw_costs, solution, report.coalitions, report.impulses_m_s),
+    )
+    return dict(zip(FIGURES, drawings, strict=True))
