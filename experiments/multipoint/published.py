@@ -1,4 +1,4 @@
-"""Mironov and Mironov (2007): visits to several moving targets."""
+"""Numbers of Mironov and Mironov (2007): visits to several moving targets."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ Floats = NDArray[np.float64]
 PAPER = "multipoint"
 TITLE = "Mironov and Mironov (2007), visits to several moving targets"
 REMARKS = (
-    "The paper prints no numbers. Those here are reference values of the corrected conditions, on which four "
-    "independent solvers agreed; closed forms are exact.",
-    "Condition of the times: printed with the target's velocity twice; dI/dt_i = D_i' (V_i - V) is right.",
+    "The paper prints no numbers. The numbers here are reference values of the corrected conditions, on which four "
+    "independent solvers agree; the closed forms are exact.",
+    "The condition of the times is printed with the target's velocity twice; dI/dt_i = D_i' (V_i - V) is right.",
     "B_2 of the elimination for N = 2 is R43(t2, t1) alone; costates between nodes have R33, R34, R43 and R44 where "
-    "R32 is printed; the line on jumps has the sign that (11) has not.",
+    "R32 is printed; the line on jumps has the sign that is missing in (11).",
 )
 _REFERENCE = Reference(PAPER, COMPUTED)
 _FLYBYS = {
@@ -61,17 +61,7 @@ _FLYBYS = {
 
 
 def reproduce(progress: Progress) -> Reproduction:
-    """Compute the numbers.
-
-    Parameters
-    ----------
-    progress : callable
-        Told the fraction done.
-
-    Returns
-    -------
-    Reproduction
-    """
+    """Compute the numbers."""
     numbers: list[PublishedNumber] = []
     problems = []
     for done, count in enumerate(_FLYBYS):
@@ -89,14 +79,14 @@ def reproduce(progress: Progress) -> Reproduction:
 
 
 def _tour(count: int, meets: Sequence[Meet] | None = None) -> tuple[Tour, Floats]:
-    """Return a built-in problem's tour, with other ways to meet, and its times."""
+    """Return the tour of a built-in problem, with other kinds of visits if given, and its times."""
     problem = load_multipoint(f"service-{count}")
     tour, times = problem.tour, problem.times_s
     assert isinstance(tour, Tour)
     assert isinstance(tour.targets, DriftingTargets)
     assert times is not None
     if meets is not None:
-        described = tuple(replace(each, meet=meet) for each, meet in zip(tour.targets.targets, meets, strict=True))
+        described = tuple(replace(target, meet=meet) for target, meet in zip(tour.targets.targets, meets, strict=True))
         tour = replace(tour, targets=replace(tour.targets, targets=described))
     return tour, times
 
@@ -106,7 +96,7 @@ def _visits(count: int) -> list[PublishedNumber]:
     order, limits = range(count), TimeLimits(latest_s=float(times[-1]))
     path, best = tour.fly(order, times), best_times(tour, order, limits, [times])
     last, _ = _tour(count, [*[Meet.FLYBY] * (count - 1), Meet.RENDEZVOUS])
-    found: dict[str, Sequence[float] | Floats] = {
+    computed: dict[str, Sequence[float] | Floats] = {
         "I (m^2/s^3)": [path.cost],
         "dI/dt (m^2/s^4)": path.time_gradient,
         "best times (s)": best.time_s[:-1],
@@ -117,37 +107,29 @@ def _visits(count: int) -> list[PublishedNumber]:
         "V(t1) (m/s)": path.arrival_states[0, 3:],
     }
     return [
-        _REFERENCE.number(f"reference, N = {count}", _indexed(name, place, len(printed)), text, float(ours))
+        _REFERENCE.number(f"reference, N = {count}", name if len(printed) == 1 else f"{name}, {i}", text, float(ours))
         for name, printed in _FLYBYS[count].items()
-        for place, (text, ours) in enumerate(zip(printed, found[name], strict=True), start=1)
+        for i, (text, ours) in enumerate(zip(printed, computed[name], strict=True), start=1)
     ]
-
-
-def _indexed(name: str, place: int, count: int) -> str:
-    return name if count == 1 else f"{name}, {place}"
 
 
 def _priced() -> list[PublishedNumber]:
     tour, times = _tour(2)
-    found = best_times(tour, (0, 1), TimeLimits(price_per_s=1e-6), [times])
-    rows = (
-        ("t1 (s)", "2905.083078", found.time_s[0]),
-        ("t2 (s)", "4690.157388", found.time_s[1]),
-        ("I (m^2/s^3)", "0.0008170807218", found.path.cost),
-    )
-    return [_REFERENCE.number("reference, N = 2, last time at 1e-6 a second", *row) for row in rows]
+    best = best_times(tour, (0, 1), TimeLimits(price_per_s=1e-6), [times])
+    printed = {"t1 (s)": "2905.083078", "t2 (s)": "4690.157388", "I (m^2/s^3)": "0.0008170807218"}
+    source = "reference, N = 2, last time at 1e-6 a second"
+    return _REFERENCE.numbers(source, printed, [*best.time_s, best.path.cost])
 
 
 def _orders() -> list[PublishedNumber]:
     tour, times = _tour(3)
     worst = max(tour.fly(order, times).cost for order in itertools.permutations(range(3)))
     best = best_order(tour, TimeLimits(latest_s=float(times[-1])))
-    return [
-        _REFERENCE.number("reference, N = 3", "I of the worst order, given times (m^2/s^3)", "0.05442751", worst),
-        _REFERENCE.number(
-            "reference, N = 3", "I of the best order, best times (m^2/s^3)", "0.008734876263", best.objective
-        ),
-    ]
+    printed = {
+        "I of the worst order, given times (m^2/s^3)": "0.05442751",
+        "I of the best order, best times (m^2/s^3)": "0.008734876263",
+    }
+    return _REFERENCE.numbers("reference, N = 3", printed, [worst, best.objective])
 
 
 def _double_integrator() -> TimeVaryingMotion:
@@ -157,34 +139,28 @@ def _double_integrator() -> TimeVaryingMotion:
 
 
 def _splines() -> list[PublishedNumber]:
-    """Free space, where the path is a cubic spline clamped at the start and natural at the end."""
+    """Return numbers in free space, where the path is a cubic spline, clamped at the start and natural at the end."""
     motion, at, states = _double_integrator(), np.array([1.0, 2.0, 3.0]), np.zeros((3, 6))
     states[:, 0] = [1.0, -1.0, 2.0]
     nodes = Nodes(at, at, states, states, 0.0 * states, 0.0 * states, np.zeros(3, dtype=bool))
     path = solve_segments(motion, 0.0, np.zeros(6), nodes)
-    exact = [
-        ("I", path.cost, 534 / 13),
-        *((f"D, {place}", path.jumps[place - 1, 0], value / 13) for place, value in enumerate((450, -366, 126), 1)),
-        *(
-            (f"V, {place}", path.arrival_states[place - 1, 3], value / 13)
-            for place, value in enumerate((-9, -3, 60), 1)
-        ),
-    ]
-    numbers = [
-        _REFERENCE.number("closed form, cubic spline", name, f"{value:.9f}", float(ours)) for name, ours, value in exact
-    ]
+    exact = {"I": 534 / 13}
+    exact |= {f"D, {i}": value / 13 for i, value in enumerate((450, -366, 126), start=1)}
+    exact |= {f"V, {i}": value / 13 for i, value in enumerate((-9, -3, 60), start=1)}
+    printed = {name: f"{value:.9f}" for name, value in exact.items()}
+    ours = [path.cost, *path.jumps[:, 0], *path.arrival_states[:, 3]]
+    numbers = _REFERENCE.numbers("closed form, cubic spline", printed, ours)
     there = np.zeros((2, 6))
     there[0, 0] = 1.0
     tour = Tour(motion, DriftingTargets((Target("out"), Target("back")), motion, there), np.zeros(6))
     back = best_times(tour, (0, 1), TimeLimits(latest_s=1.0))
+    printed = {"t1": f"{2.0 - 2.0**0.5:.9f}", "I": f"{1.5 * (1.0 + 2.0**0.5) ** 4:.8f}"}
     source = "closed form, out to 1 and back by T = 1"
-    numbers.append(_REFERENCE.number(source, "t1", f"{2.0 - 2.0**0.5:.9f}", float(back.time_s[0])))
-    numbers.append(_REFERENCE.number(source, "I", f"{1.5 * (1.0 + 2.0**0.5) ** 4:.8f}", back.path.cost))
-    return numbers
+    return numbers + _REFERENCE.numbers(source, printed, [back.time_s[0], back.path.cost])
 
 
 def _kepler() -> list[PublishedNumber]:
-    """The gravity of one point, mu = 1, targets on circles."""
+    """Return a number for a point mass, mu = 1, and targets on circles."""
     states = []
     for radius, phase, inclination in ((1.01, 0.02, 0.005), (1.02, 0.05, -0.01)):
         (c, s), tilt = (np.cos(phase), np.sin(phase)), np.array([1.0, np.cos(inclination), np.sin(inclination)])

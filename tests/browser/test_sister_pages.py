@@ -12,6 +12,7 @@ import pytest
 
 from experiments.multipoint.file import load_multipoint
 from experiments.multipoint.page import multipoint_page
+from experiments.multipoint.scene import Scene
 from experiments.pareto.file import load_pareto
 from experiments.pareto.page import pareto_page
 from experiments.pursuit.file import load_pursuit
@@ -53,7 +54,7 @@ class Solved:
         axes = load_multipoint("service-3").axes
         return {
             "pareto": pareto_page(name, self.encounter, selections),
-            "multipoint": multipoint_page(name, self.tour, (0, 1, 2), self.path, axes, 0.02),
+            "multipoint": multipoint_page(name, Scene(axes, self.tour, (0, 1, 2), self.path), 0.02),
             "reach": reachability_page(replace(self.report, rendezvous=rendezvous)),
             "pursuit": pursuit_page(name, description, self.game),
         }
@@ -205,8 +206,8 @@ def test_the_tube_holds_the_flights_and_a_control_can_be_chosen(
     periods = report.rendezvous.problem.periods
     for t in range(1, periods):
         page.evaluate(f"player.show({24 * t})")
-        assert page.evaluate("DATA.views[0].set_of_frame[player.frame]") == t
-        corners = np.array([each for face in page.evaluate(f"DATA.views[0].sets[{t}]") for each in face])
+        assert page.evaluate("DATA.views[0].sets.of_frame[player.frame]") == t
+        corners = np.array([each for face in page.evaluate(f"DATA.views[0].sets.faces[{t}]") for each in face])
         np.testing.assert_allclose(corners.min(axis=0), report.tube[t, :3, 0], rtol=1e-6, atol=1e-3)
         np.testing.assert_allclose(corners.max(axis=0), report.tube[t, :3, 1], rtol=1e-6, atol=1e-3)
     page.get_by_role("combobox", name="Control").select_option("l1")

@@ -13,10 +13,9 @@ import pytest
 
 from experiments.cli import main
 from experiments.common.problem_file import built_in_problems, problem_text
-from experiments.multipoint.curves import cost_curves
-from experiments.multipoint.figures import Scene, draw_control, draw_costates, draw_path, draw_times
-from experiments.multipoint.file import load_multipoint
-from experiments.multipoint.tables import KIND, Axes
+from experiments.multipoint.figures import draw_control, draw_costates, draw_path, draw_times
+from experiments.multipoint.file import KIND, Axes, load_multipoint
+from experiments.multipoint.scene import Scene, cost_curves
 
 FIGURES = ["figure-control", "figure-costates", "figure-path", "figure-times"]
 KEYS = [
@@ -240,8 +239,8 @@ def test_every_built_in_problem_is_sound() -> None:
         (["pareto-2008"], ["pareto-2008", "service-3"]),
         (["missing.toml"], ["missing.toml: there is no such file"]),
         (["bad\x1b[31mname"], ["bad?[31mname"]),
-        (["--order", "bets"], ["--order", "did you mean best?"]),
-        (["--times", ""], ["--times", "given, best"]),
+        (["--order", "bets"], ["Invalid value for '--order'", "'best'"]),
+        (["--times", ""], ["Invalid value for '--times'", "'given'"]),
         (["--json", "missing/x.json"], ["there is no folder missing"]),
         (["--json", "out/results.json", "--out", "out"], ["also a file of --out"]),
         (["--out", "/dev/null"], ["is a file"]),
@@ -253,8 +252,8 @@ def test_what_is_wrong_is_said_before_the_work(
     monkeypatch.setattr("rendezvous.multipoint.tour.solve_segments", lambda *_: pytest.fail("began to work"))
     code, out, err = infoset(*arguments)
     assert (code, out) == (2, "")
-    assert err.startswith("error: ")
-    assert err.count("error: ") == 1
+    assert err.startswith(("error: ", "Usage: "))
+    assert err.count("error: ") <= 1
     assert "\x1b" not in err
     for part in parts:
         assert part in err
@@ -269,14 +268,14 @@ ORBIT = "orbit_rate_rad_s = 1.13e-3"
 @pytest.mark.parametrize(
     ("text", "options", "parts"),
     [
-        (changed("2600.0", "900.0"), [], ["target #2.time_s: must be later, found 900.0", "left at 1200.0 s"]),
+        (changed("2600.0", "900.0"), [], ["target #2.time_s: must be later, found 900.0", "leaves the previous"]),
         (changed("2600.0", "1200.0"), [], ["target #2.time_s: must be later, found 1200.0"]),
         (changed("2600.0", "nan"), [], ["target #2.time_s: must be a finite number, found nan"]),
         (changed("2600.0", "-5"), [], ["target #2.time_s: must be greater than 0"]),
         (changed("2600.0", "1e300"), [], ["target #2.time_s: must be at most 1e+15 in size"]),
         (changed("time_s = 2600.0\n", ""), [], ["target #2.time_s: is missing", "optimise = true"]),
         (OPTIMISED.replace("time_s = 2600.0\n", ""), ["--times", "given"], ["--times given: needs time_s"]),
-        (changed('"T2"', '"T1"'), [], ['target #2.name: lists "T1" a second time', "list each target once"]),
+        (changed('"T2"', '"T1"'), [], ['target #2.name: "T1" is also the name of target #1']),
         (changed('"T2"', '"a\\u0007b"'), [], ["target #2.name: must be one line without control characters"]),
         (changed('"T2"', f'"{"n" * 900}"'), [], ["target #2.name: must be at most 100 characters"]),
         (changed(ORBIT, "orbit_rate_rad_s = 0.0"), [], ["orbit_rate_rad_s: must be greater than 0"]),
@@ -297,11 +296,11 @@ ORBIT = "orbit_rate_rad_s = 1.13e-3"
             changed("latest_s = 4000.0", ""), ["--times", "best"],
             ["with the last time free the energy falls to zero as it grows", "latest_s or price_per_s under [times]"],
         ),
-        (OPTIMISED.replace("latest_s = 4000.0", ""), [], ["times.latest_s", "the cost falls to zero", "price_per_s"]),
-        (targets(10) + MANY, ["--order", "best"], ["10 targets have 3 628 800 orders", "at most 9, with 362 880"]),
+        (OPTIMISED.replace("latest_s = 4000.0", ""), [], ["times.latest_s", "cost decreases to zero", "price_per_s"]),
+        (targets(10) + MANY, ["--order", "best"], ["10 targets have 3 628 800 orders", "at most 9 targets"]),
         (targets(120) + MANY, ["--order", "best"], ["120 targets have 6.7e+198 orders"]),
         (changed('"flyby"', '"fly-by"'), [], ["target #1.meet: must be one of", 'did you mean "flyby"?']),
-        (changed('meet = "flyby"', "dwell_s = 5.0"), [], ["target #1.dwell_s: is 5.0, but a flyby cannot stay"]),
+        (changed('meet = "flyby"', "dwell_s = 5.0"), [], ["target #1.dwell_s: is 5.0, but a flyby has no stay"]),
         (changed("[100.0, 2000.0, 50.0]", "[inf, 0, 0]"), [], ["target #1.position_m", "finite"]),
         (changed("[100.0, 2000.0, 50.0]", "[1e300, 0, 0]"), [], ["target #1.position_m", "1e+15 in size"]),
         (HEAD, [], ["target: is missing", "[[target]]"]),
@@ -389,8 +388,7 @@ def test_too_many_targets_are_refused_at_once(
     assert time.process_time() - began < 10.0
 
 
-def test_nothing_is_replaced_unless_told(infoset: Infoset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("experiments.common.figure_style.save_figure", lambda *_: [])  # drawn, but not written
+def test_nothing_is_replaced_unless_told(infoset: Infoset, tmp_path: Path) -> None:
     precious, folder = tmp_path / "x.json", tmp_path / "folder"
     precious.write_text("precious")
     folder.mkdir()
@@ -411,7 +409,7 @@ def test_figures_say_what_they_show() -> None:
     assert problem.times_s is not None
     path = problem.tour.fly((0, 1, 2), problem.times_s)
     scene = Scene(problem.axes, problem.tour, (0, 1, 2), path)
-    curves = cost_curves(problem.tour, (0, 1, 2), path)
+    curves = cost_curves(scene)
     assert len(curves) == 3
     for index, curve in enumerate(curves):
         at = int(np.flatnonzero(curve.time_s == problem.times_s[index])[0])
@@ -420,7 +418,7 @@ def test_figures_say_what_they_show() -> None:
         moved[index] = curve.time_s[0]
         assert curve.cost[0] == pytest.approx(problem.tour.fly((0, 1, 2), moved).cost, rel=1e-12)
     plane = draw_path(scene).axes[0]
-    assert (plane.get_xlabel(), plane.get_ylabel()) == ("y (along the motion), km", "x (radial), km")
+    assert (plane.get_xlabel(), plane.get_ylabel()) == ("y (along-track), km", "x (radial), km")
     assert [each.get_ylabel() for each in draw_control(scene).axes] == ["$u$, mm/s$^2$", "$|u|$, mm/s$^2$"]
     costates = draw_costates(scene).axes[0]
     pieces = [line for line in costates.get_lines() if len(line.get_xydata()) > 2]  # type: ignore[arg-type]
