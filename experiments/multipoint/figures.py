@@ -146,7 +146,7 @@ def _place_labels(panel: Axes, labels: list[Any], marks: Floats, line: Floats) -
     def penalty(box: Any) -> float:
         clashes = sum(box.overlaps(other) for other in taken) + _count_inside(box.padded(margin), marks)
         outside = not (frame.x0 <= box.x0 and box.x1 <= frame.x1 and frame.y0 <= box.y0 and box.y1 <= frame.y1)
-        return _OUTSIDE * outside + _CLASH * clashes + 3.0 * _count_inside(box, line)
+        return float(_OUTSIDE * outside + _CLASH * clashes + 3.0 * _count_inside(box, line))
 
     for label in labels:
         # Each position before the best one costs a point more than the one before it.
