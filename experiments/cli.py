@@ -148,9 +148,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except MemoryError:
         _complain("error: there is not enough memory to begin with; give it more")
         sys.exit(INPUT_ERROR)
-    except (SystemError, ImportError) as error:  # of Python itself, where memory ends and it does not say so
-        _complain(f"error: there is not enough memory, or the installation is damaged ({error}); give it more")
-        _leave(INPUT_ERROR)
     except SystemExit as left:
         if left.code == INPUT_ERROR:
             _leave(INPUT_ERROR)

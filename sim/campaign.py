@@ -109,7 +109,8 @@ class Campaign:
     noise : CampaignNoise or None
         None is the scenario's.
     strategy : Strategy or None
-        A strategy of your own; None is the scenario's. The manifest holds its name only.
+        A strategy of your own; None is the scenario's. The manifest holds its attribute `version`, if it has one, else
+        its name: a campaign is not resumed with another.
     guarantee : bool
         Whether the guaranteed model computes the guaranteed miss Phi, which doubles the run time.
     chunk : int or None
@@ -203,7 +204,7 @@ class Campaign:
             chunk=self._chunk_size(),
             seed=self.seed,
             noise=noise,
-            strategy=strategy_name(self.scenario, self.strategy),
+            strategy=getattr(self.strategy, "version", None) or strategy_name(self.scenario, self.strategy),
             guarantee=self.guarantee,
             versions=dict(calculating_versions()),
             axes=self.axes,

@@ -14,6 +14,7 @@ from experiments.campaigns.samples import heading, sample_json, samples, samples
 from experiments.common.errors import InputError
 from experiments.common.output import Output, output, to_json
 from experiments.common.screen import table_console
+from experiments.interception.choices import own_strategy
 from sim import Campaign, CampaignNoise, StoppingRule
 from sim.storage import need_arrow
 
@@ -34,6 +35,7 @@ def run(options: Options) -> None:
             options.out,
             seed=options.seed,
             noise=None if options.noise is None else CampaignNoise(options.noise),
+            strategy=own_strategy(options.strategy),
             guarantee=options.guarantee,
             chunk=options.chunk,
             until=_rule(options.until),

@@ -13,6 +13,7 @@ from experiments.campaigns.sweep_report import quantile_options, sweep_report
 from experiments.common.errors import InputError
 from experiments.common.output import Output, output, to_json
 from experiments.common.screen import say, table_console
+from experiments.interception.choices import own_strategy
 from sim import CampaignNoise, Sweep
 from sim.storage import need_arrow, need_free
 
@@ -38,6 +39,7 @@ def run(options: Options) -> None:
             options.out,
             seed=options.seed,
             noise=None if options.noise is None else CampaignNoise(options.noise),
+            strategy=own_strategy(options.strategy),
             guarantee=options.guarantee,
             chunk=options.chunk,
         )

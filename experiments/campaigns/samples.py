@@ -169,6 +169,9 @@ class WorstRun:
 
 def worst_runs(folder: CampaignFolder, scenario_file: Path) -> list[WorstRun]:
     """Return the runs of a campaign with the largest miss, the worst first."""
+    # The manifest's name of a strategy in a file: mine.py:Mine sha256:...
+    file, _, version = folder.manifest.strategy.rpartition(" sha256:")
+    own = f" --strategy {shlex.quote(file)}" if version and file else ""
     miss = folder.numbers("miss_m").data
     count = min(WORST, miss.size)
     places = np.argpartition(-miss, count - 1)[:count] if count else np.zeros(0, dtype=np.int64)
@@ -180,7 +183,7 @@ def worst_runs(folder: CampaignFolder, scenario_file: Path) -> list[WorstRun]:
             row["outcome"],
             row["miss_m"],
             row["impulse_m_s"],
-            replay_line(scenario_file, row["run"], folder.manifest.seed, row["noise"]),
+            replay_line(scenario_file, row["run"], folder.manifest.seed, row["noise"]) + own,
         )
         for row in folder.at(places.tolist())
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import importlib.util
 import os
 import sys
@@ -18,6 +19,8 @@ from guidance import Situation, Strategy
 from guidance.strategy import checked_impulses
 
 METHODS = ("start", "decide")
+_hashes: dict[Path, str] = {}
+"""Hash of each file as it was imported: like the modules themselves, one for the process."""
 
 
 def is_own_strategy(text: str) -> bool:
@@ -68,6 +71,14 @@ def load_strategy(text: str, option: str = "--strategy") -> Strategy:
         return _guarded(kind, module_file, option)
 
 
+def _load_same(text: str, option: str, version: str) -> Strategy:
+    """Load a strategy in another process; refuse a file that has changed since the first process imported it."""
+    strategy = load_strategy(text, option)
+    if strategy.version != version:  # type: ignore[attr-defined]
+        raise InputError(f"{option}: {text} has changed since the command started; run it again")
+    return strategy
+
+
 def _is_strategy(value: object) -> bool:
     return isinstance(value, type) and all(callable(getattr(value, method, None)) for method in METHODS)
 
@@ -80,6 +91,7 @@ def _imported(file: Path, option: str) -> ModuleType:
     other = importlib.util.find_spec(name) if name.isidentifier() else None
     if known is not None or "." in name or (other is not None and Path(other.origin or "").resolve() != file):
         raise InputError(f"{option}: {file.name} has the name of another Python module; rename the file")
+    content = file.read_bytes()
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None
@@ -88,6 +100,7 @@ def _imported(file: Path, option: str) -> ModuleType:
     try:
         with _reporting(file, option):
             spec.loader.exec_module(module)
+        _hashes[file] = hashlib.sha256(content).hexdigest()[:16]
     except BaseException:
         del sys.modules[name]
         raise
@@ -96,10 +109,14 @@ def _imported(file: Path, option: str) -> ModuleType:
 
 def _guarded(kind: Any, file: Path, option: str) -> Strategy:
     """Return a strategy of a subclass that reports the exceptions of the file, and is pickled by its path."""
+    if file not in _hashes:  # imported by other means than this module
+        _hashes[file] = hashlib.sha256(file.read_bytes()).hexdigest()[:16]
 
     class Guarded(kind):  # type: ignore[misc]
+        version = f"{file.name}:{kind.__name__} sha256:{_hashes[file]}"
+
         def __reduce__(self) -> tuple[Any, ...]:
-            return load_strategy, (f"{file}:{kind.__name__}", option)
+            return _load_same, (f"{file}:{kind.__name__}", option, self.version)
 
         def start(self, batch: int) -> Any:
             with _reporting(file, option):

@@ -82,7 +82,7 @@ class Manifest:
     noise : CampaignNoise
         Measurement noise of all cells.
     strategy : str
-        Its name; of a strategy file its name and a hash too.
+        Its name, and for a strategy in a Python file the hash of the file: `mine.py:Mine sha256:0123456789abcdef`.
     guarantee : bool
         Whether the guaranteed miss Phi was computed.
     chunk : int

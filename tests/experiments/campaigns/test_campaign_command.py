@@ -1,8 +1,11 @@
 from __future__ import annotations
 
+import hashlib
 import json
 import os
+import pickle
 import random
+import shlex
 import signal
 import subprocess
 import sys
@@ -17,6 +20,8 @@ import pytest
 from experiments.campaigns.flight import duration, size
 from experiments.campaigns.samples import replay_line
 from experiments.cli import main
+from experiments.common.errors import InputError
+from experiments.interception.own_strategy import load_strategy
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
 from guidance import NoiseKind
 from sim import Campaign, CampaignNoise, Scenario, fly_one
@@ -100,8 +105,6 @@ def test_a_stored_run_is_the_engagement_that_engage_flies(infoset: Infoset, file
     worst = json.loads(out)["worst"]
     assert [each["miss_m"] for each in worst] == sorted((each["miss_m"] for each in worst), reverse=True)
     assert len(worst) == 10
-    import shlex
-
     for each in worst[:3]:
         name, *arguments = shlex.split(each["replay"])
         assert name == "infoset"
@@ -134,6 +137,54 @@ def test_noise_model_strategy_tie_and_meter_are_the_options(infoset: Infoset, fi
     assert rows.column("miss_m").to_pylist()[3] == float(fly_one(flown, 3).result.miss_m[0])
     found = json.loads((tmp_path / "runs" / "summary.json").read_text())
     assert found["samples"][0]["phi_held"] == found["samples"][0]["phi_known"] == 8
+
+
+OWN = """
+import numpy as np
+class Half:
+    share = 0.5
+    def start(self, batch):
+        return None
+    def decide(self, situation, state):
+        return self.share * np.ones(len(situation.budget_left_m_s))
+"""
+
+
+@pytest.mark.parametrize("command", [["campaign"], ["sweep", "--vary", "thruster.budget_m_s=100:200:2"]])
+def test_a_strategy_of_a_file_in_threads_and_processes(
+    command: list[str], infoset: Infoset, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    module = f"half_{command[0]}"
+    (tmp_path / f"{module}.py").write_text(OWN)
+    asked = [*command, file, "--runs", 12, "--chunk", 4, "--strategy", f"{module}.py:Half", "-q"]
+    assert infoset(*asked, "--out", "threads") == (0, "", "")
+    assert infoset(*asked, "--out", "processes", "--processes", 2) == (0, "", "")
+    threads, processes = (CampaignFolder.read(tmp_path / name) for name in ("threads", "processes"))
+    assert threads.table().equals(processes.table())
+    digest = hashlib.sha256(OWN.encode()).hexdigest()[:16]
+    assert threads.manifest.strategy == f"{module}.py:Half sha256:{digest}"
+    if command == ["campaign"]:
+        _, out, _ = infoset("report", "threads", "--json", "-")
+        worst = json.loads(out)["worst"][0]
+        _, *arguments = shlex.split(worst["replay"])
+        assert json.loads(infoset(*arguments, "--json", "-")[1])["miss_m"] == worst["miss_m"]
+    (tmp_path / f"{module}.py").write_text(OWN.replace("0.5", "0.25"))
+    done = subprocess.run(
+        [sys.executable, "-m", "experiments", *map(str, asked), "--out", "threads", "--resume"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    here, now = (f'"{module}.py:Half sha256:{part}' for part in (f'{digest}" in the folder', ""))
+    assert f"strategy: {here}, {now}" in done.stderr
+    own = load_strategy(f"{module}.py:Half")
+    pickled = pickle.dumps(own)
+    del sys.modules[module]
+    with pytest.raises(InputError, match="has changed since the command started"):
+        pickle.loads(pickled)
 
 
 def test_until_stops_and_goes_on(infoset: Infoset, file: Path, tmp_path: Path) -> None:
