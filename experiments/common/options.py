@@ -38,6 +38,7 @@ Out = Annotated[
 Json = Annotated[
     Path | None, typer.Option("--json", metavar="FILE", help="Write results as JSON; - prints it alone on stdout.")
 ]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Csv = Annotated[
     Path | None, typer.Option("--csv", metavar="FILE", help="Write a table as CSV; - prints it alone on stdout.")
 ]

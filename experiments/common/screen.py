@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
+from experiments.common.errors import on_a_screen
+from experiments.common.output import to_json
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from sim import Results, Scenario
-
+BeginProgress = Callable[[str], Callable[[float], None]]
 NOT_FINITE = (
     "the numbers of the scenario are so large or so small that the results are not finite; "
     "check its units with: infoset scenarios check FILE"
 )
-PUBLISHED_PHI = "published Phi, no guarantee"
 
 
 def figure_files(*names: str) -> list[str]:
@@ -31,8 +32,6 @@ def figure_files(*names: str) -> list[str]:
 def say(message: str, quiet: bool) -> None:
     """Print a line beside the results, on stderr."""
     if not quiet:
-        from experiments.common.errors import on_a_screen
-
         typer.echo(on_a_screen(message), err=True)
 
 
@@ -43,7 +42,7 @@ def say_warnings(warnings: Iterable[str], quiet: bool) -> None:
 
 
 def table_console(stdout_taken: bool) -> Console:
-    """Return where tables go: stdout, or stderr where a file is printed on stdout."""
+    """Return the console for tables and lines: stdout, or stderr if a file is printed on stdout."""
     from rich.console import Console
 
     return Console(stderr=stdout_taken, highlight=False, markup=False, emoji=False)
@@ -128,18 +127,13 @@ def _stored(kernel: object) -> bool:
 
 
 @contextlib.contextmanager
-def progress_bar(quiet: bool) -> Iterator[Callable[[str], Callable[[float], None]]]:
-    """Show progress on stderr, where that is a terminal.
-
-    Parameters
-    ----------
-    quiet : bool
-        Whether to show nothing.
+def progress_bar(quiet: bool) -> Iterator[BeginProgress]:
+    """Show progress bars on stderr if that is a terminal.
 
     Yields
     ------
     callable
-        Begins a bar of a name; returns what is to be told the fraction done.
+        Starts a bar with a title and returns a function that sets the fraction done.
     """
     if quiet or not sys.stderr.isatty():
         yield lambda _name: lambda _done: None
@@ -164,51 +158,17 @@ def number(value: float | None) -> str:
     return f"{value:.1f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
-def need_finite(results: Results) -> None:
-    """Refuse results that overflowed, which no file and no figure can show.
+def show_built_in(rows: Sequence[Mapping[str, str]], json: bool, quiet: bool) -> None:
+    """Print the built-in scenarios or problems: as JSON, as names alone, or as a table."""
+    if json:
+        typer.echo(to_json(rows), nl=False)
+    elif quiet:
+        typer.echo("\n".join(row["name"] for row in rows))
+    else:
+        from rich.table import Column, Table
 
-    Parameters
-    ----------
-    results : Results
-
-    Raises
-    ------
-    InputError
-        If a miss or an impulse is no finite number.
-    """
-    import numpy as np
-
-    values = np.concatenate([results.miss_m, results.impulse_m_s, results.guaranteed_miss_m.filled(0.0)])
-    if not np.isfinite(values).all():
-        from experiments.common.errors import InputError
-
-        raise InputError(NOT_FINITE)
-
-
-def guaranteed_miss_name(model: str) -> str:
-    """Return what to call `guaranteed_miss_m` of a model: the paper's model guarantees nothing."""
-    return PUBLISHED_PHI if model == "paper" else "guaranteed miss"
-
-
-def allowance(scenario: Scenario) -> str | None:
-    """Return what the guaranteed model of a scenario allows for, as a line; None for the paper's model."""
-    from sim.gravity import on_board_model
-
-    model = on_board_model(scenario)
-    if not model.is_guaranteed:
-        return None
-    return (
-        f"the guaranteed model allows for {model.acceleration_m_s2:.5g} m/s^2 along z (manoeuvres "
-        f"{model.disturbance_m_s2:g}, gravity {model.gravity_m_s2:.2g}), a closing speed within "
-        f"{model.speed_error:.2%}, impulses within {model.execution_error_relative:.2%}"
-    )
-
-
-def certificate(results: Results) -> str:
-    """Return the certificate of a batch as a line: how often the truth was kept, and how often Phi held."""
-    kept = f"truth kept {int(results.truth_kept.sum())}/{len(results)}"
-    known = [each for each in results.phi_held.tolist() if each is not None]
-    if not known:
-        return kept
-    missing = f" ({len(results) - len(known)} without Phi)" if len(known) < len(results) else ""
-    return f"{kept}, Phi held {sum(known)}/{len(known)}{missing}"
+        *first, description = rows[0]
+        table = Table(*(Column(title, no_wrap=True) for title in first), description, box=None, pad_edge=False)
+        for row in rows:
+            table.add_row(*row.values())
+        table_console(False).print(table)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
@@ -42,4 +43,7 @@ TieName = Annotated[
 RangeMeter = Annotated[
     bool | None,
     typer.Option("--range-meter/--no-range-meter", help="Simulate with or without the scenario's range meter."),
+]
+RecordFile = Annotated[
+    Path | None, typer.Option("--record", metavar="FILE.npz", help="Write the record of the engagement.")
 ]

@@ -146,13 +146,21 @@ def test_experiment_prints_json_alone_and_the_table_beside_it(infoset: Command, 
 def test_table_of_the_experiment(infoset: Command, brief_file: Path, tmp_path: Path) -> None:
     code, out, _ = infoset("experiment", "--runs", 2)
     assert code == 0
-    for part in ("10%", "50%", "90%", "99%", "impulse, m/s", "published Phi, no guarantee, m", "  + range meter"):
+    for part in (
+        "10%",
+        "50%",
+        "90%",
+        "99%",
+        "impulse, m/s",
+        "the paper's Phi (not a bound here), m",
+        "  + range meter",
+    ):
         assert part in out
-    assert out.count("truth kept ") == 4
-    assert "Phi held" not in out
+    assert out.count("true state inside the set at every step: ") == 4
+    assert "miss within the bound Phi" not in out
     assert "paper, one run from z = -8 km, no range meter: random 4.3 m for 244.7 m/s, game 9.5 m for 521.7 m/s" in out
     assert names_in(tmp_path) == []
-    assert "paper" not in infoset("experiment", brief_file, "--runs", 1)[1]
+    assert "paper, one run" not in infoset("experiment", brief_file, "--runs", 1)[1]
 
 
 def test_quiet_experiment_prints_nothing(infoset: Command, brief_file: Path) -> None:
@@ -163,7 +171,7 @@ def test_without_a_range_sensor_there_are_two_curves_and_it_is_said(infoset: Com
     code, out, err = infoset("experiment", "asteroid-1997-single", "--runs", 1, "--json", "-")
     assert code == 0
     assert [curve["published_curve"] for curve in json.loads(out)["curves"]] == [1, 3]
-    assert "no [range_sensor]: there are curves 1 and 3 only" in err
+    assert "no [range_sensor]: curves 1 and 3 only" in err
 
 
 def test_warnings_are_said_and_written(infoset: Command, tmp_path: Path) -> None:
@@ -215,7 +223,7 @@ def test_a_run_of_the_experiment_is_the_same_engagement(infoset: Command) -> Non
 def test_the_guaranteed_model_shows_its_certificate(infoset: Command) -> None:
     code, out, _ = infoset("experiment", "--runs", 4, "--model", "guaranteed")
     assert code == 0
-    assert out.count("truth kept 4/4, Phi held 4/4") == 4
+    assert out.count("inside the set at every step: 4 of 4 runs; miss within the bound Phi: 4 of 4 runs") == 4
     assert "allows for 0.0050881" in out  # (0.005 + 3.9e-7) / (1 - 1 / 58)
     one = infoset.json("engage", "--model", "guaranteed", "--run", 3)
     assert one["phi_held"] is True
@@ -287,7 +295,7 @@ def test_engage_under_both_noises(infoset: Command, tmp_path: Path) -> None:
         "scenario.toml",
         "steps.csv",
     ]
-    for part in ("4.3", "244.7", "9.5", "521.7", "paper", "intercepted", "published Phi, no guarantee, m"):
+    for part in ("4.3", "244.7", "9.5", "521.7", "paper", "intercepted", "the paper's Phi (not a bound here), m"):
         assert part in out
     found = json.loads((folder / "results.json").read_text())
     assert [key for key in found if key in {"random", "game"}] == ["random", "game"]
@@ -318,9 +326,9 @@ def test_replay_of_one_record(infoset: Command, tmp_path: Path) -> None:
     code, out, err = infoset("replay", "a.npz")
     assert code == 0
     assert "asteroid-1997" in out
-    assert "--out DIR for the figures" in err
+    assert "--out DIR writes the figures" in err
     assert names_in(tmp_path) == ["a.npz"]
-    assert "one record or two" in infoset.refused("replay", "a.npz", "a.npz", "a.npz")
+    assert "one record, or two" in infoset.refused("replay", "a.npz", "a.npz", "a.npz")
     assert "there is no such file" in infoset.refused("replay", "b.npz", "--out", "out")
     assert names_in(tmp_path) == ["a.npz"]
 
@@ -328,19 +336,19 @@ def test_replay_of_one_record(infoset: Command, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
-        (["experiment", "--runs", "0"], ["--runs", "from 1 to 10000000", "found 0", "--runs 50"]),
-        (["experiment", "--runs", "-3"], ["--runs", "found -3"]),
-        (["experiment", "--runs", "10000001"], ["--runs", "found 10000001"]),
-        (["experiment", "--runs", "9" * 100], ["--runs", "more than 20 digits"]),
+        (["experiment", "--runs", "0"], ["--runs", "greater than or equal to 1"]),
+        (["experiment", "--runs", "-3"], ["--runs", "greater than or equal to 1"]),
+        (["experiment", "--runs", "10000001"], ["--runs", "less than or equal to 10000000"]),
+        (["experiment", "--runs", "9" * 100], ["--runs", "less than or equal to 10000000"]),
         (["experiment", "--seed", "-1"], ["--seed", "Input should be greater than or equal to 0"]),
         (["engage", "--seed", "-1"], ["--seed", "Input should be greater than or equal to 0"]),
-        (["engage", "--run", "-1"], ["--run", "from 0"]),
-        (["engage", "--run", "9" * 30], ["--run", "more than 20 digits"]),
+        (["engage", "--run", "-1"], ["--run", "greater than or equal to 0"]),
+        (["engage", "--run", "9" * 30], ["--run", "less than or equal to 9999999"]),
         (["experiment", "--strategy", "symetric-miss"], ["--strategy", "did you mean symmetric-miss?"]),
         (["experiment", "--strategy", "[red]"], ["--strategy", "[red]", "choose one of"]),
         (["engage", "--model", "papr"], ["--model", "'papr' is not one of 'paper', 'guaranteed'"]),
         (["engage", "--tie", "uper"], ["--tie", "'uper' is not one of 'upper', 'lower', 'alternate', 'random'"]),
-        (["engage", "--noise", "gmae"], ["--noise", "did you mean game?", "both"]),
+        (["engage", "--noise", "gmae"], ["--noise", "'gmae' is not one of 'random', 'game', 'both'"]),
         (["experiment", "--sections", "4"], ["--sections", "from 5", "fewest_sections", "found 4"]),
         (["experiment", "--sections", "100001"], ["--sections", "found 100001"]),
         (["engage", "asteroid-1997-single", "--range-meter"], ["--range-meter", "[range_sensor]", "relative_error"]),
@@ -363,8 +371,8 @@ def test_replay_of_one_record(infoset: Command, tmp_path: Path) -> None:
 def test_what_is_wrong_is_said_before_the_work(
     arguments: list[str], parts: list[str], infoset: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sim.simulate", lambda *_: pytest.fail("began to work"))
-    monkeypatch.setattr("sim.fly_one", lambda *_: pytest.fail("began to work"))
+    monkeypatch.setattr("experiments.interception.runs.shared.simulate", lambda *_: pytest.fail("began to work"))
+    monkeypatch.setattr("experiments.interception.runs.engage.fly_one", lambda *_: pytest.fail("began to work"))
     message = infoset.refused(*arguments)
     for part in parts:
         assert part in message
@@ -404,7 +412,7 @@ def test_a_folder_that_may_not_be_written_is_found_before_the_work(
     def refuse(*_: object, **__: object) -> None:  # chmod does not stop root
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("sim.simulate", lambda *_: pytest.fail("began to work"))
+    monkeypatch.setattr("experiments.interception.runs.shared.simulate", lambda *_: pytest.fail("began to work"))
     with monkeypatch.context() as patched:
         patched.setattr(Path, "mkdir", refuse)
         message = infoset.refused("experiment", "--out", "out")
@@ -479,7 +487,7 @@ def test_results_that_are_not_finite_are_refused(infoset: Command, monkeypatch: 
         results.miss_m[:] = math.inf
         return results
 
-    monkeypatch.setattr("sim.simulate", overflowing)
+    monkeypatch.setattr("experiments.interception.runs.shared.simulate", overflowing)
     assert "not finite" in infoset.refused("experiment", "--runs", 1)
 
 
@@ -487,7 +495,7 @@ def test_interrupted(infoset: Command, monkeypatch: pytest.MonkeyPatch, tmp_path
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sim.simulate", interrupt)
+    monkeypatch.setattr("experiments.interception.runs.shared.simulate", interrupt)
     code, out, err = infoset("experiment", "--out", "out")
     # Before it, perhaps, that kernels are compiled.
     assert (code, out, err.splitlines()[-1]) == (130, "", "interrupted")

@@ -65,7 +65,7 @@ def short_file(short: Scenario, tmp_path: Path, infoset: Infoset) -> Path:
 def test_bound_into_a_folder(infoset: Infoset, short: Scenario, short_file: Path, tmp_path: Path) -> None:
     folder = tmp_path / "results"
     code, out, err = infoset(short_file, "--out", folder, "--model", "guaranteed", "--budget", 8)
-    assert (code, err) == (0, "")
+    assert (code, err) == (0, f"wrote scenario.toml, results.json, figure-bound.pdf, figure-bound.png in {folder}\n")
     assert sorted(each.name for each in folder.iterdir()) == FILES
     found = json.loads((folder / "results.json").read_text())
     assert list(found) == KEYS
@@ -91,7 +91,7 @@ def test_bound_into_a_folder(infoset: Infoset, short: Scenario, short_file: Path
         assert all(all(flight["truth_kept"]) for flight in each["flights"])
         assert each["name"] in out
     assert f"no strategy can guarantee a miss below {found['lower_bound_m']:.3g} m" in out
-    for title in ("worst found", "closing speed", "alike until", "guaranteed", "outcome"):
+    for title in ("worst miss", "closing speed", "equal until", "guaranteed", "outcome"):
         assert title in out
 
 
@@ -120,7 +120,7 @@ def test_help_has_an_example(infoset: Infoset) -> None:
         (["asteroid-1996"], ["asteroid-1996", "did you mean"]),
         (["--strategies", "patent"], ["--strategies", "did you mean patient?"]),
         (["--strategies", "patient,patient"], ["named twice"]),
-        (["--budget", -1], ["--budget", "must be"]),
+        (["--budget", -1], ["--budget", "greater than or equal to 0"]),
         (["--model", "papr"], ["--model", "'papr' is not one of 'paper', 'guaranteed'"]),
         (["--json", "missing/x.json"], ["there is no folder missing"]),
         (["--out", "/dev/null"], ["is a file"]),
@@ -130,7 +130,9 @@ def test_help_has_an_example(infoset: Infoset) -> None:
 def test_what_is_wrong_is_said_before_the_work(
     arguments: list[str], parts: list[str], infoset: Infoset, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("sim.bound.lower_bound", lambda *_, **__: pytest.fail("began to work"))
+    monkeypatch.setattr(
+        "experiments.interception.runs.bound.lower_bound", lambda *_, **__: pytest.fail("began to work")
+    )
     code, out, err = infoset(*arguments)
     assert (code, out) == (2, "")
     assert err.startswith(("error: ", "Usage: "))
@@ -161,7 +163,7 @@ def test_a_program_without_a_solution_is_one_message(
     def fail(*_: object, **__: object) -> None:
         raise BoundError("label 1 m")
 
-    monkeypatch.setattr("sim.bound.lower_bound", fail)
+    monkeypatch.setattr("experiments.interception.runs.bound.lower_bound", fail)
     code, out, err = infoset(short_file)
     assert (code, out) == (2, "")
     assert err.startswith("error: short: a linear program of the bound has no solution (label 1 m)")

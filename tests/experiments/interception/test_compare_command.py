@@ -100,7 +100,7 @@ def test_what_is_said_is_told_apart_from_what_is_piped(infoset: Infoset, brief_f
 def test_the_table(infoset: Infoset) -> None:
     code, out, _ = infoset(*TWO, "--runs", 2, "--no-range-meter")
     assert code == 0
-    assert "asteroid-1997, without range meter, model paper, 2 runs" in out
+    assert "asteroid-1997, without range meter, model paper: quantiles of 2 runs" in out
     for part in ("10%", "50%", "99%", "worst", "symmetric-miss  miss, m", "impulse, m/s", "random", "game"):
         assert part in out
     assert max(len(line.rstrip()) for line in out.splitlines()[1:]) <= 80
@@ -137,7 +137,7 @@ def test_compare_into_a_folder(infoset: Infoset, brief_file: Path, tmp_path: Pat
         (["--strategies", "patient,,"], ["--strategies", "choose one of"]),
         (["--strategies", ""], ["--strategies", "choose one of"]),
         (["--strategies", "patient,patient"], ["patient is named twice"]),
-        (["--runs", "0"], ["--runs", "found 0"]),
+        (["--runs", "0"], ["--runs", "greater than or equal to 1"]),
         (["--seed", "-1"], ["--seed"]),
         (["--model", "papr"], ["--model", "'papr' is not one of 'paper', 'guaranteed'"]),
         (["asteroid-1996"], ["asteroid-1996", "did you mean"]),
@@ -149,7 +149,7 @@ def test_compare_into_a_folder(infoset: Infoset, brief_file: Path, tmp_path: Pat
 def test_what_is_wrong_is_said_before_the_work(
     arguments: list[str], parts: list[str], infoset: Infoset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sim.simulate", lambda *_: pytest.fail("began to work"))
+    monkeypatch.setattr("experiments.interception.runs.shared.simulate", lambda *_: pytest.fail("began to work"))
     code, out, err = infoset(*arguments)
     assert (code, out) == (2, "")
     assert err.startswith(("error: ", "Usage: "))
@@ -175,7 +175,7 @@ def test_interrupted(infoset: Infoset, monkeypatch: pytest.MonkeyPatch, tmp_path
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sim.simulate", interrupt)
+    monkeypatch.setattr("experiments.interception.runs.shared.simulate", interrupt)
     code, out, err = infoset("--out", "out")
     # Before it, perhaps, that kernels are compiled.
     assert (code, out, err.splitlines()[-1]) == (130, "", "interrupted")

@@ -1,0 +1,139 @@
+"""`infoset engage`: simulation, files and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from time import perf_counter
+
+from experiments.common.output import Cell, library_version, outcome_columns, output, to_csv, to_json
+from experiments.common.screen import figure_files, progress_bar, say_warnings, table_console, tell_of_compiling
+from experiments.interception.choices import own_strategy, scenario_with
+from experiments.interception.commands.engage import Engage
+from experiments.interception.record_file import record_path, write_record
+from experiments.interception.runs.engagement_table import FIGURE_2, FIGURE_3, draw_engagements, show_engagements
+from experiments.interception.runs.shared import need_finite, summary_head
+from experiments.interception.scenario_file import scenario_hash, scenario_to_toml, scenario_warnings
+from guidance import NoiseKind
+from infoset.sensors import SENSORS
+from sim import Inconsistency, Record, fly_one
+
+COLUMNS = (
+    *("noise", "step", "time_s", *(f"measured_{kind.quantity}" for kind in SENSORS)),
+    *("true_angle_rad", "true_rate_rad_s", "true_range_m", "impulse_m_s"),
+    *("predicted_miss_lower_m", "predicted_miss_upper_m", "truth_margin_m", "sections"),
+)
+
+
+def run(options: Engage) -> None:
+    """Simulate one or two engagements, write the files and print the table."""
+    scenario = scenario_with(
+        options.scenario,
+        strategy=options.strategy,
+        model=options.model,
+        tie=options.tie,
+        range_meter=options.range_meter,
+    )
+    own = own_strategy(options.strategy)
+    both = options.noise == "both"
+    noises = [*NoiseKind] if both else [NoiseKind(options.noise or scenario.noise)]
+    record_files = {}
+    if options.record is not None:
+        file = record_path("--record", options.record)
+        record_files = {
+            noise: file.with_name(f"{file.stem}-{noise.value}{file.suffix}") if both else file for noise in noises
+        }
+    folder_records = [f"record-{noise.value}.npz" for noise in noises]
+    files = {"--json": options.json, "--csv": options.csv}
+    with (
+        output(
+            folder=options.out,
+            names=(
+                *("scenario.toml", "results.json", "steps.csv"),
+                *(*folder_records, *figure_files(FIGURE_2, FIGURE_3)),
+            ),
+            files=files | {f"--record ({file.name})": file for file in record_files.values()},
+            overwrite=options.overwrite,
+            quiet=options.quiet,
+        ) as written,
+        progress_bar(options.quiet) as begin,
+    ):
+        say_warnings(scenario_warnings(scenario), options.quiet)
+        tell_of_compiling(options.quiet)
+        records, summaries = [], {}
+        for noise in noises:
+            began_s = perf_counter()
+            flown = replace(scenario, noise=noise)
+            record = fly_one(
+                flown, options.run, seed=options.seed, strategy=own, progress=begin(f"{noise.value} noise")
+            )
+            need_finite(record.result)
+            records.append(record)
+            summaries[noise.value] = {**summary_head(flown, own), **_summary(record, perf_counter() - began_s)}
+        head = {"version": library_version(), "scenario_hash": scenario_hash(scenario)}
+        summary = {**head, **summaries} if both else summaries[noises[0].value]
+        written.save("scenario.toml", scenario_to_toml(scenario if both else records[0].scenario))
+        written.save("results.json", to_json(summary), "--json")
+        written.save("steps.csv", to_csv(COLUMNS, _rows(records)), "--csv")
+        for record, name in zip(records, folder_records, strict=True):
+            targets = [record_files.get(record.scenario.noise), None if options.out is None else options.out / name]
+            for file in filter(None, targets):
+                write_record(record, file, overwrite=options.overwrite)
+                written.written.append(file)
+        draw_engagements(records, written)
+    if not options.quiet:
+        show_engagements(records, table_console(written.stdout_taken))
+
+
+def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
+    scenario, contradiction = record.scenario, record.inconsistency
+    return {
+        "seed": record.seed,
+        "run": record.run,
+        "runs": 1,
+        "elapsed_s": elapsed_s,
+        "published_curve": 1 + (scenario.range_sensor is not None) + 2 * (scenario.noise is NoiseKind.GAME),
+        "noise": scenario.noise.value,
+        "range_meter": scenario.range_sensor is not None,
+        **{name: values[0] for name, values in outcome_columns(record.result).items()},
+        "inconsistency": None if contradiction is None else _where(record, contradiction),
+        "steps": [
+            {
+                "time_s": step.time_s,
+                **{f"measured_{kind.quantity}": step.measured.get(kind.name) for kind in SENSORS},
+                "true_angle_rad": step.true_angle_rad,
+                "true_rate_rad_s": step.true_rate_rad_s,
+                "impulse_m_s": step.impulse_m_s,
+                "predicted_miss_m": None if step.predicted_miss_m is None else list(step.predicted_miss_m),
+                "sections": len(step.sections),
+                "truth_margin_m": step.truth_margin_m,
+            }
+            for step in record.steps
+        ],
+    }
+
+
+def _where(record: Record, contradiction: Inconsistency) -> dict[str, object]:
+    """Return the step and the label at which the measurements contradicted the model."""
+    step = contradiction.step
+    return {"step": step, "time_s": record.steps[step].time_s, "label_m": contradiction.label_m}
+
+
+def _rows(records: Sequence[Record]) -> list[list[Cell]]:
+    return [
+        [
+            record.scenario.noise.value,
+            number,
+            step.time_s,
+            *(step.measured.get(kind.name) for kind in SENSORS),
+            step.true_angle_rad,
+            step.true_rate_rad_s,
+            step.true_range_m,
+            step.impulse_m_s,
+            *(step.predicted_miss_m or (None, None)),
+            step.truth_margin_m,
+            len(step.sections),
+        ]
+        for record in records
+        for number, step in enumerate(record.steps)
+    ]

@@ -1,0 +1,79 @@
+"""Table and figures 2 and 3 of single engagements, for `engage` and `replay`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.table import Table
+
+from experiments.common.output import Output
+from experiments.common.screen import number, print_lines
+from experiments.interception.figures.process import draw_process
+from experiments.interception.figures.sets import draw_sets
+from experiments.interception.published import PRINTED_SINGLE_RUN, SINGLE
+from experiments.interception.runs.shared import allowance, bound_name
+from sim import Record
+
+FIGURE_2 = "figure-2-process"
+FIGURE_3 = "figure-3-sets"
+
+
+def show_engagements(records: Sequence[Record], console: Console) -> None:
+    """Print the results of engagements side by side, with the paper's for its scenario."""
+    bounds = sorted({bound_name(record.scenario).removesuffix(", m") for record in records})
+    columns = [
+        [
+            *("", "miss, m", "impulse, m/s", f"{' / '.join(bounds)}, m", "outcome"),
+            "true state inside the set\nat every step",
+            "smallest distance from the true\nstate to the set's boundary, m",
+            *("miss within the bound Phi", "steps", "seed, run", "strategy"),
+        ]
+    ]
+    for record in records:
+        result = record.result
+        meter = " + range meter" if record.scenario.range_sensor is not None else ""
+        columns.append(
+            [
+                f"{record.noise_name}{meter}",
+                number(float(result.miss_m[0])),
+                number(float(result.impulse_m_s[0])),
+                number(result.guaranteed_miss_m.tolist()[0]),
+                _outcome(record),
+                _yes(result.truth_kept.tolist()[0]),
+                number(result.truth_margin_m.tolist()[0]),
+                _yes(result.phi_held.tolist()[0]),
+                str(len(record.steps)),
+                f"{record.seed}, {record.run}",
+                record.strategy,
+            ]
+        )
+        paper = PRINTED_SINGLE_RUN.get(record.noise_name)
+        if record.scenario.name == SINGLE and record.scenario.range_sensor is None and paper is not None:
+            columns.append(["paper", number(paper[0]), number(paper[1]), *[""] * 8])
+    table = Table(columns[0][0], box=None, pad_edge=False)
+    for title, *_ in columns[1:]:
+        table.add_column(title, justify="right")
+    for row in list(zip(*columns, strict=True))[1:]:
+        table.add_row(*row)
+    print_lines(console, [" | ".join(dict.fromkeys(record.scenario.name for record in records))])
+    console.print(table)
+    print_lines(console, dict.fromkeys(filter(None, (allowance(record.scenario) for record in records))))
+
+
+def _yes(value: bool | None) -> str:
+    return "-" if value is None else "yes" if value else "no"
+
+
+def _outcome(record: Record) -> str:
+    outcome, contradiction = record.result.outcomes[0].value, record.inconsistency
+    if contradiction is None:
+        return outcome
+    return f"{outcome} at {record.steps[contradiction.step].time_s:g} s, label {contradiction.label_m / 1e3:.0f} km"
+
+
+def draw_engagements(records: Sequence[Record], written: Output) -> None:
+    """Draw figures 2 and 3 of one or two engagements into the folder, if there is one."""
+    if written.folder is not None:
+        written.figure(FIGURE_2, draw_process(records))
+        written.figure(FIGURE_3, draw_sets(records))

@@ -1,0 +1,144 @@
+"""`infoset experiment`: simulation, files and tables."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from time import perf_counter
+
+from rich.console import Console
+from rich.table import Table
+
+from experiments.common.output import outcome_columns, output, to_csv, to_json
+from experiments.common.screen import (
+    figure_files,
+    number,
+    print_lines,
+    progress_bar,
+    say,
+    say_warnings,
+    table_console,
+    tell_of_compiling,
+)
+from experiments.interception.choices import own_strategy, scenario_with
+from experiments.interception.commands.experiment import Experiment
+from experiments.interception.curves import Curve, curve_scenarios
+from experiments.interception.figures.distributions import draw_distributions
+from experiments.interception.published import MANY, PRINTED_SINGLE_RUN, SINGLE
+from experiments.interception.runs.shared import (
+    allowance,
+    bound_name,
+    certificate,
+    simulate_in_threads,
+    summary_head,
+)
+from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
+from infoset import Recovery
+from sim import Outcome, Scenario, quantiles
+
+FIGURE = "figure-4-distributions"
+LEVELS = (0.1, 0.5, 0.9, 0.99)
+
+
+def run(options: Experiment) -> None:
+    """Simulate the curves, write the files and print the table."""
+    scenario = scenario_with(
+        options.scenario,
+        strategy=options.strategy,
+        model=options.model,
+        tie=options.tie,
+        sections=options.sections,
+    )
+    own = own_strategy(options.strategy)
+    with (
+        output(
+            folder=options.out,
+            names=("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE)),
+            files={"--json": options.json, "--csv": options.csv},
+            overwrite=options.overwrite,
+            quiet=options.quiet,
+        ) as written,
+        progress_bar(options.quiet) as begin,
+    ):
+        say_warnings(scenario_warnings(scenario), options.quiet)
+        tell_of_compiling(options.quiet)
+        if scenario.range_sensor is None:
+            say(f"{scenario.name} has no [range_sensor]: curves 1 and 3 only", options.quiet)
+        began_s = perf_counter()
+        slowest_first = [
+            (curve, flown, f"curve {curve}: {flown.noise.value}{' + range meter' if flown.range_sensor else ''}")
+            for curve, flown in reversed(curve_scenarios(scenario))
+        ]
+        results = simulate_in_threads(
+            [(flown, own, begin(title)) for _, flown, title in slowest_first], options.runs, options.seed
+        )
+        elapsed_s = perf_counter() - began_s
+        curves = [
+            Curve(curve, flown.noise, flown.range_sensor is not None, result)
+            for (curve, flown, _), result in zip(slowest_first, results, strict=True)
+        ][::-1]
+        summary = {
+            **summary_head(scenario, own),
+            "seed": options.seed,
+            "runs": options.runs,
+            "elapsed_s": elapsed_s,
+            "curves": [{**_key(curve), **outcome_columns(curve.results)} for curve in curves],
+        }
+        written.save("scenario.toml", scenario_to_toml(scenario))
+        written.save("results.json", to_json(summary), "--json")
+        if written.wants("--csv"):
+            written.save("results.csv", _csv(curves), "--csv")
+        if options.out is not None:
+            written.figure(FIGURE, draw_distributions(curves))
+    if not options.quiet:
+        _show(table_console(written.stdout_taken), scenario, curves)
+
+
+def _key(curve: Curve) -> dict[str, int | str | bool]:
+    return {"published_curve": curve.number, "noise": curve.noise.value, "range_meter": curve.range_meter}
+
+
+def _csv(curves: Sequence[Curve]) -> str:
+    columns = [curve.results.to_dict() for curve in curves]
+    rows = [
+        [*_key(curve).values(), *values]
+        for curve, by_name in zip(curves, columns, strict=True)
+        for values in zip(*by_name.values(), strict=True)
+    ]
+    return to_csv((*_key(curves[0]), *columns[0]), rows)
+
+
+def _show(console: Console, scenario: Scenario, curves: Sequence[Curve]) -> None:
+    table = Table("curve", "quantity", box=None, pad_edge=False)
+    for level in LEVELS:
+        table.add_column(f"{level:.0%}", justify="right")
+    enlarged = scenario.set_model.recovery is Recovery.WIDENED
+    endings = {
+        Outcome.SET_LOST: f"the set became empty{'; it was enlarged and guidance continued' if enlarged else ''}",
+        Outcome.BUDGET_SPENT: "too little of the impulse budget was left",
+        Outcome.DIVERGED: "the closest approach was farther than the nominal range",
+    }
+    notes = []
+    for curve in curves:
+        results = curve.results
+        bounds = results.guaranteed_miss_m.compressed()
+        rows = (
+            (f"{curve.number} {curve.noise.value}", "miss, m", results.miss_m),
+            ("  + range meter" if curve.range_meter else "", "impulse, m/s", results.impulse_m_s),
+        )
+        for title, quantity, values in rows:
+            table.add_row(title, quantity, *(number(float(value)) for value in quantiles(values, LEVELS)))
+        median = number(float(quantiles(bounds, 0.5))) if len(bounds) else "-"
+        table.add_row("", bound_name(scenario), "", median)
+        counts = Counter(outcome for outcome in results.outcomes if outcome is not Outcome.INTERCEPTED)
+        lines = [f"in {count} runs {endings[outcome]} ({outcome.value})" for outcome, count in counts.items()]
+        notes.append(f"curve {curve.number}: " + "; ".join([certificate(results), *lines]))
+    if allowed := allowance(scenario):
+        notes.append(allowed)
+    if scenario.name in (MANY, SINGLE):
+        figures = ", ".join(f"{noise} {miss} m for {fuel} m/s" for noise, (miss, fuel) in PRINTED_SINGLE_RUN.items())
+        notes.append(f"paper, one run from z = -8 km, no range meter: {figures}")
+    runs = len(curves[0].results)
+    print_lines(console, [f"{scenario.name}: quantiles of {runs} runs per curve"])
+    console.print(table)
+    print_lines(console, notes)

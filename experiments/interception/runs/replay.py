@@ -1,0 +1,46 @@
+"""`infoset replay`: pages, animations, figures and tables of recorded engagements."""
+
+from __future__ import annotations
+
+from experiments.common.errors import InputError
+from experiments.common.output import output
+from experiments.common.screen import figure_files, progress_bar, say, table_console
+from experiments.interception.commands.replay import Replay
+from experiments.interception.figures.animation import GIF, MP4, animate, animation_path
+from experiments.interception.page import MOST_RECORDS, interception_page
+from experiments.interception.record_file import load_record
+from experiments.interception.runs.engagement_table import FIGURE_2, FIGURE_3, draw_engagements, show_engagements
+from experiments.interception.terminal.engagement import play
+
+
+def run(options: Replay) -> None:
+    """Read the records, write the files and print the table or the terminal replay."""
+    if len(options.records) > MOST_RECORDS:
+        raise InputError(f"replay shows one record, or two side by side; found {len(options.records)}: omit some")
+    animation_path("--gif", options.gif, GIF)
+    animation_path("--mp4", options.mp4, MP4)
+    files = {"--html": options.html, "--gif": options.gif, "--mp4": options.mp4}
+    with (
+        output(
+            folder=options.out,
+            names=figure_files(FIGURE_2, FIGURE_3),
+            files=files,
+            overwrite=options.overwrite,
+            quiet=options.quiet,
+        ) as written,
+        progress_bar(options.quiet) as begin,
+    ):
+        records = [load_record(file) for file in options.records]
+        if options.html is not None:
+            written.deliver("--html", interception_page(records))
+        for option, file in (("--gif", options.gif), ("--mp4", options.mp4)):
+            if file is not None:
+                written.deliver(option, animate(records, file.suffix, begin(file.name)))
+        draw_engagements(records, written)
+    console = table_console(False)
+    if options.terminal:
+        play(records, console, options.speed)
+    elif not options.quiet:
+        show_engagements(records, console)
+        if not written.written:
+            say("--html FILE.html writes an interactive page, --out DIR writes the figures", options.quiet)

@@ -1,0 +1,107 @@
+"""What the interception commands share: parallel simulation, the head of a summary, and lines about results."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from threading import Event
+
+import numpy as np
+
+from experiments.common.errors import InputError
+from experiments.common.output import library_version
+from experiments.common.screen import NOT_FINITE
+from experiments.interception.scenario_file import scenario_hash, scenario_warnings
+from guidance import Strategy
+from sim import Results, Scenario, simulate
+from sim.gravity import on_board_model
+from sim.scenario import strategy_name
+
+Progress = Callable[[float], None]
+
+
+def simulate_in_threads(
+    jobs: Sequence[tuple[Scenario, Strategy | None, Progress]], runs: int, seed: int
+) -> list[Results]:
+    """Simulate scenarios in parallel, one thread per core; the kernels release the interpreter lock.
+
+    Parameters
+    ----------
+    jobs : sequence
+        Scenario, own strategy and progress callback of each simulation, the slowest first.
+    runs, seed : int
+        As in `simulate`.
+
+    Raises
+    ------
+    InputError
+        If results are not finite.
+    """
+    stopped = Event()
+
+    def simulate_one(job: tuple[Scenario, Strategy | None, Progress]) -> Results:
+        scenario, own, report = job
+
+        def progress(share: float) -> None:
+            if stopped.is_set():
+                raise InterruptedError
+            report(share)
+
+        results = simulate(scenario, runs, seed=seed, strategy=own, progress=progress)
+        need_finite(results)
+        return results
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        try:
+            return list(pool.map(simulate_one, jobs))
+        except BaseException:
+            stopped.set()
+            raise
+
+
+def need_finite(results: Results) -> None:
+    """Raise `InputError` if results overflowed: no file and no figure can show them."""
+    values = np.concatenate([results.miss_m, results.impulse_m_s, results.guaranteed_miss_m.filled(0.0)])
+    if not np.isfinite(values).all():
+        raise InputError(NOT_FINITE)
+
+
+def summary_head(scenario: Scenario, own: Strategy | None = None) -> dict[str, object]:
+    """Return the first keys of a summary; ``strategy`` only if it is not the scenario's."""
+    warnings = scenario_warnings(scenario)
+    return {
+        "version": library_version(),
+        "scenario": scenario.name,
+        "scenario_hash": scenario_hash(scenario),
+        **({"warnings": warnings} if warnings else {}),
+        **({"strategy": strategy_name(scenario, own)} if own is not None else {}),
+    }
+
+
+def bound_name(scenario: Scenario) -> str:
+    """Return the table heading of `guaranteed_miss_m`, which is no bound in the model `paper`."""
+    return "guaranteed miss, m" if scenario.set_model.is_guaranteed else "the paper's Phi (not a bound here), m"
+
+
+def allowance(scenario: Scenario) -> str | None:
+    """Return a line with the disturbances that the guaranteed model allows for; None for the model `paper`."""
+    model = on_board_model(scenario)
+    if not model.is_guaranteed:
+        return None
+    return (
+        f"the guaranteed model allows for {model.acceleration_m_s2:.5g} m/s^2 along z (manoeuvres "
+        f"{model.disturbance_m_s2:g}, gravity {model.gravity_m_s2:.2g}), a closing speed within "
+        f"{model.speed_error:.2%}, impulses within {model.execution_error_relative:.2%}"
+    )
+
+
+def certificate(results: Results) -> str:
+    """Return a line with the numbers of runs that kept the true state, and of runs within the bound Phi."""
+    runs = len(results)
+    kept = f"true state inside the set at every step: {int(results.truth_kept.sum())} of {runs} runs"
+    held = results.phi_held.compressed()
+    if not len(held):
+        return kept
+    missing = f" ({runs - len(held)} without a bound)" if len(held) < runs else ""
+    return f"{kept}; miss within the bound Phi: {int(held.sum())} of {len(held)} runs{missing}"
