@@ -8,7 +8,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from rendezvous.piecewise import NODES, chebyshev_fit, chebyshev_points, resolve
+from rendezvous.piecewise import NODES, chebyshev_fit, chebyshev_halves, chebyshev_points, resolve
 
 Floats = NDArray[np.float64]
 
@@ -21,25 +21,15 @@ _MOST_HALVINGS = 40
 _AT_SQUARES = chebyshev.chebvander(chebyshev_points(_DEGREE + 1), NODES - 1)
 _FIT = chebyshev_fit(_DEGREE + 1)
 _AT_SAMPLES = chebyshev.chebvander(chebyshev_points(_SAMPLES), _DEGREE)
-_HALVES = [_FIT @ chebyshev.chebvander(0.5 * chebyshev_points(_DEGREE + 1) + middle, _DEGREE) for middle in (-0.5, 0.5)]
+_HALVES = chebyshev_halves(_DEGREE + 1)
 
 
 def greatest_control(control: Callable[[Floats], Floats], breaks_s: Floats) -> float:
-    """Return the greatest |u| of a control, m/s^2.
+    """Return the greatest |u| of a control, m/s^2, to 1e-9, relative.
 
-    Parameters
-    ----------
-    control : callable
-        u, shape (k, 3), m/s^2, at times of shape (k,), s; smooth between breaks, where it may jump.
-    breaks_s : ndarray, shape (P + 1,)
-        From the first time to the last, not decreasing, s; between two of them the motion turns by about a radian at
-        most (`LinearMotion.breaks`).
-
-    Returns
-    -------
-    float
-        Within 1e-9 of the greatest, relative; between short panels at late times within the effect of the rounding of
-        times.
+    `control` returns u, shape (k, 3), m/s^2, at k times, s. It is smooth between `breaks_s`, which do not decrease, and
+    its motion turns by about a radian at most between two of them (`LinearMotion.breaks`). Between short panels at late
+    times the error is the effect of the rounding of times.
 
     Raises
     ------

@@ -141,19 +141,10 @@ class _Gap:
 def free_space_capture(
     position_m: Floats, velocity_m_s: Floats, pursuer_m_s2: float, evader_m_s2: float
 ) -> LinearCapture | None:
-    """Solve the game of two constant accelerations without gravity.
+    """Solve the game of two constant accelerations without gravity; None if the evader escapes.
 
-    Parameters
-    ----------
-    position_m, velocity_m_s : ndarray, shape (3,)
-        The evader's, relative to the pursuer.
-    pursuer_m_s2, evader_m_s2 : float
-        Greatest accelerations.
-
-    Returns
-    -------
-    LinearCapture or None
-        None if the evader escapes: its acceleration is not the smaller one, and they are not on a collision course.
+    Position and velocity, shapes (3,), are the evader's, relative to the pursuer; the accelerations are the greatest
+    ones. The evader escapes if its acceleration is not the smaller one, and they are not on a collision course.
 
     Raises
     ------
@@ -184,19 +175,9 @@ def free_space_capture(
 def mass_loss_capture(
     position_m: Floats, velocity_m_s: Floats, pursuer: Thruster, evader: Thruster
 ) -> LinearCapture | None:
-    """Solve the game in free space with the loss of mass.
+    """Solve the game in free space with the loss of mass; None if a craft has burnt all its mass before a capture.
 
-    Parameters
-    ----------
-    position_m, velocity_m_s : ndarray, shape (3,)
-        The evader's, relative to the pursuer.
-    pursuer, evader : Thruster
-        At t = 0.
-
-    Returns
-    -------
-    LinearCapture or None
-        None if there is no capture before a craft has burnt all its mass.
+    Position and velocity, shapes (3,), are the evader's, relative to the pursuer; the thrusters are as at t = 0.
 
     Raises
     ------
@@ -235,23 +216,11 @@ def circular_orbit_capture(
     *,
     longest_s: float | None = None,
 ) -> LinearCapture | None:
-    """Solve the game of two constant accelerations about a circular orbit (Hill's frame).
+    """Solve the game of two constant accelerations about a circular orbit (Hill's frame); None if there is no capture.
 
-    Parameters
-    ----------
-    position_m, velocity_m_s : ndarray, shape (3,)
-        The evader's, relative to the pursuer: radial, along the motion, normal.
-    pursuer_m_s2, evader_m_s2 : float
-        Greatest accelerations.
-    rate_rad_s : float
-        Mean motion n.
-    longest_s : float or None, optional
-        End of the search; None searches 50 revolutions.
-
-    Returns
-    -------
-    LinearCapture or None
-        None if there is no capture by then, or the evader's acceleration is not the smaller one.
+    Position and velocity, shapes (3,), are the evader's, relative to the pursuer: radial, along the motion, normal. The
+    accelerations are the greatest ones, the rate is the mean motion. The search ends at `longest_s`, by default after
+    50 revolutions; there is no capture if the evader's acceleration is not the smaller one.
 
     Raises
     ------

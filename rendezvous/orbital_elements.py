@@ -13,16 +13,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class OrbitalElements:
-    """Elements of an ellipse, and the true anomaly of a point on it.
-
-    Parameters
-    ----------
-    semi_major_axis_m : float
-        a.
-    eccentricity : float
-        From 0, below 1.
-    inclination_rad, raan_rad, argument_of_perigee_rad, true_anomaly_rad : float
-        `raan` is the right ascension of the ascending node.
+    """Elements of an ellipse and the true anomaly; `raan` is the right ascension of the ascending node.
 
     Raises
     ------

@@ -29,19 +29,20 @@ def chebyshev_fit(count: int) -> Floats:
     return np.asarray(matrix)
 
 
+def chebyshev_halves(count: int) -> list[Floats]:
+    """Return the matrices that turn `count` Chebyshev coefficients on an interval into those on its two halves."""
+    points = chebyshev_points(count)
+    return [chebyshev_fit(count) @ chebyshev.chebvander(0.5 * points + middle, count - 1) for middle in (-0.5, 0.5)]
+
+
 _POINTS, _FIT = chebyshev_points(NODES), chebyshev_fit(NODES)
 
 
 @dataclass(frozen=True, eq=False)
 class Piecewise:
-    """Functions of time, each a polynomial of degree 11 on each panel.
+    """Functions of time, each a polynomial of degree 11 on each of P panels, which are in no order.
 
-    Parameters
-    ----------
-    starts_s, ends_s : ndarray, shape (P,)
-        Of the panels, in no order.
-    coefficients : ndarray, shape (P, 12, m)
-        Of Chebyshev polynomials of the position in the panel, -1 to 1.
+    The `coefficients`, shape (P, 12, m), are those of Chebyshev polynomials of the position in the panel, -1 to 1.
     """
 
     starts_s: Floats
@@ -52,12 +53,8 @@ class Piecewise:
 def resolve(function: Callable[[Floats], Floats], breaks_s: Floats) -> Piecewise:
     """Represent m functions of time, of similar magnitude, by polynomials on panels.
 
-    Parameters
-    ----------
-    function : callable
-        Values, shape (k, m), at times of shape (k,), s. They may jump at breaks, where they are not evaluated.
-    breaks_s : ndarray, shape (P + 1,)
-        Ends of the initial panels, not decreasing, s.
+    `function` returns values, shape (k, m), at k times, s. `breaks_s`, not decreasing, are the ends of the initial
+    panels; the functions may jump there and are not evaluated there.
 
     Raises
     ------

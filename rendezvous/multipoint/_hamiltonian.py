@@ -58,21 +58,9 @@ _step = step_of(_rates)
 
 @compiled
 def propagate(z: Floats, variations: Floats, duration: float) -> bool:
-    """Propagate (r, v, lambda_r, lambda_v, energy), and variations of all but the energy, in place.
+    """Propagate z = (r, v, lambda_r, lambda_v, energy), and variations of all but the energy, shape (12, m), in place.
 
-    Parameters
-    ----------
-    z : ndarray, shape (13,)
-        The state; the energy is int |u|^2 dt / 2.
-    variations : ndarray, shape (12, m)
-        Derivatives of z; m may be zero.
-    duration : float
-        In time units.
-
-    Returns
-    -------
-    bool
-        False if the trajectory falls into the centre or takes too many steps.
+    Returns whether the trajectory neither falls into the centre nor takes too many steps.
 
     Notes
     -----

@@ -63,29 +63,11 @@ def solve_path(
     before: Floats,
     at_start: Floats,
 ) -> tuple[bool, float]:
-    """Solve for the velocities at flybys and the costates.
+    """Solve for the velocities at flybys (in `begin`, `arrive`) and the costates `before` and `at_start` of N segments.
 
-    Parameters
-    ----------
-    transition, gramian : ndarray, shape (N, 6, 6)
-        Of the segments.
-    drift : ndarray, shape (N, 6)
-        Of the segments.
-    durations : ndarray, shape (N,)
-        Of the segments.
-    begin, arrive : ndarray, shape (N, 6)
-        States at both ends of each segment; velocities at flybys are filled in.
-    pinned : ndarray of bool, shape (N,)
-        Whether the velocity at the end is given.
-    before, at_start : ndarray, shape (N, 6)
-        Output: the costates at the end and at the start of each segment.
-
-    Returns
-    -------
-    solved : bool
-        False if a Gramian or a block is not positive definite; the outputs are then invalid.
-    cost : float
-        I.
+    Transitions, Gramians, drifts and durations are those of the segments, begin and arrive their states at both ends;
+    `pinned` says whether the velocity at the end is given. Returns whether all blocks are positive definite, and I;
+    otherwise the outputs are invalid.
 
     Notes
     -----

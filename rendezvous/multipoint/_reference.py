@@ -34,15 +34,7 @@ _POINTS, _WEIGHTS = _chebyshev()
 
 @dataclass(frozen=True, eq=False)
 class Panels:
-    """A function of time, by polynomials.
-
-    Parameters
-    ----------
-    breaks_s : ndarray, shape (P + 1,)
-        Ends of the panels.
-    values : ndarray, shape (P, 12, m)
-        At the Chebyshev points of each panel, both ends included.
-    """
+    """A function of time, by polynomials on P panels: `values`, shape (P, 12, m), at the Chebyshev points."""
 
     breaks_s: Floats
     values: Floats
@@ -62,17 +54,7 @@ class Panels:
 
 @dataclass(frozen=True, eq=False)
 class Reference(Panels):
-    """States as functions of time; coasting after the last panel.
-
-    Parameters
-    ----------
-    breaks_s : ndarray, shape (P + 1,)
-        Ends of the panels.
-    values : ndarray, shape (P, 12, 6)
-        States at the Chebyshev points of each panel, both ends included.
-    gravitational_parameter_m3_s2 : float
-        mu.
-    """
+    """States as functions of time; coasting after the last panel."""
 
     gravitational_parameter_m3_s2: float
 
@@ -121,13 +103,7 @@ class Reference(Panels):
 
 @dataclass(frozen=True, eq=False)
 class TracedPath(Path):
-    """A path with known states and costates at all times.
-
-    Parameters
-    ----------
-    trace : Panels
-        States and costates.
-    """
+    """A path with known states and costates at all times."""
 
     trace: Panels
 

@@ -30,23 +30,7 @@ _NONE: Floats = np.zeros((12, 0))
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Visits up to the next rendezvous, from a known state.
-
-    Parameters
-    ----------
-    start_s : float
-        Time of `start_state`.
-    start_state : ndarray, shape (6,)
-        m and m/s.
-    time_s : ndarray, shape (k,)
-        Of the visits.
-    goal : ndarray, shape (k, 6)
-        States of the targets.
-    rendezvous : bool
-        Whether the last visit is one.
-    gravitational_parameter_m3_s2 : float
-        mu.
-    """
+    """Visits up to the next rendezvous, from a known state; `goal`, shape (k, 6), contains the targets' states."""
 
     start_s: float
     start_state: Floats
@@ -105,15 +89,7 @@ def unknowns_of(path: Path, gravitational_parameter_m3_s2: float) -> list[Floats
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """A block's trajectory.
-
-    Parameters
-    ----------
-    block : Block
-        Its visits.
-    unknowns : ndarray, shape (3 + 3 k,)
-        lambda at the start, then the jumps at all nodes but the last; in units of the block.
-    """
+    """A block's trajectory: lambda at the start, then the jumps at all nodes but the last, in units of the block."""
 
     block: Block
     unknowns: Floats
@@ -157,17 +133,7 @@ class Shot:
 
 @dataclass(frozen=True, eq=False)
 class ShotPath:
-    """Trajectories that were shot, one after another, and the stays between them.
-
-    Parameters
-    ----------
-    nodes : Nodes
-        Of all blocks.
-    shots : tuple of Shot
-        One for each block of visits.
-    settle : callable
-        Makes a `Path` of this.
-    """
+    """Trajectories that were shot, one for each block, and the stays between them; `settle` makes a `Path`."""
 
     nodes: Nodes
     shots: tuple[Shot, ...]
@@ -211,19 +177,9 @@ class ShotPath:
 
 
 def shoot(block: Block, near: Floats | None = None) -> Shot | None:
-    """Find a block's trajectory by Newton's method, as the residual at the nodes is reduced in steps.
+    """Find a block's trajectory by Newton's method, as the residual at the nodes is reduced in steps; None if it fails.
 
-    Parameters
-    ----------
-    block : Block
-        Its visits.
-    near : ndarray, shape (3 + 3 k,), or None
-        Initial unknowns, of other times. If they fail, or with None, the initial trajectory is the coasting orbit.
-
-    Returns
-    -------
-    Shot or None
-        None if no trajectory is found.
+    The initial unknowns are `near`, of other times; if they fail, or with None, those of the coasting orbit.
     """
     coasting = np.zeros(3 + 3 * len(block.time_s))
     initials = [] if near is None else [(near, LEAST_STEP_FROM_NEAR)]

@@ -66,9 +66,9 @@ def solve_dense(motion: LinearMotion, start_s: float, start_state: Floats, nodes
         back = motion.transition(reach, sources[: row + 1])
         effect = motion.gramian(sources[: row + 1], reach) @ np.swapaxes(back, 1, 2)
         for target, block in ((matrix, effect[:, :3]), (by_velocity, effect[:, 3:])):
-            place = target[3 * row : 3 * row + 3]
-            place[:, :6] = block[0]
-            place[:, 6 : 6 + 3 * row] = np.swapaxes(block[1:, :, :3], 0, 1).reshape(3, 3 * row)
+            rows = target[3 * row : 3 * row + 3]
+            rows[:, :6] = block[0]
+            rows[:, 6 : 6 + 3 * row] = np.swapaxes(block[1:, :, :3], 0, 1).reshape(3, 3 * row)
         if row == count - 1:
             adjoint = np.swapaxes(back, 1, 2)
             matrix[-3:, :6] = adjoint[0, 3:]

@@ -57,18 +57,9 @@ class BestOrder:
 def best_order(
     tour: Visits, limits: TimeLimits, guesses: Sequence[Floats] = (), *, progress: Report | None = None
 ) -> BestOrder:
-    """Find the best order and the best times together.
+    """Find the best order of up to 9 targets of a `tour`, and the best times, within `limits`.
 
-    Parameters
-    ----------
-    tour : Visits
-        At most 9 targets.
-    limits : TimeLimits
-        Of the times.
-    guesses : sequence of ndarray, shape (n,)
-        Additional initial times, s, of any order.
-    progress : callable or None
-        Called with the share of orders that are decided.
+    `guesses` are additional initial times, s, of any order; `progress` is called with the share of orders decided.
 
     Raises
     ------
@@ -117,16 +108,9 @@ def best_order(
 
 
 def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | None = None) -> BestOrder:
-    """Find the best order for given times of the first, second and so on visit.
+    """Find the best order of up to 9 targets of a `tour` for increasing times of the first, second and so on visit.
 
-    Parameters
-    ----------
-    tour : Visits
-        At most 9 targets.
-    time_s : array_like, shape (n,)
-        Increasing.
-    progress : callable or None
-        Called with the share of orders that are decided.
+    `progress` is called with the share of orders decided.
 
     Raises
     ------
@@ -173,21 +157,7 @@ def best_times(
     *,
     progress: Report | None = None,
 ) -> BestTimes:
-    """Find the best times of one `order`, as `optimise_times`.
-
-    Parameters
-    ----------
-    tour : Visits
-        The targets.
-    order : sequence of int
-        Numbers of targets, first to last.
-    limits : TimeLimits
-        Of the times.
-    guesses : sequence of ndarray, shape (N,)
-        Additional initial times, s.
-    progress : callable or None
-        Called with the share of starts that are followed.
-    """
+    """Find the best times of one `order` of a `tour`; `limits`, `guesses` and `progress` as for `optimise_times`."""
     dwell = tour.dwell_s[list(order)]
     return optimise_times(tour.flyer(order), tour.start_s, dwell, limits, guesses, progress=progress)
 

@@ -32,7 +32,7 @@ _CLOCK = 1e-9
 
 
 class Effort(Enum):
-    """Effort of a search for best times: (its own starts, the number followed, relative tolerance)."""
+    """Effort of a search for best times: starts besides the guesses, starts that are followed, relative tolerance."""
 
     BOUND = (1, 1, 1e-5)
     """A bound of a partial order, from good times."""
@@ -43,20 +43,8 @@ class Effort(Enum):
     FINAL = (48, 6, 1e-9)
     """The final answer, to the last digits."""
 
-    @property
-    def spread(self) -> int:
-        """Number of starts besides the guesses."""
-        return int(self.value[0])
-
-    @property
-    def followed(self) -> int:
-        """Number of starts, the best ones, from which the objective is minimised."""
-        return int(self.value[1])
-
-    @property
-    def tolerance(self) -> float:
-        """Relative change of the objective at which a descent ends."""
-        return float(self.value[2])
+    def __init__(self, starts: int, followed: int, tolerance: float) -> None:
+        self.starts, self.followed, self.tolerance = starts, followed, tolerance
 
 
 @dataclass(frozen=True)
@@ -194,7 +182,7 @@ def optimise_times(
     enough: float = -np.inf,
     progress: Callable[[float], None] | None = None,
 ) -> BestTimes:
-    """Minimise the energy, or energy and price, over the times of visits in one order.
+    """Minimise the energy, or energy and price, over the times of N visits in one order.
 
     Parameters
     ----------
@@ -214,11 +202,6 @@ def optimise_times(
         Objective, m^2/s^3, below which a descent stops.
     progress : callable or None
         Called with the share of starts that are followed.
-
-    Returns
-    -------
-    BestTimes
-        The best local minimum found.
 
     Raises
     ------
@@ -241,7 +224,7 @@ def optimise_times(
     least = max(limits.least_gap_s, LEAST_SHARE * scale)
     trials = _Trials(fly, shifts, limits.price_per_s, least, total, scale)
     candidates = [np.diff(np.concatenate([[0.0], np.asarray(guess) - shifts])) for guess in guesses]
-    candidates += _spread(count, scale, least, bounded=np.isfinite(total), most=effort.spread)
+    candidates += _spread(count, scale, least, bounded=np.isfinite(total), most=effort.starts)
     sound = [gaps for gaps in candidates if (gaps >= least * (1 - 1e-9)).all() and gaps.sum() <= total * (1 + 1e-12)]
     starts = [trial for trial in map(trials.attempt, sound) if trial is not None]
     if not starts:

@@ -8,62 +8,42 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from rendezvous.piecewise import NODES, chebyshev_fit, chebyshev_points
+from rendezvous.piecewise import NODES, chebyshev_halves
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.intp]
 
-_PLACES, _WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.leggauss(NODES))
-_AT_PLACES = chebyshev.chebvander(_PLACES, NODES - 1)
-_HALVES = [
-    chebyshev_fit(NODES) @ chebyshev.chebvander(0.5 * chebyshev_points(NODES) + middle, NODES - 1)
-    for middle in (-0.5, 0.5)
-]
+POINTS, WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.leggauss(NODES))
+AT_POINTS = chebyshev.chebvander(POINTS, NODES - 1)
+_HALVES = chebyshev_halves(NODES)
 _LEAST_SHARE = 1e-3
-_OUTSIDE = float(1.0 - _PLACES[-1])
+_OUTSIDE = float(1.0 - POINTS[-1])
 _MOST_HALVINGS = 45
 
 
 @dataclass(frozen=True, eq=False)
 class SizeIntegral:
-    """The integral of |w| over panels.
+    """The integral of |w| over panels, with a bound on its error, and its nodes.
 
-    Parameters
-    ----------
-    value, error : float
-        The integral, and a bound on its error.
-    panel : ndarray of int, shape (n,)
-        Panels of the nodes.
-    place, weight : ndarray, shape (n,)
-        Position in the panel, -1 to 1, and weight, s, of the nodes.
-    vector : ndarray, shape (n, 3)
-        w at the nodes.
-    direction_error : float
-        A bound on the error of the integral of w / |w| at these nodes, s.
+    A node has a panel, a position in it (-1 to 1), a weight (s) and a vector w. `direction_error` (s) is a bound on the
+    error of the integral of w / |w| at these nodes.
     """
 
     value: float
     error: float
     panel: Integers
-    place: Floats
+    position: Floats
     weight: Floats
     vector: Floats
     direction_error: float
 
 
 def integrate_size(coefficients: Floats, half_s: Floats, tolerance: float, direction: float = np.inf) -> SizeIntegral:
-    """Integrate the magnitude of a vector that is a polynomial of degree 11 on each panel.
+    """Integrate the magnitude of a vector w that is a polynomial of degree 11 on each panel.
 
-    Parameters
-    ----------
-    coefficients : ndarray, shape (P, 12, 3)
-        Of Chebyshev polynomials.
-    half_s : ndarray, shape (P,)
-        Half the lengths of the panels, s.
-    tolerance : float
-        Relative, of the integral of |w|.
-    direction : float
-        Of the integral of w / |w|, relative to the time.
+    `coefficients`, shape (P, 12, 3), are those of Chebyshev polynomials, `half_s`, shape (P,), half the lengths of
+    panels. Tolerances are relative: `tolerance` of the integral of |w|, `direction` of the integral of w / |w|, to the
+    time.
 
     Notes
     -----
@@ -79,19 +59,19 @@ def integrate_size(coefficients: Floats, half_s: Floats, tolerance: float, direc
     accepted: list[tuple[Integers, Floats, Floats, Floats]] = []
     for level in range(_MOST_HALVINGS + 1):
         length = half_s[panel] * size
-        vectors = _AT_PLACES @ coefficients
+        vectors = AT_POINTS @ coefficients
         sizes, units = _polar(vectors)
-        whole, turned = length * (sizes @ _WEIGHTS), length[:, None] * np.einsum("k,nki->ni", _WEIGHTS, units)
+        whole, turned = length * (sizes @ WEIGHTS), length[:, None] * np.einsum("k,nki->ni", WEIGHTS, units)
         if scale is None:
             scale = float(whole.sum())
             if scale == 0.0:
                 return SizeIntegral(0.0, 0.0, panel[:0], middle[:0], middle[:0], np.zeros((0, 3)), 0.0)
         halves = [half @ coefficients for half in _HALVES]
-        halved = np.stack([_AT_PLACES @ half for half in halves], axis=1)
+        halved = np.stack([AT_POINTS @ half for half in halves], axis=1)
         sizes, units = _polar(halved)
-        parts = 0.5 * length * np.einsum("k,nhk->n", _WEIGHTS, sizes)
+        parts = 0.5 * length * np.einsum("k,nhk->n", WEIGHTS, sizes)
         apart = np.abs(parts - whole)
-        turn = 0.5 * length[:, None] * np.einsum("k,nhki->ni", _WEIGHTS, units) - turned
+        turn = 0.5 * length[:, None] * np.einsum("k,nhki->ni", WEIGHTS, units) - turned
         bent = np.linalg.norm(turn, axis=1)
         share = np.maximum(2.0 * length / total_s, _LEAST_SHARE)
         # The rules miss a turn between the last node and the end: its effect is bounded and added to the error.
@@ -103,11 +83,11 @@ def integrate_size(coefficients: Floats, half_s: Floats, tolerance: float, direc
         value += float(parts[done].sum())
         error += float(apart[done].sum())
         direction_error += float(bent[done].sum())
-        offsets = np.concatenate([0.5 * (_PLACES - 1.0), 0.5 * (_PLACES + 1.0)])
-        places = middle[done, None] + size[done, None] * offsets
-        weights = 0.5 * length[done, None] * np.tile(_WEIGHTS, 2)
+        offsets = np.concatenate([0.5 * (POINTS - 1.0), 0.5 * (POINTS + 1.0)])
+        positions = middle[done, None] + size[done, None] * offsets
+        weights = 0.5 * length[done, None] * np.tile(WEIGHTS, 2)
         accepted.append(
-            (np.repeat(panel[done], 2 * NODES), places.ravel(), weights.ravel(), halved[done].reshape(-1, 3))
+            (np.repeat(panel[done], 2 * NODES), positions.ravel(), weights.ravel(), halved[done].reshape(-1, 3))
         )
         if done.all():
             break

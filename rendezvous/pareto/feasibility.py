@@ -11,13 +11,12 @@ from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 
 from rendezvous.greatest_control import greatest_control
-from rendezvous.pareto._sizes import SizeIntegral, integrate_size
+from rendezvous.pareto._sizes import AT_POINTS, WEIGHTS, SizeIntegral, integrate_size
 from rendezvous.pareto.plan import Plan
 from rendezvous.piecewise import NODES, resolve
 
 Floats = NDArray[np.float64]
 
-_PLACES, _WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.leggauss(NODES))
 _IMPULSE = 1e-10
 _INTEGRAL, _DIRECTION, _GAP = 1e-10, 1e-9, 1e-6
 _MOST_STEPS = 60
@@ -47,10 +46,8 @@ class BoundCheck:
     ----------
     feasibility : Feasibility
         The verdict.
-    peak_m_s2 : float
-        Greatest |u| of the minimum-energy control.
-    least_peak_m_s2 : float
-        The least greatest |u| of any control of this meeting: a lower bound, to 1e-6.
+    peak_m_s2, least_peak_m_s2 : float
+        Greatest |u| of the minimum-energy control, and a lower bound of that of any control, to 1e-6.
     """
 
     feasibility: Feasibility
@@ -70,16 +67,7 @@ def total_impulse(plan: Plan) -> float:
 
 
 def check_bound(plan: Plan, greatest_m_s2: float, common: int = 6) -> BoundCheck:
-    """Compare a `plan` with a bound u_max > 0 on the control.
-
-    Parameters
-    ----------
-    plan : Plan
-        The minimum-energy flight.
-    greatest_m_s2 : float
-        u_max.
-    common : int
-        Number of components of the terminal state that must be met: 6, or 3 for an intercept.
+    """Compare a `plan` with a bound u_max on the control; `common` components, 6 or 3 (an intercept), must be met.
 
     Raises
     ------
@@ -103,24 +91,14 @@ def check_bound(plan: Plan, greatest_m_s2: float, common: int = 6) -> BoundCheck
 
 
 def least_peak(plan: Plan, common: int = 6) -> float:
-    """Return the least greatest |u| of a control with the effect of a `plan`, m/s^2.
+    """Return a lower bound, m/s^2, of the peak |u| of every control with the effect of a `plan` on `common` components.
 
-    Parameters
-    ----------
-    plan : Plan
-        Any flight with this effect.
-    common : int
-        Number of components of the terminal state that must be met: 6, or 3 for an intercept.
-
-    Returns
-    -------
-    float
-        A lower bound of every control's peak, m/s^2; a control exists whose peak is at most 1e-6 above it, relative.
+    A control exists whose peak is at most 1e-6 above it, relative. The common components are 6, or 3 for an intercept.
 
     Raises
     ------
     NotCertifiedError
-        If the two bounds differ by more.
+        If this precision is not reached.
 
     Notes
     -----
@@ -170,16 +148,9 @@ def least_peak(plan: Plan, common: int = 6) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Effect:
-    """E(t), the effect of a unit control at a time on the common components, whitened: int E E' dt = 1.
+    """E(t), the effect of a unit control at a time on the c common components, whitened: int E E' dt = 1.
 
-    Parameters
-    ----------
-    coefficients : ndarray, shape (P, 12, c, 3)
-        Of Chebyshev polynomials.
-    half_s : ndarray, shape (P,)
-        Half the lengths of the panels.
-    goal : ndarray, shape (c,)
-        e, the required effect.
+    Chebyshev `coefficients`, shape (P, 12, c, 3), on panels of half-lengths `half_s`; `goal` is e, the required effect.
     """
 
     coefficients: Floats
@@ -202,8 +173,8 @@ class _Effect:
         half = 0.5 * (pieces.ends_s - pieces.starts_s)
         coefficients = pieces.coefficients.reshape(len(half), NODES, common, 3)
         # Whitened again as represented: the rounding of the Gramian grows with its condition number.
-        at_nodes = np.einsum("kj,pjai->pkai", chebvander(_PLACES, NODES - 1), coefficients)
-        square = np.einsum("p,k,pkai,pkbi->ab", half, _WEIGHTS, at_nodes, at_nodes)
+        at_nodes = np.einsum("kj,pjai->pkai", AT_POINTS, coefficients)
+        square = np.einsum("p,k,pkai,pkbi->ab", half, WEIGHTS, at_nodes, at_nodes)
         again = np.linalg.inv(np.linalg.cholesky(square))
         goal = again @ (whiten @ (gramian @ plan.costate)[:common])
         return cls(np.einsum("ab,pjbi->pjai", again, coefficients), half, goal)
@@ -224,7 +195,9 @@ class _Effect:
         slope, bend = np.zeros(common), np.zeros((common, common))
         for first in range(0, len(at.weight), _AT_ONCE):
             part = slice(first, first + _AT_ONCE)
-            effect = np.einsum("nj,njai->nai", chebvander(at.place[part], NODES - 1), self.coefficients[at.panel[part]])
+            effect = np.einsum(
+                "nj,njai->nai", chebvander(at.position[part], NODES - 1), self.coefficients[at.panel[part]]
+            )
             sizes = np.linalg.norm(at.vector[part], axis=1)
             sizes = np.where(sizes > 0.0, sizes, np.inf)
             along = np.einsum("nai,ni->na", effect, at.vector[part] / sizes[:, None])

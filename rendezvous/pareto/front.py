@@ -88,36 +88,23 @@ def distances(solution: EncounterSolution) -> Floats:
 
 
 def front_of_two(distance: float, excess: ArrayLike) -> Floats:
-    """Return e_2, m^2/s^3, along the Pareto front of two: sqrt(e_1) + sqrt(e_2) = d_12.
+    """Return e_2, m^2/s^3, on the Pareto front of two craft: sqrt(e_1) + sqrt(e_2) = d_12.
 
-    Parameters
-    ----------
-    distance : float
-        d_12, m/s^1.5.
-    excess : array_like
-        e_1, from 0 to d_12^2, m^2/s^3.
+    `distance` is d_12, m/s^1.5, and `excess` is e_1, from 0 to d_12^2, m^2/s^3.
     """
     return np.asarray((distance - np.sqrt(np.asarray(excess, dtype=np.float64))) ** 2)
 
 
 def front_of_three(between: Floats, first: ArrayLike, second: ArrayLike) -> Floats:
-    """Return the third craft's excess e_3, m^2/s^3, on the Pareto front of three.
+    """Return e_3, m^2/s^3, on the Pareto front of three craft, at e_1 (`first`) and e_2 (`second`), m^2/s^3.
 
-    Parameters
-    ----------
-    between : ndarray, shape (3, 3)
-        d_ij, m/s^1.5; the first two ideals differ.
-    first, second : array_like
-        Excesses e_1 and e_2 of a point of the triangle of the ideals, m^2/s^3.
+    In a plane triangle with the sides d_ij (`between`, shape (3, 3), m/s^1.5) the distances of a point from two corners
+    give the third.
 
     Raises
     ------
     ValueError
         If the first two ideals coincide.
-
-    Notes
-    -----
-    In a plane triangle with sides d_ij, the distances of a point from two corners give the third.
     """
     e1, e2 = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
     base = between[0, 1]

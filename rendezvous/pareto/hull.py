@@ -12,19 +12,9 @@ _MOST_ROUNDS = 1000
 
 
 def nearest_in_hull(points: Floats, target: Floats) -> Floats:
-    """Return the point of a convex hull that is nearest to a target, as the weights of the points.
+    """Return the weights of `points`, shape (n, f), that give the point of their convex hull nearest to a `target`.
 
-    Parameters
-    ----------
-    points : ndarray, shape (n, f)
-        Their hull; distances are Euclidean.
-    target : ndarray, shape (f,)
-        Any point.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Not negative, of sum one; `weights @ points` is the nearest point.
+    The weights, shape (n,), are not negative and of sum one; distances are Euclidean.
 
     Notes
     -----

@@ -99,11 +99,11 @@ def least_greatest_excess(solution: EncounterSolution) -> Floats:
     def slopes(point: Floats) -> Floats:
         return np.asarray(2.0 * np.einsum("nab,nb->na", scaled, point - ideals))
 
-    begin = np.linalg.solve(scaled.sum(axis=0), np.einsum("nab,nb->a", scaled, ideals))
-    free = len(begin)
-    found = minimize(
+    initial = np.linalg.solve(scaled.sum(axis=0), np.einsum("nab,nb->a", scaled, ideals))
+    free = len(initial)
+    minimum = minimize(
         lambda x: x[-1],
-        np.append(begin, excess(begin).max()),
+        np.append(initial, excess(initial).max()),
         jac=lambda _: np.append(np.zeros(free), 1.0),
         constraints={
             "type": "ineq",
@@ -113,24 +113,14 @@ def least_greatest_excess(solution: EncounterSolution) -> Floats:
         method="SLSQP",
         options={"ftol": 1e-15, "maxiter": 200},
     )
-    best = _bound_craft(np.asarray(found.x[:-1]), excess, slopes, scaled)
+    best = _bound_craft(np.asarray(minimum.x[:-1]), excess, slopes, scaled)
     return np.asarray(middle + size * scale @ best)
 
 
 def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
-    """Return the Pareto-optimal meeting nearest to a preferred one.
+    """Return the Pareto-optimal free values of a `solution` nearest to `preferred` ones, shape (f,).
 
-    Parameters
-    ----------
-    solution : EncounterSolution
-        Of the encounter.
-    preferred : ndarray, shape (f,)
-        Free values.
-
-    Returns
-    -------
-    ndarray, shape (f,)
-        Free values, nearest in the norm of M; of the weighted mean of the M if they differ.
+    The norm is that of M; that of the weighted mean of the M if they differ.
 
     Raises
     ------
@@ -166,35 +156,35 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
         return preferred
     ideals /= size
 
-    def places(shares: Floats) -> Floats:
+    def points(shares: Floats) -> Floats:
         left = np.einsum("kn,nab->kab", shares, unit)
         right = np.einsum("kn,nab,nb->ka", shares, unit, ideals)
         return np.asarray(np.linalg.solve(left, right[..., None])[..., 0])
 
     def distance(shares: Floats) -> tuple[float, Floats]:
         shares = np.maximum(shares, 0.0)
-        point = places(shares[None])[0]
+        point = points(shares[None])[0]
         pull = np.linalg.solve(np.einsum("n,nab->ab", shares, unit), point)
         return float(point @ point), 2.0 * np.einsum("nab,nb,a->n", unit, ideals - point, pull)
 
     count = len(ideals)
     # If the shapes of the M differ much, shares of a millionth matter.
     wide = 10.0 ** (-6.0 * qmc.Halton(count, scramble=False).random(3 * _TRIED)[1:])
-    tried = np.concatenate([np.eye(count), np.full((1, count), 1.0 / count), simplex_weights(count, _TRIED), wide])
-    nearest = np.argsort((places(tried) ** 2).sum(axis=1), kind="stable")
-    shares, left = _least_share(distance, tried[nearest[0]]), np.inf
-    for begin in tried[nearest[1:_FOLLOWED]]:
-        other = _least_share(distance, begin)
+    candidates = np.concatenate([np.eye(count), np.full((1, count), 1.0 / count), simplex_weights(count, _TRIED), wide])
+    nearest = np.argsort((points(candidates) ** 2).sum(axis=1), kind="stable")
+    shares, left = _least_share(distance, candidates[nearest[0]]), np.inf
+    for candidate in candidates[nearest[1:_FOLLOWED]]:
+        other = _least_share(distance, candidate)
         shares = min(shares, other, key=lambda share: distance(share)[0])
     for _ in range(_MOST_ROUNDS):
         # The point depends on ratios of shares, so that zero is their only bound: if no change of a single share lowers
         # the distance, the conditions of the minimum hold.
         probes = _changed(shares)
-        squared = (places(probes) ** 2).sum(axis=1)
+        squared = (points(probes) ** 2).sum(axis=1)
         here = float(np.sqrt(distance(shares)[0]))
         left = here - float(np.sqrt(squared.min()))
         if left <= _NEAREST:
-            return np.asarray(preferred + size * back @ places(shares[None])[0])
+            return np.asarray(preferred + size * back @ points(shares[None])[0])
         shares = _least_share(distance, probes[squared.argmin()])
     raise NotOptimalError(
         "the Pareto-optimal meeting nearest to the preferred one was not found: one that is nearer by "
@@ -202,25 +192,25 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
     )
 
 
-def _least_share(distance: Callable[[Floats], tuple[float, Floats]], begin: Floats) -> Floats:
+def _least_share(distance: Callable[[Floats], tuple[float, Floats]], initial: Floats) -> Floats:
     """Shares of sum one, from initial ones, at which a squared distance is least."""
-    scale = np.maximum(begin / begin.sum(), 1e-6)
+    scale = np.maximum(initial / initial.sum(), 1e-6)
 
     def scaled(x: Floats) -> tuple[float, Floats]:
         squared, slopes = distance(x * scale)
         return squared, slopes * scale
 
-    found = minimize(
+    minimum = minimize(
         scaled,
-        begin / scale,
+        initial / scale,
         jac=True,
         bounds=[(0.0, 1.0 / size) for size in scale],
         constraints={"type": "eq", "fun": lambda x: x @ scale - 1.0, "jac": lambda _: scale},
         method="SLSQP",
         options={"ftol": 1e-16, "maxiter": 300},
     )
-    shares = np.maximum(found.x * scale, 0.0)
-    return np.asarray(shares / shares.sum() if np.isfinite(shares).all() and shares.sum() > 0.0 else begin)
+    shares = np.maximum(minimum.x * scale, 0.0)
+    return np.asarray(shares / shares.sum() if np.isfinite(shares).all() and shares.sum() > 0.0 else initial)
 
 
 def _changed(shares: Floats) -> Floats:

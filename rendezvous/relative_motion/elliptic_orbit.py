@@ -88,12 +88,6 @@ class EllipticOrbit:
             eccentric + 2.0 * np.arctan2(fraction * np.sin(eccentric), 1.0 - fraction * np.cos(eccentric))
         )
 
-    def rate(self, time_s: ArrayLike) -> Floats:
-        """Return the angular rate w of the radius vector, rad/s: k^2 (1 + e cos nu)^2."""
-        return np.asarray(
-            self.semi_latus_rate_rad_s * (1.0 + self.eccentricity * np.cos(self.true_anomaly(time_s))) ** 2
-        )
-
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """Return A(t) in axes of Hill, shape (..., 6, 6), for states in m and m/s.
 
