@@ -29,9 +29,9 @@ from rendezvous.reachability import (
     motion_of,
     solve,
 )
-from rendezvous.reachability.exact_check import rational_sets
 from rendezvous.reachability.problem import Block
 from rendezvous.relative_motion import EllipticOrbit
+from tests.rendezvous.reachability.rationals import rational_sets
 
 Floats = NDArray[np.float64]
 Check = Callable[[str, float, float, str], None]

@@ -23,7 +23,7 @@ _LONGEST_STEP, _SHORTEST_STEP = 0.3, 1e-6
 _PREDICTED_WITHIN = 3e-3
 
 MOST_WORK = 20_000.0
-"""Radians of extremals tried on the way, a pair of sides: 15 revolutions of 28 steps each; seconds."""
+"""Radians of extremals propagated for a pair of sides: 15 revolutions of 28 steps each; seconds."""
 
 
 class Ending(Enum):
@@ -79,7 +79,7 @@ def follow(pair: Pair, first: Node, radius: float, latest: float, most_work: flo
         step = left if step > 0.9 * left else step
         work += node.duration + step
         guess = _predicted(nodes, node.duration + step)
-        found = pair.solve(
+        after = pair.solve(
             guess,
             node.duration + step,
             node.distance - step * node.closing,
@@ -88,22 +88,22 @@ def follow(pair: Pair, first: Node, radius: float, latest: float, most_work: flo
             close=ROUGH,
         )
         # The error of a prediction of order two is as the cube of the step.
-        missed = math.inf if found is None else float(np.abs(found.vector - guess).max())
-        if found is None or not pair.is_sound(found) or missed > 8.0 * _PREDICTED_WITHIN:
+        missed = math.inf if after is None else float(np.abs(after.vector - guess).max())
+        if after is None or not pair.is_sound(after) or missed > 8.0 * _PREDICTED_WITHIN:
             if step < _SHORTEST_STEP:
                 return Branch(tuple(nodes), Ending.FOLD, work)
             step *= 0.4
             continue
-        at = first_crossing(node, found, radius)
+        at = first_crossing(node, after, radius)
         if at is not None:
             capture = polish(pair, _predicted(nodes, at), at, radius, latest)
-            if capture is not None and node.duration < capture.duration <= found.duration + _SHORTEST_STEP:
+            if capture is not None and node.duration < capture.duration <= after.duration + _SHORTEST_STEP:
                 return Branch((*nodes, capture), Ending.CAPTURE, work)
             if step < _SHORTEST_STEP:
                 return Branch(tuple(nodes), Ending.FOLD, work)
             step *= 0.4
             continue
-        nodes.append(found)
+        nodes.append(after)
         step = min(_LONGEST_STEP, step * min(2.0, 0.9 * (_PREDICTED_WITHIN / max(missed, 1e-12)) ** (1.0 / 3.0)))
     return Branch(tuple(nodes), Ending.WORK, work)
 
@@ -113,12 +113,12 @@ def polish(pair: Pair, guess: Floats, duration: float, radius: float, latest: fl
 
     None stands for a failure of Newton's method, or a residual above `MOST_RESIDUAL`.
     """
-    found = pair.solve(guess, duration, radius, time_free=True, tolerance=FINE, latest=latest)
-    if found is None:
+    rough = pair.solve(guess, duration, radius, time_free=True, tolerance=FINE, latest=latest)
+    if rough is None:
         return None
     # Once more, linearised at the solution itself: for its costates, curvature and residual.
     fine = pair.solve(
-        found.vector, found.duration, radius, time_free=True, tolerance=FINE, linear_tolerance=FINE, latest=latest
+        rough.vector, rough.duration, radius, time_free=True, tolerance=FINE, linear_tolerance=FINE, latest=latest
     )
     return fine if fine is not None and fine.residual < MOST_RESIDUAL else None
 
@@ -126,7 +126,7 @@ def polish(pair: Pair, guess: Floats, duration: float, radius: float, latest: fl
 def first_crossing(before: Node, after: Node, radius: float) -> float | None:
     """Return the time at which l first falls to a radius between two extremals, by the cubic through both, or None."""
     step = after.duration - before.duration
-    # Between its ends a cubic falls below the lower one by no more than 4/27 of what its slopes are worth.
+    # Between its ends a cubic falls below the lower one by at most 4/27 of its slopes times the step.
     dip = 4.0 / 27.0 * step * (abs(before.closing) + abs(after.closing))
     if min(before.distance, after.distance) - dip > radius:
         return None

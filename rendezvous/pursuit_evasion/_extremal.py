@@ -1,12 +1,12 @@
 """One craft's extremals, from the end of the game back to its start, with their variational equations: compiled.
 
-An extremal carries its craft as far along `nu` as it can by the time of the end. There its costate is (nu, 0), and
-going back it is the same flow for pursuer and evader: thrust along p_v, where p is the costate of the pursuer and the
-costate of the evader with its sign turned. So close to the end p_v / |p_v| is nu, and the flow is smooth to its end.
+An extremal takes its craft as far along `nu` as possible by the time of the end. There its costate is (nu, 0), and
+backward in time it is the same flow for pursuer and evader: thrust along p_v, where p is the costate of the pursuer and
+minus the costate of the evader. Near the end p_v / |p_v| is nu, and the flow is smooth up to the end.
 
 Wang's slides, "Optimal control", with k = +1 for the pursuer and -1 for the evader: u = k lambda_v / |lambda_v|,
-lambda_r' = (mu / r^3) lambda_v - 3 mu (lambda_v . r) r / r^5 (they lose '. r'), lambda_v' = -lambda_r; p = k lambda.
-That of the mass, lambda_m' = k |lambda_v| T / m^2 (they lose k), is not needed: both thrust fully all the time.
+lambda_r' = (mu / r^3) lambda_v - 3 mu (lambda_v . r) r / r^5 (they omit '. r'), lambda_v' = -lambda_r; p = k lambda.
+That of the mass, lambda_m' = k |lambda_v| T / m^2 (they omit k), is not needed: both thrust fully all the time.
 """
 
 from __future__ import annotations
@@ -84,30 +84,30 @@ _step = step_of(_rates)
 
 
 def flow_back(y: Floats, z: Floats | None, craft: Floats, begin: float, end: float, tolerance: float) -> bool:
-    """Carry a state and its variations back from time to go `begin` to `end`, in place.
+    """Integrate a state and its variations from time to go `begin` to `end`, in place; either may be the greater.
 
     Parameters
     ----------
     y : ndarray, shape (12,)
         Position, velocity, p_r, p_v.
     z : ndarray, shape (12, 9), or None
-        Their derivatives; None to carry y alone.
+        Their derivatives; None to integrate y alone.
     craft : ndarray, shape (5,)
         mu, oblateness, thrust, mass at the end of the game, mass flow.
     begin, end : float
-        Times to go; either may be the greater.
+        Times to go.
     tolerance : float
-        Of a step's error, relative and absolute, in y.
+        Tolerance of a step's error, relative and absolute, in y.
 
     Returns
     -------
     bool
-        False where the steps became too many or too small, or the numbers too great.
+        False where the steps are too many or too small, or a number overflows.
 
     Notes
     -----
-    Dormand and Prince's method of order 8 (SciPy's coefficients), with the error of y alone steering the steps. A step
-    costs 12 stages of some 0.3 us, or 0.1 us for y alone.
+    The Dormand-Prince method of order 8 (SciPy's coefficients); the error of y alone controls the steps. A step costs
+    12 stages of some 0.3 us, or 0.1 us for y alone.
     """
     if begin == end:
         return True
@@ -116,7 +116,7 @@ def flow_back(y: Floats, z: Floats | None, craft: Floats, begin: float, end: flo
 
 @compiled
 def flow_kernel(y: Floats, z: Floats, craft: Floats, begin: float, end: float, tolerance: float) -> bool:
-    """Do what `flow_back` does; z of no rows carries y alone."""
+    """Integrate as `flow_back` does; z of no rows integrates y alone."""
     ky, kz = np.empty((STAGES, STATES)), np.empty((STAGES, len(z), COLUMNS))
     y_next, z_next = np.empty_like(y), np.empty_like(z)
     parameters = craft, np.empty((3, 3)), np.empty((3, 3))
@@ -150,23 +150,10 @@ def flow_kernel(y: Floats, z: Floats, craft: Floats, begin: float, end: float, t
 def shoot_back(
     end_state: Floats, nu: Floats, plane: Floats, craft: Floats, duration: float, tolerance: float
 ) -> tuple[Floats, Floats] | None:
-    """Carry an extremal and its variations from its end to the start of the game.
+    """Return state and costate at the start of the game, shape (12,), and their derivatives, shape (12, 9), or None.
 
-    Parameters
-    ----------
-    end_state : ndarray, shape (6,)
-    nu : ndarray, shape (3,)
-    plane : ndarray, shape (2, 3)
-        Two directions that nu is varied along.
-    craft : ndarray, shape (5,)
-        As of `flow_back`.
-    duration, tolerance : float
-
-    Returns
-    -------
-    tuple of ndarray or None
-        State and costate at the start, shape (12,), and their derivatives, shape (12, 9), by end state, nu along the
-        two directions, and mass at the end. None where the propagation fails.
+    The derivatives are by end state, by nu along the two directions of `plane`, shape (2, 3), and by the mass at the
+    end. `craft` is that of `flow_back`. None stands for a failed propagation.
     """
     y, z = np.zeros(STATES), np.zeros((STATES, COLUMNS))
     y[:6], y[6:9] = end_state, nu
@@ -176,39 +163,16 @@ def shoot_back(
 
 
 def shoot_state_back(end_state: Floats, nu: Floats, craft: Floats, duration: float, tolerance: float) -> Floats | None:
-    """Carry an extremal alone from its end to the start of the game.
-
-    Parameters
-    ----------
-    end_state : ndarray, shape (6,)
-    nu : ndarray, shape (3,)
-    craft : ndarray, shape (5,)
-        As of `flow_back`.
-    duration, tolerance : float
-
-    Returns
-    -------
-    ndarray or None
-        State and costate at the start, shape (12,); None where the propagation fails.
-    """
+    """Return state and costate at the start of the game alone, shape (12,), or None; see `shoot_back`."""
     y = np.zeros(STATES)
     y[:6], y[6:9] = end_state, nu
     return y if flow_back(y, None, craft, 0.0, duration, tolerance) else None
 
 
 def rate(y: Floats, mu: float, oblateness: float, push: float) -> Floats:
-    """Rate of position and velocity at a state and costate, in time.
+    """Return the time derivative of position and velocity, shape (6,), at a state and costate, shape (12,).
 
-    Parameters
-    ----------
-    y : ndarray, shape (12,)
-    mu, oblateness : float
-    push : float
-        Acceleration of the thrust.
-
-    Returns
-    -------
-    ndarray, shape (6,)
+    `push` is the acceleration of the thrust.
     """
     out = np.empty(6)
     _rate(y, mu, oblateness, push, out)

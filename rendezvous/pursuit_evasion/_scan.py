@@ -56,7 +56,7 @@ class _End:
 
 
 def scan(pair: Pair, node: Node) -> Scan:
-    """Look in all directions, at the duration of an extremal, from its own outward.
+    """Look in all directions, at the duration of an extremal, from its direction outward.
 
     Notes
     -----
@@ -71,12 +71,12 @@ def scan(pair: Pair, node: Node) -> Scan:
     both = [i for i in range(len(grid)) if i in pursuer and i in evader]
     nu = grid[both]
     distance = np.array([grid[i] @ (evader[i].state - pursuer[i].state)[:3] for i in both])
-    found: list[Node] = []
+    peaks: list[Node] = []
     for index in _starts(nu, distance):
         peak = _climb(pair, pursuer[both[index]], evader[both[index]], node.duration)
-        if peak is not None and all(np.abs(peak.nu - each.nu).max() > 1e-3 for each in found):
-            found.append(peak)
-    return Scan(nu, distance, len(grid), tuple(sorted(found, key=lambda each: -each.distance)))
+        if peak is not None and all(np.abs(peak.nu - other.nu).max() > 1e-3 for other in peaks):
+            peaks.append(peak)
+    return Scan(nu, distance, len(grid), tuple(sorted(peaks, key=lambda peak: -peak.distance)))
 
 
 def greater(pair: Pair, node: Node) -> Node | None:

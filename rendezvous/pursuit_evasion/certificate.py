@@ -113,35 +113,35 @@ class Certificate:
     @property
     def failures(self) -> tuple[str, ...]:
         """Return the checks that failed, a phrase each."""
-        found = []
+        failures = []
         if not self.residual < MOST_RESIDUAL:
-            found.append(f"the residual is {self.residual:.1e}")
+            failures.append(f"the residual is {self.residual:.1e}")
         if not self.hamiltonian_drift < MOST_HAMILTONIAN_DRIFT:
-            found.append(f"the Hamiltonian drifts by {self.hamiltonian_drift:.1e}")
+            failures.append(f"the Hamiltonian drifts by {self.hamiltonian_drift:.1e}")
         if not self.integrator_gap_m < MOST_INTEGRATOR_GAP * self.unit_length_m:
-            found.append(f"a second integrator ends {self.integrator_gap_m:.3g} m away")
+            failures.append(f"a second integrator ends {self.integrator_gap_m:.3g} m away")
         if not self.closing_speed_m_s > 0.0:
-            found.append("the closing speed is not positive")
+            failures.append("the closing speed is not positive")
         if not self.least_curvature > 0.0:
-            found.append("a curvature is not positive")
+            failures.append("a curvature is not positive")
         if not self.no_conjugate_point:
-            found.append("an extremal has a conjugate point")
+            failures.append("an extremal has a conjugate point")
         if not self.no_earlier_capture:
-            found.append("earlier captures are not excluded")
+            failures.append("earlier captures are not excluded")
         if not self.above_the_planet:
-            found.append("a path goes through the planet")
+            failures.append("a path goes through the planet")
         if self.pursuer_alone_s is None:
-            found.append("the pursuer's deviation could not be followed")
+            failures.append("the pursuer's deviation could not be followed")
         elif self.pursuer_alone_s < self.capture_s - MOST_GAIN_S:
-            found.append(f"the pursuer alone captures at {self.pursuer_alone_s:.2f} s")
-        for each in self.evader_deviations:
-            if not each.conclusive:
-                found.append(f"the answer to {each.name} could not be followed")
-            elif each.capture_s is None or each.capture_s > self.capture_s + MOST_GAIN_S:
-                found.append(f"the evader gains by {each.name}")
+            failures.append(f"the pursuer alone captures at {self.pursuer_alone_s:.2f} s")
+        for deviation in self.evader_deviations:
+            if not deviation.conclusive:
+                failures.append(f"the answer to {deviation.name} could not be followed")
+            elif deviation.capture_s is None or deviation.capture_s > self.capture_s + MOST_GAIN_S:
+                failures.append(f"the evader gains by {deviation.name}")
         if self.greatest_excess_m is not None and self.greatest_excess_m > self.excess_tolerance_m:
-            found.append(f"another direction keeps the evader {self.greatest_excess_m:.3g} m away")
-        return tuple(found)
+            failures.append(f"another direction keeps the evader {self.greatest_excess_m:.3g} m away")
+        return tuple(failures)
 
     @property
     def excess_tolerance_m(self) -> float:
@@ -190,7 +190,7 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
     looked = scan(scaled.pair, node) if all_directions else None
     excess = None
     if looked is not None:
-        excess = max([float(looked.distance.max(initial=-np.inf)), *(each.distance for each in looked.maxima)]) - radius
+        excess = max([float(looked.distance.max(initial=-np.inf)), *(peak.distance for peak in looked.maxima)]) - radius
     return Certificate(
         residual=capture.residual,
         hamiltonian_drift=drift,
@@ -241,8 +241,8 @@ def _best_answer(
     pursuer: Side, evader: Side, radius: float, duration: float, left: float
 ) -> tuple[float | None, float]:
     """Return the earliest capture, the end of the game if there is none before it, or None if unknown."""
-    found, conclusive, left = _followed(pursuer, evader, radius, duration * _BEYOND, left)
-    return found if found is not None else duration if conclusive else None, left
+    capture, conclusive, left = _followed(pursuer, evader, radius, duration * _BEYOND, left)
+    return capture if capture is not None else duration if conclusive else None, left
 
 
 def _deviation(
@@ -252,8 +252,8 @@ def _deviation(
         path = steered_path(evader, policy.direction, duration * _BEYOND)
     except PathError:
         return Deviation(policy.value, None, False), left
-    found, conclusive, left = _followed(pursuer, KnownPath(path.state_at), radius, duration * _BEYOND, left)
-    return Deviation(policy.value, None if found is None else found * time_s, conclusive), left
+    capture, conclusive, left = _followed(pursuer, KnownPath(path.state_at), radius, duration * _BEYOND, left)
+    return Deviation(policy.value, None if capture is None else capture * time_s, conclusive), left
 
 
 def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float, float]:
@@ -288,7 +288,7 @@ def _integrator_gap(pursuer: Craft, evader: Craft, node: Node) -> float:
     """Integrate both forward from their start states and costates by a multistep method, and compare the ends."""
     gaps = []
     for craft, costate, end in zip((pursuer, evader), node.costates, (node.pursuer, node.evader), strict=True):
-        found = solve_ivp(
+        forward = solve_ivp(
             _forward_rates,
             (0.0, node.duration),
             np.concatenate([craft.start, costate]),
@@ -297,7 +297,7 @@ def _integrator_gap(pursuer: Craft, evader: Craft, node: Node) -> float:
             atol=_SECOND_TOLERANCE,
             args=(craft,),
         )
-        gaps.append(float(np.linalg.norm(found.y[:3, -1] - end[:3])))
+        gaps.append(float(np.linalg.norm(forward.y[:3, -1] - end[:3])))
     return max(gaps)
 
 

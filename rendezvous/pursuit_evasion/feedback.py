@@ -211,9 +211,9 @@ def fly_many(
     solution = solve(game) if solution is None else solution
     flights = []
     for run in range(runs):
-        own = np.random.SeedSequence(entropy=seed, spawn_key=(run, 0))
+        stream = np.random.SeedSequence(entropy=seed, spawn_key=(run, 0))
         flights.append(
-            fly(game, steering(run), replan_s=replan_s, observation=observation, seed=own, solution=solution)
+            fly(game, steering(run), replan_s=replan_s, observation=observation, seed=stream, solution=solution)
         )
         if progress is not None:
             progress((run + 1) / runs)
@@ -226,7 +226,7 @@ def capture_quantiles_s(flights: Sequence[Flight]) -> list[float]:
     The list is empty where none captured.
     """
     times = [flight.time_s for flight in flights if flight.ended is Ended.CAPTURED]
-    return [float(each) for each in np.quantile(times, _QUANTILES)] if times else []
+    return [float(time_s) for time_s in np.quantile(times, _QUANTILES)] if times else []
 
 
 class _Pursuit:
@@ -290,9 +290,9 @@ class _Pursuit:
         latest = min(_lasts(self._pursuer, self._dry[0]), _lasts(evader, self._dry[1]), _LONGEST)
         kept = replace(before, duration=before.duration - spell) if before.duration > spell else None
         if kept is not None:
-            found = pair.solve(kept.vector, kept.duration, self._radius, time_free=True, tolerance=FINE, latest=latest)
-            if found is not None and found.is_saddle and found.closing > 0.0:
-                return found
+            node = pair.solve(kept.vector, kept.duration, self._radius, time_free=True, tolerance=FINE, latest=latest)
+            if node is not None and node.is_saddle and node.closing > 0.0:
+                return node
         if float(np.linalg.norm(evader.start[:3] - self._pursuer.start[:3])) <= self._radius:
             return kept
         first = pair.begin(latest)

@@ -114,7 +114,7 @@ def capture_map(
         points, wrong = _row(grid.games(j), follow_all, int(_GOLDEN * CHECKED_EVERY * j))
         for i, point in enumerate(points):
             grid.put(j, i, point)
-        about_wrong = [each for i in wrong for each in grid.about(j, i)]
+        about_wrong = [point for i in wrong for point in grid.about(j, i)]
         grid.settle([*about_wrong, *((k, i) for i in grid.surprises(j) for k in (j, j - 1))])
         if progress is not None:
             progress((j + 1) / len(rows))
@@ -166,8 +166,8 @@ class _Grid:
 
     def about(self, j: int, i: int) -> list[tuple[int, int]]:
         """Return the four neighbours of a point."""
-        beside = ((j - 1, i), (j + 1, i), (j, i - 1), (j, i + 1))
-        return [(k, h) for k, h in beside if 0 <= k < len(self._rows) and 0 <= h < len(self._columns)]
+        neighbours = ((j - 1, i), (j + 1, i), (j, i - 1), (j, i + 1))
+        return [(k, h) for k, h in neighbours if 0 <= k < len(self._rows) and 0 <= h < len(self._columns)]
 
     def settle(self, doubted: list[tuple[int, int]]) -> None:
         """Solve points that came from neighbours from scratch; where the answer changes, their neighbours too."""

@@ -64,7 +64,7 @@ class ExtremalPath:
 
     def _carry(self, y: Floats, begin: float, end: float) -> None:
         if not flow_back(y, None, self.craft.kernel_craft(self.duration), begin, end, FINE):
-            raise PathError("an extremal that was found cannot be propagated")
+            raise PathError("an extremal cannot be propagated again")
 
 
 def extremal_paths(pursuer: Craft, evader: Craft, node: Node) -> tuple[ExtremalPath, ExtremalPath]:
@@ -105,16 +105,16 @@ def steered_path(craft: Craft, direction: Direction, duration: float) -> Steered
     -----
     SciPy's DOP853 to 1e-12: some 3 ms a revolution.
     """
-    asked = 0
+    calls = 0
 
     def counted(time: float, state: Floats) -> Floats:
-        nonlocal asked
-        asked += 1
-        if asked > _MOST_RATES:
+        nonlocal calls
+        calls += 1
+        if calls > _MOST_RATES:
             raise PathError("a steered path turns too fast to be followed")
         return _rates(time, state, craft, direction)
 
-    found = solve_ivp(
+    path = solve_ivp(
         counted,
         (0.0, duration),
         np.append(craft.start, craft.mass),
@@ -123,9 +123,9 @@ def steered_path(craft: Craft, direction: Direction, duration: float) -> Steered
         atol=_TOLERANCE,
         dense_output=True,
     )
-    if not found.success:
+    if not path.success:
         raise PathError("a steered path cannot be followed: it comes too near the planet's centre")
-    return SteeredPath(craft, direction, found.sol)
+    return SteeredPath(craft, direction, path.sol)
 
 
 def _rates(time: float, state: Floats, craft: Craft, direction: Direction) -> Floats:

@@ -135,7 +135,7 @@ def _capture(game: Game, units: Units, node: Node) -> Capture:
 
 
 def _by_another_route(game: Game) -> tuple[Capture | None, Route | None]:
-    """Return what the first route that leads anywhere finds, and which one it is."""
+    """Return the capture of the first route that succeeds, and that route."""
     for route, solved_by in ((Route.HOMOTOPY, solve_by_homotopy), (Route.LINEAR_GAME, solve_by_linear_game)):
         capture = solved_by(game)
         if capture is not None:

@@ -117,13 +117,13 @@ class ConeProgram:
         rows, limits = rows / sizes[:, None], limits / sizes
         scaled = ConeProgram(self.cost).meet(equal, levels).keep(rows, limits)
         equations = {"A_eq": equal, "b_eq": levels} if len(equal) else {}
-        found = linprog(
+        optimum = linprog(
             self.cost, A_ub=rows, b_ub=limits, bounds=(None, None), method="highs", options=HIGHS, **equations
         )
-        if found.status == 0:
-            point = np.asarray(found.x)
+        if optimum.status == 0:
+            point = np.asarray(optimum.x)
             try:
-                scaled.need_solution(point, -np.concatenate([found.eqlin.marginals, found.ineqlin.marginals]))
+                scaled.need_solution(point, -np.concatenate([optimum.eqlin.marginals, optimum.ineqlin.marginals]))
             except NoSolutionError:
                 pass
             else:

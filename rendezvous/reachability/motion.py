@@ -146,12 +146,12 @@ class NonlinearMotion:
         begin = np.concatenate([[float(self.orbit.true_anomaly(start_s))], initial.T.ravel()])
         if times[-1] == start_s:
             return np.repeat(initial[:, None, :], len(times), axis=1)
-        found = solve_ivp(
+        solution = solve_ivp(
             slope, (start_s, times[-1]), begin, method="DOP853", t_eval=times, rtol=_RELATIVE, atol=_ABSOLUTE
         )
-        if not found.success:
-            raise ArithmeticError(f"the motion could not be integrated: {found.message}")
-        return np.asarray(found.y[1:].reshape(6, count, len(times)).transpose(1, 2, 0))
+        if not solution.success:
+            raise ArithmeticError(f"the motion could not be integrated: {solution.message}")
+        return np.asarray(solution.y[1:].reshape(6, count, len(times)).transpose(1, 2, 0))
 
     def fly(self, start: ArrayLike, accelerations: ArrayLike, period_s: float, points: int = 1) -> Floats:
         """Return the states of craft that hold an acceleration during each period, shape (k, T points + 1, 6).
@@ -161,10 +161,10 @@ class NonlinearMotion:
         """
         push = np.asarray(accelerations, dtype=float)
         state = np.broadcast_to(np.asarray(start, dtype=float), (len(push), 6))
-        path = [state[:, None, :]]
+        legs = [state[:, None, :]]
         for t in range(push.shape[1]):
             times = period_s * (t + np.arange(1, points + 1) / points)
-            found = self.paths(period_s * t, state, push[:, t], times)
-            path.append(found)
-            state = found[:, -1]
-        return np.concatenate(path, axis=1)
+            leg = self.paths(period_s * t, state, push[:, t], times)
+            legs.append(leg)
+            state = leg[:, -1]
+        return np.concatenate(legs, axis=1)

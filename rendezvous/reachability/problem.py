@@ -97,14 +97,14 @@ class ReachabilityProblem:
         if self.control.ndim != 3 or not self.control.shape[2]:
             raise ValueError("B(t) must have the shape (T, n, m), m at least 1")
         m = self.control.shape[2]
-        wanted = {
+        arrays = {
             "A(t)": (self.transition, (periods, n, n)),
             "B(t)": (self.control, (periods, n, m)),
             "the initial state": (self.initial, (n,)),
             "the bounds on states": (self.state_bounds, (n,)),
             "the bounds on controls": (self.control_bounds, (m,)),
         }
-        for name, (array, shape) in wanted.items():
+        for name, (array, shape) in arrays.items():
             if array.shape != shape:
                 raise ValueError(f"{name} must have the shape {shape}, found {array.shape}")
             if not np.isfinite(array).all():

@@ -149,7 +149,7 @@ class _Program:
         self.periods, self.states, self.group = problem.periods, problem.states, problem.controls
         self.width = disturbance.shape[2]
         pairs = [(t, s) for t in range(self.periods) for s in range(t)]
-        self.gain_at = {pair: place for place, pair in enumerate(pairs)}
+        self.gain_at = {pair: index for index, pair in enumerate(pairs)}
         self.gains = self.periods * self.group  # index of the first
         self.begin = self.size = self.gains + len(pairs) * self.group * self.width
         self.rows: list[dict[int, float]] = []
@@ -186,26 +186,26 @@ class _Program:
         cost = np.zeros(self.size)
         cost[self.begin :] = _TIDY  # of equally good plans, the one with small gains
         cost[greatest] = 1.0
-        places = [(r, c, v) for r, entries in enumerate(self.rows) for c, v in entries.items()]
-        r, c, v = zip(*places, strict=True)
+        entries_at = [(r, c, v) for r, entries in enumerate(self.rows) for c, v in entries.items()]
+        r, c, v = zip(*entries_at, strict=True)
         matrix = coo_array((v, (r, c)), shape=(len(self.rows), self.size)).tocsr()
-        found = linprog(cost, A_ub=matrix, b_ub=self.limits, bounds=(None, None), method="highs-ipm", options=HIGHS)
-        if found.status == 2:
+        optimum = linprog(cost, A_ub=matrix, b_ub=self.limits, bounds=(None, None), method="highs-ipm", options=HIGHS)
+        if optimum.status == 2:
             raise NoRobustPlanError(
                 "no plan with feedback keeps the constraints under every disturbance; reduce the disturbance, "
                 "or relax the bounds"
             )
-        if found.status != 0:
-            raise ArithmeticError(f"HiGHS: {found.message}")
-        return self._plan(found.x)
+        if optimum.status != 0:
+            raise ArithmeticError(f"HiGHS: {optimum.message}")
+        return self._plan(optimum.x)
 
     def _plan(self, solution: Floats) -> FeedbackPlan:
         problem, reach = self.problem, self.problem.control_bounds
         nominal = solution[: self.gains].reshape(self.periods, self.group) * reach
         gains = np.zeros((self.periods, self.periods, self.group, self.width))
         block = self.group * self.width
-        for (t, s), place in self.gain_at.items():
-            start = self.gains + place * block
+        for (t, s), index in self.gain_at.items():
+            start = self.gains + index * block
             gains[t, s] = solution[start : start + block].reshape(self.group, self.width) * reach[:, None]
         centre = problem.run(nominal)
         # Effect of w(s) at t, directly and through the controls.
@@ -242,14 +242,14 @@ class _Program:
 
     def _absolute(self, entries: dict[int, float], constant: float) -> int:
         """A variable not below |entries + constant|."""
-        place = self._new()
-        self._add({**entries, place: -1.0}, -constant)
-        self._add({**{c: -v for c, v in entries.items()}, place: -1.0}, constant)
-        return place
+        index = self._new()
+        self._add({**entries, index: -1.0}, -constant)
+        self._add({**{c: -v for c, v in entries.items()}, index: -1.0}, constant)
+        return index
 
     def _spread(self, row: Floats, time: int) -> dict[int, float]:
         """Variables whose sum is how far disturbances move row . x(time)."""
-        places: dict[int, float] = {}
+        margins: dict[int, float] = {}
         turned = np.einsum("n,nsm->sm", row, self.response[time])
         for s in range(time):
             for q in range(self.width):
@@ -261,8 +261,8 @@ class _Program:
                 }
                 constant = float(row @ self.effect[time, s, :, q])
                 if entries or constant != 0.0:
-                    places[self._absolute(entries, constant)] = 1.0
-        return places
+                    margins[self._absolute(entries, constant)] = 1.0
+        return margins
 
     def _nominal(self, row: Floats, time: int) -> tuple[dict[int, float], float]:
         turned = np.einsum("n,nsm->sm", row, self.response[time]).ravel()

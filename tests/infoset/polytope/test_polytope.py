@@ -22,7 +22,7 @@ from infoset.polytope import (
     relative_interior,
     shadow,
 )
-from rendezvous.reachability.exact_check import rational_hull, rational_intersection
+from tests.rendezvous.reachability.rationals import rational_hull, rational_intersection
 
 needs_ppl = pytest.mark.skipif(find_spec("ppl") is None, reason="needs the extra exact: pip install '.[exact]'")
 

@@ -32,7 +32,8 @@ from rendezvous.reachability import (
     solve,
     vertices,
 )
-from rendezvous.reachability.exact_check import rational_sets
+
+from .rationals import rational_sets
 
 Floats = NDArray[np.float64]
 Paper = Callable[..., ReachabilityProblem]

@@ -1,18 +1,18 @@
-"""Sets in exact rational arithmetic, for checks; needs the extra `exact` (pplpy)."""
+"""Sets in exact rational arithmetic, by the Parma Polyhedra Library (pplpy)."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from math import lcm
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rendezvous.reachability.problem import Block
 
-if TYPE_CHECKING:
+with suppress(ModuleNotFoundError):  # tests that need it are skipped
     import ppl
 
 Floats = NDArray[np.float64]
@@ -43,8 +43,6 @@ class RationalSet:
 
 def rational_hull(points: Floats) -> RationalSet:
     """Return the exact convex hull of points, shape (k, n), by the double description of the library PPL."""
-    import ppl
-
     system = ppl.Generator_System()
     for point in points:
         numerators, divisor = _whole([Fraction(float(value)) for value in point])
@@ -54,11 +52,9 @@ def rational_hull(points: Floats) -> RationalSet:
 
 def rational_intersection(normals: Floats, offsets: Floats) -> RationalSet:
     """Return {x: normals x <= offsets}, exactly, for normals of shape (m, n)."""
-    import ppl
-
-    found = ppl.C_Polyhedron(normals.shape[1], "universe")
-    _cut(found, normals, offsets, range(normals.shape[1]))
-    return _rounded(found, normals.shape[1])
+    polyhedron = ppl.C_Polyhedron(normals.shape[1], "universe")
+    _cut(polyhedron, normals, offsets, range(normals.shape[1]))
+    return _rounded(polyhedron, normals.shape[1])
 
 
 def rational_sets(block: Block) -> tuple[list[RationalSet], list[RationalSet]]:
@@ -71,8 +67,6 @@ def rational_sets(block: Block) -> tuple[list[RationalSet], list[RationalSet]]:
     Forward: states, controls and next states as one polyhedron, projected on the last. Backward: projected on the
     first. No inverse of A, no rounding; numbers grow by some 50 binary digits a period.
     """
-    import ppl
-
     size, group = block.size, len(block.controls)
     current = ppl.C_Polyhedron(size, "universe")
     _fix(current, block.initial, range(size))
@@ -101,52 +95,42 @@ def rational_sets(block: Block) -> tuple[list[RationalSet], list[RationalSet]]:
 
 
 def _step(block: Block, period: int, before: int, after: int) -> ppl.C_Polyhedron:
-    """States (their first place: before), controls and next states (after) of a period, states unconstrained."""
-    import ppl
-
+    """States (first index: before), controls and next states (after) of a period, states unconstrained."""
     size, group = block.size, len(block.controls)
-    found = ppl.C_Polyhedron(2 * size + group, "universe")
+    polyhedron = ppl.C_Polyhedron(2 * size + group, "universe")
     for j in range(group):
-        found.add_constraint(ppl.Variable(before + size + j) <= 1)
-        found.add_constraint(ppl.Variable(before + size + j) >= -1)
+        polyhedron.add_constraint(ppl.Variable(before + size + j) <= 1)
+        polyhedron.add_constraint(ppl.Variable(before + size + j) >= -1)
     for i in range(size):
         row = np.concatenate([block.transition[period, i], block.control[period, i]])
         numerators, divisor = _whole([Fraction(float(value)) for value in row])
-        found.add_constraint(divisor * ppl.Variable(after + i) == _expression(numerators, before))
-    return found
+        polyhedron.add_constraint(divisor * ppl.Variable(after + i) == _expression(numerators, before))
+    return polyhedron
 
 
-def _widened(given: ppl.C_Polyhedron, before: int, after: int) -> ppl.C_Polyhedron:
-    """The same set with more, free coordinates before and after its own."""
-    import ppl
-
-    found = ppl.C_Polyhedron(before, "universe")
-    found.concatenate_assign(given)
-    found.add_space_dimensions_and_embed(after)
-    return found
+def _widened(inner: ppl.C_Polyhedron, before: int, after: int) -> ppl.C_Polyhedron:
+    """The set with more, free coordinates before and after its own."""
+    polyhedron = ppl.C_Polyhedron(before, "universe")
+    polyhedron.concatenate_assign(inner)
+    polyhedron.add_space_dimensions_and_embed(after)
+    return polyhedron
 
 
-def _cut(polyhedron: ppl.C_Polyhedron, normals: Floats, offsets: Floats, places: range) -> None:
-    import ppl
-
+def _cut(polyhedron: ppl.C_Polyhedron, normals: Floats, offsets: Floats, axes: range) -> None:
     for normal, offset in zip(normals, offsets, strict=True):
         if np.isfinite(offset):
             numerators, _ = _whole([Fraction(float(value)) for value in (*normal, offset)])
-            total = sum((n * ppl.Variable(place) for n, place in zip(numerators, places, strict=False)), start=0)
+            total = sum((n * ppl.Variable(axis) for n, axis in zip(numerators, axes, strict=False)), start=0)
             polyhedron.add_constraint(total <= numerators[-1])
 
 
-def _fix(polyhedron: ppl.C_Polyhedron, state: Floats, places: range) -> None:
-    import ppl
-
-    for value, place in zip(state, places, strict=True):
+def _fix(polyhedron: ppl.C_Polyhedron, state: Floats, axes: range) -> None:
+    for value, axis in zip(state, axes, strict=True):
         exact = Fraction(float(value))
-        polyhedron.add_constraint(exact.denominator * ppl.Variable(place) == exact.numerator)
+        polyhedron.add_constraint(exact.denominator * ppl.Variable(axis) == exact.numerator)
 
 
 def _rounded(polyhedron: ppl.C_Polyhedron, size: int) -> RationalSet:
-    import ppl
-
     if polyhedron.is_empty():
         return RationalSet(np.zeros((0, size)), 0, -1, np.zeros((size, 2)))
     points = [
@@ -166,7 +150,5 @@ def _whole(values: Rationals) -> tuple[list[int], int]:
 
 
 def _expression(numerators: list[int], first: int = 0) -> ppl.Linear_Expression:
-    import ppl
-
-    terms = (n * ppl.Variable(first + place) for place, n in enumerate(numerators))
+    terms = (n * ppl.Variable(first + axis) for axis, n in enumerate(numerators))
     return sum(terms, start=ppl.Linear_Expression(0))
