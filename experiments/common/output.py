@@ -7,7 +7,6 @@ import csv
 import io
 import json
 import os
-import secrets
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 from enum import Enum
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from experiments.common.errors import InputError, on_a_screen
+from sim.storage.files import replace_file, temporary_beside
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -215,7 +215,7 @@ def check_file(file: Path, *, overwrite: bool = False) -> None:
     """
     with _said(file):
         _check_name(file, overwrite)
-        probe = _temporary(file)
+        probe = temporary_beside(file)
         with probe.open("x"):
             pass
         probe.unlink()
@@ -239,14 +239,7 @@ def write_file(file: Path, content: str | bytes, *, overwrite: bool = False) -> 
     """
     with _said(file):
         _check_name(file, overwrite)
-        temporary = _temporary(file)
-        try:
-            with temporary.open("xb") as stream:
-                stream.write(content.encode() if isinstance(content, str) else content)
-            temporary.replace(file)
-        finally:
-            with contextlib.suppress(OSError, ValueError):
-                temporary.unlink(missing_ok=True)
+        replace_file(file, content.encode() if isinstance(content, str) else content)
 
 
 def deliver(destination: Path | None, text: str, *, overwrite: bool) -> None:
@@ -385,7 +378,7 @@ def _check_folder(folder: Path, overwrite: bool) -> list[Path]:
                 raise InputError(
                     f"{folder}: is not empty; choose another folder, or give --overwrite to replace files in it"
                 )
-            probe = _temporary(folder / "probe")
+            probe = temporary_beside(folder / "probe")
             with probe.open("x"):
                 pass
             probe.unlink()
@@ -395,11 +388,6 @@ def _check_folder(folder: Path, overwrite: bool) -> list[Path]:
                 each.rmdir()
         raise
     return made
-
-
-def _temporary(file: Path) -> Path:
-    """Return a short name in the same folder that nobody else has."""
-    return file.parent / f".infoset-{os.getpid()}-{secrets.token_hex(4)}.tmp"
 
 
 def _resolved(path: Path) -> Path:
