@@ -17,7 +17,7 @@ from scipy.optimize import linprog
 from benchmarks.conftest import LINES
 from experiments.reachability.file import load_rendezvous
 from experiments.reachability.printed_tables import compare_published
-from experiments.reachability.report import SINGLE, make_report, report_json
+from experiments.reachability.report import SINGLE, Request, make_report, report_json
 from infoset.polytope import Polytope, cut
 from rendezvous.reachability import (
     Budget,
@@ -60,7 +60,7 @@ def paper(periods: int) -> ReachabilityProblem:
 def test_the_papers_case_with_everything_it_prints(under: Check) -> None:
     def work() -> None:
         given = load_rendezvous("rendezvous-2021")
-        report = make_report(given, [*SINGLE])
+        report = make_report(given, Request([*SINGLE]))
         report_json(report)
         [each.rows for each in compare_published(given, report.solution)]
 

@@ -38,7 +38,7 @@ LINE_LOOKS: tuple[dict[str, Any], ...] = (
     {"color": TRUTH, "linestyle": "-", "marker": "o"},
     {"color": MEASURED, "linestyle": (0, (5, 1.5)), "marker": "s"},
     {"color": "#7f2704", "linestyle": (0, (1.2, 1.0)), "marker": "^"},
-    {"color": "#5a9bd4", "linestyle": (0, (5, 1, 1, 1)), "marker": "D"},
+    {"color": "#2f6b3a", "linestyle": (0, (5, 1, 1, 1)), "marker": "D"},
     {"color": "#4d4d4d", "linestyle": (0, (3, 1, 1, 1, 1, 1)), "marker": "v"},
 )
 """Lines and marks that stay apart in grey, for craft, optimal controls and components."""

@@ -83,7 +83,7 @@ def draw_path(scene: Scene) -> Figure:
             panel.apply_aspect()
         _mark_visits(panel, scene, positions[:, [across, up]], scene.path.arrival_states[:, [across, up]] * per_m)
         panel.set(xlabel=f"{labels[across]}, {name}", ylabel=f"{labels[up]}, {name}")
-        panel.set_title(f"({letter}) {'equal' if equal else 'different'} scales", loc="left")
+        panel.set_title(f"({letter}) axes with {'equal' if equal else 'different'} scales", loc="left")
     legend: dict[str, Any] = {"handlelength": 2.0, "columnspacing": 1.3, "fontsize": 7.0}
     figure.legend(handles=_path_handles(scene), loc="lower center", ncols=7, **legend)
     return figure

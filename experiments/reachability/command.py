@@ -8,11 +8,11 @@ from typing import Annotated, Literal
 import typer
 
 from experiments.common.command import command
-from experiments.common.options import Html, Json, Out, Overwrite, ProblemName, Quiet, Seed
+from experiments.common.options import FileOptions, Html, ProblemName, Seed
 
 
 @dataclass(frozen=True)
-class Reach:
+class Reach(FileOptions):
     """Compute all optimal controls of a rendezvous under constraints, and its reachable sets.
 
     The results are the least terminal norm, the forward sets, the tube of all optimal trajectories, and the set of
@@ -42,11 +42,7 @@ class Reach:
         typer.Option(min=0, max=1000, help="Number of simulations with navigation errors, if the problem has them."),
     ] = 10
     seed: Seed = 0
-    out: Out = None
-    json: Json = None
     html: Html = None
-    overwrite: Overwrite = False
-    quiet: Quiet = False
 
 
 @command

@@ -1,10 +1,10 @@
-"""Problem files of kind `reachable-rendezvous`: their tables, and the problem of the core that they describe."""
+"""Problem files of kind `reachable-rendezvous`: tables, checks, and the problem in SI."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property
 from typing import Annotated
@@ -20,6 +20,7 @@ from experiments.common.toml_values import (
     KILO,
     NUMBER,
     POSITIVE,
+    Constant,
     Degrees,
     Description,
     Name,
@@ -67,7 +68,7 @@ def _rows(value: object) -> Rows:
     """Check an array of arrays of three numbers."""
     if not isinstance(value, list) or not 1 <= len(value) <= MOST_HALFSPACES:
         raise wrong(f"must be an array of 1 to {MOST_HALFSPACES} arrays of 3 numbers")
-    return tuple(Numbers(3, NUMBER)(each) for each in value)
+    return tuple(Numbers(3, NUMBER)(row) for row in value)
 
 
 def _row(value: object) -> tuple[Decimal, ...]:
@@ -89,108 +90,110 @@ FromPeriod = Annotated[int, PlainValidator(_from_period)]
 
 
 class OrbitTable(Table):
-    """The orbit of the passive craft."""
+    """[orbit]: the orbit of the passive craft."""
 
     semi_major_axis_km: Positive = key("semi-major axis", "10000.0")
-    eccentricity: Eccentricity = key("at least 0 and below 1", "0.1")
-    true_anomaly_deg: Degrees = key("at t = 0", "0.0")
-    gravitational_parameter_m3_s2: Positive = key("of the Earth or another body", "3.986004418e14")
+    eccentricity: Eccentricity = key("eccentricity, at least 0 and below 1", "0.1")
+    true_anomaly_deg: Degrees = key("true anomaly at t = 0", "0.0")
+    gravitational_parameter_m3_s2: Positive = key("gravitational parameter of the planet", "3.986004418e14")
 
 
 class InitialTable(Table):
-    """The active craft at t = 0: x against the motion, y outward, z completes."""
+    """[initial]: the active craft at t = 0; x against the motion, y outward, z completes."""
 
-    position_m: Vector = key("x, y, z", "[2650.0, -2540.0, 2120.0]")
-    velocity_m_s: Vector = key("of the same", "[-3.0, 2.0, 3.0]")
+    position_m: Vector = key("position", "[2650.0, -2540.0, 2120.0]")
+    velocity_m_s: Vector = key("velocity", "[-3.0, 2.0, 3.0]")
 
 
 class BoundsTable(Table):
-    """What no component may exceed: one number, or one an axis."""
+    """[bounds]: bounds of the components, one number or one for each axis."""
 
-    position_m: Bound = key("at t = 0..T", "3000.0")
-    velocity_m_s: Bound = key("at t = 0..T", "7.5")
-    control: Bound = key("of the control, which acceleration_m_s2 multiplies", "1.0")
+    position_m: Bound = key("bound of the position at t = 0..T", "3000.0")
+    velocity_m_s: Bound = key("bound of the velocity at t = 0..T", "7.5")
+    control: Bound = key("bound of the control, in units of acceleration_m_s2", "1.0")
 
 
 class ConeTable(Table):
-    """An approach cone, as a pyramid inside it."""
+    """[cone]: an approach cone, replaced by a pyramid inside it."""
 
-    apex_m: Vector = key("where it begins", "[-20.0, 0.0, 0.0]")
-    axis: Vector = key("along which it opens; of any length", "[1.0, 0.0, 0.0]")
-    half_angle_deg: OpenAngle = key("between axis and cone", "20.0")
-    faces: Annotated[int, PlainValidator(Whole(MOST_FACES))] = key("of the pyramid, at least 3", "8", default=8)
-    from_period: FromPeriod = key("the first t at which it holds", "0", default=0)
+    apex_m: Vector = key("apex", "[-20.0, 0.0, 0.0]")
+    axis: Vector = key("direction of the axis, of any length", "[1.0, 0.0, 0.0]")
+    half_angle_deg: OpenAngle = key("angle between axis and cone", "20.0")
+    faces: Annotated[int, PlainValidator(Whole(MOST_FACES))] = key(
+        "number of faces of the pyramid, at least 3", "8", default=8
+    )
+    from_period: FromPeriod = key("first t at which it holds", "0", default=0)
 
 
 class KeepInTable(Table):
-    """A bounded polytope that the position must stay in: normals . position <= offsets_m."""
+    """[[keep_in]]: a bounded polytope for the position, normals . position <= offsets_m."""
 
-    normals: Annotated[Rows, PlainValidator(_rows)] = key("an array a half-space", "[[1.0, 0.0, 0.0]]")
-    offsets_m: Annotated[tuple[Decimal, ...], PlainValidator(_row)] = key("a number a half-space", "[2000.0]")
-    from_period: FromPeriod = key("the first t at which it holds", "0", default=0)
+    normals: Annotated[Rows, PlainValidator(_rows)] = key("one array for each half-space", "[[1.0, 0.0, 0.0]]")
+    offsets_m: Annotated[tuple[Decimal, ...], PlainValidator(_row)] = key("one number for each half-space", "[2000.0]")
+    from_period: FromPeriod = key("first t at which it holds", "0", default=0)
 
 
 class DisturbanceTable(Table):
-    """An acceleration that nobody knows, held over each period."""
+    """[disturbance]: an unknown acceleration, constant over each period."""
 
-    acceleration_m_s2: Bound = key("greatest size along an axis", "1e-4")
+    acceleration_m_s2: Bound = key("largest magnitude along an axis", "1e-4")
 
 
 class NavigationTable(Table):
-    """Errors of the state that a plan begins from, in closed loop."""
+    """[navigation]: errors of the initial state of a plan, in closed loop."""
 
-    position_error_m: Bound = key("greatest error along an axis", "1.0")
-    velocity_error_m_s: Bound = key("greatest error along an axis", "0.01")
+    position_error_m: Bound = key("largest error along an axis", "1.0")
+    velocity_error_m_s: Bound = key("largest error along an axis", "0.01")
 
 
 class ReachabilityTables(Table):
     """A problem file of kind `reachable-rendezvous`."""
 
-    schema_number: int = key("the form of this file", "1", default=1, alias="schema")
-    kind: str = key("the kind of problem", f'"{KIND}"')
-    name: Name = key("what to call it", '"rendezvous-2021"')
-    description: Description = key("a line about it", '"..."', default="")
-    periods: Annotated[int, PlainValidator(Whole(MOST_PERIODS))] = key("how many, T", "4")
-    period_s: Positive = key("how long each is", "180.0")
-    acceleration_m_s2: Positive = key("of a unit control", "0.15")
+    schema_number: Constant = key("version of this file format", "1", default=1, alias="schema")
+    kind: Constant = key("kind of problem", f'"{KIND}"')
+    name: Name = key("name of the results", '"rendezvous-2021"')
+    description: Description = key("one line for `infoset problems list`", '"..."', default="")
+    periods: Annotated[int, PlainValidator(Whole(MOST_PERIODS))] = key("number of periods, T", "4")
+    period_s: Positive = key("length of a period", "180.0")
+    acceleration_m_s2: Positive = key("acceleration of a unit control", "0.15")
     model: Annotated[MotionModel, PlainValidator(OneOf(MotionModel))] = key(
         "frozen at t = 0, or time-varying", '"frozen"', default=MotionModel.FROZEN
     )
     thrust: Annotated[ThrustShape, PlainValidator(OneOf(ThrustShape))] = key(
-        "box: each component is bounded; ball: their norm", '"box"', default=ThrustShape.BOX
+        "box (each component is bounded) or ball (the norm is bounded)", '"box"', default=ThrustShape.BOX
     )
     checks_between_periods: FromPeriod = key(
-        "at how many instants within a period constraints hold too", "0", default=0
+        "number of instants within a period at which the constraints also hold", "0", default=0
     )
     orbit: OrbitTable = key("the orbit of the passive craft", "")
     initial: InitialTable = key("the active craft at t = 0", "")
-    bounds: BoundsTable = key("what no component may exceed", "")
+    bounds: BoundsTable = key("bounds of the components", "")
     cone: ConeTable | None = key("an approach cone", "", default=None)
     keep_in: Annotated[tuple[KeepInTable, ...], Field(max_length=MOST_POLYTOPES)] = key(
-        "polytopes to stay in", "", default=()
+        "polytopes for the position", "", default=()
     )
     disturbance: DisturbanceTable | None = key("an unknown acceleration", "", default=None)
-    navigation: NavigationTable | None = key("errors of navigation", "", default=None)
+    navigation: NavigationTable | None = key("navigation errors", "", default=None)
 
 
 @dataclass(frozen=True, eq=False)
 class Rendezvous:
-    """A problem as a person wrote it, in SI.
+    """A problem as read, in SI.
 
     Parameters
     ----------
     name, description : str
     hash : str
-        Of every value that can change a result.
+        Fingerprint of the values.
     problem : ReachabilityProblem
     motion : ConstantMotion or TschaunerHempel
-        The linear motion that the problem is made of.
+        Linear model of the motion.
     truth : NonlinearMotion
     period_s, acceleration_m_s2 : float
     disturbance : ndarray, shape (T, 6, 3), or None
-        What unit moves of the unknown acceleration do to the state.
+        Effect of unit components of the unknown acceleration on the state.
     navigation_error : ndarray, shape (6,), or None
-        Greatest error of each component.
+        Largest error of each component.
     """
 
     name: str
@@ -206,76 +209,45 @@ class Rendezvous:
 
     @cached_property
     def instants(self) -> Floats:
-        """Matrices of states between the periods, at which all members are checked."""
+        """Return the matrices of the states between the periods at which all members are checked."""
         return between_periods(self.motion, self.problem.periods, self.period_s, self.acceleration_m_s2, _INSTANTS)
 
     def lasting(self, periods: int) -> ReachabilityProblem:
-        """Return the problem with another number of periods, its last constraints kept on.
-
-        Parameters
-        ----------
-        periods : int
-            At least as many as it has.
-
-        Returns
-        -------
-        ReachabilityProblem
-        """
-        given = self.problem
+        """Return the problem with more periods; the last offsets of its constraints continue to hold."""
+        problem, more = self.problem, periods - self.problem.periods
         transition, control = discretised(self.motion, periods, self.period_s, self.acceleration_m_s2)
-        more = periods - given.periods
-        offsets = None if given.offsets is None else np.vstack([given.offsets, np.repeat(given.offsets[-1:], more, 0)])
-        between = None
-        if given.between is not None:
-            instants = given.between.shape[1]
+        offsets, between = problem.offsets, problem.between
+        if offsets is not None:
+            offsets = np.vstack([offsets, np.repeat(offsets[-1:], more, 0)])
+        if between is not None:
+            instants = between.shape[1]
             between = between_periods(self.motion, periods, self.period_s, self.acceleration_m_s2, instants)
-        return ReachabilityProblem(
-            transition,
-            control,
-            given.initial,
-            given.state_bounds,
-            given.control_bounds,
-            given.thrust,
-            given.normals,
-            offsets,
-            given.constraint_names,
-            between,
-            given.state_names,
-        )
+        return replace(problem, transition=transition, control=control, offsets=offsets, between=between)
 
 
 def load_rendezvous(name_or_path: str | os.PathLike[str]) -> Rendezvous:
-    """Read a built-in problem, or a problem file, of reachable rendezvous.
-
-    Parameters
-    ----------
-    name_or_path : str or path
-
-    Returns
-    -------
-    Rendezvous
+    """Read a built-in problem or a file.
 
     Raises
     ------
     InputError
         If there is no such problem, or it is not sound.
     """
-    form = problem_form(KIND, ReachabilityTables, _checks)
-    tables = load_tables(form, name_or_path)
+    tables = load_tables(problem_form(KIND, ReachabilityTables, _checks), name_or_path)
     try:
         return _rendezvous(tables)
     except InadmissibleStartError as error:
-        said = "; ".join(f"{name} by {excess:.6g}" for name, excess in error.broken)
+        violated = "; ".join(f"{name} by {excess:.6g}" for name, excess in error.broken)
         raise InputError(
-            f"{os.fspath(name_or_path)}: initial: the craft begins outside its constraints: {said}; move it inside, "
-            "or let them hold from a later period (from_period)"
+            f"{os.fspath(name_or_path)}: initial: the state violates constraints: {violated}; move it inside, or let "
+            "them hold from a later period (from_period)"
         ) from None
     except (ValueError, ArithmeticError) as error:
         raise InputError(f"{os.fspath(name_or_path)}: {error}; check the numbers and their units") from None
 
 
 def _checks(known: Known) -> Iterator[Problem]:
-    """What values must be to one another."""
+    """Check the values against each other."""
     for quantity, unit in (("position", "m"), ("velocity", "m_s")):
         name = f"{quantity}_{unit}"
         values, bounds = known.value("initial", name), known.value("bounds", name)
@@ -290,14 +262,14 @@ def _checks(known: Known) -> Iterator[Problem]:
                     f"move it inside, or raise bounds.{name}",
                 )
     control = known.value("bounds", "control")
-    if known.value("thrust") == "ball" and isinstance(control, list) and len({Decimal(each) for each in control}) > 1:
-        yield Problem(("bounds", "control"), "must be one number for thrust in a ball", "write its radius")
+    if known.value("thrust") == "ball" and isinstance(control, list) and len({Decimal(value) for value in control}) > 1:
+        yield Problem(("bounds", "control"), "must be one number for thrust in a ball", "write the radius of the ball")
     faces = known.value("cone", "faces")
     if isinstance(faces, int) and faces < 3:
         yield Problem(("cone", "faces"), f"must be from 3 to {MOST_FACES}, found {faces}", "write faces = 8")
     direction = known.value("cone", "axis")
     if isinstance(direction, list) and not any(direction):
-        yield Problem(("cone", "axis"), "has no direction: all its components are 0", "write axis = [1.0, 0.0, 0.0]")
+        yield Problem(("cone", "axis"), "has no direction: all components are 0", "write axis = [1.0, 0.0, 0.0]")
     checks = known.value("checks_between_periods")
     if isinstance(checks, int) and checks > MOST_CHECKS:
         yield Problem(
@@ -305,14 +277,16 @@ def _checks(known: Known) -> Iterator[Problem]:
         )
     if known.value("disturbance") is not None and checks:
         yield Problem(
-            ("disturbance",), "is allowed for at whole periods only", "remove it, or write checks_between_periods = 0"
+            ("disturbance",),
+            "is possible without checks between periods only",
+            "remove it, or write checks_between_periods = 0",
         )
     yield from _size_problems(known)
     yield from _keep_in_problems(known)
 
 
 def _size_problems(known: Known) -> Iterator[Problem]:
-    """Refuse numbers with which nothing would finish, or be told from rounding: mostly a unit taken for another."""
+    """Refuse numbers that take too long or are lost in rounding; mostly a unit is wrong."""
     period, periods = known.number("period_s"), known.value("periods")
     axis, mu = known.number("orbit", "semi_major_axis_km"), known.number("orbit", "gravitational_parameter_m3_s2")
     if period is None:
@@ -341,41 +315,39 @@ def _size_problems(known: Known) -> Iterator[Problem]:
 
 
 def _numbers(value: object) -> list[float]:
-    """The numbers of a sound value: one, or an array."""
-    return [float(str(each)) for each in (value if isinstance(value, list) else [value])]
+    """Return the numbers of a sound value: one number, or an array."""
+    return [float(str(number)) for number in (value if isinstance(value, list) else [value])]
 
 
 def _keep_in_problems(known: Known) -> Iterator[Problem]:
     boxes = known.value("keep_in")
-    for place in range(len(boxes) if isinstance(boxes, list) else 0):
-        path = ("keep_in", str(place))
+    for index in range(len(boxes) if isinstance(boxes, list) else 0):
+        path = ("keep_in", str(index))
         normals, offsets = known.value(*path, "normals"), known.value(*path, "offsets_m")
         if not isinstance(normals, list) or not isinstance(offsets, list):
             continue
         if len(normals) != len(offsets):
             yield Problem(
                 (*path, "offsets_m"),
-                f"must be as many as normals, {len(normals)}, found {len(offsets)}",
-                "write one number a normal",
+                f"must have one number for each of the {len(normals)} normals, found {len(offsets)}",
+                "add or remove some",
             )
             continue
         rows, limits = np.array(normals, dtype=float), np.array(offsets, dtype=float)
         if (np.linalg.norm(rows, axis=1) == 0.0).any():
-            yield Problem((*path, "normals"), "has a normal of zero length", "remove it, with its offset")
+            yield Problem((*path, "normals"), "has a normal of zero length", "remove it and its offset")
             continue
         size = max(float(np.abs(limits).max()), 1e-300)
         try:
             Polytope.from_halfspaces(rows, limits / size)
         except EmptyPolytopeError as error:
-            remedy = f"relax its offsets by {error.relaxation * size:.6g} m at least"
-            yield Problem(path, "is empty: no position meets all its half-spaces", remedy)
+            remedy = f"increase its offsets by at least {error.relaxation * size:.6g} m"
+            yield Problem(path, "is empty: no position lies in all its half-spaces", remedy)
         except UnboundedPolytopeError as error:
-            along = ", ".join(f"{each:.3g}" for each in error.direction)
-            yield Problem(
-                path, f"is unbounded: it goes on without end along ({along})", "add half-spaces that close it"
-            )
+            along = ", ".join(f"{value:.3g}" for value in error.direction)
+            yield Problem(path, f"is unbounded along ({along})", "add half-spaces that bound it")
         except UncertainHullError:
-            yield Problem(path, "is too flat or too fine to be told from rounding", "make it wider")
+            yield Problem(path, "is so flat or small that rounding errors hide it", "make it wider")
 
 
 def _rendezvous(tables: ReachabilityTables) -> Rendezvous:
@@ -425,21 +397,21 @@ def _rendezvous(tables: ReachabilityTables) -> Rendezvous:
 
 
 def _regions(tables: ReachabilityTables) -> tuple[Floats | None, Floats | None, tuple[str, ...]]:
-    """Half-spaces of the cone and of polytopes to stay in, as constraints on states."""
+    """Return the half-spaces of the cone and of the polytopes as constraints on states: normals, offsets and names."""
     normals, offsets, names, begin = [], [], [], []
     cone = tables.cone
     if cone is not None:
         rows = _pyramid(_vector(cone.axis), radians(cone.half_angle_deg), cone.faces)
         normals.append(rows)
         offsets.append(rows @ _vector(cone.apex_m))
-        names += [f"face {place + 1} of the cone" for place in range(len(rows))]
+        names += [f"face {face} of the cone" for face in range(1, len(rows) + 1)]
         begin += [cone.from_period] * len(rows)
     for number, box in enumerate(tables.keep_in, start=1):
-        rows = np.array([_vector(each) for each in box.normals])
+        rows = np.array([_vector(normal) for normal in box.normals])
         lengths = np.linalg.norm(rows, axis=1)
         normals.append(rows / lengths[:, None])
         offsets.append(_vector(box.offsets_m) / lengths)
-        names += [f"half-space {place + 1} of keep_in #{number}" for place in range(len(rows))]
+        names += [f"half-space {half} of keep_in #{number}" for half in range(1, len(rows) + 1)]
         begin += [box.from_period] * len(rows)
     if not normals:
         return None, None, ()
@@ -449,7 +421,7 @@ def _regions(tables: ReachabilityTables) -> tuple[Floats | None, Floats | None, 
 
 
 def _pyramid(axis: Floats, half_angle_rad: float, faces: int) -> Floats:
-    """Outward normals of a pyramid whose edges are on a cone, of unit length."""
+    """Return the outward unit normals of a pyramid whose edges lie on a cone."""
     along = axis / np.linalg.norm(axis)
     across = np.linalg.svd(along[None, :])[2][1:]
     turns = 2.0 * np.pi * np.arange(faces) / faces
@@ -459,4 +431,4 @@ def _pyramid(axis: Floats, half_angle_rad: float, faces: int) -> Floats:
 
 
 def _vector(*parts: tuple[Decimal, ...]) -> Floats:
-    return np.array([si(each) for part in parts for each in part])
+    return np.array([si(value) for part in parts for value in part])

@@ -1,4 +1,4 @@
-"""The page of a rendezvous through reachable sets: the tube over time, and some of all optimal controls."""
+"""Page of a rendezvous through reachable sets: the tube over time, and some optimal controls."""
 
 from __future__ import annotations
 
@@ -14,79 +14,54 @@ Floats = NDArray[np.float64]
 
 _TOLERANCE = 1e-2
 _MOST_SETS = 24
-_NOTHING = 1e-10
+_ZERO = 1e-10
+"""Controls smaller than the errors of the optimization are shown as zero."""
 
 
 def reachability_page(report: Report) -> str:
-    """Return the page of a rendezvous.
-
-    Parameters
-    ----------
-    report : Report
-
-    Returns
-    -------
-    str
-        HTML.
-    """
-    rendezvous, sets = report.rendezvous, report.solution.sets
+    """Return the page of a rendezvous as HTML."""
+    rendezvous = report.rendezvous
     periods, period_s = rendezvous.problem.periods, rendezvous.period_s
-    members, paths = [member for member, _ in report.shown], [path for _, path in report.shown]
-    count = len(paths[0]) if paths else periods * POINTS + 1
-    time_s = np.linspace(0.0, periods * period_s, count)
-    times = sorted({round(each) for each in np.linspace(0, periods, min(periods, _MOST_SETS) + 1)})
-    nearest = [int(np.abs(np.array(times) - each / period_s).argmin()) for each in time_s]
-
-    def tube(axes: tuple[int, ...]) -> Sets:
-        shadows = [sets.shadow(SetKind.TUBE, t, axes, _TOLERANCE) for t in times]
-        return Sets(
-            "states on the way of optimal controls, at whole periods", [faces_of(each) for each in shadows], nearest
-        )
-
-    def view(caption: str, first: int, plane: tuple[int, int] | None = None) -> View:
-        tracks = [
-            Track(each.name, look, path[:, first : first + 3], look)
-            for look, (each, path) in enumerate(zip(members, paths, strict=True))
-        ]
-        end = Mark("where the plans end", report.tube[-1, first : first + 3].mean(axis=1), "cross")
-        shown = tube(tuple(first + axis for axis in (plane or (0, 1, 2))))
-        size = float(np.abs(report.tube[:, first : first + 3]).max())
-        unit = length_unit(size) if first == 0 else ("m/s", 1.0)
-        names = ("x", "y", "z") if first == 0 else ("vx", "vy", "vz")
-        return View(caption, names, unit, tracks, [end], plane, equal=False, sets=shown)
-
+    members = [member for member, _ in report.shown]
+    time_s = np.linspace(0.0, periods * period_s, len(report.shown[0][1]) if members else periods * POINTS + 1)
+    views = [
+        _view(report, time_s, "Positions and tube", 0),
+        _view(report, time_s, "Velocities and tube", 3),
+        _view(report, time_s, "Positions in the x-y plane", 0, (0, 1)),
+        _view(report, time_s, "Positions in the x-z plane", 0, (0, 2)),
+    ]
     period_of = np.minimum((time_s / period_s).astype(int), periods - 1)
-    acceleration = ("m/s²", rendezvous.acceleration_m_s2)
+    controls = [np.where(np.abs(member.controls) < _ZERO, 0.0, member.controls)[period_of] for member in members]
     graphs = [
         Graph(
-            f"Control along {axis}, and the range of all optimal ones",
+            f"Control along {axis}, and its range over all optimal controls",
             f"u{axis}",
-            acceleration,
-            [Curve(each.name, look, _clean(each.controls[period_of, j]), look) for look, each in enumerate(members)],
+            ("m/s²", rendezvous.acceleration_m_s2),
+            [Curve(member.name, look, controls[look][:, j], look) for look, member in enumerate(members)],
             band=report.ranges[period_of, j],
             stairs=True,
         )
         for j, axis in enumerate("xyz")
     ]
     miss = report.solution.optimal.miss
-    return motion_page(
-        f"Rendezvous {rendezvous.name}",
-        [
-            *([rendezvous.description] if rendezvous.description else []),
-            f"least terminal norm {miss:.9g} in {periods} periods of {period_s:g} s; flown on the nonlinear truth",
-        ],
-        time_s,
-        [
-            view("Positions, and the tube", 0),
-            view("Velocities, and the tube", 3),
-            view("Positions in the plane of x and y", 0, (0, 1)),
-            view("Positions in the plane of x and z", 0, (0, 2)),
-        ],
-        graphs,
-        [member.name for member in members],
-    )
+    about = [
+        *([rendezvous.description] if rendezvous.description else []),
+        f"least terminal norm {miss:.9g} in {periods} periods of {period_s:g} s; trajectories of the nonlinear model",
+    ]
+    names = [member.name for member in members]
+    return motion_page(f"Rendezvous {rendezvous.name}", about, time_s, views, graphs, names)
 
 
-def _clean(controls: Floats) -> Floats:
-    """Controls as shown: what is below the programs' own errors is zero."""
-    return np.asarray(np.where(np.abs(controls) < _NOTHING, 0.0, controls))
+def _view(report: Report, time_s: Floats, caption: str, first: int, plane: tuple[int, int] | None = None) -> View:
+    """Return a view of the three states from ``first`` on: positions (0) or velocities (3)."""
+    periods, states = report.rendezvous.problem.periods, slice(first, first + 3)
+    times = sorted({round(t) for t in np.linspace(0, periods, min(periods, _MOST_SETS) + 1)})
+    nearest = [int(np.abs(np.array(times) - time / report.rendezvous.period_s).argmin()) for time in time_s]
+    axes = tuple(first + axis for axis in (plane or (0, 1, 2)))
+    shadows = [report.solution.sets.shadow(SetKind.TUBE, t, axes, _TOLERANCE) for t in times]
+    tube = Sets("states of all optimal controls, at whole periods", [faces_of(points) for points in shadows], nearest)
+    tracks = [Track(member.name, look, path[:, states], look) for look, (member, path) in enumerate(report.shown)]
+    end = Mark("end of the optimal trajectories", report.tube[-1, states].mean(axis=1))
+    unit = length_unit(float(np.abs(report.tube[:, :3]).max())) if first == 0 else ("m/s", 1.0)
+    names = ("x", "y", "z") if first == 0 else ("vx", "vy", "vz")
+    return View(caption, names, unit, tracks, [end], plane, equal=False, sets=tube)

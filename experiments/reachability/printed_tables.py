@@ -1,4 +1,4 @@
-"""Tables 1 to 3 of Shorikov and Goranov (2021), as printed and corrected, beside what is computed here."""
+"""Tables 1 to 3 of Shorikov and Goranov (2021), as printed and corrected, compared with computed controls."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ COLUMNS = ("table", "ours", "quantity", "period", "printed", "corrected", "compu
 
 @dataclass(frozen=True)
 class PrintedTable:
-    """One of the paper's tables, as printed.
+    """A table of the paper, as printed.
 
     Parameters
     ----------
     number : int
     ours : str
-        Which optimal control stands beside it.
+        The optimal control that it is compared with.
     controls : tuple
         u(t), t = 0..3.
     nonlinear, linear : tuple
         x(t), t = 1..4.
     nonlinear_miss : float
     misprints : tuple of (str, int, int, float)
-        Quantity, t, component from 1, and what it should be.
+        Quantity, t, component from 1, and the correct number.
     """
 
     number: int
@@ -130,15 +130,7 @@ TABLES = (
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A printed table beside the optimal control that it is nearest to.
-
-    Parameters
-    ----------
-    table : PrintedTable
-    ours : Member
-    printed : Member
-        The printed controls, corrected, on our model and on the truth.
-    """
+    """A printed table, the optimal control nearest to it, and the printed control, corrected, on our models."""
 
     table: PrintedTable
     ours: Member
@@ -146,7 +138,7 @@ class Comparison:
 
     @property
     def largest_difference(self) -> float:
-        """Greatest difference of a control."""
+        """Return the largest difference of a control."""
         return float(np.abs(self.ours.controls - self.printed.controls).max())
 
     @property
@@ -166,7 +158,7 @@ class Comparison:
                     correction = corrections.get((quantity, t, component))
                     name = f"{quantity}{component}"
                     rows.append([table.number, table.ours, name, t, number, correction, float(value)])
-        miss = float(np.linalg.norm(ours.nonlinear[-1]))
+        miss = ours.nonlinear_miss
         rows.append([table.number, table.ours, "nonlinear miss", 4, table.nonlinear_miss, None, miss])
         return rows
 
@@ -177,20 +169,9 @@ def is_published(rendezvous: Rendezvous) -> bool:
 
 
 def compare_published(rendezvous: Rendezvous, solution: Solution) -> tuple[Comparison, ...]:
-    """Put the paper's tables beside optimal controls.
-
-    Parameters
-    ----------
-    rendezvous : Rendezvous
-        The published problem.
-    solution : Solution
-
-    Returns
-    -------
-    tuple of Comparison
-    """
+    """Compare the tables of the paper with optimal controls of the published problem."""
     printed = [corrected(table) for table in TABLES]
-    ours = [_ours(table, solution.optimal, each) for table, each in zip(TABLES, printed, strict=True)]
+    ours = [_ours(table, solution.optimal, control) for table, control in zip(TABLES, printed, strict=True)]
     names = [f"table {table.number}" for table in TABLES]
     members = fly_members(rendezvous, [*names, *names], np.array([*ours, *printed]))
     return tuple(
@@ -199,7 +180,7 @@ def compare_published(rendezvous: Rendezvous, solution: Solution) -> tuple[Compa
 
 
 def corrected(table: PrintedTable) -> Floats:
-    """Return the printed controls with the misprints mended, shape (4, 3)."""
+    """Return the printed controls with the misprints corrected, shape (4, 3)."""
     controls = np.array(table.controls)
     for quantity, t, component, value in table.misprints:
         if quantity == "u":

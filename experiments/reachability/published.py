@@ -1,4 +1,4 @@
-"""Shorikov and Goranov (2021): rendezvous through reachable sets, tables 1 to 3."""
+"""Numbers of Shorikov and Goranov (2021): rendezvous through reachable sets, tables 1 to 3."""
 
 from __future__ import annotations
 
@@ -22,98 +22,83 @@ PAPER = "reachability"
 TITLE = "Shorikov and Goranov (2021), rendezvous through reachable sets"
 REMARKS = (
     "The paper does not print its orbit, period and acceleration; they were identified from its tables.",
-    "Table 1 is the control of least energy. The paper does not say which optimal controls tables 2 and 3 are: table 3 "
-    "stands beside the optimal control nearest to it, the controls of table 2 beside those that its linear states "
-    "imply. Table 2 is near the least sum of absolute values, but not it.",
-    "Linear states of tables 2 and 3 are those of the printed controls, misprints mended (the four of table 2 by what "
-    "its states imply): their tolerance has the rounding of those controls too.",
+    "Table 1 is the control of least energy. The paper does not say which optimal controls tables 2 and 3 are. Table 3 "
+    "is compared with the nearest optimal control, the controls of table 2 with those that its linear states imply. "
+    "Table 2 is near the least sum of absolute values but differs from it.",
+    "Linear states of tables 2 and 3 are those of the printed controls, with misprints corrected (the four of table 2 "
+    "by the values that its states imply); their tolerance includes the rounding of these controls.",
 )
 _REFERENCE = Reference(PAPER)
 _CONTROL_ROUNDING = 0.5e-4
 _STATE_ROUNDING = np.array([0.05, 0.05, 0.05, 0.005, 0.005, 0.005])
 _NONLINEAR_MISS = "1.668028"
-"""Of table 1, from an independent integration of (1)."""
+"""The miss of table 1, from an independent integration of (1)."""
 _OFF = ((3, 2, 3),)
 """(table, t, component) of linear states that do not follow from the controls."""
 _CONTRADICTED = ((1, 1), (1, 2), (2, 1), (2, 2))
 """(t, component) of the controls of table 2 that its states contradict."""
 _NOTES = {
-    "misprint": "the states beside it follow from the other value",
+    "misprint": "the states of the table follow from the other value",
     "contradicted": (
-        "its states follow from 0.0000 to within what their rounding leaves open, and the printed controls lead past "
-        "zero by 11 and 18 m. A tenth of them fits worse than none"
+        "the states follow from 0.0000 within their rounding, and the printed controls lead past zero by 11 and 18 m. "
+        "A tenth of them fits worse than zero"
     ),
     "nonlinear": (
-        "does not follow from (1). Tried: (1) integrated to 1e-12 on the orbit that the linear columns belong to, from "
-        "the printed and from exact controls; the difference is there after the first period, 4.6 m where 0.1 m is "
-        "right"
+        "does not follow from (1). Tried: (1) integrated to 1e-12 on the orbit of the linear columns, from the printed "
+        "and from exact controls; the difference exists already after the first period, 4.6 m where 0.1 m is right"
     ),
     "off": (
-        "the printed controls lead elsewhere by more than their rounding. Tried: the controls as printed, those "
-        "mended, and the optimal control nearest to them"
+        "the state of the printed controls differs by more than their rounding. Tried: the controls as printed, the "
+        "corrected ones, and the nearest optimal control"
     ),
 }
 
 
 def reproduce(progress: Progress) -> Reproduction:
-    """Compute the numbers.
-
-    Parameters
-    ----------
-    progress : callable
-        Told the fraction done.
-
-    Returns
-    -------
-    Reproduction
-    """
+    """Compute the numbers."""
     rendezvous = load_rendezvous(PROBLEM)
     solution = solve(rendezvous.problem)
     progress(0.5)
     first, second, third = compare_published(rendezvous, solution)
-    # Beside table 1 stands what was computed without it; beside the others what their controls lead to.
+    # Table 1 is compared with an independent computation, the others with the states of their controls.
     compared = (
         first,
         _implied(rendezvous, second),
         replace(third, ours=replace(third.printed, controls=third.ours.controls)),
     )
-    numbers = [number for each in compared for number in _table(each, rendezvous.problem)]
+    numbers = [_number(row, comparison, rendezvous.problem) for comparison in compared for row in comparison.rows]
     progress(1.0)
     return Reproduction(PAPER, TITLE, ((rendezvous.name, rendezvous.hash),), tuple(numbers), REMARKS)
 
 
 def _implied(rendezvous: Rendezvous, comparison: Comparison) -> Comparison:
-    """Return table 2 beside the controls that its states imply, and the states of its controls, mended."""
+    """Return table 2 with the controls that its states imply, and the states of its corrected controls."""
     problem, table = rendezvous.problem, comparison.table
     states = np.vstack([problem.initial, table.linear])
     for quantity, t, component, value in table.misprints:
         if quantity == "linear x":
             states[t, component - 1] = value
     implied = [_inverse(problem) @ (after - problem.transition[0] @ before) for before, after in pairwise(states)]
-    mended = corrected(table)
+    controls = corrected(table)
     for t, component in _CONTRADICTED:
-        mended[t, component - 1] = implied[t][component - 1]
-    (flown,) = fly_members(rendezvous, [comparison.ours.name], mended[None])
-    return replace(comparison, ours=replace(flown, controls=np.array(implied)))
+        controls[t, component - 1] = implied[t][component - 1]
+    (member,) = fly_members(rendezvous, [comparison.ours.name], controls[None])
+    return replace(comparison, ours=replace(member, controls=np.array(implied)))
 
 
 def _inverse(problem: ReachabilityProblem) -> Floats:
     return np.asarray(np.linalg.pinv(problem.control[0] / problem.state_bounds[:, None]) / problem.state_bounds)
 
 
-def _table(comparison: Comparison, problem: ReachabilityProblem) -> list[PublishedNumber]:
-    return [_number(row, comparison, problem) for row in comparison.rows]
-
-
 def _number(row: list[Cell], comparison: Comparison, problem: ReachabilityProblem) -> PublishedNumber:
-    table, _, quantity, t, printed, mended, ours = row
+    table, _, quantity, t, printed, correction, ours = row
     assert isinstance(quantity, str)
     assert isinstance(t, int)
     assert isinstance(printed, float)
     assert isinstance(ours, float)
     component = int(quantity[-1]) if quantity[-1].isdigit() else 0
     text = _digits(printed, quantity, component)
-    right = None if mended is None else _digits(float(str(mended)), quantity, component)
+    right = None if correction is None else _digits(float(str(correction)), quantity, component)
     note = "" if right is None else _NOTES["misprint"]
     beyond, unexplained = 0.0, False
     if quantity.startswith("u") and table == 2:
@@ -148,7 +133,7 @@ def _unit(quantity: str, component: int) -> str:
 
 
 def _digits(value: float, quantity: str, component: int) -> str:
-    """Return a number as the tables print it: at least so many decimals, which a float forgets where they are zeros."""
+    """Return a number with the decimals of the tables, including trailing zeros."""
     least = 4 if quantity.startswith("u") else 1 if 1 <= component <= 3 else 2
     exponent = Decimal(repr(value)).as_tuple().exponent
     assert isinstance(exponent, int)
@@ -156,7 +141,7 @@ def _digits(value: float, quantity: str, component: int) -> str:
 
 
 def _implied_rounding(problem: ReachabilityProblem, t: int, component: int) -> float:
-    """Return how far the rounding of the states beside a control moves the control that they imply."""
+    """Return the effect of the rounding of the states before and after a control on the control that they imply."""
     known = np.zeros(6)
     before = known if t == 0 else np.abs(problem.transition[0]) @ _STATE_ROUNDING
     after = known if t + 1 == problem.periods else _STATE_ROUNDING
@@ -164,7 +149,7 @@ def _implied_rounding(problem: ReachabilityProblem, t: int, component: int) -> f
 
 
 def _state_rounding(problem: ReachabilityProblem, t: int, component: int) -> float:
-    """Return how far the rounding of the controls until t moves a state."""
+    """Return the effect of the rounding of the controls until t on a state."""
     total = np.zeros(6)
     for power in range(t):
         total += np.abs(np.linalg.matrix_power(problem.transition[0], power) @ problem.control[0]).sum(axis=1)

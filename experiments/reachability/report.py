@@ -1,4 +1,4 @@
-"""What is computed for `infoset reach`, and its JSON; computing and writing only, nothing is drawn or printed."""
+"""Results of `infoset reach`: their computation, and their JSON."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.common.errors import InputError
+from experiments.common.output import library_version
 from experiments.reachability.file import KIND, Rendezvous
 from infoset.polytope import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
 from rendezvous.reachability import (
@@ -51,13 +52,40 @@ SINGLE = {
     "chebyshev": chebyshev_centre,
     "analytic": analytic_centre,
 }
-"""Choices that are one control each: least sum of squares, of absolute values, of Euclidean norms, and so on."""
+"""Selections of one control each: least sum of squares, of absolute values, of Euclidean norms, and so on."""
 VERTICES, SAMPLES = "vertices", "samples"
 MOST_SAMPLES = 1000
 POINTS = 24
-"""Of a flight that is shown, a period."""
+"""Points of a displayed trajectory per period."""
 _LONGER = 4
 _MOST_SHOWN, _ALIKE = 5, 1e-4
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is computed for a problem.
+
+    Parameters
+    ----------
+    selection : sequence of str
+        Names of `SINGLE`, "vertices" or "samples".
+    samples : int
+        Number of samples.
+    seed : int
+    route : Route or None
+        Representation of the sets; None chooses one.
+    closed_loop : bool
+        Whether to simulate with a new plan every period.
+    noisy_flights : int
+        Number of these simulations with navigation errors, if the problem has them.
+    """
+
+    selection: Sequence[str]
+    samples: int = 0
+    seed: int = 0
+    route: Route | None = None
+    closed_loop: bool = False
+    noisy_flights: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +97,10 @@ class Member:
     name : str
     controls : ndarray, shape (T, 3)
     linear, nonlinear : ndarray, shape (T + 1, 6)
-        States of the model and of the truth.
+        States of the linear and of the nonlinear model.
     between : float
-        Greatest excess over a constraint between the periods, on the linear motion, as a fraction of the bound; at
-        most 0 where none is broken.
+        Largest violation of a constraint between the periods by the linear model, as a fraction of the bound; at most
+        0 if there is none.
     """
 
     name: str
@@ -81,22 +109,27 @@ class Member:
     nonlinear: Floats
     between: float
 
+    @property
+    def nonlinear_miss(self) -> float:
+        """Return the terminal norm of the nonlinear model."""
+        return float(np.linalg.norm(self.nonlinear[-1]))
+
 
 @dataclass(frozen=True, eq=False)
 class Robustness:
-    """What the unknown acceleration leaves.
+    """Plans under the unknown acceleration.
 
     Parameters
     ----------
     fixed_miss : float or None
-        The least norm of the state without disturbance, by controls that are safe without feedback; None if there are
-        none.
+        Least terminal norm without disturbance, by controls that keep the constraints without feedback; None if there
+        are no such controls.
     conflict : str or None
-        Then why.
+        The reason, if there are none.
     plan : FeedbackPlan or None
-        With feedback; None if there is none.
+        Plan with feedback; None if there is none.
     refusal : str or None
-        Then why.
+        The reason, if there is none.
     """
 
     fixed_miss: float | None
@@ -107,24 +140,25 @@ class Robustness:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """All that a run of `infoset reach` finds.
+    """Results of one command.
 
     Parameters
     ----------
     rendezvous : Rendezvous
     solution : Solution
     least_periods : int or None
+        Least number of periods in which the terminal norm is zero.
     searched_periods : int
-        How far the least number of periods was looked for.
+        Largest number of periods that was searched.
     forward, tube : ndarray, shape (T + 1, 6, 2)
-        Bounds.
+        Bounds of the forward sets and of the tube.
     ranges : ndarray, shape (T, 3, 2)
-        Of the controls.
+        Ranges of the optimal controls.
     members : tuple of Member
     flight : Flight or None
-        In closed loop.
+        Simulation in closed loop.
     noisy : tuple of Flight
-        The same with errors of navigation.
+        The same with navigation errors.
     robustness : Robustness or None
     elapsed_s : float
     """
@@ -144,60 +178,29 @@ class Report:
 
     @cached_property
     def shown(self) -> tuple[tuple[Member, Floats], ...]:
-        """The first few members that differ from each other, each with its nonlinear flight, shape (points, 6)."""
+        """Return the first few different members, each with its nonlinear trajectory, shape (points, 6)."""
         chosen: list[Member] = []
-        for each in self.members:
-            if all(np.abs(each.controls - other.controls).max() > _ALIKE for other in chosen):
-                chosen.append(each)
-        return tuple((each, self._flown(each)) for each in chosen[:_MOST_SHOWN])
+        for member in self.members:
+            if all(np.abs(member.controls - other.controls).max() > _ALIKE for other in chosen):
+                chosen.append(member)
+        return tuple((member, self._trajectory(member)) for member in chosen[:_MOST_SHOWN])
 
-    def _flown(self, member: Member) -> Floats:
+    def _trajectory(self, member: Member) -> Floats:
         rendezvous = self.rendezvous
         push = rendezvous.acceleration_m_s2 * member.controls[None]
-        path = rendezvous.truth.fly(rendezvous.problem.initial, push, rendezvous.period_s, POINTS)[0]
-        return np.asarray(path)
+        return np.asarray(rendezvous.truth.fly(rendezvous.problem.initial, push, rendezvous.period_s, POINTS)[0])
 
 
-def make_report(
-    rendezvous: Rendezvous,
-    selection: Sequence[str],
-    *,
-    sample_count: int = 0,
-    seed: int = 0,
-    route: Route | None = None,
-    closed_loop: bool = False,
-    noisy_flights: int = 0,
-    progress: Progress = lambda _done: None,
-) -> Report:
-    """Solve a problem, choose members of its optimal controls and fly them.
-
-    Parameters
-    ----------
-    rendezvous : Rendezvous
-    selection : sequence of str
-        Names of `SINGLE`, "vertices" or "samples".
-    sample_count : int
-    seed : int
-    route : Route or None
-    closed_loop : bool
-    noisy_flights : int
-        How many, where the problem has errors of navigation.
-    progress : callable
-        Told the fraction done.
-
-    Returns
-    -------
-    Report
+def make_report(rendezvous: Rendezvous, request: Request, progress: Progress = lambda _done: None) -> Report:
+    """Solve a problem, select optimal controls and simulate them; ``progress`` receives the fraction done.
 
     Raises
     ------
     InputError
-        If the constraints conflict, or what was asked for cannot be had.
+        If the constraints conflict, or a request is impossible.
     """
     try:
-        return _report(
-            rendezvous, selection, sample_count, seed, route, closed_loop, noisy_flights, perf_counter(), progress
-        )
+        return _report(rendezvous, request, progress)
     except EmptyTubeError as error:
         raise InputError(_conflict(rendezvous, error)) from None
     except (TooLargeError, UncertainHullError) as error:
@@ -205,22 +208,13 @@ def make_report(
     except (ArithmeticError, np.linalg.LinAlgError, EmptyPolytopeError, UnboundedPolytopeError) as error:
         raise InputError(
             f"{rendezvous.name}: could not be solved to its tolerance: {error}; check the units of the numbers, and "
-            "that no constraint is within 1e-9 of its bound of having no solution"
+            "relax constraints that are within 1e-9 of being impossible"
         ) from None
 
 
-def _report(
-    rendezvous: Rendezvous,
-    selection: Sequence[str],
-    sample_count: int,
-    seed: int,
-    route: Route | None,
-    closed_loop: bool,
-    noisy_flights: int,
-    began_s: float,
-    progress: Progress,
-) -> Report:
-    solution = solve(rendezvous.problem, route)
+def _report(rendezvous: Rendezvous, request: Request, progress: Progress) -> Report:
+    began_s = perf_counter()
+    solution = solve(rendezvous.problem, request.route)
     progress(0.2)
     searched = rendezvous.problem
     if solution.optimal.miss > 0.0:
@@ -230,18 +224,17 @@ def _report(
     forward, tube = (solution.sets.bounds(kind) for kind in (SetKind.FORWARD, SetKind.TUBE))
     progress(0.5)
     ranges = solution.optimal.ranges()
-    members = _members(rendezvous, solution, selection, sample_count, seed)
+    members = _members(rendezvous, solution, request)
     progress(0.7)
     flight, noisy = None, []
-    if closed_loop:
+    if request.closed_loop:
         flight = _fly(rendezvous, None)
-        for run in range(noisy_flights if rendezvous.navigation_error is not None else 0):
-            sequence = np.random.SeedSequence(entropy=seed, spawn_key=(run,))
+        for run in range(request.noisy_flights if rendezvous.navigation_error is not None else 0):
+            sequence = np.random.SeedSequence(entropy=request.seed, spawn_key=(run,))
             noisy.append(_fly(rendezvous, np.random.default_rng(sequence)))
-            progress(0.7 + 0.2 * (run + 1) / noisy_flights)
-    robustness = None if rendezvous.disturbance is None else _robustness(rendezvous)
+            progress(0.7 + 0.2 * (run + 1) / request.noisy_flights)
+    robustness = None if rendezvous.disturbance is None else _robustness(rendezvous, rendezvous.disturbance)
     progress(1.0)
-    elapsed_s = perf_counter() - began_s
     return Report(
         rendezvous,
         solution,
@@ -254,159 +247,35 @@ def _report(
         flight,
         tuple(noisy),
         robustness,
-        elapsed_s,
+        elapsed_s=perf_counter() - began_s,
     )
 
 
-def report_json(report: Report) -> dict[str, object]:
-    """Return what a report says as values for JSON.
-
-    Parameters
-    ----------
-    report : Report
-
-    Returns
-    -------
-    dict
-        Beside lists of states, misses and controls, which have no one unit, it has `units`.
-    """
-    from experiments.common.output import library_version
-
-    solution = report.solution
-    return {
-        "version": library_version(),
-        "kind": KIND,
-        "problem": report.rendezvous.name,
-        "problem_hash": report.rendezvous.hash,
-        "units": {
-            "period_s": report.rendezvous.period_s,
-            "states": "x, y, z in m and their rates in m/s",
-            "misses": "Euclidean norm of six components, in m and m/s",
-            "controls": "parts of acceleration_m_s2, along x, y, z",
-            "acceleration_m_s2": report.rendezvous.acceleration_m_s2,
-        },
-        "elapsed_s": report.elapsed_s,
-        "route": solution.route.value,
-        "route_reason": solution.reason,
-        "optimal_miss": solution.optimal.miss,
-        "optimal_dimension": solution.optimal.dimension,
-        "least_periods": report.least_periods,
-        "least_periods_searched": report.searched_periods,
-        "sets": [
-            {
-                "period": t,
-                "forward": _set_json(solution, SetKind.FORWARD, t, report.forward[t]),
-                "tube": _set_json(solution, SetKind.TUBE, t, report.tube[t]),
-            }
-            for t in range(1, solution.problem.periods + 1)
-        ],
-        "controls": [_member_json(each) for each in report.members],
-        "control_ranges": report.ranges.tolist(),
-        "replan": None if report.flight is None else _flight_json(report),
-        "robust": None if report.robustness is None else _robust_json(report.robustness),
-    }
-
-
-def _set_json(solution: Solution, kind: SetKind, time: int, bounds: Floats) -> dict[str, object]:
-    counts = solution.sets.counts(kind, time)
-    return {
-        "min": bounds[:, 0].tolist(),
-        "max": bounds[:, 1].tolist(),
-        "vertices": None if counts is None else counts.vertices,
-        "facets": None if counts is None else counts.facets,
-        "dimension": None if counts is None else counts.dimension,
-    }
-
-
-def _member_json(member: Member) -> dict[str, object]:
-    cost = effort(member.controls)
-    return {
-        "name": member.name,
-        "u": member.controls.tolist(),
-        "energy": cost.energy,
-        "l1": cost.l1,
-        "norms": cost.norms,
-        "peak": cost.peak,
-        "linear_end": member.linear[-1].tolist(),
-        "nonlinear_end": member.nonlinear[-1].tolist(),
-        "nonlinear_miss": float(np.linalg.norm(member.nonlinear[-1])),
-        "between_periods_excess": member.between,
-    }
-
-
-def _flight_json(report: Report) -> dict[str, object]:
-    flight = report.flight
-    assert flight is not None
-    misses = [each.miss for each in report.noisy]
-    return {
-        "miss": flight.miss,
-        "end": flight.states[-1].tolist(),
-        "u": flight.controls.tolist(),
-        "expected_misses": flight.expected_misses.tolist(),
-        "relaxations": flight.relaxations.tolist(),
-        "noisy_misses": misses,
-        "noisy_largest_relaxations": [float(each.relaxations.max()) for each in report.noisy],
-    }
-
-
-def _robust_json(found: Robustness) -> dict[str, object]:
-    plan = found.plan
-    return {
-        "without_feedback": {"nominal_miss": found.fixed_miss, "conflict": found.conflict},
-        "with_feedback": {
-            "worst_miss": None if plan is None else plan.worst_miss,
-            "conflict": found.refusal,
-            "nominal_u": None if plan is None else plan.nominal.tolist(),
-            "min": None if plan is None else plan.lower.tolist(),
-            "max": None if plan is None else plan.upper.tolist(),
-        },
-    }
-
-
-def _members(
-    rendezvous: Rendezvous, solution: Solution, selection: Sequence[str], sample_count: int, seed: int
-) -> tuple[Member, ...]:
-    names: list[str] = []
-    controls: list[Floats] = []
-    for choice in selection:
-        if choice in SINGLE:
-            found = SINGLE[choice](solution.optimal)[None]
-        elif choice == VERTICES:
+def _members(rendezvous: Rendezvous, solution: Solution, request: Request) -> tuple[Member, ...]:
+    controls: dict[str, Floats] = {}
+    for name in request.selection:
+        if name in SINGLE:
+            controls[name] = SINGLE[name](solution.optimal)
+        elif name == VERTICES:
             try:
-                found = vertices(solution.optimal)
+                several = vertices(solution.optimal)
             except (TooManyVerticesError, UncertainHullError) as error:
                 raise InputError(f"--select vertices: {error}; choose for example --select samples:20") from None
+            controls |= {f"vertex {number}": control for number, control in enumerate(several, start=1)}
         else:
-            found = samples(solution.optimal, sample_count, np.random.default_rng(seed))
-        single = {VERTICES: "vertex", SAMPLES: "sample"}.get(choice)
-        names += [choice] if single is None else [f"{single} {place + 1}" for place in range(len(found))]
-        controls += [*found]
-    if not controls:
-        return ()
-    return fly_members(rendezvous, names, np.array(controls))
+            several = samples(solution.optimal, request.samples, np.random.default_rng(request.seed))
+            controls |= {f"sample {number}": control for number, control in enumerate(several, start=1)}
+    return fly_members(rendezvous, [*controls], np.array([*controls.values()])) if controls else ()
 
 
 def fly_members(rendezvous: Rendezvous, names: Sequence[str], controls: Floats) -> tuple[Member, ...]:
-    """Fly controls on the model and on the truth.
-
-    Parameters
-    ----------
-    rendezvous : Rendezvous
-    names : sequence of str
-    controls : ndarray, shape (k, T, 3)
-
-    Returns
-    -------
-    tuple of Member
-    """
+    """Simulate controls, shape (k, T, 3), on the linear and on the nonlinear model."""
     problem = rendezvous.problem
     linear = problem.run(controls)
     nonlinear = rendezvous.truth.fly(problem.initial, rendezvous.acceleration_m_s2 * controls, rendezvous.period_s)
     between = replace(problem, between=rendezvous.instants).excess(controls)
-    return tuple(
-        Member(*each)
-        for each in zip(names, controls, linear, nonlinear, (float(each) for each in between), strict=True)
-    )
+    rows = zip(names, controls, linear, nonlinear, between, strict=True)
+    return tuple(Member(*row, float(excess)) for *row, excess in rows)
 
 
 def _fly(rendezvous: Rendezvous, generator: np.random.Generator | None) -> Flight:
@@ -423,12 +292,11 @@ def _fly(rendezvous: Rendezvous, generator: np.random.Generator | None) -> Fligh
     try:
         return replan(rendezvous.problem, truth, None if generator is None else observe)
     except ArithmeticError as error:
-        raise InputError(f"--replan: {error}; reduce the errors of navigation, or leave --replan out") from None
+        raise InputError(f"--replan: {error}; reduce the navigation errors, or omit --replan") from None
 
 
-def _robustness(rendezvous: Rendezvous) -> Robustness:
-    assert rendezvous.disturbance is not None
-    problem, disturbance = rendezvous.problem, rendezvous.disturbance
+def _robustness(rendezvous: Rendezvous, disturbance: Floats) -> Robustness:
+    problem = rendezvous.problem
     fixed, conflict, plan, refusal = None, None, None, None
     try:
         fixed = solve(tightened(problem, disturbance), Route.LIFTED).optimal.miss
@@ -443,9 +311,91 @@ def _robustness(rendezvous: Rendezvous) -> Robustness:
 
 def _conflict(rendezvous: Rendezvous, error: EmptyTubeError) -> str:
     bounds = rendezvous.problem.state_bounds
-    by = f"bounds.position_m by {error.relaxation * bounds[:3].max():.6g} and bounds.velocity_m_s by "
+    position, velocity = error.relaxation * bounds[:3].max(), error.relaxation * bounds[3:].max()
     return (
         f"{rendezvous.name}: no control keeps the constraints: they conflict at t = {error.time} "
         f"({', '.join(error.names)}); relax all constraints on states by {100.0 * error.relaxation:.4g} % of their "
-        f"bounds, that is {by}{error.relaxation * bounds[3:].max():.6g}, or begin elsewhere"
+        f"bounds, that is bounds.position_m by {position:.6g} and bounds.velocity_m_s by {velocity:.6g}, or change the "
+        "initial state"
     )
+
+
+def report_json(report: Report) -> dict[str, object]:
+    """Return the results for `experiments.common.output.to_json`; key ``units`` has the units of the states."""
+    solution, rendezvous = report.solution, report.rendezvous
+    return {
+        "version": library_version(),
+        "kind": KIND,
+        "problem": rendezvous.name,
+        "problem_hash": rendezvous.hash,
+        "units": {
+            "period_s": rendezvous.period_s,
+            "states": "x, y, z in m and their rates in m/s",
+            "misses": "Euclidean norm of six components, in m and m/s",
+            "controls": "parts of acceleration_m_s2, along x, y, z",
+            "acceleration_m_s2": rendezvous.acceleration_m_s2,
+        },
+        "elapsed_s": report.elapsed_s,
+        "route": solution.route,
+        "route_reason": solution.reason,
+        "optimal_miss": solution.optimal.miss,
+        "optimal_dimension": solution.optimal.dimension,
+        "least_periods": report.least_periods,
+        "least_periods_searched": report.searched_periods,
+        "sets": [
+            {
+                "period": t,
+                "forward": _set_json(solution, SetKind.FORWARD, t, report.forward[t]),
+                "tube": _set_json(solution, SetKind.TUBE, t, report.tube[t]),
+            }
+            for t in range(1, solution.problem.periods + 1)
+        ],
+        "controls": [_member_json(member) for member in report.members],
+        "control_ranges": report.ranges,
+        "replan": None if report.flight is None else _flight_json(report.flight, report.noisy),
+        "robust": None if report.robustness is None else _robust_json(report.robustness),
+    }
+
+
+def _set_json(solution: Solution, kind: SetKind, time: int, bounds: Floats) -> dict[str, object]:
+    counts = solution.sets.counts(kind, time)
+    keys = ("vertices", "facets", "dimension")
+    return {"min": bounds[:, 0], "max": bounds[:, 1]} | {key: counts and getattr(counts, key) for key in keys}
+
+
+def _member_json(member: Member) -> dict[str, object]:
+    return {
+        "name": member.name,
+        "u": member.controls,
+        **vars(effort(member.controls)),
+        "linear_end": member.linear[-1],
+        "nonlinear_end": member.nonlinear[-1],
+        "nonlinear_miss": member.nonlinear_miss,
+        "between_periods_excess": member.between,
+    }
+
+
+def _flight_json(flight: Flight, noisy: Sequence[Flight]) -> dict[str, object]:
+    return {
+        "miss": flight.miss,
+        "end": flight.states[-1],
+        "u": flight.controls,
+        "expected_misses": flight.expected_misses,
+        "relaxations": flight.relaxations,
+        "noisy_misses": [noisy_flight.miss for noisy_flight in noisy],
+        "noisy_largest_relaxations": [noisy_flight.relaxations.max() for noisy_flight in noisy],
+    }
+
+
+def _robust_json(robustness: Robustness) -> dict[str, object]:
+    plan = robustness.plan
+    return {
+        "without_feedback": {"nominal_miss": robustness.fixed_miss, "conflict": robustness.conflict},
+        "with_feedback": {
+            "worst_miss": None if plan is None else plan.worst_miss,
+            "conflict": robustness.refusal,
+            "nominal_u": None if plan is None else plan.nominal,
+            "min": None if plan is None else plan.lower,
+            "max": None if plan is None else plan.upper,
+        },
+    }

@@ -19,7 +19,7 @@ from experiments.pursuit.file import load_pursuit
 from experiments.pursuit.page import pursuit_page
 from experiments.reachability.file import load_rendezvous
 from experiments.reachability.page import reachability_page
-from experiments.reachability.report import Report, make_report
+from experiments.reachability.report import Report, Request, make_report
 from rendezvous.multipoint import Path as FlightPath
 from rendezvous.pareto import EncounterSolution, least_greatest_excess, least_sum_of_costs, solve_encounter
 from rendezvous.pursuit_evasion import History, Solution, history, solve
@@ -69,7 +69,7 @@ def solved() -> Solved:
         solve_encounter(load_pareto("pareto-2008").encounter),
         visits.tour,
         visits.tour.fly((0, 1, 2), visits.times_s),
-        make_report(load_rendezvous("rendezvous-2021"), ["energy", "l1", "peak"]),
+        make_report(load_rendezvous("rendezvous-2021"), Request(["energy", "l1", "peak"])),
         game,
         history(game, 301),
     )

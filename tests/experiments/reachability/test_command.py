@@ -12,10 +12,10 @@ import pytest
 
 from experiments.cli import main
 from experiments.common.problem_file import built_in_problems, problem_text
-from experiments.reachability.figures import draw_reach, shown_times
+from experiments.reachability.figures import drawings, shown_times
 from experiments.reachability.file import KIND, load_rendezvous
 from experiments.reachability.printed_tables import TABLES, compare_published, corrected, is_published
-from experiments.reachability.report import make_report
+from experiments.reachability.report import Request, make_report
 from rendezvous.reachability import solve
 
 FIGURES = ["figure-controls", "figure-planes", "figure-positions", "figure-velocities"]
@@ -106,7 +106,7 @@ def test_reach_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
     ]
     assert len(first) == 12
     assert max(first) <= 0.5e-4
-    for piece in ("least terminal norm 0", "zero takes 3 periods at least", "route: exact", "table 3", "replanned"):
+    for piece in ("least terminal norm 0", "zero needs at least 3 periods", "route: exact", "table 3", "replanned"):
         assert piece in out
 
 
@@ -157,7 +157,7 @@ def test_the_cone_is_inside_its_angle_and_kept() -> None:
     away = points[inside] - [-15.0, 0.0, 0.0]
     angles = np.degrees(np.arctan2(np.linalg.norm(away[:, 1:], axis=1), away[:, 0]))
     assert 19.0 < angles.max() <= 20.0 + 1e-9
-    report = make_report(given, ["energy", "analytic"])
+    report = make_report(given, Request(["energy", "analytic"]))
     for each in report.members:
         gaps = each.linear @ problem.normals.T - problem.offsets
         assert gaps.max() < 1e-6
@@ -177,8 +177,8 @@ def test_constraints_between_the_periods_bind(tmp_path: Path) -> None:
     free, bound = tmp_path / "free.toml", tmp_path / "bound.toml"
     free.write_text(text)
     bound.write_text(text.replace("model =", "checks_between_periods = 5\nmodel ="))
-    loose = make_report(load_rendezvous(free), ["energy"]).members[0]
-    kept = make_report(load_rendezvous(bound), ["energy"]).members[0]
+    loose = make_report(load_rendezvous(free), Request(["energy"])).members[0]
+    kept = make_report(load_rendezvous(bound), Request(["energy"])).members[0]
     assert loose.between > 1e-3
     assert kept.between < 0.2 * loose.between
 
@@ -219,12 +219,12 @@ def test_zero_out_of_reach_is_looked_for_further_on(infoset: Infoset, tmp_path: 
         (["--select", "enrgy"], ["--select", "did you mean energy?"]),
         (["--select", "energy,energy"], ["named twice"]),
         (["--select", ""], ["--select", "choose one of"]),
-        (["--select", "samples"], ["must say how many"]),
+        (["--select", "samples"], ["needs a number"]),
         (["--select", "samples:0"], ["must be from 1 to 1000"]),
-        (["--select", "samples:-5"], ["must say how many"]),
+        (["--select", "samples:-5"], ["needs a number"]),
         (["--select", "energy:4"], ["takes no number"]),
-        (["--route", "exakt"], ["--route", "did you mean exact?"]),
-        (["--noisy-flights", "-1"], ["--noisy-flights", "must be from 0"]),
+        (["--route", "exakt"], ["Invalid value for '--route'", "'exact'"]),
+        (["--noisy-flights", "-1"], ["Invalid value for '--noisy-flights'"]),
         (["--json", "missing/x.json"], ["there is no folder missing"]),
         (["--json", "out/results.json", "--out", "out"], ["also a file of --out"]),
     ],
@@ -232,11 +232,11 @@ def test_zero_out_of_reach_is_looked_for_further_on(infoset: Infoset, tmp_path: 
 def test_what_is_wrong_is_said_before_the_work(
     arguments: list[str], parts: list[str], infoset: Infoset, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("experiments.reachability.report.make_report", lambda *_, **__: pytest.fail("began to work"))
+    monkeypatch.setattr("experiments.reachability.run.make_report", lambda *_, **__: pytest.fail("began to work"))
     code, out, err = infoset(*arguments)
     assert (code, out) == (2, "")
-    assert err.startswith("error: ")
-    assert err.count("error: ") == 1
+    assert err.startswith(("error: ", "Usage: "))
+    assert err.count("error: ") <= 1
     for part in parts:
         assert part in err
     assert list(tmp_path.iterdir()) == []
@@ -268,16 +268,16 @@ SQUARE = "[[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0],
         (edited("rendezvous-2021") + CONE.replace("[0.0, 0.0, 0.0]", "[1.0, 0.0, 0.0]"), ["initial", "face", "cone"]),
         (
             edited("rendezvous-2021") + f"[[keep_in]]\nnormals = {SQUARE}]\noffsets_m = [1.0, 1.0, 1.0, 1.0, 1.0]\n",
-            ["keep_in #1", "unbounded", "along (1, "],
+            ["keep_in #1", "unbounded along (1, "],
         ),
         (
             edited("rendezvous-2021")
             + f"[[keep_in]]\nnormals = {SQUARE}, [1.0, 0.0, 0.0]]\noffsets_m = [-9.0, 1.0, 1.0, 1.0, 1.0, 5.0]\n",
-            ["keep_in #1", "is empty", "relax its offsets by 2 m"],
+            ["keep_in #1", "is empty", "increase its offsets by at least 2 m"],
         ),
         (
             edited("rendezvous-2021") + f"[[keep_in]]\nnormals = {SQUARE}]\noffsets_m = [1.0]\n",
-            ["keep_in #1.offsets_m", "as many as normals, 5, found 1"],
+            ["keep_in #1.offsets_m", "one number for each of the 5 normals, found 1"],
         ),
         (edited("rendezvous-2021") + "[cones]\n", ["cones", "did you mean cone?"]),
         ("kind = [", ["is not TOML"]),
@@ -329,8 +329,8 @@ def test_nothing_is_replaced_unless_told(infoset: Infoset, tmp_path: Path) -> No
 
 
 def test_figures_show_sets_members_and_ranges() -> None:
-    report = make_report(load_rendezvous("rendezvous-2021"), ["energy", "l1", "norms"])
-    positions, velocities, planes, controls = draw_reach(report)
+    report = make_report(load_rendezvous("rendezvous-2021"), Request(["energy", "l1", "norms"]))
+    positions, velocities, planes, controls = (draw() for draw in drawings(report))
     assert "nonlinear" in positions.legends[0].get_texts()[0].get_text()
     assert velocities.axes[0].get_xlabel() == "$v_x$, m/s"
     assert [each.get_xlabel() for each in planes.axes] == ["x, m", "x, m", "$v_x$, m/s", "$v_x$, m/s"]
