@@ -222,8 +222,10 @@ def draw_planes(report: Report) -> Figure:
         axes.xaxis.set_major_locator(MaxNLocator(6))
     handles = [Line2D([], [], markersize=3.2, label=_title(member), **look) for look, member, _ in _shown(report)]
     title = "lines: nonlinear model; marks: linear model, at whole periods" if handles else None
-    handles += [axes.lines[-2], axes.lines[-1], Patch(label="tube at t", **_SET)]
-    figure.legend(handles=handles, loc="upper center", ncols=4, title=title, title_fontsize=7.5)
+    tube = Patch(label="tube at t", **_SET)
+    figure.legend(
+        handles=[*handles, *panels[-1].lines[-2:], tube], loc="upper center", ncols=4, title=title, title_fontsize=7.5
+    )
     return figure
 
 

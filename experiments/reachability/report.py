@@ -274,8 +274,8 @@ def fly_members(rendezvous: Rendezvous, names: Sequence[str], controls: Floats) 
     linear = problem.run(controls)
     nonlinear = rendezvous.truth.fly(problem.initial, rendezvous.acceleration_m_s2 * controls, rendezvous.period_s)
     between = replace(problem, between=rendezvous.instants).excess(controls)
-    rows = zip(names, controls, linear, nonlinear, between, strict=True)
-    return tuple(Member(*row, float(excess)) for *row, excess in rows)
+    rows = zip(names, controls, linear, nonlinear, between.tolist(), strict=True)
+    return tuple(Member(*row) for row in rows)
 
 
 def _fly(rendezvous: Rendezvous, generator: np.random.Generator | None) -> Flight:

@@ -46,13 +46,14 @@ def run(options: Reach) -> None:
         written.save("results.json", to_json(report_json(report)), "--json")
         if comparisons:
             written.save(TABLES, to_csv(COLUMNS, [row for comparison in comparisons for row in comparison.rows]))
-        if options.html is not None:
-            written.deliver("--html", reachability_page(report))
         try:
+            if options.html is not None:
+                written.deliver("--html", reachability_page(report))
             written.draw(dict(zip(FIGURES, drawings(report), strict=True)), begin("figures"))
         except ArithmeticError as error:
-            file = f"{written.folder}/results.json"
-            raise InputError(f"cannot draw the tube: {error}; the numbers are in {file}") from None
+            raise InputError(
+                f"cannot draw the tube: {error}; the numbers are in results.json, or use --json alone"
+            ) from None
     if not options.quiet:
         _print_report(table_console(written.stdout_taken), report, comparisons)
 

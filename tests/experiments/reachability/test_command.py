@@ -317,6 +317,16 @@ def test_what_the_exact_route_and_vertices_cannot_do_is_said(infoset: Infoset) -
     assert "choose samples" in err
 
 
+def test_a_tube_that_cannot_be_drawn_ends_in_a_message(infoset: Infoset, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> str:
+        raise ArithmeticError("a convex program was not solved")
+
+    monkeypatch.setattr("experiments.reachability.run.reachability_page", fail)
+    code, _, err = infoset("--select", "energy", "--html", "page.html", "-q")
+    assert code == 2
+    assert "cannot draw the tube: a convex program was not solved; the numbers are in" in err
+
+
 def test_nothing_is_replaced_unless_told(infoset: Infoset, tmp_path: Path) -> None:
     precious = tmp_path / "x.json"
     precious.write_text("precious")
