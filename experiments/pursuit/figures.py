@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from experiments.common.display_units import M_PER_KM, length_unit, time_unit
 from experiments.common.figure_style import IMPULSE, LIMIT, MEASURED, TRUTH, figure_grid, new_figure, style
-from rendezvous.pursuit_evasion import Ended, Flight, History, PlayerHistory, Solution, Verdict
-from rendezvous.pursuit_evasion.history import orbital_axes
+from rendezvous.pursuit_evasion import Ended, Flight, History, PlayerHistory, Solution, Verdict, orbital_axes
 
 Floats = NDArray[np.float64]
 

@@ -16,8 +16,7 @@ from rendezvous.pursuit_evasion._pair import COARSE, Node
 from rendezvous.pursuit_evasion._scan import greater
 from rendezvous.pursuit_evasion._side import Craft, across
 from rendezvous.pursuit_evasion.game import Game, Player
-from rendezvous.pursuit_evasion.history import orbital_axes
-from rendezvous.pursuit_evasion.paths import steered_path
+from rendezvous.pursuit_evasion.paths import orbital_axes, steered_path
 from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
 from rendezvous.pursuit_evasion.steering import Policy
 from rendezvous.pursuit_evasion.units import ScaledGame, Units, horizon_s, scaled_game, units_of

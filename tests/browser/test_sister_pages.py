@@ -22,8 +22,7 @@ from experiments.reachability.page import reachability_page
 from experiments.reachability.report import Report, Request, make_report
 from rendezvous.multipoint import Path as FlightPath
 from rendezvous.pareto import EncounterSolution, least_greatest_excess, least_sum_of_costs, solve_encounter
-from rendezvous.pursuit_evasion import History, Solution, history, solve
-from rendezvous.pursuit_evasion.history import orbital_axes
+from rendezvous.pursuit_evasion import History, Solution, history, orbital_axes, solve
 from tests.browser.conftest import Opened, numbers
 
 Open = Callable[..., Opened]
