@@ -296,6 +296,11 @@ class MultipointProblem:
 def load_multipoint(name_or_path: str) -> MultipointProblem:
     """Read a built-in problem or a file.
 
+    Parameters
+    ----------
+    name_or_path : str or path
+        A built-in name, or the path of a TOML file.
+
     Raises
     ------
     InputError

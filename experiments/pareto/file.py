@@ -140,6 +140,11 @@ class ParetoProblem:
 def load_pareto(name_or_path: str) -> ParetoProblem:
     """Read a built-in problem or a file.
 
+    Parameters
+    ----------
+    name_or_path : str or path
+        A built-in name, or the path of a TOML file.
+
     Raises
     ------
     InputError

@@ -311,6 +311,11 @@ FORM = problem_form(KIND, PursuitTables, _checks)
 def load_pursuit(name_or_path: str) -> PursuitProblem:
     """Read a built-in problem or a file.
 
+    Parameters
+    ----------
+    name_or_path : str or path
+        A built-in name, or the path of a TOML file.
+
     Raises
     ------
     InputError

@@ -228,6 +228,11 @@ class Rendezvous:
 def load_rendezvous(name_or_path: str | os.PathLike[str]) -> Rendezvous:
     """Read a built-in problem or a file.
 
+    Parameters
+    ----------
+    name_or_path : str or path
+        A built-in name, or the path of a TOML file.
+
     Raises
     ------
     InputError
