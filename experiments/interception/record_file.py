@@ -1,12 +1,11 @@
 """Records of engagements as `.npz` files: a JSON header and plain arrays, no pickle.
 
 The members of the archive are stored, not compressed, so that no file can hold more than its own size. The sets are
-flat vertices with offsets. What is not known in a step has a mask; no number stands for a reason.
+flat arrays of vertices with offsets. A value that is not known in a step has a mask.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import io
 import json
@@ -16,13 +15,15 @@ import tokenize
 import warnings
 import zipfile
 from collections.abc import Mapping
+from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from experiments.common.errors import InputError
 from experiments.common.output import library_version, write_file
@@ -33,6 +34,7 @@ from infoset.limits import LARGEST, SMALLEST
 from infoset.sensors import SENSORS
 from sim import Inconsistency, Record, Results, Scenario, StepRecord
 from sim.columns import Column, columns_of, values_of
+from sim.storage.codec import from_json, to_json
 
 FORMAT = "infoset-record"
 SCHEMA = 2
@@ -79,8 +81,23 @@ _LISTED_MEMBER = b"PK\x01\x02"
 """How an entry of an archive's list of members begins."""
 
 
+_Name = Annotated[str, Field(max_length=LONGEST_NAME)]
+_OTHER_KEYS = ("format", "schema", "version", "sha256", "scenario", "result")
+
+
+@dataclass(frozen=True)
+class _Engagement:
+    """Keys of the header that are fields of the record as they are."""
+
+    seed: Annotated[int, Field(ge=0)]
+    run: Annotated[int, Field(ge=0, lt=2**63)]
+    strategy: _Name
+    noise: _Name | None
+    inconsistency: Inconsistency | None
+
+
 class _UnsoundError(Exception):
-    """Why a file is no record."""
+    """The reason why a file is not a readable record."""
 
 
 def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
@@ -89,31 +106,33 @@ def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: boo
     Parameters
     ----------
     record : Record
+        From `fly_one`.
     path : str or path
-        Where, ending in ``.npz``.
+        Name of the file; it ends in ``.npz``.
     overwrite : bool
-        Whether it may be there already.
+        Whether an existing file is replaced.
 
     Raises
     ------
     InputError
-        If it cannot be written, is there already, or no scenario file can hold the record's scenario.
+        If the file cannot be written, exists already, or no scenario file can hold the record's scenario.
     """
     file = record_path("record", Path(path))
     toml = scenario_to_toml(record.scenario)
     if read_scenario(toml, f"the scenario of {file}") != record.scenario:
         raise InputError(f"{file}: the scenario {shown(record.scenario.name)} does not read back as it is; correct it")
     arrays = _to_arrays(record)
+    engagement = to_json(_Engagement(record.seed, record.run, record.strategy, record.noise, record.inconsistency))
+    inconsistency = engagement.pop("inconsistency")
+    if record.noise is None:
+        del engagement["noise"]
     header = {
         "format": FORMAT,
         "schema": SCHEMA,
         "version": library_version(),
-        "seed": record.seed,
-        "run": record.run,
-        "strategy": record.strategy,
-        **({} if record.noise is None else {"noise": record.noise}),
+        **engagement,
         "result": _result_to_json(record.result),
-        "inconsistency": None if record.inconsistency is None else dataclasses.asdict(record.inconsistency),
+        "inconsistency": inconsistency,
         "scenario": toml,
     }
     header["sha256"] = _checksum(header, arrays)
@@ -133,24 +152,24 @@ def load_record(path: str | os.PathLike[str]) -> Record:
     Parameters
     ----------
     path : str or path
-        A file that `write_record` or ``infoset engage --record`` has written.
+        A file of `write_record` or ``infoset engage --record``.
 
     Returns
     -------
     Record
-        Equal, bit for bit, to what was written.
+        Equal, bit for bit, to the record that was written.
 
     Raises
     ------
     InputError
-        If it is no such file, or no longer what was written.
+        If the file is not a record, or has changed since it was written.
     """
     file = Path(path)
     try:
         if file.is_dir():
             raise InputError(f"{file}: is a folder; name a record in it, a file ending in .npz")
         if file.exists() and not file.is_file():
-            raise InputError(f"{file}: is no ordinary file; {REMEDY}")
+            raise InputError(f"{file}: is not an ordinary file; {REMEDY}")
         size = file.stat().st_size
         if size > LARGEST_FILE_BYTES:
             raise InputError(f"{file}: has {size} bytes, more than any record ({LARGEST_FILE_BYTES}); {REMEDY}")
@@ -171,23 +190,7 @@ def load_record(path: str | os.PathLike[str]) -> Record:
 
 
 def record_path(option: str, path: Path) -> Path:
-    """Return the path of a record if its name ends as it must.
-
-    Parameters
-    ----------
-    option : str
-        What it was given to.
-    path : Path
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    InputError
-        If it does not end in ``.npz``.
-    """
+    """Return a path, the value of an option, if it ends in ``.npz``; raise `InputError` otherwise."""
     if path.suffix != ".npz":
         raise InputError(f"{option}: {path} must end in .npz; for example {option} flight.npz")
     return path
@@ -341,47 +344,27 @@ def _read_header(header: NDArray[Any]) -> dict[str, Any]:
 
 
 def _to_record(header: Mapping[str, Any], arrays: Arrays, source: str) -> Record:
-    keys = {"format", "schema", "version", "seed", "run", "strategy", "result", "inconsistency", "scenario", "sha256"}
-    if set(header) - {"noise"} != keys:
-        raise _UnsoundError(f"its header has the keys {', '.join(sorted(map(str, header)))}")
-    seed, run, strategy, toml = (header[key] for key in ("seed", "run", "strategy", "scenario"))
-    if not (_is_whole(seed) and _is_whole(run) and run < 2**63 and isinstance(strategy, str) and isinstance(toml, str)):
-        raise _UnsoundError("its header has a wrong seed, run, strategy or scenario")
-    if not strategy.isprintable() or len(strategy) > LONGEST_NAME:
-        raise _UnsoundError("its header has a strategy whose name cannot be printed")
-    noise = header.get("noise", "")
-    if not isinstance(noise, str) or not noise.isprintable() or len(noise) > LONGEST_NAME:
-        raise _UnsoundError("its header has a noise whose name cannot be printed")
+    missing = [key for key in _OTHER_KEYS if key not in header]
+    if missing:
+        raise _UnsoundError(f"its header has no key {missing[0]}")
+    others = {key: value for key, value in header.items() if key not in _OTHER_KEYS}
     try:
-        scenario = read_scenario(toml, f"{source}: the scenario in it")
+        engagement = from_json(_Engagement, {"noise": None, **others})
+        scenario = read_scenario(header["scenario"], f"{source}: the scenario in it")
+    except ValueError as error:
+        raise _UnsoundError(f"its header is wrong: {error}") from None
     except InputError as error:
         raise _UnsoundError(f"its scenario is unsound: {error}") from None
     _check(arrays)
+    found = engagement.inconsistency
+    if found is not None and not (0 <= found.step < len(arrays["time_s"]) and abs(found.label_m) <= LARGEST):
+        raise _UnsoundError("its header is wrong: inconsistency is not at a step of the record")
     return Record(
         scenario=scenario,
-        seed=seed,
-        run=run,
-        strategy=strategy,
-        result=_result_from_json(header["result"], run, scenario.set_model.is_guaranteed),
+        result=_result_from_json(header["result"], engagement.run, scenario.set_model.is_guaranteed),
         steps=_to_steps(arrays, scenario),
-        noise=header.get("noise"),
-        inconsistency=_inconsistency_from_json(header["inconsistency"], len(arrays["time_s"])),
+        **vars(engagement),
     )
-
-
-def _inconsistency_from_json(found: object, steps: int) -> Inconsistency | None:
-    if found is None:
-        return None
-    if not isinstance(found, dict) or set(found) != {"step", "label_m"}:
-        raise _UnsoundError("its header has a wrong inconsistency")
-    step, label = found["step"], found["label_m"]
-    if not (_is_whole(step) and step < steps and isinstance(label, float) and abs(label) <= LARGEST):
-        raise _UnsoundError("its header has a wrong inconsistency")
-    return Inconsistency(step, label)
-
-
-def _is_whole(value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
 
 
 def _check(arrays: Arrays) -> None:
