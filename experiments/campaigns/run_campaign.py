@@ -43,18 +43,20 @@ def run(options: Options) -> None:
         flown = fly(asked, options)
         stored = flown.result.folder
         found = samples(stored)
-        summary = {
-            **heading(stored),
-            **({"warnings": flown.warnings} if flown.warnings else {}),
-            "elapsed_s": flown.elapsed_s,
-            "redone": [{"file": damage.file.name, "reason": damage.reason} for damage in flown.result.redone],
-            "samples": [sample_json(sample) for sample in found],
-        }
+        summary = to_json(
+            {
+                **heading(stored),
+                **({"warnings": flown.warnings} if flown.warnings else {}),
+                "elapsed_s": flown.elapsed_s,
+                "redone": [{"file": damage.file.name, "reason": damage.reason} for damage in flown.result.redone],
+                "samples": [sample_json(sample) for sample in found],
+            }
+        )
         tables = samples_table(found, stored.manifest.scenario.set_model.kind.value)
         folder = Output(options.out, {}, overwrite=True)
-        folder.save(SUMMARY, to_json(summary))
+        folder.save(SUMMARY, summary)
         written.written += [options.out / "shards", options.out / SCENARIO_FILE, *folder.written]
-        written.deliver("--json", to_json(summary))
+        written.deliver("--json", summary)
     if not options.quiet:
         _show(table_console(written.stdout_taken), flown, *tables)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from enum import Enum
 from typing import Any
 
 from experiments.common.errors import InputError
@@ -43,6 +44,9 @@ FORM = Form(
     schema=SCHEMA,
 )
 
+_POWERS = {"_km3_s2": 3 * KILO, "_km_s": KILO, "_km": KILO}
+"""Powers of ten of the units in the keys of a file that are not SI units."""
+_WHOLE = ("schema", "sections", "fewest_sections")
 UNUSUAL_TABLES = ("rate_sensor", "target")
 """Tables that the template shows but leaves out."""
 
@@ -230,67 +234,52 @@ def scenario_to_toml(scenario: Scenario) -> str:
             f"scenario {shown(scenario.name)}: its angle sensor has the nominal range {sensor.nominal_range_m!r} m and "
             f"it has {scenario.nominal_range_m!r} m; a scenario file has one, nominal.range_km"
         )
-    tables: dict[str, dict[str, str]] = {
-        "": {
-            "schema": str(SCHEMA),
-            "name": quoted_text(scenario.name),
-            "description": quoted_text(scenario.description),
-        }
+    tables: dict[str, dict[str, object]] = {
+        "": {"schema": SCHEMA, "name": scenario.name, "description": scenario.description}
     }
     if sun is not None:
         tables["sun"] = {
-            "gravitational_parameter_km3_s2": number_text(sun.gravitational_parameter_m3_s2, 3 * KILO),
-            "distance_km": number_text(sun.distance_m, KILO),
-            "direction_deg": degrees_text(sun.direction_rad),
+            "gravitational_parameter_km3_s2": sun.gravitational_parameter_m3_s2,
+            "distance_km": sun.distance_m,
+            "direction_deg": sun.direction_rad,
         }
-    tables["nominal"] = {
-        "range_km": number_text(scenario.nominal_range_m, KILO),
-        "closing_speed_km_s": number_text(model.closing_speed_m_s, KILO),
+    tables["nominal"] = {"range_km": scenario.nominal_range_m, "closing_speed_km_s": model.closing_speed_m_s}
+    tables["uncertainty"] = {**_box(model.bounds)}
+    tables["dispersion"] = {
+        key: pair[0] if pair[0] == pair[1] else pair for key, pair in _box(scenario.dispersion).items()
     }
-    tables["uncertainty"] = _box(model.bounds, _pair)
-    tables["dispersion"] = _box(scenario.dispersion, _pair_or_number)
-    tables["angle_sensor"] = {
-        "period_s": number_text(sensor.period_s),
-        "error_at_nominal_range_rad": number_text(sensor.error_at_nominal_range_rad),
-        "error_at_zero_range_rad": number_text(sensor.error_at_zero_range_rad),
-    }
-    if scenario.range_sensor is not None:
-        tables["range_sensor"] = {
-            "period_s": number_text(scenario.range_sensor.period_s),
-            "relative_error": number_text(scenario.range_sensor.relative_error),
-        }
-    if scenario.rate_sensor is not None:
-        tables["rate_sensor"] = {
-            "period_s": number_text(scenario.rate_sensor.period_s),
-            "error_rad_s": number_text(scenario.rate_sensor.error_rad_s),
-        }
-    if scenario.target is not None:
-        tables["target"] = {
-            "manoeuvre": quoted_text(scenario.target.manoeuvre.value),
-            "acceleration_m_s2": number_text(scenario.target.acceleration_m_s2),
-            "switching_period_s": number_text(scenario.target.switching_period_s),
-        }
-    tables["thruster"] = {
-        "budget_m_s": number_text(scenario.thruster.budget_m_s),
-        "least_impulse_m_s": number_text(scenario.thruster.least_impulse_m_s),
-        "greatest_impulse_m_s": number_text(scenario.thruster.greatest_impulse_m_s),
-        "execution_error_relative": number_text(scenario.thruster.execution_error_relative),
-    }
+    tables["angle_sensor"] = {key: value for key, value in vars(sensor).items() if key != "nominal_range_m"}
+    for table in ("range_sensor", "rate_sensor", "target"):
+        if (fitted := getattr(scenario, table)) is not None:
+            tables[table] = vars(fitted)
+    tables["thruster"] = vars(scenario.thruster)
     tables["guidance"] = {
-        "step_s": number_text(model.step_s),
-        "strategy": quoted_text(scenario.strategy),
-        "range_threshold_km": number_text(model.range_threshold_m, KILO),
+        "step_s": model.step_s,
+        "strategy": scenario.strategy,
+        "range_threshold_km": model.range_threshold_m,
     }
     tables["information_set"] = {
-        "model": quoted_text(model.kind.value),
-        "initial_set": quoted_text(model.initial_set.value),
-        "sections": str(int(model.sections)),
-        "fewest_sections": str(int(model.fewest_sections)),
-        "recovery": quoted_text(model.recovery.value),
-        "disturbance_m_s2": number_text(model.disturbance_m_s2),
+        "model": model.kind,
+        "initial_set": model.initial_set,
+        "sections": int(model.sections),
+        "fewest_sections": int(model.fewest_sections),
+        "recovery": model.recovery,
+        "disturbance_m_s2": model.disturbance_m_s2,
     }
-    tables["noise"] = {"kind": quoted_text(scenario.noise.value), "tie": quoted_text(scenario.tie.value)}
+    tables["noise"] = {"kind": scenario.noise, "tie": scenario.tie}
     return "\n".join(_table_lines(tables))
+
+
+def _value_text(key: str, value: Any) -> str:
+    """Write an SI value in the unit that its key names."""
+    if isinstance(value, Enum | str):
+        return quoted_text(value.value if isinstance(value, Enum) else value)
+    if isinstance(value, tuple):
+        return f"[{', '.join(_value_text(key, end) for end in value)}]"
+    if key.endswith("_deg"):
+        return degrees_text(value)
+    power = next((power for unit, power in _POWERS.items() if key.endswith(unit)), 0)
+    return str(value) if key in _WHOLE else number_text(value, power)
 
 
 def _interval(pair: DecimalPair) -> Interval:
@@ -377,29 +366,15 @@ def _composed(tables: ScenarioTables) -> Scenario:
     )
 
 
-def _pair(interval: Interval) -> str:
-    return f"[{number_text(interval[0], KILO)}, {number_text(interval[1], KILO)}]"
+def _box(box: StateBox) -> dict[str, Interval]:
+    return {"z_km": box.z_m, "x_km": box.x_m, "vz_km_s": box.vz_m_s, "vx_km_s": box.vx_m_s}
 
 
-def _pair_or_number(interval: Interval) -> str:
-    least, greatest = (number_text(end, KILO) for end in interval)
-    return least if least == greatest else f"[{least}, {greatest}]"
-
-
-def _box(box: StateBox, written: Any) -> dict[str, str]:
-    return {
-        "z_km": written(box.z_m),
-        "x_km": written(box.x_m),
-        "vz_km_s": written(box.vz_m_s),
-        "vx_km_s": written(box.vx_m_s),
-    }
-
-
-def _table_lines(tables: dict[str, dict[str, str]]) -> Iterator[str]:
+def _table_lines(tables: dict[str, dict[str, object]]) -> Iterator[str]:
     for table, keys in tables.items():
         if table:
             yield f"\n[{table}]"
-        yield from (f"{key} = {value}" for key, value in keys.items())
+        yield from (f"{key} = {_value_text(key, value)}" for key, value in keys.items())
     yield ""
 
 

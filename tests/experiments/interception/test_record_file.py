@@ -176,7 +176,7 @@ def test_what_is_no_file(tmp_path: Path) -> None:
         load_record(tmp_path / "x.npz")
     with pytest.raises(InputError, match="is a folder"):
         load_record(tmp_path)
-    with pytest.raises(InputError, match="no ordinary file"):
+    with pytest.raises(InputError, match="not an ordinary file"):
         load_record("/dev/null")
     with pytest.raises(InputError, match="cannot be read"):
         load_record("a\0b")
