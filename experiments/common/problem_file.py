@@ -13,7 +13,16 @@ from importlib import resources
 
 from experiments.common.errors import InputError
 from experiments.common.toml_file import Form, Known, Problem, Tables, no_checks
-from experiments.common.toml_values import nearest, shown
+from experiments.common.toml_values import Constant, Description, Name, Table, key, nearest, shown
+
+
+class ProblemTables(Table):
+    """The keys of every problem file, above its first table."""
+
+    schema_number: Constant = key("version of this file format", "1", alias="schema", default=1)
+    kind: Constant = key("kind of problem", '"pareto-encounter"')
+    name: Name = key("name of the results", '"my-problem"')
+    description: Description = key("one line for `infoset problems list`", '"Who meets whom"', default="")
 
 
 @dataclass(frozen=True)

@@ -274,6 +274,7 @@ POSITIVE = Number(above=ZERO)
 Positive = Annotated[Decimal, PlainValidator(POSITIVE)]
 NotNegative = Annotated[Decimal, PlainValidator(Number(least=ZERO))]
 Fraction = Annotated[Decimal, PlainValidator(Number(above=ZERO, below=ONE))]
+Eccentricity = Annotated[Decimal, PlainValidator(Number(least=ZERO, below=ONE))]
 Degrees = Annotated[Decimal, PlainValidator(Number(least=Decimal(-360), most=Decimal(360)))]
 Vector = Annotated[tuple[Decimal, ...], PlainValidator(Numbers(3, NUMBER))]
 Name = Annotated[str, PlainValidator(Line(LONGEST_NAME, empty=False, forbidden='/\\:*?"<>|$', begins_badly="-."))]

@@ -14,19 +14,16 @@ from pydantic import Field, PlainValidator
 
 from experiments.common.errors import InputError
 from experiments.common.orbit_angle import angle_problems
-from experiments.common.problem_file import duplicate_names, problem_form, problem_hash
+from experiments.common.problem_file import ProblemTables, duplicate_names, problem_form, problem_hash
 from experiments.common.toml_file import KeyPath, Known, Problem, load_tables
 from experiments.common.toml_values import (
     KILO,
     NUMBER,
-    ONE,
     ZERO,
-    Constant,
     Degrees,
-    Description,
+    Eccentricity,
     Name,
     NotNegative,
-    Number,
     Numbers,
     OneOf,
     Positive,
@@ -88,7 +85,6 @@ def _flag(value: object) -> bool:
 
 
 Elements = Annotated[tuple[Decimal, ...], PlainValidator(_elements)]
-Eccentricity = Annotated[Decimal, PlainValidator(Number(least=ZERO, below=ONE))]
 Time = Annotated[Decimal, PlainValidator(NUMBER)]
 
 
@@ -131,13 +127,10 @@ class TimesTable(Table):
     price_per_s: NotNegative = key("price of one second of the last time, added to the cost", "1e-6", default=ZERO)
 
 
-class MultipointTables(Table):
+class MultipointTables(ProblemTables):
     """A problem file of kind `multipoint`."""
 
-    schema_number: Constant = key("version of this file format", "1", alias="schema", default=1)
-    kind: Constant = key("kind of problem", f'"{KIND}"')
     name: Name = key("name of the results", '"my-tour"', default="tour")
-    description: Description = key("one line for `infoset problems list`", '"Who is visited"', default="")
     axes: Annotated[Axes, PlainValidator(OneOf(Axes))] = key('"hill" or "inertial"', '"hill"')
     orbit_rate_rad_s: Positive | None = key("mean motion of the reference orbit", "1.13e-3", default=None)
     eccentricity: Eccentricity = key("of the reference orbit", "0.0", default=ZERO)

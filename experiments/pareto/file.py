@@ -13,13 +13,11 @@ from pydantic import Field, PlainValidator
 
 from experiments.common.errors import InputError
 from experiments.common.orbit_angle import angle_problems
-from experiments.common.problem_file import duplicate_names, problem_form, problem_hash
+from experiments.common.problem_file import ProblemTables, duplicate_names, problem_form, problem_hash
 from experiments.common.toml_file import Known, Problem, load_tables
 from experiments.common.toml_values import (
     NUMBER,
     ZERO,
-    Constant,
-    Description,
     Name,
     NotNegative,
     OneOf,
@@ -76,13 +74,10 @@ class CraftTable(Table):
     start_s: NotNegative = key("start time", "0.0", default=ZERO)
 
 
-class ParetoTables(Table):
+class ParetoTables(ProblemTables):
     """A problem file of kind `pareto-encounter`."""
 
-    schema_number: Constant = key("version of this file format", "1", alias="schema", default=1)
-    kind: Constant = key("kind of problem", f'"{KIND}"')
     name: Name = key("name of the results", '"my-encounter"', default="encounter")
-    description: Description = key("one line for `infoset problems list`", '"Who meets whom"', default="")
     orbit_rate_rad_s: Positive = key("mean motion of the circular reference orbit", "1.176e-3")
     duration_s: Positive = key("from t = 0 to the meeting", "30.0")
     free: Annotated[tuple[Component, ...], PlainValidator(_free)] = key(

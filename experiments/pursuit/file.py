@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from pydantic import PlainValidator
 
 from experiments.common.errors import InputError
-from experiments.common.problem_file import problem_form, problem_hash
+from experiments.common.problem_file import ProblemTables, problem_form, problem_hash
 from experiments.common.toml_file import Known, Problem, load_tables, read_tables
 from experiments.common.toml_values import (
     KILO,
@@ -24,9 +24,7 @@ from experiments.common.toml_values import (
     NUMBER,
     ONE,
     ZERO,
-    Constant,
     Degrees,
-    Description,
     Name,
     NotNegative,
     Number,
@@ -99,13 +97,10 @@ class PlayerTable(Table):
     specific_impulse_s: Positive = key("specific impulse", "350.0")
 
 
-class PursuitTables(Table):
+class PursuitTables(ProblemTables):
     """A problem file of kind `pursuit-evasion`."""
 
-    schema_number: Constant = key("version of this file format", "1", alias="schema", default=1)
-    kind: Constant = key("kind of problem", f'"{KIND}"')
     name: Name = key("name of the results", '"my-pursuit"', default="pursuit")
-    description: Description = key("one line for `infoset problems list`", '"Who pursues whom"', default="")
     gravitational_parameter_km3_s2: Positive = key("gravitational parameter of the planet", "398600.4418")
     planet_radius_km: NotNegative = key("the orbits stay above it", "6378.137", default=EARTH_RADIUS_KM)
     j2: Oblateness = key("second zonal harmonic", "1.08262668e-3", default=ZERO)

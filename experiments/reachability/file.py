@@ -14,16 +14,14 @@ from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
 from experiments.common.errors import InputError
-from experiments.common.problem_file import problem_form, problem_hash
+from experiments.common.problem_file import ProblemTables, problem_form, problem_hash
 from experiments.common.toml_file import Known, Problem, load_tables
 from experiments.common.toml_values import (
     KILO,
     NUMBER,
     POSITIVE,
-    Constant,
     Degrees,
-    Description,
-    Name,
+    Eccentricity,
     Number,
     Numbers,
     OneOf,
@@ -83,7 +81,6 @@ def _from_period(value: object) -> int:
     return value
 
 
-Eccentricity = Annotated[Decimal, PlainValidator(Number(least=Decimal(0), below=Decimal(1)))]
 OpenAngle = Annotated[Decimal, PlainValidator(Number(above=Decimal(0), below=Decimal(90)))]
 Bound = Annotated[tuple[Decimal, ...], PlainValidator(Numbers(3, POSITIVE, one_for_all=True))]
 FromPeriod = Annotated[int, PlainValidator(_from_period)]
@@ -146,13 +143,9 @@ class NavigationTable(Table):
     velocity_error_m_s: Bound = key("largest error along an axis", "0.01")
 
 
-class ReachabilityTables(Table):
+class ReachabilityTables(ProblemTables):
     """A problem file of kind `reachable-rendezvous`."""
 
-    schema_number: Constant = key("version of this file format", "1", default=1, alias="schema")
-    kind: Constant = key("kind of problem", f'"{KIND}"')
-    name: Name = key("name of the results", '"rendezvous-2021"')
-    description: Description = key("one line for `infoset problems list`", '"..."', default="")
     periods: Annotated[int, PlainValidator(Whole(MOST_PERIODS))] = key("number of periods, T", "4")
     period_s: Positive = key("length of a period", "180.0")
     acceleration_m_s2: Positive = key("acceleration of a unit control", "0.15")
