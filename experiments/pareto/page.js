@@ -28,8 +28,8 @@ const flat = (meeting) => [meeting[0], meeting[1] ?? 0];
 
 const plane = {
   limits: (() => {
-    const places = [...DATA.craft.map(({ ideal }) => ideal), ...DATA.selections.map((each) => each.point)].map(flat);
-    return [0, 1].map((axis) => limitsOf(places.map((place) => place[axis]), 0.35));
+    const points = [...DATA.craft.map(({ ideal }) => ideal), ...DATA.selections.map((selection) => selection.point)].map(flat);
+    return [0, 1].map((axis) => limitsOf(points.map((at) => at[axis]), 0.35));
   })(),
 
   draw(chart) {
@@ -41,8 +41,8 @@ const plane = {
     if (DATA.pareto_hull) {
       chart.curve(DATA.pareto_hull, { fill: theme.colours.set, opacity: 0.18, stroke: theme.colours.line, width: 1, closed: true });
     }
-    for (const each of DATA.pareto_points) {
-      const [x, y] = flat(each);
+    for (const optimal of DATA.pareto_points) {
+      const [x, y] = flat(optimal);
       chart.path([[chart.across(x) - 1, chart.up(y)], [chart.across(x) + 1, chart.up(y)]], { stroke: theme.colours.line, width: 2 });
     }
     DATA.craft.forEach((craft, index) => {
@@ -50,7 +50,7 @@ const plane = {
       if (DATA.free.length === 2) chart.curve(equalCosts(craft, point), { stroke: colour, width: 1.3, dash: lookOf(index).dash });
       chart.point(...flat(craft.ideal), lookOf(index).mark, colour);
     });
-    for (const each of DATA.selections) chart.point(...flat(each.point), "cross", theme.colours.quiet);
+    for (const selection of DATA.selections) chart.point(...flat(selection.point), "cross", theme.colours.quiet);
     chart.point(...flat(point), "diamond", theme.colours.ink);
     chart.end();
     chart.describe(rows().map((row) => row.join(" ")).join(", "));
@@ -60,10 +60,10 @@ const plane = {
     const chart = panel;
     const near = [
       ...DATA.craft.map(({ name, ideal }) => [`cheapest meeting of ${name}`, ideal]),
-      ...DATA.selections.map((each) => [each.name, each.point]),
+      ...DATA.selections.map((selection) => [selection.name, selection.point]),
       ["meeting", point],
     ].filter(([, at]) => Math.hypot(chart.across(flat(at)[0]) - x, chart.up(flat(at)[1]) - y) < 10);
-    return near.length ? near.flatMap(([name, at]) => [name, ...DATA.free.map((each, k) => `${each.name} = ${shown(at[k], each.unit)}`)]) : null;
+    return near.length ? near.flatMap(([name, at]) => [name, ...DATA.free.map((component, k) => `${component.name} = ${shown(at[k], component.unit)}`)]) : null;
   },
 };
 
@@ -108,8 +108,8 @@ main.append(
   element("div", { class: "choices" }, ...inputs.map(({ label }) => label),
     choice("Go to", [["", "\u2026"], ...DATA.selections.map(({ name }, index) => [String(index), name]),
       ...DATA.craft.map(({ name }, index) => [String(DATA.selections.length + index), `cheapest meeting of ${name}`])], "", (value) => {
-      const places = [...DATA.selections.map((each) => each.point), ...DATA.craft.map(({ ideal }) => ideal)];
-      if (value !== "") moveTo(places[Number(value)].slice());
+      const points = [...DATA.selections.map((selection) => selection.point), ...DATA.craft.map(({ ideal }) => ideal)];
+      if (value !== "") moveTo(points[Number(value)].slice());
     })),
   top_,
 );
@@ -118,15 +118,15 @@ const { player, panels } = buildMotion(main);
 /** Change the meeting and update costs, paths and drawings; `typed` is the input field of the change, if any. */
 function moveTo(meeting, typed = null) {
   point = meeting;
-  const at = (base, slope) => base.map((value, axis) => value + slope[axis].reduce((sum, each, k) => sum + each * point[k], 0));
-  for (const each of panels) {
-    const { view } = each;
+  const at = (base, slope) => base.map((value, axis) => value + slope[axis].reduce((sum, factor, k) => sum + factor * point[k], 0));
+  for (const viewer of panels) {
+    const { view } = viewer;
     view.tracks.forEach((track, index) => {
       const craft = DATA.craft[index];
       track.points = craft.path_base_m.map((base, moment) => at(base, craft.path_slope[moment]));
     });
     view.marks[0].point = at(DATA.meeting_base_m, DATA.opening);
-    each.fit();
+    viewer.fit();
   }
   inputs.forEach(({ input }, index) => { if (input !== typed) input.value = Number(point[index].toPrecision(8)); });
   fillTable(costs, rows());

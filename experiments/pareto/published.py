@@ -138,8 +138,8 @@ def _solved(encounter: Encounter, velocities: Floats) -> EncounterSolution:
     """Solve the encounter with the paper's rate and other start velocities, shape (3, 3)."""
     motion = ClohessyWiltshire(RATE_RAD_S, ORBITAL)
     craft = tuple(
-        replace(each, motion=motion, state=np.concatenate([each.state[:3], velocity]))
-        for each, velocity in zip(encounter.craft, velocities, strict=True)
+        replace(member, motion=motion, state=np.concatenate([member.state[:3], velocity]))
+        for member, velocity in zip(encounter.craft, velocities, strict=True)
     )
     return solve_encounter(replace(encounter, craft=craft))
 
@@ -155,16 +155,18 @@ def _identified(encounter: Encounter, progress: Progress) -> Floats:
 
     def misses(shift: Floats) -> Floats:
         numbers = _results(_solved(encounter, printed + _DECIMALS * shift.reshape(3, 3)))
-        used = [each for each in numbers if each.source in _IDENTIFYING and each.corrected is None]
-        return np.array([((each.ours or 0.0) - float(each.printed)) / last_digit(each.printed) for each in used])
+        used = [number for number in numbers if number.source in _IDENTIFYING and number.corrected is None]
+        return np.array(
+            [((number.ours or 0.0) - float(number.printed)) / last_digit(number.printed) for number in used]
+        )
 
     printed, shift = np.array(_VELOCITIES, dtype=float), np.zeros(9)
     for step in range(_STEPS):
         at = misses(shift)
         slopes = []
-        for place in range(9):
-            slopes.append(misses(shift + np.eye(9)[place]) - at)
-            progress((step + (place + 1) / 9) / _STEPS)
+        for column in range(9):
+            slopes.append(misses(shift + np.eye(9)[column]) - at)
+            progress((step + (column + 1) / 9) / _STEPS)
         shift = shift - np.linalg.lstsq(np.stack(slopes, axis=1), at, rcond=None)[0]
     return np.asarray(printed + _DECIMALS * shift.reshape(3, 3))
 
@@ -236,7 +238,7 @@ def _coefficients(terms: Mapping[str, str], times: Floats, values: Floats) -> Fl
 
 
 def _over_orbits() -> Floats:
-    """Return times over two orbits: in the 30 s of the flight the terms can hardly be told apart."""
+    """Return times over two orbits: in the 30 s of the flight the terms are nearly dependent."""
     return np.linspace(0.0, 4.0 * np.pi / RATE_RAD_S, 200)
 
 
