@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from experiments import load_scenario
-from experiments.common.figure_style import CURVE_LOOKS, new_figure, place_axes, save_figure, style
+from experiments.common.figure_style import CURVE_LOOKS, new_figure, place_axes, style
+from experiments.common.output import Output
 from guidance import NoiseKind
 from sim import Campaign, Scenario, simulate
 
@@ -77,7 +78,8 @@ def main() -> None:
         figure.legend(
             *left.get_legend_handles_labels(), loc="lower center", ncols=2, title="points measured, lines fitted"
         )
-    save_figure(figure, out, "figure-campaign-cost")
+    out.mkdir(parents=True, exist_ok=True)
+    Output(out, {}, overwrite=True).figure("figure-campaign-cost", figure)
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
-"""The command `infoset` from its first moment: an interrupt while modules are loaded ends it as one during a flight."""
+"""Entry point of the command `infoset`: an interrupt while modules are loaded ends it like one during a computation."""
 
 from __future__ import annotations
 
 import sys
 
-_MOMENT_S = 0.05
+_DELAY_S = 0.05
 
 
 def main() -> None:
@@ -13,14 +13,14 @@ def main() -> None:
     Raises
     ------
     SystemExit
-        Always: 0 done, 2 wrong input, 130 interrupted.
+        Always: 0 done, 1 a published number disagrees, 2 wrong input, 130 interrupted.
 
     Notes
     -----
     Only `sys` is imported before this `try`: an interrupt before it ends the process by the signal.
     """
     try:
-        sys.unraisablehook = _lose_no_interrupt
+        sys.unraisablehook = _repeat_interrupt
         import atexit
 
         atexit.register(_keep_exit_code)
@@ -36,27 +36,27 @@ def main() -> None:
         sys.exit(INTERRUPTED)
 
 
-def _lose_no_interrupt(unraisable: sys.UnraisableHookArgs) -> None:
-    """Interrupt again where an interrupt fell into a callback of Python's own, which would drop it with a traceback."""
+def _repeat_interrupt(unraisable: sys.UnraisableHookArgs) -> None:
+    """Send the interrupt again if it fell into a callback of Python, which drops exceptions with a traceback."""
     import os
     import signal
     import threading
 
     if isinstance(unraisable.exc_value, KeyboardInterrupt) and os.name == "posix":
-        # A moment later: at once it would fall into this hook, and be dropped too.
-        threading.Timer(_MOMENT_S, os.kill, (os.getpid(), signal.SIGINT)).start()
+        # After a delay: an immediate signal would fall into this hook, which drops exceptions too.
+        threading.Timer(_DELAY_S, os.kill, (os.getpid(), signal.SIGINT)).start()
     else:
         sys.__unraisablehook__(unraisable)
 
 
 def _keep_exit_code() -> None:
-    """Let no interrupt replace the exit code: none that comes while Python exits, and none that was handled before.
+    """Ignore interrupts while Python exits, and clear the mark of an interrupt that was handled before.
 
     Notes
     -----
-    An interrupt inside text that Python runs (a dataclass or a named tuple that is being defined) is remembered as not
-    handled until the next such text. Under ``python -m`` the process then ends by the signal, whatever `SystemExit`
-    says. Defining a named tuple clears it.
+    An interrupt inside code that Python compiles (the definition of a dataclass or a named tuple) is marked as not
+    handled until the next such code. Under ``python -m`` the process then ends by the signal, whatever `SystemExit`
+    says. Defining a named tuple clears the mark.
     """
     import signal
     from collections import namedtuple
@@ -66,7 +66,7 @@ def _keep_exit_code() -> None:
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
-    """Whether an error is an interrupt, or what Python 3.11 makes of one while a module is loaded: another's cause."""
+    """Whether an error is an interrupt or has one as its cause, as in Python 3.11 while a module is loaded."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__
     return error is not None

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-from importlib.metadata import PackageNotFoundError, version
+import json
+from importlib.metadata import PackageNotFoundError, distribution, version
 
 CALCULATING = ("infoset", "numpy", "numba", "llvmlite")
 
@@ -43,3 +44,13 @@ def _version(name: str) -> str:
         return version(name)
     except PackageNotFoundError:
         return "none"
+
+
+def install_command(extra: str) -> str:
+    """Return the command that installs an optional extra: from the clone of an editable installation, else by name."""
+    try:
+        origin = json.loads(distribution("infoset").read_text("direct_url.json") or "{}")
+    except PackageNotFoundError:
+        origin = {"dir_info": {"editable": True}}
+    editable = origin.get("dir_info", {}).get("editable", False)
+    return f'pip install -e ".[{extra}]"' if editable else f'pip install "infoset[{extra}]"'

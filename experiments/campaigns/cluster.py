@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.common.errors import InputError
 from experiments.common.toml_values import shown
-from sim.versions import CALCULATING, calculating_versions, differences
+from sim.versions import CALCULATING, calculating_versions, differences, install_command
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -71,7 +71,7 @@ def connected(address: str) -> Iterator[Cluster]:
         from distributed import Client
     except ImportError:
         raise InputError(
-            "--dask: clusters need Dask, which is not installed; install the extra: pip install 'infoset[distributed]'"
+            f"--dask: clusters need Dask, which is not installed: {install_command('distributed')}"
         ) from None
     # A scheduler that dies is told of in one message here, not in the tracebacks of its client's threads.
     for name in ("distributed", "distributed.client", "asyncio"):

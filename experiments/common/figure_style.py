@@ -5,15 +5,12 @@ from __future__ import annotations
 import contextlib
 import io
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-
-from experiments.common.output import write_file
 
 WIDTH_MM = 180.0
 PNG_DPI = 200
@@ -182,12 +179,3 @@ def figure_bytes(figure: Figure) -> list[tuple[str, bytes]]:
             figure.savefig(content, format=kind, **option)
         files.append((kind, content.getvalue()))
     return files
-
-
-def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
-    """Write a figure as NAME.pdf and NAME.png into a folder, which is created if it does not exist."""
-    folder.mkdir(parents=True, exist_ok=True)
-    files = [(folder / f"{name}.{kind}", content) for kind, content in figure_bytes(figure)]
-    for file, content in files:
-        write_file(file, content, overwrite=True)
-    return [file for file, _ in files]

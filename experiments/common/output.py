@@ -1,4 +1,4 @@
-"""Files that commands write: checked before the work, written whole or not at all, replaced only when told to."""
+"""Files that commands write: checked before the work, written completely or not at all."""
 
 from __future__ import annotations
 
@@ -30,64 +30,8 @@ STDOUT = "-"
 Cell = str | int | float | bool | None
 
 
-@contextlib.contextmanager
-def checked_destinations(
-    *,
-    folder: Path | None = None,
-    names: Sequence[str] = (),
-    files: Mapping[str, Path | None] | None = None,
-    overwrite: bool = False,
-) -> Iterator[None]:
-    """Check everything that will be written, before the work: really try, and leave nothing behind.
-
-    Parameters
-    ----------
-    folder : Path or None
-        A folder to fill. It is made, and taken away again should the work fail before anything is in it.
-    names : sequence of str
-        What will be written into the folder.
-    files : mapping of str to Path or None
-        Single files, by the option that names them. The path ``-`` is stdout, and only one may be that.
-    overwrite : bool
-        Whether a folder may hold something, and files be replaced.
-
-    Yields
-    ------
-    None
-        While the work is done.
-
-    Raises
-    ------
-    InputError
-        If something cannot be written, or would replace what is there.
-    """
-    given = {option: path for option, path in (files or {}).items() if path is not None}
-    printed = [option for option, path in given.items() if str(path) == STDOUT]
-    if len(printed) > 1:
-        raise InputError(f"{' and '.join(printed)} cannot both be printed on stdout; name a file for one of them")
-    made: list[Path] = []
-    try:
-        if folder is not None:
-            made = _check_folder(folder, overwrite)
-            for name in names:
-                check_file(folder / name, overwrite=overwrite)
-        taken = {_resolved(folder / name): "a file of --out" for name in names} if folder is not None else {}
-        for option, path in given.items():
-            if option in printed:
-                continue
-            check_file(path, overwrite=overwrite)
-            other = taken.setdefault(_resolved(path), f"the file of {option}")
-            if other != f"the file of {option}":
-                raise InputError(f"{option}: {path} is also {other}; choose another name")
-        yield
-    finally:
-        for each in reversed(made):
-            with contextlib.suppress(OSError):
-                each.rmdir()  # only what is still empty goes
-
-
 class Output:
-    """The files of one command: written whole or not at all, and listed when the command ends.
+    """The files of one command, listed when the command ends.
 
     Parameters
     ----------
@@ -145,6 +89,10 @@ class Output:
             self.figure(name, draw())
             progress(done / len(drawings))
 
+    def add(self, file: Path) -> None:
+        """List a file that another function has written."""
+        self.written.append(file)
+
     def _write(self, file: Path, content: str | bytes) -> None:
         write_file(file, content, overwrite=self._overwrite)
         self.written.append(file)
@@ -179,17 +127,38 @@ def output(
     InputError
         If a file cannot be written, or would replace an existing one.
     """
-    with checked_destinations(folder=folder, names=names, files=files, overwrite=overwrite):
-        opened = Output(folder, {option: path for option, path in (files or {}).items() if path}, overwrite)
+    single = {option: path for option, path in (files or {}).items() if path is not None}
+    printed = [option for option, path in single.items() if str(path) == STDOUT]
+    if len(printed) > 1:
+        raise InputError(f"{' and '.join(printed)} cannot both be printed on stdout; name a file for one of them")
+    created: list[Path] = []
+    try:
+        owners: dict[Path, str] = {}
+        if folder is not None:
+            created = _check_folder(folder, overwrite)
+            for name in names:
+                check_file(folder / name, overwrite=overwrite)
+            owners = {_resolved(folder / name): "a file of --out" for name in names}
+        for option, path in single.items():
+            if option in printed:
+                continue
+            check_file(path, overwrite=overwrite)
+            if (other := owners.setdefault(_resolved(path), f"the file of {option}")) != f"the file of {option}":
+                raise InputError(f"{option}: {path} is also {other}; choose another name")
+        opened = Output(folder, single, overwrite)
         yield opened
+    finally:
+        _remove_empty(created)
     if opened.written and not quiet:
         typer.echo(on_a_screen("\n".join(_listed(opened.written))), err=True)
 
 
-def output_of(options: FileOptions, names: Sequence[str]) -> contextlib.AbstractContextManager[Output]:
-    """Return the `output` of a command that writes files of these names with ``--out``."""
-    files = {f"--{option}": getattr(options, option, None) for option in ("json", "csv", "html")}
-    return output(folder=options.out, names=names, files=files, overwrite=options.overwrite, quiet=options.quiet)
+def output_of(
+    options: FileOptions, names: Sequence[str], files: Mapping[str, Path | None] | None = None
+) -> contextlib.AbstractContextManager[Output]:
+    """Return the `output` of a command that writes files of these names with ``--out``, and single files."""
+    single = {f"--{option}": getattr(options, option, None) for option in ("json", "csv", "html")} | dict(files or {})
+    return output(folder=options.out, names=names, files=single, overwrite=options.overwrite, quiet=options.quiet)
 
 
 def _listed(files: Sequence[Path]) -> Iterator[str]:
@@ -200,20 +169,14 @@ def _listed(files: Sequence[Path]) -> Iterator[str]:
 
 
 def check_file(file: Path, *, overwrite: bool = False) -> None:
-    """Check that a file can be written, by writing beside it.
-
-    Parameters
-    ----------
-    file : Path
-    overwrite : bool
-        Whether it may be there already.
+    """Check that a file can be written, by creating a temporary file in its folder.
 
     Raises
     ------
     InputError
-        If it cannot, or is there already and may not be replaced.
+        If it cannot be written, is a link, or exists and `overwrite` is false.
     """
-    with _said(file):
+    with _reporting(file):
         _check_name(file, overwrite)
         probe = temporary_beside(file)
         with probe.open("x"):
@@ -222,69 +185,20 @@ def check_file(file: Path, *, overwrite: bool = False) -> None:
 
 
 def write_file(file: Path, content: str | bytes, *, overwrite: bool = False) -> None:
-    """Write a file whole or not at all, and replace one only when told to.
-
-    Parameters
-    ----------
-    file : Path
-    content : str or bytes
-        Text is written as UTF-8.
-    overwrite : bool
-        Whether it may be there already.
+    """Write a file completely or not at all; text is written as UTF-8.
 
     Raises
     ------
     InputError
-        If it cannot be written, is a link, or is there already and may not be replaced.
+        If it cannot be written, is a link, or exists and `overwrite` is false.
     """
-    with _said(file):
+    with _reporting(file):
         _check_name(file, overwrite)
         replace_file(file, content.encode() if isinstance(content, str) else content)
 
 
-def deliver(destination: Path | None, text: str, *, overwrite: bool) -> None:
-    """Give a text to whoever asked for it: print it on stdout, or write a file.
-
-    Parameters
-    ----------
-    destination : Path or None
-        ``-`` is stdout; None is nobody.
-    text : str
-    overwrite : bool
-        Whether a file may be there already.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written, or is there already and may not be replaced.
-    """
-    if destination is None:
-        return
-    if str(destination) == STDOUT:
-        typer.echo(text, nl=False)
-    else:
-        write_file(destination, text, overwrite=overwrite)
-
-
-@contextlib.contextmanager
-def reporting_failures(where: Path) -> Iterator[None]:
-    """Turn an error of the file system, in what is written by others, into one that a person can act on.
-
-    Parameters
-    ----------
-    where : Path
-        What is being written.
-
-    Yields
-    ------
-    None
-    """
-    with _said(where):
-        yield
-
-
 def library_version() -> str:
-    """Return the version of the installed distribution, which stands in every file."""
+    """Return the version of the installed distribution."""
     return version("infoset")
 
 
@@ -317,19 +231,9 @@ def json_value(value: Any) -> object:
 
 
 def to_csv(columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
-    """Return a table as comma-separated values.
+    """Return a table as comma-separated values, the names of the columns in the first line.
 
-    Parameters
-    ----------
-    columns : sequence of str
-        Names, with their units.
-    rows : sequence of sequences
-        None is an empty cell, True and False are ``true`` and ``false``, numbers have all their digits.
-
-    Returns
-    -------
-    str
-        A line of names and a line a row.
+    None is an empty cell, True and False are ``true`` and ``false``, numbers have all their digits.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -347,7 +251,7 @@ def _cell(value: Cell) -> str:
 
 
 def _check_name(file: Path, overwrite: bool) -> None:
-    """Say what is wrong with a name as the name of a file to write."""
+    """Raise `InputError` if a file cannot have this name."""
     if file.is_dir():
         raise InputError(f"{file}: is a folder; name a file in it, for example {file / 'new-file'}")
     if os.path.lexists(file):
@@ -360,20 +264,20 @@ def _check_name(file: Path, overwrite: bool) -> None:
     if not file.parent.is_dir():
         raise InputError(f"{file}: there is no folder {file.parent}; make it first")
     with contextlib.suppress(FileNotFoundError):
-        file.lstat()  # fails where the name itself cannot be: it is too long
+        file.lstat()  # raises OSError if the name is too long
 
 
 def _check_folder(folder: Path, overwrite: bool) -> list[Path]:
-    """Make a folder if it is not there, try to write in it, and return what was made, outermost first."""
-    made: list[Path] = []
+    """Create a folder if needed, try to write in it, and return the created folders, the outermost first."""
+    created: list[Path] = []
     try:
-        with _said(folder):
+        with _reporting(folder):
             if os.path.lexists(folder) and not folder.is_dir():
                 raise InputError(f"{folder}: is a file, not a folder; choose another name for the output folder")
-            missing = [each for each in (folder, *folder.parents) if not each.exists()]
-            for each in reversed(missing):
-                each.mkdir()
-                made.append(each)
+            missing = [parent for parent in (folder, *folder.parents) if not parent.exists()]
+            for parent in reversed(missing):
+                parent.mkdir()
+                created.append(parent)
             if not overwrite and next(folder.iterdir(), None) is not None:
                 raise InputError(
                     f"{folder}: is not empty; choose another folder, or give --overwrite to replace files in it"
@@ -383,20 +287,25 @@ def _check_folder(folder: Path, overwrite: bool) -> list[Path]:
                 pass
             probe.unlink()
     except InputError:
-        for each in reversed(made):
-            with contextlib.suppress(OSError):
-                each.rmdir()
+        _remove_empty(created)
         raise
-    return made
+    return created
+
+
+def _remove_empty(folders: Sequence[Path]) -> None:
+    for folder in reversed(folders):
+        with contextlib.suppress(OSError):
+            folder.rmdir()
 
 
 def _resolved(path: Path) -> Path:
-    with _said(path):
+    with _reporting(path):
         return path.resolve()
 
 
 @contextlib.contextmanager
-def _said(path: Path) -> Iterator[None]:
+def _reporting(path: Path) -> Iterator[None]:
+    """Turn an error of the file system into an `InputError` with the path and the reason."""
     try:
         yield
     except BrokenPipeError:

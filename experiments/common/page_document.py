@@ -15,9 +15,7 @@ import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
-from pathlib import Path
 
-from experiments.common.errors import InputError
 from experiments.common.output import json_value, library_version
 
 BLOCKS = ("dom.js", "chart.js", "scene.js", "player.js")
@@ -77,29 +75,6 @@ def embedded_json(value: object) -> str:
     text = json.dumps(value, allow_nan=False, ensure_ascii=False, separators=(",", ":"), default=json_value)
     # A half of a surrogate pair is no character that a file can hold.
     return text.translate(_ESCAPES).encode("utf-8", "backslashreplace").decode("utf-8")
-
-
-def page_path(option: str, path: Path | None) -> Path | None:
-    """Return the path of a page if its name ends as browsers expect.
-
-    Parameters
-    ----------
-    option : str
-        What it was given to.
-    path : Path or None
-
-    Returns
-    -------
-    Path or None
-
-    Raises
-    ------
-    InputError
-        If it does not end in ``.html``.
-    """
-    if path is not None and path.suffix != ".html":
-        raise InputError(f"{option}: {path} must end in .html; for example {option} page.html")
-    return path
 
 
 @cache

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sim.storage.files import DamagedError, MissingLibraryError, reporting
 from sim.storage.manifest import Manifest, read_manifest
+from sim.versions import install_command
 
 Numbers = np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]
 Codes = NDArray[np.int8]
@@ -285,7 +286,6 @@ def need_arrow() -> ModuleType:
         from sim.storage import tables
     except ImportError:
         raise MissingLibraryError(
-            "campaigns are stored with pyarrow, which is not installed; install the extra: pip install "
-            "'infoset[campaign]'"
+            f"campaigns are stored with pyarrow, which is not installed: {install_command('campaign')}"
         ) from None
     return tables

@@ -20,7 +20,7 @@ import pytest
 from experiments.cli import main
 from experiments.common import screen
 from experiments.common.errors import InputError
-from experiments.common.output import checked_destinations, to_csv, to_json, write_file
+from experiments.common.output import output, to_csv, to_json, write_file
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_text
 from sim import Scenario, simulate
 
@@ -422,7 +422,7 @@ def test_a_folder_that_may_not_be_written_is_found_before_the_work(
 
 def test_a_folder_made_for_work_that_failed_is_taken_away(tmp_path: Path) -> None:
     def work() -> None:
-        with checked_destinations(folder=tmp_path / "a" / "b"):
+        with output(folder=tmp_path / "a" / "b"):
             assert (tmp_path / "a" / "b").is_dir()
             raise RuntimeError("no")
 

@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 from experiments.common.errors import InputError
-from experiments.common.figure_style import new_figure, save_figure
+from experiments.common.figure_style import new_figure
+from experiments.common.output import Output
 from tests.faults.conftest import Infoset, Left, begin, ended, need_whole
 
 COMMANDS = {
@@ -104,7 +105,7 @@ def test_a_figure_replaces_the_one_before_only_when_it_is_whole(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     figure = new_figure(height_mm=20.0, width_mm=20.0)
-    save_figure(figure, tmp_path, "figure")
+    Output(tmp_path, {}, overwrite=True).figure("figure", figure)
     before = {each.name: each.read_bytes() for each in tmp_path.iterdir()}
     figure.text(0.5, 0.5, "another")
 
@@ -113,7 +114,7 @@ def test_a_figure_replaces_the_one_before_only_when_it_is_whole(
 
     monkeypatch.setattr(Path, "replace", full)
     with pytest.raises(InputError, match="No space left on device"):
-        save_figure(figure, tmp_path, "figure")
+        Output(tmp_path, {}, overwrite=True).figure("figure", figure)
     assert {each.name: each.read_bytes() for each in tmp_path.iterdir()} == before
 
 
@@ -122,7 +123,10 @@ def test_a_figure_replaces_the_one_before_only_when_it_is_whole(
     [
         (OSError(errno.ENOSPC, "No space left on device", "/home/x/.cache/k.nbi"), ["k.nbi: No space left", "disk"]),
         (OSError(errno.EIO, "Input/output error"), ["Input/output error", "check the disk"]),
-        (MemoryError("Unable to allocate 9 GiB"), ["there is not enough memory (Unable to allocate 9 GiB)"]),
+        (
+            MemoryError("Unable to allocate 9 GiB"),
+            ["Not enough memory (Unable to allocate 9 GiB). Free some memory"],
+        ),
     ],
 )
 def test_what_nobody_has_made_a_message_of(

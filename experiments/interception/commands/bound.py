@@ -8,12 +8,12 @@ from typing import Annotated
 import typer
 
 from experiments.common.command import command
-from experiments.common.options import Json, Out, Overwrite, Quiet, Seed
+from experiments.common.options import FileOptions, Seed
 from experiments.interception.options import MOST_RUNS, ModelName, ScenarioName, Strategies
 
 
 @dataclass(frozen=True)
-class Bound:
+class Bound(FileOptions):
     """Compute a lower bound of the miss that any strategy can guarantee, and simulate what proves it.
 
     Two true states with equal measurements up to some step get equal impulses until then, so at least one of them
@@ -34,10 +34,6 @@ class Bound:
         ),
     ] = 500
     seed: Seed = 0
-    out: Out = None
-    json: Json = None
-    overwrite: Overwrite = False
-    quiet: Quiet = False
 
 
 @command

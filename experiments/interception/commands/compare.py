@@ -8,12 +8,12 @@ from typing import Annotated
 import typer
 
 from experiments.common.command import command
-from experiments.common.options import Csv, Json, Out, Overwrite, Quiet, Seed
+from experiments.common.options import Csv, FileOptions, Seed
 from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, ScenarioName, Strategies
 
 
 @dataclass(frozen=True)
-class Compare:
+class Compare(FileOptions):
     """Compare strategies: the miss and the impulse spent, with random noise and with game noise.
 
     All strategies have the same starts and errors, run by run. Game noise is simulated with each of its four tie
@@ -29,11 +29,7 @@ class Compare:
     seed: Seed = 0
     model: ModelName = None
     range_meter: RangeMeter = None
-    out: Out = None
-    json: Json = None
     csv: Csv = None
-    overwrite: Overwrite = False
-    quiet: Quiet = False
 
 
 @command

@@ -9,12 +9,12 @@ from typing import Annotated, Literal
 import typer
 
 from experiments.common.command import command
-from experiments.common.options import Csv, Json, Out, Overwrite, Quiet, Seed
+from experiments.common.options import Csv, FileOptions, Seed
 from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, ScenarioName, StrategyName, TieName
 
 
 @dataclass(frozen=True)
-class Engage:
+class Engage(FileOptions):
     """Simulate one engagement and show its course; with --noise both, one with each kind of noise.
 
     Run K is the same engagement, number for number, as run K of: infoset experiment with the same seed.
@@ -35,11 +35,7 @@ class Engage:
         Path | None,
         typer.Option(metavar="FILE.npz", help="Write the record; with --noise both FILE-random.npz and FILE-game.npz."),
     ] = None
-    out: Out = None
-    json: Json = None
     csv: Csv = None
-    overwrite: Overwrite = False
-    quiet: Quiet = False
 
 
 @command

@@ -8,12 +8,12 @@ from typing import Annotated
 import typer
 
 from experiments.common.command import command
-from experiments.common.options import Csv, Json, Out, Overwrite, Quiet, Seed
+from experiments.common.options import Csv, FileOptions, Seed
 from experiments.interception.options import MOST_RUNS, ModelName, ScenarioName, StrategyName, TieName
 
 
 @dataclass(frozen=True)
-class Experiment:
+class Experiment(FileOptions):
     """Simulate four curves of many runs: random and game noise, each without and with the range meter.
 
     All curves have the same starts and errors, run by run. Run K is the same engagement as in: infoset engage --run K.
@@ -29,11 +29,7 @@ class Experiment:
     sections: Annotated[
         int | None, typer.Option(metavar="N", help="Number of sections at the start, in place of the scenario's.")
     ] = None
-    out: Out = None
-    json: Json = None
     csv: Csv = None
-    overwrite: Overwrite = False
-    quiet: Quiet = False
 
 
 @command

@@ -59,7 +59,7 @@ def run(options: Adversary) -> None:
         elapsed_s = perf_counter() - began_s
         if options.record is not None:
             write_record(worst.record(own), options.record, overwrite=options.overwrite)
-            written.written.append(options.record)
+            written.add(options.record)
         summary = {**summary_head(scenario), **_summary(scenario, worst, options, elapsed_s)}
         written.deliver("--json", to_json(summary))
     if not options.quiet:

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
-from experiments.common.output import output, to_json
+from experiments.common.output import output_of, to_json
 from experiments.common.screen import (
     BeginProgress,
     figure_files,
@@ -84,13 +84,7 @@ def run(options: Bound) -> None:
     scenario = scenario_with(options.scenario, model=options.model)
     strategies = chosen_strategies(scenario, options.strategies)
     with (
-        output(
-            folder=options.out,
-            names=("scenario.toml", "results.json", *figure_files(FIGURE)),
-            files={"--json": options.json},
-            overwrite=options.overwrite,
-            quiet=options.quiet,
-        ) as written,
+        output_of(options, ("scenario.toml", "results.json", *figure_files(FIGURE))) as written,
         progress_bar(options.quiet) as begin,
     ):
         say_warnings(scenario_warnings(scenario), options.quiet)

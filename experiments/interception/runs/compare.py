@@ -9,7 +9,7 @@ from time import perf_counter
 from rich.console import Console
 from rich.table import Table
 
-from experiments.common.output import Cell, output, to_csv, to_json
+from experiments.common.output import Cell, output_of, to_csv, to_json
 from experiments.common.screen import (
     figure_files,
     number,
@@ -37,13 +37,7 @@ def run(options: Compare) -> None:
     scenario = scenario_with(options.scenario, model=options.model, range_meter=options.range_meter)
     strategies = chosen_strategies(scenario, options.strategies)
     with (
-        output(
-            folder=options.out,
-            names=("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE)),
-            files={"--json": options.json, "--csv": options.csv},
-            overwrite=options.overwrite,
-            quiet=options.quiet,
-        ) as written,
+        output_of(options, ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE))) as written,
         progress_bar(options.quiet) as begin,
     ):
         say_warnings(scenario_warnings(scenario), options.quiet)

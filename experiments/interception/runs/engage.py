@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from time import perf_counter
 
-from experiments.common.output import Cell, library_version, outcome_columns, output, to_csv, to_json
+from experiments.common.output import Cell, library_version, outcome_columns, output_of, to_csv, to_json
 from experiments.common.screen import figure_files, progress_bar, say_warnings, table_console, tell_of_compiling
 from experiments.interception.choices import own_strategy, scenario_with
 from experiments.interception.commands.engage import Engage
@@ -44,18 +44,9 @@ def run(options: Engage) -> None:
             noise: file.with_name(f"{file.stem}-{noise.value}{file.suffix}") if both else file for noise in noises
         }
     folder_records = [f"record-{noise.value}.npz" for noise in noises]
-    files = {"--json": options.json, "--csv": options.csv}
+    names = ["scenario.toml", "results.json", "steps.csv", *folder_records, *figure_files(FIGURE_2, FIGURE_3)]
     with (
-        output(
-            folder=options.out,
-            names=(
-                *("scenario.toml", "results.json", "steps.csv"),
-                *(*folder_records, *figure_files(FIGURE_2, FIGURE_3)),
-            ),
-            files=files | {f"--record ({file.name})": file for file in record_files.values()},
-            overwrite=options.overwrite,
-            quiet=options.quiet,
-        ) as written,
+        output_of(options, names, {f"--record ({file.name})": file for file in record_files.values()}) as written,
         progress_bar(options.quiet) as begin,
     ):
         say_warnings(scenario_warnings(scenario), options.quiet)
@@ -79,7 +70,7 @@ def run(options: Engage) -> None:
             targets = [record_files.get(record.scenario.noise), None if options.out is None else options.out / name]
             for file in filter(None, targets):
                 write_record(record, file, overwrite=options.overwrite)
-                written.written.append(file)
+                written.add(file)
         draw_engagements(records, written)
     if not options.quiet:
         show_engagements(records, table_console(written.stdout_taken))

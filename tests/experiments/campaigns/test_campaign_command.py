@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -27,6 +28,7 @@ from guidance import NoiseKind
 from sim import Campaign, CampaignNoise, Scenario, fly_one
 from sim.chunk import chunk_size
 from sim.storage import CampaignFolder
+from sim.versions import install_command
 
 Infoset = Callable[..., tuple[int, str, str]]
 FILES = [".lock", "manifest.json", "scenario.toml", "shards", "summary.json"]
@@ -295,8 +297,7 @@ def test_without_the_extra_it_says_which(
         code, out, err = infoset(*command)
         assert (code, out) == (2, "")
         assert err == (
-            "error: campaigns are stored with pyarrow, which is not installed; install the extra: "
-            "pip install 'infoset[campaign]'\n"
+            f"error: campaigns are stored with pyarrow, which is not installed: {install_command('campaign')}\n"
         )
     monkeypatch.undo()
 
@@ -305,7 +306,20 @@ def test_without_dask_it_says_which_extra(infoset: Infoset, file: Path, monkeypa
     monkeypatch.setitem(sys.modules, "distributed", None)
     code, _, err = infoset("campaign", file, "--runs", 8, "--out", "runs", "--dask", "tcp://127.0.0.1:1")
     assert code == 2
-    assert "pip install 'infoset[distributed]'" in err
+    assert f"not installed: {install_command('distributed')}" in err
+
+
+@pytest.mark.parametrize(
+    ("origin", "command"),
+    [
+        ('{"url": "file:///a", "dir_info": {"editable": true}}', 'pip install -e ".[exact]"'),
+        ('{"url": "file:///a", "dir_info": {}}', 'pip install "infoset[exact]"'),
+        (None, 'pip install "infoset[exact]"'),
+    ],
+)
+def test_the_command_for_an_extra(origin: str | None, command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sim.versions.distribution", lambda _name: SimpleNamespace(read_text=lambda _file: origin))
+    assert install_command("exact") == command
 
 
 def test_a_large_campaign_says_time_and_disk_first(

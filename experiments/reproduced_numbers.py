@@ -1,0 +1,138 @@
+"""`infoset reproduce`: computation, file and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from decimal import Decimal
+from itertools import groupby
+
+import typer
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from experiments.common.output import library_version, output, to_json
+from experiments.common.published_number import PublishedNumber, Reproduction, Verdict
+from experiments.common.screen import (
+    print_lines,
+    progress_bar,
+    table_console,
+    tell_of_compiling,
+    tell_of_compiling_pursuit,
+    tell_of_compiling_rendezvous,
+)
+from experiments.papers import PAPERS, reproduce_paper
+from experiments.reproduce import Reproduce
+
+DISAGREED = 1
+"""Exit code if a number that should agree does not."""
+
+
+def run(options: Reproduce) -> None:
+    """Compute the numbers, write the file and print the tables."""
+    papers = PAPERS if options.paper is None else (options.paper,)
+    with (
+        output(files={"--json": options.json}, overwrite=options.overwrite, quiet=options.quiet) as written,
+        progress_bar(options.quiet) as begin,
+    ):
+        if "interception" in papers:
+            tell_of_compiling(options.quiet)
+        if "pareto" in papers or "multipoint" in papers:
+            tell_of_compiling_rendezvous(options.quiet)
+        if "pursuit" in papers:
+            tell_of_compiling_pursuit(options.quiet)
+        reproductions = [reproduce_paper(name, begin(name)) for name in papers]
+        summary = {"version": library_version(), "papers": [_summary(each) for each in reproductions]}
+        written.deliver("--json", to_json(summary))
+    if not options.quiet:
+        _show(table_console(written.stdout_taken), reproductions)
+    disagreed = [number for each in reproductions for number in each.numbers if number.verdict is Verdict.DISAGREED]
+    for number in disagreed:
+        typer.echo(
+            f"disagreed: {number.paper}, {number.source}, {number.name}: printed {number.printed}, ours {number.ours}",
+            err=True,
+        )
+    if disagreed:
+        raise typer.Exit(DISAGREED)
+
+
+def _summary(reproduction: Reproduction) -> dict[str, object]:
+    return {
+        "paper": reproduction.paper,
+        "title": reproduction.title,
+        "problems": [{"name": name, "hash": fingerprint} for name, fingerprint in reproduction.problems],
+        "verdicts": {verdict.value: reproduction.count(verdict) for verdict in Verdict},
+        "remarks": list(reproduction.remarks),
+        "numbers": [_number(number) for number in reproduction.numbers],
+    }
+
+
+def _number(number: PublishedNumber) -> dict[str, object]:
+    finite = number.ours is not None and abs(number.ours) < float("inf")
+    return {
+        "source": number.source,
+        "name": number.name,
+        "printed": number.printed,
+        "corrected": number.corrected,
+        "ours": number.ours if finite else None,
+        "agrees_from": number.band.lowest,
+        "agrees_to": number.band.highest,
+        "agrees_by": "ours" if number.spread is None else "printed",
+        "verdict": number.verdict.value,
+        "note": number.note,
+    }
+
+
+def _show(console: Console, reproductions: Sequence[Reproduction]) -> None:
+    for reproduction in reproductions:
+        notes = list(dict.fromkeys(number.note for number in reproduction.numbers if number.note))
+        console.print(Text(reproduction.title, style="bold"), soft_wrap=True)
+        console.print(_table(reproduction, notes))
+        print_lines(console, [f"({i}) {note}." for i, note in enumerate(notes, start=1)])
+        print_lines(console, [*(f"* {remark}" for remark in reproduction.remarks), ""])
+    for reproduction in reproductions:
+        counts = [(reproduction.count(verdict), verdict.value) for verdict in Verdict]
+        listed = ", ".join(f"{count} {verdict}" for count, verdict in counts if count)
+        print_lines(console, [f"{reproduction.paper}: {len(reproduction.numbers)} numbers: {listed}"])
+
+
+def _table(reproduction: Reproduction, notes: Sequence[str]) -> Table:
+    table = Table(box=None, pad_edge=False)
+    table.add_column("number", min_width=16, overflow="fold")
+    for title in ("printed", "ours", "tolerance"):
+        table.add_column(title, justify="right", no_wrap=True)
+    table.add_column("verdict", min_width=13)
+    for source, numbers in groupby(reproduction.numbers, lambda number: number.source):
+        table.add_row(Text(source, style="bold"))
+        for number in numbers:
+            note = f" ({notes.index(number.note) + 1})" if number.note else ""
+            corrected = f"\n({number.corrected})" if number.corrected not in {None, number.printed} else ""
+            table.add_row(
+                number.name,
+                f"{number.printed}{corrected}",
+                _digits(number),
+                _tolerance(number),
+                f"{number.verdict.value}{note}",
+            )
+    return table
+
+
+def _digits(number: PublishedNumber) -> str:
+    """Return our number with one or two digits more than the printed one."""
+    if number.ours is None:
+        return "none"
+    known = Decimal(number.corrected or number.printed).as_tuple()
+    assert isinstance(known.exponent, int)
+    if "e" in number.printed and number.ours:
+        text = f"{number.ours:.{len(known.digits)}e}"
+    else:
+        text = f"{number.ours:.{max(0, -known.exponent) + 2}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def _tolerance(number: PublishedNumber) -> str:
+    band, printed = number.band, float(number.printed)
+    below, above = printed - band.lowest, band.highest - printed
+    if number.spread is None and abs(above - below) <= 1e-3 * max(above, below):
+        return f"{0.5 * (below + above):.2g}"
+    return f"{band.lowest:.3g} .. {band.highest:.3g}"
