@@ -20,7 +20,7 @@ class EmptyPolytopeError(ValueError):
     """
 
     def __init__(self, relaxation: float, rows: NDArray[np.int64] | None = None) -> None:
-        super().__init__(f"the polytope is empty: its constraints must be relaxed by {relaxation:.3g} to hold a point")
+        super().__init__(f"the polytope is empty; it is not if its constraints are relaxed by {relaxation:.3g}")
         self.relaxation = relaxation
         self.rows = np.zeros(0, np.int64) if rows is None else rows
 
@@ -36,7 +36,7 @@ class UnboundedPolytopeError(ValueError):
 
     def __init__(self, direction: Floats) -> None:
         shown = ", ".join(f"{component:.3g}" for component in direction)
-        super().__init__(f"the polytope is unbounded: it goes on without end along ({shown})")
+        super().__init__(f"the polytope is unbounded along ({shown})")
         self.direction = direction
 
 

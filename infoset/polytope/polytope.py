@@ -70,9 +70,9 @@ class Polytope:
         """
         array = np.asarray(points, dtype=float)
         if array.ndim != 2 or not len(array) or not array.shape[1]:
-            raise ValueError("the hull needs points as an array of shape (k, n), with k and n at least 1")
+            raise ValueError("points must have the shape (k, n), with k and n at least 1")
         if not np.isfinite(array).all():
-            raise ValueError("the hull needs finite points")
+            raise ValueError("points must be finite")
         return cls(*hull_of_points(array, flat))
 
     @classmethod
@@ -114,13 +114,13 @@ class Polytope:
         """
         rows, limits = np.asarray(normals, dtype=float), np.asarray(offsets, dtype=float)
         if rows.ndim != 2 or limits.shape != (len(rows),) or not rows.shape[1]:
-            raise ValueError("half-spaces need normals of shape (m, n) and offsets of shape (m,)")
+            raise ValueError("half-spaces must have normals of shape (m, n) and offsets of shape (m,)")
         flat = np.zeros((0, rows.shape[1])) if across is None else np.asarray(across, dtype=float)
         heights = np.zeros(0) if levels is None else np.asarray(levels, dtype=float)
         if flat.ndim != 2 or flat.shape[1] != rows.shape[1] or heights.shape != (len(flat),):
-            raise ValueError("equations need rows of shape (k, n) and levels of shape (k,)")
+            raise ValueError("equations must have rows of shape (k, n) and levels of shape (k,)")
         if not all(np.isfinite(array).all() for array in (rows, limits, flat, heights)):
-            raise ValueError("half-spaces and equations need finite numbers")
+            raise ValueError("half-spaces and equations must be finite")
         return cls(*intersection_of_halfspaces(rows, limits, flat, heights, bounded=bounded))
 
     @classmethod

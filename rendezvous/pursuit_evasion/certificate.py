@@ -176,7 +176,7 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
     """
     capture = solution.capture
     if capture is None:
-        raise ValueError(f"a game that ends as {solution.verdict.value} has no capture to certify")
+        raise ValueError(f"there is no capture to certify: the verdict is {solution.verdict.value}")
     game, units, node = solution.game, solution.units, capture.extremal
     scaled = scaled_game(game, units)
     pursuer, evader, radius = scaled.pursuer, scaled.evader, scaled.radius

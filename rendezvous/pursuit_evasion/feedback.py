@@ -174,7 +174,7 @@ def fly(
         raise ValueError("the time between plans must be positive")
     solution = solve(game) if solution is None else solution
     if solution.capture is None:
-        raise ValueError(f"a game that ends as {solution.verdict.value} gives no plan to begin with")
+        raise ValueError(f"there is no first plan: the verdict of the game is {solution.verdict.value}")
     units = solution.units
     seen = observation or Observation()
     random = np.random.default_rng(seed)
@@ -299,7 +299,7 @@ class _Pursuit:
         branch = None if first is None else follow(pair, first, self._radius, latest, self._work)
         self._work -= 0.0 if branch is None else branch.work
         afresh = branch.last if branch is not None and branch.ending is Ending.CAPTURE else None
-        # Close to the end a point may slip out of reach by metres: a pass near it is better than another revolution.
+        # Near the end a point may be unreachable by metres: passing near it is better than another revolution.
         if kept is not None and (
             afresh is None or afresh.duration > kept.duration + _PATIENCE * (kept.duration + spell)
         ):

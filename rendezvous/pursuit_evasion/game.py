@@ -56,7 +56,7 @@ class Gravity:
         _need(0.0 <= self.planet_radius_m < math.inf, "the radius of the planet must not be negative")
         _need(math.isfinite(self.j2) and abs(self.j2) < 0.1, "J2 must be small: that of the Earth is 1.0826e-3")
         _need(0.0 <= self.equatorial_radius_m < math.inf, "the equatorial radius must not be negative")
-        _need(self.j2 == 0.0 or self.equatorial_radius_m > 0.0, "J2 needs the equatorial radius that it refers to")
+        _need(self.j2 == 0.0 or self.equatorial_radius_m > 0.0, "J2 needs the equatorial radius")
 
     @property
     def oblateness_m5_s2(self) -> float:
@@ -158,12 +158,12 @@ class Game:
         """Check the values."""
         _need(self.pursuer.thrust_n > 0.0, "the pursuer's thrust must be positive")
         _need(0.0 <= self.capture_radius_m < math.inf, "the capture radius must not be negative")
-        _need(self.longest_s > 0.0, "the time looked at must be positive")
+        _need(self.longest_s > 0.0, "the longest duration must be positive")
         for name, player in (("pursuer", self.pursuer), ("evader", self.evader)):
             state = np.array(player.position_m), np.array(player.velocity_m_s)
             _need(bool(np.any(state[0] != 0.0)), f"the {name} is at the centre of the planet")
             axis = semi_major_axis_m(*state, self.gravity.parameter_m3_s2)
-            _need(0.0 < axis < math.inf, f"the {name}'s orbit is no ellipse: it is too fast to stay in orbit")
+            _need(0.0 < axis < math.inf, f"the {name}'s orbit is not an ellipse: its speed is too high")
             perigee = perigee_m(*state, self.gravity.parameter_m3_s2)
             _need(perigee > 1e-6 * axis, f"the {name} falls along a line through the planet's centre")
             _need(perigee > self.gravity.planet_radius_m, f"the {name}'s orbit reaches into the planet")

@@ -66,7 +66,7 @@ class ExtremalPath:
 
     def _carry(self, y: Floats, begin: float, end: float) -> None:
         if not flow_back(y, None, self.craft.kernel_craft(self.duration), begin, end, FINE):
-            raise PathError("an extremal cannot be propagated again")
+            raise PathError("an extremal of the solution cannot be propagated")
 
 
 def extremal_paths(pursuer: Craft, evader: Craft, node: Node) -> tuple[ExtremalPath, ExtremalPath]:
@@ -113,7 +113,7 @@ def steered_path(craft: Craft, direction: Direction, duration: float) -> Steered
         nonlocal calls
         calls += 1
         if calls > _MOST_RATES:
-            raise PathError("a steered path turns too fast to be followed")
+            raise PathError("the direction of thrust turns too fast to integrate the path")
         return _rates(time, state, craft, direction)
 
     path = solve_ivp(
@@ -126,7 +126,7 @@ def steered_path(craft: Craft, direction: Direction, duration: float) -> Steered
         dense_output=True,
     )
     if not path.success:
-        raise PathError("a steered path cannot be followed: it comes too near the planet's centre")
+        raise PathError("the path cannot be integrated: it passes too near the planet's centre")
     return SteeredPath(craft, direction, path.sol)
 
 
@@ -190,7 +190,7 @@ def history(solution: Solution, count: int = 400) -> History:
     """
     capture = solution.capture or solution.fallback
     if capture is None:
-        raise ValueError(f"a game that ends as {solution.verdict.value} has no capture to sample")
+        raise ValueError(f"there is no capture to sample: the verdict is {solution.verdict.value}")
     units, node = solution.units, capture.extremal
     times = np.linspace(0.0, node.duration, count)
     scaled = scaled_game(solution.game, units)

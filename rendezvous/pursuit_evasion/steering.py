@@ -63,7 +63,7 @@ class Script:
     def __post_init__(self) -> None:
         """Check the values."""
         if not self.begin_s or len(self.begin_s) != len(self.policies):
-            raise ValueError("a script needs as many times as policies, and one at least")
+            raise ValueError("a script must have one time for each policy, and at least one policy")
         if self.begin_s[0] != 0.0 or any(b <= a for a, b in zip(self.begin_s, self.begin_s[1:], strict=False)):
             raise ValueError("the times of a script must rise, from 0")
 

@@ -110,7 +110,7 @@ def _plan(problem: ReachabilityProblem, start: int, estimated: Floats, relative:
         except EmptyTubeError as error:
             fraction = (fraction + error.relaxation * (1.0 + fraction)) * _MORE + _LEAST_RELAXATION
         if fraction > _MOST_RELAXATION:
-            raise ArithmeticError(f"no plan from period {start}: the state is far outside every constraint")
+            raise ArithmeticError(f"no plan from period {start}: the state is far outside the constraints")
 
 
 def _worst(problem: ReachabilityProblem, time: int, state: Floats) -> float:

@@ -52,7 +52,7 @@ def discretised(
     Equation (3). A block exponential for the frozen model, closed forms and quadrature for the other.
     """
     if periods < 1:
-        raise ValueError("T = 0: there must be at least one period")
+        raise ValueError("there must be at least one period")
     starts = period_s * np.arange(periods if isinstance(motion, TschaunerHempel) else 1)
     transition = motion.transition(starts, starts + period_s)
     control = acceleration_m_s2 * motion.held_input(starts, starts + period_s)

@@ -49,8 +49,8 @@ class EmptyTubeError(ValueError):
 
     def __init__(self, time: int, relaxation: float, names: tuple[str, ...]) -> None:
         super().__init__(
-            f"no control keeps the constraints: they conflict at t = {time} ({', '.join(names)}) and can be kept "
-            f"once each is relaxed by {100.0 * relaxation:.3g} % of its bound"
+            f"no control keeps the constraints: they conflict at t = {time} ({', '.join(names)}); a solution exists if "
+            f"all are relaxed by {100.0 * relaxation:.3g} % of their bounds"
         )
         self.time = time
         self.relaxation = relaxation

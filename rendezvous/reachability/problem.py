@@ -90,12 +90,12 @@ class ReachabilityProblem:
 
     def __post_init__(self) -> None:
         if self.transition.ndim != 3 or not len(self.transition):
-            raise ValueError("T = 0: there must be at least one period; give A(t) as an array of shape (T, n, n)")
+            raise ValueError("A(t) must have the shape (T, n, n), with at least one period")
         periods, n = self.transition.shape[:2]
         if periods > MOST_PERIODS:
-            raise ValueError(f"{periods} periods would not finish; at most {MOST_PERIODS} are taken")
+            raise ValueError(f"there must be at most {MOST_PERIODS} periods, found {periods}")
         if self.control.ndim != 3 or not self.control.shape[2]:
-            raise ValueError("B(t) must have the shape (T, n, m), m at least 1")
+            raise ValueError("B(t) must have the shape (T, n, m), with at least one control")
         m = self.control.shape[2]
         arrays = {
             "A(t)": (self.transition, (periods, n, n)),
@@ -112,7 +112,7 @@ class ReachabilityProblem:
         if (self.state_bounds <= 0.0).any() or (self.control_bounds <= 0.0).any():
             raise ValueError("all bounds on states and controls must be positive")
         if self.thrust is ThrustShape.BALL and np.ptp(self.control_bounds) > 0.0:
-            raise ValueError("a ball has one radius: the bounds on controls must be equal")
+            raise ValueError("for thrust in a ball the bounds on controls must be equal")
         self._check_more(periods, n, m)
         self._check_start()
 
@@ -134,7 +134,7 @@ class ReachabilityProblem:
         if self.between is not None and (
             self.between.ndim != 4 or self.between.shape[0] != periods or self.between.shape[2:] != (n, n + m)
         ):
-            raise ValueError(f"states between the periods need the shape ({periods}, s, {n}, {n + m})")
+            raise ValueError(f"matrices of states within periods must have the shape ({periods}, s, {n}, {n + m})")
 
     def _check_start(self) -> None:
         over = np.abs(self.initial) - self.state_bounds
@@ -244,7 +244,7 @@ class ReachabilityProblem:
 
     def _part(self, start: int, end: int, state: Floats) -> ReachabilityProblem:
         if not 0 <= start < end <= self.periods:
-            raise ValueError(f"T = 0: from period {start} to {end} is no part of {self.periods} periods")
+            raise ValueError(f"periods {start} to {end} must be a part of the {self.periods} periods, and not empty")
         return replace(
             self,
             transition=self.transition[start:end],

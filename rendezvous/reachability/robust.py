@@ -114,11 +114,11 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
     """
     _check(problem, disturbance)
     if problem.thrust is ThrustShape.BALL:
-        raise ValueError("feedback from disturbances is planned for thrust in a box")
+        raise ValueError("feedback from disturbances needs thrust in a box")
     if problem.periods > MOST_PERIODS_WITH_FEEDBACK:
         raise ValueError(
-            f"feedback from disturbances over {problem.periods} periods would not finish; at most "
-            f"{MOST_PERIODS_WITH_FEEDBACK} are taken"
+            f"a plan with feedback from disturbances can have at most {MOST_PERIODS_WITH_FEEDBACK} periods, found "
+            f"{problem.periods}"
         )
     return _Program(problem, disturbance).solve()
 
@@ -128,7 +128,7 @@ def _check(problem: ReachabilityProblem, disturbance: Floats) -> None:
     if disturbance.ndim != 3 or disturbance.shape[:2] != shape or not np.isfinite(disturbance).all():
         raise ValueError(f"the disturbance must be finite, of shape ({shape[0]}, {shape[1]}, q)")
     if problem.between is not None:
-        raise ValueError("disturbances are allowed for at whole periods only")
+        raise ValueError("disturbances need constraints at whole periods only")
 
 
 def _all_constraints(problem: ReachabilityProblem) -> tuple[Floats, Floats, tuple[str, ...]]:

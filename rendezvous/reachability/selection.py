@@ -198,8 +198,8 @@ def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
             raise TooManyVerticesError("with thrust in a ball the optimal controls have no vertices; choose a box")
         if part.optimal.size > _MOST_DIMENSIONS:
             raise TooManyVerticesError(
-                f"the optimal controls of a block span {part.optimal.size} dimensions; vertices are listed to "
-                f"{_MOST_DIMENSIONS}: choose samples"
+                f"the optimal controls of a block span {part.optimal.size} dimensions, more than the limit of "
+                f"{_MOST_DIMENSIONS} for vertices: choose samples"
             )
         if not part.optimal.size:
             corners.append(np.zeros((1, 0)))
@@ -207,10 +207,14 @@ def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
         try:
             corners.append(Polytope.from_halfspaces(part.optimal.rows, part.optimal.limits, bounded=True).vertices)
         except EmptyPolytopeError as error:  # the centre is inside
-            raise UncertainHullError("the optimal controls of a block are so thin that rounding hides them") from error
+            raise UncertainHullError(
+                "the set of optimal controls of a block is too thin: it is empty by rounding"
+            ) from error
     count = int(np.prod([len(block) for block in corners]))
     if count > most:
-        raise TooManyVerticesError(f"the optimal controls have {count} vertices, over {most}: choose samples")
+        raise TooManyVerticesError(
+            f"the optimal controls have {count} vertices, more than the limit of {most}: choose samples"
+        )
     points = corners[0]
     for block in corners[1:]:
         points = np.hstack([np.repeat(points, len(block), axis=0), np.tile(block, (len(points), 1))])

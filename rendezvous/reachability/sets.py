@@ -190,13 +190,13 @@ class Meter:
         expected_mb = 1e-6 * growth * facets * (8.0 * count + 4.0 * growth * facets)
         if expected_s > self.budget.seconds:
             raise TooLargeError(
-                f"a hull of {count} points in R^{size} is expected to bring the exact sets to {expected_s:.3g} s, over "
-                f"the {self.budget.seconds:g} s they may take"
+                f"with a hull of {count} points in R^{size} the exact sets are expected to take {expected_s:.3g} s, "
+                f"more than the limit of {self.budget.seconds:g} s"
             )
         if expected_mb > self.budget.megabytes:
             raise TooLargeError(
-                f"a hull of {count} points in R^{size} is expected to take {expected_mb:.3g} MB, over the "
-                f"{self.budget.megabytes:g} MB it may take"
+                f"a hull of {count} points in R^{size} is expected to take {expected_mb:.3g} MB, more than the limit "
+                f"of {self.budget.megabytes:g} MB"
             )
 
 
@@ -220,7 +220,9 @@ class ExactSets:
     def __init__(self, optimum: BlockOptimum, meter: Meter) -> None:
         block = optimum.block
         if block.size > meter.budget.dimension:
-            raise TooLargeError(f"a block of {block.size} states is over the {meter.budget.dimension} of exact sets")
+            raise TooLargeError(
+                f"a block has {block.size} states, more than the limit of {meter.budget.dimension} for exact sets"
+            )
         self._optimum, self._meter = optimum, meter
         reach = np.ones(len(block.controls))
         corners = Polytope.box(-reach, reach).vertices if len(reach) else np.zeros((1, 0))

@@ -195,7 +195,7 @@ def _exact(optima: tuple[BlockOptimum, ...], meter: Meter) -> tuple[BlockSets, .
     try:
         return tuple(ExactSets(optimum, meter) for optimum in optima)
     except EmptyPolytopeError as error:  # the programs show that it is not empty
-        raise UncertainHullError("a set is so thin that rounding leaves nothing of it") from error
+        raise UncertainHullError("a set is too thin: it is empty by rounding") from error
 
 
 def _need_agreement(exact: tuple[BlockSets, ...], lifted: tuple[BlockSets, ...]) -> None:
@@ -204,22 +204,24 @@ def _need_agreement(exact: tuple[BlockSets, ...], lifted: tuple[BlockSets, ...])
         for kind in SetKind:
             apart = float(np.abs(one.bounds(kind) - other.bounds(kind)).max())
             if apart > AGREEMENT:
-                raise UncertainHullError(f"{kind.value} sets by hulls and by programs are {apart:.2g} of a bound apart")
+                raise UncertainHullError(
+                    f"{kind.value} sets from hulls and from programs differ by {apart:.2g} of a bound"
+                )
 
 
 def _refusal(problem: ReachabilityProblem, *, asked: bool) -> str | None:
     """Why exact sets are not tried, or None."""
     if problem.thrust is ThrustShape.BALL:
-        return "thrust in a ball has sets that are no polytopes"
+        return "for thrust in a ball the sets are not polytopes"
     if problem.between is not None:
-        return "constraints between the periods bind states and controls together"
+        return "constraints within periods couple states and controls"
     if asked:
         return None
     largest = max(block.size for block in problem.blocks)
     if largest > MOST_STATES_BY_CHOICE:
-        return f"the constraints couple {largest} states, whose hulls lose facets to rounding"
+        return f"the constraints couple {largest} states: rounding loses facets of hulls in so many dimensions"
     if problem.periods > MOST_PERIODS_BY_CHOICE:
-        return f"over {MOST_PERIODS_BY_CHOICE} periods hulls lose facets to rounding"
+        return f"rounding loses facets of hulls after more than {MOST_PERIODS_BY_CHOICE} periods"
     return None
 
 

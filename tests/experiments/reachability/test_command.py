@@ -311,7 +311,7 @@ def test_a_conflict_says_when_and_by_how_much(infoset: Infoset, tmp_path: Path) 
 def test_what_the_exact_route_and_vertices_cannot_do_is_said(infoset: Infoset) -> None:
     code, _, err = infoset("rendezvous-16-periods", "--route", "exact")
     assert code == 2
-    assert "--route exact: thrust in a ball" in err
+    assert "--route exact: for thrust in a ball" in err
     code, _, err = infoset("approach-cone", "--select", "vertices")
     assert code == 2
     assert "choose samples" in err

@@ -85,7 +85,7 @@ def test_without_a_curve_an_earlier_capture_is_not_excluded(solved: Solution) ->
 
 
 def test_what_is_not_captured_has_no_certificate(slides: MakeGame) -> None:
-    with pytest.raises(ValueError, match="escapes has no capture"):
+    with pytest.raises(ValueError, match="no capture to certify: the verdict is escapes"):
         certify(solve(slides(20.0)))
 
 

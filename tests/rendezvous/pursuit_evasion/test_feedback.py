@@ -133,7 +133,7 @@ def test_random_steering_is_the_same_however_often_it_is_asked() -> None:
 
 
 def test_a_game_without_a_capture_has_no_plan(slides: MakeGame) -> None:
-    with pytest.raises(ValueError, match="no plan to begin with"):
+    with pytest.raises(ValueError, match="no first plan"):
         fly(slides(20.0), None)
 
 

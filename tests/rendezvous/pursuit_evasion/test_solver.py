@@ -306,7 +306,7 @@ def test_what_is_no_player_is_refused(changes: dict[str, object], message: str) 
 @pytest.mark.parametrize(
     ("position", "velocity", "message"),
     [
-        ((7e6, 0.0, 0.0), (0.0, 12e3, 0.0), "no ellipse"),
+        ((7e6, 0.0, 0.0), (0.0, 12e3, 0.0), "not an ellipse"),
         ((7e6, 0.0, 0.0), (100.0, 0.0, 0.0), "falls along a line"),
         ((7e6, 0.0, 0.0), (0.0, 5e3, 0.0), "reaches into the planet"),
         ((0.0, 0.0, 0.0), (0.0, 5e3, 0.0), "centre of the planet"),

@@ -118,8 +118,8 @@ def test_route_is_told(paper: Paper) -> None:
     chosen = solve(paper())
     assert chosen.route is Route.EXACT
     assert chosen.reason == "blocks of 4, 2 states"
-    assert solve(paper(thrust=ThrustShape.BALL)).reason == "thrust in a ball has sets that are no polytopes"
-    assert solve(paper(periods=32, period_s=22.5)).reason == "over 16 periods hulls lose facets to rounding"
+    assert solve(paper(thrust=ThrustShape.BALL)).reason == "for thrust in a ball the sets are not polytopes"
+    assert solve(paper(periods=32, period_s=22.5)).reason == "rounding loses facets of hulls after more than 16 periods"
 
 
 def test_least_norms(paper: Paper, exact: Solution) -> None:
