@@ -1,4 +1,4 @@
-"""How the documentation is built; CONTRIBUTING.md has the command. Nothing here reaches the network."""
+"""Configuration of the documentation; CONTRIBUTING.md has the command. Nothing is loaded from the network."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rendezvous import multipoint, pareto, pursuit_evasion, reachability, relati
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "_extensions"))
 
-# Gallery examples draw into files; without a screen pyplot must not look for one.
+# Gallery examples draw into files, also on machines without a screen.
 os.environ.setdefault("MPLBACKEND", "agg")
 
 _project = tomllib.loads((HERE.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -42,7 +42,7 @@ html_math_renderer = "mathml"
 exclude_patterns = ["_build", "_extensions", "examples", "gallery/*.py", "gallery/*.ipynb", "**/sg_execution_times.rst"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 nitpicky = True
-# Other projects' types are named and not linked: their inventories would have to be fetched.
+# Types of other projects are named and not linked: links would need their inventories from the network.
 nitpick_ignore_regex = [
     ("py:.*", r"(numpy|np|os|shapely|pyarrow|matplotlib|concurrent|collections|pathlib|enum|types|typing)\..*"),
     (
@@ -52,10 +52,14 @@ nitpick_ignore_regex = [
     ),
 ]
 
-# Types of our own that are handed out and not made by people: named and not described here.
+# Types that functions return and users do not construct: named without a description.
 nitpick_ignore = [
     ("py:class", f"{module}.{name}")
     for module, names in {
+        "experiments.multipoint.file": ("MultipointProblem",),
+        "experiments.pareto.file": ("ParetoProblem",),
+        "experiments.pursuit.file": ("PursuitProblem",),
+        "experiments.reachability.file": ("Rendezvous",),
         "guidance.kalman": ("KalmanState",),
         "guidance.least_squares": ("LeastSquaresState",),
         "infoset.history": ("History",),
@@ -96,12 +100,12 @@ toc_object_entries_show_parents = "hide"
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = True
 numpydoc_xref_ignore = "all"
-# numpydoc would link int, str and array_like to pages of Python and NumPy, which are not fetched.
+# Without this numpydoc links int, str and array_like to pages of Python and NumPy.
 xref.DEFAULT_LINKS.clear()
 
 
 def _public(*packages: ModuleType) -> dict[str, str]:
-    """Where a name in a docstring's types is described; a name that two packages have is left alone."""
+    """Return where the type names in docstrings are described; names that occur in two packages are left out."""
     homes: dict[str, list[str]] = {}
     for package in packages:
         for name in package.__all__:
@@ -114,7 +118,7 @@ numpydoc_xref_aliases = _public(
     infoset, guidance, sim, multipoint, pareto, polytope, pursuit_evasion, reachability, relative_motion
 )
 
-# Docstrings are plain text with |moduli| and `names`; to reStructuredText the first would be substitutions.
+# Docstrings are plain text with |moduli| and `names`; reStructuredText reads the first as substitutions.
 default_role = "code"
 
 
@@ -131,7 +135,7 @@ _LIMITED = re.compile(r"~?(?:typing\.)?Annotated\[((?:[^\[\]]|\[[^\[\]]*\])*?), 
 def _plain_types(
     app: Sphinx, what: str, name: str, thing: object, options: object, signature: str | None, returned: str | None
 ) -> tuple[str | None, str | None]:
-    """Write `ndarray` and `float` where the full type says no more: the docstring has shapes, units and limits."""
+    """Write `ndarray` and `float` instead of full types: the docstring has shapes, units and limits."""
     plain = [
         None if text is None else _LIMITED.sub(r"\1", _ARRAY.sub("numpy.ndarray", text))
         for text in (signature, returned)
@@ -140,12 +144,12 @@ def _plain_types(
 
 
 def setup(app: Sphinx) -> None:
-    """Before numpydoc takes the docstrings apart."""
+    """Register the changes of docstrings and signatures; the first runs before numpydoc."""
     app.connect("autodoc-process-docstring", _keep_moduli, priority=100)
     app.connect("autodoc-process-signature", _plain_types, priority=900)
 
 
-# --- pictures made while building
+# --- figures computed during the build
 sphinx_gallery_conf = {
     "examples_dirs": "examples",
     "gallery_dirs": "gallery",
@@ -170,7 +174,7 @@ html_title = "infoset"
 html_context = {"default_mode": "auto"}
 html_static_path = ["_static"]
 html_css_files = ["infoset.css"]
-# Pages that stand alone have nothing to list beside them.
+# Pages without a sidebar.
 html_sidebars = {"index": [], "start": [], "glossary": []}
 html_copy_source = False
 html_show_sourcelink = False

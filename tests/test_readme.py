@@ -1,4 +1,4 @@
-"""What the README says is true."""
+"""The commands, examples and names in the README are correct."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ PROSE = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/README.md")
 
 
 def blocks(language: str) -> list[str]:
-    """Code blocks of the README in a language."""
+    """Return the code blocks of the README in a language."""
     return re.findall(rf"^```{language}\n(.*?)^```$", README, flags=re.DOTALL | re.MULTILINE)
 
 
 def command(name: str) -> str:
-    """One of the marked commands."""
+    """Return one of the marked commands."""
     found = re.search(rf"<!-- command: {name} -->\n```sh\n(.+)\n```", README)
     assert found is not None
     return found[1]
@@ -78,7 +78,7 @@ def test_constraints_hold_names_and_versions_only() -> None:
 
 
 def normal(name: str) -> str:
-    """A distribution's name as indexes compare it."""
+    """Return the normalised name of a distribution."""
     return re.sub(r"[-_.]+", "-", name).lower()
 
 

@@ -1,4 +1,4 @@
-"""The directive `command-help`: what `infoset COMMAND --help` prints, asked for while building."""
+"""The directive `command-help`: the output of `infoset COMMAND --help`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 
 class CommandHelp(SphinxDirective):
-    """Help of one command, or of one of its own commands."""
+    """The help of a command or a subcommand."""
 
     required_arguments = 1
     optional_arguments = 1

@@ -1,4 +1,4 @@
-"""A scraper for the gallery: figures that the library returns, which pyplot does not know of."""
+"""A scraper for the gallery: figures that the library returns, which pyplot does not manage."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ DPI = 110
 
 
 def library_figures(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]) -> str:
-    """Save the figure that a block calls `library_figure`, once, and return the text that shows it."""
+    """Save the figure with the name `library_figure` of a block, once, and return the text that shows it."""
     figure = block_vars["example_globals"].pop("library_figure", None)
     if not isinstance(figure, Figure):
         return ""

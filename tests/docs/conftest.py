@@ -1,4 +1,4 @@
-"""Pages as tests see them: what stands in their blocks, and what is said about running it."""
+"""Pages of the documentation, their blocks, and which blocks are run."""
 
 from __future__ import annotations
 
@@ -23,11 +23,9 @@ class Block:
     Parameters
     ----------
     page : str
-        The page's path in the project.
-    language : str
-    text : str
+        Path of the page in the project.
     not_run : str
-        Why tests do not run it, from the comment `<!-- not run: REASON -->` above it; empty where they do.
+        Reason from the comment `<!-- not run: REASON -->` above the block; empty if tests run it.
     """
 
     page: str
@@ -43,8 +41,7 @@ class Page:
     Parameters
     ----------
     name : str
-        Its path in the project.
-    text : str
+        Path in the project.
     """
 
     name: str
@@ -52,33 +49,33 @@ class Page:
 
     @property
     def path(self) -> Path:
-        """Where it is."""
+        """Absolute path."""
         return ROOT / self.name
 
     def blocks(self, *languages: str) -> list[Block]:
-        """Fenced blocks in some languages, or in any."""
-        found = []
+        """Return the fenced blocks in some languages, or in all."""
+        blocks = []
         for match in _BLOCK.finditer(self.text):
             language, comment = match["language"].strip(), match["comment"] or ""
             if not languages or language in languages:
                 reason = comment.removeprefix(_NOT_RUN) if comment.startswith(_NOT_RUN) else ""
-                found.append(Block(self.name, language, match["text"], reason))
-        return found
+                blocks.append(Block(self.name, language, match["text"], reason))
+        return blocks
 
     def prose(self) -> str:
-        """The text without its fenced blocks and its comments."""
+        """Return the text without fenced blocks and comments."""
         return re.sub(r"<!--.*?-->", "", _BLOCK.sub("", self.text), flags=re.DOTALL)
 
 
 def all_pages() -> list[Page]:
-    """Every page of prose in the project, that of the site first."""
+    """Return every page of prose in the project, the pages of the site first."""
     site = [path for path in sorted((ROOT / "docs").rglob("*.md")) if not {"_build", "gallery"} & set(path.parts)]
     others = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "benchmarks/README.md")]
     return [Page(path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8")) for path in (*site, *others)]
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Give a test that asks for `page` every page."""
+    """Parametrise the tests with an argument `page` with all pages."""
     if "page" in metafunc.fixturenames:
         pages = all_pages()
         metafunc.parametrize("page", pages, ids=[page.name for page in pages])

@@ -1,4 +1,4 @@
-"""Every command line in the prose is run, or says above it why it is not."""
+"""Every command line in the prose runs, or has a reason above it why it does not."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ REDUCED = (
     (r"--single-runs \d+", "--single-runs 2"),
     (r"--engagements (\d+|N)", "--engagements 8"),
     (r"--budget \d+", "--budget 20"),
-    # An axis of a sweep or a map: its ends.
+    # An axis of a sweep or a map is reduced to its ends.
     (r"(=(?:log:)?[\d.e+-]+:[\d.e+-]+):\d+", r"\1:2"),
-    # A map's own grid has 2121 points.
+    # The grid of a map has 2121 points.
     (
         r"^infoset pursuit-map (\S+)(?!.* --x)",
         r"infoset pursuit-map \1 --x phase_deg=-20:20:3 --y thrust_ratio=0.2:0.5:2",
     ),
-    # A narrow interval needs more runs than a test flies.
+    # A narrow interval needs too many runs for a test.
     (r" --until \"[^\"]*\"", ""),
 )
-"""How a line is made smaller before it is run; in this order. What it does stays the same."""
+"""Substitutions that reduce a line before it is run, in this order. Its effect stays the same."""
 
 SLOW = (
     r"^infoset (sweep|campaign|report|compare|bound|adversary|pursuit-map)\b",
@@ -46,35 +46,35 @@ SLOW = (
     r"^infoset multipoint .*--(order|times) best\b",
     r"^infoset reach\b",
     r"^infoset replay .*--(gif|mp4)\b",
-    # Figures take seconds; those of `experiment` and of `replay` are drawn by quick lines.
+    # Figures take seconds; quick lines draw those of `experiment` and `replay`.
     r"^infoset (pareto|multipoint|pursuit)\b.* --out\b",
     r"^infoset engage (?!.* --record\b).* --out\b",
     r"^python ",
 )
-"""Lines that are run with -m slow only."""
+"""Lines that run with -m slow only."""
 
 ELSEWHERE = {
-    "python benchmarks/page_speed.py": "it measures for minutes, in a browser; tests/browser opens the same pages",
+    "python benchmarks/page_speed.py": "it takes minutes in a browser; tests/browser opens the same pages",
 }
-"""Lines in running text, which can have no comment above them, that are not run, and why."""
+"""Lines in running text (without a comment above them) that are not run, and the reason."""
 
 SET_UP = (
     r"(python3 -m venv \.venv|\. \.venv/bin/activate|\.venv/bin/python -m pytest"
     r"|\.venv/bin/pip install -c constraints\.txt (\S+|-e \S+))"
 )
-"""What makes an environment and runs these tests. `.ci/run` does it word for word; here the names in it are checked."""
+"""Lines that create an environment and run these tests. `.ci/run` runs them; these tests check the names in them."""
 
 _PROMPT = "$ "
 LANGUAGES = {"sh", "console", "python", "pycon", "text", "toml", "math", "{eval-rst}", "{toctree}"}
 
 _PLACEHOLDER = re.compile(r"\[|\||\.\.\.|=?\b[A-Z]+\b(?!\w)|^infoset [a-z-]+( [a-z-]+| --[a-z-]+)?$")
-"""Something that stands for something else, or the mere name of a command."""
+"""A placeholder, or the name of a command without arguments."""
 
 
 def lines_of(text: str) -> Iterator[str]:
-    """Command lines of a block, continued ones joined, without comments."""
+    """Yield the command lines of a block, continued ones joined, without comments."""
     lines = text.replace("\\\n", " ").splitlines()
-    if any(line.startswith(_PROMPT) for line in lines):  # a session: the other lines are what it printed
+    if any(line.startswith(_PROMPT) for line in lines):  # a session: the other lines are output
         lines = [line.removeprefix(_PROMPT) for line in lines if line.startswith(_PROMPT)]
     for line in lines:
         for part in line.split(" && "):
@@ -84,31 +84,31 @@ def lines_of(text: str) -> Iterator[str]:
 
 
 def inline_lines(page: Page) -> list[str]:
-    """Command lines in the running text."""
+    """Return the command lines in the running text."""
     return re.findall(
         r"`((?:infoset|python (?:benchmarks|docs)/[^\s`]+)(?: [^`\n]+)?)`", re.sub(r"\s*\n\s*", " ", page.prose())
     )
 
 
 def is_complete(line: str) -> bool:
-    """Whether a line in the running text can be run as it stands: nothing in it stands for something else."""
+    """Whether a line in the running text is complete: it contains no placeholder."""
     return " " in line and _PLACEHOLDER.search(re.sub(r"^python \S+", "", line)) is None
 
 
 def reduced(line: str) -> str:
-    """The line, made smaller by the rules above."""
+    """Return the line, reduced by the rules above."""
     for pattern, small in REDUCED:
         line = re.sub(pattern, small, line)
     return line
 
 
 def is_slow(line: str) -> bool:
-    """Whether a line takes more than a few seconds, even when it is made smaller."""
+    """Whether a line takes more than a few seconds, even if it is reduced."""
     return any(re.search(pattern, line) for pattern in SLOW)
 
 
 def run(line: str, folder: Path) -> None:
-    """Run a line in a folder as a reader would, in this process where it can be."""
+    """Run a line in a folder, in this process if possible."""
     words = shlex.split(reduced(line.replace(".venv/bin/", "")))
     assert words, line
     if words[0] == "python":
@@ -118,14 +118,12 @@ def run(line: str, folder: Path) -> None:
         )
         assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
         return
-    assert words[0] == "infoset", (
-        f"{line}: no rule for running it; a comment <!-- not run: REASON --> may stand above it"
-    )
+    assert words[0] == "infoset", f"{line}: no rule to run it; put a comment <!-- not run: REASON --> above it"
     into = None
     if ">" in words:
         words, into = words[: words.index(">")], folder / words[words.index(">") + 1]
     if "--out" in words and (folder / words[words.index("--out") + 1]).exists():
-        words.append("--overwrite")  # another line of the page has written there
+        words.append("--overwrite")  # another line of the page wrote there
     printed, complained = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(complained), pytest.raises(SystemExit) as left:
         main(words[1:])
@@ -135,20 +133,20 @@ def run(line: str, folder: Path) -> None:
 
 
 def fenced_lines(page: Page) -> list[str]:
-    """Command lines of the page's blocks that are to be run, set-up left out."""
+    """Return the command lines of the blocks of a page that are run, without set-up."""
     lines = [line for block in page.blocks("sh", "console") if not block.not_run for line in lines_of(block.text)]
     return [line for line in lines if not re.fullmatch(SET_UP, line.replace('"', ""))]
 
 
 def lines_to_run(page: Page) -> list[str]:
-    """All that a reader could copy from a page, in its order, each once."""
+    """Return all command lines of a page in their order, each once."""
     lines = dict.fromkeys([*fenced_lines(page), *filter(is_complete, inline_lines(page))])
     return [line for line in lines if line not in ELSEWHERE]
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty folder to be in."""
+    """An empty working folder."""
     monkeypatch.setenv("NO_COLOR", "1")
     monkeypatch.setenv("COLUMNS", "100")
     monkeypatch.chdir(tmp_path)
@@ -156,7 +154,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def quick_lines(page: Page) -> list[str]:
-    """Lines of a page that take a few seconds at most."""
+    """Return the lines of a page that take a few seconds at most."""
     return [line for line in lines_to_run(page) if not is_slow(line)]
 
 
@@ -165,7 +163,7 @@ def test_the_quick_lines_run(page: Page, pages: list[Page], folder: Path) -> Non
     for other in pages[: [each.name for each in pages].index(page.name)]:
         there = quick_lines(other)
         shared = [line for line in lines if line in there]
-        if shared == there[: len(shared)]:  # that page begins with them: it is their test
+        if shared == there[: len(shared)]:  # the other page begins with them and tests them
             lines = [line for line in lines if line not in there]
     for line in lines:
         run(line, folder)
@@ -180,7 +178,7 @@ def test_all_lines_run_in_their_order(page: Page, folder: Path) -> None:
 
 
 def test_blocks_are_in_known_languages(page: Page) -> None:
-    # A block without one, or in another, would not be run by anything here.
+    # A block in another language would not be tested.
     known = {block.language.split(" ")[0] for block in page.blocks()}
     assert known <= {*LANGUAGES, "{command-help}"}
 
@@ -189,11 +187,11 @@ def test_blocks_that_are_not_run_say_why(pages: list[Page]) -> None:
     left_out = {(block.page, block.text): block.not_run for page in pages for block in page.blocks() if block.not_run}
     for line, reason in ELSEWHERE.items():
         print(f"not run: {line}: {reason}")  # noqa: T201
-        assert any(line in page.text for page in pages), f"{line} is in no page any more"
+        assert any(line in page.text for page in pages), f"no page contains {line}"
     for (name, text), reason in left_out.items():
         print(f"not run: {name}: {next(lines_of(text))}: {reason}")  # noqa: T201 (listed with -s or -rA)
         assert len(reason.split()) >= 4, f"{name}: {text}"
-    # Whoever leaves out another one says so here, too.
+    # A further block that is not run must be listed here.
     assert sorted(name for name, _ in left_out) == [
         *["CONTRIBUTING.md"] * 4,
         "benchmarks/README.md",
@@ -212,7 +210,7 @@ def test_set_up_lines_name_what_exists(pages: list[Page]) -> None:
 
 
 def check_options(line: str) -> None:
-    """See that a line's command, and every option in it, exist."""
+    """Check that the command of a line, and every option in it, exist."""
     words = re.sub(r"[\[\]|,]", " ", line).split()[1:]
     command: Any = commands()
     while words and words[0] in getattr(command, "commands", {}):

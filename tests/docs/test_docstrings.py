@@ -1,4 +1,4 @@
-"""What the reference says of public things is whole: every parameter is described, every number has its unit."""
+"""The reference is complete: every parameter of a public name is described, every number has its unit."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ PACKAGES = (
 )
 
 RAISES_CHECKED = ("infoset", "guidance", "sim", "rendezvous")
-"""Packages in which whatever public raises has to say so."""
+"""Packages in which public functions document the exceptions that they raise."""
 
 WITHOUT_UNITS = (
-    *("infoset.ConvexPolygons", "infoset.polytope."),  # geometry, of whatever it is of
+    *("infoset.ConvexPolygons", "infoset.polytope."),  # geometry in any unit
     *(
         "sim.Distribution",
         "sim.QuantileEstimate",
@@ -32,7 +32,7 @@ WITHOUT_UNITS = (
         "sim.quantiles",
     ),
 )
-"""Geometry and statistics: their numbers have the units of what they are given."""
+"""Geometry and statistics: their results have the units of their arguments."""
 
 CONTRACTS = {
     "start": "guidance.Strategy",
@@ -40,7 +40,7 @@ CONTRACTS = {
     "measure": "guidance.MeasurementNoise",
     **dict.fromkeys(("true_value", "bound", "cut", "measured", "error"), "infoset.Sensor"),
 }
-"""Methods that many classes have for one contract, which describes their parameters."""
+"""Methods of a contract that many classes implement; the contract describes their parameters."""
 
 _IN_NAME = re.compile(r"_(m|s|rad|km|deg|kg|n|m_s|km_s|rad_s|m_s2|m2_s3|m3_s2|kg_s|per_m|per_s|mb)$")
 _UNIT = re.compile(
@@ -52,12 +52,12 @@ _NONE_OR_GIVEN = re.compile(
     r"|standard deviations|units? of|own units|any units|permutation|matri|costate|states?\b|Gramian"
     r"|[Ff]ree (terminal )?values"
 )
-"""Words that say that a number has no unit, or whose unit is a convention of the reference: states are in m and m/s,
-matrices and costates in what follows from that, free values in those of their components."""
+"""Words for numbers without a unit, or with a unit by convention of the reference: states are in m and m/s; the units of
+matrices and costates follow from that; free values have the units of their components."""
 
 
 def public_things() -> Iterator[tuple[str, Any]]:
-    """Classes, functions and methods that packages give out, by name."""
+    """Yield the public classes, functions and methods of the packages, by name."""
     for package in PACKAGES:
         module = importlib.import_module(package)
         defined = [name for name, thing in vars(module).items() if getattr(thing, "__module__", None) == package]
@@ -78,7 +78,7 @@ THINGS = dict(public_things())
 
 
 def entries(text: str, title: str) -> list[tuple[str, str]]:
-    """Heads and texts of a section of a NumPy-style docstring."""
+    """Return the heads and texts of a section of a NumPy-style docstring."""
     found = re.search(rf"^{title}\n-+\n(.*?)(?=^\w[\w ]*\n-+$|\Z)", text, flags=re.DOTALL | re.MULTILINE)
     listed: list[tuple[str, str]] = []
     for line in found[1].splitlines() if found else ():
@@ -90,13 +90,13 @@ def entries(text: str, title: str) -> list[tuple[str, str]]:
 
 
 def described(text: str) -> set[str]:
-    """Parameters that a docstring has in its section."""
+    """Return the names in the section Parameters of a docstring."""
     heads = [head.split(" : ")[0] for head, _ in entries(text, "Parameters")]
     return {name.strip().lstrip("*") for head in heads for name in head.split(",")}
 
 
 def undescribed(name: str, thing: Any) -> list[str]:
-    """Parameters of a public thing of which nothing is said."""
+    """Return the parameters of a public name that are not described."""
     if inspect.isclass(thing) and getattr(thing, "_is_protocol", False):
         return []
     text = inspect.getdoc(thing) or ""
@@ -116,7 +116,7 @@ def undescribed(name: str, thing: Any) -> list[str]:
 
 
 def without_unit(name: str, thing: Any) -> list[str]:
-    """Numbers in the docstring of a public thing that do not say what they are measured in."""
+    """Return the numbers in the docstring of a public name that have no unit."""
     text = inspect.getdoc(thing) or ""
     if name.startswith(WITHOUT_UNITS):
         return []
@@ -142,7 +142,7 @@ Definition = ast.FunctionDef | ast.AsyncFunctionDef
 
 
 def public_definitions(tree: ast.Module) -> Iterator[tuple[str, Definition, str]]:
-    """Functions and methods of a module that are public, by name, with the docstring that has to speak for them."""
+    """Yield the public functions and methods of a module, by name, with the docstring that documents them."""
     for node in tree.body:
         if isinstance(node, Definition) and not node.name.startswith("_"):
             yield node.name, node, ast.get_docstring(node) or ""
@@ -157,7 +157,7 @@ def public_definitions(tree: ast.Module) -> Iterator[tuple[str, Definition, str]
 
 
 def silent_raises(source: str) -> list[str]:
-    """Public things in a module's text that raise, without a section Raises."""
+    """Return the public names of a module that raise but have no section Raises."""
     return [
         name
         for name, body, text in public_definitions(ast.parse(source))

@@ -1,4 +1,4 @@
-"""Links between pages lead to files and anchors that exist; nothing is fetched."""
+"""Links between pages lead to existing files and anchors; nothing is loaded from the network."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-# Others' addresses are not looked up; this is all there are.
+# All external addresses; they are not opened.
 OUTSIDE = {"https://keepachangelog.com/en/1.1.0/", "https://semver.org/spec/v2.0.0.html"}
 
 _LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
@@ -21,14 +21,14 @@ _TOCTREE_ENTRY = re.compile(r"^(?:.*<)?([\w/.-]+)>?$")
 
 @cache
 def anchors(path: Path) -> set[str]:
-    """Anchors of a page's headings, as both the site and hosts of repositories make them."""
+    """Return the anchors of the headings of a page, as both the site and hosts of repositories make them."""
     text = re.sub(r"^```.*?^```$", "", path.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
     titles = re.findall(r"^#+ (.+)$", text, flags=re.MULTILINE)
     return {re.sub(r"\s", "-", re.sub(r"[^\w\s-]", "", title.strip().lower())) for title in titles}
 
 
 def source_of(target: Path) -> Path | None:
-    """The file that a link leads to; of a page that the gallery makes, the example it is made from."""
+    """Return the file that a link leads to; for a page of the gallery, its example."""
     if target.exists() and "gallery" not in target.parts:
         return target
     if target.parent == DOCS / "gallery":
@@ -51,7 +51,7 @@ def test_links_lead_somewhere(page: Page) -> None:
 
 
 def test_links_into_the_gallery_say_that_it_needs_the_site(page: Page) -> None:
-    # A clone has no docs/gallery: who reads the files there would be sent to nothing.
+    # A clone has no docs/gallery, so the link works on the site only.
     for paragraph in page.prose().split("\n\n"):
         if any("gallery/" in link for link in _LINK.findall(paragraph)):
             assert re.search(r"\bsite\s+is\s+built\b", paragraph), f"{page.name}: {paragraph}"

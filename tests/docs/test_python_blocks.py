@@ -1,4 +1,4 @@
-"""Every Python block in the prose runs, those of a page one after the other in one namespace."""
+"""Every Python block in the prose runs; the blocks of a page share one namespace, in their order."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from tests.docs.conftest import Page
 
 REDUCED = ((r"\bruns=[\d_]+", "runs=4"),)
-"""How blocks are made smaller before they are run."""
+"""Substitutions that reduce blocks before they are run."""
 
 
 def run_blocks(page: Page) -> None:
@@ -31,7 +31,7 @@ def run_blocks(page: Page) -> None:
 
 @pytest.fixture(autouse=True)
 def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What blocks write goes to a folder of their own."""
+    """Use a separate folder for the output of blocks."""
     monkeypatch.chdir(tmp_path)
 
 

@@ -1,6 +1,6 @@
-"""The built site: links, pictures, and that it needs nothing from elsewhere. CONTRIBUTING.md says how to build it.
+"""The built site: links, pictures, and that it loads nothing from the network. CONTRIBUTING.md has the build command.
 
-INFOSET_SITE names the folder of the site; then a site that is not there is a failure.
+INFOSET_SITE is the folder of the site. If it is set and the site does not exist, the tests fail.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ LOADED = {"script": "src", "img": "src", "source": "src", "iframe": "src"}
 
 @dataclass
 class _Reader(HTMLParser):
-    """What a page has, loads and links to."""
+    """Identifiers, loaded files, links and pictures of a page."""
 
     ids: set[str] = field(default_factory=set)
     links: list[str] = field(default_factory=list)
@@ -58,7 +58,7 @@ def site() -> Path:
     named = os.environ.get("INFOSET_SITE")
     folder = Path(named) if named else ROOT / "docs" / "_build"
     if not (folder / "index.html").is_file():
-        assert named is None, f"there is no site in {folder}"
+        assert named is None, f"no site in {folder}"
         pytest.skip("the site is not built: python -m sphinx -W --keep-going docs docs/_build")
     return folder.resolve()
 
@@ -75,7 +75,7 @@ def read(site: Path) -> dict[Path, _Reader]:
 
 
 def public_names() -> Iterator[str]:
-    """Every name that a package gives out."""
+    """Yield every public name of the packages."""
     for package in PACKAGES:
         yield from (f"{package}.{name}" for name in importlib.import_module(package).__all__)
 
@@ -119,9 +119,9 @@ def test_nothing_is_loaded_from_elsewhere(site: Path, read: dict[Path, _Reader])
 
 def test_pictures_say_what_they_show(site: Path, read: dict[Path, _Reader]) -> None:
     for page, reader in read.items():
-        # Small pictures of the gallery are beside their titles, which say the same.
-        beside = page == site / "gallery" / "index.html"
-        assert all(text or (text is not None and beside) for text in reader.pictures), page.relative_to(site)
+        # Thumbnails of the gallery have no text; their titles have the same content.
+        titled = page == site / "gallery" / "index.html"
+        assert all(text or (text is not None and titled) for text in reader.pictures), page.relative_to(site)
 
 
 def test_every_public_name_is_described(read: dict[Path, _Reader]) -> None:
