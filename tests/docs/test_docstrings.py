@@ -52,8 +52,8 @@ _NONE_OR_GIVEN = re.compile(
     r"|standard deviations|units? of|own units|any units|permutation|matri|costate|states?\b|Gramian"
     r"|[Ff]ree (terminal )?values"
 )
-"""Words for numbers without a unit, or with a unit by convention of the reference: states are in m and m/s; the units of
-matrices and costates follow from that; free values have the units of their components."""
+"""Words for numbers without a unit, or with a unit by convention of the reference: states are in m and m/s; the units
+of matrices and costates follow from that; free values have the units of their components."""
 
 
 def public_things() -> Iterator[tuple[str, Any]]:
