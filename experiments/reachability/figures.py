@@ -18,7 +18,6 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from experiments.common.display_units import length_unit
 from experiments.common.figure_style import (
     INK,
     LIMIT,
@@ -96,7 +95,7 @@ def shown_times(periods: int, most: int = _MOST_TIMES) -> list[int]:
 
 def _units(report: Report) -> tuple[list[str], Floats]:
     """Return the titles of the six axes, and the factors from SI to their units."""
-    unit, per_m = length_unit(float(np.abs(report.tube[:, :3]).max()))
+    unit, per_m = report.length_unit
     names = [f"{name}, {unit if axis < 3 else 'm/s'}" for axis, name in enumerate(_AXES)]
     return names, np.array([per_m] * 3 + [1.0] * 3)
 

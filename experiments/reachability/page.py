@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.common.display_units import length_unit
 from experiments.common.page_motion import Curve, Graph, Mark, Sets, Track, View, faces_of, motion_page
 from experiments.reachability.report import POINTS, Report
 from rendezvous.reachability import SetKind
@@ -16,6 +15,13 @@ _TOLERANCE = 1e-2
 _MOST_SETS = 24
 _ZERO = 1e-10
 """Controls smaller than the errors of the optimization are shown as zero."""
+_VIEWS = (
+    ("Positions and tube", 0, None),
+    ("Velocities and tube", 3, None),
+    ("Positions in the x-y plane", 0, (0, 1)),
+    ("Positions in the x-z plane", 0, (0, 2)),
+)
+"""Caption, first state and plane of each view."""
 
 
 def reachability_page(report: Report) -> str:
@@ -24,12 +30,7 @@ def reachability_page(report: Report) -> str:
     periods, period_s = rendezvous.problem.periods, rendezvous.period_s
     members = [member for member, _ in report.shown]
     time_s = np.linspace(0.0, periods * period_s, len(report.shown[0][1]) if members else periods * POINTS + 1)
-    views = [
-        _view(report, time_s, "Positions and tube", 0),
-        _view(report, time_s, "Velocities and tube", 3),
-        _view(report, time_s, "Positions in the x-y plane", 0, (0, 1)),
-        _view(report, time_s, "Positions in the x-z plane", 0, (0, 2)),
-    ]
+    views = [_view(report, time_s, *view) for view in _VIEWS]
     period_of = np.minimum((time_s / period_s).astype(int), periods - 1)
     controls = [np.where(np.abs(member.controls) < _ZERO, 0.0, member.controls)[period_of] for member in members]
     graphs = [
@@ -52,7 +53,7 @@ def reachability_page(report: Report) -> str:
     return motion_page(f"Rendezvous {rendezvous.name}", about, time_s, views, graphs, names)
 
 
-def _view(report: Report, time_s: Floats, caption: str, first: int, plane: tuple[int, int] | None = None) -> View:
+def _view(report: Report, time_s: Floats, caption: str, first: int, plane: tuple[int, int] | None) -> View:
     """Return a view of the three states from ``first`` on: positions (0) or velocities (3)."""
     periods, states = report.rendezvous.problem.periods, slice(first, first + 3)
     times = sorted({round(t) for t in np.linspace(0, periods, min(periods, _MOST_SETS) + 1)})
@@ -62,6 +63,6 @@ def _view(report: Report, time_s: Floats, caption: str, first: int, plane: tuple
     tube = Sets("states of all optimal controls, at whole periods", [faces_of(points) for points in shadows], nearest)
     tracks = [Track(member.name, look, path[:, states], look) for look, (member, path) in enumerate(report.shown)]
     end = Mark("end of the optimal trajectories", report.tube[-1, states].mean(axis=1))
-    unit = length_unit(float(np.abs(report.tube[:, :3]).max())) if first == 0 else ("m/s", 1.0)
+    unit = report.length_unit if first == 0 else ("m/s", 1.0)
     names = ("x", "y", "z") if first == 0 else ("vx", "vy", "vz")
     return View(caption, names, unit, tracks, [end], plane, equal=False, sets=tube)

@@ -10,6 +10,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.common.display_units import Unit, length_unit
 from experiments.common.errors import InputError
 from experiments.common.output import library_version
 from experiments.reachability.file import KIND, Rendezvous
@@ -175,6 +176,11 @@ class Report:
     noisy: tuple[Flight, ...]
     robustness: Robustness | None
     elapsed_s: float
+
+    @property
+    def length_unit(self) -> Unit:
+        """Return the unit in which positions are shown."""
+        return length_unit(float(np.abs(self.tube[:, :3]).max()))
 
     @cached_property
     def shown(self) -> tuple[tuple[Member, Floats], ...]:

@@ -10,7 +10,7 @@ from rich.table import Table
 from experiments.common.errors import InputError
 from experiments.common.options import choice, whole_number
 from experiments.common.output import output_of, to_csv, to_json
-from experiments.common.screen import figure_files, number, number_table, print_lines, progress_bar, table_console
+from experiments.common.screen import figure_files, number, number_table, progress_bar, table_console
 from experiments.reachability.command import Reach
 from experiments.reachability.figures import drawings
 from experiments.reachability.file import load_rendezvous
@@ -42,8 +42,9 @@ def run(options: Reach) -> None:
     files = ("results.json", *((TABLES,) if published else ()), *figure_files(*FIGURES))
     with output_of(options, files) as written, progress_bar(options.quiet) as begin:
         report = make_report(rendezvous, request, begin(rendezvous.name))
+        results = report_json(report)
         comparisons = compare_published(rendezvous, report.solution) if published else ()
-        written.save("results.json", to_json(report_json(report)), "--json")
+        written.save("results.json", to_json(results), "--json")
         if comparisons:
             written.save(TABLES, to_csv(COLUMNS, [row for comparison in comparisons for row in comparison.rows]))
         try:
@@ -77,27 +78,27 @@ def _selection(text: str) -> tuple[list[str], int]:
 
 
 def _print_report(console: Console, report: Report, comparisons: Sequence[Comparison]) -> None:
-    solution, least = report.solution, report.least_periods
-    dimension = solution.optimal.dimension
-    reached = f"zero needs at least {least} periods" if least else f"zero not reached in {report.searched_periods}"
-    lines = [
-        f"{report.rendezvous.name}: least terminal norm {solution.optimal.miss:.9g}; {reached}",
-        f"route: {solution.route.value} ({solution.reason})",
-        f"optimal controls: {f'a set of dimension {dimension}' if dimension else 'one'}",
-    ]
-    print_lines(console, lines)
+    console.print("\n".join(_summary(report)), soft_wrap=True)
     console.print("", _sets_table(report), sep="\n")
     if report.members:
         console.print("", _members_table(report), sep="\n")
     if comparisons:
         console.print("", _published_table(comparisons), sep="\n")
-        print_lines(
-            console, ["the printed misses do not follow from the equations of motion; see docs/reachability.md"]
-        )
-    print_lines(console, _feedback_lines(report))
+        console.print("the printed misses do not follow from the equations of motion; see docs/reachability.md")
+    for line in _feedback(report):
+        console.print(line, soft_wrap=True)
 
 
-def _feedback_lines(report: Report) -> Iterator[str]:
+def _summary(report: Report) -> Iterator[str]:
+    solution, least = report.solution, report.least_periods
+    dimension = solution.optimal.dimension
+    reached = f"zero needs at least {least} periods" if least else f"zero not reached in {report.searched_periods}"
+    yield f"{report.rendezvous.name}: least terminal norm {solution.optimal.miss:.9g}; {reached}"
+    yield f"route: {solution.route.value} ({solution.reason})"
+    yield f"optimal controls: {f'a set of dimension {dimension}' if dimension else 'one'}"
+
+
+def _feedback(report: Report) -> Iterator[str]:
     if report.flight is not None:
         yield f"\nreplanned every period: nonlinear miss {number(report.flight.miss)}"
     if report.noisy:
