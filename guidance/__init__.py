@@ -1,4 +1,4 @@
-"""Guidance: what to do with an information set, and what nature does against it."""
+"""Guidance: strategies that turn an information set into impulses, the thruster, and measurement noise."""
 
 from guidance.game_noise import GameNoise
 from guidance.kalman import Kalman

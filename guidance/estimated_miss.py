@@ -1,4 +1,4 @@
-"""From an estimated miss and its uncertainty to an impulse: the part that the strategies with estimators share."""
+"""The impulse for an estimated miss with an uncertainty, shared by the strategies with estimators."""
 
 from __future__ import annotations
 
@@ -11,23 +11,18 @@ Floats = NDArray[np.float64]
 def impulse_beyond_dead_zone(
     miss_m: Floats, deviation_m: Floats, time_to_go_s: Floats, dead_zone: float, last_s: float
 ) -> Floats:
-    """Impulse that corrects an estimated miss as far as it is surely there, and at the end as it is.
+    """Return the impulse (m/s) that corrects the part of an estimated miss outside a dead zone.
 
     Parameters
     ----------
     miss_m, deviation_m : ndarray, shape (B,)
         Estimated zero-effort miss and its standard deviation, m.
     time_to_go_s : ndarray, shape (B,)
-        Time to the closest approach, s; without it (not positive) nothing is fired.
+        Time to the closest approach, s; the impulse is zero where it is not positive.
     dead_zone : float
-        Half-width of the zone about zero that is left alone, in standard deviations.
+        Half-width of the dead zone, in standard deviations.
     last_s : float
-        Time to go from which on there is no dead zone, s: what is left now cannot wait.
-
-    Returns
-    -------
-    ndarray, shape (B,)
-        m/s.
+        Time to go below which there is no dead zone, s.
     """
     zone = np.where(time_to_go_s > last_s, dead_zone, 0.0) * deviation_m
     excess = miss_m - np.clip(miss_m, -zone, zone)

@@ -20,15 +20,16 @@ Z, VZ, X, SPEED = range(4)
 
 @dataclass
 class KalmanState:
-    """A bank of M filters an engagement, one a stretch of the possible ranges.
+    """A bank of M filters for each engagement, one for each interval of the possible ranges.
 
     Parameters
     ----------
     mean : ndarray, shape (B, M, 4)
         Estimates of (z, V_z, x, closing speed), m and m/s.
     covariance : ndarray, shape (B, M, 4, 4)
+        Their covariances.
     log_weight : ndarray, shape (B, M)
-        Logarithms of the probabilities of the stretches, up to a constant.
+        Logarithms of the probabilities of the intervals, up to a constant.
     """
 
     mean: Floats
@@ -37,18 +38,18 @@ class KalmanState:
 
 
 class Kalman:
-    """Estimate as if errors were Gaussian, and correct the expected miss where it stands out of its uncertainty.
+    """Estimate as if errors were Gaussian, and correct the part of the expected miss outside a dead zone.
 
     Parameters
     ----------
     dead_zone : float
-        What is left alone of the estimated miss, in standard deviations of it.
+        Half-width of the dead zone of the estimated miss, in standard deviations.
     last_s : float
-        Time to go from which on nothing is left alone, s.
+        Time to go below which there is no dead zone, s.
     members : int
-        Number of filters, that is of stretches of the possible ranges.
+        Number of filters, one for each interval of the possible ranges.
     process_noise : float
-        Standard deviation of the acceleration along z, constant over a step and independent from step to step,
+        Standard deviation of the acceleration along z, constant over a step and independent between steps,
         in units of that of an acceleration uniform within the bound of the set's model.
 
     Raises
@@ -58,19 +59,17 @@ class Kalman:
 
     Notes
     -----
-    An extended Kalman filter with the state (z, V_z, x, closing speed), z' = V_z, x' = -closing speed, and the impulses
-    really given. An error uniform within +-b has the variance b^2/3, and that is the variance used, b at the estimated
-    range. The prior is uniform in the bounds that the set starts from. Angles alone show the range only through
-    the impulses given; with so wide a prior of the range one linearisation is poor. Hence a bank: each filter
-    has a stretch of the range, and its weight is the likelihood of what it has seen (a range-parameterised filter).
-    The impulse minimises the expected square of the miss over the bank, E[m tau]/E[tau^2], tau the time to go.
-    Cost: some 30 operations of NumPy on B M stacked 4 x 4 matrices a step. Libraries such as filterpy run one
-    filter at a time, which would be a Python loop over the batch, so none is used.
+    The state is (z, V_z, x, closing speed) with z' = V_z, x' = -closing speed, and the impulses as given. The variance
+    of a measurement is b^2/3, that of an error uniform within +-b, with b at the estimated range. The prior is uniform
+    within the initial bounds of the set. Angles alone show the range only through the impulses, and one linearisation
+    is poor for a wide prior of the range. Therefore each filter of the bank has an interval of the range, and its
+    weight is the likelihood of its measurements (a range-parameterised filter). The impulse minimises the expected
+    square of the miss over the bank, E[m tau]/E[tau^2], with the time to go tau. Cost: about 30 NumPy operations on B M
+    stacked 4 x 4 matrices per step. Libraries such as filterpy run one filter at a time, in a Python loop.
 
-    Limits: it knows probabilities only, so it has no guarantee of any kind, and its deviations are those of independent
-    errors: an error that keeps its sign, or changes it on purpose, is within the bound and outside the theory.
-    A uniform error has sharp ends, which tell more than a variance does; an estimator of second moments cannot use it.
-    The sensor of the rate is not used.
+    Limits: the filter guarantees nothing. Its deviations are those of independent errors; an error that keeps its sign,
+    or changes it on purpose, is within the bound but outside the theory. A uniform error has sharp ends, which contain
+    more information than its variance; an estimator of second moments cannot use it. The rate sensor is not used.
 
     References
     ----------
@@ -91,21 +90,21 @@ class Kalman:
         self.process_noise = process_noise
 
     def start(self, batch: int) -> KalmanState:
-        """Start with filters that know nothing yet."""
+        """Start with empty filters; the first step sets their prior."""
         return KalmanState(
             np.zeros((batch, self.members, 4)), np.zeros((batch, self.members, 4, 4)), np.zeros((batch, self.members))
         )
 
     def decide(self, situation: Situation, state: KalmanState) -> Floats:
-        """Predict, learn from what is new, and correct the part of the miss that stands out, m/s."""
+        """Predict, update with the new measurements, and return the impulses, m/s."""
         if situation.step == 0:
-            self._know_the_bounds(situation, state)
+            self._set_prior(situation, state)
         else:
             self._predict(situation, state)
-        _learn(situation, state)
+        _update_all(situation, state)
         return self._impulse(state)
 
-    def _know_the_bounds(self, situation: Situation, state: KalmanState) -> None:
+    def _set_prior(self, situation: Situation, state: KalmanState) -> None:
         bounds = situation.information.model.bounds
         edges = np.linspace(*bounds.x_m, self.members + 1)
         stretch = (bounds.x_m[1] - bounds.x_m[0]) / self.members
@@ -138,7 +137,7 @@ class Kalman:
         gradient = np.stack([np.ones_like(miss), to_go, velocity / speed, -velocity * to_go / speed], axis=-1)
         variance = np.einsum("bmi,bmij,bmj->bm", gradient, state.covariance, gradient)
         mean = (weight * miss).sum(axis=1)
-        # Where nearly all is known, rounding may leave a variance just below zero.
+        # Rounding may leave a small variance just below zero.
         spread = (weight * (np.maximum(variance, 0.0) + (miss - mean[:, None]) ** 2)).sum(axis=1)
         deviation = np.sqrt(spread)
         square = (weight * to_go**2).sum(axis=1)
@@ -147,8 +146,8 @@ class Kalman:
         return impulse_beyond_dead_zone(best * to_go, deviation, to_go, self.dead_zone, self.last_s)
 
 
-def _learn(situation: Situation, state: KalmanState) -> None:
-    """Take in the measurements of this step."""
+def _update_all(situation: Situation, state: KalmanState) -> None:
+    """Update the filters with the measurements of this step."""
     nearest = situation.closing_speed_m_s * situation.step_s * 0.1
     z, x = state.mean[..., Z], np.maximum(state.mean[..., X], nearest)
     meter, angle_sensor = situation.sensors.get("range"), situation.information.model.angle_sensor
@@ -167,9 +166,9 @@ def _learn(situation: Situation, state: KalmanState) -> None:
 
 
 def _update(state: KalmanState, innovation: Floats, gradient: Floats, variance: Floats) -> None:
-    """Learn one scalar measurement a filter, in Joseph's form, and weigh the filters by it."""
+    """Update each filter with one scalar measurement, in Joseph's form, and its weight."""
     spread = np.einsum("bmij,bmj->bmi", state.covariance, gradient)
-    # No variance is below zero, whatever rounding leaves of one that angles have shrunk by twenty decades.
+    # Rounding may leave a negative value where angles have reduced a variance by twenty decades.
     total = np.maximum(np.einsum("bmi,bmi->bm", gradient, spread), 0.0) + variance
     gain = spread / total[..., None]
     state.mean = state.mean + gain * innovation[..., None]

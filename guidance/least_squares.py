@@ -17,12 +17,7 @@ Z, VZ, X, SPEED = range(4)
 
 
 class Measurements:
-    """All measurements of one kind so far.
-
-    Parameters
-    ----------
-    batch : int
-    """
+    """All measurements of one sensor so far, in arrays that grow."""
 
     def __init__(self, batch: int) -> None:
         self.count = 0
@@ -31,21 +26,21 @@ class Measurements:
 
     @property
     def times_s(self) -> Floats:
-        """When, s, shape (n,)."""
+        """Times, s, shape (n,)."""
         return self._times[: self.count]
 
     @property
     def values(self) -> Floats:
-        """What was measured, rad or m, shape (B, n)."""
+        """Measured values, rad or m, shape (B, n)."""
         return self._values[0, :, : self.count]
 
     @property
     def offsets_m(self) -> Floats:
-        """How far the impulses had moved z by then, m, shape (B, n)."""
+        """Change of z by the impulses until then, m, shape (B, n)."""
         return self._values[1, :, : self.count]
 
     def add(self, time_s: float, value: Floats, offset_m: Floats) -> None:
-        """Keep one more."""
+        """Append a measurement."""
         if self.count == self._times.size:
             self._times = np.concatenate([self._times, np.empty_like(self._times)])
             self._values = np.concatenate([self._values, np.empty_like(self._values)], axis=2)
@@ -55,12 +50,7 @@ class Measurements:
 
 
 class LeastSquaresState:
-    """Everything measured and done, and the fit to it.
-
-    Parameters
-    ----------
-    batch : int
-    """
+    """Measurements and impulses so far, and the motion fitted to them."""
 
     def __init__(self, batch: int) -> None:
         self.start = np.zeros((batch, 4))
@@ -70,38 +60,38 @@ class LeastSquaresState:
         self.speed_given_m_s = np.zeros(batch)
         """Sum of the impulses so far."""
         self.offset_given_m = np.zeros(batch)
-        """How far they have moved z, sum k_j (t - t_j)."""
+        """Change of z by the impulses, sum k_j (t - t_j)."""
 
 
 class LeastSquares:
-    """Fit one motion to everything measured, and correct its miss where it stands out of its uncertainty.
+    """Fit one motion to all measurements, and correct the part of its miss outside a dead zone.
 
     Parameters
     ----------
     dead_zone : float
-        What is left alone of the estimated miss, in standard deviations of it.
+        Half-width of the dead zone of the estimated miss, in standard deviations.
     last_s : float
-        Time to go from which on nothing is left alone, s.
+        Time to go below which there is no dead zone, s.
     iterations : int
-        Gauss-Newton steps after each measurement, from the fit before.
+        Gauss-Newton steps after each measurement, starting from the previous fit.
 
     Raises
     ------
     TypeError, ValueError
-        If a value is negative or not finite, or there is no step.
+        If a value is negative or not finite, or `iterations` is less than 1.
 
     Notes
     -----
-    The motion is z(t) = z_0 + V_0 t - sum k_j (t - t_j), x(t) = x_0 - c t: four unknowns, and the impulses really
-    given. Each step solves for them anew over all measurements: normal equations of 4 x 4, weights 1/variance with
-    the variance b^2/3 of an error uniform within +-b, and the bounds of the start as one more measurement of the same
-    kind (variance width^2/12). The uncertainty of the miss is that of the normal
-    equations. Cost: a step goes over all measurements, some microseconds each a batch; 200 of them here.
+    The motion is z(t) = z_0 + V_0 t - sum k_j (t - t_j), x(t) = x_0 - c t, with four unknowns and the impulses as
+    given. Each step solves the 4 x 4 normal equations over all measurements, with weights 1/variance: b^2/3 for an
+    error uniform within +-b, and width^2/12 for the initial bounds, which count as one more measurement. The
+    covariance of the miss is that of the normal equations. Cost: each step uses all measurements, about 200 here, at a
+    few microseconds each per batch.
 
-    Limits: there is no process noise, so a target that manoeuvres, or an engine that errs, is fitted as if it did not.
-    One linearisation describes what is left uncertain, and without a range meter the range is known poorly until the
-    end. As for every estimator of this kind nothing is guaranteed, and errors that keep their sign, or change it on
-    purpose, are outside the theory. The sensor of the rate is not used.
+    Limits: there is no process noise, so manoeuvres of the target and errors of the engine are not modelled. One
+    linearisation describes the remaining uncertainty, and without a range meter the range is known poorly until the
+    end. Nothing is guaranteed; errors that keep their sign, or change it on purpose, are outside the theory. The rate
+    sensor is not used.
 
     References
     ----------
@@ -119,11 +109,11 @@ class LeastSquares:
         self.iterations = iterations
 
     def start(self, batch: int) -> LeastSquaresState:
-        """Start with nothing measured."""
+        """Start without measurements."""
         return LeastSquaresState(batch)
 
     def decide(self, situation: Situation, state: LeastSquaresState) -> Floats:
-        """Fit again, and correct the part of the miss that stands out, m/s."""
+        """Fit the motion again, and return the impulses, m/s."""
         _note(situation, state)
         centre, variance = _prior(situation)
         if situation.step == 0:
@@ -137,7 +127,7 @@ class LeastSquares:
 
 
 def _note(situation: Situation, state: LeastSquaresState) -> None:
-    """Keep what was done in the step before and measured in this one."""
+    """Store the impulse of the previous step and the measurements of this one."""
     if situation.step > 0:
         state.speed_given_m_s = state.speed_given_m_s + situation.last_impulse_m_s
         state.offset_given_m = state.offset_given_m + situation.step_s * state.speed_given_m_s
@@ -147,19 +137,19 @@ def _note(situation: Situation, state: LeastSquaresState) -> None:
 
 
 def _prior(situation: Situation) -> tuple[Floats, Floats]:
-    """Centre and variances of what is known at the start."""
+    """Return mean and variances of the start."""
     bounds = situation.information.model.bounds
     intervals = np.array([bounds.z_m, bounds.vz_m_s, bounds.x_m, (-bounds.vx_m_s[1], -bounds.vx_m_s[0])])
-    # An exact bound would have no variance: it is given one that is nothing beside its value and what angles can tell.
+    # An exactly known value gets a variance that is negligible against its size and against the angle errors.
     sensor = situation.information.model.angle_sensor
     angle = max(sensor.error_at_zero_range_rad, sensor.error_at_nominal_range_rad)
-    told = np.array([angle * bounds.x_m[1], angle * situation.closing_speed_m_s, 0.0, 0.0])
-    widths = np.maximum(np.ptp(intervals, axis=1), 1e-9 * np.maximum(np.abs(intervals).max(axis=1), told))
+    resolved = np.array([angle * bounds.x_m[1], angle * situation.closing_speed_m_s, 0.0, 0.0])
+    widths = np.maximum(np.ptp(intervals, axis=1), 1e-9 * np.maximum(np.abs(intervals).max(axis=1), resolved))
     return intervals.mean(axis=1), widths**2 / 12.0
 
 
 def _improve(situation: Situation, state: LeastSquaresState, centre: Floats, variance: Floats) -> Floats:
-    """One Gauss-Newton step on all measurements; the covariance of the fit, shape (B, 4, 4)."""
+    """Do one Gauss-Newton step on all measurements; return the covariance of the fit, shape (B, 4, 4)."""
     start, model = state.start, situation.information.model
     normal = np.broadcast_to(np.diag(1.0 / variance), (len(start), 4, 4)).copy()
     right = (centre - start) / variance
@@ -184,8 +174,8 @@ def _improve(situation: Situation, state: LeastSquaresState, centre: Floats, var
         weighted = jacobian * (3.0 / bound**2)[..., None]
         normal += np.swapaxes(weighted, 1, 2) @ jacobian
         right += np.einsum("bni,bn->bi", weighted, residual)
-    # Scaled by the prior's deviations, whose sizes span six decades, the prior is the identity: no eigenvalue is less
-    # than 1, whatever rounding says where angles tell some direction ten decades better than another.
+    # In units of the prior's deviations, which span six decades, the prior is the identity, so no exact eigenvalue is
+    # less than 1. Rounding errors matter where angles determine one direction ten decades better than another.
     scale = np.sqrt(variance)
     values, vectors = np.linalg.eigh(normal * np.outer(scale, scale))
     inverse = (vectors / np.maximum(values, 1.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
@@ -196,7 +186,7 @@ def _improve(situation: Situation, state: LeastSquaresState, centre: Floats, var
 
 
 def _miss(situation: Situation, state: LeastSquaresState) -> tuple[Floats, Floats, Floats, Floats]:
-    """Offset, its rate and time to go now, and the gradient of the miss by the start, shape (B, 4)."""
+    """Return z, V_z and time to go now, and the gradient of the miss by the start, shape (B, 4)."""
     time, start = situation.time_s, state.start
     z_now = start[:, Z] + start[:, VZ] * time - state.offset_given_m
     v_now = start[:, VZ] - state.speed_given_m_s

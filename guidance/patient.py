@@ -1,4 +1,4 @@
-"""A strategy that waits: it corrects what is certain, and what could not be corrected later."""
+"""A strategy that corrects what is certain, and what could not be corrected later."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ LAST_SECONDS_S = 3.0
 
 
 class Patient:
-    """Correct only what is certain, and what could no longer be corrected later; at the very end, as U_s.
+    """Correct only what is certain, and what could not be corrected later; in the last 3 s, act as U_s.
 
     Parameters
     ----------
     share : float
-        How much of what the remaining impulses can do is relied upon, from 0 to 1. At 0 every end of the interval is
-        beyond it and the strategy is U_s; at 1 it corrects nothing before it must.
+        Share of the correction that later impulses can give, from 0 to 1, on which the strategy relies. With 0 it is
+        U_s; with 1 it waits as long as it can.
 
     Raises
     ------
@@ -29,24 +29,21 @@ class Patient:
 
     Notes
     -----
-    Every hypothesis of the set has a predicted miss. Where the whole interval of them is on one side of zero, its
-    near end is what every hypothesis needs: correcting it is never regretted, and early it costs least. The far end
-    is needed by the worst hypothesis only. Most of it will be refuted by later measurements, and the strategy leaves
-    it to them as long as a share of what the remaining impulses can do would still correct it:
-    the sum over the steps to come of mu2 x_j/e, with no more of them than the budget pays for. What is beyond is
-    corrected now; if both ends are, their excesses are balanced. In the last 3 s it is U_s, which leaves least.
+    Every hypothesis of the set has a predicted miss. If the whole interval of misses is on one side of zero, every
+    hypothesis needs the correction of its near end: it is certain, and costs least when it is early. Only the worst
+    hypothesis needs the correction of the far end. Later measurements usually refute it, so the strategy waits as long
+    as a share of the correction that later impulses can give covers it: the sum of mu2 x_j/e over the remaining steps,
+    limited by the budget. The excess over that is corrected now; if both ends have an excess, the two are balanced.
 
-    The cost of a wait: an impulse needed late is dearer than the same correction early, as 1/x; what it
-    saves is the correction of noise. The larger the share, the later a worst case is met, and the more impulses at
-    their limit it takes.
+    Waiting saves the correction of noise, but the same correction costs more later, in proportion to 1/x. The larger
+    the share, the later a worst case is corrected, with more impulses at their limit.
 
-    Limits: it knows misses only as bounded, so probable and merely possible hypotheses weigh the same. The share
-    guarantees nothing by itself: what a set may still grow by (the disturbance) is in the interval, but what nature
-    may still choose is not counted.
+    Limits: misses are bounded only, so probable and merely possible hypotheses have the same weight. The share alone
+    guarantees nothing: the interval includes future disturbances, but not future choices of the noise.
 
     References
     ----------
-    Kumkov and Patsko (1997), section 6, for the interval and U_s. The rule of patience is not theirs.
+    Kumkov and Patsko (1997), section 6, for the interval and U_s. The rule of waiting is not theirs.
     """
 
     name = "patient"
@@ -60,7 +57,7 @@ class Patient:
         """Start without a state."""
 
     def decide(self, situation: Situation, state: None) -> Floats:
-        """Return the certain part of the correction, or what could no longer wait, m/s."""
+        """Return the certain part of the correction, or the urgent part if it is larger, m/s."""
         miss, e = situation.predicted_miss, situation.closing_speed_m_s
         upper_range, lower_range = miss.upper_point.range_m, miss.lower_point.range_m
         symmetric = symmetric_impulse(miss, e)
@@ -78,17 +75,9 @@ class Patient:
 
 
 def correctable_later_m(situation: Situation, range_m: Floats) -> Floats:
-    """Miss that impulses after this step can still correct, if the object is at a range now.
+    """Return the miss (m) that impulses after this step can still correct, if the object is now at `range_m`.
 
-    Parameters
-    ----------
-    situation : Situation
-    range_m : ndarray, shape (B,)
-
-    Returns
-    -------
-    ndarray, shape (B,)
-        m: the sum of mu2 x_j/e over the steps to come with x_j > 0, the earliest of them, as many as the budget pays.
+    It is the sum of mu2 x_j/e over the next steps with x_j > 0, as many as the budget allows.
     """
     thruster, e, step_s = situation.thruster, situation.closing_speed_m_s, situation.step_s
     to_go_s = range_m / e
@@ -98,5 +87,5 @@ def correctable_later_m(situation: Situation, range_m: Floats) -> Floats:
 
 
 def _impulse(miss_m: Floats, range_m: Floats, closing_speed_m_s: float) -> Floats:
-    """Impulse that corrects a miss at a range; zero where there is no range."""
+    """Return the impulse that corrects a miss at a range; zero where the range is not positive."""
     return np.divide(miss_m * closing_speed_m_s, range_m, out=np.zeros_like(range_m), where=range_m > 0.0)

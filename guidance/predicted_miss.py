@@ -1,4 +1,4 @@
-"""Predicted miss of single states, and the impulse that makes an interval of them symmetric."""
+"""Predicted miss of a state, and the impulse that makes an interval of misses symmetric."""
 
 from __future__ import annotations
 
@@ -12,19 +12,14 @@ Floats = NDArray[np.float64]
 
 
 def zero_effort_miss(omega_rad_s: Floats, range_m: Floats, closing_speed_m_s: float) -> Floats:
-    """Signed miss without further control, omega x^2 / e.
+    """Return the signed miss (m) without further impulses, omega x^2 / e, which equals z + V x/e.
 
     Parameters
     ----------
     omega_rad_s, range_m : ndarray
-        Line-of-sight rate and range, of any common shape.
+        Line-of-sight rate and range x, of any common shape.
     closing_speed_m_s : float
-        e.
-
-    Returns
-    -------
-    ndarray
-        m; it equals z + V x/e.
+        Nominal closing speed e.
 
     References
     ----------
@@ -35,19 +30,14 @@ def zero_effort_miss(omega_rad_s: Floats, range_m: Floats, closing_speed_m_s: fl
 
 
 def symmetric_impulse(interval: PredictedMiss, closing_speed_m_s: float) -> Floats:
-    """Impulse k_s after which the ends of the predicted-miss interval are opposite.
+    """Return the impulse k_s (m/s) after which the ends of the predicted-miss interval are opposite.
 
     Parameters
     ----------
     interval : PredictedMiss
-        One interval an engagement.
+        Interval of each engagement; the impulse is zero where it does not exist.
     closing_speed_m_s : float
-        e.
-
-    Returns
-    -------
-    ndarray, shape (B,)
-        m/s; zero where there is no interval.
+        Nominal closing speed e.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""The strategies that can be named in a scenario."""
+"""Strategies by name, as scenario files and commands select them."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from guidance.symmetric_miss import SymmetricMiss
 from guidance.zero_effort import ZeroEffortMiss
 
 _STRATEGIES: Mapping[str, Callable[[], Strategy]] = MappingProxyType(
-    {each.name: each for each in (SymmetricMiss, Patient, ZeroEffortMiss, Kalman, LeastSquares)}
+    {kind.name: kind for kind in (SymmetricMiss, Patient, ZeroEffortMiss, Kalman, LeastSquares)}
 )
 
 
 def strategy_names() -> list[str]:
-    """Names of the strategies that `make_strategy` knows."""
+    """Return the names of the registered strategies, sorted."""
     return sorted(_STRATEGIES)
 
 
 def make_strategy(name: str) -> Strategy:
-    """The strategy of a name.
+    """Return a registered strategy with its default settings.
 
     Raises
     ------
     ValueError
-        If there is none of that name.
+        If the name is not registered.
     """
     if name not in _STRATEGIES:
         raise ValueError(f"no strategy is called '{name}'; there are: {', '.join(strategy_names())}")

@@ -12,22 +12,18 @@ from infoset.limits import shown
 
 
 def checked_impulses(wanted: object, tracking: NDArray[np.bool_], strategy: object, step: int) -> NDArray[np.float64]:
-    """Return the impulses that a strategy wants, if they are real numbers, one an engagement, and finite.
+    """Return the impulses of a strategy as an array of shape (B,), if they are real and finite.
 
     Parameters
     ----------
     wanted : object
-        What it returned.
+        Return value of the strategy.
     tracking : ndarray of bool, shape (B,)
         Engagements that have a set; elsewhere an impulse need not be finite.
     strategy : object
         The strategy, for the message.
     step : int
-
-    Returns
-    -------
-    ndarray, shape (B,)
-        m/s.
+        Number of the step, for the message.
 
     Raises
     ------
@@ -45,27 +41,22 @@ def checked_impulses(wanted: object, tracking: NDArray[np.bool_], strategy: obje
 
 
 class Strategy(Protocol):
-    """A rule that turns what is known into impulses, for a whole batch at once.
+    """A rule that computes the impulses of a batch of engagements from what is known on board.
 
-    A strategy says what it wants; the thruster gives what it can. Where an engagement has no set left
-    (`situation.predicted_miss.exists` is False) what is wanted is ignored.
+    The thruster limits the impulses that a strategy returns. Where an engagement has no set
+    (`situation.predicted_miss.exists` is False) they are ignored.
     """
 
     def start(self, batch: int) -> Any:
-        """State of the strategy's own for a `batch` of so many engagements; None if it needs none."""
+        """Return the state of the strategy for `batch` engagements, or None."""
 
     def decide(self, situation: Situation, state: Any) -> NDArray[np.float64]:
-        """Decide on the impulses of a step.
+        """Return the impulses of a step along z, m/s, shape (B,).
 
         Parameters
         ----------
         situation : Situation
             What is known on board.
         state : object
-            What `start` returned; it may be changed.
-
-        Returns
-        -------
-        ndarray, shape (B,)
-            Wanted impulses along z, m/s.
+            Return value of `start`; it may be changed.
         """

@@ -1,4 +1,4 @@
-"""Measurement noise that keeps, step by step, the extreme it is told to keep."""
+"""Game noise with the extreme to keep prescribed for every step."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class SwitchingNoise(GameNoise):
-    """The game noise with the extreme to keep given for every step, not only where both are equally bad.
+    """Game noise with the extreme to keep prescribed for every step, not only for ties.
 
     Parameters
     ----------
     tie : TieRule
-        Not looked at.
+        Not used.
     tie_draws : ndarray, shape (B, steps)
-        The upper extreme is kept where it is not negative, the lower one elsewhere.
+        The upper extreme is kept where the value is not negative, the lower one elsewhere.
     """
 
     def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:

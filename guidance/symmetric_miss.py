@@ -10,13 +10,13 @@ from guidance.situation import Situation
 
 
 class SymmetricMiss:
-    """Keep the predicted-miss interval symmetric about zero: the greatest possible miss is then least.
+    """Keep the predicted-miss interval symmetric about zero, which minimises the greatest possible miss.
 
-    It chases the noise: the middle of the interval moves with every measurement, and every move is corrected.
+    It reacts to noise: every measurement moves the middle of the interval, and every move is corrected.
 
     References
     ----------
-    Kumkov and Patsko (1997), section 6. The thresholds of the engine are `Thruster.give`.
+    Kumkov and Patsko (1997), section 6. `Thruster.give` applies the thresholds of the engine.
     """
 
     name = "symmetric-miss"

@@ -1,4 +1,4 @@
-"""What the engine can do."""
+"""The engine: limits of its impulses."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from infoset.limits import NotNegative, Part, Positive, check_fields
 
 @dataclass(frozen=True)
 class Thruster:
-    """An engine that gives impulses along z of bounded size from a bounded budget.
+    """An engine that gives impulses along z, limited in size and in their sum.
 
     Parameters
     ----------
     budget_m_s : float
-        Sum mu of the moduli of all impulses, m/s.
+        Budget mu: greatest sum of the absolute values of all impulses, m/s.
     least_impulse_m_s, greatest_impulse_m_s : float
-        Bounds mu1 and mu2 of the modulus of one impulse that is not zero, m/s.
+        Bounds mu1 and mu2 of the absolute value of an impulse that is not zero, m/s.
     execution_error_relative : float
-        Bound delta of |given / commanded - 1|: an impulse k comes out as k (1 + error).
+        Bound delta of |given / commanded - 1|: a commanded impulse k is executed as k (1 + error).
 
     Raises
     ------
@@ -47,17 +47,14 @@ class Thruster:
             )
 
     def give(self, wanted_m_s: NDArray[np.float64], budget_left_m_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Impulses that the engine gives when a strategy wants these.
+        """Return the impulses that the engine gives, m/s.
+
+        Zero if |wanted| < mu1 or n < mu1, otherwise `wanted` with its absolute value limited to min(mu2, n).
 
         Parameters
         ----------
         wanted_m_s, budget_left_m_s : ndarray, shape (B,)
-            Wanted impulses (signed) and what is left of the budget n, m/s.
-
-        Returns
-        -------
-        ndarray, shape (B,)
-            Zero if |wanted| < mu1 or n < mu1, else `wanted` limited in modulus to min(mu2, n), m/s.
+            Impulses of the strategy (signed), and the budget n that is left.
         """
         size = np.abs(wanted_m_s)
         limited = np.copysign(np.minimum(size, np.minimum(self.greatest_impulse_m_s, budget_left_m_s)), wanted_m_s)

@@ -15,17 +15,17 @@ class ZeroEffortMiss:
 
     Notes
     -----
-    The middle of a section is that of its interval of predicted misses, and it weighs as much as the interval is wide:
-    a stand-in for the centroid of the whole set that needs no vertices. The impulse makes the weighted sum of squared
-    misses of the middles least, k = e sum(w m x)/sum(w x^2). (The middle of the whole interval would be U_s itself.)
+    The middle of a section is the middle m of its interval of predicted misses, with the width of the interval as its
+    weight w. This approximates the centroid of the set without its vertices. The impulse minimises the weighted sum of
+    the squared misses of the middles: k = e sum(w m x) / sum(w x^2). (The middle of the whole interval gives U_s.)
 
-    Limits: like U_s it corrects every move of the middle, so it chases the noise and spends as much; and unlike U_s it
-    leaves the ends of the interval unequal, so the greatest possible miss is not the least there is.
+    Limits: like U_s, it corrects every change of the middle, so it reacts to noise and spends as much. Unlike U_s, it
+    leaves the ends of the interval unequal, so it does not minimise the greatest possible miss.
 
     References
     ----------
-    Zarchan (2012), Tactical and Strategic Missile Guidance, chapter 2, for guidance by the zero-effort miss; that of a
-    set's middle is the plain thing to do with a set, and is here to be compared with.
+    Zarchan (2012), Tactical and Strategic Missile Guidance, chapter 2, for guidance by the zero-effort miss. Its use on
+    the middle of a set is not from the literature; it is a baseline for comparison.
     """
 
     name = "zero-effort-miss"
@@ -34,10 +34,10 @@ class ZeroEffortMiss:
         """Start without a state."""
 
     def decide(self, situation: Situation, state: None) -> Floats:
-        """Return the impulse that takes the middle of the set to zero, m/s."""
+        """Return the impulse that makes the miss of the middle zero, m/s."""
         lower, upper = situation.information.predicted_miss_by_section_m()
         living, ranges = situation.information.living, situation.information.ranges_m
-        # A single point is as good as any other where every section is one.
+        # The addition keeps the weights positive if every section is a single point.
         width = upper - lower + np.finfo(np.float64).tiny
         weight = np.where(living, width, 0.0)
         weight = weight / np.maximum(weight.max(axis=1, keepdims=True), np.finfo(np.float64).tiny)

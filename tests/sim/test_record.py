@@ -7,7 +7,9 @@ from typing import Any
 
 from guidance import LineOfSight
 from infoset import InformationSetView, RangeSensor, Recovery
+from infoset.sensors import SENSORS
 from sim import Outcome, Scenario, fly_one
+from sim.draws import EXECUTION, START, TARGET, TIE
 
 
 class RangeAlone:
@@ -25,3 +27,9 @@ def test_the_measurement_that_empties_the_set_for_good_is_kept(brief: Scenario) 
     assert record.result.outcomes == (Outcome.SET_LOST,)
     assert first.measured == {"range": 10.0 * first.true_range_m}
     assert later.measured == {}
+
+
+def test_each_kind_of_sensor_has_its_own_name_column_and_stream() -> None:
+    for key in ("name", "quantity", "stream"):
+        assert len({getattr(kind, key) for kind in SENSORS}) == len(SENSORS)
+    assert {kind.stream for kind in SENSORS}.isdisjoint({START, TIE, EXECUTION, TARGET})

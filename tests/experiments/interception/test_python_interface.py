@@ -1,0 +1,110 @@
+"""The functions of `experiments` from Python: scenarios by name, files and figures."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from matplotlib.figure import Figure
+
+import infoset
+import sim
+from experiments import find_worst, fly_one, load_record, load_scenario, lower_bound, plot, save, simulate
+from experiments.common.errors import InputError
+from experiments.interception.scenario_file import scenario_text
+from sim import Record, Results
+
+NAME = "asteroid-1997-single"
+
+
+@pytest.fixture(scope="module")
+def results() -> Results:
+    return simulate(NAME, 3, seed=4, strategy="patient")
+
+
+@pytest.fixture(scope="module")
+def record() -> Record:
+    return fly_one(NAME, seed=4, strategy="patient")
+
+
+def test_names_and_paths_give_the_numbers_of_scenarios(results: Results, record: Record, tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(scenario_text(NAME))
+    again = sim.simulate(load_scenario(NAME), 3, seed=4, strategy="patient")
+    assert results.to_dict() == again.to_dict() == simulate(file, 3, seed=4, strategy="patient").to_dict()
+    assert record.result.miss_m[0] == results.miss_m[0]
+    assert record.strategy == record.scenario.strategy == "patient"
+    assert results.to_dict() != simulate(NAME, 3, seed=4).to_dict()
+
+
+def test_the_search_and_the_bound_take_names() -> None:
+    assert find_worst(NAME, budget=4, strategy="patient").strategy == "patient"
+    assert len(repr(lower_bound(NAME))) < 100
+
+
+def test_unknown_names_are_refused() -> None:
+    with pytest.raises(InputError, match="nowhere"):
+        simulate("nowhere", 1)
+    with pytest.raises(ValueError, match="no strategy is called 'patience'"):
+        simulate(NAME, 1, strategy="patience")
+
+
+def test_the_repr_of_a_record_is_two_lines(record: Record) -> None:
+    assert len(repr(record).splitlines()) == 2
+    assert len(repr(record)) < 300
+    assert "patient" in repr(record)
+
+
+def test_a_record_comes_back(record: Record, tmp_path: Path) -> None:
+    save(record, tmp_path / "flight.npz")
+    assert load_record(tmp_path / "flight.npz").result.to_dict() == record.result.to_dict()
+    with pytest.raises(InputError, match=r"must end in \.npz"):
+        save(record, tmp_path / "flight.csv")
+
+
+def test_results_are_saved_by_suffix(results: Results, tmp_path: Path) -> None:
+    save(results, tmp_path / "results.json")
+    assert json.loads((tmp_path / "results.json").read_text()) == results.to_dict()
+    save(results, tmp_path / "results.csv")
+    rows = list(csv.DictReader((tmp_path / "results.csv").read_text().splitlines()))
+    assert list(rows[0]) == list(results.to_dict())
+    assert [float(row["miss_m"]) for row in rows] == results.miss_m.tolist()
+    with pytest.raises(InputError, match=r"results are written as \.csv or \.json"):
+        save(results, tmp_path / "results.xlsx")
+    with pytest.raises(InputError, match=r"results\.csv"):
+        save(results, tmp_path / "results.csv")
+    save(results, tmp_path / "results.csv", overwrite=True)
+
+
+def test_results_and_records_are_drawn(results: Results, record: Record) -> None:
+    figure = plot(results)
+    assert isinstance(figure, Figure)
+    assert [axes.get_xlabel() for axes in figure.axes] == ["miss, m", "impulse spent, m/s"]
+    assert len(plot(record).axes) == len(plot([record]).axes) == 4
+
+
+def test_pandas_gets_the_columns(results: Results, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Any] = []
+
+    def frame(columns: Any) -> Any:
+        made.append(columns)
+        return SimpleNamespace(attrs={})
+
+    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=frame))
+    units = results.to_pandas().attrs["units"]
+    assert made == [results.to_dict()]
+    assert (units["miss_m"], units["start_vz_m_s"], units["outcome"]) == ("m", "m/s", "")
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ModuleNotFoundError, match="pip install pandas"):
+        results.to_pandas()
+
+
+def test_the_version_and_the_command_of_the_package() -> None:
+    done = subprocess.run([sys.executable, "-m", "infoset", "--version"], capture_output=True, text=True, check=True)
+    assert infoset.__version__ in done.stdout
