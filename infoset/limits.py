@@ -1,4 +1,4 @@
-"""What a number may be: declared once, at the field of a dataclass, and read by its constructor and by file readers."""
+"""Limits of numbers: declared once, at the field of a dataclass, for its constructor and for file readers."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 LARGEST = 1e60
-"""Greatest size of any number: products of a few such numbers do not overflow."""
+"""Greatest absolute value of any number: products of a few such numbers do not overflow."""
 SMALLEST = 1e-110
-"""Least size of a number that must be positive: its square can be divided by."""
+"""Least value of a number that must be positive: its square is not zero."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a number may be; `above` and `below` are not allowed themselves, `least` and `most` are.
+    """Limits of a number.
 
     Parameters
     ----------
     above, least, below, most : float or None
-        None is no limit but `LARGEST`.
+        Ends of the interval; `above` and `below` are excluded. None is no limit but `LARGEST`.
     whole : bool
-        Whether it must be an integer; `LARGEST` does not bind an integer.
+        Whether the number must be an integer; `LARGEST` does not apply to integers.
     """
 
     above: float | None = None
@@ -35,7 +35,7 @@ class Limits:
     whole: bool = False
 
     def problem(self, value: object) -> str | None:
-        """Return what is wrong with the size of a number, or None."""
+        """Return why a number is outside the limits, or None."""
         number: Any = value
         if not (self.whole or -LARGEST <= number <= LARGEST):  # NaN is neither
             return f"must be finite, at most {LARGEST:g} in size"
@@ -52,20 +52,14 @@ class Limits:
         return None
 
     def need(self, name: str, value: object) -> None:
-        """Refuse what is not a number within these limits.
-
-        Parameters
-        ----------
-        name : str
-            Of the parameter, for the message.
-        value : object
+        """Raise an error, which starts with `name`, if a value is not a number within these limits.
 
         Raises
         ------
         TypeError
-            If it is no float and no integer, or not an integer where it must be; a bool is neither.
+            If it is not a float or an integer, or not an integer where it must be one; a bool is neither.
         ValueError
-            If it is out of the limits.
+            If it is outside the limits.
         """
         kinds = (int, np.integer) if self.whole else (int, float, np.integer)  # single precision would round
         if isinstance(value, bool) or not isinstance(value, kinds):
@@ -94,7 +88,7 @@ Part = Annotated[float, PART]
 
 @dataclass(frozen=True)
 class _Rule:
-    """What the annotation of a field asks for."""
+    """Type and limits that the annotation of a field requires."""
 
     field: str
     name: str
@@ -118,19 +112,10 @@ class _Rule:
 def limits_of(owner: type, field: str) -> Limits:
     """Return the limits that a dataclass declares for the numbers of a field.
 
-    Parameters
-    ----------
-    owner : type
-    field : str
-
-    Returns
-    -------
-    Limits
-
     Raises
     ------
     TypeError
-        If it declares none.
+        If it declares no limits.
     """
     found = next(rule.limits for rule in _rules(owner) if rule.field == field)
     if found is None:
@@ -139,13 +124,10 @@ def limits_of(owner: type, field: str) -> Limits:
 
 
 def check_fields(owner: object) -> None:
-    """Refuse the values of a dataclass that do not fit the annotations of its fields.
+    """Check the values of a dataclass against the annotations of its fields.
 
-    Parameters
-    ----------
-    owner : dataclass
-        Numbers are annotated with `Limits`, intervals are pairs (least, greatest) of such numbers; enumerations, other
-        dataclasses and text are checked by type.
+    Numbers are annotated with `Limits`, intervals are pairs (least, greatest) of such numbers; enumerations, other
+    dataclasses and text are checked by type.
 
     Raises
     ------
@@ -173,21 +155,14 @@ def _rule(field: str, name: str, hint: Any) -> _Rule:
 
 
 def need_pair(name: str, value: object, limits: Limits = NUMBER) -> None:
-    """Refuse what is not a pair (least, greatest) of numbers within limits.
-
-    Parameters
-    ----------
-    name : str
-        Of the parameter, for the message.
-    value : object
-    limits : Limits
+    """Raise an error, which starts with `name`, if a value is not a pair (least, greatest) of numbers within limits.
 
     Raises
     ------
     TypeError
         If it is not a tuple of two real numbers.
     ValueError
-        If one is out of the limits, or the pair is reversed.
+        If a number is outside the limits, or the pair is reversed.
     """
     if not isinstance(value, tuple) or len(value) != 2:
         raise TypeError(f"{name} must be a pair (least, greatest): got {shown(value)}")
@@ -198,22 +173,12 @@ def need_pair(name: str, value: object, limits: Limits = NUMBER) -> None:
 
 
 def real_values(name: str, value: ArrayLike) -> NDArray[np.float64]:
-    """Return an array of real numbers, finite or not, of any shape.
-
-    Parameters
-    ----------
-    name : str
-        Of the parameter, for the message.
-    value : array_like
-
-    Returns
-    -------
-    ndarray of float
+    """Return an array of real numbers, finite or not, of any shape; `name` is for the message.
 
     Raises
     ------
     TypeError
-        If it is masked, complex, or of anything but numbers.
+        If it is masked, complex, or does not hold numbers.
     """
     values = value if isinstance(value, np.ndarray) else np.asarray(value)
     if isinstance(values, np.ma.MaskedArray):
@@ -224,26 +189,14 @@ def real_values(name: str, value: ArrayLike) -> NDArray[np.float64]:
 
 
 def real_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return an array of finite real numbers of a shape.
-
-    Parameters
-    ----------
-    name : str
-        Of the parameter, for the message.
-    value : array_like
-        Of that shape, or one number for all.
-    shape : tuple of int
-
-    Returns
-    -------
-    ndarray of float, of that shape
+    """Return finite real numbers as an array of a shape, from such an array or from one number for all elements.
 
     Raises
     ------
     TypeError
-        If it is masked, complex, or of anything but numbers.
+        If it is masked, complex, or does not hold numbers.
     ValueError
-        If a number is not finite, or the shape is another.
+        If a number is not finite, or the shape is different.
     """
     values = real_values(name, value)
     if values.shape not in ((), shape):
@@ -254,25 +207,14 @@ def real_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[n
 
 
 def flags(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Return an array of flags of a shape, or a single one for all.
-
-    Parameters
-    ----------
-    name : str
-        Of the parameter, for the message.
-    value : array_like of bool
-    shape : tuple of int
-
-    Returns
-    -------
-    ndarray of bool
+    """Return flags as an array of a shape, or a single flag for all elements.
 
     Raises
     ------
     TypeError
         If it is not of the type bool, or masked.
     ValueError
-        If the shape is another.
+        If the shape is different.
     """
     values = np.asarray(value)
     if isinstance(value, np.ma.MaskedArray) or values.dtype != np.bool_:
@@ -283,6 +225,6 @@ def flags(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.boo
 
 
 def shown(value: object) -> str:
-    """Return a value on one line of a message, cut short if it is long."""
+    """Return a value as text on one line, for a message; long texts are truncated."""
     text = " ".join(repr(value).split())
     return text if len(text) <= 80 else f"{text[:77]}..."

@@ -1,4 +1,4 @@
-"""What the set assumes: the motion, the start, the sensor and how much uncertainty a step adds."""
+"""Assumptions of the set: motion, start, angle sensor, and the uncertainty that a step adds."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _SECTIONS = Limits(least=1, most=MOST_SECTIONS, whole=True)
 
 
 LEAST_RANGE = 1e-9
-"""Of the greatest label: at a range of zero an angle is that of nothing."""
+"""Least range as a share of the greatest label; at a range of zero there is no angle."""
 
 
 class Model(Enum):
     """What the set allows for.
 
-    PAPER is the published procedure: it may lose the truth. GUARANTEED allows for everything the truth can do - its
-    closing speed, gravity, manoeuvres, the engine's errors, rounding - and does not.
+    PAPER is the published procedure, whose set may lose the true state. GUARANTEED allows for errors of the closing
+    speed, gravity, manoeuvres, errors of the engine and rounding, and its set does not.
     """
 
     PAPER = "paper"
@@ -34,9 +34,9 @@ class Model(Enum):
 
 
 class InitialSet(Enum):
-    """The shape of a section at the start.
+    """Shape of a section at the start.
 
-    RECTANGLE is the paper's, a rectangle in (omega, alpha); BOX is the one in (z, V).
+    RECTANGLE is a rectangle in (omega, alpha), as in the paper; BOX is a rectangle in (z, V).
     """
 
     RECTANGLE = "rectangle"
@@ -44,10 +44,10 @@ class InitialSet(Enum):
 
 
 class Recovery(Enum):
-    """What becomes of a set that a measurement empties: the measurement contradicts the model.
+    """What happens to a set that a measurement leaves empty, because it contradicts the model.
 
-    WIDENED goes on without that measurement, from the last consistent set widened by a disturbance; NONE leaves the set
-    empty, and nothing more is done with it, as in the published procedure.
+    WIDENED ignores the measurement and enlarges the last consistent set by a disturbance. NONE leaves the set empty, as
+    in the published procedure.
     """
 
     WIDENED = "widened"
@@ -94,7 +94,7 @@ class StateBox:
 
 @dataclass(frozen=True)
 class SetModel:
-    """Everything an information set needs to know.
+    """Parameters of an information set.
 
     Parameters
     ----------
@@ -103,30 +103,30 @@ class SetModel:
     step_s : float
         The step Delta of observation and control, s.
     bounds : StateBox
-        What is known of the state at t = 0.
+        Possible states at t = 0.
     angle_sensor : AngleSensor
         Error law of the line-of-sight angle.
     disturbance_m_s2 : float
-        In the paper's model, bound nu of the fictitious acceleration along z; in the guaranteed one, of the target's
-        own manoeuvres along z, m/s^2.
+        Bound of the acceleration along z, m/s^2: nu of the fictitious one in the paper's model, that of the target's
+        manoeuvres in the guaranteed model.
     range_threshold_m : float
-        Hypotheses about to fall below this range eps leave the set, m.
+        Hypotheses whose range is about to fall below this value eps leave the set, m.
     sections : int
         Number of x-sections at the start, on a uniform grid over the possible ranges, ends included.
     fewest_sections : int
-        When fewer are left, the set is re-gridded by replay to 2 fewest_sections + 1.
+        If fewer sections are left, replay makes a new grid of 2 fewest_sections + 1.
     initial_set : InitialSet
         Shape of a section at the start.
     kind : Model
         What the set allows for.
     recovery : Recovery
-        What becomes of a set that a measurement empties.
+        What happens to an empty set.
     gravity_m_s2 : float
-        Bound of the difference of gravity along z; only the guaranteed model counts it.
+        Bound of the difference of gravity along z; used by the guaranteed model only.
     gravity_speed_change : float
-        Bound of the relative change of the closing speed by gravity; only the guaranteed model counts it.
+        Bound of the relative change of the closing speed by gravity; used by the guaranteed model only.
     execution_error_relative : float
-        Bound of |given / commanded - 1| of an impulse; only the guaranteed model counts it.
+        Bound of |given / commanded - 1| of an impulse; used by the guaranteed model only.
 
     Raises
     ------
@@ -162,18 +162,19 @@ class SetModel:
         self.check_start("bounds", self.bounds)
 
     def check_start(self, name: str, box: StateBox) -> None:
-        """Refuse a box of starts that reaches below the threshold, or in which the angle's error bound vanishes.
+        """Refuse starts below the range threshold, and starts where the error bound of the angle is not positive.
 
         Parameters
         ----------
         name : str
-            Of the box, for the message.
+            Name of the box, for the message.
         box : StateBox
+            Possible starts.
 
         Raises
         ------
         ValueError
-            If it is.
+            If there are such starts.
         """
         if self.range_threshold_m >= box.x_m[0]:
             raise ValueError(
@@ -189,12 +190,12 @@ class SetModel:
 
     @property
     def is_guaranteed(self) -> bool:
-        """Whether the set is meant to keep the truth, whatever it does within its bounds."""
+        """Whether the model is the guaranteed one, whose set keeps the true state."""
         return self.kind is Model.GUARANTEED
 
     @property
     def speed_error(self) -> float:
-        """Greatest |eta|, with e (1 + eta) the closing speed of a truth; zero in the paper's model."""
+        """Greatest |eta|, where e (1 + eta) is the true closing speed; zero in the paper's model."""
         if not self.is_guaranteed:
             return 0.0
         e = self.closing_speed_m_s
@@ -202,37 +203,37 @@ class SetModel:
 
     @property
     def acceleration_m_s2(self) -> float:
-        """Bound nu of the acceleration along z that the set allows for, m/s^2.
+        """Bound nu of the acceleration along z in the set, m/s^2.
 
-        In the guaranteed model lengths, and so accelerations, are those of the truth divided by 1 + eta.
+        In the guaranteed model, lengths and accelerations are the true ones divided by 1 + eta.
         """
         if not self.is_guaranteed:
             return self.disturbance_m_s2
         return (self.disturbance_m_s2 + self.gravity_m_s2) / (1.0 - self.speed_error)
 
     def steps_in(self, period_s: float) -> int:
-        """Number of steps from one measurement to the next, at least one."""
+        """Return the number of steps between two measurements, at least one."""
         return max(1, round(period_s / self.step_s))
 
     @property
     def least_range_m(self) -> float:
-        """Least range that a hypothesis may have, m: the threshold, and more than rounding makes of zero."""
+        """Least range of a hypothesis, m: the threshold, and more than the rounding error of zero."""
         return max(self.range_threshold_m, LEAST_RANGE * self.label_limits_m[1])
 
     @property
     def label_limits_m(self) -> Interval:
-        """Least and greatest label of a truth, m: its range at t = 0 divided by 1 + eta.
+        """Least and greatest label of a true state, m: its range at t = 0 divided by 1 + eta.
 
         Raises
         ------
         ValueError
-            If eta may be 1 or more: the guaranteed model has no labels then.
+            If eta may be 1 or more, for which the guaranteed model has no labels.
         """
         least, greatest = self.bounds.x_m
         eta = self.speed_error
         if eta >= 1.0:
             raise ValueError(
-                "SetModel: in the guaranteed model the closing speed must be known to within itself: bounds.vx_m_s and "
+                "SetModel: the guaranteed model needs a closing speed known to better than 100 %: bounds.vx_m_s and "
                 f"gravity_speed_change let it differ by {eta:.3g} of closing_speed_m_s, {self.closing_speed_m_s:g} m/s"
             )
         return least / (1.0 + eta), greatest / (1.0 - eta)

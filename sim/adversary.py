@@ -1,6 +1,6 @@
-"""Search for the engagement that a strategy stands worst: the start and the measurement errors of the greatest miss.
+"""Search for the start and the measurement errors with the greatest miss of a strategy.
 
-What is found bounds from below what the strategy can guarantee. It is no proof that there is nothing worse.
+The miss found is a lower bound of what the strategy can guarantee. It does not prove that no greater one exists.
 """
 
 from __future__ import annotations
@@ -23,37 +23,37 @@ from sim.results import Outcome
 from sim.scenario import Scenario, with_strategy
 
 CHUNK = 50
-"""Engagements flown together."""
+"""Engagements in a batch."""
 GENERATION = 100
-"""Engagements flown before the next choice."""
+"""Engagements between two selections."""
 ELITE = 24
-"""The worst plans so far that are changed further."""
+"""Number of plans with the greatest misses so far that are changed further."""
 LINEAGE_SHARE = 6
-"""Most of the elite that may come from one first plan, while the search is young."""
+"""Greatest number of the elite that comes from one first plan in the first part of the search."""
 YOUNG_SHARE = 0.5
-"""Share of the budget that the search is young for."""
+"""Share of the budget that is the first part of the search."""
 FIRST_SHARE = 0.25
 """Share of the budget for first plans."""
 MOST_CHANGES = 3
-"""Changes from a plan to the next, at most."""
+"""Greatest number of changes from a plan to the next."""
 LATE_STEPS = 12.0
-"""Mean distance from the end, in steps, of those changes that prefer the end."""
+"""Mean distance from the end, in steps, of the changes near the end."""
 
 UPPER, LOWER = 1.0, -1.0
 
 
 class NothingCountsError(ValueError):
-    """No engagement of a search counts."""
+    """In every engagement of a search the set was lost, or the miss was not finite."""
 
 
 @dataclass(frozen=True)
 class WorstEngagement:
-    """The engagement of greatest miss that a search has found.
+    """The engagement with the greatest miss of a search.
 
     Parameters
     ----------
     scenario : Scenario
-        What was searched; its dispersion is the one start that was found.
+        Scenario of the search; its dispersion is the start that was found.
     seed : int
         The seed of the search.
     strategy : str
@@ -61,21 +61,22 @@ class WorstEngagement:
     miss_m : float
         True miss, m.
     outcome : Outcome
+        How the engagement ended.
     truth_kept : bool
-        Whether the truth was inside its own section after every measurement.
+        Whether the true state was inside its section after every measurement.
     position_m, velocity_m_s : ndarray, shape (2,)
         Start: (z, x) and (V_z, V_x).
     errors : mapping of str to ndarray, shape (steps,)
         Measurement errors by sensor in units of their bounds, zero where nothing was measured. `ScriptedNoise` with
         them flies this engagement again, bit for bit.
     construction : str
-        The first plan that the search made it from.
+        Kind of the first plan that it comes from.
     changes : int
-        How many plans lie between the two.
+        Number of changed plans between the two.
     evaluations : int
         Engagements flown.
     history : tuple of (int, float)
-        Evaluations and greatest miss so far, m, whenever it had risen.
+        Evaluations and greatest miss so far, m, at each increase.
     """
 
     scenario: Scenario
@@ -93,16 +94,16 @@ class WorstEngagement:
     history: tuple[tuple[int, float], ...]
 
     def noise(self) -> ScriptedNoise:
-        """The errors as the noise of a batch of one."""
+        """Return the errors as the noise of a batch of one."""
         return ScriptedNoise({name: errors[None] for name, errors in self.errors.items()})
 
     def record(self, strategy: Strategy | None = None) -> Record:
-        """Fly it once more and keep everything.
+        """Fly the engagement again and return its record.
 
         Parameters
         ----------
         strategy : Strategy or None
-            None is the scenario's own. Another one than that of the search has another miss.
+            None is the scenario's own. A strategy different from that of the search has a different miss.
         """
         return fly_one(self.scenario, seed=self.seed, strategy=strategy, noise=self.noise())
 
@@ -117,29 +118,25 @@ def find_worst(
     threads: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> WorstEngagement:
-    """Search the starts that are possible, and the errors within their bounds, for the greatest true miss.
+    """Search possible starts, and errors within their bounds, for the greatest true miss.
 
     Parameters
     ----------
     scenario : Scenario
-        Starts are sought in all of `set_model.bounds` (B x D), not in its dispersion.
+        The search covers all starts in `set_model.bounds` (B x D), not only its dispersion.
     strategy : Strategy, str or None
         A strategy of your own, the name of a registered one, or None for the scenario's.
     budget : int
         Engagements to fly.
     seed : int
-        Root seed. The same seed and budget find the same engagement, whatever the number of threads.
+        Root seed. The same seed and budget give the same engagement for any number of threads.
     keep_set : bool
-        Whether only engagements count whose set was never lost. In the model `paper` a set can be lost at once, and
-        then nothing is corrected: that is the greatest miss there is, and says nothing of the strategy.
+        Count only engagements whose set was never lost. In the model `paper` a set can be lost at the start; then
+        nothing is corrected, and the miss says nothing about the strategy.
     threads : int
-        Threads that fly.
+        Number of threads.
     progress : callable or None
-        Is told the fraction done, from 0 to 1.
-
-    Returns
-    -------
-    WorstEngagement
+        Called with the fraction done, from 0 to 1.
 
     Raises
     ------
@@ -150,15 +147,15 @@ def find_worst(
 
     Notes
     -----
-    A quarter of the budget goes to first plans: the game noise under its four tie rules, noise that keeps the upper or
-    the lower extreme in a random or a blockwise order, constant and extremal errors, and errors that follow the middle
-    between the truth and another that cannot be told from it. The worst are then changed, a few steps, blocks,
-    switching times or coordinates of the start at a time, and compete with what they become. While the search is
-    young no first plan may fill the elite with its offspring.
+    A quarter of the budget is for first plans: game noise with its four tie rules, noise that keeps the upper or the
+    lower extreme in a random or blockwise order, constant and extremal errors, and errors that show the middle between
+    the true motion and one with the same measurements. The plans with the greatest misses are then changed, by a few
+    steps, blocks, switching times or coordinates of the start, and compete with their changes. In the first part of the
+    search, the number of plans from one first plan is limited.
 
     References
     ----------
-    Kumkov and Patsko (1997), section 7: the rule of the game noise, here one plan of many.
+    Kumkov and Patsko (1997), section 7, for the rule of the game noise.
     """
     for name, count in (("budget", budget), ("threads", threads), ("seed", seed)):
         INTEGER.need(name, count)
@@ -189,7 +186,7 @@ class _Search:
         self._strategy_name = scenario.strategy if strategy is None else type(strategy).__name__
         self._lower, self._upper = corners(scenario.set_model.bounds)
         self._random = np.random.default_rng(seed)
-        # What else is random is that of run 0 in every engagement, so that the worst can be flown again alone.
+        # All other random numbers are those of run 0, so that the worst engagement can be flown again alone.
         self._draws = draw(self.scenario, [0], seed)
         self._steps = self._draws.steps
         self._names = tuple(dict.fromkeys((*ROWS, *scenario.sensors)))
@@ -245,13 +242,13 @@ class _Search:
         counts = np.isfinite(results.miss_m)
         if self._keep_set:
             counts &= outcomes != Outcome.SET_LOST
-        if tie is not None:  # what the game did, as a plan
+        if tie is not None:  # the errors of the game become the plan
             plans.sequence[:], plans.given[:] = noise.errors, True
         value = np.where(counts, results.miss_m, -np.inf)
         return Flown(plans, value, noise.errors, outcomes, results.truth_kept)
 
     def _select(self, flown: Flown, young: bool) -> None:
-        """Note what has been flown, and keep the worst."""
+        """Update the elite and the history with new flights."""
         self.evaluations += len(flown.value)
         rivals = flown if self._elite is None else self._elite.join(flown)
         order = np.argsort(-rivals.value, kind="stable")
@@ -272,7 +269,7 @@ class _Search:
             self.history.append((self.evaluations, greatest))
 
     def _first_plans(self, count: int) -> list[tuple[Plans, TieRule | None]]:
-        """First plans, `count` in all, of every construction as many."""
+        """Return `count` first plans, in equal numbers for each construction."""
         makers: list[tuple[str, TieRule | None, Callable[[int, Floats], tuple[Floats, bool]]]] = [
             *((f"game noise, tie {tie.value}", tie, self._coins) for tie in TieRule),
             ("extremes kept in random order", None, self._coins),
@@ -299,7 +296,7 @@ class _Search:
         return plans
 
     def _starts(self, count: int) -> Floats:
-        """Starts in B x D: half of them anywhere, the others with some coordinates at an end."""
+        """Return starts in B x D; in a quarter of them, some coordinates are at an end of their interval."""
         share = self._random.random((count, 4))
         at_end = (self._random.random((count, 4)) < 0.5) & (self._random.random((count, 1)) < 0.5)
         return self._lower + (self._upper - self._lower) * np.where(at_end, np.round(share), share)
@@ -318,10 +315,10 @@ class _Search:
         return np.repeat(self._random.uniform(-1.0, 1.0, (count, 1)), self._steps, axis=1), True
 
     def _pair(self, count: int, start: Floats) -> tuple[Floats, bool]:
-        """Half the lateral distance to another straight motion, within the bounds until shortly before the end.
+        """Return errors that show the middle between the true motion and another straight one.
 
-        The other motion is `at_first` bounds away at t = 0 and one bound away, on either side, when the two can be
-        told apart; from then on the measurements are exact.
+        Shortly before the end the two are two bounds apart and can be distinguished; after that the measurements are
+        exact.
         """
         step_s, sensor = self.scenario.set_model.step_s, self.scenario.set_model.angle_sensor
         closing = -start[:, 3:]
@@ -336,10 +333,10 @@ class _Search:
         return np.where(np.arange(self._steps) <= apart_at, np.clip(errors, -1.0, 1.0), 0.0), True
 
     def _children(self, count: int) -> Plans:
-        """Plans changed from the elite; the worse a plan, the more often."""
+        """Return changed plans of the elite; plans with a greater miss are chosen more often."""
         elite = self._elite
         if elite is None:
-            raise RuntimeError("there is nothing to change before something has flown")
+            raise RuntimeError("no plan has flown yet")
         ranks = np.floor(len(elite.value) * self._random.random(count) ** 2).astype(np.int64)
         plans = elite.plans.take(ranks)
         for i in range(count):
@@ -350,19 +347,19 @@ class _Search:
         return plans
 
     def _last_step(self, plans: Plans, i: int) -> int:
-        """The last step before the closest approach of a start, with a step to spare."""
+        """Return the last step before the closest approach of a start, plus one."""
         x, vx = float(plans.start[i, 1]), float(plans.start[i, 3])
         return min(self._steps - 1, int(x / (-vx * self.scenario.set_model.step_s)) + 1)
 
     def _step(self, plans: Plans, i: int) -> int:
-        """A step at random: anywhere or, as often, late."""
+        """Return a random step: anywhere or near the end, with equal probability."""
         last = self._last_step(plans, i)
         if self._random.random() < 0.5:
             return int(self._random.integers(last + 1))
         return max(0, last - int(self._random.exponential(LATE_STEPS)))
 
     def _span(self, plans: Plans, i: int) -> slice:
-        """A block of steps at random, short more often than long."""
+        """Return a random block of steps; short ones are more frequent."""
         begin = self._step(plans, i)
         return slice(begin, begin + 1 + int(10.0 ** self._random.uniform(0.0, 2.0)))
 
@@ -390,7 +387,7 @@ class _Search:
         plans.given[i] = np.roll(plans.given[i], by)
 
     def _give_block(self, plans: Plans, i: int) -> None:
-        """Give the errors of a block, or leave it to the extremes."""
+        """Prescribe the errors of a block, or let the noise keep extremes there."""
         span = self._span(plans, i)
         if plans.given[i, span].all():
             plans.given[i, span] = False
@@ -400,7 +397,7 @@ class _Search:
             plans.sequence[i, :, span] = self._random.choice([-1.0, 0.0, 1.0, anything], (len(self._names), 1))
 
     def _move_error(self, plans: Plans, i: int) -> None:
-        """Change the size of the given errors of a block."""
+        """Change the size of the prescribed errors of a block."""
         span = self._span(plans, i)
         moved = plans.sequence[i, :, span] + 10.0 ** self._random.uniform(-2.0, 0.0) * self._random.normal(
             size=(len(self._names), 1)
@@ -409,7 +406,7 @@ class _Search:
         plans.sequence[i, :, span] = np.where(given, np.clip(moved, -1.0, 1.0), plans.sequence[i, :, span])
 
     def _cross(self, plans: Plans, i: int) -> None:
-        """Take the end of the plan from another of the elite."""
+        """Replace the end of the plan by that of another plan of the elite."""
         elite = self._elite
         if elite is not None:
             other, begin = int(self._random.integers(len(elite.value))), self._step(plans, i)
@@ -417,7 +414,7 @@ class _Search:
             plans.given[i, begin:] = elite.plans.given[other, begin:]
 
     def _move_start(self, plans: Plans, i: int) -> None:
-        """Move the start by little or much, in one coordinate or in all, or one coordinate to an end."""
+        """Move the start in some coordinates or in all, or set some coordinates to an end."""
         which = self._random.random(4) < self._random.choice([0.25, 1.0])
         width = self._upper - self._lower
         moved = plans.start[i] + width * 10.0 ** self._random.uniform(-5.0, -0.5) * self._random.normal(size=4)
@@ -440,6 +437,6 @@ class _Search:
 
 
 def _in_chunks(plans: Plans, tie: TieRule | None) -> list[tuple[Plans, TieRule | None]]:
-    """Plans in parts as even as can be, none larger than a chunk."""
+    """Split plans into equal parts of at most `CHUNK`."""
     parts = np.array_split(np.arange(len(plans)), -(-len(plans) // CHUNK))
     return [(plans.take(part), tie) for part in parts]

@@ -1,4 +1,4 @@
-"""A lower bound on what any strategy can guarantee, and the two truths that no strategy can serve both."""
+"""A lower bound on the miss that any strategy can guarantee, from two motions with the same measurements."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 LABELS_A_PERIOD, PERIODS_LOOKED_AT = 8, 7
-"""The bound ripples with the label, once in the way flown between two steps; beneath that it changes slowly."""
+"""The bound oscillates with the label; the period is the distance flown between two measurements."""
 REFINEMENTS = 5
 MARGIN = 1e-6
-"""Share of each limit that is kept back: angles are no ratios, and the truths are to look alike in rounded numbers."""
+"""Reserve as a share of each limit, for rounding and for the difference between an angle and its tangent."""
 
 STEPS_A_BLOCK = 8
-"""Acceleration is constant over blocks whose length is an eighth of the time to the last common measurement."""
+"""Acceleration is constant over blocks of an eighth of the time to the last common measurement."""
 
 
 class BoundError(RuntimeError):
@@ -30,7 +30,7 @@ class BoundError(RuntimeError):
 
 @dataclass(frozen=True)
 class TruthPair:
-    """Two truths that look alike up to some step, and end as far apart as they can.
+    """Two true motions with the same measurements up to some step, and the greatest distance at the end.
 
     Parameters
     ----------
@@ -39,15 +39,15 @@ class TruthPair:
     vx_m_s : float
         Their common velocity along x, m/s; negative.
     last_common_step : int
-        The last step whose measurements, and so whose impulse, can be the same; -1 if there is none.
+        Last step whose measurements, and therefore impulses, can be the same; -1 if there is none.
     apart_m : float
-        Their distance along z when x = 0, without impulses or under the same ones, m.
+        Their distance along z at x = 0, with the same impulses, m.
     correction_m : float
-        What the impulses after `last_common_step` can change of one miss, m.
+        Greatest change of one miss by the impulses after `last_common_step`, m.
     position_m, velocity_m_s : ndarray, shape (2, 2)
-        (z, x) and (V_z, V_x) of either at t = 0.
+        (z, x) and (V_z, V_x) of each at t = 0.
     acceleration_m_s2 : ndarray, shape (2, steps)
-        Acceleration along z of either over each step; the last step holds x = 0.
+        Acceleration along z of each over each step; x = 0 is in the last step.
     """
 
     label_m: float
@@ -61,7 +61,7 @@ class TruthPair:
 
     @property
     def bound_m(self) -> float:
-        """What one of the two must miss by, whatever the strategy, m."""
+        """Miss that at least one of the two has with any strategy, m."""
         return max(0.0, 0.5 * self.apart_m - self.correction_m)
 
     @property
@@ -70,7 +70,7 @@ class TruthPair:
         return -self.label_m / self.vx_m_s
 
     def distance_m(self, step_s: float) -> tuple[Floats, Floats]:
-        """Times of all steps and of the arrival, s, and the distance of the two along z then, m."""
+        """Return the times of all steps and of the arrival, s, and the distance of the two along z, m."""
         steps = self.acceleration_m_s2.shape[1]
         times_s = np.append(np.arange(steps) * step_s, self.arrival_s)
         offset, velocity, acceleration = (
@@ -88,8 +88,9 @@ class LabelBound:
     label_m, vx_m_s : float
         Range at t = 0 and velocity along x.
     last_common_step : int
-        Where it is reached.
+        Last common step of the best pair.
     bound_m : float
+        The bound.
     """
 
     label_m: float
@@ -100,16 +101,16 @@ class LabelBound:
 
 @dataclass(frozen=True)
 class LowerBound:
-    """What no strategy can guarantee to stay below.
+    """A miss below which no strategy can guarantee to stay.
 
     Parameters
     ----------
     pairs : tuple of TruthPair
-        The best pair at either end of the interval of V_x and at the nominal closing speed, the best of them first.
+        Best pair at both ends of the interval of V_x and at the nominal closing speed, the best one first.
     by_label : tuple of LabelBound
-        All labels looked at, in rising order, for each velocity along x.
+        Bounds of all examined labels, in ascending order, for each velocity along x.
     disturbance_m_s2 : float
-        Acceleration along z that the truth is allowed, m/s^2.
+        Greatest acceleration of the true motion along z, m/s^2.
     """
 
     pairs: tuple[TruthPair, ...]
@@ -128,18 +129,18 @@ class LowerBound:
 
     @property
     def pair(self) -> TruthPair:
-        """The two truths that show it."""
+        """The two motions with this bound."""
         return self.pairs[0]
 
     @property
     def speeds_m_s(self) -> tuple[float, ...]:
-        """Velocities along x that were looked at, in rising order, m/s."""
+        """Examined velocities along x, in ascending order, m/s."""
         return tuple(sorted({each.vx_m_s for each in self.by_label}))
 
     def curve(self, vx_m_s: float) -> tuple[Floats, Floats]:
-        """Labels and bounds of one velocity along x, m."""
-        found = [each for each in self.by_label if each.vx_m_s == vx_m_s]
-        return np.array([each.label_m for each in found]), np.array([each.bound_m for each in found])
+        """Return labels and bounds of one velocity along x, m."""
+        bounds = [bound for bound in self.by_label if bound.vx_m_s == vx_m_s]
+        return np.array([bound.label_m for bound in bounds]), np.array([bound.bound_m for bound in bounds])
 
 
 def lower_bound(
@@ -147,18 +148,14 @@ def lower_bound(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> LowerBound:
-    """Find the greatest miss that no strategy can guarantee to stay below.
+    """Find the greatest miss below which no strategy can guarantee to stay.
 
     Parameters
     ----------
     scenario : Scenario
-        Its range meter does not matter: the two truths have the same range.
+        A range meter has no effect, because the two motions have the same range.
     progress : callable or None
-        Is told the fraction done, from 0 to 1.
-
-    Returns
-    -------
-    LowerBound
+        Called with the fraction done, from 0 to 1.
 
     Raises
     ------
@@ -167,20 +164,19 @@ def lower_bound(
 
     Notes
     -----
-    Any pair of admissible truths gives a bound; the search is for a good one. The last measurements decide, so that
-    the bound depends on the label mostly through the place of the last measurement before x = 0, and repeats with the
-    way flown in between. Labels are therefore looked at over whole periods, at some places of the range
-    interval, for both ends of the interval of V_x and for the nominal closing speed; the best are then refined.
-    Some 600 linear programs of about 110 variables, 6 ms each.
+    Any pair of admissible motions gives a bound; the search looks for a good one. The bound depends on the label mostly
+    through the range of the last measurement before x = 0, and repeats with the distance flown between measurements.
+    Therefore the search covers whole periods of labels in some parts of the range interval, for both ends of the
+    interval of V_x and for the nominal closing speed, and refines the best labels. Cost: about 600 linear programs of
+    about 110 variables, 6 ms each.
 
-    The order in a step is measure, decide, fire. Equal measurements up to step s, then, mean equal impulses up to and
-    with that of step s; those of j > s may differ, and each moves one miss by at most mu2 x_j / |V_x|. The distance
-    along z of the two at x = 0 is thus at least |dz(T)| - 2 mu2 sum_{j > s} x_j / |V_x|, and one of them misses by at
-    least half of it. Of impulses the budget allows, the earliest count: they move the miss most.
+    The order in a step is measure, decide, fire. Equal measurements up to step s give equal impulses up to step s.
+    Later impulses may differ, and each changes one miss by at most mu2 x_j / |V_x|. The distance of the two along z at x = 0
+    is therefore at least |dz(T)| - 2 mu2 sum_{j > s} x_j / |V_x|, and one of the two misses by at least half of it. The
+    sum uses the earliest impulses that the budget allows, because they change the miss most.
     """
     model = scenario.set_model
-    # The target's manoeuvre is what tells one truth from another. Gravity is no choice of theirs: at one label it acts
-    # on both of a pair alike but for about K/R^3 times their distance, 1e-11 m/s^2 here.
+    # The manoeuvres of a pair may differ. Gravity acts on both alike, up to K/R^3 times their distance (1e-11 m/s^2).
     allowed = model.disturbance_m_s2
     slow, fast = max(model.bounds.vx_m_s), min(model.bounds.vx_m_s)
     speeds = sorted({fast, min(max(-model.closing_speed_m_s, fast), slow), slow})
@@ -196,7 +192,7 @@ def lower_bound(
         labels = grid.tolist()
         for index in range(len(grid) + extra):
             if index >= len(grid) and best is not None:
-                # About the best so far: half a width to either side, again and again.
+                # Refine around the best label: half a width to each side, repeatedly.
                 width *= 0.5 if (index - len(grid)) % 2 == 0 else 1.0
                 side = 1.0 if (index - len(grid)) % 2 else -1.0
                 labels.append(min(max(best.label_m + side * width, model.bounds.x_m[0]), model.bounds.x_m[1]))
@@ -211,24 +207,12 @@ def lower_bound(
         if best is not None:
             pairs.append(best)
     pairs.sort(key=lambda pair: -pair.bound_m)
-    by_label = {(each.vx_m_s, each.label_m): each for each in found}
-    return LowerBound(tuple(pairs), tuple(each for _, each in sorted(by_label.items())), allowed)
+    by_label = {(bound.vx_m_s, bound.label_m): bound for bound in found}
+    return LowerBound(tuple(pairs), tuple(bound for _, bound in sorted(by_label.items())), allowed)
 
 
 def label_grid(scenario: Scenario, vx_m_s: float) -> Floats:
-    """Labels to look at: whole periods of the ripple at even places, ends included.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    vx_m_s : float
-        Velocity along x, m/s.
-
-    Returns
-    -------
-    ndarray
-        m, in rising order; all periods where they are few.
-    """
+    """Return the labels to examine, m, in ascending order: whole periods of the bound, evenly spaced, ends included."""
     lower, upper = scenario.set_model.bounds.x_m
     period = -vx_m_s * scenario.set_model.step_s * scenario.set_model.steps_in(scenario.set_model.angle_sensor.period_s)
     whole = max(1, int(np.ceil((upper - lower) / period)))
@@ -248,23 +232,20 @@ def pair_at(
     last_common_step: int | None = None,
     try_first_before_s: float | None = None,
 ) -> TruthPair:
-    """Find the pair of truths of one label and velocity that gives the greatest bound.
+    """Find the pair of motions with the greatest bound for one label and velocity.
 
     Parameters
     ----------
     scenario : Scenario
+        Bounds, sensors and engine.
     label_m, vx_m_s : float
         Range at t = 0 and velocity along x; the range is x(t) = label + vx t.
     disturbance_m_s2 : float
-        Acceleration along z that a truth may have, m/s^2.
+        Greatest acceleration along z, m/s^2.
     last_common_step : int or None
-        Up to where the two look alike; None tries all that may be the best.
+        Last step with the same measurements; None searches for the best one.
     try_first_before_s : float or None
-        How long before arrival to look first for the last common step, s; None begins at the end.
-
-    Returns
-    -------
-    TruthPair
+        Time before arrival at which that search starts, s; None starts at the end.
 
     Raises
     ------
@@ -283,9 +264,9 @@ def pair_at(
 
 
 def _climb(pair_of: Callable[[int], TruthPair], start: int, count: int) -> TruthPair:
-    """Climb from an index to where neither neighbour is better, in strides that double and halve.
+    """Return the pair at a local maximum, found from an index with steps that double and halve.
 
-    With a straight rise of the distance and a quadratic one of the correction the bound has one summit.
+    The distance grows linearly and the correction quadratically, so the bound has one maximum.
     """
     known: dict[int, TruthPair] = {}
 
@@ -307,17 +288,17 @@ def _climb(pair_of: Callable[[int], TruthPair], start: int, count: int) -> Truth
 
 
 class _Approach:
-    """Everything about one label and velocity that the linear programs share.
+    """Data of one label and velocity that all its linear programs use.
 
-    `limits_m` is how far apart the two may be along z at each step, `rate_limits_m` how far apart their predicted
-    misses may be for the rate sensor; infinite where nothing is measured.
+    `limits_m` is the greatest distance of the two along z at each step with the same measured angle, `rate_limits_m`
+    that of their predicted misses with the same measured rate; infinite where nothing is measured.
     """
 
     def __init__(self, scenario: Scenario, label_m: float, vx_m_s: float, disturbance_m_s2: float) -> None:
         model = scenario.set_model
         self.scenario, self.label_m, self.vx_m_s, self.disturbance_m_s2 = scenario, label_m, vx_m_s, disturbance_m_s2
         self.arrival_s = -label_m / vx_m_s
-        # Steps whose range is positive; a step that would begin at the very arrival has none.
+        # Steps that start before the arrival, up to rounding.
         self.steps = max(1, int(np.ceil(self.arrival_s / model.step_s * (1.0 - 1e-12))))
         self.times_s = np.append(np.arange(self.steps) * model.step_s, self.arrival_s)
         self.ranges_m = np.maximum(label_m + vx_m_s * self.times_s[:-1], 0.0)
@@ -334,12 +315,12 @@ class _Approach:
 
     @property
     def candidates(self) -> Integers:
-        """Last common steps that may be the best: each just before a measurement, or at the end."""
+        """Last common steps that may be the best: those before a measurement, and the end."""
         measured = np.flatnonzero(np.isfinite(np.minimum(self.limits_m, self.rate_limits_m)))
         return np.append(measured - 1, self.steps - 1).astype(np.int64)
 
     def correction_m(self, last_common_step: int) -> float:
-        """What impulses after a step can change of the miss: the earliest first, while the budget lasts, m."""
+        """Return the greatest change of the miss by impulses after a step, within the budget, m."""
         thruster = self.scenario.thruster
         arms_s = self.ranges_m[last_common_step + 1 :] / -self.vx_m_s
         spent = thruster.greatest_impulse_m_s * np.arange(len(arms_s))
@@ -347,7 +328,7 @@ class _Approach:
         return float(sizes @ arms_s)
 
     def pair(self, last_common_step: int) -> TruthPair:
-        """The pair farthest apart at the end of those that look alike up to a step."""
+        """Return the pair with the greatest distance at the end of those with the same measurements up to a step."""
         offset, velocity, acceleration = self._farthest(last_common_step)
         box = self.scenario.set_model.bounds
         sides = np.array([0.5, -0.5])
@@ -364,13 +345,13 @@ class _Approach:
         )
 
     def _farthest(self, last_common_step: int) -> tuple[float, float, Floats]:
-        """Difference of the two truths: offset and velocity at t = 0, acceleration over each step.
+        """Return the difference of the two motions: offset and velocity at t = 0, acceleration over each step.
 
         Notes
         -----
-        A linear program in the offset, the velocity and the acceleration at the knots of a time grid that is as fine
-        as the steps about the last common measurement and coarser before: an acceleration constant over longer
-        blocks is an admissible one, and measurements within a block are inequalities of their own.
+        A linear program in the offset, the velocity and the acceleration at the knots of a time grid that has the steps
+        near the last common measurement and longer blocks before. An acceleration that is constant over longer blocks
+        is admissible, and measurements within a block are additional inequalities.
         """
         from scipy.optimize import linprog  # takes half a second to load
 
@@ -378,7 +359,7 @@ class _Approach:
         knots = self._knots(last_common_step)
         at_s, count = self.times_s[knots], len(knots)
         blocks = count - 1
-        # Units in which all variables are of the order of one: otherwise absolute tolerances of the solver matter.
+        # Units in which all variables are of order one, because the tolerances of the solver are absolute.
         second = self.scenario.set_model.step_s
         metre = 1.0 / max(float(np.median(self.ranges_m)) * 2e-4, 1e-9)
         push = 2.0 * self.disturbance_m_s2 * metre
@@ -403,7 +384,7 @@ class _Approach:
         bounds[0] = min(bounds[0], (box.z_m[1] - box.z_m[0]) * metre)
         bounds[count] = (box.vz_m_s[1] - box.vz_m_s[0]) * metre * second
         bounds[2 * count :] = 1.0
-        # What is measured within a block, and all rates: a z + b V + c u of the block's first knot.
+        # Measurements within a block, and all rates, as a z + b V + c u of the first knot of the block.
         within, rated = (
             np.setdiff1d(np.flatnonzero(np.isfinite(limits)), knots),
             np.flatnonzero(np.isfinite(rate_limits)),
@@ -441,7 +422,7 @@ class _Approach:
             float(np.clip(value / unit, -width, width))
             for value, unit, width in zip((solved.x[0], solved.x[count]), (metre, metre * second), widths, strict=True)
         )
-        # The solver keeps to the limits but for its tolerances; what is returned keeps to them exactly.
+        # The solution violates the limits by up to the solver's tolerances; scaling makes it satisfy them exactly.
         positions, speeds = _motion(offset, velocity, acceleration, self.times_s)
         misses = positions[:-1] + speeds[:-1] * (self.arrival_s - self.times_s[:-1])
         sizes = np.abs(np.concatenate([positions[:-1], misses]))
@@ -451,7 +432,7 @@ class _Approach:
         return share * offset, share * velocity, share * acceleration
 
     def _knots(self, last_common_step: int) -> Integers:
-        """Steps where blocks of constant acceleration end, 0 and the arrival included."""
+        """Return the steps at which blocks of constant acceleration end, with 0 and the arrival."""
         knots = [self.steps]
         while knots[-1] > 0:
             to_go = max(0, last_common_step - knots[-1])
@@ -460,7 +441,7 @@ class _Approach:
 
 
 def _motion(offset: float, velocity: float, acceleration: Floats, times_s: Floats) -> tuple[Floats, Floats]:
-    """Positions and speeds at some times, with constant acceleration between them."""
+    """Return positions and speeds at some times, with constant acceleration between them."""
     step = np.diff(times_s)
     speeds = velocity + np.concatenate([[0.0], np.cumsum(acceleration * step)])
     ways = speeds[:-1] * step + 0.5 * acceleration * step**2

@@ -1,4 +1,4 @@
-"""Random numbers of a batch of runs: each run has its own streams, whatever batch it is flown in."""
+"""Random numbers of a batch of runs. Each run has its own streams, independent of the batch."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ Floats = NDArray[np.float64]
 START, TIE, EXECUTION, TARGET = 0, 3, 5, 6
 """Streams of a run; each kind of sensor has its own as well (`Sensor.stream`)."""
 MOST_STEPS = 100_000
-"""Steps of a flight: what is random in it is drawn before it begins."""
+"""Greatest number of steps of a flight; all random numbers are drawn before it starts."""
 
 
 @dataclass(frozen=True)
 class Draws:
-    """Everything random in a batch of B engagements.
+    """Random numbers of a batch of B engagements.
 
     Parameters
     ----------
     position_m, velocity_m_s : ndarray, shape (B, 2)
-        Relative (z, x) and (V_z, V_x) of the truth at t = 0.
+        True relative (z, x) and (V_z, V_x) at t = 0.
     errors : mapping of str to ndarray, shape (B, steps)
         Measurement errors by sensor, uniform in [-1, 1], in units of their bounds.
     tie : ndarray, shape (B, steps)
@@ -52,24 +52,12 @@ class Draws:
 
 
 def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
-    """Draw the random numbers of some runs of an experiment.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    runs : sequence of int
-        Numbers of the runs.
-    seed : int
-        The root seed. Run k has the same numbers in every experiment of the same seed.
-
-    Returns
-    -------
-    Draws
+    """Return the random numbers of some runs; run k has the same numbers in every call with the same seed.
 
     Raises
     ------
     ValueError
-        If a flight takes more than 100 000 steps.
+        If a flight takes more than `MOST_STEPS` steps.
     """
     steps = greatest_number_of_steps(scenario)
     box = scenario.dispersion
@@ -92,18 +80,18 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
 
 
 def corners(box: StateBox) -> tuple[Floats, Floats]:
-    """Least and greatest (z, x, V_z, V_x) of a box."""
+    """Return least and greatest (z, x, V_z, V_x) of a box."""
     intervals = np.array([box.z_m, box.x_m, box.vz_m_s, box.vx_m_s], dtype=np.float64)
     return intervals[:, 0], intervals[:, 1]
 
 
 def generator(seed: int, run: int, stream: int) -> np.random.Generator:
-    """The generator of one stream of one run."""
+    """Return the random generator of one stream of one run."""
     return np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(run, stream)))
 
 
 def greatest_number_of_steps(scenario: Scenario) -> int:
-    """Steps after which every truth of the dispersion has passed its closest approach.
+    """Return the number of steps after which every start of the dispersion has passed its closest approach.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The one closed loop: a batch of engagements flown step by step against the truth."""
+"""The closed loop: a batch of engagements, step by step against the true motion."""
 
 from __future__ import annotations
 
@@ -37,16 +37,18 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Step:
-    """One step of a batch, as an observer sees it: after the decision, before the impulse.
+    """One step of a batch, after the decision and before the impulse.
 
     Parameters
     ----------
     step : int
+        Number of the step.
     time_s : float
+        Time since the start, s.
     tracking : ndarray of bool, shape (B,)
         Engagements that still measure and decide.
     flying : ndarray of bool, shape (B,)
-        Engagements whose truth had not passed its closest approach.
+        Engagements before their closest approach.
     sight : Sight
         True geometry.
     measured : mapping of str to ndarray, shape (B,)
@@ -54,7 +56,7 @@ class Step:
     predicted_miss : PredictedMiss
         After the measurement, before the impulse.
     impulse_m_s : ndarray, shape (B,)
-        What the thruster gives.
+        Impulses of the thruster, before errors of execution.
     information : InformationSetView
         The set after the measurement.
     """
@@ -76,8 +78,9 @@ class Engagements:
     Parameters
     ----------
     scenario : Scenario
+        What is flown.
     draws : Draws
-        The random numbers of the batch.
+        Starts and random numbers of the batch.
     strategy : Strategy or None
         None is the scenario's own.
     truth : TrueMotion or None
@@ -85,12 +88,12 @@ class Engagements:
     noise : MeasurementNoise or None
         None is the scenario's own.
     guarantee : bool
-        Whether the guaranteed model keeps its guaranteed miss, which takes about as long as all the rest.
+        Compute the bound Phi in the guaranteed model; it doubles the run time.
 
     Notes
     -----
-    One step: measure, intersect, decide, shift, drop what falls below the threshold, predict; meanwhile the truth
-    moves on, and is watched for its closest approach. Nothing flows from the truth to the strategy but measurements.
+    One step: measure and cut, decide, shift, drop labels below the threshold, predict; then the true motion advances to
+    its closest approach. The strategy gets nothing from the true motion but measurements.
     """
 
     def __init__(
@@ -132,22 +135,16 @@ class Engagements:
 
     @property
     def flying(self) -> bool:
-        """Whether any truth has yet to pass its closest approach, or x = 0: until then its label may still leave."""
+        """Whether any true motion is before its closest approach or x = 0; until then its label may still leave."""
         return bool((self._flying | ~self._arrived).any()) and self.step < self._draws.steps
 
     @property
     def inconsistency(self) -> tuple[MaskedIntegers, MaskedFloats]:
-        """Step at which each set emptied first, and the label (m) that came nearest to living on; masked: never."""
+        """Step at which each set first became empty, and the label (m) nearest to consistency; masked without one."""
         return self._information.inconsistency
 
     def advance(self, observe: Callable[[Step], None] | None = None) -> None:
-        """Fly one step.
-
-        Parameters
-        ----------
-        observe : callable or None
-            Is shown each step after the decision, before the impulse.
-        """
+        """Fly one step; `observe` is called after the decision, before the impulse."""
         model, thruster = self.scenario.set_model, self.scenario.thruster
         sight = self._truth.sight()
         self._tracking = self._flying & self._information.tracking
@@ -184,27 +181,27 @@ class Engagements:
         self._arrival_s = np.where(passing, self.step * model.step_s + passage.arrival_s, self._arrival_s)
         self._flying &= ~passage.passed
         self.step += 1
-        # The closest approach may come before x = 0, and the label leaves by then only.
+        # The label leaves at x = 0, which may come after the closest approach.
         self._arrived |= ~self._flying & (self._arrival_s <= self.step * model.step_s)
         self._information.stop(self._arrived)
 
     def truth_margins_m(self) -> list[MaskedFloats]:
-        """Signed margins of the truths in their own sections after each step's measurement, one array (B,) a step, m.
+        """Return the signed margins (m) of the true states in their sections, one array of shape (B,) per step.
 
-        They are masked where nothing was measured yet. Where the truth has not arrived, its section is that of a motion
-        without further impulses.
+        They are masked before the first measurement. Before arrival, a section is that of a motion without further
+        impulses.
         """
         return self._truth_section.margins_m(self._arrivals_s())[: self.step]
 
     def _arrivals_s(self) -> Floats:
-        """Times when x is zero, as far as they are known now, s."""
+        """Return the times of x = 0, s, without further impulses for flights that have not arrived."""
         if not self._flying.any():
             return self._arrival_s
         ahead_s = self.step * self.scenario.set_model.step_s + self._truth.arrival_s()
         return np.where(self._flying, ahead_s, self._arrival_s)
 
     def _measure(self, sight: Sight) -> Measurements:
-        """Measure with the sensors that are due, and cut the sets."""
+        """Measure with the sensors that are due, cut the sets, and return the measured values."""
         due = {name: sensor for name, sensor in self._sensors.items() if self.step % self._every[name] == 0}
         if not due or not self._tracking.any():
             return {}
@@ -219,12 +216,12 @@ class Engagements:
         return measured
 
     def _executed(self, impulse: Floats) -> Floats:
-        """What becomes of commanded impulses."""
+        """Return the executed impulses."""
         errors, bound = self._draws.execution, self.scenario.thruster.execution_error_relative
         return impulse if errors is None else impulse * (1.0 + bound * errors[:, self.step])
 
     def _manoeuvre(self, sight: Sight) -> Floats | None:
-        """Acceleration of the targets over this step; None where none manoeuvres."""
+        """Return the acceleration of the targets over this step; None without a target that manoeuvres."""
         target = self.scenario.target
         if target is None or self._draws.target is None:
             return None
@@ -252,7 +249,7 @@ class Engagements:
         return checked_impulses(wanted, self._tracking, self._strategy, self.step)
 
     def _finish_labels(self) -> None:
-        """Let labels leave below the threshold, and note the predicted miss of those that do."""
+        """Drop labels below the threshold, and store the predicted miss of those that leave."""
         if self._model.is_guaranteed:
             self._information.drop_below_threshold()
             return
@@ -268,13 +265,13 @@ class Engagements:
             self._finished_label |= finished
 
     def results(self, runs: NDArray[np.int64]) -> Results:
-        """Results so far, under these run numbers."""
+        """Return the results so far, with these run numbers."""
         lost = self._information.inconsistent
         margin = self._truth_section.least_margin_m(self._arrivals_s())
         payoff, known = self._guaranteed, self._finished_label
         if self._model.is_guaranteed:
             payoff, known = self._information.guaranteed_miss()
-        # Out of steps without having passed: the object is where it is.
+        # Without a closest approach within the greatest number of steps, the miss is the present range.
         miss = np.where(np.isfinite(self._miss), self._miss, self._truth.sight().range_m)
         return Results(
             runs=runs,

@@ -1,4 +1,4 @@
-"""What gravity can do to the relative motion: the bounds that the guaranteed model needs."""
+"""Bounds of the effect of gravity on the relative motion, for the guaranteed model."""
 
 from __future__ import annotations
 
@@ -15,73 +15,50 @@ LEAST_SPEED_CHANGE = 1e-8
 
 
 def on_board_model(scenario: Scenario) -> SetModel:
-    """The set model of a scenario with the bounds that its other tables imply: gravity and the engine's errors.
-
-    Parameters
-    ----------
-    scenario : Scenario
-
-    Returns
-    -------
-    SetModel
+    """Return the set model of a scenario with the bounds of gravity and of the engine's errors.
 
     Raises
     ------
     ValueError
-        If the closing speed of a truth may differ from the nominal one by as much as itself: the guaranteed model has
-        no labels then.
+        If the true closing speed may differ from the nominal one by 100 % or more: the guaranteed model has no labels.
     """
     model = replace(scenario.set_model, execution_error_relative=scenario.thruster.execution_error_relative)
     model = with_gravity(model, scenario.sun, greatest_impulses_m_s(model, scenario.thruster))
     if model.speed_error >= 1.0:
         raise ValueError(
-            f"the guaranteed model needs a closing speed known to within itself: bounds.vx_m_s, gravity and how far "
-            f"impulses lead across let it differ by {model.speed_error:.3g} of the nominal "
-            f"{model.closing_speed_m_s:g} m/s"
+            f"the guaranteed model needs a closing speed known to better than 100 %: bounds.vx_m_s, gravity and the "
+            f"impulses let it differ by {100.0 * model.speed_error:.3g} % of the nominal "
+            f"{model.closing_speed_m_s:g} m/s; narrow bounds.vx_m_s"
         )
     return model
 
 
 def greatest_impulses_m_s(model: SetModel, thruster: Thruster) -> float:
-    """Greatest sum of the impulses of a flight, m/s: the budget, or as many as there are steps.
-
-    Parameters
-    ----------
-    model : SetModel
-    thruster : Thruster
-
-    Returns
-    -------
-    float
-    """
+    """Return the greatest sum of the impulses of a flight, m/s: the budget, or the greatest impulse at every step."""
     steps = model.bounds.x_m[1] / (-model.bounds.vx_m_s[1] * model.step_s) + 1.0
     most = min(thruster.budget_m_s, thruster.greatest_impulse_m_s * steps)
     return most * (1.0 + thruster.execution_error_relative)
 
 
 def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetModel:
-    """The same model with the bounds of gravity's doings under a Sun.
+    """Return a model with `gravity_m_s2` and `gravity_speed_change` for a Sun, or for free space.
 
     Parameters
     ----------
     model : SetModel
+        Model without the bounds of gravity.
     sun : Sun or None
         None is free space.
     impulses_m_s : float
-        Greatest sum of the impulses: they carry the spacecraft across.
-
-    Returns
-    -------
-    SetModel
-        With `gravity_m_s2` and `gravity_speed_change`.
+        Greatest sum of the impulses, which change the lateral velocity.
 
     Notes
     -----
-    To first order the difference of the Sun's attraction at two points r apart is (K/R^3)(3 (n . r) n - r), n the
-    direction of the Sun. Along z it is at most (K/R^3)(1.5 |r| + 0.5 |z|), and at most 2 K/R^3 |r| in any direction.
-    The set sees the truth in units that change as gravity changes V_x: that adds 0.7 |z| and 2 (|r| + |z|) |V_z|/|V_x|.
-    The Sun comes nearer by no more than the range and the way flown, and a margin of 5 % stands for what is left out:
-    the second order, the change of n. docs/guarantee.md has the derivation.
+    To first order, the difference of the Sun's attraction at two points with distance vector r is
+    (K/R^3)(3 (n . r) n - r), with the direction n of the Sun. Along z it is at most (K/R^3)(1.5 |r| + 0.5 |z|), in any
+    direction at most 2 K/R^3 |r|. The lengths of the model scale with V_x, which gravity changes; this adds 0.7 |z| and
+    2 (|r| + |z|) |V_z|/|V_x|. R decreases by at most the range and the distance flown. A margin of 5 % covers the
+    second order and the change of n. docs/guarantee.md has the derivation.
     """
     if sun is None:
         return replace(model, gravity_m_s2=0.0, gravity_speed_change=LEAST_SPEED_CHANGE)

@@ -1,4 +1,4 @@
-"""The truth: heliocentric two-body motion of both craft, as relative motion of a batch."""
+"""True motion: heliocentric two-body motion of spacecraft and object, as relative motion of a batch."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ PASSAGE_LEAPS = 8
 Z, X = 0, 1
 RELATIVE, SPACECRAFT = 0, 1
 POSITION, VELOCITY, ACCELERATION, LOST = range(4)
-"""What a motion consists of. The last is what rounding took from the position, and goes into the next step."""
+"""Parts of a motion. LOST is the rounding error of the position, which the next step adds again."""
 
 
 @dataclass(frozen=True)
 class Sight:
-    """The true geometry, one a row.
+    """True geometry of each engagement.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Sight:
     range_m : ndarray, shape (B,)
         Distance between the centres of mass.
     slope, slope_rate_per_s : ndarray, shape (B,)
-        z/x, which is tan(alpha) without the rounding of the angle, and its rate; zero where x is zero.
+        z/x, that is tan(alpha) without the rounding of the angle, and its rate; zero where x is zero.
     """
 
     alpha_rad: Floats
@@ -46,16 +46,16 @@ class Sight:
 
 @dataclass(frozen=True)
 class Passage:
-    """What one step showed of the closest approach.
+    """Closest approaches within one step.
 
     Parameters
     ----------
     passed : ndarray of bool, shape (B,)
         Whether the closest approach lies within the step.
     least_distance_m : ndarray, shape (B,)
-        The least distance of those that have passed; infinite for the others, which are still coming nearer.
+        Least distance where the closest approach lies within the step, infinite elsewhere.
     arrival_s : ndarray, shape (B,)
-        Time from the beginning of the step until x = 0, of those that have passed in it; zero for the others.
+        Time from the beginning of the step to x = 0 where the closest approach lies within the step, zero elsewhere.
     """
 
     passed: NDArray[np.bool_]
@@ -64,23 +64,23 @@ class Passage:
 
 
 class TrueMotion(Protocol):
-    """The motion that guidance is flown against."""
+    """The true motion of a batch."""
 
     def sight(self) -> Sight:
-        """Geometry now."""
+        """Return the present geometry."""
 
     def fire(self, impulse_m_s: Floats) -> None:
         """Change the spacecraft's velocity along z: V_z becomes V_z - k."""
 
     def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
-        """Move one step on, the object accelerating along z, shape (B,), if it manoeuvres."""
+        """Advance by one step, with accelerations of the object along z, shape (B,), if it manoeuvres."""
 
     def arrival_s(self) -> Floats:
-        """Times from now until x = 0, shape (B,)."""
+        """Return the times from now to x = 0, shape (B,)."""
 
 
 class KeplerMotion:
-    """Relative motion of the object about the spacecraft, both in the Sun's gravity.
+    """Motion of the object relative to the spacecraft, both in the Sun's gravity.
 
     Parameters
     ----------
@@ -92,7 +92,8 @@ class KeplerMotion:
     Notes
     -----
     Velocity Verlet on the exact difference of the two accelerations, in substeps of at most 0.5 s: about 1e-8 m over
-    100 s here. The spacecraft's own orbit, circular at t = 0 and toward +x, places the Sun; the impulses move it.
+    100 s here. The spacecraft's orbit, circular and toward +x at t = 0, gives the position of the Sun; impulses change
+    it.
 
     References
     ----------
@@ -100,7 +101,7 @@ class KeplerMotion:
     """
 
     def __init__(self, position_m: Floats, velocity_m_s: Floats, sun: Sun | None) -> None:
-        # By coordinate the relative motion and, beside it, the spacecraft's own.
+        # For each coordinate the relative motion and that of the spacecraft.
         self._motion = np.zeros((4, 2, 2, len(position_m)))
         self._motion[POSITION, :, RELATIVE] = position_m.T
         self._motion[VELOCITY, :, RELATIVE] = velocity_m_s.T
@@ -128,7 +129,7 @@ class KeplerMotion:
         return np.asarray(self._motion[VELOCITY, :, RELATIVE].T)
 
     def sight(self) -> Sight:
-        """Geometry now."""
+        """Return the present geometry."""
         (z, x), (v_z, v_x) = self._motion[POSITION, :, RELATIVE], self._motion[VELOCITY, :, RELATIVE]
         squared, slope = z * z + x * x, _ratio(z, x)
         return Sight(
@@ -145,28 +146,28 @@ class KeplerMotion:
         self._motion[VELOCITY, Z, SPACECRAFT] += impulse_m_s
 
     def arrival_s(self) -> Floats:
-        """Times from now until x = 0, shape (B,), s.
+        """Return the times from now to x = 0, shape (B,), s.
 
         Notes
         -----
-        The motion without impulses, in 64 leaps and a last straight stretch. Impulses, which are along z, shift this
-        time by some nanoseconds, by the gravity where they lead.
+        The motion without impulses in 64 leaps, and a straight line at the end. Impulses, which are along z, change
+        this time through gravity by some nanoseconds.
         """
         return self._time_to_zero(self._motion, self._manoeuvre, ARRIVAL_LEAPS)
 
     def _time_to_zero(self, motion: Floats, manoeuvre_m_s2: Floats, leaps: int) -> Floats:
-        """Times until x = 0 of some motions without impulses, s."""
+        """Return the times to x = 0 of some motions without impulses, s."""
         duration = motion[POSITION, X, RELATIVE] / -motion[VELOCITY, X, RELATIVE]
         for _ in range(leaps):
             motion = self._leap(motion, duration / leaps, manoeuvre_m_s2)
         return np.asarray(duration - motion[POSITION, X, RELATIVE] / motion[VELOCITY, X, RELATIVE])
 
     def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
-        """Move one step on, the object accelerating along z, shape (B,), if it manoeuvres."""
+        """Advance by one step, with accelerations of the object along z, shape (B,), if it manoeuvres."""
         if manoeuvre_m_s2 is not None:
             self._manoeuvre = manoeuvre_m_s2
             accelerate_all(self._motion, self._manoeuvre, self._gravitational_parameter)
-        # In free space the motion over a step is a parabola, which one leap has exactly.
+        # In free space one leap gives the exact motion over a step, a parabola.
         free_space = self._gravitational_parameter == 0.0
         substeps = 1 if free_space else max(1, int(np.ceil(step_s / LONGEST_SUBSTEP_S * (1.0 - 1e-12))))
         duration = np.full(self._motion.shape[-1], step_s / substeps)
@@ -186,7 +187,7 @@ class KeplerMotion:
         return Passage(passed, least, arrival)
 
     def _leap(self, motion: Floats, duration_s: Floats, manoeuvre_m_s2: Floats) -> Floats:
-        """Return a motion some time on, in memory of its own."""
+        """Return a motion at a later time, in new memory."""
         after = np.empty_like(motion)
         leap_all(motion, duration_s, manoeuvre_m_s2, self._gravitational_parameter, after)
         return after
@@ -194,7 +195,7 @@ class KeplerMotion:
 
 @inlined
 def attraction(z: float, x: float, gravitational_parameter_m3_s2: float) -> tuple[float, float]:
-    """Acceleration -K r / |r|^3 at a position from the Sun, along z and x, m/s^2."""
+    """Return the acceleration -K r / |r|^3 at a position relative to the Sun, along z and x, m/s^2."""
     squared = z * z + x * x
     share = -gravitational_parameter_m3_s2 / (squared * math.sqrt(squared))
     return share * z, share * x
@@ -202,16 +203,16 @@ def attraction(z: float, x: float, gravitational_parameter_m3_s2: float) -> tupl
 
 @entry
 def accelerate_all(motion: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3_s2: float) -> None:
-    """Write the accelerations of a motion: of the spacecraft, and of the object about it, which manoeuvres.
+    """Write the accelerations of a motion, relative and of the spacecraft.
 
     Parameters
     ----------
     motion : ndarray, shape (4, 2, 2, B)
-        Position, velocity, acceleration and what rounding took; along z and x; relative, and the spacecraft's.
+        Position, velocity, acceleration and lost rounding; along z and x; relative, and of the spacecraft.
     manoeuvre_m_s2 : ndarray, shape (B,)
         Acceleration of the object along z.
     gravitational_parameter_m3_s2 : float
-        Of the Sun; zero is free space.
+        K of the Sun; zero is free space.
     """
     for b in range(motion.shape[3]):
         for axis in (Z, X):
@@ -232,14 +233,14 @@ def accelerate_all(motion: Floats, manoeuvre_m_s2: Floats, gravitational_paramet
 def leap_all(
     motion: Floats, duration_s: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3_s2: float, after: Floats
 ) -> None:
-    """Write a motion some time on, shape (B,), as `accelerate_all` has it: one step of velocity Verlet."""
+    """Write a motion after times of shape (B,), in the form of `accelerate_all`: one step of velocity Verlet."""
     for axis in (Z, X):
         for craft in (RELATIVE, SPACECRAFT):
             for b in range(motion.shape[3]):
                 before = motion[POSITION, axis, craft, b]
                 half = 0.5 * duration_s[b] * motion[ACCELERATION, axis, craft, b]
                 at_middle = motion[VELOCITY, axis, craft, b] + half
-                # Rounding would add up over the steps, and the set allows for that of one.
+                # Rounding errors must not accumulate: the set allows for those of one step.
                 way = duration_s[b] * at_middle + motion[LOST, axis, craft, b]
                 position = before + way
                 after[POSITION, axis, craft, b] = position
@@ -253,17 +254,9 @@ def leap_all(
 
 
 def closest_distance(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2: Floats, duration_s: float) -> Floats:
-    """Least distance from the origin over a stretch of uniformly accelerated motion that passes it.
+    """Return the least distance (m) from the origin during uniformly accelerated motion, vectors of shape (2, B).
 
-    Parameters
-    ----------
-    position_m, velocity_m_s, acceleration_m_s2 : ndarray, shape (2, B)
-    duration_s : float
-
-    Returns
-    -------
-    ndarray, shape (B,)
-        m. Four Newton steps from the straight line's answer.
+    Four Newton steps, starting from the closest approach of straight motion.
     """
     moment = np.clip(-_dot(position_m, velocity_m_s) / _dot(velocity_m_s, velocity_m_s), 0.0, duration_s)
     for _ in range(4):
@@ -276,7 +269,7 @@ def closest_distance(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2
 
 
 def _ratio(over: Floats, under: Floats) -> Floats:
-    """Quotient; zero where the divisor is: the object is just there, and no section has a range of zero."""
+    """Return the quotient; zero where the divisor is zero, where no section exists."""
     return np.divide(over, under, out=np.zeros_like(over), where=under != 0.0)
 
 

@@ -1,4 +1,4 @@
-"""Fly the two truths of a lower bound side by side, against any strategy."""
+"""Flight of the two true motions of a lower bound, with any strategy."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STEPS_BEYOND = 2
 
 
 class ScheduledMotion(KeplerMotion):
-    """Kepler motion, the object accelerating along z as laid down before.
+    """Kepler motion with a prescribed acceleration of the object along z.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class ScheduledMotion(KeplerMotion):
     sun : Sun or None
         None is free space.
     acceleration_m_s2 : ndarray, shape (B, steps)
-        Acceleration along z over each step; none after the last.
+        Acceleration along z over each step; zero after the last.
     """
 
     def __init__(self, position_m: Floats, velocity_m_s: Floats, sun: Sun | None, acceleration_m_s2: Floats) -> None:
@@ -41,7 +41,7 @@ class ScheduledMotion(KeplerMotion):
         self._step = 0
 
     def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
-        """Move one step on, under the acceleration of this step and no other."""
+        """Advance by one step with the prescribed acceleration."""
         over = self._step >= self._schedule.shape[1]
         scheduled = np.zeros(len(self._schedule)) if over else self._schedule[:, self._step]
         self._step += 1
@@ -50,12 +50,12 @@ class ScheduledMotion(KeplerMotion):
 
 @dataclass(frozen=True)
 class PairFlight:
-    """What came of flying a pair.
+    """Outcome of the flight of a pair.
 
     Parameters
     ----------
     results : Results
-        Of the two truths.
+        Results of the two flights.
     impulse_m_s : ndarray, shape (steps, 2)
         Impulses at each step.
     greatest_error_share : float
@@ -68,7 +68,7 @@ class PairFlight:
 
     @property
     def worst_miss_m(self) -> float:
-        """The worse of the two misses, m."""
+        """Greater one of the two misses, m."""
         return float(self.results.miss_m.max())
 
 
@@ -77,26 +77,24 @@ def fly_pair(
     pair: TruthPair,
     strategy: Strategy | None = None,
 ) -> PairFlight:
-    """Fly two truths that cannot be told apart until it is late.
+    """Fly two motions with the same measurements up to the last common step.
+
+    The greater one of the two misses is at least `pair.bound_m` for every deterministic strategy, up to the differences
+    in the notes.
 
     Parameters
     ----------
     scenario : Scenario
-        Its noise is replaced by the pair's, its target's manoeuvre by the pair's accelerations.
+        The pair replaces its noise and the manoeuvre of its target.
     pair : TruthPair
+        Starts and accelerations of the two motions.
     strategy : Strategy or None
         None is the scenario's own.
 
-    Returns
-    -------
-    PairFlight
-        The worse of the two misses is at least `pair.bound_m` for every strategy that is the same function of the
-        same measurements, but for what is said in the notes.
-
     Notes
     -----
-    The bound is reckoned in a straight frame; here the miss is the least distance between the two and gravity curves
-    the way. The miss is measured across the relative velocity, and so is smaller than |z| at x = 0 by (V_z/V_x)^2 / 2.
+    The bound assumes straight motion, and |z| at x = 0 as the miss. Here gravity curves the motion, and the miss is the
+    least distance, which is smaller by the relative amount (V_z/V_x)^2 / 2.
     """
     steps = pair.acceleration_m_s2.shape[1] + STEPS_BEYOND
     nothing = np.zeros((2, steps))

@@ -1,4 +1,4 @@
-"""What nature intends in engagements that an adversary searches among, and what came of it."""
+"""Adversary plans (start and errors of each engagement) and their outcomes."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ ANGLE = 0
 
 @dataclass(frozen=True)
 class Plans:
-    """What nature intends in each of n engagements.
+    """Plans of n engagements.
 
     Parameters
     ----------
     start : ndarray, shape (n, 4)
-        z, x, V_z, V_x at t = 0, m and m/s.
+        (z, x, V_z, V_x) at t = 0, m and m/s.
     sequence : ndarray, shape (n, rows, steps)
         Errors in units of their bounds, one row per sensor, `ROWS` first.
     given : ndarray of bool, shape (n, steps)
-        Whether the errors of a step are those of the sequence. Elsewhere the upper extreme of the predicted miss is
-        kept where the angle's element is not negative, the lower one where it is.
+        Whether the errors of a step are those of the sequence. Otherwise the noise keeps the upper extreme of the
+        predicted miss if the element of the angle is not negative, and the lower one if it is.
     lineage, changes : ndarray of int, shape (n,)
-        From which first plan it comes, and by how many changes.
+        Number of the first plan that a plan comes from, and of the changes since.
     """
 
     start: Floats
@@ -49,25 +49,26 @@ class Plans:
         return len(self.start)
 
     def take(self, which: Counts | slice) -> Plans:
-        """Copies of some of them."""
-        return Plans(*(getattr(self, each.name)[which].copy() for each in fields(self)))
+        """Return copies of some plans."""
+        return Plans(*(getattr(self, field.name)[which].copy() for field in fields(self)))
 
     def join(self, other: Plans) -> Plans:
-        """These and others."""
+        """Return these plans and others."""
         return Plans(*(np.concatenate([getattr(each, of.name) for each in (self, other)]) for of in fields(self)))
 
 
 @dataclass
 class PlannedNoise:
-    """Measures as planned, and notes the errors made: what is measured is what the noted error gives.
+    """Noise of planned engagements that stores its errors: the stored errors reproduce the measurements.
 
     Parameters
     ----------
     plans : Plans
+        Plans of the batch.
     names : sequence of str
         Sensors of the rows of a sequence.
     tie : TieRule or None
-        How equals are told apart where an extreme is kept; None lets every step choose its side (`SwitchingNoise`).
+        Tie rule where an extreme is kept; None selects the side at every step (`SwitchingNoise`).
 
     Attributes
     ----------
@@ -99,13 +100,14 @@ class PlannedNoise:
 
 @dataclass(frozen=True)
 class Flown:
-    """Plans with what came of them.
+    """Plans with their outcomes.
 
     Parameters
     ----------
     plans : Plans
+        Plans of n engagements.
     value : ndarray, shape (n,)
-        The miss, m, or -inf where the engagement does not count.
+        Miss, m; -inf if the engagement does not count.
     errors : ndarray, shape (n, rows, steps)
         Errors made, in units of their bounds.
     outcomes : ndarray of Outcome, shape (n,)
@@ -119,10 +121,10 @@ class Flown:
     truth_kept: Flags
 
     def take(self, which: Counts | slice) -> Flown:
-        """Some of them."""
+        """Return some of them."""
         return Flown(self.plans.take(which), *(getattr(self, each.name)[which] for each in fields(self)[1:]))
 
     def join(self, other: Flown) -> Flown:
-        """These and others."""
+        """Return these and others."""
         both = (np.concatenate([getattr(each, of.name) for each in (self, other)]) for of in fields(self)[1:])
         return Flown(self.plans.join(other.plans), *both)

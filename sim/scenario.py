@@ -1,4 +1,4 @@
-"""A scenario: every number of an engagement, in SI units."""
+"""A scenario: all numbers of an engagement, in SI units."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _DIRECTION = Limits(least=-2.0 * math.pi, most=2.0 * math.pi)
 
 @dataclass(frozen=True)
 class Sun:
-    """The attracting body both craft move about.
+    """The attracting body of both spacecraft and object.
 
     Parameters
     ----------
@@ -47,8 +47,8 @@ class Sun:
 class Manoeuvre(Enum):
     """How the target accelerates along z, within its bound.
 
-    NONE is not at all; CONSTANT always the same way; BANG_BANG changes sides at even times; RANDOM_TELEGRAPH at random
-    times; WORST_CASE pushes the truth's predicted miss further out, the way it is already.
+    CONSTANT keeps its sign, BANG_BANG changes it at equal intervals, RANDOM_TELEGRAPH at random times; WORST_CASE has
+    the sign of the predicted miss of the true state, and increases it.
     """
 
     NONE = "none"
@@ -65,10 +65,11 @@ class Target:
     Parameters
     ----------
     manoeuvre : Manoeuvre
+        How it accelerates.
     acceleration_m_s2 : float
         Its acceleration along z, m/s^2.
     switching_period_s : float
-        Time between changes of side (bang-bang), or its mean (random telegraph), s.
+        Time between changes of sign (bang-bang), or its mean (random telegraph), s.
 
     Raises
     ------
@@ -86,20 +87,20 @@ class Target:
 
 @dataclass(frozen=True)
 class Scenario:
-    """An interception: truth, sensors, engine, guidance and noise.
+    """An interception: true motion, sensors, engine, guidance and noise.
 
     Parameters
     ----------
     name, description : str
-        What a person calls it, and a line about it.
+        Name, and one line of description.
     sun : Sun or None
         None is free space.
     nominal_range_m : float
         Nominal range at t = 0, m.
     dispersion : StateBox
-        Where the truth starts (B0 x D0), uniform; unknown on board. A fixed value has equal ends.
+        True starts (B0 x D0), uniform, unknown on board. A fixed value has equal ends.
     set_model : SetModel
-        What is known and assumed on board; it holds the closing speed, the step and the angle sensor.
+        Knowledge and assumptions on board, with the closing speed, the step and the angle sensor.
     range_sensor : RangeSensor or None
         The range meter, if there is one.
     thruster : Thruster
@@ -109,11 +110,11 @@ class Scenario:
     noise : NoiseKind
         How measurement errors are chosen.
     tie : TieRule
-        The game noise's choice between equally bad extremes.
+        How game noise breaks ties.
     rate_sensor : RateSensor or None
-        The sensor of the line of sight's rate, if there is one.
+        The sensor of the line-of-sight rate, if there is one.
     target : Target or None
-        None does not manoeuvre.
+        A target that manoeuvres; None does not.
 
     Raises
     ------

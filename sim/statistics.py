@@ -1,4 +1,4 @@
-"""Statistics of samples: empirical distribution, quantiles and a confidence band that assumes nothing."""
+"""Statistics of samples: empirical distribution, quantiles, and distribution-free confidence intervals."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Distribution:
-    """Empirical distribution function of a sample, with a band that holds the true one with given confidence.
+    """Empirical distribution function of a sample, with a confidence band.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
-        The sample in rising order.
+        The sample in ascending order.
     probability : ndarray, shape (n,)
-        Share of the sample not above each value.
+        Share of the sample at or below each value.
     lower, upper : ndarray, shape (n,)
         Band of the distribution function at each value, simultaneous over all of them.
     confidence : float
-        Probability that the band holds the true distribution function everywhere.
+        Probability that the true distribution function lies within the band everywhere.
     """
 
     values: Floats
@@ -38,7 +38,7 @@ class Distribution:
 
 
 def empirical_distribution(sample: ArrayLike, confidence: float = 0.95) -> Distribution:
-    """Empirical distribution with the Dvoretzky-Kiefer-Wolfowitz band.
+    """Return the empirical distribution of a sample with its Dvoretzky-Kiefer-Wolfowitz band.
 
     Parameters
     ----------
@@ -46,10 +46,6 @@ def empirical_distribution(sample: ArrayLike, confidence: float = 0.95) -> Distr
         At least one finite value.
     confidence : float
         In (0, 1).
-
-    Returns
-    -------
-    Distribution
 
     Raises
     ------
@@ -75,7 +71,7 @@ def empirical_distribution(sample: ArrayLike, confidence: float = 0.95) -> Distr
 
 
 def band_half_width(size: int, confidence: float) -> float:
-    """Half-width of the Dvoretzky-Kiefer-Wolfowitz band at `size` n, `confidence` c: sqrt(ln(2 / (1 - c)) / (2 n)).
+    """Return the half-width of the band for `size` n and `confidence` c: sqrt(ln(2 / (1 - c)) / (2 n)).
 
     Raises
     ------
@@ -89,17 +85,7 @@ def band_half_width(size: int, confidence: float) -> float:
 
 
 def quantiles(sample: ArrayLike, levels: ArrayLike) -> Floats:
-    """Quantiles of a sample, linearly interpolated between order statistics.
-
-    Parameters
-    ----------
-    sample : array_like, shape (n,)
-    levels : array_like, shape (m,)
-        In [0, 1].
-
-    Returns
-    -------
-    ndarray, shape (m,)
+    """Return quantiles of a sample at some levels in [0, 1], linearly interpolated between order statistics.
 
     Raises
     ------
@@ -114,16 +100,16 @@ def quantiles(sample: ArrayLike, levels: ArrayLike) -> Floats:
 
 @dataclass(frozen=True)
 class QuantileEstimate:
-    """A quantile of a sample, with an interval that holds the true one.
+    """A quantile of a sample with a confidence interval.
 
     Parameters
     ----------
     level : float
         In [0, 1].
     value : float
-        Of the sample.
+        Quantile of the sample.
     lower, upper : float or None
-        Ends of the interval; None where the sample is too small to bound that side.
+        Ends of the interval; None if the sample is too small to bound that side.
     """
 
     level: float
@@ -133,12 +119,12 @@ class QuantileEstimate:
 
     @property
     def width(self) -> float | None:
-        """Width of the interval; None where a side is not bounded."""
+        """Width of the interval; None if a side is not bounded."""
         return None if self.lower is None or self.upper is None else self.upper - self.lower
 
 
 def estimate_quantiles(sample: ArrayLike, levels: Sequence[float], confidence: float = 0.95) -> list[QuantileEstimate]:
-    """Quantiles of a sample with intervals that assume nothing of the distribution.
+    """Return quantiles of a sample, in the order of the levels, with distribution-free confidence intervals.
 
     Parameters
     ----------
@@ -147,12 +133,7 @@ def estimate_quantiles(sample: ArrayLike, levels: Sequence[float], confidence: f
     levels : sequence of float
         In [0, 1].
     confidence : float
-        Probability, at least, that an interval holds the true quantile, in (0, 1).
-
-    Returns
-    -------
-    list of QuantileEstimate
-        In the order of the levels.
+        Least probability that an interval contains the true quantile, in (0, 1).
 
     Raises
     ------
@@ -161,8 +142,8 @@ def estimate_quantiles(sample: ArrayLike, levels: Sequence[float], confidence: f
 
     Notes
     -----
-    The interval runs between two order statistics: as many values lie below the true quantile as a binomial variable
-    of n trials of that probability says (David, Nagaraja 2003, Order Statistics, section 7.1). O(n log n).
+    The ends of the interval are order statistics: the number of values below the true quantile is binomial with n
+    trials and the level as probability (David, Nagaraja 2003, Order Statistics, section 7.1). O(n log n).
     """
     values = np.sort(real_values("sample", sample).ravel())
     if values.size == 0 or not np.isfinite(values).all():
@@ -176,7 +157,7 @@ def estimate_quantiles(sample: ArrayLike, levels: Sequence[float], confidence: f
         )
         for lower, upper in (order_statistics(values.size, level, confidence) for level in levels)
     ]
-    # The copy that was sorted is spent on the quantiles: another one of a million values is memory.
+    # overwrite_input saves a second copy of a million values.
     wanted = np.quantile(values, levels, overwrite_input=True)
     return [
         QuantileEstimate(level, float(value), *ends) for level, value, ends in zip(levels, wanted, bounds, strict=True)
@@ -184,28 +165,20 @@ def estimate_quantiles(sample: ArrayLike, levels: Sequence[float], confidence: f
 
 
 def order_statistics(size: int, level: float, confidence: float) -> tuple[int, int]:
-    """Ranks, counted from 1, of the two values of a sample that enclose the quantile of a level.
+    """Return the ranks, from 1, of the two values of a sample that enclose the quantile of a level.
 
-    Parameters
-    ----------
-    size : int
-    level, confidence : float
-
-    Returns
-    -------
-    tuple of int
-        Below 1 or above `size` where no value of the sample bounds that side.
+    A rank below 1 or above `size` means that no value bounds that side.
     """
     tail = 0.5 * (1.0 - confidence)
-    # A quantile of level 0 or 1 is an end of the distribution: no sample bounds it on the outside.
+    # A quantile of level 0 or 1 is an end of the distribution; no value bounds it on the outside.
     if level in (0.0, 1.0):
         return (0, 1) if level == 0.0 else (size, size + 1)
     return _least_count(size, level, tail), _least_count(size, level, 1.0 - tail) + 1
 
 
 def _least_count(size: int, level: float, probability: float) -> int:
-    """Least k for which a binomial variable is at most k with at least a probability."""
-    from scipy.special import bdtr  # only here: every command would wait for it
+    """Return the least k such that a binomial variable is at most k with at least this probability."""
+    from scipy.special import bdtr  # slow to load, and few commands need it
 
     low, high = 0, size
     while low < high:

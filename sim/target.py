@@ -1,4 +1,4 @@
-"""How a manoeuvring target accelerates."""
+"""Acceleration of a manoeuvring target."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ ROUNDING = 1e-12
 
 
 def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, predicted_miss_m: Floats) -> Floats:
-    """Acceleration of the targets of a batch along z over one step, m/s^2, shape (B,).
+    """Return the acceleration of the targets of a batch along z over one step, m/s^2, shape (B,).
 
     Parameters
     ----------
     target : Target
+        Kind, size and period of the manoeuvre.
     draws : ndarray, shape (B, steps)
-        Uniform in [-1, 1].
+        Random numbers, uniform in [-1, 1].
     step : int
         Number of the step.
     step_s : float
-        Its length, s.
+        Length of a step.
     predicted_miss_m : ndarray, shape (B,)
-        The truth's own predicted miss z + V_z (time to go), signed.
+        Predicted miss z + V_z (time to go) of the true state, signed.
     """
     first = np.where(draws[:, 0] >= 0.0, 1.0, -1.0)
     if target.manoeuvre is Manoeuvre.NONE:
@@ -35,10 +36,10 @@ def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, p
     elif target.manoeuvre is Manoeuvre.CONSTANT:
         side = first
     elif target.manoeuvre is Manoeuvre.BANG_BANG:
-        # A whole number of periods is one, whatever rounding makes of the quotient.
+        # A whole number of periods must not be rounded down.
         side = first * (-1.0) ** math.floor(step * step_s / target.switching_period_s * (1.0 + ROUNDING))
     elif target.manoeuvre is Manoeuvre.RANDOM_TELEGRAPH:
-        # Switches are a Poisson process: so likely is an odd number of them within a step.
+        # Probability of an odd number of switches within a step of a Poisson process.
         odd = 0.5 * (1.0 - math.exp(-2.0 * step_s / target.switching_period_s))
         switches = 0.5 * (1.0 + draws[:, 1 : step + 1]) < odd
         side = first * (-1.0) ** switches.sum(axis=1)

@@ -1,7 +1,7 @@
-"""The section at the truth's own label: does the information set keep the truth?
+"""The section at the label of the true state, and the distance of the true state from its boundary.
 
-The label is known when the truth has arrived, and not before: impulses move it, through gravity, by some nanoseconds
-of time. So what happens is noted in flight, and judged afterwards.
+The label is known only on arrival, because impulses change the arrival time by some nanoseconds through gravity.
+Therefore measurements and impulses are stored during the flight and evaluated afterwards.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ LABEL_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
 
 @dataclass
 class _Step:
-    """What one step did to the sections, and where the truth was when it measured; None where it did not."""
+    """Measurements and impulse of one step, and the true state at its measurements; None without one."""
 
     where: Flags | None = None
     slope: Floats | None = None
@@ -38,16 +38,12 @@ class _Step:
 
 
 class TruthSection:
-    """What was measured and fired in a batch of flights, to judge whether the truths stayed in their sections.
-
-    Parameters
-    ----------
-    model : SetModel
+    """Measurements and impulses of a batch of flights, for the margins of the true states in their sections.
 
     Notes
     -----
-    Angles do not see scale: a truth with closing speed e (1 + eta) has the angles of a model motion at range
-    x / (1 + eta), so its label is e T with T the time when x = 0.
+    Angles do not depend on scale: a true motion with closing speed e (1 + eta) has the angles of a model motion at
+    range x / (1 + eta), so its label is e T, with T the time at which x = 0.
     """
 
     def __init__(self, model: SetModel) -> None:
@@ -57,45 +53,38 @@ class TruthSection:
         self._steps = [_Step()]
 
     def look(self, where: Flags, sight: Sight) -> None:
-        """Note which flights measure in this step, and where the true states are."""
+        """Store which flights measure in this step, and the true states."""
         slope, rate = sight.alpha_rad, sight.omega_rad_s
         if self._exact_angles:
             slope, rate = sight.slope, sight.slope_rate_per_s
         self._steps[-1] = _Step(where.copy(), slope, rate)
 
     def measure_angle(self, alpha_rad: Floats, where: Flags) -> None:
-        """Note a measured angle."""
+        """Store a measured angle."""
         self._steps[-1].alpha_rad = alpha_rad.copy()
 
     def measure_range(
         self, range_m: Floats, relative_error: float, where: Flags, *, alpha_rad: ArrayLike | None
     ) -> None:
-        """Do nothing: a range selects labels and leaves the true state's section as it is."""
+        """Do nothing: a range selects labels and does not cut sections."""
 
     def measure_rate(self, omega_rad_s: Floats, error_rad_s: float, where: Flags) -> None:
-        """Note a measured rate."""
+        """Store a measured rate."""
         self._steps[-1].rates.append((omega_rad_s.copy(), error_rad_s * (1.0 + BOUND_SLACK)))
 
     def shift(self, impulse_m_s: Floats) -> None:
-        """Note an impulse."""
+        """Store an impulse."""
         self._steps[-1].impulse_m_s = impulse_m_s
 
     def predict(self) -> None:
-        """Note that a step has ended."""
+        """End the step."""
         self._steps.append(_Step())
 
     def margins_m(self, arrival_s: Floats) -> list[MaskedFloats]:
-        """Signed margins of the truths in their sections after each step's measurement, for the times when x is zero.
+        """Return the signed margins (m) of the true states in their sections, one array of shape (B,) per step.
 
-        Parameters
-        ----------
-        arrival_s : ndarray, shape (B,)
-            From the start to x = 0, s.
-
-        Returns
-        -------
-        list of masked array, shape (B,)
-            One a step, m, as of the last measurement; masked where nothing was measured yet.
+        A margin is that of the last measurement; it is masked before the first one. `arrival_s` are the times from the
+        start to x = 0.
         """
         labels = self._law.closing_speed * arrival_s
         stack = SectionStack(self._law, labels[:, None], np.ones(len(labels), dtype=np.int64))
@@ -118,7 +107,7 @@ class TruthSection:
                 v = step.slope_rate_per_s * ranges - self._law.closing_speed * step.slope
                 now = stack.margins(v, z, elapsed)
                 now = np.where(stack.living[:, 0], now, stack.sections.overlaps[:, 0])
-                # The truth's own label is known to half an ulp, and its z and V as well as that.
+                # The label of the true state has an error of half an ulp, and so have its z and V.
                 now += LABEL_ROUNDING * labels * np.abs(step.slope)
                 margin = np.where(where, now, margin)
             margins.append(_if_measured(margin))
@@ -128,9 +117,9 @@ class TruthSection:
         return margins
 
     def least_margin_m(self, arrival_s: Floats) -> MaskedFloats:
-        """Least of the signed margins of each truth, m; masked where nothing was measured."""
+        """Return the least signed margin of each true state, m; masked where nothing was measured."""
         margins = self.margins_m(arrival_s)
-        least = np.min([each.filled(np.inf) for each in margins], axis=0)
+        least = np.min([margin.filled(np.inf) for margin in margins], axis=0)
         return _if_measured(least)
 
 
