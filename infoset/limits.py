@@ -142,15 +142,15 @@ def check_fields(owner: object) -> None:
 @cache
 def _rules(owner: type) -> tuple[_Rule, ...]:
     hints = get_type_hints(owner, include_extras=True)
-    return tuple(_rule(each.name, f"{owner.__name__}: {each.name}", hints[each.name]) for each in fields(owner))
+    return tuple(_rule(field.name, f"{owner.__name__}: {field.name}", hints[field.name]) for field in fields(owner))
 
 
 def _rule(field: str, name: str, hint: Any) -> _Rule:
     optional = get_origin(hint) in (Union, types.UnionType)
     if optional:
-        (hint,) = (each for each in get_args(hint) if each is not types.NoneType)
+        (hint,) = (kind for kind in get_args(hint) if kind is not types.NoneType)
     inner, *more = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-    limits = next((each for each in more if isinstance(each, Limits)), None)
+    limits = next((note for note in more if isinstance(note, Limits)), None)
     return _Rule(field, name, limits, get_origin(inner) is tuple, inner if isinstance(inner, type) else None, optional)
 
 

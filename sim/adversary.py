@@ -208,7 +208,7 @@ class _Search:
         if elite is None or not np.isfinite(elite.value[0]):
             raise NothingCountsError("in every engagement flown the set was lost, or the miss was not finite")
         start = elite.plans.start[0]
-        z, x, vz, vx = ((float(each), float(each)) for each in start)
+        z, x, vz, vx = ((value, value) for value in start.tolist())
         return WorstEngagement(
             scenario=replace(self.scenario, dispersion=StateBox(z, x, vz, vx)),
             seed=self._seed,
@@ -254,12 +254,12 @@ class _Search:
         order = np.argsort(-rivals.value, kind="stable")
         kept: list[int] = []
         of_lineage: dict[int, int] = {}
-        for each in order.tolist():
-            lineage = int(rivals.plans.lineage[each])
-            same = bool(kept) and rivals.value[each] == rivals.value[kept[-1]]
+        for index in order.tolist():
+            lineage = int(rivals.plans.lineage[index])
+            same = bool(kept) and rivals.value[index] == rivals.value[kept[-1]]
             full = young and of_lineage.get(lineage, 0) >= LINEAGE_SHARE
             if not same and not full:
-                kept.append(each)
+                kept.append(index)
                 of_lineage[lineage] = of_lineage.get(lineage, 0) + 1
             if len(kept) == ELITE:
                 break

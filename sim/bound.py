@@ -135,7 +135,7 @@ class LowerBound:
     @property
     def speeds_m_s(self) -> tuple[float, ...]:
         """Examined velocities along x, in ascending order, m/s."""
-        return tuple(sorted({each.vx_m_s for each in self.by_label}))
+        return tuple(sorted({bound.vx_m_s for bound in self.by_label}))
 
     def curve(self, vx_m_s: float) -> tuple[Floats, Floats]:
         """Return labels and bounds of one velocity along x, m."""
@@ -171,9 +171,9 @@ def lower_bound(
     about 110 variables, 6 ms each.
 
     The order in a step is measure, decide, fire. Equal measurements up to step s give equal impulses up to step s.
-    Later impulses may differ, and each changes one miss by at most mu2 x_j / |V_x|. The distance of the two along z at x = 0
-    is therefore at least |dz(T)| - 2 mu2 sum_{j > s} x_j / |V_x|, and one of the two misses by at least half of it. The
-    sum uses the earliest impulses that the budget allows, because they change the miss most.
+    Later impulses may differ, and each changes one miss by at most mu2 x_j / |V_x|. The distance of the two along z at
+    x = 0 is therefore at least |dz(T)| - 2 mu2 sum_{j > s} x_j / |V_x|, and one of the two misses by at least half of
+    it. The sum uses the earliest impulses that the budget allows, because they change the miss most.
     """
     model = scenario.set_model
     # The manoeuvres of a pair may differ. Gravity acts on both alike, up to K/R^3 times their distance (1e-11 m/s^2).
@@ -279,7 +279,7 @@ def _climb(pair_of: Callable[[int], TruthPair], start: int, count: int) -> Truth
 
     at, stride = start, 1
     while stride:
-        better = next((each for each in (at - stride, at + stride) if value(each) > value(at)), None)
+        better = next((index for index in (at - stride, at + stride) if value(index) > value(at)), None)
         if better is None:
             stride //= 2
         else:
@@ -452,7 +452,7 @@ def _sparse(shape: tuple[int, int], *entries: tuple[Integers, Integers, Floats |
     """Return a sparse matrix of (rows, columns, values)."""
     from scipy.sparse import csc_array
 
-    rows = np.concatenate([each[0] for each in entries])
-    columns = np.concatenate([each[1] for each in entries])
-    values = np.concatenate([np.broadcast_to(each[2], each[0].shape) for each in entries])
+    rows = np.concatenate([row for row, _, _ in entries])
+    columns = np.concatenate([column for _, column, _ in entries])
+    values = np.concatenate([np.broadcast_to(value, row.shape) for row, _, value in entries])
     return csc_array((values, (rows, columns)), shape=shape)

@@ -94,14 +94,14 @@ def _impulse_svg(time_s: Floats, impulse_m_s: Floats, greatest_m_s: float) -> st
 def _quantiles(values: np.ndarray) -> Sequence[str]:
     if not len(values):
         return ["-"] * (len(LEVELS) + 1)
-    return [f"{each:.4g}" for each in (*np.quantile(values, LEVELS), values.max())]
+    return [f"{value:.4g}" for value in (*np.quantile(values, LEVELS), values.max())]
 
 
 def _table(caption: str, heads: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]]) -> str:
-    top = "".join(f'<th scope="col">{html.escape(each)}</th>' for each in heads)
+    top = "".join(f'<th scope="col">{html.escape(head)}</th>' for head in heads)
     body = "".join(
         f'<tr><th scope="row">{html.escape(name)}</th>'
-        + "".join(f"<td>{html.escape(each)}</td>" for each in cells)
+        + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells)
         + "</tr>"
         for name, cells in rows
     )
