@@ -104,6 +104,26 @@ class Sensor(ABC):
             Engagements that have measured.
         """
 
+    def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats] | None:
+        """Return the band of (V, z) that a measurement leaves, for the lower bound of the miss (`sim.lower_bound`).
+
+        Parameters
+        ----------
+        range_m : ndarray
+            Ranges x, m.
+        closing_speed_m_s : float
+            Closing speed e.
+        errors : float
+            Half-width of the interval of the measured quantity, in units of the bound.
+
+        Returns
+        -------
+        tuple of (bool, ndarray), or None
+            Whether it is a band of the predicted miss z + V x/e (otherwise of z), and its half-width, m. None if a
+            measurement leaves V and z as they are.
+        """
+        return None
+
     def measured(self, sight: Geometry, error: Floats | float) -> Floats:
         """Return the measured value for an error.
 
@@ -184,6 +204,10 @@ class AngleSensor(Sensor):
     def cut(self, sets: Cuttable, measured: Measurements, where: NDArray[np.bool_]) -> None:
         """Cut by the angle."""
         sets.measure_angle(measured[self.name], where)
+
+    def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats]:
+        """Return a band of z."""
+        return False, errors * self.error_bound(range_m) * range_m
 
 
 @dataclass(frozen=True)
@@ -280,6 +304,10 @@ class RateSensor(Sensor):
     def cut(self, sets: Cuttable, measured: Measurements, where: NDArray[np.bool_]) -> None:
         """Cut by the rate."""
         sets.measure_rate(measured[self.name], self.error_rad_s, where)
+
+    def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats]:
+        """Return a band of the predicted miss, omega x^2/e."""
+        return True, errors * self.error_rad_s * range_m * range_m / closing_speed_m_s
 
 
 SENSORS: tuple[type[Sensor], ...] = (AngleSensor, RangeSensor, RateSensor)

@@ -290,8 +290,8 @@ def _climb(pair_of: Callable[[int], TruthPair], start: int, count: int) -> Truth
 class _Approach:
     """Data of one label and velocity that all its linear programs use.
 
-    `limits_m` is the greatest distance of the two along z at each step with the same measured angle, `rate_limits_m`
-    that of their predicted misses with the same measured rate; infinite where nothing is measured.
+    `limits_m` is the greatest distance of the two along z at each step with the same measurements, `miss_limits_m` that
+    of their predicted misses; infinite where nothing is measured.
     """
 
     def __init__(self, scenario: Scenario, label_m: float, vx_m_s: float, disturbance_m_s2: float) -> None:
@@ -303,20 +303,18 @@ class _Approach:
         self.times_s = np.append(np.arange(self.steps) * model.step_s, self.arrival_s)
         self.ranges_m = np.maximum(label_m + vx_m_s * self.times_s[:-1], 0.0)
         self.limits_m = np.full(self.steps, np.inf)
-        looked = np.arange(0, self.steps, scenario.set_model.steps_in(model.angle_sensor.period_s))
-        self.limits_m[looked] = (
-            2.0 * (1.0 - MARGIN) * model.angle_sensor.error_bound(self.ranges_m[looked]) * self.ranges_m[looked]
-        )
-        self.rate_limits_m = np.full(self.steps, np.inf)
-        if scenario.rate_sensor is not None:
-            rated = np.arange(0, self.steps, scenario.set_model.steps_in(scenario.rate_sensor.period_s))
-            error_m_s = (1.0 - MARGIN) * scenario.rate_sensor.error_rad_s * self.ranges_m[rated]
-            self.rate_limits_m[rated] = 2.0 * error_m_s * self.ranges_m[rated] / -vx_m_s
+        self.miss_limits_m = np.full(self.steps, np.inf)
+        for sensor in scenario.sensors.values():
+            due = np.arange(0, self.steps, model.steps_in(sensor.period_s))
+            band = sensor.band(self.ranges_m[due], -vx_m_s, 2.0 * (1.0 - MARGIN))
+            if band is not None:
+                limits = self.miss_limits_m if band[0] else self.limits_m
+                limits[due] = np.minimum(limits[due], band[1])
 
     @property
     def candidates(self) -> Integers:
         """Last common steps that may be the best: those before a measurement, and the end."""
-        measured = np.flatnonzero(np.isfinite(np.minimum(self.limits_m, self.rate_limits_m)))
+        measured = np.flatnonzero(np.isfinite(np.minimum(self.limits_m, self.miss_limits_m)))
         return np.append(measured - 1, self.steps - 1).astype(np.int64)
 
     def correction_m(self, last_common_step: int) -> float:
@@ -376,18 +374,18 @@ class _Approach:
             (blocks + rows, v, -1.0),
             (blocks + rows, u, -push * step * second),
         )
-        limits, rate_limits = self.limits_m * metre, self.rate_limits_m * metre
+        limits, miss_limits = self.limits_m * metre, self.miss_limits_m * metre
         limits[last_common_step + 1 :] = np.inf
-        rate_limits[last_common_step + 1 :] = np.inf
+        miss_limits[last_common_step + 1 :] = np.inf
         bounds = np.full(2 * count + blocks, np.inf)
         bounds[:count] = np.append(limits, np.inf)[knots]
         bounds[0] = min(bounds[0], (box.z_m[1] - box.z_m[0]) * metre)
         bounds[count] = (box.vz_m_s[1] - box.vz_m_s[0]) * metre * second
         bounds[2 * count :] = 1.0
-        # Measurements within a block, and all rates, as a z + b V + c u of the first knot of the block.
+        # Measurements within a block, and all predicted misses, as a z + b V + c u of the first knot of the block.
         within, rated = (
             np.setdiff1d(np.flatnonzero(np.isfinite(limits)), knots),
-            np.flatnonzero(np.isfinite(rate_limits)),
+            np.flatnonzero(np.isfinite(miss_limits)),
         )
         looked = np.concatenate([within, rated])
         block = np.searchsorted(knots, looked, side="right") - 1
@@ -400,7 +398,7 @@ class _Approach:
             (row, 2 * count + block, push * (0.5 * since**2 + since * to_go)),
         ]
         entries += [(len(looked) + row, column, -factor) for row, column, factor in entries]
-        most = np.concatenate([limits[within], rate_limits[rated]])
+        most = np.concatenate([limits[within], miss_limits[rated]])
         cost = np.zeros(2 * count + blocks)
         cost[blocks] = -1.0
         solved = linprog(
@@ -426,7 +424,7 @@ class _Approach:
         positions, speeds = _motion(offset, velocity, acceleration, self.times_s)
         misses = positions[:-1] + speeds[:-1] * (self.arrival_s - self.times_s[:-1])
         sizes = np.abs(np.concatenate([positions[:-1], misses]))
-        allowed = np.concatenate([limits / metre, rate_limits / metre])
+        allowed = np.concatenate([limits / metre, miss_limits / metre])
         share = float(np.divide(allowed, sizes, out=np.full(len(sizes), np.inf), where=sizes > 0.0).min())
         share = min(1.0, share)
         return share * offset, share * velocity, share * acceleration

@@ -18,6 +18,7 @@ from typing import Any, Literal
 from experiments.common.errors import InputError
 from experiments.common.toml_values import LARGEST, SMALLEST, nearest, number_text, shown
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
+from experiments.interception.scenario_tables import OPTIONAL_SENSORS
 from sim.scenario import Scenario
 from sim.storage import MOST_CELLS, Axis
 
@@ -28,7 +29,7 @@ EXAMPLE = "--vary angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:8,thruster
 _PLACES = Context(prec=12)
 """Values between the ends are rounded to as many digits: what a person would write."""
 
-_OPTIONAL = ("sun", "range_sensor", "rate_sensor", "target")
+_OPTIONAL = ("sun", *OPTIONAL_SENSORS, "target")
 _ENDS = ("least", "greatest")
 
 

@@ -7,6 +7,7 @@ from decimal import Decimal
 
 from experiments.common.toml_file import Known, Problem
 from experiments.common.toml_values import KILO, DecimalPair, shown, si
+from experiments.interception.scenario_tables import OPTIONAL_SENSORS
 from guidance import Thruster
 from infoset import AngleSensor, Model, SetModel, StateBox
 from sim.draws import MOST_STEPS
@@ -43,7 +44,7 @@ def _impulses(known: Known) -> Iterator[Problem]:
 
 def _periods(known: Known) -> Iterator[Problem]:
     step = known.number("guidance", "step_s")
-    for sensor in ("angle_sensor", "range_sensor", "rate_sensor"):
+    for sensor in ("angle_sensor", *OPTIONAL_SENSORS):
         period = known.number(sensor, "period_s")
         if step is None or period is None:
             continue

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from dataclasses import fields
 from enum import Enum
 from typing import Any
 
@@ -21,12 +22,28 @@ from experiments.common.toml_file import (
     read_tables,
     tables_of,
 )
-from experiments.common.toml_values import KILO, DecimalPair, degrees_text, number_text, quoted_text, radians, shown, si
+from experiments.common.toml_values import (
+    KILO,
+    DecimalPair,
+    Table,
+    degrees_text,
+    number_text,
+    quoted_text,
+    radians,
+    shown,
+    si,
+)
 from experiments.interception.scenario_checks import cross_problems
-from experiments.interception.scenario_tables import SCHEMA, DispersionTable, ScenarioTables, UncertaintyTable
+from experiments.interception.scenario_tables import (
+    OPTIONAL_SENSORS,
+    SCHEMA,
+    DispersionTable,
+    ScenarioTables,
+    UncertaintyTable,
+)
 from guidance.thruster import Thruster
 from infoset.model import InitialSet, Interval, Model, SetModel, StateBox
-from infoset.sensors import AngleSensor, RangeSensor, RateSensor
+from infoset.sensors import AngleSensor
 from sim.scenario import Scenario, Sun, Target
 from sim.storage.codec import scenario_hash as scenario_hash  # noqa: PLC0414 (users import it from here)
 
@@ -47,7 +64,7 @@ FORM = Form(
 _POWERS = {"_km3_s2": 3 * KILO, "_km_s": KILO, "_km": KILO}
 """Powers of ten of the units in the keys of a file that are not SI units."""
 _WHOLE = ("schema", "sections", "fewest_sections")
-UNUSUAL_TABLES = ("rate_sensor", "target")
+UNUSUAL_TABLES = (*(table for table in OPTIONAL_SENSORS if table != "range_sensor"), "target")
 """Tables that the template shows but leaves out."""
 
 
@@ -249,7 +266,7 @@ def scenario_to_toml(scenario: Scenario) -> str:
         key: pair[0] if pair[0] == pair[1] else pair for key, pair in _box(scenario.dispersion).items()
     }
     tables["angle_sensor"] = {key: value for key, value in vars(sensor).items() if key != "nominal_range_m"}
-    for table in ("range_sensor", "rate_sensor", "target"):
+    for table in (*OPTIONAL_SENSORS, "target"):
         if (fitted := getattr(scenario, table)) is not None:
             tables[table] = vars(fitted)
     tables["thruster"] = vars(scenario.thruster)
@@ -307,8 +324,7 @@ def _to_scenario(tables: ScenarioTables, source: str) -> Scenario:
 
 
 def _composed(tables: ScenarioTables) -> Scenario:
-    information_set, sun, range_sensor = tables.information_set, tables.sun, tables.range_sensor
-    rate_sensor, target = tables.rate_sensor, tables.target
+    information_set, sun, target = tables.information_set, tables.sun, tables.target
     nominal_range_m = si(tables.nominal.range_km, KILO)
     fewest = information_set.fewest_sections
     return Scenario(
@@ -341,9 +357,6 @@ def _composed(tables: ScenarioTables) -> Scenario:
             kind=information_set.model,
             recovery=information_set.recovery,
         ),
-        range_sensor=None
-        if range_sensor is None
-        else RangeSensor(period_s=si(range_sensor.period_s), relative_error=si(range_sensor.relative_error)),
         thruster=Thruster(
             budget_m_s=si(tables.thruster.budget_m_s),
             least_impulse_m_s=si(tables.thruster.least_impulse_m_s),
@@ -353,9 +366,6 @@ def _composed(tables: ScenarioTables) -> Scenario:
         strategy=tables.guidance.strategy,
         noise=tables.noise.kind,
         tie=tables.noise.tie,
-        rate_sensor=None
-        if rate_sensor is None
-        else RateSensor(period_s=si(rate_sensor.period_s), error_rad_s=si(rate_sensor.error_rad_s)),
         target=None
         if target is None
         else Target(
@@ -363,7 +373,13 @@ def _composed(tables: ScenarioTables) -> Scenario:
             acceleration_m_s2=si(target.acceleration_m_s2),
             switching_period_s=si(target.switching_period_s),
         ),
+        **{table: _sensor(kind, getattr(tables, table)) for table, kind in OPTIONAL_SENSORS.items()},
     )
+
+
+def _sensor(kind: Any, table: Table | None) -> Any:
+    """Return a sensor from its table; None without one."""
+    return None if table is None else kind(**{field.name: si(getattr(table, field.name)) for field in fields(kind)})
 
 
 def _box(box: StateBox) -> dict[str, Interval]:

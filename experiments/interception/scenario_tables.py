@@ -5,8 +5,9 @@ Numbers stay decimal here, as written: they are rounded once, when they become S
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from decimal import Decimal
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import PlainValidator
 
@@ -134,6 +135,10 @@ class RateSensorTable(Table):
     error_rad_s: Annotated[Decimal, _number(RateSensor, "error_rad_s")] = key(
         "greatest error of the line of sight's angular rate", "1e-6"
     )
+
+
+OPTIONAL_SENSORS: Mapping[str, type[Any]] = {"range_sensor": RangeSensor, "rate_sensor": RateSensor}
+"""Kinds of sensors that a scenario may leave out, by table and field; keys of a table are the fields of the kind."""
 
 
 class TargetTable(Table):

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar
 
-from guidance import LineOfSight
-from infoset import InformationSetView, RangeSensor, Recovery
-from infoset.sensors import SENSORS
-from sim import Outcome, Scenario, fly_one
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from guidance import LineOfSight, NoiseKind
+from infoset import InformationSetView, InitialSet, Model, RangeSensor, Recovery, Sensor
+from infoset.sensors import SENSORS, Cuttable, Geometry, Measurements
+from sim import Outcome, Scenario, fly_one, lower_bound
 from sim.draws import EXECUTION, START, TARGET, TIE
+
+Floats = NDArray[np.float64]
 
 
 class RangeAlone:
@@ -33,3 +39,55 @@ def test_each_kind_of_sensor_has_its_own_name_column_and_stream() -> None:
     for key in ("name", "quantity", "stream"):
         assert len({getattr(kind, key) for kind in SENSORS}) == len(SENSORS)
     assert {kind.stream for kind in SENSORS}.isdisjoint({START, TIE, EXECUTION, TARGET})
+
+
+@dataclass(frozen=True)
+class StreakSensor(Sensor):
+    """A kind of sensor that the library does not have: the rate of the line of sight from the length of streaks."""
+
+    name: ClassVar[str] = "streak"
+    quantity: ClassVar[str] = "streak_px"
+    stream: ClassVar[int] = 99
+
+    period_s: float
+    exposure_s: float
+    pixel_rad: float
+
+    def true_value(self, sight: Geometry) -> Floats:
+        return sight.omega_rad_s * self.exposure_s / self.pixel_rad
+
+    def bound(self, sight: Geometry) -> float:
+        return 0.5
+
+    def cut(self, sets: Cuttable, measured: Measurements, where: NDArray[np.bool_]) -> None:
+        rate_of_a_pixel = self.pixel_rad / self.exposure_s
+        sets.measure_rate(measured[self.name] * rate_of_a_pixel, 0.5 * rate_of_a_pixel, where)
+
+    def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats]:
+        return True, errors * 0.5 * self.pixel_rad / self.exposure_s * range_m**2 / closing_speed_m_s
+
+
+class WithStreaks(Scenario):
+    @property
+    def sensors(self) -> dict[str, Sensor]:
+        return {**super().sensors, "streak": StreakSensor(2.0 * self.set_model.step_s, 0.1, 2e-7)}
+
+
+@pytest.mark.parametrize("noise", NoiseKind)
+def test_a_new_kind_of_sensor_is_one_class(brief: Scenario, noise: NoiseKind) -> None:
+    model = replace(brief.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    plain = replace(brief, noise=noise, set_model=model)
+    streaks = WithStreaks(**{field.name: getattr(plain, field.name) for field in fields(plain)})
+    record = fly_one(streaks)
+    assert [("streak" in step.measured) for step in record.steps[:4]] == [True, False, True, False]
+    assert record.result.truth_kept.all()
+    without = fly_one(plain)
+    assert [step.measured["angle"] for step in record.steps[:1]] == [
+        step.measured["angle"] for step in without.steps[:1]
+    ]
+    width, wide = (
+        sum(np.ptp(step.predicted_miss_m) for step in flown.steps[1:9] if step.predicted_miss_m is not None)
+        for flown in (record, without)
+    )
+    assert width < wide
+    assert lower_bound(streaks).bound_m <= lower_bound(plain).bound_m
