@@ -49,14 +49,16 @@ Arrays = dict[str, NDArray[Any]]
 _STEPS, _STEPS_2, _STEPS_AND_1, _SECTIONS, _SECTIONS_AND_1, _VERTICES_2, _ANY = range(7)
 _FLOAT, _FLAG, _COUNT, _BYTE = "<f8", "|b1", "<i8", "|u1"
 
+_MEASURED: Mapping[str, tuple[str, int]] = {
+    name: (kind, _STEPS)
+    for sensor in SENSORS
+    for name, kind in ((f"{sensor.name}_measured", _FLAG), (f"measured_{sensor.quantity}", _FLOAT))
+}
+"""Members of the sensors; a record written before a kind of sensor was added lacks those of that kind."""
 _MEMBERS: Mapping[str, tuple[str, int]] = {
     "header": (_BYTE, _ANY),
     "time_s": (_FLOAT, _STEPS),
-    **{
-        name: (kind, _STEPS)
-        for sensor in SENSORS
-        for name, kind in ((f"{sensor.name}_measured", _FLAG), (f"measured_{sensor.quantity}", _FLOAT))
-    },
+    **_MEASURED,
     "true_angle_rad": (_FLOAT, _STEPS),
     "true_rate_rad_s": (_FLOAT, _STEPS),
     "true_range_m": (_FLOAT, _STEPS),
@@ -281,7 +283,7 @@ def _unpack(content: bytes) -> Arrays:
             names = [member.filename for member in members]
             wanted = [f"{name}.npy" for name in _MEMBERS]
             unknown = sorted(set(names) - set(wanted))
-            missing = [name for name in wanted if name not in names]
+            missing = [name for name in wanted if name not in names and name.removesuffix(".npy") not in _MEASURED]
             if unknown or missing:
                 what = f"it has {shown(unknown[0])}" if unknown else f"it has no {missing[0]}"
                 raise _UnsoundError(f"{what}: another program has made it")
@@ -355,6 +357,8 @@ def _to_record(header: Mapping[str, Any], arrays: Arrays, source: str) -> Record
         raise _UnsoundError(f"its header is wrong: {error}") from None
     except InputError as error:
         raise _UnsoundError(f"its scenario is unsound: {error}") from None
+    nothing = {name: np.zeros(len(arrays["time_s"]), dtype=kind) for name, (kind, _) in _MEASURED.items()}
+    arrays = nothing | arrays
     _check(arrays)
     found = engagement.inconsistency
     if found is not None and not (0 <= found.step < len(arrays["time_s"]) and abs(found.label_m) <= LARGEST):

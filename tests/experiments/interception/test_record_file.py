@@ -273,6 +273,14 @@ def test_a_header_without_a_nullable_column_reads_as_unknown(content: bytes, tmp
     assert load_record(tmp_path / "x.npz").result.guaranteed_miss_m.mask.all()
 
 
+def test_a_record_without_a_kind_of_sensor_has_no_measurement_of_it(content: bytes, tmp_path: Path) -> None:
+    def without_rates(arrays: Arrays) -> None:
+        del arrays["rate_measured"], arrays["measured_rate_rad_s"]
+
+    (tmp_path / "x.npz").write_bytes(remade(content, without_rates))
+    assert all(set(step.measured) <= {"angle", "range"} for step in load_record(tmp_path / "x.npz").steps)
+
+
 def put(name: str, at: int, value: object) -> Callable[[Arrays], None]:
     def change(arrays: Arrays) -> None:
         arrays[name][at] = value
