@@ -9,7 +9,7 @@ import clarabel
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
-from scipy.sparse import csc_matrix
+from scipy.sparse import csc_matrix, issparse, vstack
 
 from infoset.polytope import HIGHS
 
@@ -61,8 +61,8 @@ class ConeProgram:
         self._whole: tuple[Floats, Floats] | None = None
 
     def keep(self, rows: Floats, limits: Floats) -> ConeProgram:
-        """Add rows v <= limits."""
-        return self._add("rows", rows, limits, clarabel.NonnegativeConeT(len(rows)))
+        """Add rows v <= limits; the rows of a program that is only checked may be a sparse array."""
+        return self._add("rows", rows, limits, clarabel.NonnegativeConeT(len(limits)))
 
     def meet(self, rows: Floats, levels: Floats) -> ConeProgram:
         """Add rows v = levels."""
@@ -74,7 +74,7 @@ class ConeProgram:
         return self._add("cone", block, np.concatenate([[height], free]), clarabel.SecondOrderConeT(len(block)))
 
     def _add(self, kind: str, block: Floats, ends: Floats, cone: object) -> ConeProgram:
-        if len(block):
+        if len(ends):
             self._blocks.append(self._widened(block))
             self._ends.append(ends)
             self._cones.append(cone)
@@ -219,7 +219,8 @@ class ConeProgram:
 
     def _stacked(self, wanted: str | None = None) -> tuple[Floats, Floats]:
         chosen = [i for i, kind in enumerate(self._kinds) if wanted in (None, kind)]
-        rows = np.vstack([np.zeros((0, len(self.cost))), *(self._blocks[i] for i in chosen)])
+        blocks = [np.zeros((0, len(self.cost))), *(self._blocks[i] for i in chosen)]
+        rows = vstack(blocks, format="csr") if any(issparse(block) for block in blocks) else np.vstack(blocks)
         return rows, np.concatenate([np.zeros(0), *(self._ends[i] for i in chosen)])
 
     def _parts(self, values: Floats) -> Iterator[tuple[str, Floats]]:

@@ -10,6 +10,7 @@ from scipy.optimize import linprog
 from scipy.sparse import coo_array
 
 from infoset.polytope import HIGHS
+from rendezvous.reachability.conic import ConeProgram, NoSolutionError
 from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
 
 Floats = NDArray[np.float64]
@@ -109,8 +110,8 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
     Notes
     -----
     With affine feedback every constraint is linear in (nominal, gains) but for absolute values, one more variable each:
-    one linear program (HiGHS) of some T^2 (n + m) q / 2 of them. It minimises the sum of the greatest terminal states,
-    divided by their bounds.
+    one linear program (HiGHS) of some T^2 (n + m) q / 2 of them, whose solution is checked. It minimises the sum of the
+    greatest terminal states, divided by their bounds.
     """
     _check(problem, disturbance)
     if problem.thrust is ThrustShape.BALL:
@@ -196,7 +197,8 @@ class _Program:
                 "or relax the bounds"
             )
         if optimum.status != 0:
-            raise ArithmeticError(f"HiGHS: {optimum.message}")
+            raise NoSolutionError(f"HiGHS: {optimum.message}")
+        ConeProgram(cost).keep(matrix, np.array(self.limits)).need_solution(optimum.x, -optimum.ineqlin.marginals)
         return self._plan(optimum.x)
 
     def _plan(self, solution: Floats) -> FeedbackPlan:
