@@ -34,7 +34,9 @@ def command(run: Callable[[Options], None]) -> Callable[..., None]:
         run(options(**values))
 
     registered.__name__ = run.__name__
-    registered.__doc__ = inspect.getdoc(options)
+    # Typer keeps the line breaks of a docstring after its first paragraph.
+    paragraphs = (inspect.getdoc(options) or "").split("\n\n")
+    registered.__doc__ = "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
     registered.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
         [each.replace(annotation=hints[each.name]) for each in parameters]
     )

@@ -32,7 +32,9 @@ class Pursuit(FileOptions):
     settings: Settings = None
     certify: Annotated[
         bool,
-        typer.Option("--certify", help="Also search all directions for a branch with a larger distance of the evader."),
+        typer.Option(
+            "--certify", help="Also search all directions for a branch on which the evader keeps a larger distance."
+        ),
     ] = False
     feedback: Annotated[
         str | None,

@@ -73,7 +73,7 @@ def run(options: PursuitMap) -> None:
         lines.append(f"capture times from {solved.capture_s.min():.1f} to {solved.capture_s.max():.1f} s")
     if solved.count(PointStatus.NEIGHBOUR):
         lines.append(
-            "neighbour: a local saddle continued from a neighbour, earlier captures not excluded at the point itself; "
+            "points continued from a neighbour are local saddle points: earlier captures are not excluded there; "
             "--certify solves every point from scratch"
         )
     print_lines(table_console(written.stdout_taken), lines)

@@ -28,6 +28,14 @@ _UNKNOWN: dict[PointStatus, tuple[str, str]] = {
     PointStatus.PROPELLANT_EXHAUSTED: ("#d2d2d2", "\\\\\\\\"),
     PointStatus.NO_GAME: ("#ffffff", "xxxx"),
 }
+_WORDS = {
+    PointStatus.FOLLOWED: "solved from scratch",
+    PointStatus.NEIGHBOUR: "continued from a neighbour",
+    PointStatus.NOT_CERTIFIED: "not certified",
+    PointStatus.ESCAPES: "escape",
+    PointStatus.PROPELLANT_EXHAUSTED: "propellant exhausted",
+    PointStatus.NO_GAME: "no game",
+}
 _RATIOS = {
     "phase_deg": "lead of the evader, deg",
     "thrust_ratio": "thrust of the evader / thrust of the pursuer",
@@ -38,8 +46,8 @@ _UNITS = {"km3_s2": "km$^3$/s$^2$", "deg": "deg", "km": "km", "kg": "kg", "N": "
 
 def counted(solved: CaptureMap) -> str:
     """Return the number of points of each status, for the terminal and the figure."""
-    counts = {status.value: solved.count(status) for status in PointStatus}
-    return ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+    counts = {words: solved.count(status) for status, words in _WORDS.items()}
+    return ", ".join(f"{count} {words}" for words, count in counts.items() if count)
 
 
 @style()
@@ -121,7 +129,7 @@ def _hatch_unknown(axes: Any, solved: CaptureMap) -> list[Patch]:
         for j, first, last in _stretches(where):
             left, right, bottom, top = across[first], across[last + 1], up[j], up[j + 1]
             axes.fill([left, right, right, left], [bottom, bottom, top, top], **look)
-        handles.append(Patch(label=status.value, **look))
+        handles.append(Patch(label=_WORDS[status], **look))
     return handles
 
 

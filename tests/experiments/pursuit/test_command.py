@@ -278,7 +278,7 @@ def test_a_map(infoset: Infoset, tmp_path: Path) -> None:
     code, out, _ = infoset("pursuit-map", *SMALL_MAP, "--out", "map", "--json", "x.json")
     assert code == 0
     assert "8 points" in out
-    assert "4 escapes" in out
+    assert "4 escape" in out
     assert sorted(each.name for each in (tmp_path / "map").iterdir()) == MAP_FILES
     found = json.loads((tmp_path / "x.json").read_text())
     assert found["x"] == {"parameter": "phase_deg", "values": [-9.0, -8.0, -7.0, -6.0]}
@@ -346,7 +346,7 @@ def test_a_map_says_below_it_what_the_terminal_said() -> None:
     status = np.where(times.mask, STATUSES.index(PointStatus.NOT_CERTIFIED), STATUSES.index(PointStatus.FOLLOWED))
     found = CaptureMap(np.arange(5.0), np.arange(4.0), times, status, times, 19)
     figure = draw_map(found, "phase_deg", "thrust_ratio")
-    assert [each.get_text() for each in figure.texts] == ["20 points: 19 followed, 1 not-certified"]
+    assert [each.get_text() for each in figure.texts] == ["20 points: 19 solved from scratch, 1 not certified"]
     axes = figure.axes[0]
     assert axes.get_title() == "capture time, h"
     # No line ends beside the point that has no time: its four cells are empty.
