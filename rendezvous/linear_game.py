@@ -385,7 +385,7 @@ def _contact(
 
 
 def _safe_step(value: float, rate: float, bend: float) -> float:
-    """Return how long value + rate dt - bend dt^2 / 2 stays positive."""
+    """Return the time for which value + rate dt - bend dt^2 / 2 is positive."""
     if bend <= 0.0:
         return -value / rate if rate < 0.0 else math.inf
     root = math.sqrt(rate * rate + 2.0 * bend * value)

@@ -118,7 +118,7 @@ class TracedPath(Path):
 
 
 def panels_of(path: Path, before: Reference, *, keep: bool = False) -> Panels:
-    """Represent states and costates of a path whose motion is linear about `before`; `keep` keeps its panels."""
+    """Represent states and costates of a path whose motion is linear about `before`; `keep` reuses its panels."""
     assert isinstance(path.motion, TimeVaryingMotion)
     mu = before.gravitational_parameter_m3_s2
 

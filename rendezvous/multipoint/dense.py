@@ -61,7 +61,7 @@ def solve_dense(motion: LinearMotion, start_s: float, start_state: Floats, nodes
     matrix = np.zeros((3 * count + 3, 3 * count + 3))
     by_velocity = np.zeros_like(matrix[:-3])
     for row in range(count):
-        # Column blocks: lambda_r0, lambda_V0, then the jumps at the nodes before.
+        # Column blocks: lambda_r0, lambda_V0, then the jumps at earlier nodes.
         reach = np.full(row + 1, times[row])
         back = motion.transition(reach, sources[: row + 1])
         effect = motion.gramian(sources[: row + 1], reach) @ np.swapaxes(back, 1, 2)
@@ -79,7 +79,7 @@ def solve_dense(motion: LinearMotion, start_s: float, start_state: Floats, nodes
     columns = np.abs(matrix / rows[:, None]).max(axis=0)
     scaled = matrix / rows[:, None] / columns
     solved = np.linalg.solve(scaled, right / rows) / columns
-    # The paper's unknowns are lambda+ less lambda-.
+    # The paper's unknowns are lambda+ minus lambda-.
     jumps = np.empty((count, 3))
     jumps[:-1] = -solved[6:].reshape(-1, 3)
     adjoint = np.swapaxes(motion.transition(np.full(count, times[-1]), sources), 1, 2)[:, :3]

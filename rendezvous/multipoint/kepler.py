@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -172,8 +172,7 @@ class KeplerTour(Visits):
                 break
             if change <= SETTLED or (change <= ROUNDING and change > 0.3 * before):
                 path = solve_segments(self._motion_about(flown), self.start_s, self.start_state, nodes)
-                values = {field.name: getattr(path, field.name) for field in fields(path)}
-                return TracedPath(**values, trace=panels_of(path, flown, keep=True))
+                return TracedPath(**vars(path), trace=panels_of(path, flown, keep=True))
             reference = mixture.mix(reference, flown) if index > 1 else flown
         raise NotSettledError(
             f"re-linearising does not settle: trajectories still differ by {change:.2g} of the distance from the "

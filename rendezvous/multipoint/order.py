@@ -98,7 +98,7 @@ def best_order(
         )
         return times.objective, times.flown, times.evaluations
 
-    # A local minimum of a partial order is no bound: it is taken as one that many times greater than the minimum.
+    # A local minimum of a partial order is no bound; divided by the slack, it is used as one.
     slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0 / (1.0 - _MARGIN)
     search = _Search(solve, count, progress, tour.start_s, horizon, slack, looks_twice=True)
     best = search.run()

@@ -30,7 +30,7 @@ class Meeting(Enum):
     RENDEZVOUS = "rendezvous"
     """Position and velocity."""
     INTERCEPT = "intercept"
-    """Position alone: each craft arrives with a velocity of its own."""
+    """Position only: the velocities of the craft differ."""
 
 
 @dataclass(frozen=True, eq=False)

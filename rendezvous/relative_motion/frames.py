@@ -24,7 +24,7 @@ class Axis(Enum):
 
 
 class StateOrder(Enum):
-    """How a state lists its components."""
+    """Order of the components of a state."""
 
     POSITION_THEN_VELOCITY = (0, 1, 2, 3, 4, 5)
     INTERLEAVED = (0, 3, 1, 4, 2, 5)

@@ -233,7 +233,7 @@ def _collocated(motion: TimeVaryingMotion, starts: Floats, ends: Floats, panels:
 
 
 def _difference(first: _Solution, second: _Solution, durations: Floats) -> float:
-    """Greatest disagreement, each part relative to its own size in states divided by (T, T, T, 1, 1, 1)."""
+    """Greatest difference of two solutions, relative to each part, in states divided by (T, T, T, 1, 1, 1)."""
     if not len(durations):
         return 0.0
     scale = np.ones((len(durations), 6))

@@ -104,7 +104,7 @@ class TschaunerHempel(LinearMotion):
         return np.asarray(np.abs(anomalies[1] - anomalies[0]) < SHORT_RAD)
 
     def _by_length(self, start_s: ArrayLike, end_s: ArrayLike, of_short: _OfIntervals, of_long: _OfIntervals) -> Floats:
-        """Matrices of intervals, in axes of Hill, by two methods, of short and of long intervals."""
+        """Matrices of intervals, in axes of Hill: those of short and of long intervals by two methods."""
         starts, ends = np.broadcast_arrays(np.asarray(start_s, dtype=np.float64), np.asarray(end_s, dtype=np.float64))
         shape, starts, ends = starts.shape, starts.ravel(), ends.ravel()
         short = self._short(starts, ends)

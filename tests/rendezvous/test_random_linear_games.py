@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 import pytest
@@ -195,14 +195,8 @@ def test_random_games(check: Check) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
-def test_many_random_games(check: Check) -> None:
-    failed = {}
-    for seed in range(1000, 3000):
-        try:
-            check(seed)
-        except (AssertionError, ValueError, RuntimeError, RuntimeWarning) as error:
-            failed[seed] = str(error).splitlines()[:3]
-    assert not failed
+def test_many_random_games(check: Check, check_seeds: Callable[[Check, Iterable[int]], None]) -> None:
+    check_seeds(check, range(1000, 3000))
 
 
 def grazing_game(random: np.random.Generator) -> tuple[Floats, Floats, float, float]:

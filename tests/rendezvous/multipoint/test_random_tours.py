@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from itertools import pairwise, permutations
 
 import numpy as np
@@ -293,22 +293,10 @@ def test_an_order_is_not_dropped_for_a_local_minimum_of_its_beginning(seed: int)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
-def test_many_random_tours(check: Check) -> None:
-    failed = {}
-    for seed in MANY:
-        try:
-            check(seed)
-        except (AssertionError, ValueError, RuntimeWarning) as error:
-            failed[seed] = str(error).splitlines()[:3]
-    assert not failed
+def test_many_random_tours(check: Check, check_seeds: Callable[[Check, Iterable[int]], None]) -> None:
+    check_seeds(check, MANY)
 
 
 @pytest.mark.slow
-def test_many_orders_with_their_times() -> None:
-    failed = {}
-    for seed in range(100):
-        try:
-            order_and_times_agree(seed)
-        except (AssertionError, ValueError, RuntimeWarning) as error:
-            failed[seed] = str(error).splitlines()[:3]
-    assert not failed
+def test_many_orders_with_their_times(check_seeds: Callable[[Check, Iterable[int]], None]) -> None:
+    check_seeds(order_and_times_agree, range(100))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import clarabel
 import numpy as np
@@ -377,11 +377,5 @@ def test_random_encounters(check: Check, seed: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
-def test_many_random_encounters(check: Check) -> None:
-    failed = {}
-    for seed in MANY:
-        try:
-            check(seed)
-        except (AssertionError, ValueError, RuntimeWarning) as error:
-            failed[seed] = str(error).splitlines()[:3]
-    assert not failed
+def test_many_random_encounters(check: Check, check_seeds: Callable[[Check, Iterable[int]], None]) -> None:
+    check_seeds(check, MANY)
