@@ -25,7 +25,6 @@ _ROUNDS = 12
 _FAST = 0.2
 _GREATEST_CORRECTION = 0.5
 _FIRST_STEP = 0.3
-_NONE: Floats = np.zeros((12, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +105,7 @@ class Shot:
                 now, node = block.time_s[node], node + 1
             _advance(z, (time - now) / duration)
             now = time
-            rows[row] = z[:12]
+            rows[row] = z[:12, 0]
         return rows[:, :6] * block.state_units, rows[:, 6:] * block.costate_units
 
     @cached_property
@@ -115,20 +114,20 @@ class Shot:
         block, count = self.block, len(self.block.time_s)
         z, starts, ends = self._begin(), np.empty((count, 12)), np.empty((count, 12))
         for node in range(count):
-            starts[node] = z[:12]
+            starts[node] = z[:12, 0]
             _advance(z, block.durations[node])
-            ends[node] = z[:12]
+            ends[node] = z[:12, 0]
             if node < count - 1:
                 self._jump(z, node)
         (length, duration), costate = block.units, block.costate_units
-        energy = float(z[12]) * length**2 / duration**3
+        energy = float(z[12, 0]) * length**2 / duration**3
         return ends[:, :6] * block.state_units, ends[:, 6:] * costate, starts[:, 6:] * costate, energy
 
     def _begin(self) -> Floats:
-        return np.concatenate([self.block.start_state / self.block.state_units, self.unknowns[:6], [0.0]])
+        return _initial(self.block, self.unknowns[:6])
 
     def _jump(self, z: Floats, node: int) -> None:
-        z[6:9] -= self.unknowns[6 + 3 * node : 9 + 3 * node]
+        z[6:9, 0] -= self.unknowns[6 + 3 * node : 9 + 3 * node]
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,36 +189,41 @@ def shoot(block: Block, near: Floats | None = None) -> Shot | None:
     return None
 
 
+def _initial(block: Block, costate: Floats, variations: int = 0) -> Floats:
+    """State, costate and energy at the start of a block in column 0, and columns for their variations."""
+    z = np.zeros((13, 1 + variations))
+    z[:12, 0] = np.concatenate([block.start_state / block.state_units, costate])
+    return z
+
+
 def _advance(z: Floats, duration: float) -> None:
-    if duration > 0.0 and not propagate(z, _NONE, duration):
+    if duration > 0.0 and not propagate(z, duration):
         raise ValueError("a trajectory falls into the centre")
 
 
 def _residual(block: Block, unknowns: Floats, slopes: Floats | None = None) -> Floats | None:
     """Return the residual at the nodes, or None if there is no trajectory; fill in its derivatives `slopes`."""
-    scale = block.state_units
-    goals = block.goal / scale
+    goals = block.goal / block.state_units
     size, last = len(unknowns), len(block.time_s) - 1
-    z = np.concatenate([block.start_state / scale, unknowns[:6], [0.0]])
-    variations = np.zeros((12, size))
-    variations[6:, :6] = np.eye(6)
+    z = _initial(block, unknowns[:6], size)
+    z[6:12, 1:7] = np.eye(6)
     residual = np.empty(size)
     for node, duration in enumerate(block.durations):
-        known = 0 if slopes is None else 6 + 3 * node  # columns of later jumps are zero
-        varied = np.ascontiguousarray(variations[:, :known])
-        if duration > 0.0 and not propagate(z, varied, duration):
+        known = 1 if slopes is None else 7 + 3 * node  # columns of later jumps are zero
+        varied = z[:, :known].copy()
+        if duration > 0.0 and not propagate(varied, duration):
             return None
-        variations[:, :known] = varied
+        z[:, :known] = varied
         rows, jump = slice(3 * node, 3 * node + 3), slice(6 + 3 * node, 9 + 3 * node)
-        residual[rows] = z[:3] - goals[node, :3]
+        residual[rows] = z[:3, 0] - goals[node, :3]
         if slopes is not None:
-            slopes[rows] = variations[:3]
+            slopes[rows] = z[:3, 1:]
         if node < last:
-            z[6:9] -= unknowns[jump]
-            variations[6:9, jump] -= np.eye(3)
-    residual[-3:] = z[3:6] - goals[last, 3:] if block.rendezvous else z[9:12]
+            z[6:9, 0] -= unknowns[jump]
+            z[6:9, 7 + 3 * node : 10 + 3 * node] -= np.eye(3)
+    residual[-3:] = z[3:6, 0] - goals[last, 3:] if block.rendezvous else z[9:12, 0]
     if slopes is not None:
-        slopes[-3:] = variations[3:6] if block.rendezvous else variations[9:]
+        slopes[-3:] = z[3:6, 1:] if block.rendezvous else z[9:12, 1:]
     return residual if np.isfinite(residual).all() and (slopes is None or np.isfinite(slopes).all()) else None
 
 

@@ -134,8 +134,11 @@ def flow_kernel(y: Floats, z: Floats, craft: Floats, begin: float, end: float, t
             return False
         first = 1
         if error < 1.0:
-            y[:] = y_next
-            z[:] = z_next
+            for i in range(STATES):
+                y[i] = y_next[i]
+            for i in range(len(z)):
+                for j in range(COLUMNS):
+                    z[i, j] = z_next[i, j]
             if last:
                 return True
             s += h
