@@ -1,4 +1,4 @@
-"""What the numbers of a result depend on besides its scenario and seed."""
+"""Versions of the packages that the numbers of a result depend on."""
 
 from __future__ import annotations
 
@@ -10,27 +10,17 @@ CALCULATING = ("infoset", "numpy", "numba", "llvmlite")
 
 
 class VersionError(Exception):
-    """Results were asked of another version than the one at hand; the message names both."""
+    """A chunk is to be flown with other versions of the packages; the message names both."""
 
 
 @functools.cache
 def calculating_versions() -> tuple[tuple[str, str], ...]:
-    """Return name and version of each package whose numbers a result is made of."""
+    """Return name and version of each package that computes."""
     return tuple((name, _version(name)) for name in CALCULATING)
 
 
 def differences(here: tuple[tuple[str, str], ...], there: tuple[tuple[str, str], ...]) -> list[str]:
-    """Say which versions differ, a piece of text each: `numpy 2.1 here, 2.0 there`.
-
-    Parameters
-    ----------
-    here, there : tuple of pairs of str
-        From `calculating_versions`.
-
-    Returns
-    -------
-    list of str
-    """
+    """Return a text for each version that differs, such as `numpy 2.1 here, 2.0 there`."""
     ours, theirs = dict(here), dict(there)
     return [
         f"{name} {ours.get(name, 'none')} here, {theirs.get(name, 'none')} there"

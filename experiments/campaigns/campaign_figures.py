@@ -1,4 +1,4 @@
-"""A campaign as pictures: distributions with bands, convergence of quantiles, and the miss over the initial state."""
+"""Figures of a campaign: distributions with bands, convergence of quantiles, and the miss over the initial state."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 CONVERGING = (0.5, 0.9, 0.99)
 MOST_POINTS = 2000
-"""Points of a curve, and of a cloud: more show nothing more and make a file that nobody can open."""
+"""Most points of a curve and of a cloud; more would only make the file larger."""
 
 _CONFIDENCE = 0.95
 _LOOKS = 28
@@ -45,7 +45,9 @@ class CampaignColumns:
     Parameters
     ----------
     noise : str
+        Name of the noise.
     range_meter : bool
+        Whether the scenario has a range meter.
     miss_m, impulse_m_s : ndarray, shape (n,)
         In the order of the runs.
     guaranteed_miss_m : ndarray, shape (m,)
@@ -66,22 +68,14 @@ class CampaignColumns:
 
     @property
     def look(self) -> dict[str, Any]:
-        """How its curves are drawn: dark and solid, or light and dashed, to stay apart in grey."""
+        """Line style: dark and solid, or light and dashed, which differ in grey too."""
         return CURVE_LOOKS[1 if self.noise == "random" else 4]
 
 
 def draw_campaign_distributions(columns: Sequence[CampaignColumns]) -> Figure:
     """Draw the distribution functions of (a) the miss and (b) the impulse spent, with their confidence bands.
 
-    Parameters
-    ----------
-    columns : sequence of CampaignColumns
-        At least one, one a noise.
-
-    Returns
-    -------
-    Figure
-        The guaranteed miss beside the miss, dotted, where there is one.
+    The guaranteed miss is dotted. There must be at least one noise.
     """
     with style():
         figure = new_figure(height_mm=99.0)
@@ -105,26 +99,18 @@ def draw_campaign_distributions(columns: Sequence[CampaignColumns]) -> Figure:
 def draw_convergence(columns: Sequence[CampaignColumns]) -> Figure:
     """Draw quantiles of the miss and the impulse of the first n runs over n, with their confidence intervals.
 
-    Parameters
-    ----------
-    columns : sequence of CampaignColumns
-        At least one.
-
-    Returns
-    -------
-    Figure
-        A row a noise.
+    Each noise has a row; there must be at least one.
     """
     with style():
         figure = new_figure(height_mm=58.0 * len(columns) + 14.0 * len(columns) + 10.0)
         rows = place_axes(figure, len(columns), 2, margins_mm=(16.0, 4.0, 21.0, 7.0), gaps_mm=(14.0, 17.0))
         letter = iter("abcdefghijkl")
-        for row, each in zip(rows, columns, strict=True):
+        for row, column in zip(rows, columns, strict=True):
             for axes, label, sample in zip(
-                row, ("miss, m", "impulse spent, m/s"), (each.miss_m, each.impulse_m_s), strict=True
+                row, ("miss, m", "impulse spent, m/s"), (column.miss_m, column.impulse_m_s), strict=True
             ):
-                _convergence(axes, sample, str(each.look["color"]))
-                axes.set_title(f"({next(letter)}) {label.split(',')[0]}, {each.noise} noise")
+                _convergence(axes, sample, str(column.look["color"]))
+                axes.set_title(f"({next(letter)}) {label.split(',')[0]}, {column.noise} noise")
                 axes.set_xlabel("runs")
                 axes.set_ylabel(label)
         handles: list[Line2D | Patch] = [
@@ -137,31 +123,23 @@ def draw_convergence(columns: Sequence[CampaignColumns]) -> Figure:
 
 
 def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
-    """Draw the miss over each component of the initial state: a cloud of runs, its median and 90 % quantile.
+    """Draw the miss over each component of the initial state: the runs, their median and their 90 % quantile.
 
-    Parameters
-    ----------
-    columns : sequence of CampaignColumns
-        At least one.
-
-    Returns
-    -------
-    Figure
-        A row a noise.
+    Each noise has a row; there must be at least one.
     """
     with style():
         figure = new_figure(height_mm=44.0 * len(columns) + 15.0 * len(columns) + 6.0)
         rows = place_axes(figure, len(columns), 4, margins_mm=(14.0, 6.0, 20.0, 7.0), gaps_mm=(9.0, 15.0))
         letter = iter("abcdefghijkl")
-        for row, each in zip(rows, columns, strict=True):
-            limit = axis_limit([each.miss_m])
+        for row, column in zip(rows, columns, strict=True):
+            limit = axis_limit([column.miss_m])
             for axes, name in zip(row, _START_LABELS, strict=True):
-                _cloud(axes, each.start[name], each.miss_m, str(each.look["color"]))
+                _cloud(axes, column.start[name], column.miss_m, str(column.look["color"]))
                 axes.set_xlabel(_START_LABELS[name])
                 axes.set_ylim(0.0, 1.04 * limit or 1.0)
                 axes.locator_params(axis="x", nbins=3)
                 axes.tick_params(labelleft=axes is row[0])
-                axes.set_title(f"({next(letter)}) {each.noise} noise")
+                axes.set_title(f"({next(letter)}) {column.noise} noise")
             row[0].set_ylabel("miss, m")
         handles = [
             Line2D([], [], linestyle="", marker=".", color=LIMIT, label=f"runs (at most {MOST_POINTS} drawn)"),
@@ -173,16 +151,9 @@ def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
 
 
 def correlations(columns: CampaignColumns) -> dict[str, dict[str, float | None]]:
-    """Return Pearson's and Spearman's correlation of the miss with each component of the initial state and its size.
+    """Return Pearson's and Spearman's correlation of the miss with each component of the initial state, by component.
 
-    Parameters
-    ----------
-    columns : CampaignColumns
-
-    Returns
-    -------
-    dict of str to dict
-        By component, `|z_km|` and `|vz_km_s|` too; None where the component or the miss does not vary.
+    `|z_km|` and `|vz_km_s|` are included. A correlation is None where the component or the miss does not vary.
     """
     start = dict(columns.start)
     start |= {f"|{name}|": np.abs(start[name]) for name in ("z_km", "vz_km_s")}
@@ -209,32 +180,32 @@ def _ranks(values: Floats) -> Floats:
 
 
 def _draw_miss(axes: Axes, columns: Sequence[CampaignColumns]) -> None:
-    """Draw the misses, and dotted what was guaranteed of them; the axis has room for both."""
-    samples = [each.miss_m for each in columns]
-    guaranteed = [each.guaranteed_miss_m for each in columns]
+    """Draw the misses, and dotted their guarantees; the axis has room for both."""
+    samples = [column.miss_m for column in columns]
+    guaranteed = [column.guaranteed_miss_m for column in columns]
     ends = scale_axis(axes, [*samples, *(each for each in guaranteed if each.size)], from_zero=True)
-    for each in columns:
-        _distribution(axes, each.miss_m, ends, each.look, band=True)
-        if each.guaranteed_miss_m.size:
-            _distribution(axes, each.guaranteed_miss_m, ends, each.look | _DOTTED, band=False)
+    for column in columns:
+        _distribution(axes, column.miss_m, ends, column.look, band=True)
+        if column.guaranteed_miss_m.size:
+            _distribution(axes, column.guaranteed_miss_m, ends, column.look | _DOTTED, band=False)
     notes = [_beyond("runs", samples, ends[1]), _beyond("dotted", guaranteed, ends[1])]
     axes.set_title("(a) miss")
     axes.set_xlabel("\n".join(["miss, m", *filter(None, notes)]))
 
 
 def _draw_impulse(axes: Axes, columns: Sequence[CampaignColumns]) -> None:
-    samples = [each.impulse_m_s for each in columns]
+    samples = [column.impulse_m_s for column in columns]
     ends = scale_axis(axes, samples, from_zero=False)
-    for each in columns:
-        _distribution(axes, each.impulse_m_s, ends, each.look, band=True)
+    for column in columns:
+        _distribution(axes, column.impulse_m_s, ends, column.look, band=True)
     axes.set_title("(b) impulse spent")
     axes.set_xlabel("\n".join(["impulse spent, m/s", *filter(None, [_beyond("runs", samples, ends[1])])]))
 
 
 def _beyond(name: str, samples: Sequence[Floats], right: float) -> str:
-    """What is to be said of the values that do not fit; nothing where all do."""
-    told = [f"{int((each > right).sum())} of {each.size}" for each in samples if (each > right).any()]
-    return f"{name} beyond the axis: {', '.join(told)}" if told else ""
+    """Return a note on the values beyond the axis; empty where there are none."""
+    counts = [f"{int((sample > right).sum())} of {sample.size}" for sample in samples if (sample > right).any()]
+    return f"{name} beyond the axis: {', '.join(counts)}" if counts else ""
 
 
 def _distribution(
@@ -314,16 +285,16 @@ def _guarantee_name(columns: Sequence[CampaignColumns]) -> str:
 
 
 def _handles(columns: Sequence[CampaignColumns]) -> tuple[list[Any], list[str]]:
-    """What the legend shows, and what it says: a line a noise, dotted its guarantee, and the band in all colours."""
+    """Return the handles and labels of the legend: each noise, its guarantee dotted, and the band in all colours."""
     handles: list[Any] = []
     labels = []
-    for each in columns:
-        meter = "with" if each.range_meter else "no"
-        handles.append(Line2D([], [], **each.look))
-        labels.append(f"{each.noise} noise, {meter} range meter, {each.miss_m.size} runs")
-        if each.guaranteed_miss_m.size:
-            handles.append(Line2D([], [], **(each.look | _DOTTED)))
-            labels.append(f"{each.noise} noise: {_guarantee_name(columns)}")
-    handles.append(tuple(Line2D([], [], color=each.look["color"], linewidth=0.7) for each in columns))
+    for column in columns:
+        meter = "with" if column.range_meter else "no"
+        handles.append(Line2D([], [], **column.look))
+        labels.append(f"{column.noise} noise, {meter} range meter, {column.miss_m.size} runs")
+        if column.guaranteed_miss_m.size:
+            handles.append(Line2D([], [], **(column.look | _DOTTED)))
+            labels.append(f"{column.noise} noise: {_guarantee_name(columns)}")
+    handles.append(tuple(Line2D([], [], color=column.look["color"], linewidth=0.7) for column in columns))
     labels.append("thin: 95 % confidence band (Dvoretzky-Kiefer-Wolfowitz)")
     return handles, labels

@@ -1,4 +1,4 @@
-"""A Dask cluster as an executor: reached within seconds, or not at all, and of the same versions as here."""
+"""A Dask cluster as an executor: it answers within seconds and has the same versions of the packages."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 PATIENCE_S = 8.0
-"""How long a scheduler has to answer, and then its workers to appear."""
+"""Time limit for the scheduler's answer, and then for its workers, s."""
 
 RETRIES = 3
 _ADDRESS = re.compile(r"(?P<protocol>tcp|tls)://(?P<host>\[[0-9a-fA-F:]+\]|[^\s/:\[\]]+):(?P<port>\d{1,5})/?")
@@ -33,10 +33,11 @@ class Cluster:
     Parameters
     ----------
     executor : Executor
-        Flies on its workers.
+        Runs functions on its workers.
     threads : int
-        Of all its workers.
+        Threads of all workers.
     workers : int
+        Number of workers.
     """
 
     executor: Executor
@@ -46,23 +47,13 @@ class Cluster:
 
 @contextlib.contextmanager
 def connected(address: str) -> Iterator[Cluster]:
-    """Connect to a Dask scheduler.
-
-    Parameters
-    ----------
-    address : str
-        Such as tcp://host:8786.
-
-    Yields
-    ------
-    Cluster
-        Until leaving.
+    """Connect to the Dask scheduler at an address such as tcp://host:8786.
 
     Raises
     ------
     InputError
-        If Dask is not installed, the scheduler does not answer within seconds or has no workers, or a worker is of
-        another version.
+        If Dask is not installed, the scheduler does not answer in time or has no workers, or a worker has other
+        versions of the packages.
     """
     found = _ADDRESS.fullmatch(address)
     if found is None or not 0 < int(found["port"]) < 65536:
@@ -73,7 +64,7 @@ def connected(address: str) -> Iterator[Cluster]:
         raise InputError(
             f"--dask: clusters need Dask, which is not installed: {install_command('distributed')}"
         ) from None
-    # A scheduler that dies is told of in one message here, not in the tracebacks of its client's threads.
+    # The failure of a scheduler is one message of the command, without tracebacks of the client's threads.
     for name in ("distributed", "distributed.client", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     _need_listener(address, found["host"].strip("[]"), int(found["port"]))
@@ -94,18 +85,7 @@ def connected(address: str) -> Iterator[Cluster]:
 
 
 def is_open(address: str) -> bool:
-    """Whether a scheduler's address is neither encrypted nor on this machine alone.
-
-    Parameters
-    ----------
-    address : str
-        Such as tcp://host:8786.
-
-    Returns
-    -------
-    bool
-        False of what is no address.
-    """
+    """Whether a scheduler's address is neither encrypted nor on this machine only; False if it is not an address."""
     found = _ADDRESS.fullmatch(address)
     if found is None or found["protocol"] == "tls":
         return False
@@ -114,12 +94,12 @@ def is_open(address: str) -> bool:
         return False
     try:
         return not ipaddress.ip_address(host).is_loopback
-    except ValueError:  # a name, which may be anybody's
+    except ValueError:  # a name, which may be any machine's
         return True
 
 
 def _need_listener(address: str, host: str, port: int) -> None:
-    """Say at once that nobody listens; the cluster's own client would go on trying."""
+    """Fail at once if no program listens there; the client of the cluster would retry."""
     try:
         with socket.create_connection((host, port), timeout=PATIENCE_S / 2):
             pass
@@ -128,7 +108,7 @@ def _need_listener(address: str, host: str, port: int) -> None:
 
 
 def _need_scheduler(address: str) -> None:
-    """Ask who listens, and wait for an answer only so long; the cluster's own client may wait for ever."""
+    """Ask what program listens there, with a time limit; the client of the cluster may wait without one."""
     import asyncio
 
     from distributed.comm.core import connect
@@ -139,8 +119,8 @@ def _need_scheduler(address: str) -> None:
         comm = await connect(address, timeout=PATIENCE_S / 2, **arguments)
         try:
             await comm.write({"op": "identity", "reply": True})
-            told = await comm.read()
-            return told.get("type") if isinstance(told, dict) else None
+            answer = await comm.read()
+            return answer.get("type") if isinstance(answer, dict) else None
         finally:
             comm.abort()
 
@@ -149,7 +129,7 @@ def _need_scheduler(address: str) -> None:
 
     try:
         found = asyncio.run(in_time())
-    except Exception as error:  # whatever listens there may send anything, and reading that may fail in any way
+    except Exception as error:  # another program may send anything, and reading it may fail in any way
         raise _silent(address, error) from None
     if found != "Scheduler":
         raise _silent(address, OSError(0, f"it is a {str(found)[:40]}"))
@@ -175,33 +155,33 @@ def _need_workers(client: Client, address: str) -> None:
 
 
 def _need_same_versions(client: Client) -> None:
-    """Refuse workers whose numbers may differ from those of here."""
+    """Refuse workers with other versions of the packages: their numbers may differ."""
     names = CALCULATING
 
     def versions_there() -> tuple[tuple[str, str], ...]:
-        # Sent as code, for a worker may not have this package at all.
+        # Sent as code: a worker may not have this package.
         from importlib.metadata import PackageNotFoundError, version
 
-        told = []
+        versions = []
         for name in names:
             try:
-                told.append((name, version(name)))
+                versions.append((name, version(name)))
             except PackageNotFoundError:
-                told.append((name, "none"))
-        return tuple(told)
+                versions.append((name, "none"))
+        return tuple(versions)
 
     answers: dict[str, Any] = client.run(versions_there, on_error="return")
     lines = []
-    for worker, told in sorted(answers.items()):
-        if isinstance(told, BaseException):
-            lines.append(f"worker {worker} does not say its versions: {str(told)[:100]}")
+    for worker, answer in sorted(answers.items()):
+        if isinstance(answer, BaseException):
+            lines.append(f"worker {worker} does not return its versions: {str(answer)[:100]}")
         else:
-            differ = differences(calculating_versions(), told)
+            differ = differences(calculating_versions(), answer)
             lines += [f"worker {worker}: {'; '.join(differ)}"] if differ else []
     if lines:
         more = f"\n  and {len(lines) - 10} more" if len(lines) > 10 else ""
         raise InputError(
-            "--dask: workers must have the versions of here, or their numbers may differ; install the same there:"
+            "--dask: workers with other versions may compute other numbers; install the same versions there:"
             + "".join(f"\n  {line}" for line in lines[:10])
             + more
         )

@@ -1,7 +1,7 @@
-"""What a sweep varies: keys of a scenario file, each over a range of values in the unit of the file.
+"""The keys of a scenario file that a sweep varies, each over a range of values in the unit of the file.
 
-The cells are made by the one reader of scenario files: the scenario is written as a file, values are put into its text,
-and the text is read. So a cell is sound exactly when a file with these values is, and says what is wrong as one does.
+A cell is made by the reader of scenario files: the scenario is written as a file, values are replaced in its text, and
+the text is read. A cell is therefore sound exactly when a file with its values is, and has the same error messages.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MOST_VALUES = 1000
 EXAMPLE = "--vary angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:8,thruster.greatest_impulse_m_s=2:20:7"
 
 _PLACES = Context(prec=12)
-"""Values between the ends are rounded to as many digits: what a person would write."""
+"""Values between the ends are rounded to 12 digits."""
 
 _OPTIONAL = ("sun", *OPTIONAL_SENSORS, "target")
 _ENDS = ("least", "greatest")
@@ -35,7 +35,7 @@ _ENDS = ("least", "greatest")
 
 @dataclass(frozen=True)
 class _Key:
-    """A key that can be varied: where it stands, and whether only whole numbers may stand there."""
+    """A key that can be varied: its table, the end of a pair, and whether it must be a whole number."""
 
     table: str
     name: str
@@ -44,28 +44,23 @@ class _Key:
 
 
 def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
-    """Read what is to be varied.
+    """Read the value of --vary.
 
     Parameters
     ----------
     text : str
-        Of pieces `table.key=FROM:TO:COUNT` or `table.key=log:FROM:TO:COUNT`, separated by commas. Of a key that is a
-        pair `table.key.least` or `table.key.greatest` is varied.
+        `table.key=FROM:TO:COUNT` or `table.key=log:FROM:TO:COUNT`, separated by commas. Of a key that is a pair,
+        `table.key.least` or `table.key.greatest` is varied.
     scenario : Scenario
-        Whose keys they are.
-
-    Returns
-    -------
-    tuple of Axis
-        In the order given.
+        Its keys can be varied.
 
     Raises
     ------
     InputError
-        If it is written otherwise, or the scenario has no such key; the nearest is suggested.
+        If the text has another form, or the scenario has no such key; the nearest is suggested.
     """
     known = _known_keys(scenario)
-    pieces = [each.strip() for each in text.split(",")]
+    pieces = [piece.strip() for piece in text.split(",")]
     if len(pieces) > MOST_AXES:
         raise InputError(f"--vary: at most {MOST_AXES} keys can be varied at once, found {len(pieces)}; leave some out")
     axes = tuple(_axis(piece, known) for piece in pieces)
@@ -80,40 +75,29 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
 
 
 def sweep_cells(scenario: Scenario, axes: Sequence[Axis]) -> tuple[Scenario, ...]:
-    """Make the scenario of each cell.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    axes : sequence of Axis
-        From `sweep_axes`.
-
-    Returns
-    -------
-    tuple of Scenario
-        One for each combination of values; the last axis varies fastest.
+    """Return the scenario of each combination of the axes' values; the last axis varies fastest.
 
     Raises
     ------
     InputError
-        If a cell is no sound scenario; the message is that of a scenario file.
+        If a cell is not a sound scenario; the message is that of a scenario file.
     """
     known = _known_keys(scenario)
     text = scenario_to_toml(scenario)
     cells = []
     for values in itertools.product(*(axis.values for axis in axes)):
-        changed, said = text, []
+        changed, replaced = text, []
         for axis, value in zip(axes, values, strict=True):
             key = known[axis.key]
             literal = str(round(value)) if key.whole else number_text(value)
             changed = _with_value(changed, key, literal)
-            said.append(f"{axis.key} = {literal}")
-        cells.append(read_scenario(changed, f"{scenario.name} with {', '.join(said)}"))
+            replaced.append(f"{axis.key} = {literal}")
+        cells.append(read_scenario(changed, f"{scenario.name} with {', '.join(replaced)}"))
     return tuple(cells)
 
 
 def _known_keys(scenario: Scenario) -> dict[str, _Key]:
-    """The keys of a scenario that hold numbers."""
+    """Return the keys of a scenario that hold numbers."""
     known: dict[str, _Key] = {}
     for table, keys in _tables(scenario).items():
         for name, value in keys.items():
@@ -133,12 +117,12 @@ def _tables(scenario: Scenario) -> Mapping[str, Mapping[str, Any]]:
 
 
 def _axis(piece: str, known: Mapping[str, _Key]) -> Axis:
-    key, equals, written = (each.strip() for each in piece.partition("="))
+    key, equals, written = (part.strip() for part in piece.partition("="))
     if not equals or not key:
         raise InputError(f"--vary: {shown(piece)} is not written as KEY=FROM:TO:COUNT; for example {EXAMPLE}")
     if key not in known:
         raise InputError(f"--vary: {_unknown(key, known)}")
-    parts = [each.strip() for each in written.split(":")]
+    parts = [part.strip() for part in written.split(":")]
     scale: Literal["linear", "log"] = "linear"
     if parts[0] == "log":
         scale, parts = "log", parts[1:]
@@ -146,7 +130,7 @@ def _axis(piece: str, known: Mapping[str, _Key]) -> Axis:
         raise InputError(
             f"--vary: {key}: must be FROM:TO:COUNT or log:FROM:TO:COUNT, found {shown(written)}; for example {EXAMPLE}"
         )
-    first, last = (_number(each, key) for each in parts[:2])
+    first, last = (_number(part, key) for part in parts[:2])
     if first >= last:
         raise InputError(f"--vary: {key}: must go from a lesser to a greater value, found {shown(written)}")
     if scale == "log" and first <= 0:
@@ -164,13 +148,13 @@ def _axis(piece: str, known: Mapping[str, _Key]) -> Axis:
 def _unknown(key: str, known: Mapping[str, _Key]) -> str:
     names = list(known)
     table = key.partition(".")[0]
-    if table in _OPTIONAL and table not in {each.table for each in known.values()}:
+    if table in _OPTIONAL and table not in {other.table for other in known.values()}:
         return f"the scenario has no [{table}]; add that table to its file, or vary something else"
     if f"{key}.least" in known:
         return f"{key} is a pair; vary {key}.least or {key}.greatest"
     guess = nearest(key, names)
-    if guess is None:  # perhaps only its last part was written
-        alike = [each for each in names if key.rsplit(".", 1)[-1] in each.split(".")]
+    if guess is None:  # only its last part may have been written
+        alike = [name for name in names if key.rsplit(".", 1)[-1] in name.split(".")]
         guess = " or ".join(alike[:3]) or None
     hint = f"did you mean {guess}?" if guess else f"the numbers there are: {', '.join(names)}"
     return f"the scenario has no number {shown(key)}; {hint}"
@@ -197,24 +181,24 @@ def _count(text: str, key: str) -> int:
 
 
 def _spaced(first: Decimal, last: Decimal, count: int, scale: str, *, whole: bool) -> tuple[float, ...]:
-    """Values from the first to the last, both as written."""
+    """Return values from the first to the last, which are kept as written."""
     if scale == "log":
         rise = math.log(last / first) / (count - 1)
         between = [Decimal(float(first) * math.exp(rise * place)) for place in range(1, count - 1)]
     else:
         between = [first + (last - first) * place / (count - 1) for place in range(1, count - 1)]
-    values = [first, *(_PLACES.plus(each) for each in between), last]
-    return tuple(float(round(each)) if whole else float(each) for each in values)
+    values = [first, *(_PLACES.plus(value) for value in between), last]
+    return tuple(float(round(value)) if whole else float(value) for value in values)
 
 
 def _with_value(text: str, key: _Key, literal: str) -> str:
-    """Put a value into the text that `scenario_to_toml` wrote, which has each key on a line of its own."""
+    """Replace a value in the text of `scenario_to_toml`, which has one key on a line."""
     lines = text.split("\n")
     table = lines.index(f"[{key.table}]")
     place = next(at for at in range(table, len(lines)) if lines[at].startswith(f"{key.name} = "))
     if key.end is not None:
-        found = lines[place].partition(" = ")[2].strip("[]").split(", ")
-        ends = [found[0], found[-1]]
+        pair = lines[place].partition(" = ")[2].strip("[]").split(", ")
+        ends = [pair[0], pair[-1]]
         ends[_ENDS.index(key.end)] = literal
         literal = f"[{ends[0]}, {ends[1]}]"
     lines[place] = f"{key.name} = {literal}"

@@ -1,4 +1,4 @@
-"""A sweep as a picture: quantiles over one value as lines, over two as heat maps, and where a requirement is met."""
+"""Figures of a sweep: quantiles over one key as lines, over two as heat maps, and where a requirement is met."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 Grid = np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]
 
 MOST_NUMBERS = 120
-"""Cells up to which their numbers are written into them."""
+"""Most cells for which the numbers are written into the cells."""
 
 QUANTITY_NAMES = {"miss_m": "miss, m", "impulse_m_s": "impulse spent, m/s", "guaranteed_miss_m": "guaranteed miss, m"}
 _PANEL_MM = 56.0
@@ -40,29 +40,23 @@ _DASHES: tuple[tuple[float, Sequence[float]] | None, ...] = (
     (0.0, (1.5, 1.2)),
     (0.0, (6.0, 1.0, 1.0, 1.0)),
 )
-"""Of the greatest quantile, the next, and so on; None is a whole line."""
+"""Line styles from the largest quantile down; None is a solid line."""
 
 _MOST_TICKS = 8
 _HEAD_ROOM = 1.06
-"""For the arrow of the topmost point."""
+"""Factor of the axis, for the arrow of the topmost point."""
 
 
 def draw_sweep(table: SweepTable, shown: Sequence[QuantileName], requirement: Requirement | None) -> Figure:
     """Draw quantiles of a sweep over its one or two axes.
 
-    Parameters
-    ----------
-    table : SweepTable
-        Of one or two axes.
-    shown : sequence of QuantileName
-        At least one.
-    requirement : Requirement or None
-        Its bound is drawn where its quantile is.
+    With one axis each quantity and noise has a panel with its quantiles as lines; with two axes each quantile and
+    noise is a heat map. The bound of the requirement is drawn where its quantile is.
 
-    Returns
-    -------
-    Figure
-        With one axis a panel a quantity and noise, each with its quantiles as lines; with two a heat map each.
+    Raises
+    ------
+    ValueError
+        If there are more axes, or no quantile.
     """
     if len(table.axes) not in (1, 2) or not shown:
         raise ValueError("a sweep of one or two axes can be drawn, and at least one quantile")
@@ -89,8 +83,8 @@ def _lines(table: SweepTable, shown: Sequence[QuantileName], requirement: Requir
     ]
     if requirement is not None:
         handles.append(Line2D([], [], color=IMPULSE, linewidth=0.9, label=f"required: {_words(requirement)}"))
-    said = "bars: 95 % confidence intervals; an arrow: the runs are too few for an upper end"
-    figure.legend(handles=handles, loc="lower center", ncols=len(handles), title=said, title_fontsize=7.0)
+    note = "bars: 95 % confidence intervals; an arrow: the runs are too few for an upper end"
+    figure.legend(handles=handles, loc="lower center", ncols=len(handles), title=note, title_fontsize=7.0)
     return figure
 
 
@@ -202,8 +196,8 @@ def _map_panel(
         limit.set_path_effects([Stroke(linewidth=3.2, foreground="white"), Stroke(linewidth=1.5, foreground=IMPULSE)])
         axes.add_collection(limit, autolim=False)
     else:
-        said = "everywhere" if met.all() else "nowhere"
-        axes.set_xlabel(f"{axes.get_xlabel()}\n{_words(requirement)}: {said}")
+        place = "everywhere" if met.all() else "nowhere"
+        axes.set_xlabel(f"{axes.get_xlabel()}\n{_words(requirement)}: {place}")
 
 
 def between(across: Floats, up: Floats, met: np.ma.MaskedArray[Any, Any]) -> list[list[tuple[float, float]]]:
@@ -214,12 +208,7 @@ def between(across: Floats, up: Floats, met: np.ma.MaskedArray[Any, Any]) -> lis
     across, up : ndarray, shape (n + 1,) and (m + 1,)
         Edges of the columns and of the rows.
     met : masked array of bool, shape (m, n)
-        None beside a masked cell.
-
-    Returns
-    -------
-    list of list of tuple of float
-        The ends of each.
+        There is no edge next to a masked cell.
     """
     rows, columns = met.shape
     beside = np.ma.filled(met[:, 1:] != met[:, :-1], fill_value=False)
@@ -259,7 +248,7 @@ def _write_numbers(axes: Axes, across: Axis, up: Axis, values: Grid, norm: Norma
 
 
 def _norm(values: Grid) -> Normalize:
-    """How values become colours: in their logarithm where they differ greatly."""
+    """Return the scale of the colours: logarithmic where the values differ by more than a factor of 10."""
     low, high = float(values.min()), float(values.max())
     if low > 0.0 and high > 10.0 * low:
         return LogNorm(low, high)
@@ -267,7 +256,7 @@ def _norm(values: Grid) -> Normalize:
 
 
 def _beside(figure: Figure, axes: Axes) -> Axes:
-    """Axes for the scale of colours, right of a heat map."""
+    """Return axes for the colour scale to the right of a heat map."""
     place = axes.get_position()
     width, _ = figure.get_size_inches()
     gap, thick = 2.0 / (25.4 * width), 3.0 / (25.4 * width)
@@ -275,7 +264,7 @@ def _beside(figure: Figure, axes: Axes) -> Axes:
 
 
 def _edges(axis: Axis) -> Floats:
-    """Edges of the cells about the values of an axis: midway on its own scale."""
+    """Return the edges of the cells around the values of an axis: midway on its scale."""
     values = np.log(axis.values) if axis.scale == "log" else np.array(axis.values)
     middle = 0.5 * (values[1:] + values[:-1])
     edges = np.concatenate([[2.0 * values[0] - middle[0]], middle, [2.0 * values[-1] - middle[-1]]])
@@ -283,7 +272,7 @@ def _edges(axis: Axis) -> Floats:
 
 
 def _scale(axes: Axes, axis: Axis, which: str) -> None:
-    """Scale and name one axis as the sweep spaced it: ticks at its values if they are few."""
+    """Set scale and label of an axis; the ticks are at its values if they are few."""
     one = axes.xaxis if which == "x" else axes.yaxis
     if axis.scale == "log":
         (axes.set_xscale if which == "x" else axes.set_yscale)("log")
@@ -302,13 +291,13 @@ def _scale(axes: Axes, axis: Axis, which: str) -> None:
 
 
 def _power(axis: Axis) -> int:
-    """The power of ten in which an axis is labelled."""
+    """Return the power of ten of the labels of an axis."""
     greatest = max(abs(each) for each in axis.values)
     return 0 if 0.01 <= greatest < 1e5 else math.floor(math.log10(greatest))
 
 
 def _look(levels: Sequence[float], level: float) -> Any:
-    """The line style of a quantile among several."""
+    """Return the line style of one of several quantiles."""
     return _DASHES[min(levels.index(level), len(_DASHES) - 1)] or "-"
 
 

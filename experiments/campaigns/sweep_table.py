@@ -1,4 +1,4 @@
-"""What a sweep comes to: quantiles of every cell, as one table, and where a requirement is met."""
+"""The quantiles of every cell of a sweep as one table, and where a requirement is met."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ UNITS = {
     "m": "m",
     "s": "s",
 }
-"""Units by the end of a key that names them."""
+"""Units by the end of the key."""
 
 
 @dataclass(frozen=True)
@@ -42,11 +42,13 @@ class SweepTable:
     Parameters
     ----------
     axes : tuple of Axis
+        Keys that vary; the last varies fastest over the cells.
     noises : tuple of str
+        Noises of the sweep.
     levels : tuple of float
-        Of the quantiles.
+        Levels of the quantiles.
     cells : tuple of tuple of Sample
-        The samples of each cell, one a noise; none where it has not been flown. The last axis varies fastest.
+        For each cell a sample for each noise; none before it is flown.
     """
 
     axes: tuple[Axis, ...]
@@ -55,45 +57,45 @@ class SweepTable:
     cells: tuple[tuple[Sample, ...], ...]
 
     def sample(self, cell: int, noise: str) -> Sample | None:
-        """Return what a cell has under a noise."""
-        return next((each for each in self.cells[cell] if each.noise == noise), None)
+        """Return the sample of a cell under a noise."""
+        return next((sample for sample in self.cells[cell] if sample.noise == noise), None)
 
     def estimate(self, cell: int, noise: str, quantile: QuantileName) -> QuantileEstimate | None:
         """Return a quantile of a cell; None where it is not known."""
-        found = self.sample(cell, noise)
-        estimates = () if found is None else found.quantiles.get(quantile.quantity, ())
-        return next((each for each in estimates if each.level == quantile.level), None)
+        sample = self.sample(cell, noise)
+        estimates = () if sample is None else sample.quantiles.get(quantile.quantity, ())
+        return next((estimate for estimate in estimates if estimate.level == quantile.level), None)
 
     def grid(self, noise: str, quantile: QuantileName) -> np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]:
         """Return a quantile over the axes, masked where it is not known."""
-        found = [self.estimate(cell, noise, quantile) for cell in range(len(self.cells))]
-        values = np.array([0.0 if each is None else each.value for each in found])
+        estimates = [self.estimate(cell, noise, quantile) for cell in range(len(self.cells))]
+        values = np.array([0.0 if estimate is None else estimate.value for estimate in estimates])
         shape = tuple(len(axis.values) for axis in self.axes)
-        return np.ma.MaskedArray(values, mask=[each is None for each in found]).reshape(shape)
+        return np.ma.MaskedArray(values, mask=[estimate is None for estimate in estimates]).reshape(shape)
 
     def columns(self) -> tuple[dict[str, list[Any]], dict[str, str]]:
-        """Return one row a cell and noise, by column, and the units of the columns."""
+        """Return columns with a row for each cell and noise, and the units of the columns."""
         rows: list[dict[str, Any]] = []
         combinations = itertools.product(*(axis.values for axis in self.axes))
         for cell, values in enumerate(combinations):
             for noise in self.noises:
-                found = self.sample(cell, noise)
+                sample = self.sample(cell, noise)
                 row: dict[str, Any] = {"cell": cell}
                 row |= dict(zip((axis.key for axis in self.axes), values, strict=True))
-                row |= {"noise": noise, "runs": 0 if found is None else found.runs}
+                row |= {"noise": noise, "runs": 0 if sample is None else sample.runs}
                 for name in OUTCOMES:
-                    row[name.replace("-", "_")] = 0 if found is None else found.outcomes.get(name, 0)
-                row["truth_kept"] = 0 if found is None else found.truth_kept
+                    row[name.replace("-", "_")] = 0 if sample is None else sample.outcomes.get(name, 0)
+                row["truth_kept"] = 0 if sample is None else sample.truth_kept
                 for quantity, level in itertools.product(QUANTITIES, self.levels):
-                    each = self.estimate(cell, noise, QuantileName(quantity, level))
+                    estimate = self.estimate(cell, noise, QuantileName(quantity, level))
                     name = f"{quantity}_{level_name(level)}"
                     row |= {
-                        name: None if each is None else each.value,
-                        f"{name}_lower": None if each is None else each.lower,
-                        f"{name}_upper": None if each is None else each.upper,
+                        name: None if estimate is None else estimate.value,
+                        f"{name}_lower": None if estimate is None else estimate.lower,
+                        f"{name}_upper": None if estimate is None else estimate.upper,
                     }
                 for quantity in QUANTITIES:
-                    row[f"{quantity}_max"] = None if found is None else found.worst.get(quantity)
+                    row[f"{quantity}_max"] = None if sample is None else sample.worst.get(quantity)
                 rows.append(row)
         columns = {name: [row[name] for row in rows] for name in rows[0]}
         units = {axis.key: unit_of(axis.key) for axis in self.axes}
@@ -107,76 +109,50 @@ class SweepTable:
 
 
 def sweep_table(folder: CampaignFolder, quantiles: Sequence[QuantileName] = ()) -> SweepTable:
-    """Summarise a sweep.
-
-    Parameters
-    ----------
-    folder : CampaignFolder
-        Of a sweep, finished or not.
-    quantiles : sequence of QuantileName
-        Whose levels are wanted besides the usual ones.
-
-    Returns
-    -------
-    SweepTable
-    """
-    levels = tuple(sorted({*LEVELS, *(each.level for each in quantiles)}))
+    """Summarise a sweep, finished or not, at the usual levels and those of some more quantiles."""
+    levels = tuple(sorted({*LEVELS, *(quantile.level for quantile in quantiles)}))
     cells = tuple(tuple(samples(folder, cell, levels)) for cell in range(folder.manifest.cells))
     return SweepTable(folder.manifest.axes, tuple(noises_of(folder)), levels, cells)
 
 
 def crossings(values: Sequence[float], quantile: Sequence[float | None], bound: float, scale: str) -> list[float]:
-    """Return where a quantile crosses a bound along an axis, between its values on the axis's own scale.
+    """Return where a quantile crosses a bound along an axis, by interpolation on the axis's scale.
 
     Parameters
     ----------
     values : sequence of float
+        Of the axis.
     quantile : sequence of float or None
         At each value; None where it is not known.
     bound : float
+        In the unit of the quantile.
     scale : str
         `linear` or `log`.
-
-    Returns
-    -------
-    list of float
     """
-    found = []
+    places = []
     for (left, below), (right, above) in itertools.pairwise(zip(values, quantile, strict=True)):
         if below is None or above is None or (below < bound) == (above < bound):
             continue
         share = (bound - below) / (above - below)
         if scale == "log":
-            found.append(left * math.exp(share * math.log(right / left)))
+            places.append(left * math.exp(share * math.log(right / left)))
         else:
-            found.append(left + share * (right - left))
-    return found
+            places.append(left + share * (right - left))
+    return places
 
 
 def where_met(axis: Axis, quantile: Sequence[float | None], bound: float) -> str:
-    """Say for which values of an axis a quantile stays under a bound.
-
-    Parameters
-    ----------
-    axis : Axis
-    quantile : sequence of float or None
-    bound : float
-
-    Returns
-    -------
-    str
-        Such as `up to 0.00021`.
-    """
-    known = [each for each in quantile if each is not None]
+    """Return the values of an axis for which a quantile is less than a bound, as text: `up to 0.00021`."""
+    known = [value for value in quantile if value is not None]
     if not known:
         return "not flown yet"
-    crossed = [f"{each:.3g}" for each in crossings(axis.values, quantile, bound, axis.scale)]
+    crossed = [f"{place:.3g}" for place in crossings(axis.values, quantile, bound, axis.scale)]
     if not crossed:
         return "everywhere" if known[0] < bound else "nowhere"
     met, pieces = known[0] < bound, []
-    for place, each in enumerate(crossed):
+    for number, place in enumerate(crossed):
         if met:
-            pieces.append(f"up to {each}" if place == 0 else f"{crossed[place - 1]} to {each}")
+            pieces.append(f"up to {place}" if number == 0 else f"{crossed[number - 1]} to {place}")
         met = not met
     if met:
         pieces.append(f"from {crossed[-1]}")
@@ -184,19 +160,7 @@ def where_met(axis: Axis, quantile: Sequence[float | None], bound: float) -> str
 
 
 def answers(table: SweepTable, noise: str, requirement: Requirement) -> list[tuple[str, str]]:
-    """Say where a requirement is met along the first axis, for each value of the others.
-
-    Parameters
-    ----------
-    table : SweepTable
-    noise : str
-    requirement : Requirement
-
-    Returns
-    -------
-    list of tuple of str
-        What the others are, and where it is met.
-    """
+    """Return, for each combination of values of the other axes, where on the first axis it is met."""
     first, *others = table.axes
     grid = table.grid(noise, requirement.quantile)
     lines = []
@@ -206,13 +170,13 @@ def answers(table: SweepTable, noise: str, requirement: Requirement) -> list[tup
             None if missing else float(value)
             for value, missing in zip(column.data, np.ma.getmaskarray(column), strict=True)
         ]
-        said = ", ".join(f"{axis.key} = {axis.values[place]:g}" for axis, place in zip(others, places, strict=True))
-        lines.append((said, where_met(first, known, requirement.bound)))
+        label = ", ".join(f"{axis.key} = {axis.values[place]:g}" for axis, place in zip(others, places, strict=True))
+        lines.append((label, where_met(first, known, requirement.bound)))
     return lines
 
 
 def unit_of(key: str) -> str:
-    """Return the unit that a key names; empty where it names none."""
+    """Return the unit in the name of a key; empty if it has none."""
     name = _named(key)
     return next((unit for end, unit in UNITS.items() if name.endswith(f"_{end}")), "")
 
@@ -220,10 +184,10 @@ def unit_of(key: str) -> str:
 def key_label(key: str) -> str:
     """Return a key as the label of an axis: `angle sensor, error at nominal range, rad`."""
     table, name, *end = key.split(".")
-    words = next((name.removesuffix(f"_{each}") for each in UNITS if name.endswith(f"_{each}")), name)
+    words = next((name.removesuffix(f"_{end}") for end in UNITS if name.endswith(f"_{end}")), name)
     unit = unit_of(key)
-    said = f"{table}: {words} {' '.join(end)}".replace("_", " ").strip()
-    return f"{said}, {unit}" if unit else said
+    label = f"{table}: {words} {' '.join(end)}".replace("_", " ").strip()
+    return f"{label}, {unit}" if unit else label
 
 
 def _named(key: str) -> str:

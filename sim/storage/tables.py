@@ -22,7 +22,7 @@ from sim.results import Results
 SCHEMA_VERSION = 2
 M_PER_KM = 1e3
 MOST_BYTES_A_ROW = 120
-"""A row takes about 80, and would take 115 with its text written out."""
+"""A row takes about 80 bytes, and 115 with its text uncompressed."""
 BYTES_BESIDE_ROWS = 100_000
 
 _RESULTS = [column for column in columns_of(Results) if not column.derived]
@@ -68,19 +68,7 @@ def schema(*, with_cell: bool) -> Any:
 
 
 def rows(chunk: Chunk, results: Results, *, with_cell: bool) -> Any:
-    """Return the results of a chunk as an Arrow table.
-
-    Parameters
-    ----------
-    chunk : Chunk
-    results : Results
-        Of its runs, in their order.
-    with_cell : bool
-        Whether the rows say which cell of a sweep they belong to.
-
-    Returns
-    -------
-    pyarrow.Table
+    """Return the results of a chunk as an Arrow table, with the column `cell` in a sweep.
 
     Raises
     ------
@@ -109,16 +97,7 @@ def rows(chunk: Chunk, results: Results, *, with_cell: bool) -> Any:
 
 
 def need_sound(table: Any, runs: range, cell: int) -> None:
-    """Refuse rows that no campaign writes.
-
-    Parameters
-    ----------
-    table : pyarrow.Table
-        Whole rows.
-    runs : range
-        Numbers of the runs that they must be of, in order.
-    cell : int
-        Number of the cell that they must be of.
+    """Check that whole rows are those of the runs of a cell, in order, and that all values are within their limits.
 
     Raises
     ------
@@ -148,10 +127,10 @@ def need_sound(table: Any, runs: range, cell: int) -> None:
 
 
 def to_bytes(table: Any, extra: Mapping[str, str]) -> bytes:
-    """Return a table as a Parquet file, with some more of its own in the metadata of the schema."""
+    """Return a table as a Parquet file, with some more entries in the metadata of its schema."""
     sink = pa.BufferOutputStream()
     whole = table.replace_schema_metadata({**(table.schema.metadata or {}), **extra})
-    # Numbers drawn at random repeat nowhere: a dictionary of them only takes room.
+    # A dictionary of random numbers, which do not repeat, would only take space.
     pq.write_table(
         whole,
         sink,
@@ -225,12 +204,12 @@ def read(file: Path, columns: Sequence[str] | None, *, with_cell: bool) -> Any:
 
 
 def joined(parts: Sequence[Any], columns: Sequence[str] | None, *, with_cell: bool) -> Any:
-    """Return tables of some columns one after the other; without parts a table of no rows."""
+    """Return one table of several; without parts a table of no rows."""
     return pa.concat_tables(parts or [_some(columns, with_cell=with_cell).empty_table()])
 
 
 def _some(columns: Sequence[str] | None, *, with_cell: bool) -> Any:
-    """Schema of some columns."""
+    """Return the schema of some columns, None being all."""
     wanted = schema(with_cell=with_cell)
     return wanted if columns is None else pa.schema([wanted.field(name) for name in columns], metadata=wanted.metadata)
 
@@ -244,7 +223,7 @@ def numbers(table: Any, name: str) -> np.ma.MaskedArray[tuple[int], np.dtype[np.
 
 
 def codes(table: Any, name: str, known: Sequence[str]) -> NDArray[np.int8]:
-    """Return a column of text as places in a list of what it can say; -1 where it says none of them."""
+    """Return a column of text as indices in a list of values; -1 for other values."""
     found = pc.index_in(table.column(name), value_set=pa.array(list(known), type=pa.string()))
     return np.asarray(pc.fill_null(found, -1).to_numpy(), dtype=np.int8)
 
