@@ -92,8 +92,8 @@ class Engagements:
 
     Notes
     -----
-    One step: measure and cut, decide, shift, drop labels below the threshold, predict; then the true motion advances to
-    its closest approach. The strategy gets nothing from the true motion but measurements.
+    One step: measure and cut, decide, shift, drop labels below the threshold, predict; then the true motion advances,
+    and its closest approach is detected. Of the true motion, the strategy gets the measurements only.
     """
 
     def __init__(
@@ -250,10 +250,7 @@ class Engagements:
 
     def _finish_labels(self) -> None:
         """Drop labels below the threshold, and store the predicted miss of those that leave."""
-        if self._model.is_guaranteed:
-            self._information.drop_below_threshold()
-            return
-        if not self._information.sections_are_leaving():
+        if self._model.is_guaranteed or not self._information.sections_are_leaving():
             self._information.drop_below_threshold()
             return
         worst = self._information.worst_predicted_miss_m()

@@ -111,7 +111,9 @@ class Flown:
     errors : ndarray, shape (n, rows, steps)
         Errors made, in units of their bounds.
     outcomes : ndarray of Outcome, shape (n,)
+        How the engagements ended.
     truth_kept : ndarray of bool, shape (n,)
+        Whether the true state was inside its section at every step.
     """
 
     plans: Plans

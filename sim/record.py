@@ -1,4 +1,4 @@
-"""The record of one engagement: everything needed to draw it again without flying it."""
+"""The record of one engagement: everything that its figures and pages show."""
 
 from __future__ import annotations
 
@@ -24,18 +24,19 @@ class StepRecord:
     Parameters
     ----------
     time_s : float
+        Time since the start, s.
     measured : mapping of str to float
         Values measured in this step by sensor: "angle" (rad), "range" (m), "rate" (rad/s).
     true_angle_rad, true_rate_rad_s, true_range_m : float
-        Line of sight of the truth.
+        True line of sight.
     impulse_m_s : float
-        Impulse k given in this step.
+        Impulse k of this step.
     predicted_miss_m : tuple of float, or None
-        (pi_*, pi^*) after the measurement and before the impulse; None where no set is left.
+        (pi_*, pi^*) after the measurement and before the impulse; None without a set.
     truth_margin_m : float or None
-        Signed margin of the truth in its own section, as of the last measurement; None before the first.
+        Signed margin of the true state in its section at the last measurement; None before the first.
     sections : tuple of Section
-        The living sections after the measurement, in rising order of range.
+        Sections after the measurement, in ascending order of range.
     """
 
     time_s: float
@@ -51,13 +52,14 @@ class StepRecord:
 
 @dataclass(frozen=True)
 class Inconsistency:
-    """Where the data of an engagement first contradicted the model: no state agreed with a measurement.
+    """The first measurement that no state of the set agreed with.
 
     Parameters
     ----------
     step : int
+        Number of the step.
     label_m : float
-        The hypothesis that came nearest to living on: its range at t = 0.
+        Label nearest to consistency: its range at t = 0.
     """
 
     step: int
@@ -66,23 +68,24 @@ class Inconsistency:
 
 @dataclass(frozen=True)
 class Record:
-    """One engagement, whole.
+    """The whole course of one engagement.
 
     Parameters
     ----------
     scenario : Scenario
-        As flown: noise, tie rule and range meter are those of this engagement.
+        What was flown, with the noise, tie rule and range meter of this engagement.
     seed, run : int
-        What draws the same engagement again.
+        Root seed and run number, which draw the same engagement again.
     strategy : str
         Name of the strategy.
     result : Results
         A batch of one.
     steps : tuple of StepRecord
+        All steps, in order.
     noise : str or None
-        Name of a noise that is not the scenario's own; None where it is.
+        Name of a noise that replaced the scenario's; None if it did not.
     inconsistency : Inconsistency or None
-        None where the data never contradicted the model.
+        None if no measurement contradicted the model.
     """
 
     scenario: Scenario
@@ -96,7 +99,7 @@ class Record:
 
     @property
     def noise_name(self) -> str:
-        """What the noise is called that was flown."""
+        """Name of the noise that was flown."""
         return self.scenario.noise.value if self.noise is None else self.noise
 
     def __repr__(self) -> str:
@@ -173,10 +176,6 @@ def fly_one(
         A noise of your own, for a batch of one; None is the scenario's.
     progress : callable or None
         Called with the fraction done, from 0 to 1.
-
-    Returns
-    -------
-    Record
 
     Raises
     ------
