@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -104,28 +104,6 @@ class Flight:
     distances_m: Floats
     pursuer_m: Floats
     evader_m: Floats
-
-
-@dataclass
-class _Log:
-    planned: list[float] = field(default_factory=list)
-    predicted: list[float] = field(default_factory=list)
-    pursuer: list[Floats] = field(default_factory=list)
-    evader: list[Floats] = field(default_factory=list)
-
-    def flight(self, ended: Ended, time: float, distance: float, units: Units) -> Flight:
-        """Return the flight in SI units."""
-        pursuer, evader = np.array(self.pursuer).reshape(-1, 3), np.array(self.evader).reshape(-1, 3)
-        return Flight(
-            ended=ended,
-            time_s=time * units.time_s,
-            distance_m=distance * units.length_m,
-            planned_s=np.array(self.planned) * units.time_s,
-            predicted_s=np.array(self.predicted) * units.time_s,
-            distances_m=np.linalg.norm(evader - pursuer, axis=1) * units.length_m,
-            pursuer_m=pursuer * units.length_m,
-            evader_m=evader * units.length_m,
-        )
 
 
 def fly(
@@ -247,16 +225,13 @@ class _Pursuit:
         self._dry = game.pursuer.dry_mass_kg / units.mass_kg, game.evader.dry_mass_kg / units.mass_kg
         self._time, self._work = 0.0, MOST_WORK
         self._past: list[tuple[float, PathNow]] = []
-        self._log = _Log()
+        self._log: list[tuple[float, float, Floats, Floats]] = []
 
     def run(self, plan: Node, leg: float, progress: Callable[[float], None] | None) -> Flight:
         """Simulate to the end."""
         own = plan
-        while len(self._log.planned) < _MOST_PLANS:
-            self._log.planned.append(self._time)
-            self._log.predicted.append(self._time + plan.duration)
-            self._log.pursuer.append(self._pursuer.start[:3])
-            self._log.evader.append(self._evader.start[:3])
+        while len(self._log) < _MOST_PLANS:
+            self._log.append((self._time, self._time + plan.duration, self._pursuer.start[:3], self._evader.start[:3]))
             if progress is not None:
                 progress(min(1.0, self._time / (self._time + plan.duration)))
             last = plan.duration <= leg
@@ -362,7 +337,7 @@ class _Pursuit:
                 return None
             first = int(inside[0])
             at = brentq(lambda time: distance(time) - self._radius, times[first - 1], times[first]) if first else 0.0
-            return self._log.flight(Ended.CAPTURED, self._time + at, distance(at), self._units)
+            return self._flight(Ended.CAPTURED, self._time + at, distance(at))
         if not last:
             return None
         values = np.array([distance(time) for time in times])
@@ -370,7 +345,7 @@ class _Pursuit:
         low, high = times[max(0, near - 1)], times[min(_LOOKS - 1, near + 1)]
         at = float(minimize_scalar(distance, bounds=(low, high), method="bounded", options={"xatol": 1e-12}).x)
         ended = Ended.CAPTURED if distance(at) <= self._hit else Ended.MISSED
-        return self._log.flight(ended, self._time + at, distance(at), self._units)
+        return self._flight(ended, self._time + at, distance(at))
 
     def _drift(self, spell: float) -> float:
         """Approximate relative displacement of the two in a leg."""
@@ -378,7 +353,22 @@ class _Pursuit:
 
     def _end(self, ended: Ended) -> Flight:
         apart = float(np.linalg.norm(self._pursuer.start[:3] - self._evader.start[:3]))
-        return self._log.flight(ended, self._time, apart, self._units)
+        return self._flight(ended, self._time, apart)
+
+    def _flight(self, ended: Ended, time: float, distance: float) -> Flight:
+        """Return the flight in SI units."""
+        units = self._units
+        planned, predicted, pursuer, evader = (np.array(column) for column in zip(*self._log, strict=True))
+        return Flight(
+            ended=ended,
+            time_s=time * units.time_s,
+            distance_m=distance * units.length_m,
+            planned_s=planned * units.time_s,
+            predicted_s=predicted * units.time_s,
+            distances_m=np.linalg.norm(evader - pursuer, axis=1) * units.length_m,
+            pursuer_m=pursuer * units.length_m,
+            evader_m=evader * units.length_m,
+        )
 
 
 def _lasts(craft: Craft, dry: float) -> float:
