@@ -11,11 +11,11 @@ from decimal import Context, Decimal
 from enum import Enum
 from typing import Annotated, Any, Generic, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo
 from pydantic_core import PydanticCustomError
 
 from experiments.common.errors import InputError
-from infoset.limits import Limits
+from infoset.limits import Limits, limits_of
 
 LARGEST = Decimal("1e15")
 SMALLEST = Decimal("1e-100")
@@ -41,6 +41,47 @@ def si(value: Decimal, power_of_ten: int = 0) -> float:
 def radians(degrees: Decimal) -> float:
     """Change degrees to radians and round them, once."""
     return float(_EXACT.multiply(degrees, _RADIANS_PER_DEGREE))
+
+
+UNITS = {"_km3_s2": ("_m3_s2", 3 * KILO), "_km_s": ("_m_s", KILO), "_km": ("_m", KILO)}
+"""SI unit and power of ten of the units that end keys; ``_deg`` is radians, any other key is in SI."""
+
+
+def si_name(name: str) -> str:
+    """Return the name of a key in SI: ``distance_m`` of ``distance_km``."""
+    if name.endswith("_deg"):
+        return f"{name.removesuffix('_deg')}_rad"
+    return next((name.removesuffix(unit) + of_si for unit, (of_si, _) in UNITS.items() if name.endswith(unit)), name)
+
+
+def power_of_ten(name: str) -> int:
+    """Return the power of ten of the unit of a key."""
+    return next((power for unit, (_, power) in UNITS.items() if name.endswith(unit)), 0)
+
+
+def si_value(name: str, value: Any) -> Any:
+    """Return the value of a key in SI; decimals are rounded once, other values stay as they are."""
+    if isinstance(value, tuple):
+        return tuple(si_value(name, item) for item in value)
+    if not isinstance(value, Decimal):
+        return value
+    return radians(value) if name.endswith("_deg") else si(value, power_of_ten(name))
+
+
+def si_values(table: BaseModel) -> dict[str, Any]:
+    """Return the values of a table in SI by their names in SI."""
+    return {si_name(name): si_value(name, value) for name, value in table}
+
+
+def value_text(name: str, value: Any) -> str:
+    """Write an SI value as TOML in the unit of its key."""
+    if isinstance(value, Enum | str):
+        return quoted_text(value.value if isinstance(value, Enum) else value)
+    if isinstance(value, tuple):
+        return f"[{', '.join(value_text(name, item) for item in value)}]"
+    if isinstance(value, int):
+        return str(value)
+    return degrees_text(value) if name.endswith("_deg") else number_text(value, power_of_ten(name))
 
 
 def _toml_float(value: Decimal) -> str:
@@ -265,6 +306,16 @@ def known_name(value: object, names: tuple[str, ...]) -> str:
 def key(meaning: str, example: str, **options: Any) -> Any:
     """Describe a key: what the template says of it, and a value as TOML."""
     return Field(description=meaning, examples=[example], **options)
+
+
+def limited_by(owner: type, field: str | None = None) -> PlainValidator:
+    """Check a number by the limits that a dataclass declares for a field, by default that of the key's name in SI."""
+
+    def check(value: object, info: ValidationInfo) -> Decimal:
+        name = str(info.field_name)
+        return Number.of(limits_of(owner, field or si_name(name)), power_of_ten(name))(value)
+
+    return PlainValidator(check)
 
 
 ZERO, ONE = Decimal(0), Decimal(1)

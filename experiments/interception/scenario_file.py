@@ -1,16 +1,16 @@
-"""Scenario files: TOML as a person writes it, in kilometres and degrees, to and from `sim.scenario.Scenario` in SI.
+"""Scenario files: TOML in kilometres and degrees, to and from `sim.scenario.Scenario` in SI units.
 
-A number is read as the decimal that stands in the file and rounded once, after the change of unit. So every SI value
-can be written (its own shortest decimal with the point moved), and comes back as it was, bit for bit.
+A number is read as the decimal in the file and rounded once, after the change of unit. Every SI value can therefore be
+written (as its shortest decimal with the point moved) and is read back bit for bit.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import fields
-from enum import Enum
-from typing import Any
+from typing import Any, TypeVar
+
+from pydantic import BaseModel
 
 from experiments.common.errors import InputError
 from experiments.common.toml_file import (
@@ -22,25 +22,9 @@ from experiments.common.toml_file import (
     read_tables,
     tables_of,
 )
-from experiments.common.toml_values import (
-    KILO,
-    DecimalPair,
-    Table,
-    degrees_text,
-    number_text,
-    quoted_text,
-    radians,
-    shown,
-    si,
-)
+from experiments.common.toml_values import shown, si_values, value_text
 from experiments.interception.scenario_checks import cross_problems
-from experiments.interception.scenario_tables import (
-    OPTIONAL_SENSORS,
-    SCHEMA,
-    DispersionTable,
-    ScenarioTables,
-    UncertaintyTable,
-)
+from experiments.interception.scenario_tables import OPTIONAL_SENSORS, SCHEMA, ScenarioTables
 from guidance.thruster import Thruster
 from infoset.model import InitialSet, Interval, Model, SetModel, StateBox
 from infoset.sensors import AngleSensor
@@ -49,7 +33,7 @@ from sim.storage.codec import scenario_hash as scenario_hash  # noqa: PLC0414 (u
 
 DEFAULT_FEWEST_SECTIONS = 5
 SMALL_ANGLE_RAD = 0.01
-"""Greatest line-of-sight angle at which the model `paper`, which takes angles for their tangents, is good."""
+"""Largest line-of-sight angle for the model `paper`, which replaces tangents by their angles."""
 
 FORM = Form(
     noun="scenario",
@@ -61,11 +45,9 @@ FORM = Form(
     schema=SCHEMA,
 )
 
-_POWERS = {"_km3_s2": 3 * KILO, "_km_s": KILO, "_km": KILO}
-"""Powers of ten of the units in the keys of a file that are not SI units."""
-_WHOLE = ("schema", "sections", "fewest_sections")
+Part = TypeVar("Part")
 UNUSUAL_TABLES = (*(table for table in OPTIONAL_SENSORS if table != "range_sensor"), "target")
-"""Tables that the template shows but leaves out."""
+"""Tables that the template contains as comments."""
 
 
 def scenario_names() -> tuple[str, ...]:
@@ -74,23 +56,7 @@ def scenario_names() -> tuple[str, ...]:
 
 
 def scenario_text(name: str) -> str:
-    """Return the file of a built-in scenario, comments and all.
-
-    Parameters
-    ----------
-    name : str
-        One of `scenario_names()`.
-
-    Returns
-    -------
-    str
-        TOML.
-
-    Raises
-    ------
-    InputError
-        If there is no such scenario.
-    """
+    """Return the file of a built-in scenario, with its comments; `InputError` if there is no such scenario."""
     return built_in_text(FORM, name)
 
 
@@ -111,47 +77,18 @@ def load_scenario(name_or_path: str | os.PathLike[str]) -> Scenario:
     Raises
     ------
     InputError
-        If there is no such scenario or file, or the file is not a sound scenario; all its problems are named.
+        If there is no such scenario or file, or the file is not a valid scenario; the message lists all its problems.
     """
     return _to_scenario(load_tables(FORM, name_or_path), str(name_or_path))
 
 
 def read_scenario(text: str, source: str) -> Scenario:
-    """Turn the text of a scenario file into a scenario.
-
-    Parameters
-    ----------
-    text : str
-        TOML with exactly the tables and keys of a scenario.
-    source : str
-        What to call the text in messages: the file's name.
-
-    Returns
-    -------
-    Scenario
-        In SI units, each number rounded once.
-
-    Raises
-    ------
-    InputError
-        With every problem of the text: where it is, the value found and the remedy.
-    """
+    """Return the scenario of the text of a scenario file, as `load_scenario`; messages name `source`."""
     return _to_scenario(read_tables(FORM, text, source), source)
 
 
 def scenario_warnings(scenario: Scenario) -> list[str]:
-    """Say what is allowed in a scenario but probably not meant.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        A sound scenario.
-
-    Returns
-    -------
-    list of str
-        One line each: which key, and by how much.
-    """
+    """Return warnings about values of a scenario that are allowed but probably not intended, one line each."""
     lines = []
     uncertainty, dispersion = scenario.set_model.bounds, scenario.dispersion
     for key, unit in (("z", "km"), ("x", "km"), ("vz", "km/s"), ("vx", "km/s")):
@@ -163,7 +100,7 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
             if excess > 0:
                 lines.append(
                     f"dispersion.{name} reaches {excess / 1000:.6g} {unit} {side} uncertainty.{name}: "
-                    "the truth may start outside what is known on board, and the set may lose it"
+                    "the true state may start outside the uncertainty on board, and the set may lose it"
                 )
     speed = scenario.set_model.closing_speed_m_s
     least, greatest = -uncertainty.vx_m_s[1], -uncertainty.vx_m_s[0]
@@ -171,7 +108,7 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
     if outside > 0:
         lines.append(
             f"nominal.closing_speed_km_s is {outside / 1000:.6g} km/s outside uncertainty.vx_km_s: "
-            "the on-board model believes in a speed known to be wrong"
+            "the on-board model uses a speed that is known to be wrong"
         )
     thruster = scenario.thruster
     target, model = scenario.target, scenario.set_model
@@ -182,14 +119,14 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
     )
     if steepest > SMALL_ANGLE_RAD and not model.is_guaranteed:
         lines.append(
-            f"information_set.model is paper, which takes angles for their tangents, and the line of sight may be "
-            f"{steepest:.3g} rad off the x axis: beyond {SMALL_ANGLE_RAD:g} rad the set may lose the truth; "
+            f"information_set.model is paper, which replaces tangents by their angles, and the line of sight may be "
+            f"{steepest:.3g} rad off the x axis: beyond {SMALL_ANGLE_RAD:g} rad the set may lose the true state; "
             "write model = guaranteed"
         )
     if target is not None and model.is_guaranteed and target.acceleration_m_s2 > model.disturbance_m_s2:
         lines.append(
             f"target.acceleration_m_s2, {target.acceleration_m_s2:g}, exceeds information_set.disturbance_m_s2, "
-            f"{model.disturbance_m_s2:g}: the guaranteed model does not allow for it and may lose the truth"
+            f"{model.disturbance_m_s2:g}: the guaranteed model does not allow for it and may lose the true state"
         )
     if thruster.budget_m_s < thruster.least_impulse_m_s:
         lines.append(
@@ -200,12 +137,12 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
 
 
 def default_initial_set(model: Model) -> InitialSet:
-    """Return the shape of a section at t0 when a scenario does not say: the paper's rectangle, else the box."""
+    """Return the default shape of a section at t0: the paper's rectangle in the model `paper`, else the box."""
     return {Model.PAPER: InitialSet.RECTANGLE}.get(model, InitialSet.BOX)
 
 
 def scenario_template() -> str:
-    """Return a sound scenario file with a comment on every key, to start one's own from."""
+    """Return a valid scenario file with a comment on every key, as a start for other scenarios."""
     lines = [
         "# A scenario. Check it with: infoset scenarios check FILE",
         "# Every key carries its unit in its name. z is across the nominal line of approach, x along it, and the",
@@ -227,23 +164,12 @@ def scenario_template() -> str:
 
 
 def scenario_to_toml(scenario: Scenario) -> str:
-    """Write a scenario as a file that reads back as the same scenario, bit for bit.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        In SI units.
-
-    Returns
-    -------
-    str
-        TOML, every key given.
+    """Return the TOML of a scenario, with every key; it is read back as the same scenario, bit for bit.
 
     Raises
     ------
     InputError
-        If it holds what no file can: a number that is not finite, or an angle sensor with a nominal range other than
-        the scenario's own.
+        If no file can contain the scenario: a number is not finite, or its angle sensor has another nominal range.
     """
     model, sensor, sun = scenario.set_model, scenario.set_model.angle_sensor, scenario.sun
     if sensor.nominal_range_m != scenario.nominal_range_m:
@@ -287,99 +213,49 @@ def scenario_to_toml(scenario: Scenario) -> str:
     return "\n".join(_table_lines(tables))
 
 
-def _value_text(key: str, value: Any) -> str:
-    """Write an SI value in the unit that its key names."""
-    if isinstance(value, Enum | str):
-        return quoted_text(value.value if isinstance(value, Enum) else value)
-    if isinstance(value, tuple):
-        return f"[{', '.join(_value_text(key, end) for end in value)}]"
-    if key.endswith("_deg"):
-        return degrees_text(value)
-    power = next((power for unit, power in _POWERS.items() if key.endswith(unit)), 0)
-    return str(value) if key in _WHOLE else number_text(value, power)
-
-
-def _interval(pair: DecimalPair) -> Interval:
-    return si(pair[0], KILO), si(pair[1], KILO)
-
-
-def _state_box(table: UncertaintyTable | DispersionTable) -> StateBox:
-    return StateBox(
-        z_m=_interval(table.z_km),
-        x_m=_interval(table.x_km),
-        vz_m_s=_interval(table.vz_km_s),
-        vx_m_s=_interval(table.vx_km_s),
-    )
-
-
 def _to_scenario(tables: ScenarioTables, source: str) -> Scenario:
-    """Change units and compose the dataclasses of the core."""
+    """Change units and create the dataclasses of the simulator."""
     try:
         return _composed(tables)
     except ValueError as error:
-        # The decimals keep to the limits; two that differ beyond the sixteenth digit are one number in the core.
+        # The decimals are valid, but two that differ only beyond the sixteenth digit are equal after rounding.
         raise InputError(
             f"{source}: {error}; numbers are rounded to 16 digits: change it in the first of them"
         ) from None
 
 
 def _composed(tables: ScenarioTables) -> Scenario:
-    information_set, sun, target = tables.information_set, tables.sun, tables.target
-    nominal_range_m = si(tables.nominal.range_km, KILO)
-    fewest = information_set.fewest_sections
+    chosen, step, nominal = si_values(tables.information_set), si_values(tables.guidance), si_values(tables.nominal)
+    fewest = chosen.pop("fewest_sections")
     return Scenario(
         name=tables.name,
         description=tables.description,
-        sun=None
-        if sun is None
-        else Sun(
-            gravitational_parameter_m3_s2=si(sun.gravitational_parameter_km3_s2, 3 * KILO),
-            distance_m=si(sun.distance_km, KILO),
-            direction_rad=radians(sun.direction_deg),
-        ),
-        nominal_range_m=nominal_range_m,
-        dispersion=_state_box(tables.dispersion),
+        sun=_fitted(Sun, tables.sun),
+        nominal_range_m=nominal["range_m"],
+        dispersion=StateBox(**si_values(tables.dispersion)),
         set_model=SetModel(
-            closing_speed_m_s=si(tables.nominal.closing_speed_km_s, KILO),
-            step_s=si(tables.guidance.step_s),
-            bounds=_state_box(tables.uncertainty),
-            angle_sensor=AngleSensor(
-                period_s=si(tables.angle_sensor.period_s),
-                error_at_nominal_range_rad=si(tables.angle_sensor.error_at_nominal_range_rad),
-                error_at_zero_range_rad=si(tables.angle_sensor.error_at_zero_range_rad),
-                nominal_range_m=nominal_range_m,
-            ),
-            disturbance_m_s2=si(information_set.disturbance_m_s2),
-            range_threshold_m=si(tables.guidance.range_threshold_km, KILO),
-            sections=information_set.sections,
-            fewest_sections=min(DEFAULT_FEWEST_SECTIONS, information_set.sections) if fewest is None else fewest,
-            initial_set=information_set.initial_set or default_initial_set(information_set.model),
-            kind=information_set.model,
-            recovery=information_set.recovery,
+            closing_speed_m_s=nominal["closing_speed_m_s"],
+            step_s=step["step_s"],
+            bounds=StateBox(**si_values(tables.uncertainty)),
+            angle_sensor=AngleSensor(**si_values(tables.angle_sensor), nominal_range_m=nominal["range_m"]),
+            range_threshold_m=step["range_threshold_m"],
+            fewest_sections=min(DEFAULT_FEWEST_SECTIONS, chosen["sections"]) if fewest is None else fewest,
+            initial_set=chosen.pop("initial_set") or default_initial_set(chosen["model"]),
+            kind=chosen.pop("model"),
+            **chosen,
         ),
-        thruster=Thruster(
-            budget_m_s=si(tables.thruster.budget_m_s),
-            least_impulse_m_s=si(tables.thruster.least_impulse_m_s),
-            greatest_impulse_m_s=si(tables.thruster.greatest_impulse_m_s),
-            execution_error_relative=si(tables.thruster.execution_error_relative),
-        ),
+        target=_fitted(Target, tables.target),
+        thruster=Thruster(**si_values(tables.thruster)),
         strategy=tables.guidance.strategy,
         noise=tables.noise.kind,
         tie=tables.noise.tie,
-        target=None
-        if target is None
-        else Target(
-            manoeuvre=target.manoeuvre,
-            acceleration_m_s2=si(target.acceleration_m_s2),
-            switching_period_s=si(target.switching_period_s),
-        ),
-        **{table: _sensor(kind, getattr(tables, table)) for table, kind in OPTIONAL_SENSORS.items()},
+        **{table: _fitted(kind, getattr(tables, table)) for table, kind in OPTIONAL_SENSORS.items()},
     )
 
 
-def _sensor(kind: Any, table: Table | None) -> Any:
-    """Return a sensor from its table; None without one."""
-    return None if table is None else kind(**{field.name: si(getattr(table, field.name)) for field in fields(kind)})
+def _fitted(owner: type[Part], table: BaseModel | None) -> Part | None:
+    """Return the dataclass of an optional table."""
+    return None if table is None else owner(**si_values(table))
 
 
 def _box(box: StateBox) -> dict[str, Interval]:
@@ -390,7 +266,7 @@ def _table_lines(tables: dict[str, dict[str, object]]) -> Iterator[str]:
     for table, keys in tables.items():
         if table:
             yield f"\n[{table}]"
-        yield from (f"{key} = {_value_text(key, value)}" for key, value in keys.items())
+        yield from (f"{key} = {value_text(key, value)}" for key, value in keys.items())
     yield ""
 
 

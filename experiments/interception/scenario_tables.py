@@ -1,6 +1,6 @@
-"""The tables and keys of a scenario file, and what each value may be.
+"""Tables and keys of a scenario file, with the allowed values.
 
-Numbers stay decimal here, as written: they are rounded once, when they become SI.
+Numbers stay decimal, as written; the change to SI units rounds them once.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from experiments.common.toml_values import (
     Whole,
     key,
     known_name,
+    limited_by,
 )
 from guidance.noise import NoiseKind, TieRule
 from guidance.thruster import Thruster
@@ -36,16 +37,11 @@ from sim.scenario import Manoeuvre, Scenario, Sun, Target
 
 SCHEMA = 1
 SPEED_OF_LIGHT_KM_S = Decimal("299792.458")
-"""A file's speeds have units: none is greater. The core knows numbers alone."""
+"""Largest speed of a scenario file."""
 
 
 def _strategy(value: object) -> str:
     return known_name(value, tuple(guidance.strategy_names()))
-
-
-def _number(owner: type, field: str, power_of_ten: int = 0) -> PlainValidator:
-    """A number within the limits that the dataclass declares, in the unit of the file."""
-    return PlainValidator(Number.of(limits_of(owner, field), power_of_ten))
 
 
 _SPEED = Number(least=-SPEED_OF_LIGHT_KM_S, most=SPEED_OF_LIGHT_KM_S)
@@ -61,26 +57,24 @@ def _pair(field: str, *, fixed: bool = False) -> PlainValidator:
 class SunTable(Table):
     """[sun]."""
 
-    gravitational_parameter_km3_s2: Annotated[Decimal, _number(Sun, "gravitational_parameter_m3_s2", 3 * KILO)] = key(
+    gravitational_parameter_km3_s2: Annotated[Decimal, limited_by(Sun)] = key(
         "gravitational parameter of the Sun", "1.324948e11"
     )
-    distance_km: Annotated[Decimal, _number(Sun, "distance_m", KILO)] = key(
-        "distance of the Sun from the spacecraft at t0", "150.0e6"
-    )
+    distance_km: Annotated[Decimal, limited_by(Sun)] = key("distance of the Sun from the spacecraft at t0", "150.0e6")
     direction_deg: Degrees = key("direction of the Sun at t0, from the x axis toward z", "90.0")
 
 
 class NominalTable(Table):
     """[nominal]."""
 
-    range_km: Annotated[Decimal, _number(Scenario, "nominal_range_m", KILO)] = key("nominal range at t0", "5801.3")
-    closing_speed_km_s: ClosingSpeed = key("closing speed the on-board model believes in", "58.0")
+    range_km: Annotated[Decimal, limited_by(Scenario, "nominal_range_m")] = key("nominal range at t0", "5801.3")
+    closing_speed_km_s: ClosingSpeed = key("closing speed of the on-board model", "58.0")
 
 
 class UncertaintyTable(Table):
     """[uncertainty]."""
 
-    z_km: Annotated[DecimalPair, _pair("z_m")] = key("offset across the approach", "[-10.0, 10.0]")
+    z_km: Annotated[DecimalPair, _pair("z_m")] = key("position across the approach", "[-10.0, 10.0]")
     x_km: Annotated[DecimalPair, _pair("x_m")] = key("range", "[5301.3, 6301.3]")
     vz_km_s: Annotated[DecimalPair, PlainValidator(Pair(_SPEED))] = key("speed across", "[-0.1, 0.1]")
     vx_km_s: Annotated[DecimalPair, PlainValidator(Pair(_APPROACH))] = key(
@@ -104,13 +98,13 @@ class DispersionTable(Table):
 class AngleSensorTable(Table):
     """[angle_sensor]."""
 
-    period_s: Annotated[Decimal, _number(AngleSensor, "period_s")] = key(
+    period_s: Annotated[Decimal, limited_by(AngleSensor)] = key(
         "time between measurements, a multiple of guidance.step_s", "0.5"
     )
-    error_at_nominal_range_rad: Annotated[Decimal, _number(AngleSensor, "error_at_nominal_range_rad")] = key(
+    error_at_nominal_range_rad: Annotated[Decimal, limited_by(AngleSensor)] = key(
         "greatest error at nominal.range_km", "0.00015"
     )
-    error_at_zero_range_rad: Annotated[Decimal, _number(AngleSensor, "error_at_zero_range_rad")] = key(
+    error_at_zero_range_rad: Annotated[Decimal, limited_by(AngleSensor)] = key(
         "greatest error at range zero; a straight line joins both", "0.00023"
     )
 
@@ -118,21 +112,19 @@ class AngleSensorTable(Table):
 class RangeSensorTable(Table):
     """[range_sensor]."""
 
-    period_s: Annotated[Decimal, _number(RangeSensor, "period_s")] = key(
+    period_s: Annotated[Decimal, limited_by(RangeSensor)] = key(
         "time between measurements, a multiple of guidance.step_s", "2.0"
     )
-    relative_error: Annotated[Decimal, _number(RangeSensor, "relative_error")] = key(
-        "greatest error as a part of the range", "0.05"
-    )
+    relative_error: Annotated[Decimal, limited_by(RangeSensor)] = key("greatest error, relative to the range", "0.05")
 
 
 class RateSensorTable(Table):
     """[rate_sensor]."""
 
-    period_s: Annotated[Decimal, _number(RateSensor, "period_s")] = key(
+    period_s: Annotated[Decimal, limited_by(RateSensor)] = key(
         "time between measurements, a multiple of guidance.step_s", "1.0"
     )
-    error_rad_s: Annotated[Decimal, _number(RateSensor, "error_rad_s")] = key(
+    error_rad_s: Annotated[Decimal, limited_by(RateSensor)] = key(
         "greatest error of the line of sight's angular rate", "1e-6"
     )
 
@@ -147,57 +139,55 @@ class TargetTable(Table):
     manoeuvre: Annotated[Manoeuvre, PlainValidator(OneOf(Manoeuvre))] = key(
         '"none", "constant", "bang-bang", "random-telegraph" or "worst-case"', '"bang-bang"'
     )
-    acceleration_m_s2: Annotated[Decimal, _number(Target, "acceleration_m_s2")] = key(
-        "its acceleration across", "0.005"
-    )
-    switching_period_s: Annotated[Decimal, _number(Target, "switching_period_s")] = key(
-        "time between changes of side; its mean where they are random", "10.0", default=Decimal(10)
+    acceleration_m_s2: Annotated[Decimal, limited_by(Target)] = key("its acceleration along z", "0.005")
+    switching_period_s: Annotated[Decimal, limited_by(Target)] = key(
+        "time between changes of sign; their mean time if random", "10.0", default=Decimal(10)
     )
 
 
 class ThrusterTable(Table):
     """[thruster]."""
 
-    budget_m_s: Annotated[Decimal, _number(Thruster, "budget_m_s")] = key("sum of the sizes of all impulses", "1000.0")
-    least_impulse_m_s: Annotated[Decimal, _number(Thruster, "least_impulse_m_s")] = key(
-        "smaller impulses cannot be given", "0.25"
+    budget_m_s: Annotated[Decimal, limited_by(Thruster)] = key("sum of the absolute values of all impulses", "1000.0")
+    least_impulse_m_s: Annotated[Decimal, limited_by(Thruster)] = key("smaller impulses become zero", "0.25")
+    greatest_impulse_m_s: Annotated[Decimal, limited_by(Thruster)] = key(
+        "greater impulses are reduced to this one", "7.5"
     )
-    greatest_impulse_m_s: Annotated[Decimal, _number(Thruster, "greatest_impulse_m_s")] = key("nor greater ones", "7.5")
-    execution_error_relative: Annotated[Decimal, _number(Thruster, "execution_error_relative")] = key(
-        "an impulse may come out greater or less by this part", "0.0", default=Decimal(0)
+    execution_error_relative: Annotated[Decimal, limited_by(Thruster)] = key(
+        "greatest relative error of an executed impulse", "0.0", default=Decimal(0)
     )
 
 
 class GuidanceTable(Table):
     """[guidance]."""
 
-    step_s: Annotated[Decimal, _number(SetModel, "step_s")] = key("step of observation and control", "0.5")
+    step_s: Annotated[Decimal, limited_by(SetModel)] = key("step of observation and control", "0.5")
     strategy: Annotated[str, PlainValidator(_strategy)] = key("name of the guidance strategy", '"symmetric-miss"')
-    range_threshold_km: Positive = key("hypotheses about to come nearer leave the set", "5.0")
+    range_threshold_km: Positive = key("sections that would come nearer leave the set", "5.0")
 
 
 class InformationSetTable(Table):
     """[information_set]."""
 
     model: Annotated[Model, PlainValidator(OneOf(Model))] = key(
-        '"paper", as published, or "guaranteed", which never loses the truth', '"paper"'
+        '"paper", as published, or "guaranteed", which keeps the true state', '"paper"'
     )
     initial_set: Annotated[InitialSet | None, PlainValidator(OneOf(InitialSet))] = key(
         'a section at t0: "rectangle" in (omega, alpha) or "box" in (z, V)', '"rectangle"', default=None
     )
     sections: Annotated[int, PlainValidator(Whole(MOST_SECTIONS))] = key(
-        "ranges the set is stored at, a uniform grid over uncertainty.x_km", "29"
+        "number of sections: a uniform grid of ranges over uncertainty.x_km", "29"
     )
     fewest_sections: Annotated[int | None, PlainValidator(Whole(MOST_SECTIONS))] = key(
-        "fewer left: the grid is made anew with 2 fewest_sections + 1", "5", default=None
+        "with fewer left, a new grid of 2 fewest_sections + 1 sections", "5", default=None
     )
     recovery: Annotated[Recovery, PlainValidator(OneOf(Recovery))] = key(
-        'what a set that empties becomes: "widened", or "none"',
+        'after a set became empty: "widened" enlarges it, "none" ends guidance',
         '"widened"',
         default=Recovery.WIDENED,
     )
-    disturbance_m_s2: Annotated[Decimal, _number(SetModel, "disturbance_m_s2")] = key(
-        "bound of the unknown acceleration across, or of the target's", "0.005"
+    disturbance_m_s2: Annotated[Decimal, limited_by(SetModel)] = key(
+        "bound of the unknown acceleration along z, target included", "0.005"
     )
 
 
@@ -208,7 +198,7 @@ class NoiseTable(Table):
         '"random", or "game": errors chosen against the guidance', '"random"'
     )
     tie: Annotated[TieRule, PlainValidator(OneOf(TieRule))] = key(
-        'the game keeps of equals: "upper", "lower", "alternate", "random"',
+        'ties of game noise: "upper", "lower", "alternate" or "random"',
         '"upper"',
         default=TieRule.UPPER,
     )
@@ -218,21 +208,21 @@ class ScenarioTables(Table):
     """A whole scenario file."""
 
     schema_number: Annotated[int, PlainValidator(lambda value: value)] = key(
-        "version of this form of file", str(SCHEMA), alias="schema"
+        "version of the file format", str(SCHEMA), alias="schema"
     )
-    name: Name = key("what results and files are called", '"my-scenario"')
+    name: Name = key("name in results and files", '"my-scenario"')
     description: Description = key("a line for `infoset scenarios list`", '"What this scenario is about"', default="")
     sun: SunTable | None = key("the Sun, seen from the spacecraft; without the table: free space", "", default=None)
-    nominal: NominalTable = key("where the object is expected", "")
-    uncertainty: UncertaintyTable = key("what is known on board of the start", "")
-    dispersion: DispersionTable = key("where the truth starts, unknown on board", "")
+    nominal: NominalTable = key("expected range and closing speed", "")
+    uncertainty: UncertaintyTable = key("initial state of the object as known on board", "")
+    dispersion: DispersionTable = key("initial true state, unknown on board", "")
     angle_sensor: AngleSensorTable = key("the line-of-sight sensor", "")
     range_sensor: RangeSensorTable | None = key("the range meter; without the table: none", "", default=None)
     rate_sensor: RateSensorTable | None = key(
         "the sensor of the line of sight's rate; without the table: none", "", default=None
     )
-    target: TargetTable | None = key("how the object accelerates; without the table: not at all", "", default=None)
+    target: TargetTable | None = key("how the object accelerates; without the table: no acceleration", "", default=None)
     thruster: ThrusterTable = key("the engine", "")
     guidance: GuidanceTable = key("how impulses are chosen", "")
-    information_set: InformationSetTable = key("how hypotheses are kept", "")
+    information_set: InformationSetTable = key("the information set", "")
     noise: NoiseTable = key("how measurement errors are chosen", "")
