@@ -64,21 +64,22 @@ class Clock:
     def measured(self, work: Callable[..., Any]) -> Callable[..., Any]:
         """Count the sections of a measurement, then time it."""
 
-        def part(behind: Any, active: Any, _alpha: Any, _elapsed: Any, _event: Any, sections: Any, _law: Any) -> str:
+        def part(behind: Any, measured: Any, _stale: Any, _heights: Any, *others: Any) -> str:
+            sections = others[3]
             if sections.labels.shape[1] == 1:
                 return TRUTH_SECTION
-            self.section_steps += int((sections.living & (active | behind)[:, None]).sum())
+            self.section_steps += int((sections.living & (measured | behind)[:, None]).sum())
             return SECTION_STEPS
 
         return self.timed(part, work)
 
     def watch(self) -> None:
         """Put clocks round the kernels and the truth's motion."""
-        section_passes.measure_all = self.measured(section_passes.measure_all)
+        section_passes.step_all = self.measured(section_passes.step_all)
         for owner, names, part in (
             (section_passes, ("widest_all",), SECTION_STEPS),
             (section_passes, ("margins_all",), TRUTH_SECTION),
-            (section_passes, ("room_wanted", "make_room_all", "start_all", "catch_up_all"), REGRIDS),
+            (section_passes, ("make_room_all", "start_all"), REGRIDS),
             (information_set, ("refine_all",), REGRIDS),
             (section_passes, ("shift_all",), IMPULSES),
             (KeplerMotion, ("sight", "advance", "fire", "arrival_s"), TRUTH),

@@ -13,7 +13,6 @@ import typer
 from typer.core import TyperGroup
 
 from experiments.campaigns.command import campaign, report, sweep
-from experiments.common.compile_cache import keep_kernels_somewhere
 from experiments.common.errors import INTERRUPTED, InputError, on_a_screen
 from experiments.interception.commands.adversary import adversary
 from experiments.interception.commands.bound import bound
@@ -134,7 +133,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
         Always: 0 done, 1 a published number disagrees, 2 wrong input, 130 interrupted.
     """
     try:
-        keep_kernels_somewhere()
         commands()(args=None if arguments is None else list(arguments), prog_name="infoset")
     except MemoryError as error:
         typer.echo(_out_of_memory(error), err=True)

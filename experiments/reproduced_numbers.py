@@ -17,9 +17,6 @@ from experiments.common.screen import (
     print_lines,
     progress_bar,
     table_console,
-    tell_of_compiling,
-    tell_of_compiling_pursuit,
-    tell_of_compiling_rendezvous,
 )
 from experiments.papers import PAPERS, reproduce_paper
 from experiments.reproduce import Reproduce
@@ -35,12 +32,6 @@ def run(options: Reproduce) -> None:
         output(files={"--json": options.json}, overwrite=options.overwrite, quiet=options.quiet) as written,
         progress_bar(options.quiet) as begin,
     ):
-        if "interception" in papers:
-            tell_of_compiling(options.quiet)
-        if "pareto" in papers or "multipoint" in papers:
-            tell_of_compiling_rendezvous(options.quiet)
-        if "pursuit" in papers:
-            tell_of_compiling_pursuit(options.quiet)
         reproductions = [reproduce_paper(name, begin(name)) for name in papers]
         summary = {"version": library_version(), "papers": [_summary(each) for each in reproductions]}
         written.deliver("--json", to_json(summary))

@@ -5,7 +5,7 @@ A section is begun, its level turns, it is pulled apart, shifted, cut, and asked
 
 from __future__ import annotations
 
-from infoset._compile import allocation_free, inlined, substituted
+from infoset._compile import allocation_free, constants, inlined
 from infoset.chains import (
     BEGIN,
     END,
@@ -34,6 +34,10 @@ from infoset.chains import (
     write,
 )
 
+_, FORWARD = constants(2)
+BACKWARD = -FORWARD
+"""Ways along a chain."""
+
 
 @inlined
 def move_part(origins: Floats, n: int, side: int, part: int, value: float) -> None:
@@ -45,7 +49,7 @@ def move_part(origins: Floats, n: int, side: int, part: int, value: float) -> No
     origins[n, side, part + 1] += (before - (after - added)) + (value - added)
 
 
-@substituted
+@inlined
 def product_error(a: float, b: float, product: float) -> float:
     """What rounding took from a product of two floats: a b - product (Dekker)."""
     split = 134217729.0
@@ -185,7 +189,7 @@ def turn(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float) ->
     marks[n, LEFT, BEGIN], marks[n, LEFT, END] = left_begin, left_end
 
 
-@substituted
+@inlined
 def spread(origins: Floats, n: int, tau: float, half_v: float) -> None:
     """Minkowski sum with the segment of V from -half_v to half_v that lies along the level of `tau`."""
     half_m = half_v * tau
@@ -196,7 +200,7 @@ def spread(origins: Floats, n: int, tau: float, half_v: float) -> None:
     origins[n, RIGHT, REACH] += half_v
 
 
-@substituted
+@inlined
 def shift(origins: Floats, n: int, tau: float, v: float) -> None:
     """Move by V along the level of `tau`: z stays, the predicted miss changes by V tau."""
     m = v * tau
@@ -208,7 +212,7 @@ def shift(origins: Floats, n: int, tau: float, v: float) -> None:
     origins[n, RIGHT, REACH] += abs(v)
 
 
-@substituted
+@inlined
 def heights(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float) -> tuple[float, float]:
     """Least and greatest z of a section that is turned to `tau`."""
     right, left = origin_height(origins, n, RIGHT, tau), origin_height(origins, n, LEFT, tau)
@@ -293,13 +297,13 @@ def cut(
     left_first, left_last = marks[n, LEFT, BEGIN], marks[n, LEFT, END] - 1
     right_height, left_height = origin_height(origins, n, RIGHT, tau), origin_height(origins, n, LEFT, tau)
     if greatest > upper:
-        right_last = cut_end(rings, right, right_last, right_first, -1, 1.0, tau, upper - right_height)
-        left_first = cut_end(rings, left, left_first, left_last, 1, 1.0, tau, upper - left_height)
+        right_last = cut_end(rings, right, right_last, right_first, BACKWARD, 1.0, tau, upper - right_height)
+        left_first = cut_end(rings, left, left_first, left_last, FORWARD, 1.0, tau, upper - left_height)
         marks[n, RIGHT, END] = right_last + 1
         marks[n, LEFT, BEGIN] = left_first
     if least < lower:
-        left_last = cut_end(rings, left, left_last, left_first, -1, -1.0, tau, left_height - lower)
-        right_first = cut_end(rings, right, right_first, right_last, 1, -1.0, tau, right_height - lower)
+        left_last = cut_end(rings, left, left_last, left_first, BACKWARD, -1.0, tau, left_height - lower)
+        right_first = cut_end(rings, right, right_first, right_last, FORWARD, -1.0, tau, right_height - lower)
         marks[n, LEFT, END] = left_last + 1
         marks[n, RIGHT, BEGIN] = right_first
     return True, overlap

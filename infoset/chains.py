@@ -30,7 +30,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset._compile import allocation_free, constants, inlined, prefetch, substituted
+from infoset._compile import allocation_free, constants, inlined, prefetch
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -119,13 +119,13 @@ def working_room() -> Floats:
     return np.empty((CAPACITY + 2, 2))
 
 
-@substituted
+@inlined
 def place_in(ring: tuple[int, int], i: int) -> int:
     """Where a ring, of which the first place and the mask are given, has a vertex."""
     return ring[0] + 2 * (i & ring[1])
 
 
-@substituted
+@inlined
 def place(marks: Integers, n: int, side: int, i: int) -> int:
     """Where the rings have a vertex of a chain."""
     return int(marks[n, side, RING] + 2 * (i & marks[n, side, MASK]))
@@ -147,19 +147,19 @@ def write(rings: Floats, at: int, v: float, m: float) -> None:
     rings[np.uint64(at + 1)] = m
 
 
-@substituted
+@inlined
 def begin_of(marks: Integers, n: int, side: int) -> int:
     """Number of the first vertex of a chain."""
     return int(marks[n, side, BEGIN])
 
 
-@substituted
+@inlined
 def end_of(marks: Integers, n: int, side: int) -> int:
     """One past the number of the last vertex of a chain."""
     return int(marks[n, side, END])
 
 
-@substituted
+@inlined
 def count_of(marks: Integers, n: int) -> int:
     """Number of vertices of both chains."""
     right, left = marks[n, RIGHT, END] - marks[n, RIGHT, BEGIN], marks[n, LEFT, END] - marks[n, LEFT, BEGIN]
@@ -175,7 +175,7 @@ def expect(rings: Floats, marks: Integers, n: int) -> None:
         prefetch(rings, place(marks, n, side, marks[n, side, PEAK]))
 
 
-@substituted
+@inlined
 def room_of(marks: Integers, n: int) -> int:
     """Vertices that either chain of a section has room for."""
     return int(marks[n, RIGHT, MASK] + 1)
@@ -194,7 +194,7 @@ def widen_rings(rings: Floats, marks: Integers, n: int, room: int) -> None:
         marks[n, side, MASK] = room - 1
 
 
-@substituted
+@inlined
 def floats_of(room: int) -> int:
     """Floats that a ring takes: a line more than its vertices, lest all rings begin in the same lines of a cache."""
     return 2 * room + LINE
@@ -208,7 +208,7 @@ def room_for(vertices: int, room: int) -> int:
     return room
 
 
-@substituted
+@inlined
 def sign_of(side: int) -> float:
     """The side from which a chain is seen to rise: 1 for the right one, -1 for the left one."""
     return 1.0 - 2.0 * side
@@ -237,7 +237,7 @@ def vertex(origins: Floats, rings: Floats, marks: Integers, n: int, side: int, i
     return v, m
 
 
-@substituted
+@inlined
 def put(rings: Floats, marks: Integers, n: int, side: int, i: int, v: float, m: float) -> None:
     """Write a vertex, from the origin of its chain."""
     write(rings, place(marks, n, side, i), v, m)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from infoset._compile import allocation_free
+from infoset._compile import ZERO, allocation_free
 from infoset.section_life import Floats, Integers
 
 CERTAIN = 1e-13
@@ -72,13 +72,13 @@ def is_dead_between(labels: Floats, died: Integers, overlaps: Floats, number: in
     for i in range(1, number):
         last_event = max(last_event, died[i])
     known, values = latest[0], latest[1]
-    count = 0
+    count = ZERO
     for i in range(number):
         if died[i] == last_event and (count == 0 or labels[i] > known[count - 1]):
             known[count], values[count] = labels[i], overlaps[i]
             count += 1
     rounding = -CERTAIN * labels[number - 1]
-    if labels[0] < known[0] and bound_between(known, values, count, 0, labels[0], known[0], 0.0, 0.0) >= rounding:
+    if labels[0] < known[0] and bound_between(known, values, count, ZERO, labels[0], known[0], 0.0, 0.0) >= rounding:
         return False
     for i in range(count - 1):
         if bound_between(known, values, count, i + 1, known[i], known[i + 1], 0.0, 0.0) >= rounding:

@@ -191,9 +191,7 @@ class InformationSetView:
     @property
     def section_counts(self) -> NDArray[np.int64]:
         """Number of living sections, shape (B,)."""
-        counts = np.empty(self.batch, dtype=np.int64)
-        section_passes.count_living_all(self._stack.living, counts)
-        return counts
+        return np.asarray(np.count_nonzero(self._stack.living, axis=1))
 
     def stored_range_interval_m(self) -> tuple[Floats, Floats]:
         """Least and greatest range of the living stored sections, m; zeros where there is none."""
@@ -292,7 +290,7 @@ class InformationSetView:
         self._need_engagement(engagement)
         tape, law, label = self._history, self._stack.law, float(label_m)
         section = empty_sections(1)
-        died = section_life.replay(
+        died = section_passes.replay_section(
             label, tape.tape(engagement), tape.errors_if_any, law, *section, 0, np.empty(tape.events), working_room()
         )
         vertices = outline(section, 0, label, tape.elapsed, law) if died == section_life.ALIVE else np.empty((0, 2))

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from infoset._compile import compiled
+from infoset._compile import allocation_free, compiled
 from infoset.polygon import ROUNDING, Points, append, close, cross
 
 
@@ -71,7 +71,7 @@ def sort_points(points: Points, count: int) -> None:
         points[j, 1] = y
 
 
-@compiled
+@allocation_free
 def drop_turned(out: Points, made: int, fewest: int, x: float, y: float) -> int:
     """Drop last vertices, down to `fewest`, at which the way to (x, y) does not turn left; return the new count."""
     while made > fewest:
@@ -132,7 +132,7 @@ def reduce_outward(points: Points, count: int, cap: int) -> int:
     return count
 
 
-@compiled
+@allocation_free
 def cheapest_edge(points: Points, count: int, first: int, last: int) -> tuple[int, float, float]:
     """First vertex of the edge that costs least area to drop, and where its neighbours meet; -1 if not convex.
 

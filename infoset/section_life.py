@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import chain_steps, chains, whole_chains
-from infoset._compile import ZERO, allocation_free, compiled, entry, inlined, substituted
+from infoset._compile import ZERO, allocation_free, entry, inlined
 from infoset.chains import REACH, RIGHT
 from infoset.section_law import SectionLaw
 
@@ -89,19 +89,19 @@ class LastSight(NamedTuple):
     fired: float
 
 
-@substituted
+@inlined
 def range_of(label: float, elapsed: int, law: SectionLaw) -> float:
     """Range of a label after a number of steps."""
     return label - law.closing_speed * (law.step * elapsed)
 
 
-@substituted
+@inlined
 def time_to_go(label: float, elapsed: int, law: SectionLaw) -> float:
     """Time until the range of a label is zero, after a number of steps."""
     return range_of(label, elapsed, law) / law.closing_speed
 
 
-@entry
+@allocation_free
 def start_section(origins: Floats, rings: Floats, marks: Integers, n: int, label: float, law: SectionLaw) -> None:
     """Write the section at t = 0.
 
@@ -120,7 +120,7 @@ def start_section(origins: Floats, rings: Floats, marks: Integers, n: int, label
         highest -= min(law.vx_least * z_greatest, law.vx_greatest * z_greatest) / x
         shift_at_least, shift_at_greatest = -e * math.atan(z_least / x), -e * math.atan(z_greatest / x)
         z_least, z_greatest = math.atan(z_least / x) * x, math.atan(z_greatest / x) * x
-    tau = time_to_go(label, 0, law)
+    tau = time_to_go(label, ZERO, law)
     chain_steps.start(
         origins,
         rings,
@@ -134,7 +134,7 @@ def start_section(origins: Floats, rings: Floats, marks: Integers, n: int, label
         chain_steps.spread(origins, n, tau, law.half_v_at_start)
 
 
-@compiled
+@entry
 def steepest_angle(alpha: float, range_m: float, law: SectionLaw) -> float:
     """Greatest |alpha| that a measured angle admits up to a range, rad; a right angle where there is no such bound.
 
@@ -347,7 +347,7 @@ def widen_section(origins: Floats, n: int, label: float, elapsed: int, law: Sect
     chain_steps.spread(origins, n, x / law.closing_speed, law.closing_speed * bound)
 
 
-@substituted
+@inlined
 def shift_section(origins: Floats, n: int, label: float, elapsed: int, impulse: float, law: SectionLaw) -> None:
     """Shift a section by an impulse: V becomes V - k, for every k that the commanded one may have been."""
     tau = time_to_go(label, elapsed, law)
@@ -389,7 +389,7 @@ def summarise_section(
     summaries[b, s, LOWER_MISS] = lower - drift
 
 
-@entry
+@allocation_free
 def replay(
     label: float,
     tape: Tape,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from infoset import chain_steps, chains, polygon, whole_chains
-from infoset._compile import allocation_free, entry
+from infoset._compile import ZERO, allocation_free, entry
 from infoset.history import Tapes
 from infoset.section_law import SectionLaw
 from infoset.section_life import (
@@ -28,6 +28,7 @@ from infoset.section_life import (
     measure_section,
     predict_section,
     range_of,
+    replay,
     shift_section,
     start_section,
     summarise_section,
@@ -100,12 +101,12 @@ def start_all(sections: Sections, law: SectionLaw) -> None:
 
 
 @allocation_free
-def list_rows(some: Flags, others: Flags, everyone: bool, sections: Sections) -> int:
-    """List the living sections of the engagements that are among some or others, or of everyone; return how many."""
+def list_rows(first: Flags, second: Flags, third: Flags, everyone: bool, sections: Sections) -> int:
+    """List the living sections of the engagements in any of three groups, or of all; return how many."""
     _, used, living, _, _, _, _, _, _, rows = sections
     count = 0
     for b in range(living.shape[0]):
-        if some[b] or others[b] or everyone:
+        if first[b] or second[b] or third[b] or everyone:
             for s in range(used[b]):
                 if living[b, s]:
                     rows[count, 0], rows[count, 1], rows[count, 2] = b * living.shape[1] + s, b, s
@@ -114,31 +115,59 @@ def list_rows(some: Flags, others: Flags, everyone: bool, sections: Sections) ->
 
 
 @entry
-def measure_all(
-    behind: Flags, active: Flags, alpha: Floats, elapsed: int, event: int, sections: Sections, law: SectionLaw
+def step_all(
+    behind: Flags,
+    measured: Flags,
+    stale: Flags,
+    heights_wanted: bool,
+    alpha: Floats,
+    elapsed: int,
+    event: int,
+    sections: Sections,
+    law: SectionLaw,
 ) -> int:
-    """Cut every living section of the active engagements by their angle measurements, and summarise it.
+    """Predict, cut and summarise the living sections in one pass; return how many died.
 
-    Sections that are a step behind are moved on first, in the same pass. Returned is how many died.
+    Parameters
+    ----------
+    behind : ndarray of bool, shape (B,)
+        Engagements whose sections are still at step `elapsed - 1`: they are moved to step `elapsed`.
+    measured : ndarray of bool, shape (B,)
+        Engagements whose sections are cut by an angle measurement and summarised.
+    stale : ndarray of bool, shape (B,)
+        Engagements whose sections are summarised.
+    heights_wanted : bool
+        Whether the least and the greatest z of all sections are written.
+    alpha : ndarray, shape (B,)
+        Measured angles, rad.
+    elapsed, event : int
+        Steps so far, and number of the measurement.
+    sections, law : Sections, SectionLaw
+        The sections, which are changed in place, and the numbers of the model.
     """
     deaths = 0
     labels, _, living, died, overlaps, origins, rings, marks, summaries, rows = sections
-    count = list_rows(behind, active, False, sections)
+    count = list_rows(behind, measured, stale, heights_wanted, sections)
     for k in range(count):
         n, b, s = rows[k, 0], rows[k, 1], rows[k, 2]
         if k + 1 < count:
             chains.expect(rings, marks, rows[k + 1, 0])
         if behind[b]:
             predict_section(origins, rings, marks, n, labels[b, s], elapsed, law)
-        if not active[b]:
-            continue
-        living[b, s], overlap = measure_section(origins, rings, marks, n, labels[b, s], elapsed, alpha[b], law)
-        if living[b, s]:
+        if measured[b]:
+            living[b, s], overlap = measure_section(origins, rings, marks, n, labels[b, s], elapsed, alpha[b], law)
+            if not living[b, s]:
+                died[b, s] = event
+                overlaps[b, s] = overlap
+                deaths += 1
+                continue
+        if measured[b] or stale[b]:
             summarise_section(origins, rings, marks, n, labels[b, s], elapsed, law, summaries, b, s)
-        else:
-            died[b, s] = event
-            overlaps[b, s] = overlap
-            deaths += 1
+        if heights_wanted:
+            tau = time_to_go(labels[b, s], elapsed, law)
+            least, greatest = chain_steps.heights(origins, rings, marks, n, tau)
+            summaries[b, s, Z_LEAST] = least
+            summaries[b, s, Z_GREATEST] = greatest
     return deaths
 
 
@@ -208,102 +237,47 @@ def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, 
 
 
 @entry
-def catch_up_all(
-    behind: Flags, stale: Flags, heights_wanted: bool, elapsed: int, sections: Sections, law: SectionLaw
-) -> None:
-    """Move the sections that are a step behind on to step `elapsed`, and summarise those whose summary is stale.
+def make_room_all(
+    active: Flags, added: int, elapsed: int, sections: Sections, law: SectionLaw, points: Floats, widen: bool
+) -> tuple[int, int]:
+    """Find the room of the living sections of the active engagements, and widen their rings if that is wanted.
 
-    Where it is wanted, the summary has the least and the greatest z too.
-    """
-    labels, _, _, _, _, origins, rings, marks, summaries, rows = sections
-    count = list_rows(behind, stale, heights_wanted, sections)
-    for k in range(count):
-        n, b, s = rows[k, 0], rows[k, 1], rows[k, 2]
-        if k + 1 < count:
-            chains.expect(rings, marks, rows[k + 1, 0])
-        if behind[b]:
-            predict_section(origins, rings, marks, n, labels[b, s], elapsed, law)
-        if stale[b]:
-            summarise_section(origins, rings, marks, n, labels[b, s], elapsed, law, summaries, b, s)
-        if heights_wanted:
-            tau = time_to_go(labels[b, s], elapsed, law)
-            least, greatest = chain_steps.heights(origins, rings, marks, n, tau)
-            summaries[b, s, Z_LEAST] = least
-            summaries[b, s, Z_GREATEST] = greatest
-
-
-@entry
-def room_wanted(active: Flags, added: int, sections: Sections) -> tuple[int, int]:
-    """Say what room the living sections of the active engagements have.
+    Parameters
+    ----------
+    added : int
+        Vertices that every section must be able to gain.
+    active, elapsed, sections, law, points
+        Engagements, steps so far, their sections, the numbers of the model, and working room.
+    widen : bool
+        Whether to widen the rings, for which there must be memory; sections with `CAPACITY` vertices are reduced first.
 
     Returns
     -------
     floats : int
-        Floats that the rings lack before any section may gain so many vertices.
+        Floats that the rings lack before the sections can gain so many vertices.
     spare : int
         Vertices that every section may gain; negative where one must be reduced first.
     """
-    labels, used, living, _, _, _, _, marks, _, _ = sections
-    floats = 0
+    labels, used, living, _, _, origins, rings, marks, _, _ = sections
+    floats = ZERO
     spare = chains.CAPACITY
     for b in range(labels.shape[0]):
         if not active[b]:
             continue
         for s in range(used[b]):
-            if living[b, s]:
-                n = b * labels.shape[1] + s
-                count, room = chains.count_of(marks, n), chains.room_of(marks, n)
-                spare = min(spare, room - count)
-                if min(count + added, chains.CAPACITY) > room:
-                    floats += 2 * chains.floats_of(chains.room_for(count + added, room))
-    return floats, spare
-
-
-@entry
-def make_room_all(active: Flags, added: int, elapsed: int, sections: Sections, law: SectionLaw, points: Floats) -> None:
-    """See that the living sections of the active engagements may gain so many vertices: give them wider rings.
-
-    Those that have all that a section may have are reduced, outward.
-    """
-    labels, used, living, _, _, origins, rings, marks, _, _ = sections
-    for b in range(labels.shape[0]):
-        if not active[b]:
-            continue
-        for s in range(used[b]):
-            n = b * labels.shape[1] + s
             if not living[b, s]:
                 continue
-            if whole_chains.is_crowded(marks, n):
+            n = b * labels.shape[1] + s
+            if widen and whole_chains.is_crowded(marks, n):
                 whole_chains.reduce_outward(origins, rings, marks, n, time_to_go(labels[b, s], elapsed, law), points)
-            vertices = min(chains.count_of(marks, n) + added, chains.CAPACITY)
-            wanted = chains.room_for(vertices, chains.room_of(marks, n))
-            if wanted > chains.room_of(marks, n):
+            count, room = chains.count_of(marks, n), chains.room_of(marks, n)
+            wanted = chains.room_for(min(count + added, chains.CAPACITY), room)
+            if wanted > room and widen:
                 chains.widen_rings(rings, marks, n, wanted)
-
-
-@entry
-def keep_labels_all(active: Flags, least: Floats, greatest: Floats, sections: Sections, removed: Flags) -> int:
-    """Remove the living sections whose labels are outside [least, greatest]; write which, and return how many."""
-    labels, used, living, _, _, _, _, _, _, _ = sections
-    count = 0
-    for b in range(labels.shape[0]):
-        if not active[b]:
-            continue
-        for s in range(used[b]):
-            if living[b, s] and not least[b] <= labels[b, s] <= greatest[b]:
-                living[b, s] = False
-                removed[b, s] = True
-                count += 1
-    return count
-
-
-@entry
-def count_living_all(living: Flags, counts: Integers) -> None:
-    """Write how many sections of each engagement live."""
-    for b in range(living.shape[0]):
-        counts[b] = 0
-        for s in range(living.shape[1]):
-            counts[b] += living[b, s]
+            elif wanted > room:
+                floats += 2 * chains.floats_of(wanted)
+            spare = min(spare, chains.room_of(marks, n) - count)
+    return floats, spare
 
 
 @entry
@@ -380,3 +354,26 @@ def margin_in(origins: Floats, rings: Floats, marks: Integers, n: int, tau: floa
             nearest, inside = polygon.pass_edge(nearest, inside, last, vertex, 0.0, 0.0)
             last = vertex
     return math.sqrt(nearest) if inside else -math.sqrt(nearest)
+
+
+@entry
+def replay_section(
+    label: float,
+    tape: Tape,
+    errors: Floats | None,
+    law: SectionLaw,
+    origins: Floats,
+    rings: Floats,
+    marks: Integers,
+    n: int,
+    overlaps: Floats,
+    points: Floats,
+) -> int:
+    """Call `section_life.replay` from Python."""
+    return replay(label, tape, errors, law, origins, rings, marks, n, overlaps, points)
+
+
+@entry
+def write_outline(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, out: Floats) -> int:
+    """Call `whole_chains.outline` from Python."""
+    return whole_chains.outline(origins, rings, marks, n, tau, out)

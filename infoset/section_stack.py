@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset import chains, section_life, section_passes, whole_chains
+from infoset import chains, section_life, section_passes
 from infoset.chains import Chains
 from infoset.history import History
 from infoset.section_law import SectionLaw
@@ -77,17 +77,22 @@ class SectionStack:
     def _summarise(self, heights_wanted: bool = False) -> None:
         """Bring sections and summaries up to date."""
         if self._is_stale or heights_wanted:
-            section_passes.catch_up_all(
-                self._behind, self._stale, heights_wanted, self._elapsed, self.sections, self.law
-            )
+            self._pass(self._stale, heights_wanted)
             self._behind = self._stale = self._nobody
             self._is_behind = self._is_stale = False
             self._has_heights |= heights_wanted
 
+    def _pass(self, stale: Flags, heights_wanted: bool) -> None:
+        """Move the sections that are behind to the step, and summarise the stale ones."""
+        alpha = np.empty(0)
+        section_passes.step_all(
+            self._behind, self._nobody, stale, heights_wanted, alpha, self._elapsed, 0, self.sections, self.law
+        )
+
     def _catch_up(self) -> None:
         """Bring sections up to date."""
         if self._is_behind:
-            section_passes.catch_up_all(self._behind, self._nobody, False, self._elapsed, self.sections, self.law)
+            self._pass(self._nobody, False)
             self._behind, self._is_behind = self._nobody, False
 
     def ranges(self, elapsed: int) -> Floats:
@@ -99,12 +104,12 @@ class SectionStack:
         self._spare -= chains.MOST_ADDED
         if self._spare >= 0:
             return
-        floats, spare = section_passes.room_wanted(active, chains.ROOM_AHEAD, self.sections)
+        elapsed, points = self._elapsed, chains.working_room()
+        make_room = section_passes.make_room_all
+        floats, spare = make_room(active, chains.ROOM_AHEAD, elapsed, self.sections, self.law, points, False)
         if floats or spare < chains.MOST_ADDED:
             self.sections = self.sections._replace(rings=chains.with_room(self.sections.rings, floats))
-            room = chains.working_room()
-            section_passes.make_room_all(active, chains.ROOM_AHEAD, self._elapsed, self.sections, self.law, room)
-            _, spare = section_passes.room_wanted(active, 0, self.sections)
+            _, spare = make_room(active, chains.ROOM_AHEAD, elapsed, self.sections, self.law, points, True)
         self._spare = spare - chains.MOST_ADDED
 
     def make_room_for_new(self, wanted: Flags, number: int) -> None:
@@ -124,7 +129,9 @@ class SectionStack:
 
     def measure_angle(self, active: Flags, alpha: Floats, elapsed: int, event: int) -> int:
         """Cut the living sections by angle measurements (rad); return how many died."""
-        deaths = section_passes.measure_all(self._behind, active, alpha, elapsed, event, self.sections, self.law)
+        deaths = section_passes.step_all(
+            self._behind, active, self._nobody, False, alpha, elapsed, event, self.sections, self.law
+        )
         self._behind, self._is_behind = self._nobody, False
         self._measured(active)
         return deaths
@@ -171,8 +178,12 @@ class SectionStack:
 
     def keep_labels(self, least: Floats, greatest: Floats, active: Flags) -> tuple[Flags, int]:
         """Remove the living sections whose labels are outside [least, greatest]; return which, and how many."""
-        removed = np.zeros(self.labels.shape, dtype=bool)
-        return removed, section_passes.keep_labels_all(active, least, greatest, self.sections, removed)
+        sections = self.sections
+        inside = (least[:, None] <= sections.labels) & (sections.labels <= greatest[:, None])
+        used = np.arange(sections.labels.shape[1]) < sections.used[:, None]
+        removed = active[:, None] & used & sections.living & ~inside
+        sections.living[removed] = False
+        return removed, int(np.count_nonzero(removed))
 
     def margins(self, v: Floats, z: Floats, elapsed: int) -> Floats:
         """Signed margin of states (V, z) in the first slot of each engagement, m."""
@@ -213,4 +224,4 @@ def outline(section: Chains, row: int, label: float, elapsed: int, law: SectionL
     """Vertices (V, z) of a section, counter-clockwise, shape (n, 2)."""
     points = chains.working_room()
     time_to_go = (label - law.closing_speed * (law.step * elapsed)) / law.closing_speed
-    return points[: whole_chains.outline(*section, row, time_to_go, points)].copy()
+    return points[: section_passes.write_outline(*section, row, time_to_go, points)].copy()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from infoset import polygon, polygon_hull
-from infoset._compile import ZERO, allocation_free, entry, substituted
+from infoset._compile import ZERO, allocation_free, inlined
 from infoset.chains import (
     BEGIN,
     CAPACITY,
@@ -28,7 +28,7 @@ from infoset.chains import (
 )
 
 
-@substituted
+@inlined
 def is_crowded(marks: Integers, n: int) -> bool:
     """Whether a section may have more vertices than there is room for before the next step is over."""
     return bool(count_of(marks, n) > CAPACITY - MOST_ADDED)
@@ -98,7 +98,7 @@ def box_around(points: Floats, count: int, sign: float, tau: float) -> int:
     return 4
 
 
-@entry
+@allocation_free
 def outline(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, out: Floats) -> int:
     """Write the vertices (V, z), counter-clockwise; return how many: at most CAPACITY.
 
@@ -106,7 +106,7 @@ def outline(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float,
     -----
     Where the chains meet in one point they hold it twice, equal up to rounding: it is written once.
     """
-    made = 0
+    made = ZERO
     for side in (RIGHT, LEFT):
         first = begin_of(marks, n, side)
         for i in range(first, end_of(marks, n, side)):
@@ -126,7 +126,7 @@ def meets(points: Floats, i: int, v: float, z: float, reach: float, tau: float) 
     return bool(close_v and abs(points[i, 1] - z) <= 4.0 * EPSILON * (abs(z) + 2.0 * tau * reach))
 
 
-@entry
+@allocation_free
 def cut_misses(
     origins: Floats,
     rings: Floats,
@@ -145,7 +145,7 @@ def cut_misses(
     This band is not along the line of sight, so it may cut anywhere: the chains are taken apart and made anew.
     O(vertices). `points` has room for CAPACITY + 2.
     """
-    count = 0
+    count = ZERO
     for side in (RIGHT, LEFT):
         for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
             v, m = vertex(origins, rings, marks, n, side, i)

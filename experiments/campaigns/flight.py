@@ -21,7 +21,7 @@ from rich.progress import Progress as ProgressBars
 from experiments.campaigns.cluster import connected, is_open
 from experiments.campaigns.command import Flight
 from experiments.common.errors import InputError
-from experiments.common.screen import NOT_FINITE, number, say, tell_of_compiling
+from experiments.common.screen import NOT_FINITE, number, say
 from experiments.interception.choices import scenario_with
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from sim import Campaign, CampaignNoise, CampaignResult, Scenario
@@ -75,7 +75,6 @@ def fly(asked: Campaign, options: Flight) -> Flown:
     for warning in warnings[: MOST_WARNINGS if asked.cells else None]:
         note(f"warning: {warning}")
     with _workers(options, note) as workers:
-        tell_of_compiling(options.quiet)
         if asked.engagements >= ESTIMATED_FROM:
             note(f"{_estimate(asked, workers.cores)}{' at most' if asked.until else ''}")
         began_s = time.perf_counter()

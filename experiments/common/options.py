@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,6 +18,11 @@ def _page_path(path: Path | None) -> Path | None:
     if path is not None and path.suffix != ".html":
         raise InputError(f"--html: {path} must end in .html; for example --html page.html")
     return path
+
+
+def _silence_the_compile_notice(quiet: bool) -> bool:
+    logging.getLogger("infoset.kernels").setLevel(logging.ERROR if quiet else logging.NOTSET)
+    return quiet
 
 
 def finite(value: float | None) -> float | None:
@@ -52,7 +58,10 @@ Html = Annotated[
     ),
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files, and write into a folder that has some.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress and no tables.")]
+Quiet = Annotated[
+    bool,
+    typer.Option("--quiet", "-q", callback=_silence_the_compile_notice, help="Print no progress and no tables."),
+]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
@@ -62,68 +61,6 @@ def number_table(*titles: str, left: int = 1) -> Table:
     for title in titles[left:]:
         table.add_column(title, justify="right")
     return table
-
-
-def tell_of_compiling(quiet: bool) -> None:
-    """Say that the kernels are about to be compiled, if no compiled ones of this source are stored."""
-    from infoset import location, section_passes
-
-    kernels = ((section_passes.__file__, section_passes.measure_all), (location.__file__, location.refine_all))
-    _tell_of_compiling(quiet, "half a minute", kernels)
-
-
-def tell_of_compiling_pursuit(quiet: bool) -> None:
-    """Say the same of the kernels of the pursuit-evasion game."""
-    from rendezvous.pursuit_evasion import _extremal
-
-    _tell_of_compiling(quiet, "five seconds", [(_extremal.__file__, _extremal.flow_kernel)])
-
-
-def tell_of_compiling_rendezvous(quiet: bool, *, visits: bool = True, nonlinear: bool = False) -> None:
-    """Say the same of the kernels of encounters, and of visits to several targets, nonlinear ones too."""
-    from rendezvous.multipoint import _hamiltonian, _path
-    from rendezvous.relative_motion import _circular
-
-    kernels: list[tuple[str | None, object]] = [(_circular.__file__, _circular.fill_gramians)]
-    if visits:
-        kernels.append((_path.__file__, _path.solve_path))
-    if nonlinear:
-        kernels.append((_hamiltonian.__file__, _hamiltonian.propagate))
-    _tell_of_compiling(quiet, "ten seconds" if nonlinear else "five seconds", kernels)
-
-
-def _tell_of_compiling(quiet: bool, time: str, kernels: Sequence[tuple[str | None, object]]) -> None:
-    """Say it if one of some kernels, each with the file of its module, is not stored; and where, if not beside it."""
-    missing = [(Path(file or ""), kernel) for file, kernel in kernels if not _stored(kernel)]
-    if quiet or not missing:
-        return
-    source, kernel = missing[0]
-    folder = _cache_of(kernel)
-    where = ""
-    if folder is not None and folder != source.parent / "__pycache__":
-        where = f"; they are kept in {folder.parent}, not beside their source"
-    say(f"compiling the kernels, once (about {time}){where} ...", quiet)
-
-
-def _cache_of(kernel: object) -> Path | None:
-    """Where Numba keeps a kernel; None where it is not kept, or not compiled at all."""
-    folder = getattr(getattr(kernel, "stats", None), "cache_path", None)
-    return None if folder is None else Path(folder)
-
-
-def _stored(kernel: object) -> bool:
-    """Whether Numba has a compiled kernel of this very source: asked of its own index, whose stamp it will look at."""
-    if _cache_of(kernel) is None:
-        # Switched off by NUMBA_DISABLE_JIT; or nothing can be kept, which Numba's user was warned of.
-        return True
-    index = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
-    read = getattr(index, "_load_index", None)
-    if read is None:  # another Numba, that keeps its index elsewhere: nothing is said rather than something wrong
-        return True
-    try:
-        return bool(read())
-    except (OSError, EOFError):
-        return False
 
 
 @contextlib.contextmanager

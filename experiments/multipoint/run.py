@@ -12,10 +12,9 @@ from matplotlib.figure import Figure
 from experiments.common.errors import InputError
 from experiments.common.output import output_of, to_json
 from experiments.common.screen import figure_files, progress_bar, table_console
-from experiments.common.screen import tell_of_compiling_rendezvous as tell_of_compiling
 from experiments.multipoint.command import BEST, GIVEN, Multipoint
 from experiments.multipoint.figures import draw_control, draw_costates, draw_path, draw_times
-from experiments.multipoint.file import Axes, MultipointProblem, load_multipoint
+from experiments.multipoint.file import MultipointProblem, load_multipoint
 from experiments.multipoint.page import multipoint_page
 from experiments.multipoint.report import Report, Search, print_report, report_json
 from experiments.multipoint.scene import Scene, cost_curves
@@ -32,17 +31,18 @@ def run(options: Multipoint) -> None:
     problem = load_multipoint(options.problem)
     search = Search(options.order, options.times or (BEST if problem.optimise else GIVEN))
     _check(problem, search)
-    with output_of(options, ("results.json", *figure_files(*FIGURES))) as written:
-        tell_of_compiling(options.quiet, nonlinear=problem.axes is Axes.INERTIAL)
-        with progress_bar(options.quiet) as begin:
-            report = _solve(problem, search, begin(search.title))
-            written.save("results.json", to_json(report_json(report)), "--json")
-            if options.html is not None:
-                page = multipoint_page(problem.name, report.scene, problem.greatest_control_m_s2)
-                written.deliver("--html", page)
-            if options.out is not None:
-                drawings = _drawings(report, begin("cost against times"))
-                written.draw(drawings, begin("figures"))
+    with (
+        output_of(options, ("results.json", *figure_files(*FIGURES))) as written,
+        progress_bar(options.quiet) as begin,
+    ):
+        report = _solve(problem, search, begin(search.title))
+        written.save("results.json", to_json(report_json(report)), "--json")
+        if options.html is not None:
+            page = multipoint_page(problem.name, report.scene, problem.greatest_control_m_s2)
+            written.deliver("--html", page)
+        if options.out is not None:
+            drawings = _drawings(report, begin("cost against times"))
+            written.draw(drawings, begin("figures"))
     if not options.quiet:
         print_report(table_console(written.stdout_taken), report)
 

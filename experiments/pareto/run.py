@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from experiments.common.errors import InputError
 from experiments.common.output import output_of, to_json
 from experiments.common.screen import figure_files, progress_bar, table_console
-from experiments.common.screen import tell_of_compiling_rendezvous as tell_of_compiling
 from experiments.common.toml_values import LARGEST, shown
 from experiments.pareto.command import Pareto
 from experiments.pareto.figures import draw_controls, draw_costs, draw_front, draw_trajectories
@@ -50,14 +49,15 @@ def run(options: Pareto) -> None:
     """Solve the problem, write the files and print the tables."""
     problem = load_pareto(options.problem)
     preferred = None if options.prefer is None else _preferred(options.prefer, problem)
-    with output_of(options, ("results.json", *figure_files(*FIGURES))) as written:
-        tell_of_compiling(options.quiet, visits=False)
-        with progress_bar(options.quiet) as begin:
-            report = _solve(problem, preferred, begin("meetings and coalitions"))
-            written.save("results.json", to_json(report_json(report, options.samples)), "--json")
-            if options.html is not None:
-                written.deliver("--html", pareto_page(problem.name, report.solution, report.selections))
-            written.draw(_drawings(report), begin("figures"))
+    with (
+        output_of(options, ("results.json", *figure_files(*FIGURES))) as written,
+        progress_bar(options.quiet) as begin,
+    ):
+        report = _solve(problem, preferred, begin("meetings and coalitions"))
+        written.save("results.json", to_json(report_json(report, options.samples)), "--json")
+        if options.html is not None:
+            written.deliver("--html", pareto_page(problem.name, report.solution, report.selections))
+        written.draw(_drawings(report), begin("figures"))
     if not options.quiet:
         print_report(table_console(written.stdout_taken), report)
 

@@ -14,7 +14,6 @@ from experiments.common.errors import InputError
 from experiments.common.options import choice
 from experiments.common.output import Cell, library_version, output_of, to_csv, to_json
 from experiments.common.screen import figure_files, print_lines, progress_bar, say_warnings, table_console
-from experiments.common.screen import tell_of_compiling_pursuit as tell_of_compiling
 from experiments.common.toml_values import shown
 from experiments.pursuit.command import ROWS, PursuitMap
 from experiments.pursuit.file import PursuitProblem, load_pursuit, parameter_names
@@ -50,7 +49,6 @@ def run(options: PursuitMap) -> None:
         raise InputError(f"--x and --y: {points} points are over {MOST_POINTS}; choose fewer")
     with output_of(options, ("problem.toml", "results.json", "map.csv", *figure_files(FIGURE))) as written:
         say_warnings(problem.warnings(), options.quiet)
-        tell_of_compiling(options.quiet)
         began_s = perf_counter()
         with progress_bar(options.quiet) as begin:
             solved = capture_map(

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from experiments.common.errors import InputError
 from experiments.common.output import output_of, to_json
 from experiments.common.screen import figure_files, progress_bar, say, say_warnings, table_console
-from experiments.common.screen import tell_of_compiling_pursuit as tell_of_compiling
 from experiments.pursuit.command import Pursuit
 from experiments.pursuit.evader import EvaderPolicy, evader_policy
 from experiments.pursuit.figures import draw_control, draw_distance, draw_feedback, draw_orbits, draw_relative
@@ -36,7 +35,6 @@ def run(options: Pursuit) -> None:
     names = FIGURES if evader is None else (*FIGURES, FEEDBACK_FIGURE)
     with output_of(options, ("problem.toml", "results.json", *figure_files(*names))) as written:
         say_warnings(problem.warnings(), options.quiet)
-        tell_of_compiling(options.quiet)
         with progress_bar(options.quiet) as begin:
             report = _solve(problem, options, evader, begin)
             page = "" if options.html is None else _page(report)

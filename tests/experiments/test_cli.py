@@ -4,8 +4,6 @@ import csv
 import io
 import json
 import math
-import os
-import runpy
 import signal
 import subprocess
 import sys
@@ -17,8 +15,8 @@ from typing import Any
 
 import pytest
 
+import kernels
 from experiments.cli import main
-from experiments.common import screen
 from experiments.common.errors import InputError
 from experiments.common.output import output, to_csv, to_json, write_file
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_text
@@ -502,35 +500,13 @@ def test_interrupted(infoset: Command, monkeypatch: pytest.MonkeyPatch, tmp_path
     assert names_in(tmp_path) == []
 
 
-def test_what_is_said_of_compiling_is_what_numba_then_does(tmp_path: Path) -> None:
-    source = tmp_path / "doubling.py"
-    text = "from numba import njit\n\n\n@njit(cache=True)\ndef twice(x):\n    return 2.0 * x\n"
-    source.write_text(text)
-
-    def said_and_done() -> tuple[bool, bool]:
-        """Whether the kernel is said to be stored, and whether it was."""
-        kernel = runpy.run_path(str(source))["twice"]
-        said = screen._stored(kernel)
-        assert kernel(1.5) == 3.0
-        return said, sum(kernel.stats.cache_hits.values()) == 1
-
-    assert said_and_done() == (False, False)
-    assert said_and_done() == (True, True)
-    os.utime(source, (time.time() + 9, time.time() + 9))  # as installing again does; newer Numbas compare contents
-    said, done = said_and_done()
-    assert said == done
-    source.write_text(text.replace("return", "# otherwise\n    return"))
-    assert said_and_done() == (False, False)
-
-
-def test_compiling_is_said_when_nothing_is_compiled(
-    infoset: Command, brief_file: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("quiet", [True, False])
+def test_compilation_is_announced_unless_the_command_is_quiet(
+    infoset: Command, brief_file: Path, caplog: pytest.LogCaptureFixture, quiet: bool
 ) -> None:
-    monkeypatch.setattr(screen, "_stored", lambda *_: False)
-    _, out, err = infoset("experiment", brief_file, "--runs", 1, "--json", "-")
-    json.loads(out)
-    assert err.startswith("compiling the kernels, once")
-    assert infoset("experiment", brief_file, "--runs", 1, "-q") == (0, "", "")
+    assert infoset("experiment", brief_file, "--runs", 1, *(["--quiet"] if quiet else []))[0] == 0
+    kernels.LOGGER.warning("compiling")
+    assert len(caplog.records) == (not quiet)
 
 
 def test_a_reader_that_leaves_is_no_error() -> None:

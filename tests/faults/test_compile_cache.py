@@ -1,4 +1,4 @@
-"""Compiled kernels: no home, an installation that may not be written, two processes at once."""
+"""Compiled kernels: stale sources, no home, an installation that may not be written, two processes at once."""
 
 from __future__ import annotations
 
@@ -6,81 +6,145 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import infoset
-from experiments.common import compile_cache
-from experiments.common.compile_cache import VARIABLE, keep_kernels_somewhere
+import kernels
 from infoset import _compile
+from kernels import VARIABLE, cache_folder
 from rendezvous import _compile as _compile_of_rendezvous
 from tests.faults.conftest import begin, ended
 
-PACKAGES = ("infoset", "guidance", "sim", "rendezvous", "experiments")
+PACKAGES = ("kernels", "infoset", "guidance", "sim", "rendezvous", "experiments")
+
+
+def twice(value: float) -> float:
+    return 2.0 * value
 
 
 @pytest.fixture
 def nowhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """A machine where neither the installation nor the home can be written; returns the folder for temporary files."""
-    monkeypatch.setenv(VARIABLE, "put back afterwards as it was, even if it was not there")
-    monkeypatch.delenv(VARIABLE)
-    monkeypatch.setattr(compile_cache, "_written_beside_sources", lambda: False)
+    """A machine where the home cannot be written; returns the folder for temporary files."""
+    monkeypatch.delenv(VARIABLE, raising=False)
     monkeypatch.setenv("HOME", "/dev/null/nobody")
     monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null/nobody")
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     return tmp_path
 
 
-def test_a_folder_of_ones_own_is_found(nowhere: Path) -> None:
-    keep_kernels_somewhere()
-    folder = Path(os.environ[VARIABLE])
-    assert folder.parent == nowhere
-    assert folder.stat().st_mode & 0o777 == 0o700
-    del os.environ[VARIABLE]
-    keep_kernels_somewhere()
-    assert Path(os.environ[VARIABLE]) == folder  # the same one next time
+def test_a_private_folder_is_used_without_a_home(nowhere: Path) -> None:
+    folder = cache_folder(twice)
+    assert folder is not None
+    assert folder.parent.parent == nowhere
+    assert folder.parent.stat().st_mode & 0o777 == 0o700
+    assert cache_folder(twice) == folder  # the same one next time
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="users and modes of POSIX")
 def test_a_folder_that_others_may_write_is_not_believed(nowhere: Path) -> None:
-    """Compiled kernels are programs: whoever may put one there runs what he likes as this user."""
+    """Compiled kernels are programs: whoever can write one there runs code as this user."""
     folder = nowhere / f"infoset-kernels-{os.getuid()}"
     folder.mkdir()
     folder.chmod(0o777)
-    keep_kernels_somewhere()
-    assert VARIABLE not in os.environ
+    assert cache_folder(twice) is None
     folder.rmdir()
     elsewhere = nowhere / "elsewhere"
     elsewhere.mkdir(mode=0o700)
     folder.symlink_to(elsewhere)
-    keep_kernels_somewhere()
-    assert VARIABLE not in os.environ
+    assert cache_folder(twice) is None
 
 
-def test_what_a_person_has_chosen_stays(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(VARIABLE, "/mine")
-    keep_kernels_somewhere()
-    assert os.environ[VARIABLE] == "/mine"
-    assert list(nowhere.iterdir()) == []
+def test_the_folder_of_the_environment_comes_first(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, str(nowhere / "mine"))
+    folder = cache_folder(twice)
+    assert folder is not None
+    assert folder.parent == nowhere / "mine"
 
 
 @pytest.mark.usefixtures("nowhere")
-def test_no_folder_at_all_is_left_to_the_library(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tempfile.tempdir", "/dev/null/tmp")
-    keep_kernels_somewhere()
-    assert VARIABLE not in os.environ
-
-
 @pytest.mark.parametrize("compiled", [_compile.compiled, _compile_of_rendezvous.compiled])
-def test_a_kernel_that_can_be_kept_nowhere_is_compiled_all_the_same(compiled: object) -> None:
-    scope: dict[str, object] = {}
-    source = "def twice(x):\n    return 2.0 * x\n"
-    exec(compile(source, "<nowhere>", "exec"), scope)  # Numba finds no file to keep anything beside
-    with pytest.warns(RuntimeWarning, match="NUMBA_CACHE_DIR"):
-        twice = compiled(scope["twice"])  # type: ignore[operator]
-    assert twice(1.5) == 3.0
+def test_a_kernel_that_cannot_be_stored_is_compiled_all_the_same(
+    compiled: Callable[..., Callable[[float], float]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", "/dev/null/tmp")
+    assert compiled(twice)(1.5) == 3.0
+    scope: dict[str, Any] = {"__name__": "example"}
+    exec(compile("def thrice(x):\n    return 3.0 * x\n", "<no file>", "exec"), scope)
+    assert compiled(scope["thrice"])(1.5) == 4.5
+
+
+PROGRAM = """
+from infoset import caller
+print(caller.call(1.0), sum(caller.call.stats.cache_hits.values()))
+"""
+
+
+def test_no_stale_kernel_is_loaded(tmp_path: Path) -> None:
+    """A kernel is compiled again where a function that it calls, or a constant of another module, has changed."""
+    source, packages = Path(infoset.__file__).parents[1], tmp_path / "packages"
+    (packages / "infoset").mkdir(parents=True)
+    shutil.copytree(source / "kernels", packages / "kernels", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(source / "infoset" / "_compile.py", packages / "infoset")
+    texts = {
+        "__init__": "",
+        "constant": "FACTOR = 2.0\n",
+        "callee": "from infoset._compile import inlined\nfrom infoset.constant import FACTOR\n\n\n"
+        "@inlined\ndef times(x):\n    return FACTOR * x\n",
+        "caller": "from infoset import callee\nfrom infoset._compile import entry\n\n\n"
+        "@entry\ndef call(x):\n    return callee.times(x)\n",
+    }
+
+    def run(**changed: str) -> tuple[float, int]:
+        for name, text in (texts | changed).items():
+            (packages / "infoset" / f"{name}.py").write_text(text)
+        environment = {**os.environ, "PYTHONPATH": str(packages), VARIABLE: str(tmp_path / "cache")}
+        done = subprocess.run(
+            [sys.executable, "-B", "-c", PROGRAM],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        value, hits = done.stdout.split()
+        return float(value), int(hits)
+
+    assert run() == (2.0, 0)
+    assert run() == (2.0, 1)
+    assert run(constant="FACTOR = 4.0\n") == (4.0, 0)
+    assert run(callee=texts["callee"].replace("FACTOR * x", "x - FACTOR")) == (-1.0, 0)
+    assert run() == (2.0, 1)
+
+
+def test_a_linked_kernel_can_be_called_from_python() -> None:
+    linked = _compile.allocation_free(twice)
+    assert linked(1.5) == 3.0
+    assert linked(2) == 4.0
+
+
+def test_a_long_compilation_gives_one_notice(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    for limit_s, notices in ((1e9, 0), (0.0, 1)):
+        monkeypatch.setattr(kernels, "NOTICE_AFTER_S", limit_s)
+        monkeypatch.setattr(twice, "__module__", "infoset.example")
+        listener = kernels._Compilation()
+        for _ in range(2):
+            _compilation_of(listener, twice)
+        assert len(caplog.records) == notices
+
+
+def _compilation_of(listener: kernels._Compilation, function: Callable[..., object]) -> None:
+    class Dispatcher:
+        py_func = staticmethod(function)
+
+    class Event:
+        data = {"dispatcher": Dispatcher}  # noqa: RUF012
+
+    listener.on_start(Event)
+    listener.on_end(Event)
 
 
 @pytest.fixture(scope="module")
@@ -90,13 +154,13 @@ def installation(tmp_path_factory: pytest.TempPathFactory) -> Path:
     here = Path(infoset.__file__).parents[1]
     for name in PACKAGES:
         shutil.copytree(here / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
-    for each in (folder, *folder.rglob("*")):
-        each.chmod(0o500 if each.is_dir() else 0o400)
+    for path in (folder, *folder.rglob("*")):
+        path.chmod(0o500 if path.is_dir() else 0o400)
     return folder
 
 
 def environment_of(installation: Path, temporary: Path, home: Path) -> dict[str, str]:
-    """Of somebody who has chosen nothing."""
+    """Environment of somebody who has chosen no folder."""
     return {
         VARIABLE: "",
         "PYTHONPATH": str(installation),
@@ -116,14 +180,14 @@ def test_a_read_only_installation_and_no_home(installation: Path, tmp_path: Path
     first, second = (
         ended(begin("pareto", folder=tmp_path, environment=environment, prefix=ordinary)) for _ in range(2)
     )
-    kept = temporary / f"infoset-kernels-{os.getuid()}"
+    stored = temporary / f"infoset-kernels-{os.getuid()}"
     assert (first.code, second.code) == (0, 0)
     assert [line for line in first.err.splitlines() if "compiling" in line] == [
-        f"compiling the kernels, once (about five seconds); they are kept in {kept}, not beside their source ..."
+        f"compiling numerical kernels, about 5 to 15 seconds, once; the machine code is stored in {stored}"
     ]
     assert second.err == ""
     assert first.out == second.out
-    assert list(kept.rglob("*.nbc"))
+    assert list(stored.rglob("*.nbc"))
 
 
 @pytest.mark.slow
@@ -132,14 +196,17 @@ def test_a_read_only_installation_and_a_home(installation: Path, tmp_path: Path,
     environment = environment_of(installation, tmp_path, tmp_path / "home")
     left = ended(begin("pareto", folder=tmp_path, environment=environment, prefix=ordinary))
     assert left.code == 0
-    assert f"they are kept in {tmp_path / 'home'}" in left.err
+    assert f"the machine code is stored in {tmp_path / 'home'}" in left.err
     assert list((tmp_path / "home").rglob("*.nbc"))
 
 
 @pytest.mark.slow
-def test_nowhere_to_keep_anything(installation: Path, tmp_path: Path, ordinary: tuple[str, ...]) -> None:
-    """The library alone, as in a notebook: it warns, and works."""
-    code = "from rendezvous.relative_motion import _circular; print(_circular.angle_less_sine(1.0))"
+def test_no_folder_can_be_written(installation: Path, tmp_path: Path, ordinary: tuple[str, ...]) -> None:
+    """The library alone, as in a notebook: it works, and one line says what to do."""
+    code = (
+        "import kernels; kernels.NOTICE_AFTER_S = 0.0; kernels._private_folder = kernels._user_folder\n"
+        "from rendezvous.relative_motion import _circular; print(_circular.angle_less_sine(1.0))"
+    )
     sealed = tmp_path / "home"
     sealed.mkdir(mode=0o500)
     done = subprocess.run(
@@ -152,8 +219,8 @@ def test_nowhere_to_keep_anything(installation: Path, tmp_path: Path, ordinary: 
     )
     assert done.returncode == 0
     assert abs(float(done.stdout) - 0.1585290151921035) < 1e-15  # 1 - sin 1
-    assert done.stderr.count("RuntimeWarning: ") == 1
-    assert "NUMBA_CACHE_DIR" in done.stderr
+    assert done.stderr.count("compiling") == 1
+    assert "set NUMBA_CACHE_DIR" in done.stderr
 
 
 @pytest.mark.slow
@@ -161,7 +228,7 @@ def test_nowhere_to_keep_anything(installation: Path, tmp_path: Path, ordinary: 
 def test_two_processes_compile_at_once_into_one_cache(command: tuple[str, ...], tmp_path: Path) -> None:
     environment: Mapping[str, str] = {VARIABLE: str(tmp_path / "kernels")}
     both = [begin(*command, folder=tmp_path, environment=environment) for _ in range(2)]
-    one, other = (ended(each) for each in both)
+    one, other = (ended(process) for process in both)
     after = ended(begin(*command, folder=tmp_path, environment=environment))
     for left in (one, other, after):
         assert left.code == 0

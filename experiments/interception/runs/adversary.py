@@ -11,7 +11,7 @@ from rich.table import Table
 from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
 from experiments.common.output import output, to_json
-from experiments.common.screen import number, print_lines, progress_bar, say_warnings, table_console, tell_of_compiling
+from experiments.common.screen import number, print_lines, progress_bar, say_warnings, table_console
 from experiments.interception.choices import own_strategy, scenario_with
 from experiments.interception.commands.adversary import Adversary
 from experiments.interception.record_file import record_path, write_record
@@ -39,7 +39,6 @@ def run(options: Adversary) -> None:
         progress_bar(options.quiet) as begin,
     ):
         say_warnings(scenario_warnings(scenario), options.quiet)
-        tell_of_compiling(options.quiet)
         began_s = perf_counter()
         try:
             worst = find_worst(

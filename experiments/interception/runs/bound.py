@@ -22,7 +22,6 @@ from experiments.common.screen import (
     progress_bar,
     say_warnings,
     table_console,
-    tell_of_compiling,
 )
 from experiments.interception.choices import chosen_strategies, scenario_with
 from experiments.interception.commands.bound import Bound
@@ -88,7 +87,6 @@ def run(options: Bound) -> None:
         progress_bar(options.quiet) as begin,
     ):
         say_warnings(scenario_warnings(scenario), options.quiet)
-        tell_of_compiling(options.quiet)
         began_s = perf_counter()
         try:
             lower = lower_bound(scenario, progress=begin("lower bound"))

@@ -17,7 +17,6 @@ from experiments.common.screen import (
     progress_bar,
     say_warnings,
     table_console,
-    tell_of_compiling,
 )
 from experiments.interception.choices import chosen_strategies, scenario_with
 from experiments.interception.commands.compare import Compare
@@ -41,7 +40,6 @@ def run(options: Compare) -> None:
         progress_bar(options.quiet) as begin,
     ):
         say_warnings(scenario_warnings(scenario), options.quiet)
-        tell_of_compiling(options.quiet)
         began_s = perf_counter()
         reports = {name: begin(name) for name in strategies}
         compared = _simulate(scenario, strategies, options.runs, options.seed, reports)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from time import perf_counter
 
 from experiments.common.output import Cell, library_version, outcome_columns, output_of, to_csv, to_json
-from experiments.common.screen import figure_files, progress_bar, say_warnings, table_console, tell_of_compiling
+from experiments.common.screen import figure_files, progress_bar, say_warnings, table_console
 from experiments.interception.choices import own_strategy, scenario_with
 from experiments.interception.commands.engage import Engage
 from experiments.interception.record_file import record_path, write_record
@@ -50,7 +50,6 @@ def run(options: Engage) -> None:
         progress_bar(options.quiet) as begin,
     ):
         say_warnings(scenario_warnings(scenario), options.quiet)
-        tell_of_compiling(options.quiet)
         records, summaries = [], {}
         for noise in noises:
             began_s = perf_counter()

@@ -18,7 +18,6 @@ from experiments.common.screen import (
     say,
     say_warnings,
     table_console,
-    tell_of_compiling,
 )
 from experiments.interception.choices import own_strategy, scenario_with
 from experiments.interception.commands.experiment import Experiment
@@ -55,7 +54,6 @@ def run(options: Experiment) -> None:
         progress_bar(options.quiet) as begin,
     ):
         say_warnings(scenario_warnings(scenario), options.quiet)
-        tell_of_compiling(options.quiet)
         if scenario.range_sensor is None:
             say(f"{scenario.name} has no [range_sensor]: curves 1 and 3 only", options.quiet)
         began_s = perf_counter()
