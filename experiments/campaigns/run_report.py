@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -21,7 +21,6 @@ from experiments.campaigns.flight import SCENARIO_FILE, campaign_errors
 from experiments.campaigns.samples import (
     START,
     Sample,
-    WorstRun,
     heading,
     noise_flags,
     sample_json,
@@ -101,7 +100,7 @@ def _report_campaign(folder: CampaignFolder, options: Report, written: Output, c
         "damaged": [{"file": damage.file.name, "reason": damage.reason} for damage in folder.damaged],
         "samples": [sample_json(sample) for sample in found],
         "correlation_with_miss": related,
-        "worst": [asdict(flown) for flown in worst],
+        "worst": worst,
     }
     written.save("report.json", to_json(report), "--json")
     if options.out is not None:
@@ -132,7 +131,11 @@ def _columns(folder: CampaignFolder) -> list[CampaignColumns]:
 
 
 def _show(
-    console: Console, folder: CampaignFolder, found: Sequence[Sample], related: Correlations, worst: Sequence[WorstRun]
+    console: Console,
+    folder: CampaignFolder,
+    found: Sequence[Sample],
+    related: Correlations,
+    worst: Sequence[Mapping[str, Any]],
 ) -> None:
     def line(text: str) -> None:
         console.print(Text(text), soft_wrap=True)
@@ -156,6 +159,7 @@ def _show(
     console.print()
     line("the worst runs:")
     for flown in worst:
-        line(f"  {number(flown.miss_m)} m for {number(flown.impulse_m_s)} m/s, {flown.outcome}: {flown.replay}")
+        miss, impulse = number(flown["miss_m"]), number(flown["impulse_m_s"])
+        line(f"  {miss} m for {impulse} m/s, {flown['outcome']}: {flown['replay']}")
     if not (folder.path / SCENARIO_FILE).is_file():
         line(f"(there is no {SCENARIO_FILE} in the folder: with --out the report writes one)")

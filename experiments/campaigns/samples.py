@@ -155,20 +155,8 @@ def heading(folder: CampaignFolder) -> dict[str, Any]:
     }
 
 
-@dataclass(frozen=True)
-class WorstRun:
-    """One of the runs with the largest miss; `replay` is the command that flies it again."""
-
-    run: int
-    noise: str
-    outcome: str
-    miss_m: float
-    impulse_m_s: float
-    replay: str
-
-
-def worst_runs(folder: CampaignFolder, scenario_file: Path) -> list[WorstRun]:
-    """Return the runs of a campaign with the largest miss, the worst first."""
+def worst_runs(folder: CampaignFolder, scenario_file: Path) -> list[dict[str, Any]]:
+    """Return the runs of a campaign with the largest miss, the worst first; `replay` is the command that repeats it."""
     # The manifest's name of a strategy in a file: mine.py:Mine sha256:...
     file, _, version = folder.manifest.strategy.rpartition(" sha256:")
     own = f" --strategy {shlex.quote(file)}" if version and file else ""
@@ -177,14 +165,8 @@ def worst_runs(folder: CampaignFolder, scenario_file: Path) -> list[WorstRun]:
     places = np.argpartition(-miss, count - 1)[:count] if count else np.zeros(0, dtype=np.int64)
     places = places[np.lexsort((places, -miss[places]))]
     return [
-        WorstRun(
-            row["run"],
-            row["noise"],
-            row["outcome"],
-            row["miss_m"],
-            row["impulse_m_s"],
-            replay_line(scenario_file, row["run"], folder.manifest.seed, row["noise"]) + own,
-        )
+        {key: row[key] for key in ("run", "noise", "outcome", "miss_m", "impulse_m_s")}
+        | {"replay": replay_line(scenario_file, row["run"], folder.manifest.seed, row["noise"]) + own}
         for row in folder.at(places.tolist())
     ]
 
