@@ -255,7 +255,7 @@ def test_what_is_wrong_is_said_before_the_work(
         pytest.param("0" * 200_000 + ",coast\n", "is over 100 kB", id="longer"),
         ("0,coast,1\n", "found 3 values"),
         ("5,coast\n", "must rise, from 0"),
-        ("", "one at least"),
+        ("", "at least one policy"),
     ],
 )
 def test_a_script_that_is_wrong(text: str, part: str, infoset: Infoset, tmp_path: Path) -> None:
