@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from matplotlib.contour import ContourSet
 
-from experiments.cli import main
 from experiments.pursuit.figures import draw_control, draw_distance, draw_feedback, draw_orbits, draw_relative
 from experiments.pursuit.file import load_pursuit
 from experiments.pursuit.map_figure import axis_name, draw_map
@@ -24,23 +23,6 @@ MAP_FILES = ["figure-map.pdf", "figure-map.png", "map.csv", "problem.toml", "res
 SMALL_MAP = ["--x", "phase_deg=-9:-6:4", "--y", "evader.thrust_N=10:20:2"]
 
 Infoset = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Infoset:
-    """Run a command in an empty folder: exit code, stdout and stderr."""
-    monkeypatch.setenv("NO_COLOR", "1")
-    monkeypatch.setenv("COLUMNS", "100")
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as left:
-            main([str(each) for each in arguments])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.err
-        return int(left.value.code or 0), captured.out, captured.err
-
-    return run
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.cli import main
 from experiments.common.problem_file import built_in_problems, problem_text
 from experiments.reachability.figures import drawings, shown_times
 from experiments.reachability.file import KIND, load_rendezvous
@@ -37,20 +37,9 @@ Infoset = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Infoset:
+def infoset(infoset: Infoset) -> Infoset:
     """Run the command in an empty folder: exit code, stdout and stderr."""
-    monkeypatch.setenv("NO_COLOR", "1")
-    monkeypatch.setenv("COLUMNS", "100")
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as left:
-            main(["reach", *(str(each) for each in arguments)])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.err
-        return int(left.value.code or 0), captured.out, captured.err
-
-    return run
+    return partial(infoset, "reach")
 
 
 def edited(problem: str, **changes: str) -> str:
