@@ -337,6 +337,15 @@ Constant = Annotated[Any, PlainValidator(lambda value: value)]
 
 
 class Table(BaseModel):
-    """A table of a file: no keys but its own."""
+    """A table of a file; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    def si(self, name: str) -> Any:
+        """Return the value of a key in SI, or None if the file does not have it."""
+        return si_value(name, getattr(self, name))
+
+    def si_numbers(self, *names: str) -> list[float]:
+        """Return the numbers of keys and arrays in SI, one after another."""
+        values = (self.si(name) for name in names)
+        return [number for value in values for number in (value if isinstance(value, tuple) else [value])]

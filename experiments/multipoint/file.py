@@ -304,8 +304,7 @@ def load_multipoint(name_or_path: str) -> MultipointProblem:
         tour = _hill(tables) if tables.axes is Axes.HILL else _inertial(tables)
     except ValueError as error:
         raise InputError(f"{name_or_path}: {error}") from None
-    times_s = [si(table.time_s) for table in tables.target if table.time_s is not None]
-    latest, bound = tables.times.latest_s, tables.greatest_control_m_s2
+    times_s = [table.si("time_s") for table in tables.target if table.time_s is not None]
     return MultipointProblem(
         tables.name,
         name_or_path,
@@ -314,30 +313,28 @@ def load_multipoint(name_or_path: str) -> MultipointProblem:
         tour,
         np.array(times_s) if len(times_s) == len(tables.target) else None,
         tables.times.optimise,
-        None if latest is None else si(latest),
-        si(tables.times.least_gap_s),
-        si(tables.times.price_per_s),
-        None if bound is None else si(bound),
+        tables.times.si("latest_s"),
+        tables.times.si("least_gap_s"),
+        tables.times.si("price_per_s"),
+        tables.si("greatest_control_m_s2"),
     )
 
 
 def _described(tables: MultipointTables) -> tuple[Target, ...]:
-    return tuple(Target(table.name, table.meet, si(table.dwell_s)) for table in tables.target)
+    return tuple(Target(table.name, table.meet, table.si("dwell_s")) for table in tables.target)
 
 
 def _hill(tables: MultipointTables) -> Tour:
-    assert tables.orbit_rate_rad_s is not None
-    rate, eccentricity = si(tables.orbit_rate_rad_s), si(tables.eccentricity)
+    rate, eccentricity = tables.si("orbit_rate_rad_s"), tables.si("eccentricity")
     motion: LinearMotion = ClohessyWiltshire(rate)
     if eccentricity > 0.0:
-        motion = TschaunerHempel(EllipticOrbit(rate, eccentricity, radians(tables.true_anomaly_deg)))
+        motion = TschaunerHempel(EllipticOrbit(rate, eccentricity, tables.si("true_anomaly_deg")))
     initial = np.array([_relative(table) for table in tables.target])
     return Tour(motion, DriftingTargets(_described(tables), motion, initial), _relative(tables.chaser))
 
 
 def _inertial(tables: MultipointTables) -> KeplerTour:
-    assert tables.gravitational_parameter_km3_s2 is not None
-    mu = si(tables.gravitational_parameter_km3_s2, 3 * KILO)
+    mu = tables.si("gravitational_parameter_km3_s2")
     states, epochs = zip(*(_absolute(table, mu) for table in tables.target), strict=True)
     targets = KeplerTargets(_described(tables), np.array(states), np.array(epochs), mu)
     try:
@@ -349,9 +346,7 @@ def _inertial(tables: MultipointTables) -> KeplerTour:
 
 
 def _relative(body: BodyTable) -> Floats:
-    assert body.position_m is not None
-    assert body.velocity_m_s is not None
-    return np.array([si(value) for value in (*body.position_m, *body.velocity_m_s)])
+    return np.array(body.si_numbers("position_m", "velocity_m_s"))
 
 
 def _absolute(body: BodyTable, mu: float) -> tuple[Floats, float]:
@@ -360,6 +355,4 @@ def _absolute(body: BodyTable, mu: float) -> tuple[Floats, float]:
         axis, eccentricity, *angles, epoch = body.elements
         orbit = OrbitalElements(si(axis, KILO), si(eccentricity), *(radians(angle) for angle in angles))
         return np.concatenate(orbit.state(mu)), si(epoch)
-    assert body.position_km is not None
-    assert body.velocity_km_s is not None
-    return np.array([si(value, KILO) for value in (*body.position_km, *body.velocity_km_s)]), si(body.epoch_s)
+    return np.array(body.si_numbers("position_km", "velocity_km_s")), body.si("epoch_s")

@@ -26,7 +26,6 @@ from experiments.common.toml_values import (
     Vector,
     key,
     known_name,
-    si,
     wrong,
 )
 from rendezvous.pareto import Component, Craft, Encounter, Meeting
@@ -146,23 +145,20 @@ def load_pareto(name_or_path: str) -> ParetoProblem:
         If there is no such problem, or it is not sound.
     """
     tables = load_tables(FORM, name_or_path)
-    motion = ClohessyWiltshire(si(tables.orbit_rate_rad_s), ORBITAL)
+    motion = ClohessyWiltshire(tables.si("orbit_rate_rad_s"), ORBITAL)
     craft = tuple(
         Craft(
             table.name,
-            np.array([si(value) for value in (*table.position_m, *table.velocity_m_s)]),
+            np.array(table.si_numbers("position_m", "velocity_m_s")),
             motion,
-            si(table.weight),
-            si(table.start_s),
+            table.si("weight"),
+            table.si("start_s"),
         )
         for table in tables.craft
     )
-    fixed = np.array([si(getattr(tables.terminal, TERMINAL[name])) for name in COMPONENTS])
+    fixed = np.array(tables.terminal.si_numbers(*TERMINAL.values()))
     try:
-        encounter = Encounter(craft, si(tables.duration_s), tables.free, fixed, tables.meet)
+        encounter = Encounter(craft, tables.si("duration_s"), tables.free, fixed, tables.meet)
     except ValueError as error:
         raise InputError(f"{name_or_path}: {error}") from None
-    bound = tables.greatest_control_m_s2
-    return ParetoProblem(
-        tables.name, name_or_path, problem_hash(tables), encounter, None if bound is None else si(bound)
-    )
+    return ParetoProblem(tables.name, name_or_path, problem_hash(tables), encounter, tables.si("greatest_control_m_s2"))

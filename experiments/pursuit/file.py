@@ -363,12 +363,11 @@ def _game(tables: PursuitTables, changes: Mapping[str, float]) -> Game:
     if "mass_ratio" in changes:
         evader["mass_kg"] = changes["mass_ratio"] * pursuer["mass_kg"]
     mu_si = top["gravitational_parameter_km3_s2"] * 1e9
-    radius = tables.equatorial_radius_km
     gravity = Gravity(
         parameter_m3_s2=mu_si,
-        planet_radius_m=si(tables.planet_radius_km, KILO),
+        planet_radius_m=tables.si("planet_radius_km"),
         j2=top["j2"],
-        equatorial_radius_m=0.0 if radius is None else si(radius, KILO),
+        equatorial_radius_m=tables.si("equatorial_radius_km") or 0.0,
     )
     return Game(
         gravity,
@@ -380,9 +379,8 @@ def _game(tables: PursuitTables, changes: Mapping[str, float]) -> Game:
 
 
 def _player(table: PlayerTable, values: Mapping[str, float], mu_si: float) -> Player:
-    if table.position_km is not None and table.velocity_km_s is not None:
-        start: tuple[Any, Any] = (table.position_km, table.velocity_km_s)
-        (x, y, z), (vx, vy, vz) = ([si(value, KILO) for value in vector] for vector in start)
+    if table.position_km is not None:
+        x, y, z, vx, vy, vz = table.si_numbers(*STATE)
     else:
         (x, y, z), (vx, vy, vz) = (np.asarray(vector).tolist() for vector in _state(values, mu_si))
     return Player(

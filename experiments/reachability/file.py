@@ -17,7 +17,6 @@ from experiments.common.errors import InputError
 from experiments.common.problem_file import ProblemTables, problem_form, problem_hash
 from experiments.common.toml_file import Known, Problem, load_tables
 from experiments.common.toml_values import (
-    KILO,
     NUMBER,
     POSITIVE,
     Degrees,
@@ -30,7 +29,6 @@ from experiments.common.toml_values import (
     Vector,
     Whole,
     key,
-    radians,
     si,
     wrong,
 )
@@ -350,25 +348,23 @@ def _keep_in_problems(known: Known) -> Iterator[Problem]:
 
 def _rendezvous(tables: ReachabilityTables) -> Rendezvous:
     orbit = EllipticOrbit.of_size(
-        si(tables.orbit.semi_major_axis_km, KILO),
-        si(tables.orbit.eccentricity),
-        si(tables.orbit.gravitational_parameter_m3_s2),
-        radians(tables.orbit.true_anomaly_deg),
+        *tables.orbit.si_numbers(
+            "semi_major_axis_km", "eccentricity", "gravitational_parameter_m3_s2", "true_anomaly_deg"
+        )
     )
     motion = motion_of(orbit, tables.model)
-    period_s, acceleration = si(tables.period_s), si(tables.acceleration_m_s2)
+    period_s, acceleration = tables.si("period_s"), tables.si("acceleration_m_s2")
     transition, control = discretised(motion, tables.periods, period_s, acceleration)
     normals, offsets, names = _regions(tables)
     between = None
     if tables.checks_between_periods:
         between = between_periods(motion, tables.periods, period_s, acceleration, tables.checks_between_periods)
-    bounds = tables.bounds
     problem = ReachabilityProblem(
         transition,
         control,
-        _vector(tables.initial.position_m, tables.initial.velocity_m_s),
-        _vector(bounds.position_m, bounds.velocity_m_s),
-        _vector(bounds.control),
+        _vector(tables.initial, "position_m", "velocity_m_s"),
+        _vector(tables.bounds, "position_m", "velocity_m_s"),
+        _vector(tables.bounds, "control"),
         tables.thrust,
         normals,
         offsets,
@@ -378,7 +374,7 @@ def _rendezvous(tables: ReachabilityTables) -> Rendezvous:
     )
     disturbance = None
     if tables.disturbance is not None:
-        disturbance = control / acceleration * _vector(tables.disturbance.acceleration_m_s2)
+        disturbance = control / acceleration * _vector(tables.disturbance, "acceleration_m_s2")
     navigation = tables.navigation
     return Rendezvous(
         tables.name,
@@ -386,11 +382,11 @@ def _rendezvous(tables: ReachabilityTables) -> Rendezvous:
         problem_hash(tables),
         problem,
         motion,
-        NonlinearMotion(orbit, si(tables.orbit.semi_major_axis_km, KILO)),
+        NonlinearMotion(orbit, tables.orbit.si("semi_major_axis_km")),
         period_s,
         acceleration,
         disturbance,
-        None if navigation is None else _vector(navigation.position_error_m, navigation.velocity_error_m_s),
+        None if navigation is None else _vector(navigation, "position_error_m", "velocity_error_m_s"),
     )
 
 
@@ -399,16 +395,16 @@ def _regions(tables: ReachabilityTables) -> tuple[Floats | None, Floats | None, 
     normals, offsets, names, begin = [], [], [], []
     cone = tables.cone
     if cone is not None:
-        rows = _pyramid(_vector(cone.axis), radians(cone.half_angle_deg), cone.faces)
+        rows = _pyramid(_vector(cone, "axis"), cone.si("half_angle_deg"), cone.faces)
         normals.append(rows)
-        offsets.append(rows @ _vector(cone.apex_m))
+        offsets.append(rows @ _vector(cone, "apex_m"))
         names += [f"face {face} of the cone" for face in range(1, len(rows) + 1)]
         begin += [cone.from_period] * len(rows)
     for number, box in enumerate(tables.keep_in, start=1):
-        rows = np.array([_vector(normal) for normal in box.normals])
+        rows = np.array([[si(value) for value in normal] for normal in box.normals])
         lengths = np.linalg.norm(rows, axis=1)
         normals.append(rows / lengths[:, None])
-        offsets.append(_vector(box.offsets_m) / lengths)
+        offsets.append(_vector(box, "offsets_m") / lengths)
         names += [f"half-space {half} of keep_in #{number}" for half in range(1, len(rows) + 1)]
         begin += [box.from_period] * len(rows)
     if not normals:
@@ -428,5 +424,5 @@ def _pyramid(axis: Floats, half_angle_rad: float, faces: int) -> Floats:
     return np.asarray(rows / np.linalg.norm(rows, axis=1)[:, None])
 
 
-def _vector(*parts: tuple[Decimal, ...]) -> Floats:
-    return np.array([si(value) for part in parts for value in part])
+def _vector(table: Table, *names: str) -> Floats:
+    return np.array(table.si_numbers(*names))
