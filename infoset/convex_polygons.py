@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from infoset import polygon, polygon_hull, polygon_sum
 from infoset._compile import compiled
 from infoset.limits import Limits, need_pair, real_values, shown
+from infoset.pictures import outlines_svg
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -133,8 +134,6 @@ class ConvexPolygons:
         return (self[i] for i in range(len(self)))
 
     def _repr_svg_(self) -> str:
-        from infoset.pictures import outlines_svg
-
         outlines = [self.vertices[index][: self.counts[index]] for index in np.ndindex(self.shape)]
         return outlines_svg(outlines, "x", "y", repr(self).strip("<>"))
 

@@ -16,6 +16,7 @@ from infoset.guaranteed_miss import GuaranteedMiss
 from infoset.history import History
 from infoset.limits import NUMBER, POSITIVE, WHOLE
 from infoset.model import SetModel
+from infoset.pictures import sections_svg
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.section_stack import SectionStack, outline
 
@@ -72,9 +73,7 @@ class Section:
         return to_omega_alpha(self.polygon, self.range_m, self.closing_speed_m_s)
 
     def _repr_svg_(self) -> str:
-        from infoset.pictures import sections_svg
-
-        return sections_svg([self], f"section at x = {self.range_m / 1e3:.6g} km")
+        return sections_svg([self.omega_alpha.polygon()], f"section at x = {self.range_m / 1e3:.6g} km")
 
 
 def to_omega_alpha(polygon: ConvexPolygons, range_m: float, closing_speed_m_s: float) -> ConvexPolygons:
@@ -371,10 +370,9 @@ class InformationSetView:
         return [to_shapely(section.omega_alpha) for section in self.sections(engagement)]
 
     def _repr_svg_(self) -> str:
-        from infoset.pictures import sections_svg
-
         which = "" if self.batch == 1 else f", the first of {self.batch} engagements"
-        return sections_svg(self.sections(), f"{self.section_counts[0]} sections at t = {self.time_s:g} s{which}")
+        outlines = [section.omega_alpha.polygon() for section in self.sections()]
+        return sections_svg(outlines, f"{self.section_counts[0]} sections at t = {self.time_s:g} s{which}")
 
     def __repr__(self) -> str:
         head = f"{type(self).__name__} at t = {self.time_s:g} s"

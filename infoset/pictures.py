@@ -1,20 +1,16 @@
-"""What a notebook shows of sets and of predicted misses."""
+"""Pictures of polygons and predicted misses for notebooks, as SVG text made from arrays."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from infoset.svg import ACCENT, NEAR, Plane, evenly, limits, note, shade
 
-if TYPE_CHECKING:
-    from infoset.information_set_view import Section
-    from infoset.predicted_miss import PredictedMiss
-
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 MOST_OUTLINES = 9
 MOST_INTERVALS = 24
@@ -29,14 +25,10 @@ def outlines_svg(outlines: Sequence[Floats], x_title: str, y_title: str, title: 
     x_title, y_title : str
         With their units.
     title : str
-
-    Returns
-    -------
-    str
-        SVG.
+        Over the picture.
     """
     shown = [outlines[index] for index in evenly(len(outlines), MOST_OUTLINES)]
-    shown = [each for each in shown if len(each)]
+    shown = [outline for outline in shown if len(outline)]
     if not shown:
         return note(f"{title}: nothing is left" if outlines else title)
     points = np.concatenate(shown)
@@ -46,44 +38,29 @@ def outlines_svg(outlines: Sequence[Floats], x_title: str, y_title: str, title: 
     return plane.svg()
 
 
-def sections_svg(sections: Sequence[Section], title: str) -> str:
+def sections_svg(outlines: Sequence[Floats], title: str) -> str:
     """Return a picture of sections in the (omega, alpha) plane, from the nearest (dark) to the farthest.
 
     Parameters
     ----------
-    sections : sequence of Section
+    outlines : sequence of ndarray, shape (n, 2)
+        Vertices (omega, alpha) of each section, rad/s and rad.
     title : str
-
-    Returns
-    -------
-    str
-        SVG.
+        Over the picture.
     """
-    chosen = [sections[index] for index in evenly(len(sections), MOST_OUTLINES)]
-    outlines = [section.omega_alpha.polygon() * 1e6 for section in chosen]
-    return outlines_svg(outlines, "rate ω, µrad/s", "angle α, µrad", title)
+    return outlines_svg([outline * 1e6 for outline in outlines], "rate ω, µrad/s", "angle α, µrad", title)
 
 
-def predicted_miss_svg(miss: PredictedMiss) -> str:
-    """Return a picture of predicted-miss intervals, one bar an engagement.
-
-    Parameters
-    ----------
-    miss : PredictedMiss
-
-    Returns
-    -------
-    str
-        SVG.
-    """
-    known = np.flatnonzero(miss.exists)[:MOST_INTERVALS]
+def predicted_miss_svg(exists: Flags, lower_m: Floats, upper_m: Floats) -> str:
+    """Return a picture of the predicted-miss intervals of the engagements in which one exists, one bar each."""
+    known = np.flatnonzero(exists)[:MOST_INTERVALS]
     if not len(known):
         return note("predicted miss: no set is left")
-    ends = np.stack([miss.lower_m[known], miss.upper_m[known]], axis=1)
-    if len(miss.exists) == 1:
+    ends = np.stack([lower_m[known], upper_m[known]], axis=1)
+    if len(exists) == 1:
         title = f"predicted miss from {ends[0, 0]:.4g} to {ends[0, 1]:.4g} m"
     else:
-        title = f"predicted miss, {len(known)} of {len(miss.exists)} engagements"
+        title = f"predicted miss, {len(known)} of {len(exists)} engagements"
     y = (-float(len(known)), 1.0)
     plane = Plane(limits(np.append(ends, 0.0)), y, "predicted miss, m", "", title, 74 + 8 * len(known))
     plane.line(np.array([[0.0, y[0]], [0.0, y[1]]]), ACCENT, width=1.0)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from infoset.pictures import predicted_miss_svg
+
 Floats = NDArray[np.float64]
 
 
@@ -50,6 +52,4 @@ class PredictedMiss:
     upper_point: ExtremePoints
 
     def _repr_svg_(self) -> str:
-        from infoset.pictures import predicted_miss_svg
-
-        return predicted_miss_svg(self)
+        return predicted_miss_svg(self.exists, self.lower_m, self.upper_m)
