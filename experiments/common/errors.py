@@ -9,10 +9,6 @@ INTERRUPTED = 130
 def on_a_screen(message: str) -> str:
     """Return a message without what would steer the terminal: parts of it may come from somebody else's file.
 
-    Parameters
-    ----------
-    message : str
-
     Returns
     -------
     str

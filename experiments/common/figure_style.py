@@ -78,16 +78,7 @@ def style() -> Iterator[None]:
 
 
 def new_figure(height_mm: float, width_mm: float = WIDTH_MM) -> Figure:
-    """Return an empty figure of a size, with a canvas of its own and no tie to pyplot.
-
-    Parameters
-    ----------
-    height_mm, width_mm : float
-
-    Returns
-    -------
-    Figure
-    """
+    """Return an empty figure of a size, with a canvas of its own and no tie to pyplot."""
     figure = Figure(figsize=(width_mm / _MM_PER_INCH, height_mm / _MM_PER_INCH))
     FigureCanvasAgg(figure)
     return figure
@@ -105,8 +96,6 @@ def place_axes(
 
     Parameters
     ----------
-    figure : Figure
-    rows, columns : int
     margins_mm : tuple of float
         Left, right, bottom, top.
     gaps_mm : tuple of float

@@ -81,12 +81,6 @@ def choice(option: str, name: str, valid: Sequence[str]) -> str:
     ----------
     option : str
         What it was given to.
-    name : str
-    valid : sequence of str
-
-    Returns
-    -------
-    str
 
     Raises
     ------
@@ -109,14 +103,8 @@ def whole_number(option: str, value: int, least: int, greatest: int | None, exam
     ----------
     option : str
         What it was given to.
-    value, least : int
-    greatest : int or None
     example : int
         A sound one, for the message.
-
-    Returns
-    -------
-    int
 
     Raises
     ------

@@ -20,10 +20,6 @@ def angle_problems(path: KeyPath, duration_s: Decimal | None, rate_rad_s: Decima
         Where the time stands.
     duration_s, rate_rad_s : Decimal or None
         None, or not positive, where they are wrong themselves.
-
-    Yields
-    ------
-    Problem
     """
     if duration_s is None or rate_rad_s is None or duration_s <= 0 or rate_rad_s <= 0:
         return

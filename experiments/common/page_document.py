@@ -37,7 +37,6 @@ def page(title: str, scripts: Sequence[str], data: Mapping[str, object], own_scr
     data : mapping
         What the scripts draw, as in `experiments.common.output.to_json`. The keys ``heading`` and
         ``about`` (a list of lines) stand at the top of the page.
-
     own_script : str, optional
         Text of a script of this page only.
 

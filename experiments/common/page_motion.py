@@ -24,7 +24,6 @@ class Track:
 
     Parameters
     ----------
-    name : str
     look : int
         Index of the line style and the mark.
     points : ndarray, shape (n, 3)
@@ -54,7 +53,6 @@ class Sets:
 
     Parameters
     ----------
-    name : str
     faces : sequence of sequence of ndarray
         The faces of each set: polygons of shape (k, 3) in space, or (k, 2) in the plane of the view, SI.
     of_frame : sequence of int
@@ -72,17 +70,12 @@ class View:
 
     Parameters
     ----------
-    caption : str
     axes : tuple of str
         Names of the three axes, without units.
-    unit : tuple
-    tracks : sequence of Track
-    marks : sequence of Mark
     plane : tuple of int, or None
         The horizontal and the vertical axis; None is space.
     equal : bool
         Whether all axes have the same scale.
-    sets : Sets or None
     """
 
     caption: str
@@ -115,8 +108,6 @@ class Graph:
         Text above the graph.
     title : str
         Name of the vertical axis.
-    unit : tuple
-    curves : sequence of Curve
     levels : sequence of float
         Values at which horizontal lines are drawn, SI.
     band : ndarray, shape (n, 2), or None
@@ -159,13 +150,10 @@ def motion_data(
 
     Parameters
     ----------
-    heading : str
     about : sequence of str
         Lines below the heading.
     time_s : ndarray, shape (n,)
         The times that the page shows.
-    views : sequence of View
-    graphs : sequence of Graph
     choices : sequence of str
         Names of alternative controls, to show one of them.
     """

@@ -15,16 +15,7 @@ STEPS_OF_A_BOX = 65535
 
 
 def packed_floats(values: ArrayLike) -> str:
-    """Return numbers as base64 of little-endian doubles: all their digits.
-
-    Parameters
-    ----------
-    values : array_like
-
-    Returns
-    -------
-    str
-    """
+    """Return numbers as base64 of little-endian doubles: all their digits."""
     return _text(np.asarray(values, dtype="<f8"))
 
 
@@ -35,10 +26,6 @@ def packed_counts(values: ArrayLike) -> str:
     ----------
     values : array_like
         From 0 to 2^32 - 1.
-
-    Returns
-    -------
-    str
     """
     return _text(np.asarray(values, dtype="<u4"))
 

@@ -51,10 +51,6 @@ def built_in_problems() -> list[BuiltInProblem]:
 def problem_text(name: str) -> str:
     """Return the file of a built-in problem, comments and all.
 
-    Parameters
-    ----------
-    name : str
-
     Returns
     -------
     str
@@ -101,10 +97,6 @@ def problem_form(
 
 def problem_hash(tables: Tables) -> str:
     """Return a short fingerprint of every value of a problem but its name and description.
-
-    Parameters
-    ----------
-    tables : pydantic model
 
     Returns
     -------

@@ -66,7 +66,6 @@ class PublishedNumber:
 
     Parameters
     ----------
-    paper : str
     source : str
         Table or equation.
     name : str
@@ -123,10 +122,8 @@ class Reproduction:
     ----------
     paper : str
         Name on the command line.
-    title : str
     problems : tuple of (str, str)
         Name and hash of the problems or scenarios of the computation.
-    numbers : tuple of PublishedNumber
     remarks : tuple of str
         Misprints and omissions other than numbers.
     """

@@ -143,7 +143,6 @@ def built_in_text(form: Form[Tables], name: str) -> str:
 
     Parameters
     ----------
-    form : Form
     name : str
         One of `built_in_names`.
 
@@ -167,7 +166,6 @@ def load_tables(form: Form[Tables], name_or_path: str | os.PathLike[str]) -> Tab
 
     Parameters
     ----------
-    form : Form
     name_or_path : str or path
         A built-in name, or the path of a TOML file. A name wins over a file of that name, unless the argument has a
         path separator or ends in ``.toml``.
@@ -197,7 +195,6 @@ def read_tables(form: Form[Tables], text: str, source: str) -> Tables:
 
     Parameters
     ----------
-    form : Form
     text : str
         TOML.
     source : str
@@ -251,10 +248,6 @@ def keys_of(tables: type[BaseModel], path: KeyPath = ()) -> dict[str, Any]:
         The model of the whole file.
     path : tuple of str, optional
         The table in it; empty is the top of the file.
-
-    Returns
-    -------
-    dict of str to FieldInfo
     """
     model = tables
     for part in path:

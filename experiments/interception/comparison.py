@@ -22,8 +22,6 @@ class Comparison:
 
     Parameters
     ----------
-    strategy : str
-    noise : NoiseKind
     results : mapping of TieRule or None to Results
         By tie rule of the game noise; the one key of random noise is None.
     """

@@ -17,9 +17,6 @@ class Curve:
     ----------
     number : int
         1 random noise, 2 random with range meter, 3 game noise, 4 game with range meter.
-    noise : NoiseKind
-    range_meter : bool
-    results : Results
     """
 
     number: int

@@ -72,10 +72,6 @@ def reproduce(progress: Progress) -> Reproduction:
     ----------
     progress : callable
         Told the fraction done.
-
-    Returns
-    -------
-    Reproduction
     """
     single, many = load_scenario(SINGLE), load_scenario(MANY)
     numbers = [

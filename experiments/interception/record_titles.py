@@ -15,16 +15,7 @@ def noise_title(record: Record) -> str:
 
 
 def record_titles(records: Sequence[Record]) -> list[str]:
-    """Return a title for each record, with what tells it apart where the noise alone does not.
-
-    Parameters
-    ----------
-    records : sequence of Record
-
-    Returns
-    -------
-    list of str
-    """
+    """Return a title for each record, with what tells it apart where the noise alone does not."""
     titles = [noise_title(record) for record in records]
     candidates = (
         [f"run {record.run}" for record in records],

@@ -36,10 +36,6 @@ class Stages:
 def replayed(record: Record) -> Iterator[Stages]:
     """Go through a record's history again, and yield the stages of each step; what is left at the end comes last.
 
-    Parameters
-    ----------
-    record : Record
-
     Yields
     ------
     Stages

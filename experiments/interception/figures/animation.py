@@ -34,7 +34,6 @@ def animation_path(option: str, path: Path | None, ending: str) -> None:
     ----------
     option : str
         What it was given to.
-    path : Path or None
     ending : str
         ``.gif`` or ``.mp4``.
 
@@ -59,7 +58,6 @@ def animate(records: Sequence[Record], ending: str, progress: Callable[[float], 
 
     Parameters
     ----------
-    records : sequence of Record
     ending : str
         ``.gif`` (by Pillow) or ``.mp4`` (by ffmpeg).
     progress : callable

@@ -33,7 +33,6 @@ def draw_bound(scenario: Scenario, lower: LowerBound) -> Figure:
     ----------
     scenario : Scenario
         For its sensor and its step.
-    lower : LowerBound
 
     Returns
     -------

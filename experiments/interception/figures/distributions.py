@@ -119,7 +119,6 @@ def scale_axis(axes: Axes, samples: Sequence[Floats], *, from_zero: bool) -> tup
 
     Parameters
     ----------
-    axes : Axes
     samples : sequence of ndarray
         One a curve.
     from_zero : bool
@@ -152,10 +151,8 @@ def draw_band(axes: Axes, values: Floats, lower: Floats, upper: Floats, colour: 
 
     Parameters
     ----------
-    axes : Axes
     values, lower, upper : ndarray, shape (n,)
         The samples in rising order, and the band at and after each.
-    colour : str
     label : str
         Of both lines.
     """

@@ -130,13 +130,7 @@ def _draw_impulse(axes: Axes, record: Record) -> None:
 
 
 def draw_predicted_miss(axes: Axes, record: Record) -> None:
-    """Draw the predicted-miss interval against time.
-
-    Parameters
-    ----------
-    axes : Axes
-    record : Record
-    """
+    """Draw the predicted-miss interval against time."""
     times, lower, upper = _predicted_miss(record)
     axes.axhline(0.0, color=LIMIT, linewidth=0.6)
     axes.fill_between(times, lower, upper, color=SET_FILL, linewidth=0.0)
@@ -159,13 +153,7 @@ def _level_impulse(row: Sequence[Axes], records: Sequence[Record]) -> None:
 
 
 def level_predicted_miss(row: Sequence[Axes], records: Sequence[Record]) -> None:
-    """Give axes of predicted misses the same limits: linear to ten metres, a step a decade beyond.
-
-    Parameters
-    ----------
-    row : sequence of Axes
-    records : sequence of Record
-    """
+    """Give axes of predicted misses the same limits: linear to ten metres, a step a decade beyond."""
     bounds = np.concatenate([np.concatenate(_predicted_miss(record)[1:]) for record in records])
     greatest = float(np.abs(bounds).max(initial=10.0))
     decades = int(np.log10(greatest) + 1e-9)

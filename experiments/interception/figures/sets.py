@@ -98,11 +98,6 @@ def choose_sections(sections: Sequence[Section], most: int) -> list[Section]:
     ----------
     sections : sequence of Section
         In rising order of range.
-    most : int
-
-    Returns
-    -------
-    list of Section
     """
     if len(sections) <= most:
         return list(sections)
@@ -132,14 +127,7 @@ _MEASUREMENT_LOOK: dict[str, Any] = {
 
 
 def draw_step(axes: Axes, step: StepRecord, chosen: Sequence[Section]) -> None:
-    """Draw some sections of one step with the truth and the measurement, on axes that have their limits.
-
-    Parameters
-    ----------
-    axes : Axes
-    step : StepRecord
-    chosen : sequence of Section
-    """
+    """Draw some sections of one step with the truth and the measurement, on axes that have their limits."""
     outlines = [_outline(section) for section in chosen]
     for index, outline in enumerate(outlines):
         _draw_outline(axes, outline, _colour(index, len(outlines)), zorder=3.0 - 0.01 * index)
@@ -234,7 +222,6 @@ def level_planes(row: Sequence[Axes], points: Sequence[Floats]) -> None:
 
     Parameters
     ----------
-    row : sequence of Axes
     points : sequence of ndarray, shape (n, 2)
         What must be seen, as `extent_of` returns it.
     """
@@ -251,17 +238,7 @@ def level_planes(row: Sequence[Axes], points: Sequence[Floats]) -> None:
 
 
 def extent_of(step: StepRecord, chosen: Sequence[Section]) -> Floats:
-    """Return all points (omega in µrad/s, alpha in mrad) that a drawing of a step must have room for.
-
-    Parameters
-    ----------
-    step : StepRecord
-    chosen : sequence of Section
-
-    Returns
-    -------
-    ndarray, shape (n, 2)
-    """
+    """Return all points (omega in µrad/s, alpha in mrad) that a drawing of a step must have room for."""
     rate, angle = step.true_rate_rad_s * 1e6, step.true_angle_rad * 1e3
     marks = [[rate, angle]]
     if "angle" in step.measured:

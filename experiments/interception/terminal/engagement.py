@@ -30,8 +30,6 @@ def play(records: Sequence[Record], console: Console, steps_per_s: float) -> Non
 
     Parameters
     ----------
-    records : sequence of Record
-    console : Console
     steps_per_s : float
         How fast.
     """
@@ -53,14 +51,8 @@ def frame(records: Sequence[Record], step: int, console: Console) -> Group:
 
     Parameters
     ----------
-    records : sequence of Record
     step : int
         Of one that is over, its last step is shown.
-    console : Console
-
-    Returns
-    -------
-    Group
     """
     braille = "utf" in console.encoding.lower()
     beside = len(records) if console.width >= len(records) * (_LEAST_COLUMNS + 6) else 1
