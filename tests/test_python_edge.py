@@ -523,9 +523,9 @@ FILE_ONLY = (
     "range_threshold_km: must be greater than 0",
     "must be a whole number of steps of guidance.step_s",
     "must be long enough for at most",
-    "the truth is integrated in stretches",
+    "the true state is integrated in steps",
     "in the guaranteed model",
-    "the guaranteed model has room for",
+    "the guaranteed model allows at most",
 )
 SIZES = st.one_of(
     st.sampled_from([0.0, -0.0, 1.0, -1.0, 1e-120, 1e-30, 0.5, 1e3, 1e9, 1e16, 1e60, 1e65, 1e308, math.inf, math.nan]),

@@ -1,24 +1,18 @@
-"""What went wrong, said to a person."""
+"""Errors of user input, and messages for the terminal."""
 
 from __future__ import annotations
 
 INTERRUPTED = 130
-"""Exit code, as of a program that Ctrl-C ends."""
+"""Exit code of a program that Ctrl-C ends."""
 
 
 def on_a_screen(message: str) -> str:
-    """Return a message without what would steer the terminal: parts of it may come from somebody else's file.
-
-    Returns
-    -------
-    str
-        The same lines, with a question mark for each character that cannot be printed.
-    """
-    return "".join(each if each.isprintable() or each == "\n" else "?" for each in message)
+    """Return a message with a question mark for each unprintable character: parts may come from a hostile file."""
+    return "".join(letter if letter.isprintable() or letter == "\n" else "?" for letter in message)
 
 
 class InputError(Exception):
-    """Something a person gave is wrong; the message says what, where, and what to do.
+    """Wrong user input; the message says what is wrong, where, and what to do.
 
     The command line prints it without a traceback and exits with code 2.
     """

@@ -1,4 +1,4 @@
-"""The one style of every figure: sizes, colours that stay apart in grey, and how a figure becomes files."""
+"""The style of all figures: sizes, and colours that differ in grey too; figures as files."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def style() -> Iterator[None]:
 
 
 def new_figure(height_mm: float, width_mm: float = WIDTH_MM) -> Figure:
-    """Return an empty figure of a size, with a canvas of its own and no tie to pyplot."""
+    """Return an empty figure with its own canvas, independent of pyplot."""
     figure = Figure(figsize=(width_mm / _MM_PER_INCH, height_mm / _MM_PER_INCH))
     FigureCanvasAgg(figure)
     return figure
@@ -92,7 +92,7 @@ def place_axes(
     margins_mm: tuple[float, float, float, float],
     gaps_mm: tuple[float, float],
 ) -> list[list[Axes]]:
-    """Return a grid of axes in fixed places, which spares the passes of an automatic layout.
+    """Return a grid of axes at fixed positions, without the cost of an automatic layout.
 
     Parameters
     ----------

@@ -39,15 +39,11 @@ Seed = Annotated[
     int, typer.Option("--seed", metavar="N", min=0, help="Root seed. The same seed gives the same random numbers.")
 ]
 Out = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="Folder for figures and results; made if it is not there.")
+    Path | None, typer.Option("--out", metavar="DIR", help="Folder for figures and results; created if needed.")
 ]
-Json = Annotated[
-    Path | None, typer.Option("--json", metavar="FILE", help="Write results as JSON; - prints it alone on stdout.")
-]
+Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write results as JSON; - prints JSON only.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-Csv = Annotated[
-    Path | None, typer.Option("--csv", metavar="FILE", help="Write a table as CSV; - prints it alone on stdout.")
-]
+Csv = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write a table as CSV; - prints CSV only.")]
 Html = Annotated[
     Path | None,
     typer.Option(
@@ -57,7 +53,9 @@ Html = Annotated[
         help="Write an interactive page: one file that opens in any browser, offline.",
     ),
 ]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files, and write into a folder that has some.")]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Replace existing files, and write into a folder that is not empty.")
+]
 Quiet = Annotated[
     bool,
     typer.Option("--quiet", "-q", callback=_silence_the_compile_notice, help="Print no progress and no tables."),
@@ -75,18 +73,7 @@ class FileOptions:
 
 
 def choice(option: str, name: str, valid: Sequence[str]) -> str:
-    """Return a name if it is one of those there are.
-
-    Parameters
-    ----------
-    option : str
-        What it was given to.
-
-    Raises
-    ------
-    InputError
-        If it is none of them; the nearest is suggested.
-    """
+    """Return a valid name; raise `InputError`, with the nearest valid name, for any other."""
     if name in valid:
         return name
     from experiments.common.toml_values import nearest, shown
@@ -97,20 +84,7 @@ def choice(option: str, name: str, valid: Sequence[str]) -> str:
 
 
 def whole_number(option: str, value: int, least: int, greatest: int | None, example: int) -> int:
-    """Return a whole number if it lies where it must.
-
-    Parameters
-    ----------
-    option : str
-        What it was given to.
-    example : int
-        A sound one, for the message.
-
-    Raises
-    ------
-    InputError
-        If it lies outside.
-    """
+    """Return a number within limits; raise `InputError`, with a valid example, for any other."""
     if value >= least and (greatest is None or value <= greatest):
         return value
     limits = f"at least {least}" if greatest is None else f"from {least} to {greatest}"

@@ -1,4 +1,4 @@
-"""How far an orbit turns during a problem: where linear motion about it means something."""
+"""Angle of the orbit during a problem, within which linear motion is meaningful."""
 
 from __future__ import annotations
 
@@ -12,15 +12,7 @@ LEAST_RADIANS = Decimal("1e-9")
 
 
 def angle_problems(path: KeyPath, duration_s: Decimal | None, rate_rad_s: Decimal | None) -> Iterator[Problem]:
-    """Find whether a time is an unlikely angle of the orbit.
-
-    Parameters
-    ----------
-    path : tuple of str
-        Where the time stands.
-    duration_s, rate_rad_s : Decimal or None
-        None, or not positive, where they are wrong themselves.
-    """
+    """Yield a problem if the orbit turns by an unlikely angle in a time; wrong or missing values yield none."""
     if duration_s is None or rate_rad_s is None or duration_s <= 0 or rate_rad_s <= 0:
         return
     angle = duration_s * rate_rad_s

@@ -1,4 +1,4 @@
-"""One self-contained HTML document: template, style, scripts and data, under a policy that lets nothing else in.
+"""One self-contained HTML document: template, style, scripts and data, with a policy that blocks everything else.
 
 A person's texts (names, descriptions) travel as JSON in a block that no browser runs, with every character that could
 end it escaped; the scripts put them on the page as text alone. The policy names the style and the scripts by their

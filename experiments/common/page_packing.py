@@ -1,4 +1,4 @@
-"""Arrays as short text: how numbers that are many travel in a page."""
+"""Arrays as short text, for the data of a page."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 
 STEPS_OF_A_BOX = 65535
-"""A vertex is placed on this many steps across its polygon's own box: some 0.01 pixels on a screen."""
+"""Steps of the vertex grid across the box of a polygon: about 0.01 pixels on a screen."""
 
 
 def packed_floats(values: ArrayLike) -> str:

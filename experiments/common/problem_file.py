@@ -1,4 +1,4 @@
-"""Problem files: TOML with a `kind`, one kind a command, built-in ones in `experiments/problems`."""
+"""Problem files: TOML with a `kind`, one kind per command; the built-in files are in `experiments/problems`."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class ProblemTables(Table):
 
 @dataclass(frozen=True)
 class BuiltInProblem:
-    """A problem that comes with the project: its name, its kind, and a line about it."""
+    """A built-in problem."""
 
     name: str
     kind: str
@@ -49,7 +49,7 @@ def built_in_problems() -> list[BuiltInProblem]:
 
 
 def problem_text(name: str) -> str:
-    """Return the file of a built-in problem, comments and all.
+    """Return the file of a built-in problem, with its comments.
 
     Returns
     -------
@@ -81,11 +81,11 @@ def problem_form(
     Parameters
     ----------
     kind : str
-        What ``kind`` says in the file.
+        Value of ``kind`` in the file.
     tables : type
         The pydantic model of the whole file; it has `schema`, `kind` and `name` among its keys.
     checks : callable, optional
-        What the values must be to one another.
+        Checks of relations between values.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def problem_form(
 
 
 def problem_hash(tables: Tables) -> str:
-    """Return a short fingerprint of every value of a problem but its name and description.
+    """Return a short hash of all values of a problem except its name and description.
 
     Returns
     -------
@@ -122,4 +122,4 @@ def _plain(value: object) -> str:
         return str(value.value)
     if isinstance(value, Decimal):
         return f"{value.normalize():f}"
-    raise TypeError(f"a problem holds no {type(value).__name__}")
+    raise TypeError(f"a problem contains no {type(value).__name__}")

@@ -1,4 +1,4 @@
-"""What the commands that fly show of their work: progress, the notice of the first compilation, numbers in tables."""
+"""Terminal output of commands: messages, progress bars and tables."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ NOT_FINITE = (
 
 
 def figure_files(*names: str) -> list[str]:
-    """Return the names of the files that figures become."""
+    """Return the names of the files of figures."""
     return [f"{name}.{kind}" for name in names for kind in ("pdf", "png")]
 
 
 def say(message: str, quiet: bool) -> None:
-    """Print a line beside the results, on stderr."""
+    """Print a line on stderr, unless `quiet`."""
     if not quiet:
         typer.echo(on_a_screen(message), err=True)
 
 
 def say_warnings(warnings: Iterable[str], quiet: bool) -> None:
-    """Print warnings beside the results, a line each."""
+    """Print warnings on stderr, one line each."""
     for warning in warnings:
         say(f"warning: {warning}", quiet)
 
@@ -89,7 +89,7 @@ def progress_bar(quiet: bool) -> Iterator[BeginProgress]:
 
 
 def number(value: float | None) -> str:
-    """Return a number as a table shows it: three digits, more where they stand before the point."""
+    """Return a number with three significant digits, one decimal from 100 on, for tables."""
     if value is None:
         return "-"
     return f"{value:.1f}" if abs(value) >= 100 else f"{value:.3g}"

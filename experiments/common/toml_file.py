@@ -1,4 +1,4 @@
-"""TOML files that a person wrote: found by name or path, read within bounds, checked whole, problems told at once."""
+"""TOML files of the user: found by name or path, limited in size, checked completely, all problems in one message."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ Tables = TypeVar("Tables", bound=BaseModel)
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing wrong with a file.
+    """One problem of a file.
 
     Parameters
     ----------
     path : tuple of str
-        Table and key; a table of an array of tables has its place, from 0, after its name.
+        Table and key; an array of tables has the index of the table, from 0, after its name.
     text : str
         What is wrong, and with which value.
     remedy : str
-        What to do about it.
+        What to do.
     """
 
     path: KeyPath
@@ -46,14 +46,14 @@ class Problem:
 
 @dataclass(frozen=True)
 class Known:
-    """The values of a file that are sound by themselves; the others are None.
+    """The values of a file; those that are invalid are None.
 
     Parameters
     ----------
     document : dict
         The file as parsed.
     bad : frozenset of tuple of str
-        Paths of the tables and keys already found wrong.
+        Paths of the invalid tables and keys.
     """
 
     document: dict[str, Any]
@@ -86,32 +86,32 @@ class Known:
 
 
 def no_checks(_known: Known) -> Iterator[Problem]:
-    """Find nothing wrong."""
+    """Yield no problem."""
     return iter(())
 
 
 @dataclass(frozen=True)
 class Form(Generic[Tables]):
-    """What a kind of file is: its tables, and what to call it.
+    """A kind of file: its tables, and its names in messages.
 
     Parameters
     ----------
     noun : str
-        What a file of it is called in messages: ``scenario``.
+        Name of such a file in messages: ``scenario``.
     folder : str
-        Where the built-in ones lie, in the package `experiments`.
+        Folder of the built-in files in the package `experiments`.
     listed_by : str
-        The command that lists the built-in ones.
+        Command that lists the built-in files.
     begun_by : str
-        The command that gives a sound one to start from.
+        Command that prints or writes a valid file to start from.
     tables : type
         The pydantic model of the whole file, made of `experiments.common.toml_values.Table`.
     checks : callable, optional
-        What the values must be to one another.
+        Checks of relations between values.
     kind : str or None, optional
-        What the file's ``kind`` must say, where files of several kinds lie in one folder.
+        Required value of ``kind``, if a folder contains files of several kinds.
     schema : int, optional
-        The version of the form that is read.
+        Version of the file format.
     """
 
     noun: str
@@ -139,30 +139,14 @@ def built_in_names(form: Form[Tables]) -> tuple[str, ...]:
 
 
 def built_in_text(form: Form[Tables], name: str) -> str:
-    """Return a built-in file, comments and all.
-
-    Parameters
-    ----------
-    name : str
-        One of `built_in_names`.
-
-    Returns
-    -------
-    str
-        TOML.
-
-    Raises
-    ------
-    InputError
-        If there is no such file.
-    """
+    """Return the text of a built-in file, with its comments; `InputError` if there is no such file."""
     if name not in built_in_names(form):
         raise _no_such_name(form, name, f"no built-in {form.noun}")
     return resources.files("experiments").joinpath(form.folder, f"{name}.toml").read_text(encoding="utf-8")
 
 
 def load_tables(form: Form[Tables], name_or_path: str | os.PathLike[str]) -> Tables:
-    """Read a built-in file or one that a person names.
+    """Read a built-in file or a file of the user.
 
     Parameters
     ----------
@@ -178,7 +162,7 @@ def load_tables(form: Form[Tables], name_or_path: str | os.PathLike[str]) -> Tab
     Raises
     ------
     InputError
-        If there is no such file, or it is not sound; all its problems are named.
+        If there is no such file, or it is invalid; the message lists all its problems.
     """
     given = os.fspath(name_or_path)
     marks = [mark for mark in (os.sep, os.altsep) if mark]
@@ -198,7 +182,7 @@ def read_tables(form: Form[Tables], text: str, source: str) -> Tables:
     text : str
         TOML.
     source : str
-        What to call the text in messages: the file's name.
+        Name of the file in messages.
 
     Returns
     -------
@@ -208,13 +192,13 @@ def read_tables(form: Form[Tables], text: str, source: str) -> Tables:
     Raises
     ------
     InputError
-        With every problem of the text: where it is, the value found and the remedy.
+        With all problems of the text: place, value and what to do.
     """
     document = _parse(form, text, source)
     schema = document.get("schema", form.schema)
     if isinstance(schema, bool) or not isinstance(schema, int) or schema != form.schema:
         raise InputError(
-            f"{source}: schema: must be {form.schema}, the only form of file this version reads, found "
+            f"{source}: schema: must be {form.schema}, the only file format that this version reads, found "
             f"{shown(schema)}; write schema = {form.schema} and the keys of `{form.begun_by}`, or update infoset"
         )
     if form.kind is not None and document.get("kind") != form.kind:
@@ -240,7 +224,7 @@ def read_tables(form: Form[Tables], text: str, source: str) -> Tables:
 
 
 def keys_of(tables: type[BaseModel], path: KeyPath = ()) -> dict[str, Any]:
-    """Return the keys of a table as written, with what is known of each.
+    """Return the keys of a table as written, with their pydantic fields.
 
     Parameters
     ----------
@@ -304,7 +288,7 @@ def _exists(path: str) -> bool:
 
 
 def _text_of_file(form: Form[Tables], path: str) -> str:
-    """Read a file a person named."""
+    """Read a file of the user."""
     try:
         with Path(path).open("rb") as file:
             content = file.read(LARGEST_FILE_BYTES + 1)
@@ -340,7 +324,7 @@ def _decimal(literal: str) -> Decimal:
 
 
 def _parse(form: Form[Tables], text: str, source: str) -> dict[str, Any]:
-    """Parse TOML, refusing what would take the parser too long."""
+    """Parse TOML; raise `InputError` for texts that would take the parser too long."""
     if len(text) > LARGEST_FILE_BYTES:
         raise InputError(f"{source}: is over {LARGEST_FILE_BYTES // 1000} kB, far more than a {form.noun} needs")
     lines = text.split("\n")
@@ -359,7 +343,7 @@ def _parse(form: Form[Tables], text: str, source: str) -> dict[str, Any]:
 
 
 def _report(form: Form[Tables], problems: list[Problem], source: str) -> str:
-    """Put all problems of a file into one message, in the order of the tables."""
+    """Return one message with all problems of a file, in the order of the tables."""
     order = [*keys_of(form.tables)]
     problems = sorted(problems, key=lambda each: order.index(each.path[0]) if each.path[0] in order else len(order))
     lines = [f"{source}: {_written(each.path)}: {each.text}; {each.remedy}" for each in problems[:MOST_PROBLEMS]]
@@ -371,7 +355,7 @@ def _report(form: Form[Tables], problems: list[Problem], source: str) -> str:
 
 
 def _written(path: KeyPath) -> str:
-    """Return a path as a person reads it: the second of [[craft]] is ``craft #2``."""
+    """Return a path for a message: the second table of [[craft]] is ``craft #2``."""
     parts: list[str] = []
     for depth, part in enumerate(path):
         if part.isdigit() and depth:
@@ -382,7 +366,7 @@ def _written(path: KeyPath) -> str:
 
 
 def _problem(form: Form[Tables], details: Any) -> Problem:
-    """Say in our words what pydantic found."""
+    """Return the problem of an error of pydantic."""
     path = tuple(str(part) for part in details["loc"])
     if details["type"] == "missing":
         return Problem(path, "is missing", _remedy_of_missing(form.tables, path))
@@ -399,7 +383,7 @@ def _problem(form: Form[Tables], details: Any) -> Problem:
         return Problem(path, f"must have {limit} of them, found {len(details['input'])}", "add or remove some")
     heading = _heading(form.tables, path[0])
     problem = "must be tables" if heading.startswith("[[") and len(path) == 1 else "must be a table"
-    return Problem(path, f"{problem}, found {found}", f"write {heading} on a line of its own, its keys below it")
+    return Problem(path, f"{problem}, found {found}", f"write {heading} on a separate line, its keys below it")
 
 
 def _example(tables: type[BaseModel], path: KeyPath) -> str:
@@ -415,7 +399,7 @@ def _remedy_of_missing(tables: type[BaseModel], path: KeyPath) -> str:
 
 
 def _unknown(form: Form[Tables], path: KeyPath, value: object) -> tuple[str, str]:
-    """Say what to do about a key or a table that such a file does not have."""
+    """Return the text and the remedy for an unknown key or table."""
     name, home = path[-1], path[:-1]
     known_tables = tables_of(form.tables)
     homes = [_heading(form.tables, other) for other in known_tables if name in keys_of(form.tables, (other,))]
@@ -423,7 +407,7 @@ def _unknown(form: Form[Tables], path: KeyPath, value: object) -> tuple[str, str
     if heading is not None and name in keys_of(form.tables):
         what = f"is not a key of {heading}"
         if name in known_tables:
-            return what, f"write {_heading(form.tables, name)} as a table of its own"
+            return what, f"write {_heading(form.tables, name)} as a separate table"
         return what, f"move {name} above the first table"
     if homes and not isinstance(value, dict):
         return f"is not a key of {heading or 'the top'}", f"move {name} to {' or '.join(homes)}"

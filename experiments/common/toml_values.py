@@ -1,6 +1,6 @@
-"""Values of a TOML file that a person wrote: what each may be, and how it is shown back.
+"""Values of TOML files: checks, change to SI units, and text for messages.
 
-Numbers stay decimal here, as written: they are rounded once, when they become SI.
+Numbers stay decimal, as written; the change to SI units rounds them once.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def number_text(value_si: float, power_of_ten: int = 0) -> str:
     """Write an SI value as the shortest decimal of a unit 10^power_of_ten times as great."""
     value = Decimal(repr(float(value_si)))
     if not value.is_finite():
-        raise InputError(f"a file holds finite numbers only, not {value_si}; correct what is written")
+        raise InputError(f"a file contains finite numbers only, not {value_si}; correct the value")
     return _toml_float(value.scaleb(-power_of_ten, _EXACT))
 
 
@@ -115,7 +115,7 @@ def quoted_text(text: str) -> str:
 
 
 def shown(value: object) -> str:
-    """Return a TOML value as a short piece of a message, whatever its size and depth."""
+    """Return a TOML value of any size and depth as a short text for a message."""
     text = "an array of many values"
     if isinstance(value, bool):
         text = "true" if value else "false"
@@ -132,7 +132,7 @@ def shown(value: object) -> str:
 
 
 def nearest(word: str, known: list[str]) -> str | None:
-    """Return the known word most like this one, or None if nothing is like it."""
+    """Return the most similar known word, or None if none is similar."""
     found = difflib.get_close_matches(word[:LONGEST_NAME], known, n=1, cutoff=0.6)
     return found[0] if found else None
 
@@ -141,13 +141,13 @@ WRONG = "wrong"
 
 
 def wrong(problem: str, remedy: str = "") -> PydanticCustomError:
-    """Return the error of a value that may not be; without a remedy the key's example becomes one."""
+    """Return the error of an invalid value; without a remedy the message gives the example of the key."""
     return PydanticCustomError(WRONG, "{problem}", {"problem": problem, "remedy": remedy})
 
 
 @dataclass(frozen=True)
 class Number:
-    """A finite number within limits; `above` and `below` are not themselves allowed, `least` and `most` are."""
+    """A finite number within limits: `above` and `below` are excluded, `least` and `most` included."""
 
     above: Decimal | None = None
     least: Decimal | None = None
@@ -156,14 +156,14 @@ class Number:
 
     @classmethod
     def of(cls, limits: Limits, power_of_ten: int = 0) -> Number:
-        """Return what a file may hold of a number with limits in SI, in a unit 10^power_of_ten times as great."""
+        """Return the limits, given in SI, in a unit that is 10^power_of_ten SI units."""
         ends = (limits.above, limits.least, limits.below, limits.most)
         return cls(
             *(None if end is None else Decimal(repr(end)).scaleb(-power_of_ten, _EXACT).normalize() for end in ends)
         )
 
     def problem(self, value: object) -> str | None:
-        """Return what is wrong with a value, or None."""
+        """Return the problem of a value, or None."""
         if isinstance(value, bool) or not isinstance(value, int | Decimal):
             return "must be a number"
         number = Decimal(value)
@@ -193,7 +193,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Pair:
-    """An interval [least, greatest] of numbers within limits; a number too, where `fixed` allows one."""
+    """An interval [least, greatest] of numbers within limits, or a single number if `fixed`."""
 
     number: Number
     fixed: bool = False
@@ -220,7 +220,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class Numbers:
-    """An array of so many numbers within limits; one number for all of them too, where `one_for_all` allows it."""
+    """An array of `count` numbers within limits, or one number for all of them if `one_for_all`."""
 
     count: int
     number: Number
@@ -304,7 +304,7 @@ def known_name(value: object, names: tuple[str, ...]) -> str:
 
 
 def key(meaning: str, example: str, **options: Any) -> Any:
-    """Describe a key: what the template says of it, and a value as TOML."""
+    """Describe a key: its meaning for the template, and an example as TOML."""
     return Field(description=meaning, examples=[example], **options)
 
 

@@ -1,4 +1,4 @@
-"""Strategies side by side: each under random noise, and under game noise with every tie rule."""
+"""Comparison of strategies: random noise, and game noise with every tie rule."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ QUANTILES: Mapping[str, float] = {"p10": 0.1, "p50": 0.5, "p90": 0.9, "p99": 0.9
 
 @dataclass(frozen=True)
 class Comparison:
-    """One strategy under one kind of noise, the same runs as every other.
+    """One strategy with one kind of noise; all strategies have the same runs.
 
     Parameters
     ----------
@@ -42,14 +42,14 @@ class Comparison:
 
     @property
     def truth_kept(self) -> NDArray[np.bool_]:
-        """Whether the truth stayed in its own section, in each run under every tie rule, shape (N,)."""
+        """Whether the true state stayed in its section with every tie rule, shape (N,)."""
         return np.asarray(np.all([each.truth_kept for each in self.results.values()], axis=0), dtype=np.bool_)
 
     @property
     def phi_held(self) -> np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]:
-        """Whether each run's miss was within the guaranteed one under every tie rule, shape (N,).
+        """Whether the miss was within the guaranteed miss with every tie rule, shape (N,).
 
-        Masked where nothing was guaranteed, as in all of the model `paper`.
+        Masked without a guarantee, as always in the model `paper`.
         """
         held = np.ma.stack([each.phi_held for each in self.results.values()])
         return np.ma.MaskedArray(held.filled(True).all(axis=0), mask=np.ma.getmaskarray(held).all(axis=0))
@@ -58,7 +58,7 @@ class Comparison:
 def flights(
     scenario: Scenario, strategies: Mapping[str, Strategy | None]
 ) -> list[tuple[str, TieRule | None, Scenario]]:
-    """What a comparison flies: strategy, tie rule (None is random noise) and scenario."""
+    """Return the simulations of a comparison: strategy, tie rule (None is random noise) and scenario."""
     return [
         (
             name,
@@ -72,7 +72,7 @@ def flights(
 
 
 def gather(flown: Sequence[tuple[str, TieRule | None, Results]]) -> list[Comparison]:
-    """Results of flights by strategy and noise, in the order of the strategies, random noise first."""
+    """Return results by strategy and noise, in the order of the strategies, random noise first."""
     names = list(dict.fromkeys(name for name, _, _ in flown))
     return [
         Comparison(
@@ -90,6 +90,6 @@ def gather(flown: Sequence[tuple[str, TieRule | None, Results]]) -> list[Compari
 
 
 def summary(sample: Floats) -> dict[str, float]:
-    """Quantiles of a sample by name: p10, p50, p90, p99 and max."""
+    """Return the quantiles of a sample: p10, p50, p90, p99 and max."""
     values = quantiles(sample, list(QUANTILES.values()))
     return {name: float(value) for name, value in zip(QUANTILES, values, strict=True)}

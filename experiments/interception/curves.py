@@ -26,7 +26,7 @@ class Curve:
 
 
 def curve_scenarios(scenario: Scenario) -> Sequence[tuple[int, Scenario]]:
-    """Number and scenario of each curve; without a range sensor there are curves 1 and 3 only."""
+    """Return number and scenario of each curve; without a range sensor only curves 1 and 3."""
     numbered = (
         (1, replace(scenario, noise=NoiseKind.RANDOM, range_sensor=None)),
         (2, replace(scenario, noise=NoiseKind.RANDOM)),

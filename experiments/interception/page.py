@@ -69,7 +69,7 @@ def _data(record: Record, title: str) -> dict[str, object]:
         "true_angle_rad": [step.true_angle_rad for step in steps],
         "true_rate_rad_s": [step.true_rate_rad_s for step in steps],
         "true_range_m": [step.true_range_m for step in steps],
-        # omega r^2 = V_z x - V_x z, and z + V_z x / |V_x| is where the truth would pass with no more impulses.
+        # omega r^2 = V_z x - V_x z, and z + V_z x / |V_x| is the miss of the true state without further impulses.
         "true_predicted_miss_m": [-step.true_rate_rad_s * step.true_range_m**2 / velocity_x_m_s for step in steps],
         "predicted_miss_m": [step.predicted_miss_m for step in steps],
         "impulse_m_s": impulses.tolist(),
@@ -96,7 +96,7 @@ def _sets(record: Record) -> dict[str, str]:
 
 
 def _omega_alpha(section: Section) -> NDArray[np.float64]:
-    """Vertices of a section in (omega, alpha): `Section.omega_alpha`, without the checks that thousands would cost."""
+    """Vertices of a section in (omega, alpha), as `Section.omega_alpha` but without its checks."""
     v, z = section.polygon.vertices[: int(section.polygon.counts)].T
     alpha = z / section.range_m
     return np.stack([(v + section.closing_speed_m_s * alpha) / section.range_m, alpha], axis=1)

@@ -24,18 +24,17 @@ RUNS = 200
 SINGLE_RUNS = 200
 RANDOM_TIE_RUNS = 50
 REMARKS = (
-    "The paper prints four numbers, of one engagement a noise, and not its random numbers: ours are the median, and "
-    "the tolerance reaches to the 5 and 95 % of ours, over runs with random errors or over runs and the four tie "
-    "rules.",
-    "Figure 4 is printed as a picture without numbers: its quantiles are reference values of another implementation, "
-    "with bands for the number of sections and for how sections are added.",
-    "Pi is printed with |omega|; equations (13) to (15) need its sign.",
-    "Left open by the paper, and decisive: which end of an edge is the extreme, the tie rule, the shape of the initial "
-    "set.",
+    "The paper prints four numbers of one engagement per noise, without its random numbers. Ours are medians, with "
+    "tolerances from 5 to 95 % of our runs: runs with random errors, or runs with the four tie rules.",
+    "Figure 4 has no printed numbers: its quantiles are reference values of another implementation, with bands for "
+    "the number of sections and the rule for new sections.",
+    "Pi is printed with |omega|; equations (13) to (15) need the sign of omega.",
+    "The paper does not define three decisive points: the end of an edge that is the extreme, the tie rule, and the "
+    "shape of the initial set.",
 )
 _SPENDS_MORE = (
-    "the paper spends more for the same miss. Tried: many runs of random errors, and every tie rule of the game; 95 % "
-    "of ours spend less, and nothing in the text says why"
+    "the paper spends more for the same miss. Tried: many runs with random errors, and every tie rule of the game; "
+    "95 % of ours spend less, and the text gives no reason"
 )
 _FIGURE_4: dict[int, tuple[tuple[str, float, str, Band], ...]] = {
     1: (
@@ -59,20 +58,14 @@ _FIGURE_4: dict[int, tuple[tuple[str, float, str, Band], ...]] = {
         ("impulse", 0.5, "308", Band(246.4, 369.6)),
     ),
 }
-"""By curve: quantity, quantile, reference value and its band; 20 % with the range meter, of which few runs were
-made."""
+"""By curve: quantity, quantile, reference value and its band; 20 % with the range meter, for which
+few runs are known."""
 _CURVES = {1: "random", 2: "random, range meter", 3: "game", 4: "game, range meter"}
 _UNITS = {"miss": "m", "impulse": "m/s"}
 
 
 def reproduce(progress: Progress) -> Reproduction:
-    """Compute the numbers.
-
-    Parameters
-    ----------
-    progress : callable
-        Told the fraction done.
-    """
+    """Compute the numbers."""
     single, many = load_scenario(SINGLE), load_scenario(MANY)
     numbers = [
         *_single(replace(single, range_sensor=None), lambda done: progress(0.3 * done)),
@@ -86,7 +79,7 @@ def reproduce(progress: Progress) -> Reproduction:
 def _single(scenario: Scenario, progress: Progress) -> list[PublishedNumber]:
     game = replace(scenario, noise=NoiseKind.GAME)
     random = simulate(scenario, SINGLE_RUNS, guarantee=False, progress=lambda done: progress(0.5 * done))
-    # But for the random tie rule, the game draws nothing: all its runs are one.
+    # Except for the random tie rule the game is deterministic: all runs are equal.
     games = [
         simulate(replace(game, tie=tie), RANDOM_TIE_RUNS if tie is TieRule.RANDOM else 1, guarantee=False)
         for tie in TieRule
@@ -122,7 +115,7 @@ def _values(results: Results, quantity: str) -> np.ndarray:
 
 
 def _figure_4(scenario: Scenario, progress: Progress) -> list[PublishedNumber]:
-    # The published procedure: a set that a measurement empties stays lost.
+    # The published procedure: a set that became empty stays lost.
     lost = replace(scenario, set_model=replace(scenario.set_model, recovery=Recovery.NONE))
     plain = {number: flown for number, flown in curve_scenarios(scenario) if flown.range_sensor is None}
     ranging = {number: flown for number, flown in curve_scenarios(lost) if flown.range_sensor is not None}

@@ -1,4 +1,4 @@
-"""What a reader calls an engagement: titles for figures and pages."""
+"""Titles of engagements in figures and pages."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ _OUTCOMES = {Outcome.SET_LOST: "set lost", Outcome.BUDGET_SPENT: "budget spent",
 
 
 def noise_title(record: Record) -> str:
-    """Return what a reader calls the noise of an engagement: `random noise`, or `game noise, range meter`."""
+    """Return the title of the noise of an engagement: `random noise`, or `game noise, range meter`."""
     return f"{record.noise_name} noise" + (", range meter" if record.scenario.range_sensor is not None else "")
 
 
 def record_titles(records: Sequence[Record]) -> list[str]:
-    """Return a title for each record, with what tells it apart where the noise alone does not."""
+    """Return a title for each record; equal noises are distinguished by run, seed, strategy, model, tie or scenario."""
     titles = [noise_title(record) for record in records]
     candidates = (
         [f"run {record.run}" for record in records],
@@ -34,7 +34,7 @@ def record_titles(records: Sequence[Record]) -> list[str]:
 
 
 def outcome_title(record: Record) -> str:
-    """Return the miss and the impulse spent, and the outcome where it was no interception."""
+    """Return miss and impulse, and the outcome if it is not an interception."""
     result = record.result
     text = f"miss {_shown(float(result.miss_m[0]))} m, impulse spent {float(result.impulse_m_s[0]):.1f} m/s"
     outcome = _OUTCOMES.get(result.outcomes[0])

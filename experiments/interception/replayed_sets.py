@@ -1,4 +1,4 @@
-"""The sets of an engagement at each stage of each step, had by replaying what its record says was measured and done."""
+"""The sets of an engagement at each stage of each step, computed again from the measurements of its record."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class Stages:
     Parameters
     ----------
     before : tuple of Section
-        As predicted from the step before.
+        Predicted from the previous step.
     measured : tuple of Section
-        After the measurement: equal to the recorded ones.
+        After the measurement: equal to the recorded sections.
     miss_m : tuple of tuple of float
         Predicted-miss interval of each measured section, m.
     """
@@ -34,22 +34,22 @@ class Stages:
 
 
 def replayed(record: Record) -> Iterator[Stages]:
-    """Go through a record's history again, and yield the stages of each step; what is left at the end comes last.
+    """Yield the stages of each step of a record, and the set after the last step.
 
     Yields
     ------
     Stages
-        One a step, and one more whose `measured` is empty: the set as predicted from the last step.
+        One per step, and one with an empty `measured`: the set predicted from the last step.
 
     Raises
     ------
     InputError
-        If the sets come out other than recorded: another version of the library has made the record.
+        If the sets differ from the recorded ones: another version of the library wrote the record.
 
     Notes
     -----
-    After the impulse k a section is the measured one with V less by k; after the prediction it is the next step's
-    `before`. So two of the four stages are enough. Cost: that of the set's own steps, some milliseconds.
+    After the impulse k a section is the measured one with V reduced by k; after the prediction it is `before` of the
+    next step. Two of the four stages are therefore enough. The cost is that of the steps of the set, a few ms.
     """
     scenario = record.scenario
     information = InformationSet(on_board_model(scenario))
@@ -62,8 +62,8 @@ def replayed(record: Record) -> Iterator[Stages]:
         measured = tuple(information.sections())
         if [section.label_m for section in measured] != [section.label_m for section in step.sections]:
             raise InputError(
-                f"the record of {shown(scenario.name)}: replaying it gives other sets at step {number} than it holds; "
-                "another version of infoset has made it: make it anew with `infoset engage --record FILE.npz`"
+                f"the record of {shown(scenario.name)}: replaying it gives different sets at step {number}; "
+                "another version of infoset wrote it: create it again with `infoset engage --record FILE.npz`"
             )
         lower, upper = information.predicted_miss_by_section_m()
         living = information.living[0]

@@ -1,4 +1,4 @@
-"""What the values of a scenario file must be to one another."""
+"""Checks of relations between the values of a scenario file."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from sim.kepler import LONGEST_SUBSTEP_S
 from sim.scenario import Sun
 
 MOST_LEAPS = 10_000_000
-"""Stretches that the truth of one flight may be integrated in: some minutes."""
+"""Largest number of integration steps of one engagement: some minutes of computing."""
 WHOLE_STEPS_TOLERANCE = Decimal("1e-9")
 
 
 def cross_problems(known: Known) -> Iterator[Problem]:
-    """Yield what is wrong between keys, as far as the sound values tell."""
+    """Yield the problems between valid values."""
     yield from _impulses(known)
     yield from _periods(known)
     yield from _ranges(known)
@@ -100,18 +100,18 @@ def _ranges(known: Known) -> Iterator[Problem]:
         )
         return
     leaps = steps * max(Decimal(1), step / Decimal(LONGEST_SUBSTEP_S))
-    # In free space a step is one stretch, however long.
+    # In free space a step of any length is one integration step.
     if leaps > MOST_LEAPS and known.value("sun") is not None:
         yield Problem(
             ("guidance", "step_s"),
-            f"makes {steps:.3g} steps of {shown(step)} s, and the truth is integrated in stretches of at most "
-            f"{LONGEST_SUBSTEP_S:g} s: {leaps:.3g} of them, and {MOST_LEAPS:,} are allowed, some minutes of computing",
+            f"gives {steps:.3g} steps of {shown(step)} s; the true state is integrated in steps of at most "
+            f"{LONGEST_SUBSTEP_S:g} s: {leaps:.3g} of them, and {MOST_LEAPS:,} are allowed (some minutes of computing)",
             "start nearer, approach faster, or leave the table [sun] out",
         )
 
 
 def _box(known: Known, table: str) -> StateBox | None:
-    """A box of starts in SI; None if a pair of it is missing or unsound."""
+    """Return a box of initial states in SI; None if one of its pairs is missing or invalid."""
     pairs = [known.pair(table, key) for key in ("z_km", "x_km", "vz_km_s", "vx_km_s")]
     if None in pairs:
         return None
@@ -165,7 +165,7 @@ def _sun(known: Known) -> Iterator[Problem]:
 
 
 def _closing_speeds(known: Known) -> Iterator[Problem]:
-    """Only closing speeds above zero and below twice the nominal one have labels: a range x means x / (1 + eta)."""
+    """Closing speeds must be above zero and below twice the nominal one: a range x means x / (1 + eta)."""
     speed, nominal_range = known.number("nominal", "closing_speed_km_s"), known.number("nominal", "range_km")
     step = known.number("guidance", "step_s")
     box = _box(known, "uncertainty")
@@ -174,7 +174,6 @@ def _closing_speeds(known: Known) -> Iterator[Problem]:
     if nominal_range is None or step is None:
         return
     e, vx = si(speed, KILO), box.vx_m_s
-    # Of the sensor nothing is asked here.
     sensor = AngleSensor(si(step), 0.5, 0.5, si(nominal_range, KILO))
     disturbance = si(known.number("information_set", "disturbance_m_s2") or Decimal(0))
     plain = SetModel(e, si(step), box, sensor, disturbance, kind=Model.GUARANTEED)
@@ -193,8 +192,8 @@ def _closing_speeds(known: Known) -> Iterator[Problem]:
     elif plain.speed_error + change >= 1.0:
         yield Problem(
             ("sun", "distance_km"),
-            f"is so little, for so long a flight, that gravity may change the closing speed by {change:.3g} of itself: "
-            f"beside uncertainty.vx_km_s the guaranteed model has room for {1.0 - plain.speed_error:.3g}, "
+            f"is so small that gravity may change the closing speed by {change:.3g} of itself during the flight: "
+            f"with uncertainty.vx_km_s the guaranteed model allows at most {1.0 - plain.speed_error:.3g}, "
             f"found {shown(known.number('sun', 'distance_km'))}",
             "start nearer or approach faster, move the Sun away, or leave the table [sun] out",
         )
@@ -203,7 +202,7 @@ def _closing_speeds(known: Known) -> Iterator[Problem]:
 
 
 def _impulses_across(known: Known, plain: SetModel, sun: Sun | None) -> Iterator[Problem]:
-    """Impulses may lead so far across that gravity does there what the guaranteed model has no room for."""
+    """Impulses can move the spacecraft so far across that gravity exceeds what the guaranteed model allows."""
     budget, greatest, execution = (
         known.number("thruster", key) for key in ("budget_m_s", "greatest_impulse_m_s", "execution_error_relative")
     )
@@ -214,8 +213,8 @@ def _impulses_across(known: Known, plain: SetModel, sun: Sun | None) -> Iterator
     if plain.speed_error + change >= 1.0:
         yield Problem(
             ("thruster", "budget_m_s"),
-            f"lets the spacecraft go so far across that gravity may change the closing speed by {change:.3g} of "
-            f"itself: the guaranteed model has room for {1.0 - plain.speed_error:.3g}, found {shown(budget)} in "
+            f"lets the spacecraft move so far across that gravity may change the closing speed by {change:.3g} of "
+            f"itself: the guaranteed model allows at most {1.0 - plain.speed_error:.3g}, found {shown(budget)} in "
             f"impulses of up to {shown(greatest)}",
             "write the budget or the greatest impulse that the engine has, or leave the table [sun] out",
         )

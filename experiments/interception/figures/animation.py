@@ -1,4 +1,4 @@
-"""Engagements as moving pictures: the sets step by step, above their predicted misses."""
+"""Animations of engagements: the sets step by step, above their predicted misses."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ _SECOND_MM = 58.0
 
 
 def animation_path(option: str, path: Path | None, ending: str) -> None:
-    """Refuse a file that cannot be an animation of a kind.
+    """Check the name of an animation file.
 
     Parameters
     ----------
     option : str
-        What it was given to.
+        Option in the message.
     ending : str
         ``.gif`` or ``.mp4``.
 
     Raises
     ------
     InputError
-        If its name ends otherwise, or the program that makes it is missing.
+        If its suffix differs, or the program that writes it is missing.
     """
     if path is None:
         return
@@ -48,20 +48,20 @@ def animation_path(option: str, path: Path | None, ending: str) -> None:
         raise InputError(f"{option}: {path} must end in {ending}; for example {option} flight{ending}")
     if ending == MP4 and shutil.which("ffmpeg") is None:
         raise InputError(
-            f"{option}: the program ffmpeg, which makes such files, is not on the path; install it (Debian: apt-get "
-            "install ffmpeg), or ask for --gif flight.gif"
+            f"{option}: the program ffmpeg, which writes such files, is not on the path; install it (Debian: apt-get "
+            "install ffmpeg), or use --gif flight.gif"
         )
 
 
 def animate(records: Sequence[Record], ending: str, progress: Callable[[float], None] = lambda _done: None) -> bytes:
-    """Return engagements as a moving picture, side by side.
+    """Return an animation of engagements, side by side.
 
     Parameters
     ----------
     ending : str
         ``.gif`` (by Pillow) or ``.mp4`` (by ffmpeg).
     progress : callable
-        Told the fraction done.
+        Receives the fraction done.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def animate(records: Sequence[Record], ending: str, progress: Callable[[float], 
 
     Notes
     -----
-    At most 80 moments, evenly chosen over the steps; some 0.2 s each.
+    At most 80 frames, evenly distributed over the steps; about 0.2 s each.
     """
     writer: AbstractMovieWriter = PillowWriter(fps=FRAMES_PER_S) if ending == GIF else FFMpegWriter(fps=FRAMES_PER_S)
     times = np.unique([step.time_s for record in records for step in record.steps])
@@ -102,7 +102,7 @@ def animate(records: Sequence[Record], ending: str, progress: Callable[[float], 
 
 
 def _draw_planes(row: Sequence[Axes], steps: Sequence[StepRecord], titles: Sequence[str]) -> None:
-    """Draw the sets of one moment anew."""
+    """Draw the sets of one time."""
     for axes in row:
         axes.clear()
     shown = [choose_sections(step.sections, _SECTIONS) for step in steps]

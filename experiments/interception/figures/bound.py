@@ -1,4 +1,4 @@
-"""The lower bound on what any strategy can guarantee: against the label, and the pair of truths that shows it."""
+"""The lower bound of the miss that any strategy can guarantee: over the label, and the pair that proves it."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": "#5a9bd4", "linestyle": (0, (4, 1.5)), "marker": "^"},
 )
 _SECONDS_SHOWN = 3.0
-"""How many times the last stretch, in which the two are no longer alike, is shown."""
+"""Length of the time axis, in durations between the last equal measurement and the arrival."""
 
 
 def draw_bound(scenario: Scenario, lower: LowerBound) -> Figure:
-    """Draw (a) the bound against the label, a curve a closing speed, and (b) the pair that reaches it.
+    """Draw (a) the bound over the label, one curve per closing speed, and (b) the pair of true states that proves it.
 
     Parameters
     ----------
     scenario : Scenario
-        For its sensor and its step.
+        Sensor and step are used.
 
     Returns
     -------
@@ -48,7 +48,7 @@ def draw_bound(scenario: Scenario, lower: LowerBound) -> Figure:
 
 
 def ripples(labels_m: Floats, bounds_m: Floats) -> list[tuple[Floats, Floats]]:
-    """Split a curve where labels were not looked at.
+    """Split a curve at labels that were not evaluated.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def _draw_labels(axes: Axes, lower: LowerBound) -> None:
             axes.plot(stretches[0][0] / 1e3, stretches[0][1], label=name, **(look | {"markersize": 2.5}))
             continue
         banded = True
-        # Within the way of one step the bound ripples: the greatest of each ripple, and the range of it.
+        # The bound ripples over the distance of one step: the largest value of each ripple, and its range.
         middles = np.array([0.5 * (labels[0] + labels[-1]) for labels, _ in stretches]) / 1e3
         most = np.array([bounds.max() for _, bounds in stretches])
         least = np.array([bounds.min() for _, bounds in stretches])
@@ -93,7 +93,7 @@ def _draw_labels(axes: Axes, lower: LowerBound) -> None:
     )
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.08 * (high - low))
-    axes.set_title("(a) what no strategy can guarantee")
+    axes.set_title("(a) bound for all strategies")
     axes.set_xlabel("label: range at $t = 0$, km")
     axes.set_ylabel("lower bound of the guaranteed miss, m")
     handles, names = axes.get_legend_handles_labels()
@@ -114,7 +114,12 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
     corridor = sensor.error_bound(ranges) * ranges
     seen = fine >= alike_until
     axes.fill_between(
-        fine[seen], -corridor[seen], corridor[seen], facecolor=SET_FILL, linewidth=0.0, label="measured alike"
+        fine[seen],
+        -corridor[seen],
+        corridor[seen],
+        facecolor=SET_FILL,
+        linewidth=0.0,
+        label="equal measurements",
     )
     axes.plot(fine, corridor, color=SET_EDGE, linewidth=0.7, linestyle=":")
     axes.plot(fine, -corridor, color=SET_EDGE, linewidth=0.7, linestyle=":")
@@ -122,28 +127,28 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
     corrected = half - _correction(scenario, pair.last_common_step, times)
     after = to_go <= alike_until + 1e-9
     looks: tuple[tuple[float, dict[str, Any], str], ...] = (
-        (1.0, {"color": "#7f2704", "linestyle": "-"}, "one truth, equal impulses"),
-        (-1.0, {"color": "#08306b", "linestyle": (0, (4, 1.5))}, "the other"),
+        (1.0, {"color": "#7f2704", "linestyle": "-"}, "first true state, equal impulses"),
+        (-1.0, {"color": "#08306b", "linestyle": (0, (4, 1.5))}, "second true state"),
     )
     for sign, look, name in looks:
         axes.plot(to_go, sign * half, marker="o", markersize=2.2, label=name, **look)
         axes.plot(to_go[after], sign * corrected[after], color=look["color"], linewidth=0.8, linestyle=":")
-    axes.plot([], [], color=INK, linewidth=0.8, linestyle=":", label="corrected, all it can")
+    axes.plot([], [], color=INK, linewidth=0.8, linestyle=":", label="with the largest correction")
     axes.axvline(alike_until, ymax=0.72, color=LIMIT, linewidth=0.8, linestyle="--")
     top = float(max(half[-1], corridor[-1])) * 1.12
-    axes.text(alike_until, -0.93 * top, "  alike until here", color=LIMIT, ha="left", va="bottom", fontsize=7.0)
+    axes.text(alike_until, -0.93 * top, "  equal until here", color=LIMIT, ha="left", va="bottom", fontsize=7.0)
     _bracket(axes, shown, float(half[-1]), pair.correction_m)
     axes.set_xlim(shown, -0.3 * shown)
     axes.set_ylim(-top, top)
     axes.set_xticks([tick for tick in axes.get_xticks() if 0.0 <= tick <= shown])
-    axes.set_title("(b) the two truths that show it")
+    axes.set_title("(b) pair of true states that proves it")
     axes.set_xlabel("time to arrival, s")
-    axes.set_ylabel("$z$ from the middle between them, m")
+    axes.set_ylabel("$z$ from their midpoint, m")
     axes.legend(loc="upper right", handlelength=2.0, borderaxespad=0.2)
 
 
 def _correction(scenario: Scenario, last_common_step: int, times_s: Floats) -> Floats:
-    """How far the greatest impulses after a step have moved a truth at each time, m."""
+    """Displacement of a true state by the greatest impulses after a step, at each time, m."""
     thruster = scenario.thruster
     fired_s = times_s[last_common_step + 1 : -1]
     left = thruster.budget_m_s - thruster.greatest_impulse_m_s * np.arange(len(fired_s))
@@ -152,7 +157,7 @@ def _correction(scenario: Scenario, last_common_step: int, times_s: Floats) -> F
 
 
 def _bracket(axes: Axes, shown: float, half: float, correction: float) -> None:
-    """Show beside the arrival what can be corrected, and the bound that is left."""
+    """Mark at the arrival the largest correction and the bound."""
     at, bound = -0.03 * shown, max(half - correction, 0.0)
     for low, high, colour, text in (
         (0.0, bound, INK, f"bound\n{bound:.1f} m"),

@@ -1,4 +1,4 @@
-"""Strategies side by side: how the miss and the impulse spent are distributed, random beside game noise."""
+"""Comparison of strategies: distributions of miss and impulse, with random and with game noise."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ Floats = NDArray[np.float64]
 _ROW_MM = 9.0
 _BINS = 48
 _HILL = 0.62
-"""Greatest height of a histogram, in rows."""
+"""Height of a histogram, in rows."""
 
 _BAR = 0.17
-"""Where the bar of the quantiles lies below the foot of its histogram, in rows."""
+"""Distance of the quantile bar below its histogram, in rows."""
 
 _NOISES = ((NoiseKind.RANDOM, "random noise"), (NoiseKind.GAME, "game noise, worst of four tie rules"))
 
 
 def draw_comparison(compared: Sequence[Comparison]) -> Figure:
-    """Draw the distributions of (a, b) the miss and (c, d) the impulse spent, a row a strategy.
+    """Draw the distributions of (a, b) the miss and (c, d) the impulse spent, one row per strategy.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def _draw_row(
     *,
     logarithmic: bool,
 ) -> None:
-    """Draw one quantity under both noises, on one scale."""
+    """Draw one quantity with both noises, on one scale."""
     everything = np.concatenate([value(each) for each in compared])
     left, right = _ends(everything, [value(each) for each in compared], logarithmic=logarithmic)
     for axes, (noise, _) in zip(row, _NOISES, strict=True):
@@ -90,7 +90,7 @@ def _draw_row(
 
 
 def _ends(everything: Floats, samples: Sequence[Floats], *, logarithmic: bool) -> tuple[float, float]:
-    """Ends of an axis; on a logarithmic one a few small values may lie left of it."""
+    """Limits of an axis; a logarithmic axis may omit a few small values."""
     if not logarithmic:
         return 0.0, 1.04 * float(everything.max()) or 1.0
     positive = everything[everything > 0.0]

@@ -20,15 +20,15 @@ from sim import empirical_distribution
 Floats = NDArray[np.float64]
 
 _HEIGHT_MM, _NUMBER_MM = 59.0, 5.0
-"""Height of the axes, and diameter of a number on a curve."""
+"""Height of the axes, and diameter of a curve number, mm."""
 
 _LEVELS = np.linspace(0.15, 0.85, 29)
 _INSIDE = 0.05, 0.95
-"""Where across the axes a number stands free of their frame."""
+"""Horizontal range of curve numbers, as shares of the axes."""
 
 _LOGARITHMIC_FROM = 30.0
 _LEAST_SHOWN = 0.01
-"""The quantile at which a logarithmic axis starts: misses come arbitrarily near zero."""
+"""Quantile at which a logarithmic axis starts: misses can be arbitrarily small."""
 
 
 def draw_distributions(curves: Sequence[Curve], confidence: float = 0.95) -> Figure:
@@ -76,7 +76,7 @@ def draw_distributions(curves: Sequence[Curve], confidence: float = 0.95) -> Fig
 
 
 def axis_limit(samples: Sequence[Floats]) -> float:
-    """Where an axis ends: past everything, unless a few values lie far beyond the others.
+    """Return the end of an axis: beyond all values, or of all but a few very large ones.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def axis_limit(samples: Sequence[Floats]) -> float:
 
 
 def decades_apart(samples: Sequence[Floats]) -> bool:
-    """Whether samples lie so far apart that a linear axis would press some of them onto its end.
+    """Whether samples differ so much that a linear axis would show some of them only at its end.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def decades_apart(samples: Sequence[Floats]) -> bool:
 
 
 def scale_axis(axes: Axes, samples: Sequence[Floats], *, from_zero: bool) -> tuple[float, float]:
-    """Scale the axis of the values so that every sample can be seen.
+    """Scale the axis of the values so that every sample is visible.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def scale_axis(axes: Axes, samples: Sequence[Floats], *, from_zero: bool) -> tup
 
 
 def draw_band(axes: Axes, values: Floats, lower: Floats, upper: Floats, colour: str, label: str = "") -> None:
-    """Draw the two thin edges of a confidence band, where it says something: between its samples, off 0 and off 1.
+    """Draw the two thin edges of a confidence band, between its samples and away from 0 and 1.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def draw_band(axes: Axes, values: Floats, lower: Floats, upper: Floats, colour: 
 def _draw_panel(
     axes: Axes, curves: Sequence[Curve], value: Callable[[Curve], Floats], confidence: float, *, from_zero: bool
 ) -> str:
-    """Draw one distribution, and return what is to be said of the values that do not fit."""
+    """Draw one distribution, and return a note about the values beyond the axis."""
     samples = [np.asarray(value(curve), dtype=np.float64) for curve in curves]
     left, right = scale_axis(axes, samples, from_zero=from_zero)
     for curve, sample in zip(curves, samples, strict=True):
@@ -196,7 +196,7 @@ def _draw_curve(axes: Axes, curve: Curve, sample: Floats, confidence: float, end
 
 
 def _number(axes: Axes, curves: Sequence[Curve], samples: Sequence[Floats]) -> None:
-    """Put its number on each curve, where the other curves and numbers are farthest."""
+    """Put the number of each curve where it is farthest from the other curves and numbers."""
     logarithmic = axes.get_xscale() == "log"
     (low, high), across = axes.get_xlim(), np.log if logarithmic else np.asarray
     grid = np.geomspace(low, high, 200) if logarithmic else np.linspace(low, high, 200)
@@ -246,7 +246,7 @@ def _gaps(points: Floats, others: Floats) -> Floats:
 
 
 def _handles(curves: Sequence[Curve], confidence: float) -> tuple[list[Any], list[str]]:
-    """What the legend shows, and what it says: the band in the colours of all curves."""
+    """Return handles and labels of the legend; the band has the colours of all curves."""
     handles: list[Any] = [Line2D([], [], **CURVE_LOOKS[curve.number]) for curve in curves]
     labels = [
         f"{curve.number}  {curve.noise.value} noise, "

@@ -1,4 +1,4 @@
-"""The course of engagements against time: the paper's figure 2."""
+"""Engagements over time: the paper's figure 2."""
 
 from __future__ import annotations
 
@@ -34,20 +34,20 @@ Floats = NDArray[np.float64]
 
 ANGLE_RANGE_SHARE = 0.01
 RATE_RANGE_SHARE = 0.1
-"""The axes cover what is seen above this share of the first range: nearer, angle and rate blow up as 1/x and 1/x^2."""
+"""Share of the first range below which values do not set the limits: angle and rate grow as 1/x and 1/x^2."""
 
 _ROWS = 4
 _LETTER_MM, _LINE_MM = 1.8, 4.0
-"""Mean width of a letter of a title, and the height of its lines."""
+"""Mean width of a letter, and height of a line of a title, mm."""
 
 _MOST_DECADES = 4
-"""Decades up to which each is labelled."""
+"""Number of decades up to which each decade has a label."""
 
 _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def draw_process(records: Sequence[Record]) -> Figure:
-    """Draw angle, angular rate, impulse and predicted miss against time, one column a record.
+    """Draw angle, angular rate, impulse and predicted miss over time, one column per record.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def _draw_impulse(axes: Axes, record: Record) -> None:
 
 
 def draw_predicted_miss(axes: Axes, record: Record) -> None:
-    """Draw the predicted-miss interval against time."""
+    """Draw the predicted-miss interval over time."""
     times, lower, upper = _predicted_miss(record)
     axes.axhline(0.0, color=LIMIT, linewidth=0.6)
     axes.fill_between(times, lower, upper, color=SET_FILL, linewidth=0.0)
@@ -153,7 +153,7 @@ def _level_impulse(row: Sequence[Axes], records: Sequence[Record]) -> None:
 
 
 def level_predicted_miss(row: Sequence[Axes], records: Sequence[Record]) -> None:
-    """Give axes of predicted misses the same limits: linear to ten metres, a step a decade beyond."""
+    """Give axes of predicted misses the same limits: linear to ten metres, logarithmic beyond."""
     bounds = np.concatenate([np.concatenate(_predicted_miss(record)[1:]) for record in records])
     greatest = float(np.abs(bounds).max(initial=10.0))
     decades = int(np.log10(greatest) + 1e-9)
@@ -172,7 +172,7 @@ def level_predicted_miss(row: Sequence[Axes], records: Sequence[Record]) -> None
 
 
 def _note_exit(axes: Axes, values: Floats, record: Record, scale: float, unit: str) -> None:
-    """Say how far a curve goes that leaves the axes."""
+    """Write the largest value of a curve that leaves the axes."""
     low, high = axes.get_ylim()
     beyond = np.maximum(values - high, low - values)
     worst = int(beyond.argmax())
@@ -215,7 +215,7 @@ def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], records: Sequence[Re
     handles = [
         Line2D([], [], color=TRUTH, label="true angle and rate"),
         Line2D([], [], color=MEASURED, marker=".", markersize=7, linestyle="none", label=measured),
-        Line2D([], [], color=IMPULSE, linewidth=1.2, label="impulse given"),
+        Line2D([], [], color=IMPULSE, linewidth=1.2, label="impulse"),
         Line2D([], [], color=LIMIT, linewidth=0.8, linestyle=(0, (4, 2)), label="greatest impulse"),
         Patch(facecolor=SET_FILL, edgecolor=SET_EDGE, label="predicted-miss interval"),
     ]
@@ -260,7 +260,7 @@ def _rate_extent(record: Record) -> tuple[float, float]:
 
 
 def _measured_where(record: Record, chosen: NDArray[np.bool_], name: str) -> list[float]:
-    """Return what a sensor measured in the chosen steps."""
+    """Return the measurements of a sensor in the chosen steps."""
     steps = zip(record.steps, chosen, strict=True)
     return [step.measured[name] for step, use in steps if use and name in step.measured]
 

@@ -29,11 +29,11 @@ MEASUREMENT_MARK = "measured α, drawn at the true ω"
 
 _DARK, _LIGHT = (0.03, 0.14, 0.36), (0.36, 0.66, 0.86)
 _LABEL_MM, _LABEL_ROOM_MM = 14.0, 19.0
-"""Where the labels start, and the room that the sets leave for them, from the right side of the axes."""
+"""Position of the labels, and width that the sets leave for them, from the right side of the axes."""
 
 
 def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8.0), sections: int = 5) -> Figure:
-    """Draw sections of the sets after the measurement: one row a time, one column a record.
+    """Draw sections of the sets after the measurement: one row per time, one column per record.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
 
 
 def choose_sections(sections: Sequence[Section], most: int) -> list[Section]:
-    """Return up to so many sections, evenly chosen over the range, the first and the last included.
+    """Return at most `count` sections, evenly distributed over the range, with the first and the last.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ _MEASUREMENT_LOOK: dict[str, Any] = {
 
 
 def draw_step(axes: Axes, step: StepRecord, chosen: Sequence[Section]) -> None:
-    """Draw some sections of one step with the truth and the measurement, on axes that have their limits."""
+    """Draw sections of one step with the true state and the measurement, on axes with fixed limits."""
     outlines = [_outline(section) for section in chosen]
     for index, outline in enumerate(outlines):
         _draw_outline(axes, outline, _colour(index, len(outlines)), zorder=3.0 - 0.01 * index)
@@ -142,7 +142,7 @@ def draw_step(axes: Axes, step: StepRecord, chosen: Sequence[Section]) -> None:
 
 
 def _shade_allowed(axes: Axes, record: Record, step: StepRecord, chosen: Sequence[Section]) -> None:
-    """Shade the angles that the measurement allows at the nearest and at the farthest section drawn."""
+    """Shade the angles that the measurement allows at the nearest and the farthest drawn section."""
     if "angle" not in step.measured or not chosen:
         return
     for section in (chosen[0], chosen[-1]):
@@ -162,7 +162,7 @@ def _draw_outline(axes: Axes, outline: Floats, colour: Colour, zorder: float) ->
 
 
 def _label(axes: Axes, chosen: Sequence[Section], outlines: Sequence[Floats]) -> None:
-    """Put the ranges in a column to the right of the sets, in the order that crosses the fewer of their lines."""
+    """Write the ranges in a column to the right of the sets, in the order with fewer crossing lines."""
     anchors = [(*_right_top(outline), index) for index, outline in enumerate(outlines) if len(outline)]
     if not anchors:
         return
@@ -191,7 +191,7 @@ def _label(axes: Axes, chosen: Sequence[Section], outlines: Sequence[Floats]) ->
 
 
 def _crossings(anchors: Sequence[tuple[float, float, int]], heights: Floats, start: float) -> int:
-    """Count the lines that cross on the way from their anchors to the column at `start`, its heights rising."""
+    """Count the crossings of lines from their anchors to the column at `start`, in rising heights."""
     count = 0
     for (lower, low_end), (upper, high_end) in combinations(zip(anchors, heights, strict=True), 2):
         at = max(lower[0], upper[0])
@@ -209,7 +209,7 @@ def _right_top(outline: Floats) -> tuple[float, float]:
 
 
 def _spread(wanted: Sequence[float], spacing: float, low: float, high: float) -> Floats:
-    """Heights nearest the wanted rising ones, so far apart and inside the limits."""
+    """Return heights near the wanted rising ones, with a minimum distance and inside the limits."""
     heights = np.clip(np.asarray(wanted, dtype=np.float64), low, high)
     steps = spacing * np.arange(len(heights))
     heights = np.maximum.accumulate(heights - steps) + steps
@@ -218,7 +218,7 @@ def _spread(wanted: Sequence[float], spacing: float, low: float, high: float) ->
 
 
 def level_planes(row: Sequence[Axes], points: Sequence[Floats]) -> None:
-    """Give planes of sets the same limits, with room for the labels.
+    """Give planes of sets the same limits, with space for the labels.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def level_planes(row: Sequence[Axes], points: Sequence[Floats]) -> None:
 
 
 def extent_of(step: StepRecord, chosen: Sequence[Section]) -> Floats:
-    """Return all points (omega in µrad/s, alpha in mrad) that a drawing of a step must have room for."""
+    """Return all points (omega in µrad/s, alpha in mrad) that a drawing of a step must contain."""
     rate, angle = step.true_rate_rad_s * 1e6, step.true_angle_rad * 1e3
     marks = [[rate, angle]]
     if "angle" in step.measured:

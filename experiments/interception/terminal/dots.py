@@ -1,4 +1,4 @@
-"""Pictures of dots in text: Braille characters of two by four dots, or one letter a place where there are none."""
+"""Dot pictures in text: Braille characters of two by four dots, or full stops."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ class Dots:
     Parameters
     ----------
     columns, rows : int
-        Its size in characters.
+        Size in characters.
     x, y : tuple of float
         Limits of the plane.
     braille : bool
-        Whether there are Braille characters.
+        Whether the terminal has Braille characters.
     """
 
     def __init__(
@@ -46,7 +46,7 @@ class Dots:
             self._dots[self._size[1] - 1 - up, across] = True
 
     def letter(self, point: tuple[float, float], letter: str) -> None:
-        """Put a letter at a point, over everything else."""
+        """Put a letter at a point, on top of the dots."""
         across, up = np.clip(np.rint(self._places(np.array([point]))[0]), 0, self._size - 1).astype(int).tolist()
         self._letters[(int(self._size[1] - 1 - up) // UP, across // ACROSS)] = letter
 

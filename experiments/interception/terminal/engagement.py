@@ -26,12 +26,12 @@ _DECADE_M = 10.0
 
 
 def play(records: Sequence[Record], console: Console, steps_per_s: float) -> None:
-    """Play engagements in a terminal; where the output is none, print a few moments of them.
+    """Play engagements in a terminal; print a few times of them if the output is no terminal.
 
     Parameters
     ----------
     steps_per_s : float
-        How fast.
+        Speed.
     """
     count = max(len(record.steps) for record in records)
     if not console.is_terminal:
@@ -41,18 +41,18 @@ def play(records: Sequence[Record], console: Console, steps_per_s: float) -> Non
     with Live(frame(records, 0, console), console=console, auto_refresh=False) as live:
         began_s = time.monotonic()
         for step in range(1, count):
-            # A slow line drops behind for a moment, not for ever: the next moment is reckoned from the beginning.
+            # A slow terminal delays one frame only: times are counted from the start.
             time.sleep(max(0.0, began_s + step / steps_per_s - time.monotonic()))
             live.update(frame(records, step, console), refresh=True)
 
 
 def frame(records: Sequence[Record], step: int, console: Console) -> Group:
-    """Return one moment of engagements, side by side where the terminal is wide enough.
+    """Return one time of engagements, side by side if the terminal is wide enough.
 
     Parameters
     ----------
     step : int
-        Of one that is over, its last step is shown.
+        An engagement that has ended shows its last step.
     """
     braille = "utf" in console.encoding.lower()
     beside = len(records) if console.width >= len(records) * (_LEAST_COLUMNS + 6) else 1
@@ -78,7 +78,7 @@ def _step_of(record: Record, step: int) -> StepRecord:
 
 
 def _plane(record: Record, step: StepRecord, columns: int, braille: bool) -> list[str]:
-    """Sections in the (omega, alpha) plane, with X for the truth."""
+    """Sections in the (omega, alpha) plane, with X for the true state."""
     last = len(step.sections) - 1
     places = {round(each) for each in np.linspace(0, last, _SECTIONS).tolist()} if step.sections else set()
     outlines = [step.sections[place].omega_alpha.polygon() for place in sorted(places)]
@@ -99,9 +99,9 @@ def _plane(record: Record, step: StepRecord, columns: int, braille: bool) -> lis
 
 
 def _bar(record: Record, step: StepRecord, columns: int) -> str:
-    """The predicted-miss interval on a line, zero in the middle, a step a decade beyond ten metres."""
+    """The predicted-miss interval on a line with zero in the middle, logarithmic beyond ten metres."""
     if step.predicted_miss_m is None:
-        return "no set is left".center(columns)
+        return "the set is empty".center(columns)
     greatest = max(
         (abs(end) for each in record.steps if each.predicted_miss_m is not None for end in each.predicted_miss_m),
         default=_DECADE_M,

@@ -384,7 +384,7 @@ def test_missing_table(table: str) -> None:
         ("thruster", "step_s", ["is not a key of [thruster]", "move step_s to [guidance]"]),
         ("guidance", "period_s", ["move period_s to [angle_sensor] or [range_sensor]"]),
         ("noise", "name", ["move name above the first table"]),
-        ("noise", "guidance", ["write [guidance] as a table of its own"]),
+        ("noise", "guidance", ["write [guidance] as a separate table"]),
         ("noise", "zebra", ["remove it; valid here: kind, tie"]),
         ("", "descripton", ["is not a key of a scenario", "did you mean description?"]),
         ("", "step_s", ["is not a key of the top", "move step_s to [guidance]"]),
@@ -410,7 +410,7 @@ def test_unknown_table() -> None:
 def test_table_that_is_none(wrong: str) -> None:
     text = without_table("guidance")
     text = f"{text}\n{wrong}" if wrong.startswith("[") else f"{wrong}\n{text}"
-    assert_one_problem(text, "guidance", "must be a table", "write [guidance] on a line of its own")
+    assert_one_problem(text, "guidance", "must be a table", "write [guidance] on a separate line")
 
 
 @pytest.mark.parametrize("schema", ["2", "0", "1.0", '"1"', "true"])
@@ -494,7 +494,7 @@ def test_impulses_that_lead_to_where_gravity_leaves_no_labels() -> None:
     assert endless != GUARANTEED
     assert on_board_model(read_scenario(endless, "mine.toml")).speed_error < 0.02
     text = re.sub(r"greatest_impulse_m_s = \S+", "greatest_impulse_m_s = 1e12", endless)
-    assert_one_problem(text, "thruster.budget_m_s", "go so far across", "that the engine has")
+    assert_one_problem(text, "thruster.budget_m_s", "move so far across", "that the engine has")
     assert read_scenario(text.replace('"guaranteed"', '"paper"'), "mine.toml")
 
 
