@@ -12,48 +12,95 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from experiments.campaigns.command import campaign, report, sweep
+from experiments.campaigns.command import Campaign, Report, Sweep
+from experiments.common.command import command
 from experiments.common.errors import INTERRUPTED, InputError, on_a_screen
-from experiments.interception.commands.adversary import adversary
-from experiments.interception.commands.bound import bound
-from experiments.interception.commands.compare import compare
-from experiments.interception.commands.engage import engage
-from experiments.interception.commands.experiment import experiment
-from experiments.interception.commands.replay import replay
+from experiments.interception.commands.adversary import Adversary
+from experiments.interception.commands.bound import Bound
+from experiments.interception.commands.compare import Compare
+from experiments.interception.commands.engage import Engage
+from experiments.interception.commands.experiment import Experiment
+from experiments.interception.commands.replay import Replay
 from experiments.interception.commands.scenarios import app as scenarios
-from experiments.multipoint.command import multipoint
-from experiments.pareto.command import pareto
+from experiments.multipoint.command import Multipoint
+from experiments.pareto.command import Pareto
 from experiments.problem_list import app as problems
-from experiments.pursuit.command import pursuit, pursuit_map
-from experiments.reachability.command import reach
-from experiments.reproduce import reproduce
+from experiments.pursuit.command import Pursuit, PursuitMap
+from experiments.reachability.command import Reach
+from experiments.reproduce import Reproduce
 
 INPUT_ERROR = 2
 
 INTERCEPTION, CAMPAIGNS, RENDEZVOUS, TOOLS = "Interception", "Campaigns of interceptions", "Rendezvous", "Tools"
 COMMANDS = (
-    (INTERCEPTION, experiment, "experiment asteroid-1997 --runs 50 --out results"),
-    (INTERCEPTION, engage, "engage asteroid-1997-single --noise both --out figures"),
-    (INTERCEPTION, compare, "compare --strategies patient,symmetric-miss --out results"),
-    (INTERCEPTION, bound, "bound asteroid-1997 --strategies patient --out results"),
-    (INTERCEPTION, adversary, "adversary --strategy symmetric-miss --budget 2000 --record worst.npz"),
-    (INTERCEPTION, replay, "replay flight-random.npz flight-game.npz --html flights.html"),
-    (CAMPAIGNS, campaign, "campaign --noise mixed --runs 100000 --out runs"),
+    (
+        INTERCEPTION,
+        Experiment,
+        "experiments.interception.runs.experiment",
+        "experiment asteroid-1997 --runs 50 --out results",
+    ),
+    (
+        INTERCEPTION,
+        Engage,
+        "experiments.interception.runs.engage",
+        "engage asteroid-1997-single --noise both --out figures",
+    ),
+    (
+        INTERCEPTION,
+        Compare,
+        "experiments.interception.runs.compare",
+        "compare --strategies patient,symmetric-miss --out results",
+    ),
+    (
+        INTERCEPTION,
+        Bound,
+        "experiments.interception.runs.bound",
+        "bound asteroid-1997 --strategies patient --out results",
+    ),
+    (
+        INTERCEPTION,
+        Adversary,
+        "experiments.interception.runs.adversary",
+        "adversary --strategy symmetric-miss --budget 2000 --record worst.npz",
+    ),
+    (
+        INTERCEPTION,
+        Replay,
+        "experiments.interception.runs.replay",
+        "replay flight-random.npz flight-game.npz --html flights.html",
+    ),
+    (CAMPAIGNS, Campaign, "experiments.campaigns.run_campaign", "campaign --noise mixed --runs 100000 --out runs"),
     (
         CAMPAIGNS,
-        sweep,
+        Sweep,
+        "experiments.campaigns.run_sweep",
         "sweep --vary angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:8,thruster.greatest_impulse_m_s=2:20:7 "
         "--runs 200 --out sensors",
     ),
-    (CAMPAIGNS, report, "report runs --out figures"),
-    (RENDEZVOUS, pursuit, "pursuit geo-pursuit --certify --feedback coast --out results"),
-    (RENDEZVOUS, pursuit_map, "pursuit-map geo-pursuit --x phase_deg=-60:60:61 --y thrust_ratio=0:0.9:19 --out map"),
-    (RENDEZVOUS, reach, "reach rendezvous-2021 --select energy,vertices --replan --out reach"),
-    (RENDEZVOUS, pareto, "pareto pareto-2008 --prefer y_m=0,z_m=50 --out figures"),
-    (RENDEZVOUS, multipoint, "multipoint service-3 --order best --times best --out figures"),
-    (TOOLS, reproduce, "reproduce --paper pareto --json numbers.json"),
+    (CAMPAIGNS, Report, "experiments.campaigns.run_report", "report runs --out figures"),
+    (RENDEZVOUS, Pursuit, "experiments.pursuit.run", "pursuit geo-pursuit --certify --feedback coast --out results"),
+    (
+        RENDEZVOUS,
+        PursuitMap,
+        "experiments.pursuit.map",
+        "pursuit-map geo-pursuit --x phase_deg=-60:60:61 --y thrust_ratio=0:0.9:19 --out map",
+    ),
+    (
+        RENDEZVOUS,
+        Reach,
+        "experiments.reachability.run",
+        "reach rendezvous-2021 --select energy,vertices --replan --out reach",
+    ),
+    (RENDEZVOUS, Pareto, "experiments.pareto.run", "pareto pareto-2008 --prefer y_m=0,z_m=50 --out figures"),
+    (
+        RENDEZVOUS,
+        Multipoint,
+        "experiments.multipoint.run",
+        "multipoint service-3 --order best --times best --out figures",
+    ),
+    (TOOLS, Reproduce, "experiments.reproduced_numbers", "reproduce --paper pareto --json numbers.json"),
 )
-"""Panel of the help, command and example; the first word of the example is the name of the command."""
+"""Panel of the help, options, module of the run, and example; the first word of the example is the command's name."""
 
 
 class _Root(TyperGroup):
@@ -89,8 +136,9 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for panel, function, example in COMMANDS:
-    app.command(example.split()[0], rich_help_panel=panel, epilog=f"Example: infoset {example}")(function)
+for panel, options, run, example in COMMANDS:
+    register = app.command(example.split()[0], rich_help_panel=panel, epilog=f"Example: infoset {example}")
+    register(command(options, run))
 app.add_typer(scenarios, rich_help_panel=TOOLS)
 app.add_typer(problems, rich_help_panel=TOOLS)
 

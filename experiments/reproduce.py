@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.command import command
 from experiments.common.options import Json, Overwrite, Quiet
 
 
@@ -28,11 +27,3 @@ class Reproduce:
     json: Json = None
     overwrite: Overwrite = False
     quiet: Quiet = False
-
-
-@command
-def reproduce(options: Reproduce) -> None:
-    """Run `infoset reproduce`."""
-    from experiments.reproduced_numbers import run
-
-    run(options)

@@ -8,7 +8,6 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.command import command
 from experiments.common.options import Json, Out, Overwrite, Quiet, Seed
 from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, ScenarioName, StrategyName, TieName
 
@@ -169,27 +168,3 @@ class Report:
     json: Json = None
     overwrite: Overwrite = False
     quiet: Quiet = False
-
-
-@command
-def campaign(options: Campaign) -> None:
-    """Run `infoset campaign`."""
-    from experiments.campaigns.run_campaign import run
-
-    run(options)
-
-
-@command
-def sweep(options: Sweep) -> None:
-    """Run `infoset sweep`."""
-    from experiments.campaigns.run_sweep import run
-
-    run(options)
-
-
-@command
-def report(options: Report) -> None:
-    """Run `infoset report`."""
-    from experiments.campaigns.run_report import run
-
-    run(options)

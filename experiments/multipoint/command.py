@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.command import command
 from experiments.common.options import FileOptions, Html, ProblemName
 
 GIVEN, BEST = "given", "best"
@@ -30,11 +29,3 @@ class Multipoint(FileOptions):
         typer.Option(help="Times of the visits: those of the file, or the best ones. Default: as in the file."),
     ] = None
     html: Html = None
-
-
-@command
-def multipoint(options: Multipoint) -> None:
-    """Run `infoset multipoint`."""
-    from experiments.multipoint.run import run
-
-    run(options)

@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.command import command
 from experiments.common.options import FileOptions, Html, ProblemName
 
 
@@ -31,11 +30,3 @@ class Pareto(FileOptions):
         int, typer.Option(metavar="N", min=2, max=10_001, help="Number of times in each trajectory of the JSON file.")
     ] = 31
     html: Html = None
-
-
-@command
-def pareto(options: Pareto) -> None:
-    """Run `infoset pareto`."""
-    from experiments.pareto.run import run
-
-    run(options)

@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.command import command
 from experiments.common.options import Csv, FileOptions, Html, ProblemName, Seed, finite
 
 ROWS = "thrust_ratio=0:0.8:17"
@@ -100,19 +99,3 @@ class PursuitMap(FileOptions):
         ),
     ] = False
     csv: Csv = None
-
-
-@command
-def pursuit(options: Pursuit) -> None:
-    """Run `infoset pursuit`."""
-    from experiments.pursuit.run import run
-
-    run(options)
-
-
-@command
-def pursuit_map(options: PursuitMap) -> None:
-    """Run `infoset pursuit-map`."""
-    from experiments.pursuit.map import run
-
-    run(options)

@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.command import command
 from experiments.common.options import FileOptions, Html, ProblemName, Seed
 
 
@@ -43,11 +42,3 @@ class Reach(FileOptions):
     ] = 10
     seed: Seed = 0
     html: Html = None
-
-
-@command
-def reach(options: Reach) -> None:
-    """Run `infoset reach`."""
-    from experiments.reachability.run import run
-
-    run(options)

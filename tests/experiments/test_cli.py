@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import csv
+import importlib
 import io
 import json
 import math
@@ -11,12 +12,12 @@ import time
 from importlib.metadata import version
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import pytest
 
 import kernels
-from experiments.cli import main
+from experiments.cli import COMMANDS, main
 from experiments.common.errors import InputError
 from experiments.common.output import output, to_csv, to_json, write_file
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_text
@@ -545,3 +546,8 @@ def test_interrupt_of_a_process(tmp_path: Path) -> None:
     assert err.decode().splitlines()[-1] == "interrupted"
     assert b"Traceback" not in err
     assert names_in(tmp_path) == []
+
+
+def test_the_run_of_every_command_takes_its_options() -> None:
+    for _, options, module, _ in COMMANDS:
+        assert get_type_hints(importlib.import_module(module).run) == {"options": options, "return": type(None)}

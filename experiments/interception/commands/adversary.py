@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.command import command
 from experiments.common.options import Json, Overwrite, Quiet, Seed
 from experiments.interception.options import (
     MOST_RUNS,
@@ -43,11 +42,3 @@ class Adversary:
     json: Json = None
     overwrite: Overwrite = False
     quiet: Quiet = False
-
-
-@command
-def adversary(options: Adversary) -> None:
-    """Run `infoset adversary`."""
-    from experiments.interception.runs.adversary import run
-
-    run(options)

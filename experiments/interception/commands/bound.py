@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.command import command
 from experiments.common.options import FileOptions, Seed
 from experiments.interception.options import MOST_RUNS, ModelName, ScenarioName, Strategies
 
@@ -34,11 +33,3 @@ class Bound(FileOptions):
         ),
     ] = 500
     seed: Seed = 0
-
-
-@command
-def bound(options: Bound) -> None:
-    """Run `infoset bound`."""
-    from experiments.interception.runs.bound import run
-
-    run(options)

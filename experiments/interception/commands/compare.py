@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.command import command
 from experiments.common.options import Csv, FileOptions, Seed
 from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, ScenarioName, Strategies
 
@@ -30,11 +29,3 @@ class Compare(FileOptions):
     model: ModelName = None
     range_meter: RangeMeter = None
     csv: Csv = None
-
-
-@command
-def compare(options: Compare) -> None:
-    """Run `infoset compare`."""
-    from experiments.interception.runs.compare import run
-
-    run(options)

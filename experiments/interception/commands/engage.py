@@ -8,7 +8,6 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.command import command
 from experiments.common.options import Csv, FileOptions, Seed
 from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, ScenarioName, StrategyName, TieName
 
@@ -36,11 +35,3 @@ class Engage(FileOptions):
         typer.Option(metavar="FILE.npz", help="Write the record; with --noise both FILE-random.npz and FILE-game.npz."),
     ] = None
     csv: Csv = None
-
-
-@command
-def engage(options: Engage) -> None:
-    """Run `infoset engage`."""
-    from experiments.interception.runs.engage import run
-
-    run(options)

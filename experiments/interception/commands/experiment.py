@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.command import command
 from experiments.common.options import Csv, FileOptions, Seed
 from experiments.interception.options import MOST_RUNS, ModelName, ScenarioName, StrategyName, TieName
 
@@ -30,11 +29,3 @@ class Experiment(FileOptions):
         int | None, typer.Option(metavar="N", help="Number of sections at the start, in place of the scenario's.")
     ] = None
     csv: Csv = None
-
-
-@command
-def experiment(options: Experiment) -> None:
-    """Run `infoset experiment`."""
-    from experiments.interception.runs.experiment import run
-
-    run(options)

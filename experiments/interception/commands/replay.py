@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.command import command
 from experiments.common.options import Html, Out, Overwrite, Quiet
 
 
@@ -33,11 +32,3 @@ class Replay:
     out: Out = None
     overwrite: Overwrite = False
     quiet: Quiet = False
-
-
-@command
-def replay(options: Replay) -> None:
-    """Run `infoset replay`."""
-    from experiments.interception.runs.replay import run
-
-    run(options)
