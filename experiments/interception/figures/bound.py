@@ -33,6 +33,8 @@ def draw_bound(scenario: Scenario, lower: LowerBound) -> Figure:
     ----------
     scenario : Scenario
         Sensor and step are used.
+    lower : LowerBound
+        Result of `sim.lower_bound` for this scenario.
 
     Returns
     -------
