@@ -10,7 +10,7 @@ from numba import config, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from kernels import Kernels
+from infoset.kernels import Kernels
 
 _kernels = Kernels("nnan", "nsz")
 compiled, entry = _kernels.compiled, _kernels.entry

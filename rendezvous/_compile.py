@@ -8,7 +8,7 @@ as `not value > 0.0`.
 
 from __future__ import annotations
 
-from kernels import Kernels
+from infoset.kernels import Kernels
 
 _kernels = Kernels("contract", "nsz")
 compiled, allocation_free = _kernels.compiled, _kernels.entry

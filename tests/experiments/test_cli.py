@@ -16,11 +16,11 @@ from typing import Any, get_type_hints
 
 import pytest
 
-import kernels
 from experiments.cli import COMMANDS, main
 from experiments.common.errors import InputError
 from experiments.common.output import output, to_csv, to_json, write_file
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_text
+from infoset import kernels
 from sim import Scenario, simulate
 
 CURVE_KEYS = [

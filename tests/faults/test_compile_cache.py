@@ -13,13 +13,12 @@ from typing import Any
 import pytest
 
 import infoset
-import kernels
-from infoset import _compile
-from kernels import VARIABLE, cache_folder
+from infoset import _compile, kernels
+from infoset.kernels import VARIABLE, cache_folder
 from rendezvous import _compile as _compile_of_rendezvous
 from tests.faults.conftest import begin, ended
 
-PACKAGES = ("kernels", "infoset", "guidance", "sim", "rendezvous", "experiments")
+PACKAGES = ("infoset", "guidance", "sim", "rendezvous", "experiments")
 
 
 def twice(value: float) -> float:
@@ -87,8 +86,8 @@ def test_no_stale_kernel_is_loaded(tmp_path: Path) -> None:
     """A kernel is compiled again where a function that it calls, or a constant of another module, has changed."""
     source, packages = Path(infoset.__file__).parents[1], tmp_path / "packages"
     (packages / "infoset").mkdir(parents=True)
-    shutil.copytree(source / "kernels", packages / "kernels", ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copy(source / "infoset" / "_compile.py", packages / "infoset")
+    for name in ("_compile.py", "kernels.py"):
+        shutil.copy(source / "infoset" / name, packages / "infoset")
     texts = {
         "__init__": "",
         "constant": "FACTOR = 2.0\n",
@@ -204,7 +203,7 @@ def test_a_read_only_installation_and_a_home(installation: Path, tmp_path: Path,
 def test_no_folder_can_be_written(installation: Path, tmp_path: Path, ordinary: tuple[str, ...]) -> None:
     """The library alone, as in a notebook: it works, and one line says what to do."""
     code = (
-        "import kernels; kernels.NOTICE_AFTER_S = 0.0; kernels._private_folder = kernels._user_folder\n"
+        "from infoset import kernels; kernels.NOTICE_AFTER_S = 0.0; kernels._private_folder = kernels._user_folder\n"
         "from rendezvous.relative_motion import _circular; print(_circular.angle_less_sine(1.0))"
     )
     sealed = tmp_path / "home"

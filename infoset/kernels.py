@@ -32,7 +32,7 @@ F = TypeVar("F", bound=Callable[..., object])
 JIT: Any = njit
 CONFIG: Any = config
 """Numba's decorator and configuration, with the options that their types leave out."""
-PACKAGES = ("kernels", "infoset", "guidance", "sim", "rendezvous")
+PACKAGES = ("infoset", "guidance", "sim", "rendezvous")
 VARIABLE = "NUMBA_CACHE_DIR"
 LOGGER = logging.getLogger("infoset.kernels")
 """Logger of the notice; without any configuration of logging it is printed on stderr."""
