@@ -244,20 +244,14 @@ class MultipointProblem:
 
     Parameters
     ----------
-    name : str
     source : str
         Name of the file, for messages.
     hash : str
         Fingerprint of the values.
-    axes : Axes
-    tour : Visits
     times_s : ndarray, shape (n,), or None
         Times of the visits, by target as listed; None if one is missing.
     optimise : bool
         Whether times are optimised.
-    latest_s : float or None
-    least_gap_s, price_per_s : float
-    greatest_control_m_s2 : float or None
     """
 
     name: str

@@ -19,7 +19,6 @@ def multipoint_page(name: str, scene: Scene, bound_m_s2: float | None = None) ->
     ----------
     name : str
         Name of the problem.
-    scene : Scene
     bound_m_s2 : float or None
         Bound on the control.
     """

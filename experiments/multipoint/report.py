@@ -35,9 +35,6 @@ class Report:
 
     Parameters
     ----------
-    problem : MultipointProblem
-    search : Search
-    scene : Scene
     objective : float
         Cost plus the price of the last time.
     evaluations : int

@@ -28,10 +28,8 @@ class Scene:
     ----------
     axes : Axes
         Axes of the positions.
-    tour : Visits
     order : tuple of int
         Indices of the targets in the order of the visits.
-    path : Path
     """
 
     axes: Axes

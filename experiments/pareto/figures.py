@@ -153,10 +153,8 @@ def draw_front(solution: EncounterSolution, selections: Mapping[str, Floats], sw
 
     Parameters
     ----------
-    solution : EncounterSolution
     selections : mapping of str to ndarray, shape (f,)
         Pareto-optimal meetings by the rule of their choice.
-    sweep : DurationSweep
     """
     figure, (left, middle, right) = figure_grid(78.0, 1, 3, (16.0, 3.0, 23.0, 6.0), (19.0, 0.0))
     sampled = pareto_set(solution, simplex_weights(len(solution.costs), _SET_POINTS))
@@ -285,7 +283,6 @@ def draw_costs(solution: EncounterSolution, coalitions: Coalitions | None, impul
 
     Parameters
     ----------
-    solution : EncounterSolution
     coalitions : Coalitions or None
         For the Shapley values and the transfers.
     impulses_m_s : sequence of float

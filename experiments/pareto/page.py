@@ -26,7 +26,6 @@ def pareto_page(name: str, solution: EncounterSolution, selections: Mapping[str,
     ----------
     name : str
         Name of the problem.
-    solution : EncounterSolution
     selections : mapping of str to ndarray, shape (f,)
         Pareto-optimal meetings by the rule of their choice.
     """

@@ -26,8 +26,6 @@ class Report:
 
     Parameters
     ----------
-    problem : ParetoProblem
-    solution : EncounterSolution
     selections : mapping of str to ndarray, shape (f,)
         Pareto-optimal meetings by the rule of their choice.
     coalitions : Coalitions or None
@@ -36,7 +34,6 @@ class Report:
         One per craft; empty if the problem has no bound.
     peaks_m_s2, impulses_m_s : tuple of float
         Largest control and total impulse of each craft.
-    sweep : DurationSweep
     """
 
     problem: ParetoProblem

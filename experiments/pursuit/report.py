@@ -35,9 +35,6 @@ class Feedback:
         The policy of the evader, or the file of its script.
     replan_s : float
         Time between plans.
-    observation : Observation
-    seed : int
-    flights : tuple of Flight
     """
 
     policy: str

@@ -173,14 +173,10 @@ class Rendezvous:
 
     Parameters
     ----------
-    name, description : str
     hash : str
         Fingerprint of the values.
-    problem : ReachabilityProblem
     motion : ConstantMotion or TschaunerHempel
         Linear model of the motion.
-    truth : NonlinearMotion
-    period_s, acceleration_m_s2 : float
     disturbance : ndarray, shape (T, 6, 3), or None
         Effect of unit components of the unknown acceleration on the state.
     navigation_error : ndarray, shape (6,), or None

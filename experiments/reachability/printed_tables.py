@@ -24,14 +24,12 @@ class PrintedTable:
 
     Parameters
     ----------
-    number : int
     ours : str
         The optimal control that it is compared with.
     controls : tuple
         u(t), t = 0..3.
     nonlinear, linear : tuple
         x(t), t = 1..4.
-    nonlinear_miss : float
     misprints : tuple of (str, int, int, float)
         Quantity, t, component from 1, and the correct number.
     """

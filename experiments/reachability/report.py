@@ -72,7 +72,6 @@ class Request:
         Names of `SINGLE`, "vertices" or "samples".
     samples : int
         Number of samples.
-    seed : int
     route : Route or None
         Representation of the sets; None chooses one.
     closed_loop : bool
@@ -95,7 +94,6 @@ class Member:
 
     Parameters
     ----------
-    name : str
     controls : ndarray, shape (T, 3)
     linear, nonlinear : ndarray, shape (T + 1, 6)
         States of the linear and of the nonlinear model.
@@ -145,8 +143,6 @@ class Report:
 
     Parameters
     ----------
-    rendezvous : Rendezvous
-    solution : Solution
     least_periods : int or None
         Least number of periods in which the terminal norm is zero.
     searched_periods : int
@@ -155,13 +151,10 @@ class Report:
         Bounds of the forward sets and of the tube.
     ranges : ndarray, shape (T, 3, 2)
         Ranges of the optimal controls.
-    members : tuple of Member
     flight : Flight or None
         Simulation in closed loop.
     noisy : tuple of Flight
         The same with navigation errors.
-    robustness : Robustness or None
-    elapsed_s : float
     """
 
     rendezvous: Rendezvous
