@@ -1,7 +1,7 @@
-"""Sessions that need other environments than the one at hand: what is distributed, other Pythons, old libraries.
+"""Checks in other environments: the distributed files, other versions of Python, old libraries.
 
-`nox -l` lists them. All but `audit` install the wheel that is built here and run in an empty folder with the tests
-alone: nothing may depend on the checkout. Arguments after `--` go to pytest.
+`nox -l` lists the sessions. All except `audit` build the wheel, install it and run the tests in an empty folder, so
+that nothing can depend on the checkout. Arguments after `--` go to pytest.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ ROOT = Path(__file__).parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 TOOLS = ("mypy", "ruff", "import-linter", "pytest-cov")
-"""Of the extra `test`: they look at the checkout, or at what the tests do in it."""
+"""Packages of the extra `test` that check the source code; the tests do not import them."""
 TOO_NEW = ("heyoka",)
-"""Of the extra `test`: an oracle whose oldest wheels need numpy 2."""
+"""Packages of the extra `test` whose oldest wheels need numpy 2."""
 
 nox.options.sessions = ["wheel"]
 nox.options.error_on_missing_interpreters = False
@@ -28,15 +28,15 @@ nox.options.error_on_missing_interpreters = False
 @nox.session(python="3.11")
 def wheel(session: nox.Session) -> None:
     """Build wheel and sdist, check them, and run every test against the installed wheel in an empty folder."""
-    made = built(session)
-    session.run("twine", "check", "--strict", *map(str, made))
-    session.install("-c", str(ROOT / "constraints.txt"), f"{made[0]}[test]")
+    distributions = built(session)
+    session.run("twine", "check", "--strict", *map(str, distributions))
+    session.install("-c", str(ROOT / "constraints.txt"), f"{distributions[0]}[test]")
     run_tests(session)
 
 
 @nox.session(python=PYTHONS)
 def tests(session: nox.Session) -> None:
-    """Run every test on another Python."""
+    """Run every test with another version of Python."""
     session.install("-c", str(ROOT / "constraints.txt"), f"{built(session)[0]}[test]")
     run_tests(session)
 
@@ -45,22 +45,22 @@ def tests(session: nox.Session) -> None:
 def oldest(session: nox.Session) -> None:
     """Run every test with the oldest libraries that pyproject.toml allows."""
     extra = PROJECT["optional-dependencies"]["test"]
-    needed = [each for each in extra if not re.match("|".join((*TOOLS, *TOO_NEW)), each)]
+    needed = [package for package in extra if not re.match("|".join((*TOOLS, *TOO_NEW)), package)]
     session.install("--only-binary", ":all:", *map(exactly, [*PROJECT["dependencies"], *needed]))
     session.install("--no-deps", str(built(session)[0]))
-    # What the old libraries say of newer Pythons is theirs.
+    # Old libraries emit deprecation warnings; they are not errors here.
     run_tests(session, "-W", "default")
 
 
 @nox.session
 def audit(session: nox.Session) -> None:
-    """Ask whether a version in constraints.txt has a vulnerability that is known."""
+    """Check the versions in constraints.txt for known vulnerabilities."""
     session.install("pip-audit")
     session.run("pip-audit", "--strict", "--no-deps", "--disable-pip", "--requirement", str(ROOT / "constraints.txt"))
 
 
 def built(session: nox.Session) -> tuple[Path, Path]:
-    """Build the distributions; the wheel and the sdist it was built from."""
+    """Build the distributions and return the paths of the wheel and the sdist."""
     session.install("build", "twine")
     folder = Path(session.create_tmp()) / "dist"
     shutil.rmtree(folder, ignore_errors=True)
@@ -80,5 +80,5 @@ def run_tests(session: nox.Session, *options: str) -> None:
 
 
 def exactly(requirement: str) -> str:
-    """Return a requirement as its own lower bound."""
+    """Return a requirement that allows only its lower bound."""
     return requirement.replace(">=", "==", 1)

@@ -1,4 +1,4 @@
-"""The options that the tables of strategies share: which scenario, how many runs of it."""
+"""Common options of the scripts that compare strategies: scenario, model, range meter, runs and seed."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from sim import Scenario
 def asked_scenario(
     description: str | None, arguments: Sequence[str] | None, *, runs: int, seed: int
 ) -> tuple[Scenario, int, int]:
-    """Return the scenario that a command line asks for, how many runs, and their seed."""
+    """Return the scenario, the number of runs and the seed of a command line."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenario", nargs="?", default="asteroid-1997")
-    parser.add_argument("--model", choices=[each.value for each in Model], default=Model.GUARANTEED.value)
+    parser.add_argument("--model", choices=[model.value for model in Model], default=Model.GUARANTEED.value)
     parser.add_argument("--no-range-meter", action="store_true")
     parser.add_argument("--runs", type=int, default=runs)
     parser.add_argument("--seed", type=int, default=seed)
-    given = parser.parse_args(arguments)
-    scenario = load_scenario(given.scenario)
-    kind = Model(given.model)
+    options = parser.parse_args(arguments)
+    scenario = load_scenario(options.scenario)
+    kind = Model(options.model)
     if kind is not scenario.set_model.kind:
         set_model = replace(scenario.set_model, kind=kind, initial_set=default_initial_set(kind))
         scenario = replace(scenario, set_model=set_model)
-    if given.no_range_meter:
+    if options.no_range_meter:
         scenario = replace(scenario, range_sensor=None)
-    return scenario, given.runs, given.seed
+    return scenario, options.runs, options.seed
 
 
 def title(scenario: Scenario) -> str:
-    """Say in a line which scenario is flown."""
+    """Return the name, the range meter and the model of a scenario as text."""
     meter = "with" if scenario.range_sensor is not None else "without"
     return f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}"

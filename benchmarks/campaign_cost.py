@@ -1,6 +1,7 @@
-"""Time of a campaign over its runs, and of a run over its sections: `python benchmarks/campaign_cost.py --out DIR`.
+"""Time of a campaign as a function of its runs, and of a run as a function of its sections.
 
-Prints the straight lines that fit, with the greatest deviation from them, and writes figure-campaign-cost.pdf and .png.
+`python benchmarks/campaign_cost.py --out DIR` prints the fitted straight lines and the greatest deviation from them,
+and writes figure-campaign-cost.pdf and .png.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ BATCHES = 2
 
 
 def campaign_s(scenario: Scenario, runs: int) -> float:
-    """Least time of a campaign of some rounds."""
+    """Return the shortest time of a campaign in several rounds, s."""
     times = []
     for _ in range(ROUNDS):
         with tempfile.TemporaryDirectory() as folder:
@@ -52,17 +53,17 @@ def main() -> None:
             by_runs = [campaign_s(scenario, runs) for runs in RUNS]
             model = scenario.set_model
             by_sections = [
-                campaign_s(replace(scenario, set_model=replace(model, sections=each)), 64 * BATCHES) / (64 * BATCHES)
-                for each in SECTIONS
+                campaign_s(replace(scenario, set_model=replace(model, sections=count)), 64 * BATCHES) / (64 * BATCHES)
+                for count in SECTIONS
             ]
-            for axes, ticks, values, what in (
-                (left, RUNS, np.array(by_runs), "a campaign, s over runs"),
-                (right, SECTIONS, 1e3 * np.array(by_sections), "a run, ms over sections"),
+            for axes, ticks, values, name in (
+                (left, RUNS, np.array(by_runs), "time of a campaign in s, n runs"),
+                (right, SECTIONS, 1e3 * np.array(by_sections), "time of a run in ms, n sections"),
             ):
                 rise, fixed = np.polyfit(ticks, values, 1)
                 line = fixed + rise * np.array(ticks)
                 off = float(np.abs(values / line - 1.0).max())
-                print(f"{noise.value}: {what}: {fixed:.3g} + {rise:.3g} n, within {off:.0%}: {np.round(values, 3)}")  # noqa: T201
+                print(f"{noise.value}: {name}: {fixed:.3g} + {rise:.3g} n, within {off:.0%}: {np.round(values, 3)}")  # noqa: T201
                 axes.plot(ticks, values, linestyle="", marker="o", markersize=4.0, color=look["color"])
                 axes.plot(ticks, line, label=f"{noise.value} noise", **look)
         for axes, ticks, title, label in (
@@ -74,9 +75,9 @@ def main() -> None:
             axes.set_title(title)
             axes.set_xlabel(label)
         left.set_ylabel("time, s")
-        right.set_ylabel("time a run, ms")
+        right.set_ylabel("time per run, ms")
         figure.legend(
-            *left.get_legend_handles_labels(), loc="lower center", ncols=2, title="points measured, lines fitted"
+            *left.get_legend_handles_labels(), loc="lower center", ncols=2, title="points: measured, lines: fitted"
         )
     out.mkdir(parents=True, exist_ok=True)
     Output(out, {}, overwrite=True).figure("figure-campaign-cost", figure)

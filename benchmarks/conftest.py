@@ -1,4 +1,4 @@
-"""What all benchmarks share: targets, told at the end of the run, and scenarios."""
+"""Targets, which are listed at the end of a run, and scenarios of the benchmarks."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LINES = pytest.StashKey[list[str]]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--strict-targets", action="store_true", help="a target that is missed is a failure")
+    parser.addoption("--strict-targets", action="store_true", help="fail if a target is missed")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -33,10 +33,10 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
 
 
 def _checker(config: pytest.Config, at_least: bool) -> Check:
-    def check(what: str, measured: float, target: float, unit: str) -> None:
+    def check(name: str, measured: float, target: float, unit: str) -> None:
         met = measured >= target if at_least else measured < target
         bound = ">=" if at_least else "<"
-        line = f"{'met   ' if met else 'MISSED'} {what}: {measured:.4g} {unit} (target {bound} {target:g} {unit})"
+        line = f"{'met   ' if met else 'MISSED'} {name}: {measured:.4g} {unit} (target {bound} {target:g} {unit})"
         config.stash[LINES].append(line)
         assert met or not config.getoption("--strict-targets"), line
 
@@ -45,13 +45,13 @@ def _checker(config: pytest.Config, at_least: bool) -> Check:
 
 @pytest.fixture(scope="session")
 def under(pytestconfig: pytest.Config) -> Check:
-    """Note a measured value that should be under its target."""
+    """Compare a measured value with its upper limit and list both at the end of the run."""
     return _checker(pytestconfig, at_least=False)
 
 
 @pytest.fixture(scope="session")
 def at_least(pytestconfig: pytest.Config) -> Check:
-    """Note a measured value that should be at least its target."""
+    """Compare a measured value with its lower limit and list both at the end of the run."""
     return _checker(pytestconfig, at_least=True)
 
 

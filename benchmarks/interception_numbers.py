@@ -1,4 +1,4 @@
-"""The numbers of the 1997 interception beside the printed ones: the tables of docs/interception.md."""
+"""Numbers of the 1997 interception, to compare with the published ones: the tables of docs/interception.md."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ CURVE_LEVELS = (0.1, 0.5, 0.9, 0.99)
 
 
 def line(title: str, results: Results, levels: tuple[float, ...]) -> str:
-    """Quantiles of the miss and of the impulse, and the share of runs that kept the truth."""
+    """Return a line: quantiles of miss and impulse, and the share of runs with the true state always in the set."""
     miss = " / ".join(f"{value:.2f}" for value in np.quantile(results.miss_m, levels))
     impulse = " / ".join(f"{value:.0f}" for value in np.quantile(results.impulse_m_s, levels))
-    return f"{title}: miss {miss} m, impulse {impulse} m/s, truth kept {results.truth_kept.mean():.1%}"
+    return f"{title}: miss {miss} m, impulse {impulse} m/s, true state in the set {results.truth_kept.mean():.1%}"
 
 
 def main() -> None:
-    """Fly and print."""
+    """Simulate and print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=1000, help="engagements a curve")
-    parser.add_argument("--single-runs", type=int, default=300, help="runs of the single engagement a noise")
-    asked = parser.parse_args()
+    parser.add_argument("--runs", type=int, default=1000, help="engagements per curve")
+    parser.add_argument("--single-runs", type=int, default=300, help="runs of the single engagement per noise")
+    options = parser.parse_args()
     single = replace(load_scenario("asteroid-1997-single"), range_sensor=None)
-    lines = ["the single engagement, printed: random 4.3 m for 244.7 m/s, game 9.5 m for 521.7 m/s; 5/50/95/100 %"]
-    lines.append(line("random", simulate(single, asked.single_runs), SINGLE_LEVELS))
+    lines = ["single engagement, published: random 4.3 m for 244.7 m/s, game 9.5 m for 521.7 m/s; 5/50/95/100 %"]
+    lines.append(line("random", simulate(single, options.single_runs), SINGLE_LEVELS))
     for tie in TieRule:
         game = replace(single, noise=NoiseKind.GAME, tie=tie)
-        lines.append(line(f"game, {tie.value}", simulate(game, asked.single_runs), SINGLE_LEVELS))
+        lines.append(line(f"game, {tie.value}", simulate(game, options.single_runs), SINGLE_LEVELS))
     lines.append("figure 4, 10/50/90/99 %")
     for number, scenario in curve_scenarios(load_scenario("asteroid-1997")):
-        lines.append(line(f"curve {number}", simulate(scenario, asked.runs), CURVE_LEVELS))
+        lines.append(line(f"curve {number}", simulate(scenario, options.runs), CURVE_LEVELS))
     print("\n".join(lines))  # noqa: T201
 
 

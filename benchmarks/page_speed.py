@@ -1,7 +1,7 @@
-"""How long pages take to make and to draw, how large they are, and how many frames a second they play.
+"""Measure pages: time to write, size, time until the first drawing, and frames per second.
 
 Run: python benchmarks/page_speed.py
-Needs a Chromium and the extra `browser`. Prints a table in Markdown; docs/replay.md has one of them.
+It needs Chromium and the extra `browser`, and prints a table in Markdown. docs/replay.md contains such a table.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ def main() -> None:
             file = folder / "page.html"
             wide = [drawn(browser, file, 1300) for _ in range(REPEATS)]
             narrow = [drawn(browser, file, 390) for _ in range(REPEATS)]
-            first_s = min(each[0] for each in wide)
-            frames = [max(each[1] for each in found) for found in (wide, narrow)]
+            first_s = min(first for first, _ in wide)
+            frames = [max(rate for _, rate in measured) for measured in (wide, narrow)]
             size = file.stat().st_size / 1e6
             cells = f"{took_s:.2f} | {busy_s:.2f} | {size:.2f}"
             print(f"| {title} | {cells} | {first_s:.2f} | {frames[0]:.0f} | {frames[1]:.0f} |")  # noqa: T201
@@ -62,7 +62,7 @@ def infoset(folder: Path, *arguments: str) -> None:
 
 
 def timed(folder: Path, command: list[str]) -> tuple[float, float]:
-    """Return how long a command takes to write its page, start of Python and all, and for how long it computes, s."""
+    """Return the elapsed time and the processor time of a command that writes a page, with the start of Python, s."""
     began_s, before = perf_counter(), getrusage(RUSAGE_CHILDREN)
     infoset(folder, *command, "--html", "page.html", "--overwrite", "--quiet")
     took_s, after = perf_counter() - began_s, getrusage(RUSAGE_CHILDREN)
@@ -70,13 +70,13 @@ def timed(folder: Path, command: list[str]) -> tuple[float, float]:
 
 
 def drawn(browser: Any, file: Path, width: int) -> tuple[float, float]:
-    """Return when a page first had drawn, s, and how many frames a second it draws while it plays on and on."""
+    """Return the time until a page is first drawn, s, and its frames per second while it plays in a loop."""
     page = browser.new_page(viewport={"width": width, "height": 900})
     page.goto(file.as_uri())
     while not page.evaluate("performance.getEntriesByName('first-draw').length"):
         page.wait_for_timeout(10)
     first_s = page.evaluate("performance.getEntriesByName('first-draw')[0].startTime") / 1e3
-    # As fast as a screen shows, and from the start again after the end.
+    # One frame per refresh of the screen; playing starts again after the end.
     page.evaluate("player.speed = 60 / player.coarse; setInterval(() => player.playing || player.play(), 1)")
     drawn_before, began_ms = page.evaluate("[player.drawn, performance.now()]")
     page.wait_for_timeout(1e3 * PLAYED_S)

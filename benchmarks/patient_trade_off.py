@@ -1,9 +1,9 @@
-"""Print what the patient strategy's one parameter trades: miss against impulse spent.
+"""Print miss and impulse of the strategy `patient` as functions of its parameter.
 
     python benchmarks/patient_trade_off.py --model guaranteed --runs 200 --seed 100
 
-Random noise, and game noise with the worst of its four tie rules, run by run. The seed is not that of the published
-figures, so that the default may be chosen from what is printed here.
+The table has random noise, and game noise with the worst of its four tie rules in each run. The seed is not that of the
+published figures, so that the default of the parameter can be chosen from this table.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ SHARES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 
 
 def figures(scenario: Scenario, strategy: Strategy, runs: int, seed: int) -> list[float]:
-    """Miss (m) and impulse (m/s) at 50 %, 90 % and worst: under random noise, then under the worst tie rule."""
+    """Return miss (m) and impulse (m/s), 50 %, 90 % and greatest: with random noise, then with the worst tie rule."""
     random = [simulate(replace(scenario, noise=NoiseKind.RANDOM), runs, seed=seed, strategy=strategy, guarantee=False)]
     game = [
         simulate(replace(scenario, noise=NoiseKind.GAME, tie=tie), runs, seed=seed, strategy=strategy, guarantee=False)
         for tie in TieRule
     ]
-    found: list[float] = []
+    quantiles: list[float] = []
     for results in (random, game):
-        for samples in ([each.miss_m for each in results], [each.impulse_m_s for each in results]):
+        for samples in ([result.miss_m for result in results], [result.impulse_m_s for result in results]):
             worst: NDArray[np.float64] = np.max(samples, axis=0)
-            found += [float(value) for value in np.quantile(worst, (0.5, 0.9, 1.0))]
-    return found
+            quantiles += [float(value) for value in np.quantile(worst, (0.5, 0.9, 1.0))]
+    return quantiles
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Print the curve."""
+    """Print the table."""
     scenario, runs, seed = asked_scenario(__doc__, arguments, runs=200, seed=100)
     line = sys.stdout.write
     line(f"{title(scenario)}, {runs} runs, seed {seed}\n")
@@ -48,8 +48,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     strategies: list[tuple[str, Strategy]] = [("symmetric-miss", SymmetricMiss())]
     strategies += [(f"{share:g}", Patient(share)) for share in SHARES]
     for name, strategy in strategies:
-        found = figures(scenario, strategy, runs, seed)
-        cells = [f"{value:7.1f}" + ("   " if index % 3 == 2 else "") for index, value in enumerate(found)]
+        values = figures(scenario, strategy, runs, seed)
+        cells = [f"{value:7.1f}" + ("   " if index % 3 == 2 else "") for index, value in enumerate(values)]
         line(f"{name:15}{''.join(cells)}\n")
         sys.stdout.flush()
 

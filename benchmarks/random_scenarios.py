@@ -3,7 +3,7 @@
     from benchmarks.random_scenarios import random_scenario
     scenario = random_scenario(7, rate_sensor=True)
 
-The same number gives the same scenario. Each is one that a scenario file may hold: it is written as one and read back.
+The same number gives the same scenario. Every scenario is valid: it is written as a scenario file and read again.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ STRATEGIES = ("symmetric-miss", "patient")
 
 
 def random_scenario(number: int, *, rate_sensor: bool) -> Scenario:
-    """Random scenario of a number, with a rate sensor or without one; about half have a range meter.
+    """Return the random scenario with a number, with or without a rate sensor; about half have a range meter.
 
     Speeds are 1 to 100 km/s, steps 0.01 to 10 s and 16 to 126 of them, angle errors 1e-6 to 1e-2 rad, sections 3 to
     500.
@@ -34,7 +34,7 @@ def random_scenario(number: int, *, rate_sensor: bool) -> Scenario:
             scenario = _drawn(generator, number, rate_sensor)
             return read_scenario(scenario_to_toml(scenario), f"random scenario {number}")
         except InputError:
-            continue  # what no file may hold is drawn again
+            continue  # an invalid scenario is drawn again
 
 
 def _drawn(generator: np.random.Generator, number: int, rate_sensor: bool) -> Scenario:
@@ -85,7 +85,7 @@ def _drawn(generator: np.random.Generator, number: int, rate_sensor: bool) -> Sc
     if often(0.3):
         dispersion = replace(bounds, z_m=(-0.5 * z_m, 0.5 * z_m), vz_m_s=(-0.5 * vz_m_s, 0.5 * vz_m_s))
     rate_error_rad_s = error_rad / step_s * decades(-2.5, 0.5)
-    kinds = [each for each in Manoeuvre if each is not Manoeuvre.NONE]
+    kinds = [manoeuvre for manoeuvre in Manoeuvre if manoeuvre is not Manoeuvre.NONE]
     return Scenario(
         f"random-{number}",
         "",
@@ -96,7 +96,7 @@ def _drawn(generator: np.random.Generator, number: int, rate_sensor: bool) -> Sc
         RangeSensor(step_s * int(generator.integers(1, 5)), decades(-3.0, -0.5)) if often(0.5) else None,
         thruster,
         strategy=STRATEGIES[int(generator.integers(len(STRATEGIES)))],
-        # Draws hold choices between ties for this noise alone; those are used as what else is random.
+        # Draws contain tie choices only with this noise; `soundness` uses them as additional random numbers.
         noise=NoiseKind.GAME,
         tie=TieRule.RANDOM,
         rate_sensor=RateSensor(step_s * int(generator.integers(1, 4)), rate_error_rad_s) if rate_sensor else None,

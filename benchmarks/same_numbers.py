@@ -64,7 +64,7 @@ def numbers_of(checkout: Path, command: str) -> object:
 
 
 def differences(old: object, new: object, path: str = "") -> Iterator[tuple[str, object, object]]:
-    """Yield the place and both values of everything that differs; lists are one place for all their items."""
+    """Yield the key path and both values of everything that differs; all items of a list have the same path."""
     if isinstance(old, dict) and isinstance(new, dict):
         for key in (*old, *(key for key in new if key not in old)):
             if key in IGNORED:

@@ -1,13 +1,13 @@
-"""Does the guaranteed model keep its word? Fly every kind of noise from everywhere in B x D, and count what breaks.
+"""Test the guaranteed model: simulate all kinds of noise with starts in all of B x D, and count violations.
 
     python -m benchmarks.soundness --engagements 200000
     python -m benchmarks.soundness --engagements 200000 --hostile      # execution errors of 2 %, a manoeuvring target
     python -m benchmarks.soundness --engagements 200000 --random rate  # random scenarios, each with a rate sensor
     python -m benchmarks.soundness --engagements 100000 --random       # random scenarios without one
 
-Counted are engagements whose truth left its own section (by any amount), whose set was lost, whose true miss exceeded
-Phi, and those without a Phi. All must be zero; a warning ends the run. Engagements of one batch have noise of every
-kind, real Kepler truth, V_x anywhere in D.
+Counted are engagements whose true state left its section (by any amount), whose set was lost, whose true miss exceeded
+Phi, and those without a Phi. All counts must be zero; a warning ends the run. A batch has all kinds of noise, the true
+motion is Keplerian, and V_x is anywhere in D.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ KINDS = ("random", "game, upper", "game, lower", "game, alternate", "game, rando
 
 @dataclass(frozen=True)
 class BoundedPairNoise:
-    """Engagements 2 k and 2 k + 1 are shown the angle between their two, as far as both bounds allow."""
+    """Noise of pairs: engagements 2 k and 2 k + 1 both measure their mean, within the bounds of each."""
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> dict[str, Floats]:
-        """Show each the middle."""
+        """Measure the mean of both engagements of a pair."""
         measured = {}
         for name, sensor in sight.sensors.items():
             true, bound = sensor.true_value(sight), sensor.bound(sight)
@@ -51,26 +51,26 @@ class BoundedPairNoise:
 
 @dataclass(frozen=True)
 class MixedNoise:
-    """Engagement b has noise number b modulo how many there are, in pairs."""
+    """Noise of different kinds in one batch; engagements 2 k and 2 k + 1 have kind k modulo the number of kinds."""
 
     parts: tuple[MeasurementNoise, ...]
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> dict[str, Floats]:
-        """Ask all, and give to each engagement its own."""
+        """Measure with all kinds, and choose that of each engagement."""
         kind = kind_of(sight.alpha_rad.size)
-        given = [part.measure(sight, predicted) for part in self.parts]
-        return {name: np.choose(kind, [measured[name] for measured in given]) for name in sight.sensors}
+        measurements = [part.measure(sight, predicted) for part in self.parts]
+        return {name: np.choose(kind, [measured[name] for measured in measurements]) for name in sight.sensors}
 
 
 def kind_of(batch: int) -> NDArray[np.int64]:
-    """Number of the noise of each engagement."""
+    """Return the index of the noise of each engagement in `KINDS`."""
     return np.arange(batch) // 2 % len(KINDS)
 
 
 def every_noise(draws: Draws) -> MixedNoise:
-    """One noise of each kind."""
+    """Return the noise of a batch, with all kinds."""
     signs = np.where(draws.tie >= 0.0, 1.0, -1.0)
-    # Half of them at the bound, half anywhere.
+    # Half of the biases are at the bound, the others anywhere.
     bias = np.where(np.arange(len(signs)) % 4 < 2, signs[:, 0], draws.tie[:, 0])
     constant = np.broadcast_to(bias[:, None], signs.shape)
     extremal = {name: np.where(errors >= 0.0, 1.0, -1.0) for name, errors in draws.errors.items()}
@@ -87,9 +87,9 @@ def every_noise(draws: Draws) -> MixedNoise:
 
 
 def guaranteed(scenario: Scenario, hostile: bool) -> Scenario:
-    """The scenario with the guaranteed model and starts anywhere in B x D."""
+    """Return the scenario with the guaranteed model and starts anywhere in B x D."""
     model = replace(scenario.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
-    # Draws hold choices between ties for this noise alone; those are used as what else is random here.
+    # Draws contain tie choices only with this noise; they are used as additional random numbers here.
     scenario = replace(scenario, set_model=model, dispersion=model.bounds, noise=NoiseKind.GAME, tie=TieRule.RANDOM)
     if not hostile:
         return scenario
@@ -99,7 +99,7 @@ def guaranteed(scenario: Scenario, hostile: bool) -> Scenario:
 
 @dataclass(frozen=True)
 class Count:
-    """What broke, of how many."""
+    """Numbers of engagements and of violations."""
 
     engagements: int = 0
     outside: int = 0
@@ -112,12 +112,12 @@ class Count:
 
 
 def fly(scenario: Scenario, first: int, batch: int, seed: int) -> Count:
-    """Fly some engagements, of every noise."""
+    """Simulate a batch of engagements with all kinds of noise."""
     draws = draw(scenario, range(first, first + batch), seed)
     if draws.execution is not None and first // batch % 2:
         draws = replace(draws, execution=np.where(draws.execution >= 0.0, 1.0, -1.0))
     if scenario.target is not None:
-        manoeuvres = [each for each in Manoeuvre if each is not Manoeuvre.NONE]
+        manoeuvres = [manoeuvre for manoeuvre in Manoeuvre if manoeuvre is not Manoeuvre.NONE]
         target = replace(scenario.target, manoeuvre=manoeuvres[first // batch % len(manoeuvres)])
         scenario = replace(scenario, target=target)
     flight = Engagements(scenario, draws, noise=every_noise(draws))
@@ -135,27 +135,27 @@ def fly(scenario: Scenario, first: int, batch: int, seed: int) -> Count:
 
 
 def scenarios(hostile: bool) -> list[Scenario]:
-    """The built-in scenarios, each without and with its range meter."""
-    given = [guaranteed(load_scenario(name), hostile) for name in ("asteroid-1997", "comet-fast")]
-    return [replace(each, range_sensor=sensor) for each in given for sensor in (None, each.range_sensor)]
+    """Return the built-in scenarios, without and with the range meter."""
+    built_in = [guaranteed(load_scenario(name), hostile) for name in ("asteroid-1997", "comet-fast")]
+    return [replace(scenario, range_sensor=sensor) for scenario in built_in for sensor in (None, scenario.range_sensor)]
 
 
 def fly_batch(number: int, hostile: bool, seed: int) -> Count:
-    """Fly batch `number`: one in eight is of the comet, which takes three times the steps."""
-    flown = scenarios(hostile)
-    often = [each for each in flown if each.name == "asteroid-1997"]
-    rarely = [each for each in flown if each.name != "asteroid-1997"]
+    """Simulate batch `number`: one in eight is of the comet, which takes three times as many steps."""
+    built_in = scenarios(hostile)
+    often = [scenario for scenario in built_in if scenario.name == "asteroid-1997"]
+    rarely = [scenario for scenario in built_in if scenario.name != "asteroid-1997"]
     chosen = rarely[number // 8 % len(rarely)] if number % 8 == 7 else often[number % len(often)]
     return fly(chosen, number * BATCH, BATCH, seed)
 
 
 def fly_random_batch(number: int, rate_sensor: bool, seed: int) -> Count:
-    """Fly batch `number` of a random scenario of its own."""
+    """Simulate batch `number`, which has a random scenario."""
     return fly(random_scenario(seed * 1_000_000 + number, rate_sensor=rate_sensor), number * BATCH, BATCH, seed)
 
 
 def main() -> None:
-    """Fly, count and print."""
+    """Simulate, count and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--engagements", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
@@ -163,16 +163,17 @@ def main() -> None:
     parser.add_argument("--random", nargs="?", const="plain", choices=("plain", "rate"), help="random scenarios")
     parser.add_argument("--first", type=int, default=0, metavar="BATCH", help="number of the first batch")
     parser.add_argument("--workers", type=int, default=1)
-    given = parser.parse_args()
+    options = parser.parse_args()
     warnings.simplefilter("error")
     began = time.perf_counter()
     total = Count()
-    with ThreadPoolExecutor(given.workers) as pool:
-        numbers = range(given.first, given.first - (-given.engagements // BATCH))
-        if given.random is None:
-            jobs = [pool.submit(fly_batch, number, given.hostile, given.seed) for number in numbers]
+    with ThreadPoolExecutor(options.workers) as pool:
+        numbers = range(options.first, options.first - (-options.engagements // BATCH))
+        if options.random is None:
+            jobs = [pool.submit(fly_batch, number, options.hostile, options.seed) for number in numbers]
         else:
-            jobs = [pool.submit(fly_random_batch, number, given.random == "rate", given.seed) for number in numbers]
+            rate = options.random == "rate"
+            jobs = [pool.submit(fly_random_batch, number, rate, options.seed) for number in numbers]
         for number, job in enumerate(jobs):
             count = job.result()
             if count != Count(count.engagements):

@@ -1,10 +1,9 @@
-"""Print how strategies stand errors that are no game: always at their bound, changing sides at fixed times.
+"""Print the miss of all strategies with square-wave errors: always at the bound, with sign changes at fixed times.
 
     python benchmarks/square_wave_errors.py --model guaranteed --runs 50
 
-A row a strategy: the median and the greatest miss over the starts, each start counting with the worst of all square
-waves (half-periods from one measurement to the whole flight, either sign first). The range meter, if there is one,
-measures without error.
+The table has a row for each strategy: median and greatest miss and impulse over the starts, with the worst square wave
+of each start (half-periods from one measurement to the whole flight, both signs). A range meter measures without error.
 """
 
 from __future__ import annotations
@@ -23,11 +22,11 @@ from sim.draws import draw
 from sim.engagement import Engagements
 
 HALF_PERIODS = (1, 2, 3, 4, 6, 10, 20, 40, 80, 1000)
-"""In steps; the last one is a bias that never changes."""
+"""Half-periods in steps; the last one is a constant bias."""
 
 
 def worst(scenario: Scenario, name: str, runs: int, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Greatest miss (m) and greatest impulse (m/s) of each start over all square waves."""
+    """Return the greatest miss (m) and the greatest impulse (m/s) of each start over all square waves."""
     draws = draw(scenario, range(runs), seed)
     steps = draws.steps
     misses, impulses = [], []
@@ -45,7 +44,7 @@ def worst(scenario: Scenario, name: str, runs: int, seed: int) -> tuple[NDArray[
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Print a row a strategy."""
+    """Print the table."""
     scenario, runs, seed = asked_scenario(__doc__, arguments, runs=50, seed=0)
     sys.stdout.write(f"{title(scenario)}, {runs} starts, ")
     sys.stdout.write(f"seed {seed}: the worst of {2 * len(HALF_PERIODS)} square waves\n")

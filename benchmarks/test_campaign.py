@@ -1,4 +1,4 @@
-"""Campaigns: what storing costs beside flying, what a second thread gains, and whether memory grows with the runs."""
+"""Campaigns: time of storing, gain of a second thread or process, and memory as a function of the number of runs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from experiments.campaigns.samples import samples
 from infoset import StateBox
 from sim import Campaign, CampaignNoise
 
-# The last seconds of the interception with three sections: a million of these is minutes, and stored like any other.
+# The last seconds of the interception with three sections: a million of these engagements take minutes.
 whole = load_scenario('asteroid-1997')
 known = StateBox(z_m=(-1e3, 1e3), x_m=(190e3, 250e3), vz_m_s=(-50.0, 50.0), vx_m_s=(-59e3, -57e3))
 start = StateBox(z_m=(-500.0, 500.0), x_m=(210e3, 230e3), vz_m_s=(-50.0, 50.0), vx_m_s=(-58.1e3, -57.9e3))
@@ -57,64 +57,68 @@ except SystemExit as left:
 
 _PEAK = """
 from pathlib import Path
-(line,) = [each for each in Path('/proc/self/status').read_text().splitlines() if each.startswith('VmHWM')]
+(line,) = [line for line in Path('/proc/self/status').read_text().splitlines() if line.startswith('VmHWM')]
 print(line.split()[1])
 """
 
 
 def peak_mb(code: str, *arguments: object) -> float:
-    """Peak memory of a process of its own, by its own account: what the system tells its parent counts the parent's."""
+    """Return the peak memory of code in a new process, MB, which the process reads itself.
+
+    The value that the parent gets from the system includes the memory of the parent.
+    """
     if not Path("/proc/self/status").exists():
-        pytest.skip("this system does not tell a process its peak")
+        pytest.skip("this system has no /proc/self/status, which contains the peak memory")
     command = [sys.executable, "-c", code + _PEAK, *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return int(done.stdout.splitlines()[-1]) * 1024.0 / 1e6
 
 
 def times_as_long(work: Work, other: Work, folder: Path) -> float:
-    """The median, over rounds, of one time beside another measured next to it: a machine's speed changes by the minute.
+    """Return the median over rounds of the ratio of two times.
 
-    Each works in an empty folder, and the other one begins every second round.
+    Both are measured in every round, because the speed of a machine varies, and their order alternates. Both functions
+    get an empty folder.
     """
 
-    def seconds(each: Work, place: Path) -> float:
+    def seconds(function: Work, empty: Path) -> float:
         began_s = time.perf_counter()
-        each(place)
+        function(empty)
         elapsed_s = time.perf_counter() - began_s
-        shutil.rmtree(place, ignore_errors=True)
+        shutil.rmtree(empty, ignore_errors=True)
         return elapsed_s
 
     ratios = []
     for number in range(ROUNDS):
         order = (work, other) if number % 2 == 0 else (other, work)
-        spent = {each: seconds(each, folder / str(number)) for each in order}
+        spent = {function: seconds(function, folder / str(number)) for function in order}
         ratios.append(spent[work] / spent[other])
     return statistics.median(ratios)
 
 
-def test_storing_costs_little_beside_flying(curve: Scenario, tmp_path: Path, under: Check) -> None:
+def test_time_of_storing(curve: Scenario, tmp_path: Path, under: Check) -> None:
     simulate(curve, 64)
     ratio = times_as_long(
         lambda folder: Campaign(curve, RUNS, folder).run(workers=1), lambda _: simulate(curve, RUNS), tmp_path
     )
-    under(f"campaign of {RUNS} runs beside simulate, {curve.noise.value}", ratio, 1.1, "x")
+    under(f"campaign of {RUNS} runs compared with simulate, {curve.noise.value}", ratio, 1.1, "x")
 
 
 def test_two_threads(curve: Scenario, tmp_path: Path, at_least: Check) -> None:
     if (os.cpu_count() or 1) < 2:
-        pytest.skip("there is one core")
+        pytest.skip("the machine has one core")
     simulate(curve, 64)
     ratio = times_as_long(
         lambda folder: Campaign(curve, RUNS, folder).run(workers=1),
         lambda folder: Campaign(curve, RUNS, folder).run(workers=2),
         tmp_path,
     )
-    at_least(f"two threads beside one, {curve.noise.value}", ratio, 1.6, "x")
+    at_least(f"two threads compared with one, {curve.noise.value}", ratio, 1.6, "x")
 
 
 def test_two_processes(curve: Scenario, tmp_path: Path, at_least: Check) -> None:
     if (os.cpu_count() or 1) < 2:
-        pytest.skip("there is one core")
+        pytest.skip("the machine has one core")
     simulate(curve, 64)
     with worker_processes(2) as pool:
         Campaign(curve, 4 * 64, tmp_path / "warm").run(pool)
@@ -123,12 +127,12 @@ def test_two_processes(curve: Scenario, tmp_path: Path, at_least: Check) -> None
             lambda folder: Campaign(curve, RUNS, folder).run(pool, workers=4),
             tmp_path,
         )
-    at_least(f"two processes beside one thread, {curve.noise.value}", ratio, 1.6, "x")
+    at_least(f"two processes compared with one thread, {curve.noise.value}", ratio, 1.6, "x")
 
 
 def test_memory_does_not_grow_with_the_runs(tmp_path: Path, under: Check) -> None:
     peaks = {runs: peak_mb(_SHORT_FLIGHTS, runs, tmp_path / str(runs)) for runs in (FEW, MANY)}
-    under(f"peak memory of {MANY} short runs beside {FEW}", peaks[MANY] / peaks[FEW], 1.2, "x")
+    under(f"peak memory of {MANY} short runs compared with {FEW}", peaks[MANY] / peaks[FEW], 1.2, "x")
     under(f"peak memory of {MANY} short runs", peaks[MANY], 600.0, "MB")
 
 
@@ -136,5 +140,5 @@ def test_memory_of_a_real_campaign(tmp_path: Path, under: Check) -> None:
     command = ("campaign", "--noise", NoiseKind.GAME.value, "-q", "--runs")
     few = peak_mb(_COMMAND, *command, 640, "--out", tmp_path / "few")
     many = peak_mb(_COMMAND, *command, FEW, "--out", tmp_path / "many")
-    under(f"peak memory of {FEW} runs flown beside 640", many / few, 1.2, "x")
-    under(f"peak memory of {FEW} runs flown", many, 600.0, "MB")
+    under(f"peak memory of {FEW} runs compared with 640", many / few, 1.2, "x")
+    under(f"peak memory of {FEW} runs", many, 600.0, "MB")

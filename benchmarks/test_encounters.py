@@ -1,7 +1,7 @@
-"""The encounter of several craft, and visits to several targets: times of the core, and memory.
+"""Encounters of several spacecraft and visits to several targets: computing time and memory.
 
-Times are processor time, the best of several rounds, so that other work on the machine counts little; ratios are of one
-run.
+Times are processor times, the shortest of several rounds, so that other work on the machine has little effect. Ratios
+are measured in one run.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ RATE = 1.13e-3
 
 
 def best_s(work: Callable[[], object], rounds: int) -> float:
-    """Shortest of several rounds, in processor time."""
-    found = np.inf
+    """Return the shortest processor time of several rounds, s."""
+    shortest_s = np.inf
     for _ in range(rounds):
         began = time.process_time()
         work()
-        found = min(found, time.process_time() - began)
-    return float(found)
+        shortest_s = min(shortest_s, time.process_time() - began)
+    return float(shortest_s)
 
 
 def equally_spaced(count: int) -> Nodes:
-    """Random targets, 150 s apart."""
+    """Return visits to random targets every 150 s."""
     times = 150.0 * np.arange(1.0, count + 1.0)
     states = 100.0 * np.random.default_rng(0).normal(size=(count, 6))
     return Nodes(times, times, states, states, states, states, np.zeros(count, dtype=bool))
@@ -57,7 +57,7 @@ def test_segments_and_the_dense_system(benchmark: BenchmarkFixture, under: Check
     segments = best_s(lambda: solve_segments(motion, 0.0, start, nodes), 20)
     dense = best_s(lambda: solve_dense(motion, 0.0, start, nodes), 2)
     under("segment solver, N = 1000", 1e3 * segments, 40.0, "ms")
-    at_least("dense system over segment solver, N = 1000", dense / segments, 10.0, "times")
+    at_least("time of the dense system divided by the segment solver, N = 1000", dense / segments, 10.0, "times")
 
 
 def test_memory_is_linear(under: Check) -> None:
@@ -69,8 +69,8 @@ def test_memory_is_linear(under: Check) -> None:
         solve_segments(motion, 0.0, start, nodes)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
-    under("memory of 4000 nodes over that of 1000", peaks[1] / peaks[0], 4.4, "times")
-    under("memory a node", peaks[1] / 4000 / 1024, 10.0, "kB")
+    under("memory of 4000 nodes compared with 1000", peaks[1] / peaks[0], 4.4, "times")
+    under("memory per node", peaks[1] / 4000 / 1024, 10.0, "kB")
 
 
 def test_time_is_linear(under: Check) -> None:
@@ -78,7 +78,7 @@ def test_time_is_linear(under: Check) -> None:
     few, many = equally_spaced(1000), equally_spaced(8000)
     short = best_s(lambda: solve_segments(motion, 0.0, start, few), 20)
     long = best_s(lambda: solve_segments(motion, 0.0, start, many), 10)
-    under("time of 8000 nodes over that of 1000", long / short, 12.0, "times")
+    under("time of 8000 nodes compared with 1000", long / short, 12.0, "times")
 
 
 def test_order_and_times_of_five(benchmark: BenchmarkFixture, under: Check) -> None:

@@ -1,4 +1,4 @@
-"""The experiment as a person waits for it: one curve in the process, and whole processes with their peak memory."""
+"""The interception experiment: one curve in this process, and commands as processes with their peak memory."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Process:
 
 
 def infoset(*arguments: str, cache: Path | None = None) -> Process:
-    """Run the command `infoset` in a process of its own, with a compile cache of its own if one is given."""
+    """Run the command `infoset` in a new process, with another compile cache if `cache` is not None."""
     environment = dict(os.environ) if cache is None else {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
     command = [sys.executable, "-m", "experiments", *arguments]
     began = time.perf_counter()
@@ -80,7 +80,7 @@ def test_phi_costs_at_most_three_times(curve: Scenario, under: Check) -> None:
     for guarantee in (True, False):
         elapsed_s(guarantee)
     ratios = [elapsed_s(True) / elapsed_s(False) for _ in range(ROUNDS)]
-    under(f"time with Phi over time without, {curve.noise.value}", sorted(ratios)[ROUNDS // 2], 3.0, "times")
+    under(f"time with Phi divided by time without, {curve.noise.value}", sorted(ratios)[ROUNDS // 2], 3.0, "times")
 
 
 def test_first_run(tmp_path: Path, under: Check) -> None:

@@ -1,6 +1,6 @@
-"""The orbital pursuit-evasion game: cold, warm and in a map, and beside SciPy's integrator with fsolve.
+"""The orbital pursuit-evasion game: without and with an initial guess, as a map, and compared with SciPy.
 
-Times are of the processor, so that other work on the machine does not count, and the best of many rounds.
+Times are processor times, the shortest of many rounds, so that other work on the machine has little effect.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ PHASES, INCLINATIONS = 101, 21
 
 @pytest.fixture(scope="module")
 def game() -> Game:
-    """The slides' case, 20 against 10 N."""
+    """The game of the slides: thrusts of 20 N and 10 N."""
     return load_pursuit("geo-pursuit").game()
 
 
@@ -41,13 +41,13 @@ def solved(game: Game) -> Solution:
 
 
 def best_s(benchmark: BenchmarkFixture) -> float:
-    """Least time of a round."""
+    """Return the shortest time of a round, s."""
     assert benchmark.stats is not None
     return float(benchmark.stats.stats.min)
 
 
 def seconds(work: Callable[[], object], rounds: int) -> float:
-    """Least processor time of some rounds."""
+    """Return the shortest processor time of several rounds, s."""
     times = []
     for _ in range(rounds):
         began = time.process_time()
@@ -59,12 +59,12 @@ def seconds(work: Callable[[], object], rounds: int) -> float:
 @pytest.mark.benchmark(group="pursuit", timer=time.process_time)
 def test_cold(benchmark: BenchmarkFixture, game: Game, under: Check) -> None:
     benchmark.pedantic(solve, args=(game,), rounds=30, warmup_rounds=2)
-    under("pursuit, slides' case from nothing", 1e3 * best_s(benchmark), COLD_MS, "ms")
+    under("pursuit, game of the slides without a guess", 1e3 * best_s(benchmark), COLD_MS, "ms")
 
 
 @pytest.mark.benchmark(group="pursuit", timer=time.process_time)
 def test_warm(benchmark: BenchmarkFixture, game: Game, solved: Solution, under: Check) -> None:
-    # Each round another thrust of the evader, within a percent.
+    # The games differ in the thrust of the evader, by at most 0.5 %.
     assert solved.capture is not None
     node, units = solved.capture.extremal, solved.units
     others = [
@@ -84,19 +84,19 @@ def test_map(benchmark: BenchmarkFixture, game: Game, under: Check) -> None:
     mu = game.gravity.parameter_m3_s2
 
     def game_at(phase_deg: float, inclination_deg: float) -> Game:
-        angles = (math.radians(each) for each in (inclination_deg, 79.0, 0.0, 318.0 + phase_deg))
+        angles = (math.radians(degrees) for degrees in (inclination_deg, 79.0, 0.0, 318.0 + phase_deg))
         position, velocity = OrbitalElements(42166e3, 0.00016, *angles).state(mu)
         evader = Player(tuple(position), tuple(velocity), 2000.0, 200.0, 10.0, 350.0)
         return Game(game.gravity, game.pursuer, evader)
 
     columns, rows = np.linspace(-30.0, 30.0, PHASES), np.linspace(0.2, 2.2, INCLINATIONS)
-    found = benchmark.pedantic(capture_map, args=(game_at, columns, rows), rounds=2, warmup_rounds=0)
-    assert found.count(PointStatus.FOLLOWED) + found.count(PointStatus.NEIGHBOUR) == PHASES * INCLINATIONS
+    captures = benchmark.pedantic(capture_map, args=(game_at, columns, rows), rounds=2, warmup_rounds=0)
+    assert captures.count(PointStatus.FOLLOWED) + captures.count(PointStatus.NEIGHBOUR) == PHASES * INCLINATIONS
     under(f"pursuit, a map of {PHASES * INCLINATIONS} points", best_s(benchmark), MAP_S, "s")
 
 
 def rates(t: float, y: Floats, thrust: float, mass: float, flow: float) -> Floats:
-    """State and costate of the pursuer, or of the evader with its costate turned; mu is one."""
+    """Right-hand side of state and costate of the pursuer, or of the evader with its costate negated, for mu = 1."""
     r, lv = y[:3], y[9:]
     square = float(r @ r)
     cube = square * math.sqrt(square)
@@ -109,11 +109,11 @@ def rates(t: float, y: Floats, thrust: float, mass: float, flow: float) -> Float
 
 
 @pytest.mark.benchmark(group="pursuit", timer=time.process_time)
-def test_beside_scipy(benchmark: BenchmarkFixture, game: Game, solved: Solution, at_least: Check) -> None:
-    """SciPy's integrator of order 8 with differences on 13 unknowns, from a guess 1e-4 off, to the same capture time.
+def test_compared_with_scipy(benchmark: BenchmarkFixture, game: Game, solved: Solution, at_least: Check) -> None:
+    """Compare with `solve_ivp` (DOP853) and `fsolve` on 13 unknowns, from a guess with a relative error of 1e-4.
 
-    Its right-hand side is plain scalar Python with as few array operations as it takes; ours is given no guess at all,
-    then the one that SciPy has.
+    SciPy's right-hand side is scalar Python with few array operations. The solver of the project has no guess first,
+    then the same guess as SciPy.
     """
     assert solved.capture is not None
     units, node = units_of(game), solved.capture.extremal
@@ -143,7 +143,9 @@ def test_beside_scipy(benchmark: BenchmarkFixture, game: Game, solved: Solution,
     theirs = seconds(scipy, 3)
     assert times[-1] == pytest.approx(solved.capture.time_s, rel=1e-7)
     cold = seconds(lambda: solve(game), 20)
-    at_least("pursuit from nothing, over SciPy from a close guess", theirs / cold, TIMES_FASTER, "x")
+    at_least("pursuit without a guess, compared with SciPy from a close guess", theirs / cold, TIMES_FASTER, "x")
     off = replace(node, **{name: getattr(node, name) * (1.0 + 1e-4) for name in ("pursuer", "evader", "duration")})
     benchmark.pedantic(solve_near, args=(game, units, off), rounds=50, warmup_rounds=2)
-    at_least("pursuit from a close guess, over SciPy from one", theirs / best_s(benchmark), TIMES_FASTER, "x")
+    at_least(
+        "pursuit from a close guess, compared with SciPy from the same", theirs / best_s(benchmark), TIMES_FASTER, "x"
+    )

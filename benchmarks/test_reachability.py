@@ -1,6 +1,6 @@
-"""Reachable rendezvous: the paper's case, long horizons, and forward sets beside two polytope libraries.
+"""Reachable rendezvous: the paper's case, long horizons, and forward sets compared with two polytope libraries.
 
-Times are of the processor, so that other work on the machine does not count; the best of a few.
+Times are processor times, the shortest of several rounds, so that other work on the machine has little effect.
 """
 
 from __future__ import annotations
@@ -50,21 +50,21 @@ def best_s(work: Callable[[], object], rounds: int) -> float:
 
 
 def paper(periods: int) -> ReachabilityProblem:
-    """The paper's 720 s in so many periods."""
+    """Return the paper's problem of 720 s with another number of periods."""
     orbit = EllipticOrbit.of_size(1e7, 0.1, 3.986004418e14)
     transition, control = discretised(motion_of(orbit, MotionModel.FROZEN), periods, 720.0 / periods, 0.15)
     start = np.array([2650.0, -2540.0, 2120.0, -3.0, 2.0, 3.0])
     return ReachabilityProblem(transition, control, start, np.array([3000.0] * 3 + [7.5] * 3), np.ones(3))
 
 
-def test_the_papers_case_with_everything_it_prints(under: Check) -> None:
+def test_the_papers_case_with_its_report(under: Check) -> None:
     def work() -> None:
-        given = load_rendezvous("rendezvous-2021")
-        report = make_report(given, Request([*SINGLE]))
+        rendezvous = load_rendezvous("rendezvous-2021")
+        report = make_report(rendezvous, Request([*SINGLE]))
         report_json(report)
-        [each.rows for each in compare_published(given, report.solution)]
+        [table.rows for table in compare_published(rendezvous, report.solution)]
 
-    under("the paper's case: sets, ranges, six controls flown, tables 1-3", best_s(work, 7), PAPER_S, "s")
+    under("the paper's case: sets, ranges, six simulated controls, tables 1-3", best_s(work, 7), PAPER_S, "s")
 
 
 def test_axis_supports_of_the_tube_at_64_periods(under: Check) -> None:
@@ -88,9 +88,9 @@ def test_axis_supports_grow_slowly(under: Check, periods: int) -> None:
 def test_the_exact_route_is_refused_in_time(under: Check, periods: int) -> None:
     problem = paper(periods)
     began = time.process_time()
-    found = solve(problem, budget=Budget(seconds=2.0))
+    solution = solve(problem, budget=Budget(seconds=2.0))
     taken = time.process_time() - began
-    under(f"T = {periods}: {found.route.value} ({found.reason[:60]})", taken, 4.0, "s")
+    under(f"T = {periods}: {solution.route.value} ({solution.reason[:60]})", taken, 4.0, "s")
 
 
 def own_step(block: Block, vertices: Floats, period: int) -> Floats:
@@ -99,7 +99,7 @@ def own_step(block: Block, vertices: Floats, period: int) -> Floats:
 
 
 def cdd_step(block: Block, vertices: Floats, period: int) -> Floats:
-    """Floats, by double description: generators, then half-spaces, then generators of the cut."""
+    """Compute a forward set with the package `cdd`: generators, half-spaces, then generators of the intersection."""
     import cdd
 
     points = _moved(block, vertices, period)
@@ -109,19 +109,19 @@ def cdd_step(block: Block, vertices: Floats, period: int) -> Floats:
     halves = cdd.copy_inequalities(cdd.polyhedron_from_matrix(generators))
     rows = [*halves.array, *np.column_stack([block.offsets[period + 1], -block.normals]).tolist()]
     both = cdd.matrix_from_array(rows, rep_type=cdd.RepType.INEQUALITY, lin_set=halves.lin_set)
-    found = np.array(cdd.copy_generators(cdd.polyhedron_from_matrix(both)).array)
-    return np.asarray(found[found[:, 0] == 1.0, 1:])
+    cut_generators = np.array(cdd.copy_generators(cdd.polyhedron_from_matrix(both)).array)
+    return np.asarray(cut_generators[cut_generators[:, 0] == 1.0, 1:])
 
 
 def polytope_step(block: Block, vertices: Floats, period: int) -> Floats:
-    """The package `polytope`: the hull by its quickhull, vertices by its own enumeration."""
+    """Compute a forward set with the package `polytope`: its quickhull and its vertex enumeration."""
     import polytope
 
     box = polytope.Polytope(block.normals, block.offsets[period + 1])
-    found = polytope.extreme(polytope.qhull(_moved(block, vertices, period)).intersect(box))
-    if found is None:
-        raise ArithmeticError("it finds the set empty")
-    return np.asarray(found)
+    extreme = polytope.extreme(polytope.qhull(_moved(block, vertices, period)).intersect(box))
+    if extreme is None:
+        raise ArithmeticError("the set is empty according to polytope")
+    return np.asarray(extreme)
 
 
 def _moved(block: Block, vertices: Floats, period: int) -> Floats:
@@ -131,18 +131,18 @@ def _moved(block: Block, vertices: Floats, period: int) -> Floats:
 
 
 def essential(vertices: Floats) -> int:
-    """How many vertices are more than 1e-7 away from the hull of the others: by linear programs, one at a time."""
+    """Return the number of vertices farther than 1e-7 from the hull of the others, by linear programs."""
     kept = list(range(len(vertices)))
     size = vertices.shape[1]
-    for place in range(len(vertices)):
-        others = vertices[[each for each in kept if each != place]]
+    for candidate in range(len(vertices)):
+        others = vertices[[index for index in kept if index != candidate]]
         rows = np.block([[others.T, -np.ones((size, 1))], [-others.T, -np.ones((size, 1))]])
-        ends = np.concatenate([vertices[place], -vertices[place]])
+        ends = np.concatenate([vertices[candidate], -vertices[candidate]])
         cost = np.concatenate([np.zeros(len(others)), [1.0]])
         sums = np.concatenate([np.ones(len(others)), [0.0]])[None]
-        found = linprog(cost, A_ub=rows, b_ub=ends, A_eq=sums, b_eq=[1.0], bounds=(0.0, None), method="highs")
-        if found.fun < MERGE:
-            kept.remove(place)
+        distance = linprog(cost, A_ub=rows, b_ub=ends, A_eq=sums, b_eq=[1.0], bounds=(0.0, None), method="highs")
+        if distance.fun < MERGE:
+            kept.remove(candidate)
     return len(kept)
 
 
@@ -155,14 +155,14 @@ STEPS: dict[str, tuple[str, Callable[[Block, Floats, int], Floats]]] = {
 
 @pytest.mark.parametrize("first", [0, 2], ids=["from the start", "from t = 2, where sets have an interior"])
 @pytest.mark.parametrize("which", [0, 1], ids=["x-y block, 4-D", "z block, 2-D"])
-def test_forward_sets_beside_other_libraries(pytestconfig: pytest.Config, which: int, first: int) -> None:
-    """Time, whether each finishes, and whether its vertex counts are those of exact rationals."""
+def test_forward_sets_compared_with_other_libraries(pytestconfig: pytest.Config, which: int, first: int) -> None:
+    """List the time of each library, whether it finishes, and whether its vertex counts are right."""
     block = paper(4).blocks[which]
-    exact = [each.vertices for each in rational_sets(block)[0]]
-    right = [essential(each) for each in exact[first + 1 :]]
+    exact = [forward.vertices for forward in rational_sets(block)[0]]
+    right = [essential(vertices) for vertices in exact[first + 1 :]]
     lines = [
         f"forward sets of {block.size} states, t = {first + 1}..4: essential vertices {right}, "
-        f"by exact rationals {[len(each) for each in exact[first + 1 :]]}"
+        f"by exact rationals {[len(vertices) for vertices in exact[first + 1 :]]}"
     ]
     for name, (module, step) in STEPS.items():
         if importlib.util.find_spec(module) is None:

@@ -1,9 +1,9 @@
-"""One step of one section: the engine beside the same step over shapely objects and shapely's vectorised calls.
+"""One step of the sections: the engine compared with shapely objects in a loop and with shapely's vectorised calls.
 
-The step is the paper's: shear (one step of the motion), the disturbance's segment, the cut by an angle measurement,
-and the extremes of the predicted miss. The sections are those of 50 engagements in mid-flight. Shapely's two are
-written as fast as it allows: the hull of a line through all corners, for one, where a point object for every corner
-costs five times the whole step. Times are of the processor, so that other work on the machine does not count.
+The step is that of the paper: shear (one step of the motion), sum with the segment of the disturbance, cut by an angle
+measurement, and the extremes of the predicted miss. The sections are those of 50 engagements after 60 steps. Both
+versions with shapely are optimised; for example, they take the hull of a line through all corners, because an object
+for each corner would take five times as long as the whole step. Times are processor times.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ WHOLE, WHOLE_TARGET = 200, 100.0
 
 @dataclass(frozen=True)
 class Flight:
-    """Sets in mid-flight, the angles measured in the next step, and the same sections for shapely.
+    """Information sets after some steps, the angles of the next step, and the same sections as shapely objects.
 
-    The engine is timed over a stretch of steps (angles and impulses): in flight its sets stay in the processor's cache,
-    a fresh copy of them does not.
+    The engine is timed over several steps (angles and impulses), so that the sets are in the processor's cache as in an
+    engagement; a new copy is not.
     """
 
     model: SetModel
@@ -53,13 +53,13 @@ class Flight:
     half_width_m: Floats
 
     def batch(self) -> tuple[tuple[InformationSet], dict[str, object]]:
-        """Fresh sets for a round of the engine's step, which changes them."""
+        """Return copies of the sets for a round, because the engine's step changes its arguments."""
         return (self.information.copy(),), {}
 
 
 @pytest.fixture(scope="module")
 def flight(curve: Scenario) -> Flight:
-    flown = Engagements(curve, draw(curve, range(ENGAGEMENTS), seed=0))
+    engagements = Engagements(curve, draw(curve, range(ENGAGEMENTS), seed=0))
     caught: list[InformationSet] = []
     stretch: list[tuple[Floats, Floats]] = []
 
@@ -70,8 +70,8 @@ def flight(curve: Scenario) -> Flight:
         elif step.step > STEP and "angle" in step.measured:
             stretch.append((step.measured["angle"], step.impulse_m_s))
 
-    while flown.step <= STEP + STRETCH:
-        flown.advance(catch)
+    while engagements.step <= STEP + STRETCH:
+        engagements.advance(catch)
     (information,), alpha_rad = caught, stretch[0][0]
     model = curve.set_model
     sections = [(b, section) for b in range(ENGAGEMENTS) for section in information.sections(b)]
@@ -141,14 +141,14 @@ def step_vectorised(flight: Flight, polygons: NDArray[np.object_]) -> Floats:
 
 
 def seconds(benchmark: BenchmarkFixture) -> float:
-    """Median time of a round."""
+    """Return the median time of a round, s."""
     assert benchmark.stats is not None
     return float(benchmark.stats.stats.median)
 
 
 @pytest.fixture(scope="module")
 def median_s() -> dict[str, float]:
-    """Medians of one flight, gathered by its benchmarks for the ratios."""
+    """Median times of the benchmarks of one flight, for the ratios."""
     return {}
 
 
@@ -181,18 +181,23 @@ def test_shapely_vectorised(
 def test_ratios(flight: Flight, curve: Scenario, median_s: dict[str, float], at_least: Check) -> None:
     noise, sections = curve.noise.value, len(flight.polygons)
     if len([key for key in median_s if key.endswith(f" {noise}")]) < 3:
-        pytest.skip("all three must be run")
+        pytest.skip("the ratio needs all three benchmarks")
     engine = median_s[f"engine {noise}"]
     vertices = np.mean([len(polygon.exterior.coords) - 1 for polygon in flight.polygons])
     sort = f"{noise}, {sections} sections of {vertices:.0f} vertices, {1e9 * engine / sections:.0f} ns each"
-    at_least(f"section-step over objects ({sort})", median_s[f"objects {noise}"] / engine, OVER_OBJECTS, "x")
-    at_least(f"section-step over vectorised ({sort})", median_s[f"vectorised {noise}"] / engine, OVER_VECTORISED, "x")
+    at_least(f"section-step compared with objects ({sort})", median_s[f"objects {noise}"] / engine, OVER_OBJECTS, "x")
+    at_least(
+        f"section-step compared with vectorised ({sort})",
+        median_s[f"vectorised {noise}"] / engine,
+        OVER_VECTORISED,
+        "x",
+    )
 
 
 def test_whole_engagements(flight: Flight, curve: Scenario, median_s: dict[str, float], at_least: Check) -> None:
     noise = curve.noise.value
     if f"objects {noise}" not in median_s:
-        pytest.skip("the loop over shapely objects must be run")
+        pytest.skip("the ratio needs the benchmark of shapely objects")
     draws, sections = draw(curve, range(WHOLE), seed=0), []
     counted = Engagements(curve, draws)
     while counted.flying:
@@ -203,9 +208,12 @@ def test_whole_engagements(flight: Flight, curve: Scenario, median_s: dict[str, 
         simulate(curve, WHOLE)
         times.append(time.process_time() - began_s)
     objects_s = median_s[f"objects {noise}"] / len(flight.polygons) * sum(sections)
-    sort = f"{noise}, {WHOLE / min(times):.0f} engagements a second, {sum(sections) / WHOLE:.0f} section-steps each"
+    sort = f"{noise}, {WHOLE / min(times):.0f} engagements per second, {sum(sections) / WHOLE:.0f} section-steps each"
     at_least(
-        f"whole engagements over their section-steps as objects ({sort})", objects_s / min(times), WHOLE_TARGET, "x"
+        f"whole engagements compared with their section-steps as objects ({sort})",
+        objects_s / min(times),
+        WHOLE_TARGET,
+        "x",
     )
 
 

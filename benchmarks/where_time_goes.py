@@ -1,10 +1,10 @@
-"""Where the time of an engagement goes: by part, by section-step, and how many vertices there are.
+"""Print the time of an engagement by part and per section-step, and the number of vertices of the sections.
 
     python benchmarks/where_time_goes.py                     # random noise, 50 and 200 engagements at once
     python benchmarks/where_time_goes.py --noise game --together 400
 
-Parts are timed by wrapping the kernels and the methods that call them, each without what it calls; the best of some
-rounds is shown. The wrapping itself is a few per cent, told as part of the interpreter's.
+Kernels and methods are wrapped in timers. The time of a part does not include other parts that it calls. The output is
+that of the fastest round. The timers take a few per cent, which are counted as time of the interpreter.
 """
 
 from __future__ import annotations
@@ -31,38 +31,38 @@ ROUNDS = 8
 SECTION_STEPS = "prediction, cut and summary of the sections"
 REGRIDS = "new grids of sections, and their ends"
 IMPULSES = "impulses of the sections"
-TRUTH_SECTION = "the truth's own section and its margin"
-TRUTH = "the truth's motion"
+TRUTH_SECTION = "section and margin of the true state"
+TRUTH = "true motion"
 DRAWS = "random numbers"
-REST = "the interpreter, NumPy, and what is not named"
+REST = "interpreter, NumPy and other code"
 
 
 @dataclass
 class Clock:
-    """Seconds by part, and section-steps, of one flight."""
+    """Seconds by part, and number of section-steps, of one flight."""
 
     seconds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     section_steps: int = 0
     inside: list[float] = field(default_factory=list)
 
     def timed(self, part: Callable[..., str], work: Callable[..., Any]) -> Callable[..., Any]:
-        """Do the work, and count it without what is counted inside it."""
+        """Return the function `work` with a timer; the time of timed functions that it calls is not included."""
 
-        def wrapped(*given: Any) -> Any:
-            name = part(*given)
+        def wrapped(*arguments: Any) -> Any:
+            name = part(*arguments)
             self.inside.append(0.0)
             began_s = time.perf_counter()
-            done = work(*given)
+            result = work(*arguments)
             elapsed_s = time.perf_counter() - began_s
             self.seconds[name] += elapsed_s - self.inside.pop()
             if self.inside:
                 self.inside[-1] += elapsed_s
-            return done
+            return result
 
         return wrapped
 
     def measured(self, work: Callable[..., Any]) -> Callable[..., Any]:
-        """Count the sections of a measurement, then time it."""
+        """Return the kernel of a measurement with a timer and a count of its sections."""
 
         def part(behind: Any, measured: Any, _stale: Any, _heights: Any, *others: Any) -> str:
             sections = others[3]
@@ -74,7 +74,7 @@ class Clock:
         return self.timed(part, work)
 
     def watch(self) -> None:
-        """Put clocks round the kernels and the truth's motion."""
+        """Add timers to the kernels and to the true motion."""
         section_passes.step_all = self.measured(section_passes.step_all)
         for owner, names, part in (
             (section_passes, ("widest_all",), SECTION_STEPS),
@@ -89,7 +89,7 @@ class Clock:
 
 
 def vertices(scenario: Scenario, together: int) -> tuple[float, float, int]:
-    """Least and greatest mean number of vertices of a living section over the steps, and the greatest of any."""
+    """Return the least and greatest mean number of vertices of the sections over the steps, and the greatest number."""
     flight = Engagements(scenario, draw(scenario, range(together), 0), guarantee=False)
     means, greatest = [], 0
     while flight.flying:
@@ -104,7 +104,7 @@ def vertices(scenario: Scenario, together: int) -> tuple[float, float, int]:
 
 
 def show(scenario: Scenario, together: int, clock: Clock) -> None:
-    """Fly some rounds, and print the quickest."""
+    """Simulate several rounds and print the times of the fastest."""
     best_s, parts, steps = float("inf"), dict[str, float](), 1
     for _ in range(ROUNDS):
         clock.seconds.clear()
@@ -121,28 +121,28 @@ def show(scenario: Scenario, together: int, clock: Clock) -> None:
             best_s, parts, steps = elapsed_s, dict(clock.seconds), clock.section_steps
     parts[REST] = best_s - sum(parts.values())
     lines = [
-        f"{together} engagements at once: {1e3 * best_s / together:.2f} ms each, {together / best_s:.0f} a second",
+        f"{together} engagements at once: {1e3 * best_s / together:.2f} ms each, {together / best_s:.0f} per second",
         *(
             f"  {1e3 * spent_s / together:6.2f} ms  {100.0 * spent_s / best_s:3.0f} %  {part}"
-            for part, spent_s in sorted(parts.items(), key=lambda each: -each[1])
+            for part, spent_s in sorted(parts.items(), key=lambda item: -item[1])
         ),
-        f"  {1e9 * parts[SECTION_STEPS] / steps:.0f} ns a section-step, of which there are {steps / together:.0f}",
+        f"  {1e9 * parts[SECTION_STEPS] / steps:.0f} ns per section-step, {steps / together:.0f} steps per engagement",
     ]
     sys.stdout.write("\n".join(lines) + "\n")
 
 
 def main() -> None:
-    """Print it for each size of batch."""
+    """Print the times for each size of batch."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--noise", choices=[kind.value for kind in NoiseKind], default=NoiseKind.RANDOM.value)
     parser.add_argument("--together", type=int, nargs="+", default=[50, 200])
-    given = parser.parse_args()
-    scenario = replace(load_scenario("asteroid-1997"), range_sensor=None, noise=NoiseKind(given.noise))
-    least, most, greatest = vertices(scenario, max(given.together))
+    options = parser.parse_args()
+    scenario = replace(load_scenario("asteroid-1997"), range_sensor=None, noise=NoiseKind(options.noise))
+    least, most, greatest = vertices(scenario, max(options.together))
     sys.stdout.write(f"vertices of a section: {least:.0f} to {most:.0f} on average over a flight, {greatest} at most\n")
     clock = Clock()
     clock.watch()
-    for together in given.together:
+    for together in options.together:
         show(scenario, together, clock)
 
 

@@ -1,4 +1,4 @@
-"""How many examples Hypothesis tries, few by default and more under the profile `thorough`, and what many tests fly."""
+"""Number of examples of Hypothesis (more with the profile `thorough`), and fixtures that many tests use."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sim import Scenario
 
 OF_THE_CHECKOUT = ["docs", "test_architecture.py", "test_readme.py"]
-"""Tests of files that no wheel holds: left out where there are none, so that the others can run against a wheel."""
+"""Tests of files that the wheel does not contain. They are skipped outside a checkout, where the wheel is tested."""
 IN_A_CHECKOUT = (Path(__file__).parents[1] / "README.md").exists()
 collect_ignore = [] if IN_A_CHECKOUT else OF_THE_CHECKOUT
 
@@ -28,18 +28,18 @@ settings.load_profile(PROFILE)
 
 
 def pytest_configure() -> None:
-    """Let tests interrupt what they began: what a script begins in the background, and its children, ignore it."""
+    """Restore the default handler of SIGINT, which shells disable for background jobs; some tests send SIGINT."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_report_header() -> str | None:
-    """Say what is left out."""
-    return None if IN_A_CHECKOUT else f"no checkout here: left out {', '.join(OF_THE_CHECKOUT)}"
+    """Name the skipped tests."""
+    return None if IN_A_CHECKOUT else f"not a checkout; skipped: {', '.join(OF_THE_CHECKOUT)}"
 
 
 def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
-    """Multiply the examples of those tests too that say how many they want: a profile alone leaves them as they are."""
+    """Multiply also the examples of tests that set their number; a profile does not change those."""
     if PROFILE != "thorough":
         return
     tests = {id(item.obj): item.obj for item in items if isinstance(item, pytest.Function)}
@@ -53,18 +53,18 @@ def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
 
 @pytest.fixture(autouse=True)
 def environment_is_put_back() -> Iterator[None]:
-    """Find the test that leaves a variable behind, not the later one that it makes fail or slow."""
+    """Fail the test that leaves a changed environment variable, which could affect later tests."""
     before = dict(os.environ)
     yield
     after = dict(os.environ)
-    for each in (before, after):
-        each.pop("PYTEST_CURRENT_TEST", None)
+    for variables in (before, after):
+        variables.pop("PYTEST_CURRENT_TEST", None)
     assert after == before
 
 
 @pytest.fixture(scope="session")
 def brief() -> Scenario:
-    """The last ten seconds of an approach whose range is known, in few sections: for what is no matter of numbers."""
+    """A short scenario with few sections: the last ten seconds of an approach with a known range."""
     from experiments.interception.scenario_file import load_scenario
     from infoset import StateBox
 
@@ -77,7 +77,7 @@ def brief() -> Scenario:
 
 @pytest.fixture(scope="session")
 def brief_file(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The file of that scenario, in no folder that a test looks at."""
+    """The file of the scenario `brief`, in a separate folder."""
     from experiments.interception.scenario_file import scenario_to_toml
 
     file = tmp_path_factory.mktemp("scenario") / "brief.toml"

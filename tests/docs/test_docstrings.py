@@ -46,6 +46,7 @@ _IN_NAME = re.compile(r"_(m|s|rad|km|deg|kg|n|m_s|km_s|rad_s|m_s2|m2_s3|m3_s2|kg
 _UNIT = re.compile(
     r"(?<![\w^'’])(m|s|rad|km|deg|kg|N|MB|ms|m/s|km/s|rad/s|rad/m|m/s\^1\.5|m/s\^2|m/s\^3|m\^2/s\^3|m\^3/s\^2|kg/s|1/s)(?!\w)"
 )
+_NUMBER = re.compile(r"\bfloat\b|Floats|ArrayLike|NDArray\[np\.float")
 _NONE_OR_GIVEN = re.compile(
     r"share|fraction|[Rr]elative|probability|ratio|eccentricity|weights?\b|confidence|level|direction|zonal|scaled"
     r"|[Ii]n [\[(][-\d]|between 0 and 1|0 to 1|unit (length|vector)|Unit vectors|dimensionless|nondimensional"
@@ -96,7 +97,7 @@ def described(text: str) -> set[str]:
 
 
 def undescribed(name: str, thing: Any) -> list[str]:
-    """Return the parameters of a public name that are not described."""
+    """Return the numbers among the parameters of a public name whose unit is neither in the name nor described."""
     if inspect.isclass(thing) and getattr(thing, "_is_protocol", False):
         return []
     text = inspect.getdoc(thing) or ""
@@ -104,14 +105,11 @@ def undescribed(name: str, thing: Any) -> list[str]:
     contract = CONTRACTS.get(name.rsplit(".", 1)[-1])
     if contract is not None and "Parameters\n" not in text:
         known |= described(inspect.getdoc(THINGS[f"{contract}.{name.rsplit('.', 1)[-1]}"]) or "") | {"batch"}
-    wanted = [each for each in inspect.signature(thing).parameters if each not in {"self", "cls"}]
-    if inspect.isclass(thing) or "Parameters\n" in text:
-        return [each for each in wanted if each not in known]
-    # Described in a line or two: that names what has to be said, and a name with its unit says it all.
     return [
-        each
-        for each in wanted
-        if each not in known and not _IN_NAME.search(each) and re.search(rf"\b{each}\b", text) is None
+        parameter.name
+        for parameter in inspect.signature(thing).parameters.values()
+        if _NUMBER.search(str(parameter.annotation)) and parameter.name not in known
+        if not _IN_NAME.search(parameter.name) and re.search(rf"\b{parameter.name}\b", text) is None
     ]
 
 
