@@ -19,6 +19,7 @@ from rendezvous.pareto import (
     EncounterSolution,
     Feasibility,
     Meeting,
+    NotCertifiedError,
     Plan,
     analyse_coalitions,
     check_bound,
@@ -252,11 +253,11 @@ def some_plan(seed: int, longest_rad: float) -> tuple[Plan, int]:
 def the_peak_and_the_impulse_agree(seed: int) -> None:
     plan, _ = some_plan(seed, 1000.0)
     start, end = plan.craft.start_s, plan.meeting_s
-    times = np.linspace(start, end, 4001)
+    times = np.linspace(start, end, 40_001)
     if isinstance(plan.craft.motion, TschaunerHempel):  # more of them near the periapsis
         orbit = plan.craft.motion.orbit
         first, last = (float(each) for each in orbit.eccentric_anomaly(np.array([start, end])))
-        times = orbit.time_of_eccentric(np.linspace(first, last, 4001))
+        times = orbit.time_of_eccentric(np.linspace(first, last, 40_001))
         times[0], times[-1] = start, end
     sizes = np.linalg.norm(plan.control(times), axis=1)
     steps = np.diff(times)
@@ -336,8 +337,16 @@ def least_peak_program(plan: Plan, common: int, count: int) -> tuple[float, floa
     return below, above
 
 
+REFUSED = (1826,)
+"""Of `MANY`: the direction of the control almost vanishes at some time, and the two bounds stay 5e-6 apart."""
+
+
 def the_least_peak_agrees(seed: int) -> None:
     plan, common = some_plan(seed, 12.0)
+    if seed in REFUSED:
+        with pytest.raises(NotCertifiedError, match="not known to 1e-06"):
+            least_peak(plan, common)
+        return
     least = least_peak(plan, common)
     if not plan.costate.any():
         assert least == peak_control(plan) == 0.0
