@@ -94,7 +94,7 @@ def vertices(scenario: Scenario, together: int) -> tuple[float, float, int]:
     means, greatest = [], 0
     while flight.flying:
         flight.advance()
-        sections = flight._information._stack.sections
+        sections = flight._information._state.stack.sections
         marks = sections.marks[sections.living.ravel()]
         if len(marks):
             count = marks[:, 0, 1] - marks[:, 0, 0] + marks[:, 1, 1] - marks[:, 1, 0]

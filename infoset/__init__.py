@@ -7,11 +7,12 @@ Start with `InformationSet` (a batch of sets carried through measurements, impul
 from importlib.metadata import version
 
 from infoset.convex_polygons import ConvexPolygons
-from infoset.information_set import InformationSet
-from infoset.information_set_view import InformationSetView, Section, SetStatus, to_omega_alpha
+from infoset.information_set import InformationSet, InformationSetView
 from infoset.model import InitialSet, Model, Recovery, SetModel, StateBox
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.sensors import AngleSensor, RangeSensor, RateSensor, Sensor
+from infoset.set_queries import Section, to_omega_alpha
+from infoset.set_state import SetStatus
 from infoset.shapes import from_shapely, to_shapely
 
 __version__ = version("infoset")

@@ -1,4 +1,4 @@
-"""The information set that a person handles: all states that agree with everything measured and done."""
+"""The public classes: the information set, and its read-only view for strategies and noises."""
 
 from __future__ import annotations
 
@@ -8,33 +8,42 @@ from numpy.typing import ArrayLike
 from infoset import section_life
 from infoset.guaranteed_miss import GuaranteedMiss
 from infoset.history import History
-from infoset.information_set_view import Flags, Floats, InformationSetView, SetStatus
 from infoset.limits import COUNT, NOT_NEGATIVE, PART, flags, real_array, shown
-from infoset.location import refine_all
 from infoset.model import InitialSet, Recovery, SetModel
-from infoset.replays import workspace
 from infoset.section_law import BOUND_SLACK, section_law
 from infoset.section_life import steepest_angle
 from infoset.section_stack import SectionStack
+from infoset.set_queries import SetQueries
+from infoset.set_state import Flags, Floats, SetState, SetStatus
+
+
+class InformationSetView(SetQueries):
+    """Read-only view of an information set. It follows the set and cannot change it."""
+
+    def copy(self) -> InformationSet:
+        """Return an independent information set that starts from the state of this one."""
+        twin = InformationSet.__new__(InformationSet)
+        twin._state = self._state.copy()
+        return twin
 
 
 class InformationSet(InformationSetView):
-    """All states (alpha, omega, x) that agree with everything measured and done, for a batch of engagements.
+    """All states (alpha, omega, x) that agree with the measurements and impulses so far, for a batch of engagements.
 
     Parameters
     ----------
     model : SetModel
-        What is known and assumed.
+        Known constants and assumptions.
     batch : int
         Number of engagements B; one by default.
     guarantee : bool
-        Whether to keep the guaranteed miss Phi: only the guaranteed model, started from a box, has one. It takes about
-        as long as the rest.
+        Whether to compute the guaranteed miss Phi, which doubles the run time. Only the guaranteed model with a box as
+        initial set has one.
 
     Raises
     ------
     TypeError, ValueError
-        If the model is of another type, the batch is no count, or the model has no labels.
+        If the model is not a `SetModel`, the batch is not a positive whole number, or the model has no labels.
 
     Examples
     --------
@@ -66,42 +75,45 @@ class InformationSet(InformationSetView):
         labels[:, : model.sections] = (
             np.linspace(least, greatest, model.sections) if model.sections > 1 else 0.5 * (least + greatest)
         )
-        super().__init__(
-            model,
-            SectionStack(section_law(model), labels, np.full(batch, model.sections)),
-            History(batch),
-            (np.full(batch, least), np.full(batch, greatest)),
-            np.full(batch, SetStatus.TRACKING.value, dtype=np.int64),
+        law = section_law(model)
+        has_phi = guarantee and model.is_guaranteed and model.initial_set is InitialSet.BOX
+        state = SetState(
+            model=model,
+            stack=SectionStack(law, labels, np.full(batch, model.sections)),
+            history=History(batch),
+            lower_label=np.full(batch, least),
+            upper_label=np.full(batch, greatest),
+            status=np.full(batch, SetStatus.TRACKING.value, dtype=np.int64),
+            some_left=np.zeros(batch, dtype=bool),
+            lost_step=np.full(batch, -1, dtype=np.int64),
+            lost_label=np.zeros(batch),
+            phi=GuaranteedMiss(law, batch, model.speed_error) if has_phi else None,
         )
-        if guarantee and model.is_guaranteed and model.initial_set is InitialSet.BOX:
-            self._phi = GuaranteedMiss(self._stack.law, batch, model.speed_error)
+        super().__init__(state)
 
     def guaranteed_miss(self) -> tuple[Floats, Flags]:
-        """The guaranteed miss Phi: whatever the truth is and did within its bounds, its miss is no more.
+        """Return the guaranteed miss Phi: an upper bound of the true miss if all errors are within their bounds.
 
         Returns
         -------
         phi_m : ndarray, shape (B,)
-            m; zero where no label has left yet.
+            m; zero while no label has passed below the range threshold.
         exists : ndarray of bool, shape (B,)
-            Whether it holds: some label has left, the model guarantees, and no measurement broke its bounds.
+            Whether the bound is valid: some label has passed below the threshold, the model is guaranteed, and the
+            data never contradicted it.
 
         Notes
         -----
-        It is of the labels that have left below the threshold; the truth is among them by the time it arrives.
+        Phi bounds the miss of the labels below the threshold. The label of the true state is one of them at arrival.
         """
-        if self._phi is None:
+        phi = self._state.phi
+        if phi is None:
             return np.zeros(self.batch), np.zeros(self.batch, dtype=bool)
-        return self._phi.bound_m, self._phi.exists & ~self.inconsistent
+        return phi.bound_m, phi.exists & ~self.inconsistent
 
     def view(self) -> InformationSetView:
-        """A read-only view of this set: it follows the set and cannot change it."""
-        limits = self._lower_label, self._upper_label
-        view = InformationSetView(self.model, self._stack, self._history, limits, self._status)
-        # All of these are only ever changed in place.
-        view._some_left, view._phi = self._some_left, self._phi
-        view._lost_step, view._lost_label = self._lost_step, self._lost_label
-        return view
+        """Return a read-only view of this set; it follows the set."""
+        return InformationSetView(self._state)
 
     def measure_range(
         self,
@@ -111,7 +123,7 @@ class InformationSet(InformationSetView):
         *,
         alpha_rad: ArrayLike | None = None,
     ) -> None:
-        """Keep the ranges that a range measurement allows: x_m/(1 + b) <= x <= x_m/(1 - b).
+        """Remove the ranges that contradict a range measurement: keep x_m/(1 + b) <= x <= x_m/(1 - b).
 
         Parameters
         ----------
@@ -120,10 +132,10 @@ class InformationSet(InformationSetView):
         relative_error : float
             Bound b, in [0, 1).
         where : array_like of bool, shape () or (B,)
-            Which engagements have measured.
+            Engagements with a measurement.
         alpha_rad : array_like, shape () or (B,), or None
-            Angle measured at the same moment: in the guaranteed model the distance measured is x / cos(alpha). Without
-            it alpha is bounded by how far the object can have gone.
+            Angle measured at the same time. In the guaranteed model the measured distance is x / cos(alpha); without
+            a measured angle, alpha is bounded by the greatest possible displacement along z.
 
         Raises
         ------
@@ -132,40 +144,40 @@ class InformationSet(InformationSetView):
 
         Notes
         -----
-        A range measurement cuts no polygon: it narrows the interval of labels.
+        A range measurement narrows the interval of labels and leaves the polygons of the others unchanged.
         """
         PART.need("relative_error", relative_error)
         measured = self._spread(range_m, "range_m")
         if (measured < 0.0).any():
             raise ValueError(f"range_m must not be negative: got {shown(range_m)}")
-        active = self._active(where)
+        state, active = self._state, self._active(where)
         travelled = self.model.closing_speed_m_s * self.time_s
         slack = section_life.CUT_SLACK * (measured + travelled)
         eta = self.model.speed_error
         nearer = np.cos(self._greatest_alpha(alpha_rad)) if self.model.is_guaranteed else 1.0
         lower = measured * nearer / ((1.0 + relative_error) * (1.0 + eta)) + travelled - slack
         upper = measured / ((1.0 - relative_error) * (1.0 - eta)) + travelled + slack
-        before = self._lower_label.copy(), self._upper_label.copy()
-        self._lower_label[active] = np.maximum(self._lower_label, lower)[active]
-        self._upper_label[active] = np.minimum(self._upper_label, upper)[active]
-        _, removed = self._stack.keep_labels(self._lower_label, self._upper_label, active)
+        before = state.lower_label.copy(), state.upper_label.copy()
+        state.lower_label[active] = np.maximum(state.lower_label, lower)[active]
+        state.upper_label[active] = np.minimum(state.upper_label, upper)[active]
+        _, removed = state.stack.keep_labels(state.lower_label, state.upper_label, active)
         if removed:
-            emptied = self._keep_enough(active, emptied=SetStatus.EMPTY)
+            emptied = self._refine_if_few(active, emptied=SetStatus.EMPTY)
             self._recover(emptied, None, *before)
 
     def _greatest_alpha(self, measured_rad: ArrayLike | None) -> Floats:
-        """Bound of |alpha| now, rad, shape (B,): from a measured one, or from the fastest the object can go."""
-        law, travelled = self._stack.law, self.model.closing_speed_m_s * self.time_s
+        """Bound of |alpha| now, rad, shape (B,): from a measured angle, or from the greatest possible velocity."""
+        law, travelled = self._state.stack.law, self.model.closing_speed_m_s * self.time_s
         if measured_rad is not None:
             farthest = law.label_greatest - travelled
             return np.array(
                 [steepest_angle(alpha, farthest, law) for alpha in self._spread(measured_rad, "alpha_rad").tolist()]
             )
         box = self.model.bounds
-        impulses = self._history.total_impulse() * (1.0 + self.model.execution_error_relative)
+        impulses = self._state.history.total_impulse() * (1.0 + self.model.execution_error_relative)
         fastest = impulses + max(abs(v) for v in box.vz_m_s) + law.disturbance * self.time_s
         offset = max(abs(z) for z in box.z_m) + fastest * self.time_s
-        nearest = np.maximum((self._lower_label - travelled) * (1.0 - self.model.speed_error), 0.0)
+        nearest = np.maximum((self._state.lower_label - travelled) * (1.0 - self.model.speed_error), 0.0)
         return np.asarray(np.arctan2(offset, nearest))
 
     def measure_angle(self, alpha_rad: ArrayLike, where: ArrayLike = True) -> None:
@@ -176,27 +188,27 @@ class InformationSet(InformationSetView):
         alpha_rad : array_like, shape () or (B,)
             Measured angle alpha_m, rad.
         where : array_like of bool, shape () or (B,)
-            Which engagements have measured.
+            Engagements with a measurement.
         """
         measured = self._spread(alpha_rad, "alpha_rad")
-        active = self._active(where)
-        event = self._history.record(section_life.ANGLE, measured, active)
-        before = self._lower_label.copy(), self._upper_label.copy()
-        if self._stack.measure_angle(active, measured, self._history.elapsed, event):
-            emptied = self._keep_enough(active, emptied=SetStatus.EMPTY)
+        state, active = self._state, self._active(where)
+        event = state.history.record(section_life.ANGLE, measured, active)
+        before = state.lower_label.copy(), state.upper_label.copy()
+        if state.stack.measure_angle(active, measured, state.history.elapsed, event):
+            emptied = self._refine_if_few(active, emptied=SetStatus.EMPTY)
             self._recover(emptied, event, *before)
 
     def measure_rate(self, omega_rad_s: ArrayLike, error_rad_s: float, where: ArrayLike = True) -> None:
-        """Cut every section by a measurement of the line of sight's rate: |omega - omega_m| <= error.
+        """Cut every section by a measurement of the line-of-sight rate: |omega - omega_m| <= error.
 
         Parameters
         ----------
         omega_rad_s : array_like, shape () or (B,)
             Measured rate, rad/s.
         error_rad_s : float
-            Its error bound, rad/s.
+            Error bound of the rate, rad/s.
         where : array_like of bool, shape () or (B,)
-            Which engagements have measured.
+            Engagements with a measurement.
 
         References
         ----------
@@ -204,87 +216,90 @@ class InformationSet(InformationSetView):
         """
         NOT_NEGATIVE.need("error_rad_s", error_rad_s)
         measured = self._spread(omega_rad_s, "omega_rad_s")
-        active = self._active(where)
+        state, active = self._state, self._active(where)
         error = error_rad_s * (1.0 + BOUND_SLACK)
-        event = self._history.record(section_life.RATE, measured, active, error)
-        before = self._lower_label.copy(), self._upper_label.copy()
-        if self._stack.measure_rate(active, measured, error, self._history.elapsed, event, self._history):
-            emptied = self._keep_enough(active, emptied=SetStatus.EMPTY)
+        event = state.history.record(section_life.RATE, measured, active, error)
+        before = state.lower_label.copy(), state.upper_label.copy()
+        if state.stack.measure_rate(active, measured, error, state.history.elapsed, event, state.history):
+            emptied = self._refine_if_few(active, emptied=SetStatus.EMPTY)
             self._recover(emptied, event, *before)
 
     def shift(self, impulse_m_s: ArrayLike, where: ArrayLike = True) -> None:
-        """Shift every section by an impulse: V becomes V - k, that is omega becomes omega - k/x.
+        """Shift every section by an impulse k: V becomes V - k, and omega becomes omega - k/x.
 
         Parameters
         ----------
         impulse_m_s : array_like, shape () or (B,)
             Impulse k along z, m/s.
         where : array_like of bool, shape () or (B,)
-            Which engagements have fired.
+            Engagements with an impulse.
         """
         impulse = self._spread(impulse_m_s, "impulse_m_s")
-        active = self._followed & flags("where", where, (self.batch,)) & (impulse != 0.0)
-        if self._phi is not None:
-            self._phi.fire(np.where(active, impulse, 0.0), self._history.elapsed)
-        self._history.record(section_life.IMPULSE, impulse, active)
-        self._stack.shift(active, impulse, self._history.elapsed)
+        state, elapsed = self._state, self._state.history.elapsed
+        active = self._computes_phi & flags("where", where, (self.batch,)) & (impulse != 0.0)
+        if state.phi is not None:
+            state.phi.fire(np.where(active, impulse, 0.0), elapsed)
+        state.history.record(section_life.IMPULSE, impulse, active)
+        state.stack.shift(active, impulse, elapsed)
 
     def drop_below_threshold(self) -> Flags:
-        """Let the sections leave whose range will be below the threshold after the next step.
+        """Remove the sections whose range will be below the threshold after the next step.
 
         Returns
         -------
         ndarray of bool, shape (B, S)
-            Which stored sections left.
+            Stored sections that were removed.
         """
-        active, least_label = self.tracking, self._least_label_next()
-        followed = self._followed
-        if self._phi is not None:
-            leaving_below = np.minimum(self._upper_label, least_label)
-            self._phi.leave(followed, self._lower_label, leaving_below, self._stack, self._history)
+        state, active, least_label = self._state, self.tracking, self._least_label_next()
+        computes_phi = self._computes_phi
+        if state.phi is not None:
+            leaving_below = np.minimum(state.upper_label, least_label)
+            state.phi.leave(computes_phi, state.lower_label, leaving_below, state.stack, state.history)
         if self.model.is_guaranteed:
-            # A label may have left though none that is stored has; whether Phi is kept must not change what is flown.
-            self._some_left |= active & (self._lower_label < least_label)
-        np.maximum(self._lower_label, least_label, out=self._lower_label, where=followed)
-        if self._stack.least_label >= least_label:
-            return np.zeros(self._stack.labels.shape, dtype=bool)
-        left, removed = self._stack.keep_labels(self._lower_label, self._upper_label, active)
+            # A label between the stored ones may pass the threshold. The status must not depend on whether Phi is
+            # computed.
+            state.some_left |= active & (state.lower_label < least_label)
+        np.maximum(state.lower_label, least_label, out=state.lower_label, where=computes_phi)
+        if state.stack.least_label >= least_label:
+            return np.zeros(state.stack.labels.shape, dtype=bool)
+        left, removed = state.stack.keep_labels(state.lower_label, state.upper_label, active)
         if removed:
-            self._some_left |= left.any(axis=1)
-            self._keep_enough(active, emptied=SetStatus.FINISHED)
+            state.some_left |= left.any(axis=1)
+            self._refine_if_few(active, emptied=SetStatus.FINISHED)
         return left
 
     def sections_are_leaving(self) -> bool:
-        """Whether `drop_below_threshold` would let any stored section leave now."""
+        """Return whether `drop_below_threshold` would remove a stored section now."""
         least_label = self._least_label_next()
-        if self._stack.least_label >= least_label:
+        if self._state.stack.least_label >= least_label:
             return False
-        return bool(((self._stack.labels < least_label) & self.living).any())
+        return bool(((self._state.stack.labels < least_label) & self.living).any())
 
     def _least_label_next(self) -> float:
-        """Least label whose range will not be below the threshold after the next step, m."""
-        elapsed = self.model.step_s * (self._history.elapsed + 1)
+        """Least label, m, whose range is not below the threshold after the next step."""
+        elapsed = self.model.step_s * (self._state.history.elapsed + 1)
         return self.model.least_range_m + self.model.closing_speed_m_s * elapsed
 
     def predict(self) -> None:
-        """Move the set one step on, under every disturbance within its bound.
+        """Predict the set over one step, for all disturbances within the bound.
 
         Notes
         -----
-        The exact disturbance is a thin lens in (V, z); as in the paper it is the segment between its ends.
+        The exact set of disturbances is a thin lens in (V, z). As in the paper, the segment between its ends is used.
         """
         active = self.tracking
-        self._history.record(section_life.PREDICTION)
-        self._stack.predict(active, self._history.elapsed)
+        self._state.history.record(section_life.PREDICTION)
+        self._state.stack.predict(active, self._state.history.elapsed)
 
     @property
-    def _followed(self) -> Flags:
-        """Which engagements Phi follows: also those in which no label above the threshold was found to live."""
-        return np.asarray((self._status != SetStatus.STOPPED.value) & (self._status != SetStatus.EMPTY.value))
+    def _computes_phi(self) -> Flags:
+        """Engagements in which Phi is updated, also without a living label above the threshold."""
+        status = self._state.status
+        return np.asarray((status != SetStatus.STOPPED.value) & (status != SetStatus.EMPTY.value))
 
     def stop(self, where: ArrayLike) -> None:
-        """Follow engagements no longer: nothing is computed from now on for those `where` is true, shape () or (B,)."""
-        self._status[flags("where", where, (self.batch,))] = SetStatus.STOPPED.value
+        """Stop the computation in the engagements where `where`, shape () or (B,), is true."""
+        self._state.status[flags("where", where, (self.batch,))] = SetStatus.STOPPED.value
 
     def _spread(self, value: ArrayLike, name: str) -> Floats:
         return real_array(name, value, (self.batch,))
@@ -292,75 +307,59 @@ class InformationSet(InformationSetView):
     def _active(self, where: ArrayLike) -> Flags:
         return np.asarray(self.tracking & flags("where", where, (self.batch,)))
 
-    def _keep_enough(self, active: Flags, emptied: SetStatus) -> Flags:
-        """Re-grid where fewer than the fewest sections are left; note, and return, where nothing lives any more."""
+    def _refine_if_few(self, active: Flags, emptied: SetStatus) -> Flags:
+        """Make a new grid where too few sections are left. Set the status of empty sets; return where to recover."""
         empty = active & (self.section_counts < self.model.fewest_sections)
         if not empty.any():
             return empty
-        self._regrid(empty, 2 * self.model.fewest_sections + 1)
+        self._state.refine(empty, 2 * self.model.fewest_sections + 1)
         empty &= self.section_counts == 0
-        self._status[empty] = emptied.value
+        self._state.status[empty] = emptied.value
         if emptied is SetStatus.EMPTY:
-            self._status[empty & self._some_left] = SetStatus.REFUTED.value
-            empty &= ~self._some_left
+            self._state.status[empty & self._state.some_left] = SetStatus.REFUTED.value
+            empty &= ~self._state.some_left
         return empty
 
     def _recover(self, empty: Flags, event: int | None, lower: Floats, upper: Floats) -> None:
-        """Go on without the measurement that emptied a set: the last consistent set, predicted to now and widened.
+        """Discard the measurement that emptied a set: restore the last consistent set, predict and enlarge it.
 
         Parameters
         ----------
         empty : ndarray of bool, shape (B,)
-            Which sets.
+            Sets to recover.
         event : int or None
-            The measurement; None for one of range, which is no event.
+            Number of the measurement in the history; None for a range, which the history does not contain.
         lower, upper : ndarray, shape (B,)
-            Limits of the labels before it.
+            Limits of the labels before the measurement, m.
         """
         if not empty.any():
             return
-        history = self._history
-        for b in np.flatnonzero(empty & (self._lost_step < 0)):
-            self._lost_step[b] = history.elapsed
-            self._lost_label[b] = self._nearest_to_living(int(b), event, lower[b], upper[b])
+        state, history = self._state, self._state.history
+        for b in np.flatnonzero(empty & (state.lost_step < 0)):
+            state.lost_step[b] = history.elapsed
+            state.lost_label[b] = self._nearest_to_living(int(b), event, lower[b], upper[b])
         if self.model.recovery is Recovery.NONE:
             return
         if event is not None:
             history.retract(event, empty)
         history.record(section_life.WIDENING, applies=empty)
-        # Those that this measurement killed live again; their polygons are made anew below.
-        sections = self._stack.sections
+        # The sections that this measurement emptied live again; the refinement below recomputes their polygons.
+        sections = state.stack.sections
         stored = np.arange(sections.labels.shape[1]) < sections.used[:, None]
         killed = (sections.died == section_life.ALIVE) | (sections.died == (-1 if event is None else event))
         sections.living[empty] = (stored & killed)[empty]
-        self._lower_label[empty], self._upper_label[empty] = lower[empty], upper[empty]
-        self._status[empty] = SetStatus.TRACKING.value
-        self._regrid(empty, 2 * self.model.fewest_sections + 1)
-        self._status[empty & (self.section_counts == 0)] = SetStatus.EMPTY.value
+        state.lower_label[empty], state.upper_label[empty] = lower[empty], upper[empty]
+        state.status[empty] = SetStatus.TRACKING.value
+        state.refine(empty, 2 * self.model.fewest_sections + 1)
+        state.status[empty & (self.section_counts == 0)] = SetStatus.EMPTY.value
 
     def _nearest_to_living(self, b: int, event: int | None, lower: float, upper: float) -> float:
-        """Label that came nearest to living through a measurement, within the limits of labels before it."""
-        used = self._stack.sections.used[b]
-        killed = self._stack.sections.died[b, :used] == event
+        """Label, m, whose section was closest to the band of a measurement that emptied the set."""
+        state, sections = self._state, self._state.stack.sections
+        used = sections.used[b]
+        killed = sections.died[b, :used] == event
         if event is not None and killed.any():
-            overlaps = np.where(killed, self._stack.sections.overlaps[b, :used], -np.inf)
-            return float(self._stack.labels[b, overlaps.argmax()])
-        middle = 0.5 * (self._lower_label[b] + self._upper_label[b])
+            overlaps = np.where(killed, sections.overlaps[b, :used], -np.inf)
+            return float(sections.labels[b, overlaps.argmax()])
+        middle = 0.5 * (state.lower_label[b] + state.upper_label[b])
         return float(min(max(middle, lower), upper))
-
-    def _regrid(self, wanted: Flags, sections: int) -> None:
-        tape, stack = self._history, self._stack
-        stack.make_room_for_new(wanted, sections)
-        spare = refine_all(
-            wanted,
-            sections,
-            tape.elapsed,
-            self._lower_label,
-            self._upper_label,
-            tape.tapes,
-            tape.errors_if_any,
-            stack.sections,
-            stack.law,
-            workspace(tape.events, stack.labels.shape[1]),
-        )
-        stack.note_new(spare)

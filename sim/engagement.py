@@ -21,8 +21,8 @@ from guidance import (
 from guidance.noise import checked_measurements
 from guidance.strategy import checked_impulses
 from infoset import InformationSet, InformationSetView, PredictedMiss
-from infoset.information_set_view import MaskedFloats, MaskedIntegers
 from infoset.sensors import Measurements
+from infoset.set_queries import MaskedFloats, MaskedIntegers
 from sim.draws import Draws
 from sim.gravity import on_board_model
 from sim.kepler import KeplerMotion, Sight, TrueMotion

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset.information_set_view import MaskedFloats
 from infoset.limits import NOT_NEGATIVE
+from infoset.set_queries import MaskedFloats
 from sim.columns import Column, columns, columns_of, documented, values_of
 from sim.pictures import results_html
 

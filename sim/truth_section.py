@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from infoset import SetModel
 from infoset.history import History
-from infoset.information_set_view import MaskedFloats
 from infoset.section_law import BOUND_SLACK, section_law
 from infoset.section_life import ANGLE, IMPULSE, PREDICTION
 from infoset.section_stack import SectionStack
+from infoset.set_queries import MaskedFloats
 from sim.kepler import Sight
 
 Floats = NDArray[np.float64]

@@ -313,7 +313,7 @@ def test_runs_are_integers() -> None:
 
 def test_an_engagement_that_is_not_there() -> None:
     for call in (lambda: information().sections(2), lambda: information().section_at(5.5e6, 2)):
-        with pytest.raises(IndexError, match="engagement must be less than 2, their number: got 2"):
+        with pytest.raises(IndexError, match="engagement must be less than 2, the number of engagements: got 2"):
             call()
 
 

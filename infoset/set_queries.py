@@ -1,9 +1,8 @@
-"""What may be asked of an information set: all that strategies and noises see of it."""
+"""Queries of an information set: the part of its interface that changes nothing."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,38 +11,18 @@ from numpy.typing import NDArray
 from infoset import section_life, section_passes
 from infoset.chains import empty_sections, working_room
 from infoset.convex_polygons import ConvexPolygons
-from infoset.guaranteed_miss import GuaranteedMiss
-from infoset.history import History
 from infoset.limits import NUMBER, POSITIVE, WHOLE
 from infoset.model import SetModel
 from infoset.pictures import sections_svg
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
-from infoset.section_stack import SectionStack, outline
+from infoset.section_stack import outline
+from infoset.set_state import Flags, Floats, SetState, SetStatus
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-    from infoset.information_set import InformationSet
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 MaskedFloats = np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]
 MaskedIntegers = np.ma.MaskedArray[tuple[int], np.dtype[np.int64]]
-
-
-class SetStatus(Enum):
-    """What has become of an information set."""
-
-    TRACKING = 0
-    """Some state agrees with everything, above the range threshold."""
-    EMPTY = 1
-    """No state agrees, none had left below the threshold, and no recovery was possible."""
-    FINISHED = 2
-    """Every hypothesis has left below the threshold."""
-    REFUTED = 3
-    """The hypotheses above the threshold are refuted, so the truth is among those that have left."""
-    STOPPED = 4
-    """No longer followed, at its owner's word."""
 
 
 @dataclass(frozen=True)
@@ -53,11 +32,11 @@ class Section:
     Parameters
     ----------
     label_m : float
-        Range at t = 0 under this hypothesis, m.
+        Range at t = 0, m: the hypothesis of the section.
     range_m : float
         Range now, m.
     closing_speed_m_s : float
-        The nominal closing speed e, m/s.
+        Nominal closing speed e, m/s.
     polygon : ConvexPolygons
         All (V, z) that agree with the history, m/s and m.
     """
@@ -69,7 +48,7 @@ class Section:
 
     @property
     def omega_alpha(self) -> ConvexPolygons:
-        """The section as people look at it: (omega, alpha), rad/s and rad."""
+        """The section in the (omega, alpha) plane, rad/s and rad."""
         return to_omega_alpha(self.polygon, self.range_m, self.closing_speed_m_s)
 
     def _repr_svg_(self) -> str:
@@ -77,14 +56,14 @@ class Section:
 
 
 def to_omega_alpha(polygon: ConvexPolygons, range_m: float, closing_speed_m_s: float) -> ConvexPolygons:
-    """Image of a polygon of (V, z) in the (omega, alpha) plane at a range.
+    """Map polygons from the (V, z) plane to the (omega, alpha) plane at a range.
 
     Parameters
     ----------
     polygon : ConvexPolygons
         Polygons of (V, z), m/s and m.
     range_m, closing_speed_m_s : float
-        Range x and closing speed e.
+        Range x, m, and closing speed e, m/s.
 
     Returns
     -------
@@ -100,100 +79,83 @@ def to_omega_alpha(polygon: ConvexPolygons, range_m: float, closing_speed_m_s: f
 _TRACKING = SetStatus.TRACKING.value
 
 
-class InformationSetView:
-    """What may be asked of an information set; nothing here changes it. Leading axis: B engagements.
+class SetQueries:
+    """Queries of B information sets; the leading axis of every result is the engagement.
 
     Parameters
     ----------
-    model : SetModel
-    stack : SectionStack
-        The stored sections.
-    history : History
-        What was measured and done.
-    label_limits : tuple of ndarray, shape (B,)
-        Least and greatest label that may live, m.
-    status : ndarray of int, shape (B,)
-        Values of `SetStatus`.
+    state : SetState
+        The state to read. It may be shared with the set that changes it.
     """
 
-    def __init__(
-        self,
-        model: SetModel,
-        stack: SectionStack,
-        history: History,
-        label_limits: tuple[Floats, Floats],
-        status: NDArray[np.int64],
-    ) -> None:
-        self.model = model
-        self._stack = stack
-        self._history = history
-        self._lower_label, self._upper_label = label_limits
-        self._status = status
-        self._some_left = np.zeros(stack.batch, dtype=bool)
-        self._phi: GuaranteedMiss | None = None
-        self._lost_step = np.full(stack.batch, -1, dtype=np.int64)
-        self._lost_label = np.zeros(stack.batch)
+    def __init__(self, state: SetState) -> None:
+        self._state = state
+
+    @property
+    def model(self) -> SetModel:
+        """Known constants and assumptions."""
+        return self._state.model
 
     @property
     def batch(self) -> int:
         """Number of engagements B."""
-        return int(self._stack.batch)
+        return int(self._state.stack.batch)
 
     @property
     def time_s(self) -> float:
         """Time now, s."""
-        return self._history.elapsed * self.model.step_s
+        return self._state.history.elapsed * self.model.step_s
 
     @property
     def status(self) -> list[SetStatus]:
-        """What has become of each set."""
-        return [SetStatus(value) for value in self._status]
+        """Status of each set."""
+        return [SetStatus(value) for value in self._state.status]
 
     @property
     def tracking(self) -> Flags:
-        """Whether each set has states left above the threshold, shape (B,)."""
-        return np.asarray(self._status == _TRACKING)
+        """Whether each set contains states above the range threshold, shape (B,)."""
+        return np.asarray(self._state.status == _TRACKING)
 
     @property
     def inconsistent(self) -> Flags:
-        """Whether the data of each set have contradicted the model: it emptied, and was made anew. Shape (B,)."""
-        return np.asarray(self._lost_step >= 0)
+        """Whether the data contradicted the model, so that the set became empty at some step, shape (B,)."""
+        return np.asarray(self._state.lost_step >= 0)
 
     @property
     def inconsistency(self) -> tuple[MaskedIntegers, MaskedFloats]:
-        """Step at which each set emptied first, and the label (m) that came nearest to living on; masked: never."""
+        """Step at which each set first became empty, and its label closest to living, m; masked if it never did."""
         never = ~self.inconsistent
         return (
-            np.ma.MaskedArray(self._lost_step.copy(), mask=never),
-            np.ma.MaskedArray(self._lost_label.copy(), mask=never),
+            np.ma.MaskedArray(self._state.lost_step.copy(), mask=never),
+            np.ma.MaskedArray(self._state.lost_label.copy(), mask=never),
         )
 
     @property
     def living(self) -> Flags:
-        """Which stored sections live, shape (B, S)."""
-        living = self._stack.living.view()
+        """Whether each stored section lives, that is, is not empty, shape (B, S)."""
+        living = self._state.stack.living.view()
         living.flags.writeable = False
         return living
 
     @property
     def labels_m(self) -> Floats:
-        """Labels of the stored sections, living or not, m, shape (B, S)."""
-        labels = self._stack.labels.view()
+        """Labels of all stored sections, m, shape (B, S)."""
+        labels = self._state.stack.labels.view()
         labels.flags.writeable = False
         return labels
 
     @property
     def ranges_m(self) -> Floats:
-        """Ranges of the stored sections now, m, shape (B, S)."""
-        return self._stack.ranges(self._history.elapsed)
+        """Ranges of all stored sections now, m, shape (B, S)."""
+        return self._state.stack.ranges(self._state.history.elapsed)
 
     @property
     def section_counts(self) -> NDArray[np.int64]:
         """Number of living sections, shape (B,)."""
-        return np.asarray(np.count_nonzero(self._stack.living, axis=1))
+        return np.asarray(np.count_nonzero(self._state.stack.living, axis=1))
 
     def stored_range_interval_m(self) -> tuple[Floats, Floats]:
-        """Least and greatest range of the living stored sections, m; zeros where there is none."""
+        """Return the least and the greatest range of the living sections, m; zeros where none lives."""
         ranges, living = self.ranges_m, self.living
         tracked = living.any(axis=1)
         least = np.where(living, ranges, np.inf).min(axis=1)
@@ -201,7 +163,7 @@ class InformationSetView:
         return np.where(tracked, least, 0.0), np.where(tracked, greatest, 0.0)
 
     def least_and_greatest_alpha(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Least and greatest line-of-sight angle of the stored sections, with the ranges where they are reached.
+        """Return the least and the greatest line-of-sight angle of the living sections, and their ranges.
 
         Returns
         -------
@@ -209,10 +171,10 @@ class InformationSetView:
             rad and m; zeros where no section lives.
         """
         ranges = self.ranges_m
-        # Dead or unused slots may stand at any range, and so may sections of engagements that are followed no longer.
+        # Empty or unused slots may have any range, and so may the sections of stopped engagements.
         living = self.living & (ranges != 0.0)
         rows = np.arange(self.batch)
-        least, greatest = self._stack.heights
+        least, greatest = self._state.stack.heights
         alphas_least = np.divide(least, ranges, out=np.full(ranges.shape, np.inf), where=living)
         alphas_greatest = np.divide(greatest, ranges, out=np.full(ranges.shape, -np.inf), where=living)
         least_at, greatest_at = alphas_least.argmin(axis=1), alphas_greatest.argmax(axis=1)
@@ -225,69 +187,64 @@ class InformationSetView:
         )
 
     def predicted_miss(self) -> PredictedMiss:
-        """Predicted-miss interval over the stored sections, with the points that reach its ends.
-
-        Returns
-        -------
-        PredictedMiss
-            One interval an engagement.
+        """Return the predicted-miss interval of each engagement and the states that reach its ends.
 
         References
         ----------
         Kumkov and Patsko (1997), equations (13) and (14).
         """
-        exists, ends = self._stack.widest(self._history.elapsed)
+        exists, ends = self._state.stack.widest(self._state.history.elapsed)
         lower, upper = ends[:, 0].T, ends[:, 1].T
         return PredictedMiss(exists, lower[0], upper[0], ExtremePoints(*lower[1:]), ExtremePoints(*upper[1:]))
 
     def worst_predicted_miss_m(self) -> Floats:
-        """Greatest modulus of the predicted miss in each stored section, m, shape (B, S); zero where none lives."""
-        summaries = self._stack.summaries
+        """Return the greatest |predicted miss| in each stored section, m, shape (B, S); zero for empty sections."""
+        summaries = self._state.stack.summaries
         worst = np.maximum(summaries[:, :, section_life.UPPER_MISS], -summaries[:, :, section_life.LOWER_MISS])
         return np.where(self.living, worst, 0.0)
 
     def predicted_miss_by_section_m(self) -> tuple[Floats, Floats]:
-        """Least and greatest predicted miss of each stored section, m, each (B, S); zeros where none lives."""
-        summaries, living = self._stack.summaries, self.living
+        """Return the least and the greatest predicted miss of each section, m, each (B, S); zeros if it is empty."""
+        summaries, living = self._state.stack.summaries, self.living
         lower, upper = summaries[:, :, section_life.LOWER_MISS], summaries[:, :, section_life.UPPER_MISS]
         return np.where(living, lower, 0.0), np.where(living, upper, 0.0)
 
     def sections(self, engagement: int = 0) -> list[Section]:
-        """Living sections of one engagement, in rising order of range."""
+        """Return the living sections of one engagement in order of increasing range."""
         self._need_engagement(engagement)
         ranges = self.ranges_m[engagement]
         return [
             Section(
-                float(self._stack.labels[engagement, s]),
+                float(self._state.stack.labels[engagement, s]),
                 float(ranges[s]),
                 self.model.closing_speed_m_s,
-                _as_polygon(self._stack.polygon(engagement, int(s), self._history.elapsed)),
+                _as_polygon(self._state.stack.polygon(engagement, int(s), self._state.history.elapsed)),
             )
             for s in np.flatnonzero(self.living[engagement])
         ]
 
     def section_at(self, label_m: float, engagement: int = 0) -> Section:
-        """The section at any label, had by replaying the history.
+        """Return the section at any label, computed by replaying the history.
 
         Parameters
         ----------
         label_m : float
-            Range at t = 0 of the hypothesis, m.
+            Range at t = 0, m.
         engagement : int
-            Which of the batch.
+            Number of the engagement.
 
         Returns
         -------
         Section
-            Its polygon is empty if the label is refuted.
+            Its polygon is empty if the data exclude the label.
 
         Notes
         -----
-        Some 30 ns an event of the history.
+        About 30 ns per event of the history.
         """
         NUMBER.need("label_m", label_m)
         self._need_engagement(engagement)
-        tape, law, label = self._history, self._stack.law, float(label_m)
+        tape, law, label = self._state.history, self._state.stack.law, float(label_m)
         section = empty_sections(1)
         died = section_passes.replay_section(
             label, tape.tape(engagement), tape.errors_if_any, law, *section, 0, np.empty(tape.events), working_room()
@@ -297,21 +254,21 @@ class InformationSetView:
         return Section(label, x, self.model.closing_speed_m_s, _as_polygon(vertices))
 
     def margin(self, label_m: float, alpha_rad: float, omega_rad_s: float, engagement: int = 0) -> float:
-        """Signed margin of a state in the section at its label: positive inside, negative outside.
+        """Return the signed distance of a state to the boundary of its section: positive inside, negative outside.
 
         Parameters
         ----------
         label_m : float
             Range at t = 0 of the state, m.
         alpha_rad, omega_rad_s : float
-            Line-of-sight angle and its rate now.
+            Line-of-sight angle, rad, and its rate, rad/s, now.
         engagement : int
-            Which of the batch.
+            Number of the engagement.
 
         Returns
         -------
         float
-            Distance to the boundary, m, with V counted as V x/e, the miss that it is worth; -inf if refuted.
+            Distance in the plane of V x/e and z, m; -inf if the section is empty.
         """
         NUMBER.need("alpha_rad", alpha_rad)
         NUMBER.need("omega_rad_s", omega_rad_s)
@@ -324,10 +281,10 @@ class InformationSetView:
     def _need_engagement(self, engagement: int) -> None:
         WHOLE.need("engagement", engagement)
         if engagement >= self.batch:
-            raise IndexError(f"engagement must be less than {self.batch}, their number: got {engagement}")
+            raise IndexError(f"engagement must be less than {self.batch}, the number of engagements: got {engagement}")
 
     def living_range_interval_m(self) -> tuple[Floats, Floats]:
-        """Exact ends of the ranges that agree with the history, found by replay between the stored sections.
+        """Return the least and the greatest range, m, that agree with the history, to rounding.
 
         Returns
         -------
@@ -336,35 +293,14 @@ class InformationSetView:
 
         Notes
         -----
-        About ten replays an end, fewer where it is a limit known already.
+        The ends are located between the stored sections by about ten replays each.
         """
-        copy = self._detached()
-        copy._regrid(self.tracking, 2)
-        return copy.stored_range_interval_m()
-
-    def copy(self) -> InformationSet:
-        """An information set of its own that starts from this one."""
-        return self._detached()
-
-    def _detached(self) -> InformationSet:
-        from infoset.information_set import InformationSet
-
-        twin = InformationSet.__new__(InformationSet)
-        InformationSetView.__init__(
-            twin,
-            self.model,
-            self._stack.copy(),
-            self._history.copy(),
-            (self._lower_label.copy(), self._upper_label.copy()),
-            self._status.copy(),
-        )
-        twin._some_left = self._some_left.copy()
-        twin._lost_step, twin._lost_label = self._lost_step.copy(), self._lost_label.copy()
-        twin._phi = None if self._phi is None else self._phi.copy()
-        return twin
+        refined = self._state.copy()
+        refined.refine(self.tracking, 2)
+        return SetQueries(refined).stored_range_interval_m()
 
     def to_shapely(self, engagement: int = 0) -> list[BaseGeometry]:
-        """Living sections of one engagement as shapely geometries in the (omega, alpha) plane, rad/s and rad."""
+        """Return the living sections of one engagement as shapely geometries of (omega, alpha), rad/s and rad."""
         from infoset.shapes import to_shapely
 
         return [to_shapely(section.omega_alpha) for section in self.sections(engagement)]
@@ -377,7 +313,7 @@ class InformationSetView:
     def __repr__(self) -> str:
         head = f"{type(self).__name__} at t = {self.time_s:g} s"
         if self.batch > 1:
-            counts = np.bincount(self._status, minlength=len(SetStatus))
+            counts = np.bincount(self._state.status, minlength=len(SetStatus))
             states = ", ".join(f"{counts[s.value]} {s.name.lower()}" for s in SetStatus if counts[s.value])
             if self.inconsistent.any():
                 states += f", {np.count_nonzero(self.inconsistent)} of them inconsistent"
