@@ -157,7 +157,7 @@ def infoset(
 ) -> None:
     """Simulate interceptions guided by information sets, and solve rendezvous and pursuit problems.
 
-    An information set contains all states that agree with the measurements, the impulses and the model.
+    An information set contains all states that are consistent with the measurements, the impulses and the model.
     """
 
 

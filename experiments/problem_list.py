@@ -13,7 +13,7 @@ app = typer.Typer(name="problems", epilog="Example: infoset problems show pareto
 
 @app.callback(invoke_without_command=True)
 def problems(context: typer.Context, json: AsJson = False, quiet: Quiet = False) -> None:
-    """List and show the built-in problems of rendezvous and pursuit. Alone, it lists them."""
+    """List and show the built-in problems of rendezvous and pursuit. Without a command, list them."""
     if context.invoked_subcommand is None:
         list_problems(json=json, quiet=quiet)
     elif json or quiet:
@@ -22,7 +22,7 @@ def problems(context: typer.Context, json: AsJson = False, quiet: Quiet = False)
 
 @app.command("list", epilog="Example: infoset problems list --json")
 def list_problems(json: AsJson = False, quiet: Quiet = False) -> None:
-    """List the built-in problems with their kinds; with --quiet their names alone."""
+    """List the built-in problems with their kinds; with --quiet, print only their names."""
     from experiments.common.problem_file import built_in_problems
     from experiments.common.screen import show_built_in
 
@@ -35,7 +35,7 @@ def list_problems(json: AsJson = False, quiet: Quiet = False) -> None:
 
 @app.command(epilog="Example: infoset problems show pareto-2008 > mine.toml")
 def show(name: Annotated[str, typer.Argument(help="Name of a built-in problem.")]) -> None:
-    """Print the file of a built-in problem, with its comments."""
+    """Print the file of a built-in problem, including its comments."""
     from experiments.common.problem_file import problem_text
 
     typer.echo(problem_text(name), nl=False)

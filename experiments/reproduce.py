@@ -12,17 +12,17 @@ from experiments.common.options import Json, Overwrite, Quiet
 
 @dataclass(frozen=True)
 class Reproduce:
-    """Compute every number of the five papers, and print it with the published one.
+    """Compute every number of the five papers, and print it with the published number.
 
-    Each number has its table or equation, the tolerance of its printed digits, and a verdict: agreed, misprint (with
-    the correct number and the reason), or not explained (with what was tried). The exit code is 1 if a number that
-    should agree does not. A paper without printed results is compared with reference values. Without --json no file
-    is written.
+    Each number is printed with its table or equation, the tolerance of its printed digits, and a verdict: agreed,
+    misprint (with the correct number and the reason), or not explained (with the attempted explanations). The exit
+    code is 1 if a number that should agree does not. If a paper prints no results, its numbers are compared with
+    reference values. Without --json no file is written.
     """
 
     paper: Annotated[
         Literal["interception", "pareto", "multipoint", "reachability", "pursuit"] | None,
-        typer.Option(help="One paper; by default all five."),
+        typer.Option(help="One paper. Default: all five."),
     ] = None
     json: Json = None
     overwrite: Overwrite = False

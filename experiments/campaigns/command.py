@@ -17,14 +17,18 @@ EXECUTION = "Execution"
 
 Required = Annotated[
     str,
-    typer.Option("--require", metavar="RULE", help="Bound of a quantile, drawn as a contour."),
+    typer.Option(
+        "--require",
+        metavar="RULE",
+        help="Requirement on a quantile: its upper bound, in the unit of the name. The figure shows it as a contour.",
+    ),
 ]
 Shown = Annotated[
     str | None,
     typer.Option(
         metavar="QUANTILES",
-        help='Quantiles to draw, separated by commas, for example "miss_m p99,impulse_m_s p90"; '
-        "p50 and p99 of miss and impulse by default.",
+        help='Quantiles to draw, separated by commas, for example "miss_m p99,impulse_m_s p90". '
+        "Default: p50 and p99 of the miss and of the impulse.",
     ),
 ]
 
@@ -34,14 +38,14 @@ class Flight:
     """Options of a campaign and of a sweep."""
 
     scenario: ScenarioName = "asteroid-1997"
-    runs: Annotated[int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Engagements, of each cell in a sweep.")]
+    runs: Annotated[int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs; in a sweep, of each cell.")]
     out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Folder for the runs, shard by shard; made if it does not exist.")
+        Path, typer.Option(metavar="DIR", help="Folder for the runs; created if needed.")
     ]
     noise: Annotated[
         Literal["random", "game", "mixed"] | None,
         typer.Option(
-            help="Measurement noise, in place of the scenario's; mixed: random in even runs, game in odd ones."
+            help="Measurement noise; mixed: random in even runs, game in odd runs. Default: that of the scenario."
         ),
     ] = None
     seed: Seed = 0
@@ -55,7 +59,7 @@ class Flight:
     resume: Annotated[
         bool,
         typer.Option(
-            "--resume", rich_help_panel=EXECUTION, help="Continue the campaign in DIR; an empty DIR starts a new one."
+            "--resume", rich_help_panel=EXECUTION, help="Continue the campaign in DIR; if DIR is empty, start a new one."
         ),
     ] = False
     chunk: Annotated[
@@ -65,7 +69,7 @@ class Flight:
             min=1,
             max=MOST_AT_ONCE,
             rich_help_panel=EXECUTION,
-            help="Engagements of a shard; it changes no number. By default it suits the number of runs.",
+            help="Number of runs in a shard; it does not change the results. Default: depends on the number of runs.",
         ),
     ] = None
     workers: Annotated[
@@ -75,7 +79,7 @@ class Flight:
             min=1,
             max=MOST_WORKERS,
             rich_help_panel=EXECUTION,
-            help="Threads on this machine; one a core by default.",
+            help="Number of threads on this machine. Default: one per core.",
         ),
     ] = None
     processes: Annotated[
@@ -85,7 +89,7 @@ class Flight:
             min=1,
             max=MOST_WORKERS,
             rich_help_panel=EXECUTION,
-            help="Processes on this machine in place of threads: faster for long campaigns.",
+            help="Number of processes on this machine, instead of threads; faster for long campaigns.",
         ),
     ] = None
     dask: Annotated[
@@ -93,25 +97,27 @@ class Flight:
         typer.Option(
             metavar="ADDRESS",
             rich_help_panel=EXECUTION,
-            help="Fly on a Dask cluster: the address of its scheduler, as tcp://host:8786.",
+            help="Simulate on a Dask cluster: address of its scheduler, for example tcp://host:8786.",
         ),
     ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Campaign(Flight):
-    """Fly a campaign: thousands of engagements, each stored in DIR as soon as its shard is complete.
+    """Simulate a campaign: thousands of runs, stored in DIR in shards (files of many runs).
 
-    After an interruption of any kind, --resume continues with the same command line; more runs extend the campaign.
-    The numbers depend on the scenario, the seed and the run only, not on workers, shards or interruptions. Run K of a
-    noise is the same engagement as: infoset engage --noise NOISE --run K. See the results with: infoset report DIR.
+    A shard is written as soon as its runs are complete. After any interruption, the same command with --resume
+    continues the campaign; with a greater --runs it extends the campaign. The numbers depend only on the scenario, the
+    seed and the run, not on workers, shards or interruptions. Run K with a noise is the same engagement as in:
+    infoset engage --noise NOISE --run K. To see the results: infoset report DIR.
     """
 
     until: Annotated[
         str | None,
         typer.Option(
             metavar="RULE",
-            help='Stop once the 95 % confidence interval of a quantile is narrow enough: "miss_m p99 ci<0.5".',
+            help="Stop when the 95 % confidence interval of a quantile is narrow enough, for example "
+            '"miss_m p99 ci<0.5" (m).',
         ),
     ] = None
     guarantee: Annotated[
@@ -125,18 +131,19 @@ class Campaign(Flight):
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep(Flight):
-    """Sweep values of a scenario: which sensor, which engine is needed for 99 % of the runs under 10 m?
+    """Simulate a scenario with many values of its keys, for example to find the sensor with 99 % of the misses < 10 m.
 
-    Every combination of the values is flown with the same starts and errors, and stored as a campaign is. DIR gets one
-    table, sweep.parquet, with a row for each cell; a figure of lines (one key) or heat maps (two); and the runs.
+    Each combination of values is a cell. All cells have the same initial states and random errors, and are stored like
+    a campaign. DIR contains the runs; one table, sweep.parquet, with one row for each cell; and one figure: lines for
+    one key, heat maps for two keys.
     """
 
     vary: Annotated[
         str,
         typer.Option(
             metavar="KEY=FROM:TO:COUNT,...",
-            help="Numeric keys of the scenario file, in its units; KEY=log:FROM:TO:COUNT spaces them evenly in the "
-            "logarithm. Of a pair KEY.least or KEY.greatest is varied.",
+            help="Keys of the scenario file and their values, in the units of the file. KEY=log:FROM:TO:COUNT has "
+            "logarithmic spacing. If the value is a pair, vary KEY.least or KEY.greatest.",
         ),
     ]
     require: Required = "miss_m p99<10"
@@ -146,22 +153,22 @@ class Sweep(Flight):
         typer.Option("--guarantee/--no-guarantee", help="Compute the bound Phi in the model guaranteed."),
     ] = False
     yes: Annotated[
-        bool, typer.Option("--yes", help="Do not ask before a sweep of more than a million engagements.")
+        bool, typer.Option("--yes", help="Do not ask before a sweep of more than a million runs.")
     ] = False
 
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """Report on a campaign or a sweep, finished or not, from its files only.
+    """Report on a campaign or a sweep, complete or not, from its stored files.
 
-    Of a campaign: quantiles with 95 % intervals, how the runs ended, the correlation of the miss with the initial
-    state, and the worst ten runs with the command that flies each again; with --out figures of the distributions, of
-    the convergence of the quantiles, and of the miss over the initial state. Of a sweep: where the requirement is met,
-    with --out the table and the figure. --require and --show are for sweeps. Without --out or --json no file is
-    written.
+    For a campaign: quantiles with 95 % confidence intervals, outcomes of the runs, correlation of the miss with the
+    initial state, and the ten worst runs, each with the command that simulates it again; with --out, figures of the
+    distributions, of the convergence of the quantiles, and of the miss against the initial state. For a sweep: the
+    values that meet the requirement; with --out, the table and the figure. --require and --show are for sweeps.
+    Without --out or --json no file is written.
     """
 
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of infoset campaign or infoset sweep.")]
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder written by infoset campaign or infoset sweep.")]
     require: Required = "miss_m p99<10"
     show: Shown = None
     out: Out = None

@@ -17,7 +17,8 @@ StrategyName = Annotated[
     typer.Option(
         "--strategy",
         metavar="NAME",
-        help="Guidance strategy, in place of the scenario's. FILE.py:CLASS is a class in a Python file.",
+        help="Guidance strategy: a built-in name, or FILE.py:CLASS for a class in a Python file. Default: that of the "
+        "scenario.",
     ),
 ]
 Strategies = Annotated[
@@ -25,15 +26,16 @@ Strategies = Annotated[
     typer.Option(
         "--strategies",
         metavar="A,B,C",
-        help="Strategies, separated by commas; FILE.py:CLASS is a class in a file. Default: all built-in ones.",
+        help="Strategies, separated by commas: built-in names, or FILE.py:CLASS for a class in a Python file. Default: "
+        "all built-in strategies.",
     ),
 ]
 ModelName = Annotated[
     Literal["paper", "guaranteed"] | None,
     typer.Option(
         "--model",
-        help="Model of the information set, in place of the scenario's. Another model starts from its default "
-        "initial set.",
+        help="Model of the information set. Default: that of the scenario. A model other than the scenario's starts "
+        "from its default initial set.",
     ),
 ]
 TieName = Annotated[

@@ -16,13 +16,13 @@ GIVEN, BEST = "given", "best"
 class Multipoint(FileOptions):
     """Visit several moving targets with minimum energy, by flybys or rendezvous.
 
-    With --order best and --times given the times of the file are slots: the first target visited has the earliest
-    time. Without --out, --json or --html no file is written.
+    With --order best and --times given, the times of the file are kept and the targets are exchanged: the target that
+    is visited first has the earliest time. Without --out, --json or --html no file is written.
     """
 
     problem: ProblemName = "service-3"
     order: Annotated[
-        Literal["given", "best"], typer.Option(help="Order of the targets: as listed in the file, or the best one.")
+        Literal["given", "best"], typer.Option(help="Order of the targets: that of the file, or the best one.")
     ] = "given"
     times: Annotated[
         Literal["given", "best"] | None,

@@ -14,16 +14,17 @@ from experiments.common.options import FileOptions, Html, ProblemName
 class Pareto(FileOptions):
     """Find a meeting of several craft that is Pareto-optimal: no craft can save energy unless another one uses more.
 
-    Each craft flies with minimum energy. The meeting minimizes the group loss, the weighted sum of the costs of the
-    craft beyond those of their own cheapest meetings. Other choices of the meeting, the coalitions and the bound on
-    the control are also evaluated. Without --out, --json or --html no file is written.
+    Each craft moves with minimum energy. The excess of a craft is its cost minus the cost of its cheapest meeting. The
+    meeting minimizes the group loss, which is the weighted sum of the excesses. Other choices of the meeting, the
+    coalitions and the bound on the control are also evaluated. Without --out, --json or --html no file is written.
     """
 
     problem: ProblemName = "pareto-2008"
     prefer: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME=VALUE,..", help="A preferred meeting; the nearest Pareto-optimal one is added to the choices."
+            metavar="NAME=VALUE,..",
+            help="Preferred meeting, for example y_m=0,z_m=50. The nearest Pareto-optimal meeting is also evaluated.",
         ),
     ] = None
     samples: Annotated[

@@ -14,7 +14,9 @@ ROWS = "thrust_ratio=0:0.8:17"
 Settings = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="KEY=VALUE", help="Replace a value of the problem, for example evader.thrust_N=5; repeatable."
+        "--set",
+        metavar="KEY=VALUE",
+        help="Replace a value of the problem, for example evader.thrust_N=5. May be given several times.",
     ),
 ]
 
@@ -23,8 +25,8 @@ Settings = Annotated[
 class Pursuit(FileOptions):
     """Solve the game of two spacecraft in which the pursuer minimizes the time of capture and the evader maximizes it.
 
-    Every capture has a certificate; a saddle point is claimed only if all its checks hold. Without --out, --json or
-    --html no file is written.
+    Each capture has a certificate (a list of checks). The result is called a saddle point only if all checks hold.
+    Without --out, --json or --html no file is written.
     """
 
     problem: ProblemName = "geo-pursuit"
@@ -32,14 +34,15 @@ class Pursuit(FileOptions):
     certify: Annotated[
         bool,
         typer.Option(
-            "--certify", help="Also search all directions for a branch on which the evader keeps a larger distance."
+            "--certify",
+            help="Also search in all directions for a branch of solutions on which the evader keeps a larger distance.",
         ),
     ] = False
     feedback: Annotated[
         str | None,
         typer.Option(
             metavar="POLICY",
-            help="Simulate a pursuer that replans against an evader with this policy: optimal, random, coast, "
+            help="Simulate a pursuer that replans and an evader that follows this policy: optimal, random, coast, "
             "prograde, retrograde, normal, antinormal, outward, inward, or a CSV file with lines time_s,policy.",
         ),
     ] = None
@@ -49,22 +52,22 @@ class Pursuit(FileOptions):
             metavar="S",
             min=1.0,
             callback=finite,
-            help="Time between plans. Default: 600 s, or a fiftieth of a game shorter than 30 000 s.",
+            help="Time between plans, s. Default: 600 s, or 1/50 of the duration of the game if that is shorter.",
         ),
     ] = None
     delay_s: Annotated[
-        float, typer.Option(metavar="S", min=0.0, callback=finite, help="Age of the pursuer's observation.")
+        float, typer.Option(metavar="S", min=0.0, callback=finite, help="Delay of the pursuer's observation, s.")
     ] = 0.0
     position_noise_m: Annotated[
         float,
         typer.Option(
-            metavar="M", min=0.0, callback=finite, help="Standard deviation of each observed position component."
+            metavar="M", min=0.0, callback=finite, help="Standard deviation of each observed position component, m."
         ),
     ] = 0.0
     velocity_noise_m_s: Annotated[
         float,
         typer.Option(
-            metavar="M/S", min=0.0, callback=finite, help="Standard deviation of each observed velocity component."
+            metavar="M/S", min=0.0, callback=finite, help="Standard deviation of each observed velocity component, m/s."
         ),
     ] = 0.0
     runs: Annotated[int, typer.Option(metavar="N", min=1, max=10_000, help="Number of simulations with feedback.")] = 1
@@ -74,10 +77,10 @@ class Pursuit(FileOptions):
 
 @dataclass(frozen=True)
 class PursuitMap(FileOptions):
-    """Solve a game on a grid of two parameters: phase_deg (the evader's lead), thrust_ratio, mass_ratio, or any key.
+    """Solve a game on a grid of two parameters: phase_deg (lead of the evader), thrust_ratio, mass_ratio, or any key.
 
-    Each point starts from the solutions of its neighbours; some points are solved from scratch to check the others.
-    A point without a certified solution has no capture time. Without --out, --json or --csv no file is written.
+    The solution of a point starts from those of its neighbours; some points are solved from scratch as a check. A
+    point without a certified solution has no capture time. Without --out, --json or --csv no file is written.
     """
 
     problem: ProblemName = "geo-pursuit"
@@ -86,16 +89,17 @@ class PursuitMap(FileOptions):
         typer.Option(
             "--x",
             metavar="KEY=FROM:TO:N",
-            help="Parameter of the columns, first and last value, number of values. Default: phases that suit the "
-            "pursuer's thrust.",
+            help="Parameter of the columns: first value, last value, number of values. Default: phase_deg in a range "
+            "that depends on the pursuer's thrust.",
         ),
     ] = None
-    rows: Annotated[str, typer.Option("--y", metavar="KEY=FROM:TO:N", help="The same for the rows.")] = ROWS
+    rows: Annotated[str, typer.Option("--y", metavar="KEY=FROM:TO:N", help="Parameter of the rows, in the same form.")] = ROWS
     settings: Settings = None
     certify: Annotated[
         bool,
         typer.Option(
-            "--certify", help="Solve every point from scratch, with other branches where a branch folds (slow)."
+            "--certify",
+            help="Solve every point from scratch, and follow other branches where a branch of solutions folds (slow).",
         ),
     ] = False
     csv: Csv = None

@@ -24,21 +24,27 @@ class Reach(FileOptions):
         str,
         typer.Option(
             metavar="A,B,C",
-            help="Optimal controls to show: energy, l1, norms (least sums of squares, absolute values, Euclidean "
-            "norms), peak, chebyshev, analytic, vertices, samples:N.",
+            help="Optimal controls to simulate: energy, l1, norms (least sum of squares, of absolute values, of "
+            "Euclidean norms), peak (least peak), chebyshev, analytic (centres of the set), vertices, samples:N "
+            "(N random ones).",
         ),
     ] = "energy,l1,norms,peak,chebyshev,analytic"
     route: Annotated[
         Literal["auto", "exact", "lifted"],
-        typer.Option(help="Representation of the sets: exact polytopes, or lifted linear programs."),
+        typer.Option(help="Representation of the sets: exact polytopes, or lifted linear programs; auto chooses one."),
     ] = "auto"
     replan: Annotated[
         bool,
-        typer.Option("--replan", help="Also simulate in closed loop: a new plan every period, nonlinear model."),
+        typer.Option("--replan", help="Also simulate in closed loop on the nonlinear model, with a new plan every period."),
     ] = False
     noisy_flights: Annotated[
         int,
-        typer.Option(min=0, max=1000, help="Number of simulations with navigation errors, if the problem has them."),
+        typer.Option(
+            metavar="N",
+            min=0,
+            max=1000,
+            help="Number of simulations of --replan with navigation errors, if the problem has them.",
+        ),
     ] = 10
     seed: Seed = 0
     html: Html = None

@@ -20,11 +20,11 @@ from experiments.interception.options import (
 
 @dataclass(frozen=True)
 class Adversary:
-    """Search for the start and the measurement errors with which a strategy has the greatest miss.
+    """Search for the initial state and the measurement errors that give the greatest miss of a strategy.
 
-    The search covers all starts that the scenario allows, and all errors within their bounds. The miss that it finds
-    is a true miss: no guarantee of the strategy can be below it, and greater misses may exist. The same seed and
-    budget give the same result. Without --json or --record no file is written.
+    The search covers all initial states that the scenario allows, and all errors within their bounds. The result is a
+    simulated miss: the strategy cannot guarantee a smaller one, and greater misses may exist. The same seed and budget
+    give the same result. Without --json or --record no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
@@ -35,7 +35,7 @@ class Adversary:
         int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of engagements to simulate.")
     ] = 2000
     keep_set: Annotated[
-        bool, typer.Option("--keep-set", help="Count only engagements whose set never became empty.")
+        bool, typer.Option("--keep-set", help="Consider only engagements in which the set never became empty.")
     ] = False
     seed: Seed = 0
     record: RecordFile = None

@@ -13,11 +13,11 @@ from experiments.interception.options import MOST_RUNS, ModelName, ScenarioName,
 
 @dataclass(frozen=True)
 class Bound(FileOptions):
-    """Compute a lower bound of the miss that any strategy can guarantee, and simulate what proves it.
+    """Compute a lower bound of the guaranteed miss of all strategies, and simulate the pairs of states that prove it.
 
-    Two true states with equal measurements up to some step get equal impulses until then, so at least one of them
-    misses. The bound is the greatest miss that such pairs prove; each strategy is simulated against the pairs. Without
-    --out or --json no file is written.
+    Two true states whose measurements are equal until some step receive equal impulses until that step, so at least
+    one of them misses. The bound is the greatest miss that such pairs prove. Each strategy is simulated with these
+    pairs. Without --out or --json no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
@@ -29,7 +29,7 @@ class Bound(FileOptions):
             metavar="N",
             min=0,
             max=MOST_RUNS,
-            help="Number of engagements in the search for the worst one, per strategy; 0 skips the search.",
+            help="Number of engagements in the search for the worst one, for each strategy; 0 skips the search.",
         ),
     ] = 500
     seed: Seed = 0

@@ -13,17 +13,18 @@ from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, S
 
 @dataclass(frozen=True)
 class Compare(FileOptions):
-    """Compare strategies: the miss and the impulse spent, with random noise and with game noise.
+    """Compare strategies by miss and spent impulse, with random noise and with game noise.
 
-    All strategies have the same starts and errors, run by run. Game noise is simulated with each of its four tie
-    rules, and each run counts with the worst of them. Run K is the same engagement as in: infoset engage --run K.
+    Run K has the same initial state and the same random errors for all strategies. Game noise is simulated with each
+    of its four tie rules, and a run is represented by the worst of the four. Run K is the same engagement as in:
+    infoset engage --run K.
     Without --out, --json or --csv no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
     strategies: Strategies = None
     runs: Annotated[
-        int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs per strategy and noise.")
+        int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs for each strategy and noise.")
     ] = 50
     seed: Seed = 0
     model: ModelName = None

@@ -14,15 +14,15 @@ from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, S
 
 @dataclass(frozen=True)
 class Engage(FileOptions):
-    """Simulate one engagement and show its course; with --noise both, one with each kind of noise.
+    """Simulate one engagement and show its result; with --noise both, one with each kind of noise.
 
-    Run K is the same engagement, number for number, as run K of: infoset experiment with the same seed.
+    Run K has exactly the same numbers as run K of infoset experiment with the same seed.
     Without --out, --json, --csv or --record no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
     noise: Annotated[
-        Literal["random", "game", "both"] | None, typer.Option(help="Measurement noise, in place of the scenario's.")
+        Literal["random", "game", "both"] | None, typer.Option(help="Measurement noise. Default: that of the scenario.")
     ] = None
     range_meter: RangeMeter = None
     strategy: StrategyName = None
@@ -32,6 +32,6 @@ class Engage(FileOptions):
     run: Annotated[int, typer.Option(metavar="K", min=0, max=MOST_RUNS - 1, help="Number of the run, from 0.")] = 0
     record: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.npz", help="Write the record; with --noise both FILE-random.npz and FILE-game.npz."),
+        typer.Option(metavar="FILE.npz", help="Write the record; with --noise both, FILE-random.npz and FILE-game.npz."),
     ] = None
     csv: Csv = None

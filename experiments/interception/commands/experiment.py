@@ -13,19 +13,19 @@ from experiments.interception.options import MOST_RUNS, ModelName, ScenarioName,
 
 @dataclass(frozen=True)
 class Experiment(FileOptions):
-    """Simulate four curves of many runs: random and game noise, each without and with the range meter.
+    """Simulate many runs of four cases (curves): random or game noise, without or with the range meter.
 
-    All curves have the same starts and errors, run by run. Run K is the same engagement as in: infoset engage --run K.
-    Without --out, --json or --csv no file is written.
+    Game noise is measurement errors chosen against the guidance. Run K starts from the same state in all four cases,
+    and is the same engagement as in: infoset engage --run K. Without --out, --json or --csv no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"
-    runs: Annotated[int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs per curve.")] = 50
+    runs: Annotated[int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs of each case.")] = 50
     seed: Seed = 0
     strategy: StrategyName = None
     model: ModelName = None
     tie: TieName = None
     sections: Annotated[
-        int | None, typer.Option(metavar="N", help="Number of sections at the start, in place of the scenario's.")
+        int | None, typer.Option(metavar="N", help="Number of sections at t = 0. Default: that of the scenario.")
     ] = None
     csv: Csv = None

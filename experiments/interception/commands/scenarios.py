@@ -14,7 +14,7 @@ app = typer.Typer(name="scenarios", epilog="Example: infoset scenarios new mine.
 
 @app.callback(invoke_without_command=True)
 def scenarios(context: typer.Context, json: AsJson = False, quiet: Quiet = False) -> None:
-    """List, show and check scenarios, and create a scenario file. Alone, it lists the built-in scenarios."""
+    """List, show and check scenarios, and create a scenario file. Without a command, list the built-in scenarios."""
     if context.invoked_subcommand is None:
         list_scenarios(json=json, quiet=quiet)
     elif json or quiet:
@@ -23,7 +23,7 @@ def scenarios(context: typer.Context, json: AsJson = False, quiet: Quiet = False
 
 @app.command("list", epilog="Example: infoset scenarios list --json")
 def list_scenarios(json: AsJson = False, quiet: Quiet = False) -> None:
-    """List the built-in scenarios; with --quiet their names alone."""
+    """List the built-in scenarios; with --quiet, print only their names."""
     from experiments.interception.runs.scenarios import list_scenarios
 
     list_scenarios(json, quiet)
@@ -31,7 +31,7 @@ def list_scenarios(json: AsJson = False, quiet: Quiet = False) -> None:
 
 @app.command(epilog="Example: infoset scenarios show asteroid-1997 > mine.toml")
 def show(name: Annotated[str, typer.Argument(help="Name of a built-in scenario.")]) -> None:
-    """Print the file of a built-in scenario, with its comments."""
+    """Print the file of a built-in scenario, including its comments."""
     from experiments.interception.scenario_file import scenario_text
 
     typer.echo(scenario_text(name), nl=False)
@@ -43,7 +43,7 @@ def check(
     json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Check a scenario file: exit code 0 if it is valid, else 2 and a message with all its problems."""
+    """Check a scenario file. The exit code is 0 if it is valid; otherwise it is 2, and all problems are listed."""
     from experiments.interception.runs.scenarios import check
 
     check(file, json, quiet)
@@ -55,7 +55,7 @@ def new(
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a scenario file with a comment on every key, as a start for your own."""
+    """Write a scenario file with a comment on every key, as a template for your own scenario."""
     from experiments.interception.runs.scenarios import new
 
     new(file, overwrite, quiet)
