@@ -285,7 +285,7 @@ class _Compilation(event.Listener):
             how = f"in every process, because no cache folder can be written: set {VARIABLE} to a folder that can"
         else:
             how = f"once; the machine code is stored in {folder.parent}"
-        LOGGER.warning("compiling numerical kernels, about 5 to 15 seconds, %s", how)
+        LOGGER.warning("compiling the numerical kernels (about 5 to 15 s), %s", how)
 
 
 event.register("numba:compile", _Compilation())

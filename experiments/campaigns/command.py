@@ -38,10 +38,10 @@ class Flight:
     """Options of a campaign and of a sweep."""
 
     scenario: ScenarioName = "asteroid-1997"
-    runs: Annotated[int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs; in a sweep, of each cell.")]
-    out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Folder for the runs; created if needed.")
+    runs: Annotated[
+        int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs; in a sweep, of each cell.")
     ]
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the runs; created if needed.")]
     noise: Annotated[
         Literal["random", "game", "mixed"] | None,
         typer.Option(
@@ -59,7 +59,9 @@ class Flight:
     resume: Annotated[
         bool,
         typer.Option(
-            "--resume", rich_help_panel=EXECUTION, help="Continue the campaign in DIR; if DIR is empty, start a new one."
+            "--resume",
+            rich_help_panel=EXECUTION,
+            help="Continue the campaign in DIR; if DIR is empty, start a new one.",
         ),
     ] = False
     chunk: Annotated[
@@ -152,9 +154,7 @@ class Sweep(Flight):
         bool,
         typer.Option("--guarantee/--no-guarantee", help="Compute the bound Phi in the model guaranteed."),
     ] = False
-    yes: Annotated[
-        bool, typer.Option("--yes", help="Do not ask before a sweep of more than a million runs.")
-    ] = False
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before a sweep of more than a million runs.")] = False
 
 
 @dataclass(frozen=True, kw_only=True)

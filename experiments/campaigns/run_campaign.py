@@ -70,18 +70,18 @@ def _rule(text: str | None) -> StoppingRule | None:
 
 def _show(console: Console, flown: Flown, table: Table, notes: Sequence[str]) -> None:
     folder, manifest = flown.result.folder, flown.result.folder.manifest
-    stopped = "" if manifest.stopped_after is None else f" of {manifest.runs}, stopped by {manifest.until}"
+    stopped = "" if manifest.stopped_after is None else f" of {manifest.runs}, stopped by the rule {manifest.until}"
 
     def line(text: str) -> None:
         console.print(Text(text), soft_wrap=True)
 
     line(
-        f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}, {duration(flown.elapsed_s)}; quantiles, 95 % "
-        "intervals"
+        f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}, {duration(flown.elapsed_s)}; quantiles with "
+        "95 % confidence limits"
     )
     console.print(table)
     for note in notes:
         line(note)
     if manifest.until is not None and manifest.stopped_after is None:
-        line(f"{manifest.until} was not met: give more --runs, with --resume")
-    line(f"see the results with: infoset report {folder.path}")
+        line(f"the rule {manifest.until} is not met; continue with --resume and a greater --runs")
+    line(f"to see the results: infoset report {folder.path}")

@@ -66,7 +66,10 @@ def _read(options: Report) -> CampaignFolder:
         raise InputError(f"{path}: there is no such folder; name the folder of infoset campaign or infoset sweep")
     folder = CampaignFolder.read(path)
     for damage in folder.damaged:
-        say(f"warning: {damage.file}: {damage.reason}; left out, fly it again with --resume", options.quiet)
+        say(
+            f"warning: {damage.file}: {damage.reason}; its runs are left out; simulate them again with --resume",
+            options.quiet,
+        )
     if not folder.finished_runs:
         raise InputError(f"{path}: contains no runs yet; continue with: infoset {folder.manifest.kind} --resume")
     if not folder.complete:
@@ -141,8 +144,8 @@ def _show(
         console.print(Text(text), soft_wrap=True)
 
     manifest = folder.manifest
-    stopped = "" if manifest.stopped_after is None else f", stopped by {manifest.until}"
-    line(f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}; quantiles, 95 % intervals")
+    stopped = "" if manifest.stopped_after is None else f", stopped by the rule {manifest.until}"
+    line(f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}; quantiles with 95 % confidence limits")
     table, notes = samples_table(found, manifest.scenario.set_model.kind.value)
     console.print(table)
     for note in notes:
@@ -157,9 +160,9 @@ def _show(
         table.add_row(name, *(("-" if value is None else f"{value:+.2f}") for value in values))
     console.print(table)
     console.print()
-    line("the worst runs:")
+    line("the worst runs, each with the command that simulates it again:")
     for flown in worst:
         miss, impulse = number(flown["miss_m"]), number(flown["impulse_m_s"])
-        line(f"  {miss} m for {impulse} m/s, {flown['outcome']}: {flown['replay']}")
+        line(f"  miss {miss} m, impulse {impulse} m/s, {flown['outcome']}: {flown['replay']}")
     if not (folder.path / SCENARIO_FILE).is_file():
-        line(f"(there is no {SCENARIO_FILE} in the folder: with --out the report writes one)")
+        line(f"(the folder has no {SCENARIO_FILE}, which these commands need; --out writes one)")

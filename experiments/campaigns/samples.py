@@ -212,7 +212,7 @@ def samples_table(found: Sequence[Sample], model: str) -> tuple[Table, list[str]
     model : str
         Of the information set: the paper's has no guarantee.
     """
-    phi = "published Phi, m" if model == "paper" else "guaranteed miss, m"
+    phi = "the paper's Phi (not a bound here), m" if model == "paper" else "guaranteed miss, m"
     names = {"miss_m": "miss, m", "impulse_m_s": "impulse, m/s", "guaranteed_miss_m": phi}
     table = Table("noise", box=None, pad_edge=False)
     table.add_column("quantity", no_wrap=True)
@@ -225,12 +225,12 @@ def samples_table(found: Sequence[Sample], model: str) -> tuple[Table, list[str]
             values = [number(estimate.value) for estimate in estimates]
             first = sample.noise if place == 0 else ""
             table.add_row(first, names[quantity], *values, number(sample.worst[quantity]))
-            table.add_row("", "  at least", *(number(estimate.lower) for estimate in estimates), "", style="dim")
-            table.add_row("", "  at most", *(number(estimate.upper) for estimate in estimates), "", style="dim")
+            table.add_row("", "  lower limit", *(number(estimate.lower) for estimate in estimates), "", style="dim")
+            table.add_row("", "  upper limit", *(number(estimate.upper) for estimate in estimates), "", style="dim")
         others = [f"{count} {name}" for name, count in sample.outcomes.items() if name != Outcome.INTERCEPTED.value]
-        held = f", miss at most Phi in {sample.phi_held} of {sample.phi_known}" if sample.phi_known else ""
+        held = f"; miss within the bound Phi: {sample.phi_held} of {sample.phi_known} runs" if sample.phi_known else ""
         notes.append(
-            f"{sample.noise} noise, {sample.runs} runs: true state inside the set in {sample.truth_kept} of "
-            f"{sample.runs}{held}; not intercepted: {', '.join(others) or 'none'}"
+            f"{sample.noise} noise: true state inside the set at every step: {sample.truth_kept} of {sample.runs} "
+            f"runs{held}; other outcomes than intercepted: {', '.join(others) or 'none'}"
         )
     return table, notes

@@ -95,15 +95,15 @@ class SweepReport:
         )
         for noise in table.noises:
             lines = answers(table, noise, required)
-            line(f"{noise} noise: {required} is met for {first.key}")
+            line(f"{noise} noise: {required} is met for these values of {first.key}:")
             for at, met in lines[:MOST_LINES]:
-                line(f"  {met}{f', where {at}' if at else ''}")
+                line(f"  {met}{f' (at {at})' if at else ''}")
             if len(lines) > MOST_LINES:
-                line(f"  and {len(lines) - MOST_LINES} more lines in the JSON report")
+                line(f"  {len(lines) - MOST_LINES} more lines are in the JSON report (--json)")
         if len(table.axes) != 1:
             return
         shown = Table(first.key, "noise", box=None, pad_edge=False)
-        for title in ("at least", str(required.quantile), "at most"):
+        for title in ("lower limit", str(required.quantile), "upper limit"):
             shown.add_column(title, justify="right")
         for noise in table.noises:
             for cell, value in enumerate(first.values):

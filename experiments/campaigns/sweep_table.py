@@ -145,7 +145,7 @@ def where_met(axis: Axis, quantile: Sequence[float | None], bound: float) -> str
     """Return the values of an axis for which a quantile is less than a bound, as text: `up to 0.00021`."""
     known = [value for value in quantile if value is not None]
     if not known:
-        return "not flown yet"
+        return "not simulated yet"
     crossed = [f"{place:.3g}" for place in crossings(axis.values, quantile, bound, axis.scale)]
     if not crossed:
         return "everywhere" if known[0] < bound else "nowhere"

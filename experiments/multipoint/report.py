@@ -101,8 +101,12 @@ def _node_json(scene: Scene, index: int) -> dict[str, object]:
 def print_report(console: Console, report: Report) -> None:
     """Print the cost, the visits and the extent of the search."""
     path, nodes = report.scene.path, report.scene.path.nodes
-    print_lines(console, [f"{report.problem.name}: I = {path.cost:.8g} m^2/s^3, peak |u| {report.peak_m_s2:.4g} m/s^2"])
-    table = number_table("target", "meet", "time\ns", "relative speed\nm/s", "dI/dt\nm^2/s^4", "|jump|\nm/s^3", left=2)
+    print_lines(
+        console, [f"{report.problem.name}: cost I = {path.cost:.8g} m^2/s^3, peak |u| {report.peak_m_s2:.4g} m/s^2"]
+    )
+    table = number_table(
+        "target", "meet", "time\ns", "relative speed\nm/s", "dI/dt\nm^2/s^4", "costate jump\nm/s^3", left=2
+    )
     relative = np.linalg.norm(path.arrival_states[:, 3:] - nodes.arrive[:, 3:], axis=1)
     for index, name in enumerate(report.scene.names):
         rendezvous = bool(nodes.rendezvous[index])

@@ -171,11 +171,11 @@ def print_report(console: Console, report: Report) -> None:
         chosen.add_row(name.replace("_", " "), *values, number(float(solution.group_loss(point))))
     console.print(chosen)
     if report.coalitions is None:
-        print_lines(console, ["coalitions: not computed, the number of craft is too large"])
+        print_lines(console, ["the coalitions are not computed: there are too many craft"])
         return
     pairs = zip(names, report.coalitions.shapley, strict=True)
     shares = ", ".join(f"{name} {number(float(value))}" for name, value in pairs)
-    print_lines(console, [f"Shapley value of the excess: {shares}", report.coalitions.core.reason])
+    print_lines(console, [f"Shapley value of the excess, m^2/s^3: {shares}", report.coalitions.core.reason])
 
 
 def _exceeded(report: Report) -> list[str]:
@@ -183,8 +183,8 @@ def _exceeded(report: Report) -> list[str]:
     bound = report.problem.greatest_control_m_s2 or 0.0
     return [
         f"{cost.craft.name}: the minimum-energy control exceeds the bound {bound:g} m/s^2 by "
-        f"{check.peak_m_s2 / bound - 1.0:.2%}; another control keeps the bound, with a peak of at least "
-        f"{check.least_peak_m_s2:.6g} m/s^2"
+        f"{check.peak_m_s2 / bound - 1.0:.2%}; another control satisfies the bound (the smallest possible peak is "
+        f"{check.least_peak_m_s2:.6g} m/s^2)"
         for cost, check in zip(report.solution.costs, report.bounds, strict=False)
         if check.feasibility is Feasibility.ANOTHER_CONTROL
     ]

@@ -93,7 +93,9 @@ class PursuitMap(FileOptions):
             "that depends on the pursuer's thrust.",
         ),
     ] = None
-    rows: Annotated[str, typer.Option("--y", metavar="KEY=FROM:TO:N", help="Parameter of the rows, in the same form.")] = ROWS
+    rows: Annotated[
+        str, typer.Option("--y", metavar="KEY=FROM:TO:N", help="Parameter of the rows, in the same form.")
+    ] = ROWS
     settings: Settings = None
     certify: Annotated[
         bool,

@@ -35,7 +35,9 @@ class Reach(FileOptions):
     ] = "auto"
     replan: Annotated[
         bool,
-        typer.Option("--replan", help="Also simulate in closed loop on the nonlinear model, with a new plan every period."),
+        typer.Option(
+            "--replan", help="Also simulate in closed loop on the nonlinear model, with a new plan every period."
+        ),
     ] = False
     noisy_flights: Annotated[
         int,

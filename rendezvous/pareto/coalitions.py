@@ -29,10 +29,10 @@ class Core(Enum):
         """The reason, in a sentence."""
         if self is Core.EMPTY:
             return (
-                "the core is empty: alone each craft has no excess, so in the core each would pay at most zero, "
-                "but the cost of the common meeting is positive"
+                "the core is empty: each craft alone has zero excess, so its share in the core is at most zero, but "
+                "the shares must sum to the cost of the common meeting, which is positive"
             )
-        return "all ideals coincide: no craft has an excess, and the core is the division in which every cost is zero"
+        return "all ideal meetings coincide: no craft has an excess, and in the only division of the core all are zero"
 
 
 @dataclass(frozen=True)

@@ -157,7 +157,10 @@ def test_table_of_the_experiment(infoset: Command, brief_file: Path, tmp_path: P
         assert part in out
     assert out.count("true state inside the set at every step: ") == 4
     assert "miss within the bound Phi" not in out
-    assert "paper, one run from z = -8 km, no range meter: random 4.3 m for 244.7 m/s, game 9.5 m for 521.7 m/s" in out
+    assert (
+        "paper (one run from z = -8 km, no range meter): random noise: miss 4.3 m, impulse 244.7 m/s; "
+        "game noise: miss 9.5 m, impulse 521.7 m/s" in out
+    )
     assert names_in(tmp_path) == []
     assert "paper, one run" not in infoset("experiment", brief_file, "--runs", 1)[1]
 
@@ -223,7 +226,7 @@ def test_the_guaranteed_model_shows_its_certificate(infoset: Command) -> None:
     code, out, _ = infoset("experiment", "--runs", 4, "--model", "guaranteed")
     assert code == 0
     assert out.count("inside the set at every step: 4 of 4 runs; miss within the bound Phi: 4 of 4 runs") == 4
-    assert "allows for 0.0050881" in out  # (0.005 + 3.9e-7) / (1 - 1 / 58)
+    assert "acceleration along z at most 0.0050881 m/s^2" in out  # (0.005 + 3.9e-7) / (1 - 1 / 58)
     one = infoset.json("engage", "--model", "guaranteed", "--run", 3)
     assert one["phi_held"] is True
     assert one["truth_margin_m"] == min(step["truth_margin_m"] for step in one["steps"]) >= 0.0

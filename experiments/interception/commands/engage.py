@@ -32,6 +32,8 @@ class Engage(FileOptions):
     run: Annotated[int, typer.Option(metavar="K", min=0, max=MOST_RUNS - 1, help="Number of the run, from 0.")] = 0
     record: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.npz", help="Write the record; with --noise both, FILE-random.npz and FILE-game.npz."),
+        typer.Option(
+            metavar="FILE.npz", help="Write the record; with --noise both, FILE-random.npz and FILE-game.npz."
+        ),
     ] = None
     csv: Csv = None

@@ -24,7 +24,10 @@ class Replay:
         Path | None, typer.Option(metavar="FILE.mp4", help="Write the animation as a video; needs the program ffmpeg.")
     ] = None
     terminal: Annotated[
-        bool, typer.Option("--terminal", help="Play as text in the terminal. If the output is not a terminal, print a few steps.")
+        bool,
+        typer.Option(
+            "--terminal", help="Play as text in the terminal. If the output is not a terminal, print a few steps."
+        ),
     ] = False
     speed: Annotated[
         float, typer.Option(metavar="STEPS_PER_S", min=0.1, max=1000.0, help="Speed of --terminal in steps per second.")

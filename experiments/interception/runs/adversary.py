@@ -91,7 +91,7 @@ def _summary(scenario: Scenario, worst: WorstEngagement, options: Adversary, ela
 
 
 def _show(console: Console, scenario: Scenario, worst: WorstEngagement, options: Adversary, elapsed_s: float) -> None:
-    meter = " + range meter" if scenario.range_sensor is not None else ""
+    meter = "with" if scenario.range_sensor is not None else "without"
     z, x = worst.position_m / M_PER_KM
     vz, vx = worst.velocity_m_s / M_PER_KM
     halfway_m = max((miss for count, miss in worst.history if 2 * count <= worst.evaluations), default=None)
@@ -101,21 +101,24 @@ def _show(console: Console, scenario: Scenario, worst: WorstEngagement, options:
         ("worst miss, m", number(worst.miss_m)),
         ("outcome", worst.outcome.value),
         ("true state inside the set at every step", "yes" if worst.truth_kept else "no"),
-        ("start z, x, km", f"{z:.4g}, {x:.6g}"),
-        ("start V_z, V_x, km/s", f"{vz:.4g}, {vx:.6g}"),
-        ("found from", f"{worst.construction}, in {worst.changes} rounds of changes"),
+        ("initial z, x, km", f"{z:.4g}, {x:.6g}"),
+        ("initial V_z, V_x, km/s", f"{vz:.4g}, {vx:.6g}"),
+        ("errors of the first candidate", worst.construction),
+        ("rounds of changes to it", str(worst.changes)),
         ("worst miss after half the budget, m", number(halfway_m)),
-        ("engagements", f"{worst.evaluations}, {number(worst.evaluations / max(elapsed_s, 1e-9))} per second"),
+        (
+            "simulated engagements",
+            f"{worst.evaluations}, {number(worst.evaluations / max(elapsed_s, 1e-9))} per second",
+        ),
     ):
         table.add_row(*row)
-    print_lines(console, [f"{scenario.name}, model {scenario.set_model.kind.value}{meter}"])
+    print_lines(console, [f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}"])
     console.print(table)
-    notes = ["a true miss: no guarantee of this strategy can be below it; greater misses may exist"]
+    notes = ["this miss was simulated: the strategy cannot guarantee a smaller one, and greater misses may exist"]
     if worst.outcome is Outcome.SET_LOST and not options.keep_set:
         notes.append(
-            "set-lost: a measurement contradicted all states of the set; --keep-set counts only engagements in which "
-            "this never happened"
+            "set-lost: a measurement contradicted all states of the set; to exclude such engagements, use --keep-set"
         )
     if options.record is not None:
-        notes.append(f"draw it with: infoset replay {options.record} --out DIR")
+        notes.append(f"to draw it: infoset replay {options.record} --out DIR")
     print_lines(console, notes)

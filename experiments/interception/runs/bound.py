@@ -197,7 +197,12 @@ def _equal_until_s(pair: TruthPair, scenario: Scenario) -> float:
 
 def _show(console: Console, scenario: Scenario, lower: LowerBound, worst: Sequence[WorstOfStrategy]) -> None:
     bounds = Table(box=None, pad_edge=False)
-    for title in ("closing speed\nkm/s", "bound\nm", "at label\nkm", "equal until, s\nbefore arrival"):
+    for title in (
+        "closing speed\nkm/s",
+        "bound\nm",
+        "range at t = 0\nkm",
+        "equal measurements until\ns before arrival",
+    ):
         bounds.add_column(title, justify="right")
     for pair in lower.pairs:
         bounds.add_row(
@@ -207,7 +212,7 @@ def _show(console: Console, scenario: Scenario, lower: LowerBound, worst: Sequen
             f"{_equal_until_s(pair, scenario):.2f}",
         )
     strategies = Table("strategy", box=None, pad_edge=False)
-    for title in ("worst miss\nm", "worst\n/ bound", "guaranteed\nmiss, m"):
+    for title in ("worst miss\nm", "worst miss\n/ bound", "guaranteed\nmiss, m"):
         strategies.add_column(title, justify="right")
     strategies.add_column("outcome")
     for strategy in worst:
@@ -218,11 +223,11 @@ def _show(console: Console, scenario: Scenario, lower: LowerBound, worst: Sequen
         [
             f"{scenario.name}, model {scenario.set_model.kind.value}: no strategy can guarantee a miss below "
             f"{number(lower.bound_m)} m",
-            f"accelerations of the true state along z: at most {lower.disturbance_m_s2:.3g} m/s^2",
+            f"acceleration of the object along z in these pairs: at most {lower.disturbance_m_s2:.3g} m/s^2",
         ],
     )
     console.print(bounds, "", strategies, sep="\n")
-    notes = ["worst miss: the greatest of the pairs above and of the search of: infoset adversary"]
+    notes = ["worst miss: the greatest miss in simulations of these pairs and in a search (see: infoset adversary)"]
     if any(strategy.outcome is Outcome.SET_LOST for strategy in worst):
         hint = "" if scenario.set_model.is_guaranteed else "; try --model guaranteed"
         notes.append(f"set-lost: a measurement contradicted all states of the set{hint}")

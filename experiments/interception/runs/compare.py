@@ -127,7 +127,7 @@ def _show(console: Console, scenario: Scenario, compared: Sequence[Comparison]) 
     table.add_column("quantity", no_wrap=True)
     for level in QUANTILES.values():
         table.add_column("worst" if level == 1.0 else f"{level:.0%}", justify="right")
-    table.add_column("true state\nin the set", justify="right")
+    table.add_column("runs with true\nstate in the set", justify="right")
     for noise in (NoiseKind.RANDOM, NoiseKind.GAME):
         title = noise.value
         for comparison in compared:
@@ -145,4 +145,4 @@ def _show(console: Console, scenario: Scenario, compared: Sequence[Comparison]) 
         [f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}: quantiles of {runs} runs"],
     )
     console.print(table)
-    print_lines(console, ["game noise: the worst of its four tie rules, run by run"])
+    print_lines(console, ["game noise: for each run, the worst of its four tie rules"])

@@ -69,7 +69,7 @@ def _outcome(record: Record) -> str:
     outcome, contradiction = record.result.outcomes[0].value, record.inconsistency
     if contradiction is None:
         return outcome
-    return f"{outcome} at {record.steps[contradiction.step].time_s:g} s, label {contradiction.label_m / 1e3:.0f} km"
+    return f"{outcome} at {record.steps[contradiction.step].time_s:g} s, section {contradiction.label_m / 1e3:.0f} km"
 
 
 def draw_engagements(records: Sequence[Record], written: Output) -> None:

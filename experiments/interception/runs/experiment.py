@@ -123,13 +123,18 @@ def _show(console: Console, scenario: Scenario, curves: Sequence[Curve]) -> None
         median = number(float(quantiles(bounds, 0.5))) if len(bounds) else "-"
         table.add_row("", bound_name(scenario), "", median)
         counts = Counter(outcome for outcome in results.outcomes if outcome is not Outcome.INTERCEPTED)
-        lines = [f"in {count} runs {endings[outcome]} ({outcome.value})" for outcome, count in counts.items()]
+        lines = [
+            f"in {count} run{'s' if count > 1 else ''} {endings[outcome]} ({outcome.value})"
+            for outcome, count in counts.items()
+        ]
         notes.append(f"curve {curve.number}: " + "; ".join([certificate(results), *lines]))
     if allowed := allowance(scenario):
         notes.append(allowed)
     if scenario.name in (MANY, SINGLE):
-        figures = ", ".join(f"{noise} {miss} m for {fuel} m/s" for noise, (miss, fuel) in PRINTED_SINGLE_RUN.items())
-        notes.append(f"paper, one run from z = -8 km, no range meter: {figures}")
+        figures = "; ".join(
+            f"{noise} noise: miss {miss} m, impulse {fuel} m/s" for noise, (miss, fuel) in PRINTED_SINGLE_RUN.items()
+        )
+        notes.append(f"paper (one run from z = -8 km, no range meter): {figures}")
     runs = len(curves[0].results)
     print_lines(console, [f"{scenario.name}: quantiles of {runs} runs per curve"])
     console.print(table)

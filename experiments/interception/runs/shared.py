@@ -90,9 +90,9 @@ def allowance(scenario: Scenario) -> str | None:
     if not model.is_guaranteed:
         return None
     return (
-        f"the guaranteed model allows for {model.acceleration_m_s2:.5g} m/s^2 along z (manoeuvres "
-        f"{model.disturbance_m_s2:g}, gravity {model.gravity_m_s2:.2g}), a closing speed within "
-        f"{model.speed_error:.2%}, impulses within {model.execution_error_relative:.2%}"
+        f"the guaranteed model assumes: acceleration along z at most {model.acceleration_m_s2:.5g} m/s^2 (from "
+        f"manoeuvres {model.disturbance_m_s2:g} and gravity {model.gravity_m_s2:.2g}); relative error of the closing "
+        f"speed at most {model.speed_error:.2%}, of impulses at most {model.execution_error_relative:.2%}"
     )
 
 

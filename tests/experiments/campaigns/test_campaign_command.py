@@ -86,7 +86,7 @@ def test_a_campaign_into_a_folder(infoset: Infoset, brief: Scenario, file: Path,
         assert sample["miss_m"]["p50"]["lower"] in own
         assert sample["miss_m"]["p99.9"]["upper"] is None
         assert sum(sample["outcomes"].values()) == 75
-        assert f"{sample['noise']} noise, 75 runs: true state inside the set in {sample['truth_kept']} of 75" in out
+        assert f"{sample['noise']} noise: true state inside the set at every step: {sample['truth_kept']} of 75" in out
     assert "miss, m" in out
     assert "impulse, m/s" in out
 
@@ -195,11 +195,11 @@ def test_until_stops_and_goes_on(infoset: Infoset, file: Path, tmp_path: Path) -
     assert code == 0
     stored = CampaignFolder.read(tmp_path / "runs")
     assert 16 <= stored.finished_runs < 400
-    assert f"{stored.finished_runs} runs of 400, stopped by miss_m p50 ci<1" in out
+    assert f"{stored.finished_runs} runs of 400, stopped by the rule miss_m p50 ci<1" in out
     assert infoset(*asked[:-1], "miss_m p50 ci<1e-9", "--resume")[0] == 0
     assert CampaignFolder.read(tmp_path / "runs").finished_runs == 400
     code, out, _ = infoset(*asked[:-1], "miss_m p50 ci<1e-9", "--resume")
-    assert "miss_m p50 ci<1e-09 was not met: give more --runs, with --resume" in out
+    assert "the rule miss_m p50 ci<1e-09 is not met; continue with --resume and a greater --runs" in out
 
 
 def test_damage_is_said_and_mended(infoset: Infoset, file: Path, tmp_path: Path) -> None:

@@ -74,14 +74,14 @@ def test_a_report_of_files_alone(infoset: Infoset, brief: Scenario, folder: Path
     for each in found["worst"]:
         assert each["replay"] == f"infoset engage {scenario} --noise {each['noise']} --seed 0 --run {each['run']}"
         assert each["replay"] in out
-    for title in ("correlation of the miss with", "|z_km|", "Spearman", "the worst runs:", "p99.9", "at least"):
+    for title in ("correlation of the miss with", "|z_km|", "Spearman", "the worst runs, each", "p99.9", "lower limit"):
         assert title in out
 
 
 def test_a_report_writes_nothing_unasked(infoset: Infoset, folder: Path, tmp_path: Path) -> None:
     code, out, _ = infoset("report", folder)
     assert code == 0
-    assert "with --out the report writes one" in out
+    assert "--out writes one" in out
     assert list(tmp_path.iterdir()) == []
     assert infoset("report", folder, "-q") == (0, "", "")
 

@@ -110,7 +110,7 @@ def test_a_sweep_of_one_key_mixed_and_resumed(infoset: Infoset, file: Path, tmp_
     asked = ("sweep", file, "--vary", "thruster.greatest_impulse_m_s=2:8:4", "--runs", 20, "--noise", "mixed")
     code, out, _ = infoset(*asked, "--out", tmp_path / "a", "--require", "miss_m p90<3")
     assert code == 0
-    assert out.count("noise: miss_m p90<3 is met for thruster.greatest_impulse_m_s") == 2
+    assert out.count("noise: miss_m p90<3 is met for these values of thruster.greatest_impulse_m_s:") == 2
     table = pq.read_table(tmp_path / "a" / "sweep.parquet")
     assert table.column("noise").to_pylist() == ["random", "game"] * 4
     assert set(table.column("runs").to_pylist()) == {10}
@@ -128,7 +128,7 @@ def test_a_sweep_of_one_key_mixed_and_resumed(infoset: Infoset, file: Path, tmp_
 def test_the_report_of_a_sweep_is_from_its_files_alone(infoset: Infoset, swept: Path, tmp_path: Path) -> None:
     code, out, _ = infoset("report", swept, "--out", tmp_path / "report", "--require", "impulse_m_s p50<60")
     assert code == 0
-    assert "impulse_m_s p50<60 is met for angle_sensor.error_at_zero_range_rad" in out
+    assert "impulse_m_s p50<60 is met for these values of angle_sensor.error_at_zero_range_rad:" in out
     names = ["figure-sweep.pdf", "figure-sweep.png", "report.json", "scenario.toml", "sweep.parquet"]
     assert sorted(each.name for each in (tmp_path / "report").iterdir()) == names
     assert pq.read_table(tmp_path / "report" / "sweep.parquet").num_rows == 6
@@ -227,7 +227,7 @@ def test_where_a_quantile_crosses_its_bound_by_hand() -> None:
     assert where_met(axis, (15.0, 5.0, 15.0), 10.0) == "1.5 to 3"
     assert where_met(axis, (5.0, 6.0, 7.0), 10.0) == "everywhere"
     assert where_met(axis, (15.0, 16.0, 17.0), 10.0) == "nowhere"
-    assert where_met(axis, (None, None, None), 10.0) == "not flown yet"
+    assert where_met(axis, (None, None, None), 10.0) == "not simulated yet"
 
 
 @given(values=st.lists(st.floats(0.0, 20.0), min_size=2, max_size=12), bound=st.floats(1.0, 19.0))

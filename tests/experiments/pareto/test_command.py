@@ -99,7 +99,7 @@ def test_the_published_example_into_a_folder(infoset: Infoset, tmp_path: Path) -
     np.testing.assert_allclose(found["shapley_m2_s3"], [2.697786535, 5.612588912, 10.27652892], rtol=1e-9)
     assert sum(found["transfers_m2_s3"]) == pytest.approx(0.0, abs=1e-12)
     assert found["core"]["verdict"] == "empty"
-    assert "the core is empty: alone each craft has no excess" in found["core"]["reason"]
+    assert "the core is empty: each craft alone has zero excess" in found["core"]["reason"]
     assert set(found["selections"]) == {"least_group_loss", "least_sum_of_costs", "least_greatest_excess", "preferred"}
     assert len(found["sweep"]["group_loss_m2_s3"]) == len(found["sweep"]["meeting_time_s"])
     assert [each["name"] for each in found["samples"]] == ["first", "second", "third"]
@@ -111,7 +111,7 @@ def test_the_published_example_into_a_folder(infoset: Infoset, tmp_path: Path) -
         "group loss 18.5869",
         "Shapley value",
         "the core is empty",
-        "common meeting is positive",
+        "the cost of the common meeting, which is positive",
         "preferred",
     ):
         assert piece in out
@@ -289,7 +289,7 @@ def test_a_meeting_after_many_revolutions_is_not_refused(infoset: Infoset, mine:
     # 9.980e-6 m/s^2 suffices (test_choices.py); a fixed rule of quadrature said 1.14e-5.
     code, out, err = infoset(mine(LONG))
     assert (code, err) == (0, "")
-    assert "another control keeps the bound" in out
+    assert "another control satisfies the bound" in out
     assert infoset(mine(LONG.replace("1.05e-5", "9.97e-6")), "-q")[0] == 2
 
 
@@ -361,7 +361,7 @@ def test_many_craft_have_no_list_of_coalitions(infoset: Infoset, mine: Callable[
     )
     code, out, _ = infoset(mine(HEAD + tables), "--json", "found.json", "--samples", 2)
     assert code == 0
-    assert "coalitions: not computed" in out
+    assert "the coalitions are not computed" in out
     found = strict(Path("found.json").read_text())
     assert (found["coalitions"], found["shapley_m2_s3"], found["core"]) == ({}, [], None)
 
