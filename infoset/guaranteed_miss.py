@@ -240,7 +240,7 @@ def bound_leaving_all(
     Where rates were measured a window of labels is halved while its bound is loose: the bands that are convex over it
     are the wider the wider it is. Much less than `floor`, a bound of labels that have arrived, would not lessen Phi.
     """
-    stored, used, living, _, _, _, _, _, _, _ = sections
+    stored, used, living = sections.labels, sections.used, sections.living
     for b in range(active.shape[0]):
         made[b] = 0
         if not active[b] or lower[b] >= upper[b]:

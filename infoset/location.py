@@ -378,7 +378,9 @@ def refine_all(
     living section. Returned is how many vertices the fullest of the new sections may gain.
     """
     spare = CAPACITY
-    labels, used, alive, died, overlaps, origins, rings, marks, summaries, _ = sections
+    labels, used, alive, died = sections.labels, sections.used, sections.living, sections.died
+    overlaps, summaries = sections.overlaps, sections.summaries
+    origins, rings, marks = sections.origins, sections.rings, sections.marks
     for b in range(labels.shape[0]):
         if not wanted[b]:
             continue

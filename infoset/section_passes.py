@@ -92,7 +92,8 @@ def room_for_sections(labels: Floats, used: Integers) -> Sections:
 @entry
 def start_all(sections: Sections, law: SectionLaw) -> None:
     """Write the initial sections of a batch; they are not summarised yet."""
-    labels, used, living, _, _, origins, rings, marks, _, _ = sections
+    labels, used, living = sections.labels, sections.used, sections.living
+    origins, rings, marks = sections.origins, sections.rings, sections.marks
     for b in range(labels.shape[0]):
         for s in range(used[b]):
             n = b * labels.shape[1] + s
@@ -103,7 +104,7 @@ def start_all(sections: Sections, law: SectionLaw) -> None:
 @allocation_free
 def list_rows(first: Flags, second: Flags, third: Flags, everyone: bool, sections: Sections) -> int:
     """List the living sections of the engagements in any of three groups, or of all; return how many."""
-    _, used, living, _, _, _, _, _, _, rows = sections
+    used, living, rows = sections.used, sections.living, sections.rows
     count = 0
     for b in range(living.shape[0]):
         if first[b] or second[b] or third[b] or everyone:
@@ -146,7 +147,9 @@ def step_all(
         The sections, which are changed in place, and the numbers of the model.
     """
     deaths = 0
-    labels, _, living, died, overlaps, origins, rings, marks, summaries, rows = sections
+    labels, living, died, overlaps = sections.labels, sections.living, sections.died, sections.overlaps
+    summaries, rows = sections.summaries, sections.rows
+    origins, rings, marks = sections.origins, sections.rings, sections.marks
     count = list_rows(behind, measured, stale, heights_wanted, sections)
     for k in range(count):
         n, b, s = rows[k, 0], rows[k, 1], rows[k, 2]
@@ -199,7 +202,9 @@ def measure_rate_all(
     `values` and `applies` are room for the history of one engagement.
     """
     deaths = 0
-    labels, used, living, died, overlaps, origins, rings, marks, summaries, _ = sections
+    labels, used, living, died = sections.labels, sections.used, sections.living, sections.died
+    overlaps, summaries = sections.overlaps, sections.summaries
+    origins, rings, marks = sections.origins, sections.rings, sections.marks
     for b in range(labels.shape[0]):
         if not active[b]:
             continue
@@ -223,7 +228,8 @@ def measure_rate_all(
 @entry
 def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, law: SectionLaw) -> None:
     """Shift every living section, and its summary, by its engagement's impulse."""
-    labels, used, living, _, _, origins, _, _, summaries, _ = sections
+    labels, used, living = sections.labels, sections.used, sections.living
+    origins, summaries = sections.origins, sections.summaries
     for b in range(labels.shape[0]):
         if not active[b] or impulse[b] == 0.0:
             continue
@@ -258,7 +264,8 @@ def make_room_all(
     spare : int
         Vertices that every section may gain; negative where one must be reduced first.
     """
-    labels, used, living, _, _, origins, rings, marks, _, _ = sections
+    labels, used, living = sections.labels, sections.used, sections.living
+    origins, rings, marks = sections.origins, sections.rings, sections.marks
     floats = ZERO
     spare = chains.CAPACITY
     for b in range(labels.shape[0]):
@@ -301,7 +308,8 @@ def widest_all(elapsed: int, sections: Sections, law: SectionLaw, exists: Flags,
     An extreme is usually a whole edge; the point is its lowest for the upper extreme and its highest for the lower
     one, so that a mirrored engagement is mirrored exactly.
     """
-    labels, used, living, _, _, origins, rings, marks, summaries, _ = sections
+    labels, used, living, summaries = sections.labels, sections.used, sections.living, sections.summaries
+    origins, rings, marks = sections.origins, sections.rings, sections.marks
     for b in range(labels.shape[0]):
         lowest = highest = -1
         for s in range(used[b]):
@@ -330,7 +338,8 @@ def widest_all(elapsed: int, sections: Sections, law: SectionLaw, exists: Flags,
 @entry
 def margins_all(v: Floats, z: Floats, elapsed: int, sections: Sections, law: SectionLaw, margins: Floats) -> None:
     """Write the signed margin of a state (V, z) in the first section of each engagement, m; -inf where it is dead."""
-    labels, _, living, _, _, origins, rings, marks, _, _ = sections
+    labels, living = sections.labels, sections.living
+    origins, rings, marks = sections.origins, sections.rings, sections.marks
     for b in range(v.shape[0]):
         margins[b] = -np.inf
         if living[b, 0]:

@@ -1,6 +1,9 @@
-"""The stored sections of a batch of engagements, and the passes over them."""
+"""Stored sections of a batch of engagements, and the operations on them."""
 
 from __future__ import annotations
+
+import copy
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,32 +18,46 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 
+class Freshness(IntEnum):
+    """Which parts of a stack are up to date. Each state includes those before it."""
+
+    BEHIND = 0
+    """Some sections are one step behind."""
+    MOVED = 1
+    """All sections are at the present step; some summaries are out of date."""
+    SUMMARISED = 2
+    """The extremes of the predicted miss are up to date."""
+    WITH_HEIGHTS = 3
+    """The least and the greatest z are up to date too."""
+
+
 class SectionStack:
-    """B engagements x S slots of one section each, carried in place.
+    """B engagements x S slots for one section each, updated in place.
 
     Parameters
     ----------
     law : SectionLaw
+        Constants of the model.
     labels : ndarray, shape (B, S)
-        Label of each slot, m; the slots in use come first, in rising order.
+        Label of each slot, m; the slots in use are first, with increasing labels.
     used : ndarray of int, shape (B,)
         Number of slots in use.
 
     Attributes
     ----------
     least_label : float
-        No living section has a lesser label, m.
+        Lower bound of the labels of living sections, m.
     """
 
     def __init__(self, law: SectionLaw, labels: Floats, used: NDArray[np.int64]) -> None:
         self.law = law
         self.sections = section_passes.room_for_sections(labels, used.astype(np.int64))
-        self._stale = np.ones(self.batch, dtype=bool)
-        self._nobody = np.zeros(self.batch, dtype=bool)
-        self._behind = self._nobody
-        self._is_stale, self._is_behind, self._has_heights = True, False, False
-        self._spare = 0
-        self._elapsed = 0
+        self._none = np.zeros(self.batch, dtype=bool)
+        self._freshness = Freshness.MOVED
+        # Engagements with sections one step behind, and those with summaries out of date.
+        self._behind, self._stale = self._none, np.ones(self.batch, dtype=bool)
+        # Vertices that every section may still gain, and the present step.
+        self._spare = self._elapsed = 0
         section_passes.start_all(self.sections, law)
         self.least_label = self._least_label()
 
@@ -56,51 +73,49 @@ class SectionStack:
 
     @property
     def living(self) -> Flags:
-        """Which slots hold a living section, shape (B, S)."""
+        """Whether each slot contains a living section, shape (B, S)."""
         return self.sections.living
 
     @property
     def summaries(self) -> Floats:
-        """Summary of each living section but for its heights, shape (B, S, columns), brought up to date."""
-        self._summarise()
+        """Summaries of the living sections, shape (B, S, columns). The columns of z may be out of date."""
+        self._summarise(Freshness.SUMMARISED)
         return self.sections.summaries
 
     @property
     def heights(self) -> tuple[Floats, Floats]:
         """Least and greatest z of each living section, m, each (B, S)."""
-        if not self._has_heights:
-            # Who asks for them will ask for the rest.
-            self._summarise(heights_wanted=True)
+        # The predicted misses are usually needed next: one pass computes both.
+        self._summarise(Freshness.WITH_HEIGHTS)
         summaries = self.sections.summaries
         return summaries[:, :, section_life.Z_LEAST], summaries[:, :, section_life.Z_GREATEST]
 
-    def _summarise(self, heights_wanted: bool = False) -> None:
-        """Bring sections and summaries up to date."""
-        if self._is_stale or heights_wanted:
-            self._pass(self._stale, heights_wanted)
-            self._behind = self._stale = self._nobody
-            self._is_behind = self._is_stale = False
-            self._has_heights |= heights_wanted
-
-    def _pass(self, stale: Flags, heights_wanted: bool) -> None:
-        """Move the sections that are behind to the step, and summarise the stale ones."""
-        alpha = np.empty(0)
-        section_passes.step_all(
-            self._behind, self._nobody, stale, heights_wanted, alpha, self._elapsed, 0, self.sections, self.law
-        )
+    def _summarise(self, wanted: Freshness) -> None:
+        """Update the sections and the summaries."""
+        if self._freshness < wanted:
+            self._update(self._stale, wanted is Freshness.WITH_HEIGHTS)
+            self._stale, self._freshness = self._none, wanted
 
     def _catch_up(self) -> None:
-        """Bring sections up to date."""
-        if self._is_behind:
-            self._pass(self._nobody, False)
-            self._behind, self._is_behind = self._nobody, False
+        """Move the sections that are behind to the present step."""
+        if self._freshness is Freshness.BEHIND:
+            self._update(self._none, False)
+            self._freshness = Freshness.MOVED
+
+    def _update(self, stale: Flags, heights_wanted: bool) -> None:
+        """Move the sections that are behind, and summarise the stale ones."""
+        alpha = np.empty(0)
+        section_passes.step_all(
+            self._behind, self._none, stale, heights_wanted, alpha, self._elapsed, 0, self.sections, self.law
+        )
+        self._behind = self._none
 
     def ranges(self, elapsed: int) -> Floats:
-        """Range of every slot after a number of steps, m, shape (B, S)."""
+        """Return the range of every slot after a number of steps, m, shape (B, S)."""
         return self.labels - self.law.closing_speed * (self.law.step * elapsed)
 
     def _make_room(self, active: Flags) -> None:
-        """See that each living section may gain what a step adds; mostly that was seen to some steps ago."""
+        """Give each living section room for the vertices that one step adds."""
         self._spare -= chains.MOST_ADDED
         if self._spare >= 0:
             return
@@ -113,14 +128,14 @@ class SectionStack:
         self._spare = spare - chains.MOST_ADDED
 
     def make_room_for_new(self, wanted: Flags, number: int) -> None:
-        """See that there is room for so many sections of any size in each of the wanted engagements."""
+        """Allocate room for `number` sections of any size in each of the wanted engagements."""
         self._catch_up()
-        self._has_heights = False
+        self._freshness = min(self._freshness, Freshness.SUMMARISED)
         floats = 2 * (2 * chains.CAPACITY + chains.LINE) * number * int(np.count_nonzero(wanted))
         self.sections = self.sections._replace(rings=chains.with_room(self.sections.rings, floats))
 
     def note_new(self, spare: int) -> None:
-        """Note that there are new sections, of which the fullest may gain so many vertices."""
+        """Register new sections, each of which may gain at least `spare` vertices."""
         self._spare = min(self._spare, spare)
         self.least_label = self._least_label()
 
@@ -128,36 +143,35 @@ class SectionStack:
         return float(np.where(self.sections.living, self.sections.labels, np.inf).min())
 
     def measure_angle(self, active: Flags, alpha: Floats, elapsed: int, event: int) -> int:
-        """Cut the living sections by angle measurements (rad); return how many died."""
+        """Cut the living sections by angle measurements, rad; return the number of sections that became empty."""
         deaths = section_passes.step_all(
-            self._behind, active, self._nobody, False, alpha, elapsed, event, self.sections, self.law
+            self._behind, active, self._none, False, alpha, elapsed, event, self.sections, self.law
         )
-        self._behind, self._is_behind = self._nobody, False
-        self._measured(active)
+        self._behind = self._none
+        self._set_summarised(active)
         return deaths
 
     def measure_rate(
         self, active: Flags, omega: Floats, error: float, elapsed: int, event: int, history: History
     ) -> int:
-        """Cut the living sections by measured rates of the line of sight (rad/s); return how many died."""
+        """Cut the living sections by line-of-sight rates, rad/s; return the number of sections that became empty."""
         self._catch_up()
         self._make_room(active)
         room, values, applies = chains.working_room(), np.empty(history.events), np.empty(history.events, dtype=bool)
         deaths = section_passes.measure_rate_all(
             active, omega, error, elapsed, event, history.tapes, values, applies, self.sections, self.law, room
         )
-        self._measured(active)
+        self._set_summarised(active)
         return deaths
 
-    def _measured(self, active: Flags) -> None:
-        """Note that the summaries of the active engagements are fresh, but for the heights."""
-        if self._is_stale:
+    def _set_summarised(self, active: Flags) -> None:
+        """Register that a cut has updated the summaries of the active engagements, except the heights."""
+        if self._freshness < Freshness.SUMMARISED:
             self._stale = self._stale & ~active
-            self._is_stale = bool(self._stale.any())
-        self._has_heights = False
+        self._freshness = Freshness.MOVED if self._stale.any() else Freshness.SUMMARISED
 
     def shift(self, active: Flags, impulse: Floats, elapsed: int) -> None:
-        """Shift the living sections, and their summaries, by impulses (m/s)."""
+        """Shift the living sections and their summaries by impulses, m/s."""
         self._catch_up()
         section_passes.shift_all(active, impulse, elapsed, self.sections, self.law)
 
@@ -166,18 +180,17 @@ class SectionStack:
 
         Notes
         -----
-        They are moved when somebody looks at them, or with the next measurement: one pass over the memory, not two.
+        The move is postponed to the next measurement or query, so that one pass over the memory does both.
         """
         self._catch_up()
         self._make_room(active)
         self._behind = active.copy()
-        self._stale = self._stale | active if self._is_stale else self._behind
-        self._is_behind = self._is_stale = True
-        self._has_heights = False
+        self._stale = self._stale | active
+        self._freshness = Freshness.BEHIND
         self._elapsed = elapsed
 
     def keep_labels(self, least: Floats, greatest: Floats, active: Flags) -> tuple[Flags, int]:
-        """Remove the living sections whose labels are outside [least, greatest]; return which, and how many."""
+        """Remove the living sections with labels outside [least, greatest]; return a mask of them and their number."""
         sections = self.sections
         inside = (least[:, None] <= sections.labels) & (sections.labels <= greatest[:, None])
         used = np.arange(sections.labels.shape[1]) < sections.used[:, None]
@@ -186,42 +199,36 @@ class SectionStack:
         return removed, int(np.count_nonzero(removed))
 
     def margins(self, v: Floats, z: Floats, elapsed: int) -> Floats:
-        """Signed margin of states (V, z) in the first slot of each engagement, m."""
+        """Return the signed distance of states (V, z) to the boundary of the first slot's section, m, shape (B,)."""
         self._catch_up()
         margins = np.empty(self.batch)
         section_passes.margins_all(v, z, elapsed, self.sections, self.law, margins)
         return margins
 
     def widest(self, elapsed: int) -> tuple[Flags, Floats]:
-        """Predicted-miss interval of each engagement, as `section_passes.widest_all` writes it."""
-        self._summarise()
+        """Return the predicted-miss interval of each engagement in the format of `section_passes.widest_all`."""
+        self._summarise(Freshness.SUMMARISED)
         exists, ends = np.zeros(self.batch, dtype=bool), np.zeros((self.batch, 2, 4))
         section_passes.widest_all(elapsed, self.sections, self.law, exists, ends)
         return exists, ends
 
     def polygon(self, engagement: int, slot: int, elapsed: int) -> Floats:
-        """Vertices (V, z) of a living section, counter-clockwise, shape (n, 2)."""
+        """Return the vertices (V, z) of a living section, counter-clockwise, shape (n, 2)."""
         self._catch_up()
         row = engagement * self.labels.shape[1] + slot
         section = Chains(self.sections.origins, self.sections.rings, self.sections.marks)
         return outline(section, row, float(self.labels[engagement, slot]), elapsed, self.law)
 
     def copy(self) -> SectionStack:
-        """A stack of its own with the same sections."""
-        twin = SectionStack.__new__(SectionStack)
-        twin.law = self.law
+        """Return an independent copy."""
+        twin = copy.copy(self)
         arrays = {name: array.copy() for name, array in self.sections._asdict().items() if name != "rings"}
-        rings = chains.copy_of_rings(self.sections.rings, self.sections.rings.size)
-        twin.sections = Sections(**arrays, rings=rings)
-        twin._stale, twin._behind, twin._nobody = self._stale, self._behind, self._nobody
-        twin._is_stale, twin._is_behind = self._is_stale, self._is_behind
-        twin._has_heights, twin._elapsed, twin._spare = self._has_heights, self._elapsed, self._spare
-        twin.least_label = self.least_label
+        twin.sections = Sections(**arrays, rings=chains.copy_of_rings(self.sections.rings, self.sections.rings.size))
         return twin
 
 
 def outline(section: Chains, row: int, label: float, elapsed: int, law: SectionLaw) -> Floats:
-    """Vertices (V, z) of a section, counter-clockwise, shape (n, 2)."""
+    """Return the vertices (V, z) of a section, counter-clockwise, shape (n, 2)."""
     points = chains.working_room()
     time_to_go = (label - law.closing_speed * (law.step * elapsed)) / law.closing_speed
     return points[: section_passes.write_outline(*section, row, time_to_go, points)].copy()
