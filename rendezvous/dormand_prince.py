@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 STAGES = 12
 _NODES = np.ascontiguousarray(DOP853.C[:STAGES])
 _WEIGHTS = np.vstack([DOP853.A[:STAGES, :STAGES], DOP853.B])
-"""Of the stages, a row each, and of the step."""
+"""Coefficients of the stages, one row per stage, and of the step."""
 _THIRD, _FIFTH = np.ascontiguousarray(DOP853.E3[:STAGES]), np.ascontiguousarray(DOP853.E5[:STAGES])
 
 

@@ -3,7 +3,7 @@
 The pursuer minimises and the evader maximises the time of capture; both use full thrust. It is the game of Wang's
 slides (Bauman University), after Shen and Casalino, Journal of Guidance, Control, and Dynamics 41(8), 2018, p. 1823,
 with gravity omitted or linear: in free space lambda_v = (t_f - t) lambda_r, and both thrust in a constant direction.
-The solutions are not from there; the orbital game is checked against them.
+The solutions are not from these sources; tests compare the orbital game with them.
 """
 
 from __future__ import annotations
@@ -44,15 +44,15 @@ class Thruster:
     Parameters
     ----------
     thrust_n, mass_kg : float
-        At the start of the game.
+        Thrust, and mass at the start of the game.
     exhaust_speed_m_s : float
         Specific impulse times standard gravity.
 
     Raises
     ------
     ValueError
-        If the thrust is negative, or mass or exhaust speed is not positive. The methods raise it if all the mass is
-        burnt before `time_s`.
+        If the thrust is negative, or mass or exhaust speed is not positive. The methods raise ValueError if all the
+        mass is burnt before `time_s`.
     """
 
     thrust_n: float
@@ -144,7 +144,7 @@ def free_space_capture(
     """Solve the game of two constant accelerations without gravity; None if the evader escapes.
 
     Position and velocity, shapes (3,), are the evader's, relative to the pursuer; the accelerations are the greatest
-    ones. The evader escapes if its acceleration is not the smaller one, and they are not on a collision course.
+    values. The evader escapes if its acceleration is not the smaller one and the players are not on a collision course.
 
     Raises
     ------
@@ -361,7 +361,7 @@ def _first_contact(
         # Below the value by the tolerance, so that a grazing contact is not stepped over.
         step = min(window, _safe_step(here.value - CONTACT * here.lengths, here.rate, bend(t, t + window)))
         t, window = min(end, t + max(step, _LEAST_STEP * t)), 2.0 * step
-    raise LinearGameError("the gap is nearly zero for too long a time to tell the first contact")
+    raise LinearGameError("the gap is nearly zero for so long that the first contact cannot be determined")
 
 
 def _contact(
@@ -393,7 +393,7 @@ def _safe_step(value: float, rate: float, bend: float) -> float:
 
 
 def _line_of_sight(position: Floats, velocity: Floats, time_s: float) -> tuple[float, Floats]:
-    """Return distance and direction without thrust; at zero distance, the direction at the start."""
+    """Return distance and direction without thrust; at zero distance the direction is that at the start."""
     relative = position + velocity * time_s
     distance = float(np.linalg.norm(relative))
     return distance, relative / distance if distance > 0.0 else _unit(position)

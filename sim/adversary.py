@@ -53,7 +53,7 @@ class WorstEngagement:
     Parameters
     ----------
     scenario : Scenario
-        Scenario of the search; its dispersion is the start that was found.
+        Scenario of the search, with the start of this engagement as its dispersion.
     seed : int
         The seed of the search.
     strategy : str
@@ -68,13 +68,13 @@ class WorstEngagement:
         Start: (z, x) and (V_z, V_x).
     errors : mapping of str to ndarray, shape (steps,)
         Measurement errors by sensor in units of their bounds, zero where nothing was measured. `ScriptedNoise` with
-        them flies this engagement again, bit for bit.
+        these errors repeats the engagement, bit for bit.
     construction : str
-        Kind of the first plan that it comes from.
+        Kind of the first plan from which the engagement was derived.
     changes : int
-        Number of changed plans between the two.
+        Number of changes from the first plan.
     evaluations : int
-        Engagements flown.
+        Number of simulated engagements.
     history : tuple of (int, float)
         Evaluations and greatest miss so far, m, at each increase.
     """
@@ -98,12 +98,12 @@ class WorstEngagement:
         return ScriptedNoise({name: errors[None] for name, errors in self.errors.items()})
 
     def record(self, strategy: Strategy | None = None) -> Record:
-        """Fly the engagement again and return its record.
+        """Simulate the engagement again and return its record.
 
         Parameters
         ----------
         strategy : Strategy or None
-            None is the scenario's own. A strategy different from that of the search has a different miss.
+            None is the scenario's. A strategy different from that of the search has a different miss.
         """
         return fly_one(self.scenario, seed=self.seed, strategy=strategy, noise=self.noise())
 
@@ -127,7 +127,7 @@ def find_worst(
     strategy : Strategy, str or None
         A strategy of your own, the name of a registered one, or None for the scenario's.
     budget : int
-        Engagements to fly.
+        Number of engagements to simulate.
     seed : int
         Root seed. The same seed and budget give the same engagement for any number of threads.
     keep_set : bool
@@ -143,7 +143,7 @@ def find_worst(
     ValueError
         If the budget or the number of threads is not positive, or the seed is negative.
     NothingCountsError
-        If in every engagement flown the set was lost, or the miss was not finite.
+        If in every simulated engagement the set was lost, or the miss was not finite.
 
     Notes
     -----
@@ -186,7 +186,7 @@ class _Search:
         self._strategy_name = scenario.strategy if strategy is None else type(strategy).__name__
         self._lower, self._upper = corners(scenario.set_model.bounds)
         self._random = np.random.default_rng(seed)
-        # All other random numbers are those of run 0, so that the worst engagement can be flown again alone.
+        # All other random numbers are those of run 0, so that the worst engagement can be repeated alone.
         self._draws = draw(self.scenario, [0], seed)
         self._steps = self._draws.steps
         self._names = tuple(dict.fromkeys((*ROWS, *scenario.sensors)))
@@ -196,8 +196,8 @@ class _Search:
     def run(self, budget: int, pool: ThreadPoolExecutor, progress: Callable[[float], None] | None) -> None:
         flights = self._first_plans(max(1, round(FIRST_SHARE * budget)))
         while flights:
-            for flown in pool.map(lambda flight: self._fly(*flight), flights):
-                self._select(flown, young=self.evaluations < YOUNG_SHARE * budget)
+            for outcomes in pool.map(lambda flight: self._fly(*flight), flights):
+                self._select(outcomes, young=self.evaluations < YOUNG_SHARE * budget)
                 if progress is not None:
                     progress(self.evaluations / budget)
             size = min(GENERATION, budget - self.evaluations)
@@ -206,7 +206,7 @@ class _Search:
     def worst(self) -> WorstEngagement:
         elite = self._elite
         if elite is None or not np.isfinite(elite.value[0]):
-            raise NothingCountsError("in every engagement flown the set was lost, or the miss was not finite")
+            raise NothingCountsError("in every simulated engagement the set was lost, or the miss was not finite")
         start = elite.plans.start[0]
         z, x, vz, vx = ((value, value) for value in start.tolist())
         return WorstEngagement(
@@ -243,14 +243,14 @@ class _Search:
         if self._keep_set:
             counts &= outcomes != Outcome.SET_LOST
         if tie is not None:  # the errors of the game become the plan
-            plans.sequence[:], plans.given[:] = noise.errors, True
+            plans.sequence[:], plans.prescribed[:] = noise.errors, True
         value = np.where(counts, results.miss_m, -np.inf)
         return Flown(plans, value, noise.errors, outcomes, results.truth_kept)
 
-    def _select(self, flown: Flown, young: bool) -> None:
+    def _select(self, outcomes: Flown, young: bool) -> None:
         """Update the elite and the history with new flights."""
-        self.evaluations += len(flown.value)
-        rivals = flown if self._elite is None else self._elite.join(flown)
+        self.evaluations += len(outcomes.value)
+        rivals = outcomes if self._elite is None else self._elite.join(outcomes)
         order = np.argsort(-rivals.value, kind="stable")
         kept: list[int] = []
         of_lineage: dict[int, int] = {}
@@ -284,7 +284,7 @@ class _Search:
             if share == 0:
                 continue
             start = self._starts(share)
-            angle, given = maker(share, start)
+            angle, prescribed = maker(share, start)
             others = np.repeat(
                 self._random.choice([-1.0, 0.0, 1.0], (share, len(self._names) - 1, 1)), self._steps, axis=2
             )
@@ -292,7 +292,7 @@ class _Search:
             lineage = len(self._constructions) + np.arange(share)
             self._constructions += [name] * share
             none = np.zeros(share, dtype=np.int64)
-            plans += _in_chunks(Plans(start, sequence, np.full(angle.shape, given), lineage, none), tie)
+            plans += _in_chunks(Plans(start, sequence, np.full(angle.shape, prescribed), lineage, none), tie)
         return plans
 
     def _starts(self, count: int) -> Floats:
@@ -336,7 +336,7 @@ class _Search:
         """Return changed plans of the elite; plans with a greater miss are chosen more often."""
         elite = self._elite
         if elite is None:
-            raise RuntimeError("no plan has flown yet")
+            raise RuntimeError("no plan has been simulated yet")
         ranks = np.floor(len(elite.value) * self._random.random(count) ** 2).astype(np.int64)
         plans = elite.plans.take(ranks)
         for i in range(count):
@@ -384,15 +384,15 @@ class _Search:
         """Move the whole plan by a few steps."""
         by = int(self._random.choice([-3, -2, -1, 1, 2, 3]))
         plans.sequence[i] = np.roll(plans.sequence[i], by, axis=-1)
-        plans.given[i] = np.roll(plans.given[i], by)
+        plans.prescribed[i] = np.roll(plans.prescribed[i], by)
 
     def _give_block(self, plans: Plans, i: int) -> None:
         """Prescribe the errors of a block, or let the noise keep extremes there."""
         span = self._span(plans, i)
-        if plans.given[i, span].all():
-            plans.given[i, span] = False
+        if plans.prescribed[i, span].all():
+            plans.prescribed[i, span] = False
         else:
-            plans.given[i, span] = True
+            plans.prescribed[i, span] = True
             anything = self._random.uniform(-1.0, 1.0)
             plans.sequence[i, :, span] = self._random.choice([-1.0, 0.0, 1.0, anything], (len(self._names), 1))
 
@@ -402,8 +402,8 @@ class _Search:
         moved = plans.sequence[i, :, span] + 10.0 ** self._random.uniform(-2.0, 0.0) * self._random.normal(
             size=(len(self._names), 1)
         )
-        given = plans.given[i, span]
-        plans.sequence[i, :, span] = np.where(given, np.clip(moved, -1.0, 1.0), plans.sequence[i, :, span])
+        prescribed = plans.prescribed[i, span]
+        plans.sequence[i, :, span] = np.where(prescribed, np.clip(moved, -1.0, 1.0), plans.sequence[i, :, span])
 
     def _cross(self, plans: Plans, i: int) -> None:
         """Replace the end of the plan by that of another plan of the elite."""
@@ -411,7 +411,7 @@ class _Search:
         if elite is not None:
             other, begin = int(self._random.integers(len(elite.value))), self._step(plans, i)
             plans.sequence[i, :, begin:] = elite.plans.sequence[other, :, begin:]
-            plans.given[i, begin:] = elite.plans.given[other, begin:]
+            plans.prescribed[i, begin:] = elite.plans.prescribed[other, begin:]
 
     def _move_start(self, plans: Plans, i: int) -> None:
         """Move the start in some coordinates or in all, or set some coordinates to an end."""

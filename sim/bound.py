@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 LABELS_A_PERIOD, PERIODS_LOOKED_AT = 8, 7
-"""The bound oscillates with the label; the period is the distance flown between two measurements."""
+"""The bound oscillates with the label; the period is the distance travelled between two measurements."""
 REFINEMENTS = 5
 MARGIN = 1e-6
 """Reserve as a share of each limit, for rounding and for the difference between an angle and its tangent."""
@@ -45,9 +45,9 @@ class TruthPair:
     correction_m : float
         Greatest change of one miss by the impulses after `last_common_step`, m.
     position_m, velocity_m_s : ndarray, shape (2, 2)
-        (z, x) and (V_z, V_x) of each at t = 0.
+        (z, x) and (V_z, V_x) of the two motions at t = 0.
     acceleration_m_s2 : ndarray, shape (2, steps)
-        Acceleration along z of each over each step; x = 0 is in the last step.
+        Accelerations of the two motions along z over each step; x = 0 is in the last step.
     """
 
     label_m: float
@@ -165,7 +165,7 @@ def lower_bound(
     Notes
     -----
     Any pair of admissible motions gives a bound; the search looks for a good one. The bound depends on the label mostly
-    through the range of the last measurement before x = 0, and repeats with the distance flown between measurements.
+    through the range of the last measurement before x = 0, and repeats with the distance between measurements.
     Therefore the search covers whole periods of labels in some parts of the range interval, for both ends of the
     interval of V_x and for the nominal closing speed, and refines the best labels. Cost: about 600 linear programs of
     about 110 variables, 6 ms each.
@@ -183,7 +183,7 @@ def lower_bound(
     grids = [label_grid(scenario, speed) for speed in speeds]
     refinements = [2 * REFINEMENTS if len(grid) > 1 else 0 for grid in grids]
     total, done = sum(len(grid) for grid in grids) + sum(refinements), 0
-    found: list[LabelBound] = []
+    bounds: list[LabelBound] = []
     pairs: list[TruthPair] = []
     for speed, grid, extra in zip(speeds, grids, refinements, strict=True):
         best: TruthPair | None = None
@@ -198,7 +198,7 @@ def lower_bound(
                 labels.append(min(max(best.label_m + side * width, model.bounds.x_m[0]), model.bounds.x_m[1]))
             pair = pair_at(scenario, labels[index], speed, allowed, try_first_before_s=before_s)
             before_s = pair.arrival_s - pair.last_common_step * model.step_s
-            found.append(LabelBound(pair.label_m, speed, pair.last_common_step, pair.bound_m))
+            bounds.append(LabelBound(pair.label_m, speed, pair.last_common_step, pair.bound_m))
             if best is None or pair.bound_m > best.bound_m:
                 best = pair
             done += 1
@@ -207,7 +207,7 @@ def lower_bound(
         if best is not None:
             pairs.append(best)
     pairs.sort(key=lambda pair: -pair.bound_m)
-    by_label = {(bound.vx_m_s, bound.label_m): bound for bound in found}
+    by_label = {(bound.vx_m_s, bound.label_m): bound for bound in bounds}
     return LowerBound(tuple(pairs), tuple(bound for _, bound in sorted(by_label.items())), allowed)
 
 

@@ -1,4 +1,4 @@
-"""Campaigns: any number of engagements, stored as they are flown. A campaign is a sweep of one cell."""
+"""Campaigns: any number of engagements, stored during the simulation. A campaign is a sweep of one cell."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ class CampaignResult:
     Parameters
     ----------
     folder : CampaignFolder
-        Where they are.
+        Folder of the campaign.
     redone : tuple of Damage
-        Shards that were damaged and have been flown again.
+        Damaged shards whose runs were simulated again.
     """
 
     folder: CampaignFolder
@@ -74,7 +74,7 @@ class CampaignResult:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a campaign is.
+    """Progress of a campaign.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class Progress:
     flown : int
         Engagements stored in this session.
     elapsed_s : float
-        Since this session began.
+        Time since the start of this session.
     """
 
     done: int
@@ -99,26 +99,26 @@ class Campaign:
     Parameters
     ----------
     scenario : Scenario
-        What is flown.
+        Scenario to simulate.
     runs : int
-        How many, from run 0; with `until`: at most.
+        Number of runs, from run 0; with `until` the greatest number.
     folder : str or Path
-        Where they are stored.
+        Folder for the results.
     seed : int
         Run K is the same engagement in every campaign and experiment with this seed.
     noise : CampaignNoise or None
-        None is the scenario's.
+        Measurement noise; None is the scenario's.
     strategy : Strategy or None
-        A strategy of your own; None is the scenario's. The manifest holds its attribute `version`, if it has one, else
-        its name: a campaign is not resumed with another.
+        A strategy of your own; None is the scenario's. The manifest contains its attribute `version`, or its name
+        without this attribute; a campaign cannot be resumed with another strategy.
     guarantee : bool
         Whether the guaranteed model computes the guaranteed miss Phi, which doubles the run time.
     chunk : int or None
-        Engagements of a shard; it changes no number. None chooses one that suits the number of runs.
+        Engagements per shard; results do not depend on it. None chooses a value for the number of runs.
     until : StoppingRule or None
-        Stop earlier, at the end of a shard, once this is met.
+        Stop at the end of a shard once this rule is met.
     axes : tuple of Axis
-        What a sweep varies, for people: names and values as in a scenario file.
+        Keys and values that a sweep varies, as in a scenario file; stored as a description.
     cells : tuple of Scenario
         Scenarios of a sweep, one for each combination of the values; the last axis varies fastest.
 
@@ -147,7 +147,7 @@ class Campaign:
         if len(self.cells) != (math.prod(len(axis.values) for axis in self.axes) if self.axes else 0):
             raise ValueError("a sweep needs at least one axis, and a scenario for each combination of their values")
         if self.axes and self.until is not None:
-            raise ValueError("a sweep has no stopping rule: give until to a campaign")
+            raise ValueError("a sweep has no stopping rule: use until with a campaign only")
 
     def run(
         self,
@@ -158,17 +158,18 @@ class Campaign:
         progress: Callable[[Progress], None] | None = None,
         beside: Mapping[str, str] | None = None,
     ) -> CampaignResult:
-        """Fly the engagements that are not stored yet.
+        """Simulate the engagements that are not stored yet.
 
         Parameters
         ----------
         executor : Executor or None
-            Any of `concurrent.futures`, or one that behaves like it; processes must be spawned, not forked. None
-            uses threads of this process.
+            An executor of `concurrent.futures`, or one with the same interface; processes must be spawned, not
+            forked. None uses threads of this process.
         workers : int or None
-            Number of threads, by default one a core; or chunks handed to the executor at a time, by default two a core.
+            Number of threads, by default one per core; with an executor, the number of chunks that are submitted at a
+            time, by default two per core.
         resume : bool
-            Whether the folder may hold this campaign already. It may be given more runs than it had.
+            Whether the folder may contain this campaign already. The number of runs may be greater than before.
         progress : callable or None
             Called after each chunk.
         beside : mapping of str to str
@@ -177,12 +178,12 @@ class Campaign:
         Raises
         ------
         StorageError
-            If the folder holds something else or cannot be written, or pyarrow is not installed. What is stored stays,
-            and the campaign can be resumed.
+            If the folder contains something else or cannot be written, or pyarrow is not installed. Stored runs are
+            kept, and the campaign can be resumed.
         VersionError
-            If the executor flies with other versions of the packages.
+            If the workers of the executor have other versions of the packages.
         ValueError
-            If there is not at least one worker.
+            If there is no worker.
         FloatingPointError
             If results are not finite.
         """
@@ -195,7 +196,7 @@ class Campaign:
         return CampaignResult(folder, damaged)
 
     def manifest(self) -> Manifest:
-        """Return what is stored of the campaign besides its runs; a campaign that is resumed keeps its chunks."""
+        """Return the manifest of the campaign; a resumed campaign keeps the size of its chunks."""
         noise = self._noise
         hashes = ",".join(scenario_hash(noise.applied_to(cell)) for cell in self.cells)
         return Manifest(
@@ -233,7 +234,7 @@ class Campaign:
         return CampaignNoise(self.scenario.noise.value) if self.noise is None else self.noise
 
     def _chunk_size(self) -> int:
-        """Return the engagements of a shard: as asked for, or of the campaign in the folder, or the default."""
+        """Return the engagements per shard: `chunk`, or that of the campaign in the folder, or the default."""
         if self.chunk is not None:
             return self.chunk
         try:
@@ -254,11 +255,11 @@ class Campaign:
             return
         missing = [index for index in range(manifest.chunks) if index not in folder.finished]
         done = self.engagements - sum(len(manifest.runs_of(index)[1]) for index in missing)
-        flown = 0
+        stored = 0
 
         def report() -> None:
             if progress is not None:
-                progress(Progress(done, self.engagements, flown, time.perf_counter() - began_s))
+                progress(Progress(done, self.engagements, stored, time.perf_counter() - began_s))
 
         report()
         chunks = (self.chunk_at(index, manifest) for index in missing)
@@ -271,7 +272,7 @@ class Campaign:
         with contextlib.closing(flights):
             for chunk, results in flights:
                 folder.write(chunk, results)
-                done, flown = done + len(chunk.runs), flown + len(chunk.runs)
+                done, stored = done + len(chunk.runs), stored + len(chunk.runs)
                 report()
                 if stopped():
                     return
@@ -299,25 +300,25 @@ class Campaign:
 
 
 class Sweep(Campaign):
-    """The same runs in each of many cells: starts and errors are shared, so that cells differ by their values alone.
+    """A sweep: the same runs in many cells. Starts and errors are the same, so that only the varied values differ.
 
     Parameters
     ----------
     scenario : Scenario
-        The one that is varied.
+        Scenario that is varied.
     axes : tuple of Axis
-        As of `Campaign`, at least one.
+        As for `Campaign`; at least one.
     cells : tuple of Scenario
-        As of `Campaign`.
+        As for `Campaign`.
     runs : int
-        Engagements of each cell.
+        Engagements per cell.
     folder, seed, noise, guarantee, chunk, strategy, until
-        As of `Campaign`; the guaranteed miss is not computed by default.
+        As for `Campaign`; the guaranteed miss is not computed by default.
 
     Raises
     ------
     TypeError, ValueError
-        As of `Campaign`, or if there is no axis.
+        As for `Campaign`, or if there is no axis.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""A chunk of a campaign: consecutive runs of one scenario, flown together on any worker."""
+"""A chunk of a campaign: consecutive runs of one scenario, simulated together by one worker."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class CampaignNoise(Enum):
         return (NoiseKind.RANDOM, NoiseKind.GAME) if self is CampaignNoise.MIXED else (NoiseKind(self.value),)
 
     def applied_to(self, scenario: Scenario) -> Scenario:
-        """Return a scenario with this noise; a mixed one leaves it unchanged."""
+        """Return a scenario with this noise; MIXED leaves it unchanged."""
         return scenario if self is CampaignNoise.MIXED else replace(scenario, noise=NoiseKind(self.value))
 
 
@@ -43,11 +43,11 @@ class Chunk:
     Parameters
     ----------
     index : int
-        Its number in the campaign.
+        Number of the chunk in the campaign.
     cell : int
         Number of the scenario in a sweep; 0 in a campaign.
     scenario : Scenario
-        Its own noise is not used.
+        Scenario; its noise is not used.
     runs : range
         Numbers of the runs.
     seed : int
@@ -57,7 +57,7 @@ class Chunk:
     guarantee : bool
         Whether the guaranteed model computes the guaranteed miss.
     strategy : Strategy or None
-        None is the scenario's.
+        Guidance strategy; None is the scenario's.
     versions : tuple of pairs of str
         Versions of the packages that must compute it.
     """
@@ -79,21 +79,21 @@ class Chunk:
 
 
 def fly_chunk(chunk: Chunk, check: Callable[[], None] | None = None) -> Results:
-    """Fly the runs of a chunk, in their order.
+    """Simulate the runs of a chunk and return the results in the order of the runs.
 
     The results of a run do not depend on the chunk, the worker or the machine.
 
     Parameters
     ----------
     chunk : Chunk
-        The runs to fly.
+        Runs to simulate.
     check : callable or None
-        Called after every step; an exception that it raises stops the flight.
+        Called after every step; an exception that it raises stops the simulation.
 
     Raises
     ------
     VersionError
-        If the chunk is to be flown with other versions of the packages.
+        If the chunk needs other versions of the packages.
     """
     differ = differences(chunk.versions, calculating_versions())
     if differ:
@@ -111,14 +111,14 @@ def fly_chunk(chunk: Chunk, check: Callable[[], None] | None = None) -> Results:
         )
         for kind in dict.fromkeys(noises)
     ]
-    flown = join(parts)
-    return flown.take(np.argsort(flown.runs))
+    joined = join(parts)
+    return joined.take(np.argsort(joined.runs))
 
 
 def chunk_size(runs: int) -> int:
-    """Return the default engagements of a chunk: a few hundred chunks, each of some batches of the engine.
+    """Return the default number of engagements of a chunk: a few hundred chunks of several batches of the engine.
 
-    A process that dies loses its unfinished chunks, so they are small; each is a file, so they are not too many.
+    Chunks are small because a process that stops loses its unfinished chunks, and not too many because each is a file.
     """
     batches = -(-runs // (FEWEST_CHUNKS * ENGAGEMENTS_AT_ONCE))
     return max(1, min(batches, LARGEST_CHUNK // ENGAGEMENTS_AT_ONCE)) * ENGAGEMENTS_AT_ONCE

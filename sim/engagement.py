@@ -78,15 +78,15 @@ class Engagements:
     Parameters
     ----------
     scenario : Scenario
-        What is flown.
+        Scenario to simulate.
     draws : Draws
         Starts and random numbers of the batch.
     strategy : Strategy or None
-        None is the scenario's own.
+        Guidance strategy; None is the scenario's.
     truth : TrueMotion or None
-        None is Kepler motion under the scenario's Sun.
+        True motion; None is Kepler motion with the Sun of the scenario.
     noise : MeasurementNoise or None
-        None is the scenario's own.
+        Measurement noise; None is the scenario's.
     guarantee : bool
         Compute the bound Phi in the guaranteed model; it doubles the run time.
 
@@ -135,7 +135,7 @@ class Engagements:
 
     @property
     def flying(self) -> bool:
-        """Whether any true motion is before its closest approach or x = 0; until then its label may still leave."""
+        """Whether any true motion is before its closest approach or before x = 0, where its label leaves the set."""
         return bool((self._flying | ~self._arrived).any()) and self.step < self._draws.steps
 
     @property
@@ -144,7 +144,7 @@ class Engagements:
         return self._information.inconsistency
 
     def advance(self, observe: Callable[[Step], None] | None = None) -> None:
-        """Fly one step; `observe` is called after the decision, before the impulse."""
+        """Simulate one step; `observe` is called after the decision, before the impulse."""
         model, thruster = self.scenario.set_model, self.scenario.thruster
         sight = self._truth.sight()
         self._tracking = self._flying & self._information.tracking

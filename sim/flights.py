@@ -1,4 +1,4 @@
-"""Chunks flown on an executor, a limited number at a time: threads or processes of this machine, or a cluster."""
+"""Simulation of chunks on threads or processes of this machine or on a cluster, a limited number at a time."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ Flights = Generator[tuple[Chunk, Results], None, None]
 def fly_on(
     executor: Executor, chunks: Iterable[Chunk], at_once: int, check: Callable[[], None] | None = None
 ) -> Flights:
-    """Fly chunks and yield each with its results as soon as they are there, in any order.
+    """Simulate chunks and yield every chunk with its results as soon as it is finished, in any order.
 
     Parameters
     ----------
     executor : Executor
-        Of threads, processes or a cluster.
+        Executor of threads, processes or a cluster.
     chunks : iterable of Chunk
-        What to fly.
+        Chunks to simulate.
     at_once : int
-        Most chunks handed to the executor at a time; it limits the memory.
+        Greatest number of chunks that are submitted at a time; it limits the memory.
     check : callable or None
         See `fly_chunk`; for threads only.
 
     Notes
     -----
-    When it is closed, or an error ends it, chunks that have not started are cancelled.
+    When the generator is closed or ends with an error, chunks that have not started are cancelled.
     """
     waiting = iter(chunks)
     under_way: dict[Future[Results], Chunk] = {}
@@ -59,15 +59,15 @@ def fly_on(
 
 
 def fly_on_threads(workers: int, chunks: Iterable[Chunk]) -> Flights:
-    """Fly chunks on threads of this process, as `fly_on` does; the kernels release the interpreter's lock.
+    """Simulate chunks on threads of this process, as `fly_on` does; the kernels release the interpreter's lock.
 
-    When it is closed, or an error or an interrupt ends it, chunks under way stop after their current step. After a
-    MemoryError it does not wait for them: Numba keeps its lock where memory ends while it loads a kernel.
+    When the generator is closed or ends with an error or an interrupt, running chunks stop after their current step.
+    After a MemoryError it does not wait for running chunks, because Numba may then keep its lock.
 
     Raises
     ------
     InterruptedError
-        In a chunk under way, to stop it.
+        In a running chunk, to stop it.
     """
     stopped = threading.Event()
 
@@ -89,11 +89,11 @@ def fly_on_threads(workers: int, chunks: Iterable[Chunk]) -> Flights:
 
 @contextlib.contextmanager
 def worker_processes(count: int) -> Iterator[Executor]:
-    """Start processes that fly chunks; they end on leaving, at once if an error leads out, and with this process.
+    """Start processes that simulate chunks, and end the processes on exit from the context.
 
-    They are spawned, never forked: a forked process would keep the lock of a campaign's folder after its parent.
-    Threads share one interpreter, which half of the work of an engagement needs; processes do not, but each costs a
-    second or two to start and the memory of a process.
+    After an error they end at once; if this process dies, they end too. Processes are spawned, because a forked process
+    would keep the lock of a campaign's folder after the end of its parent. Threads share one interpreter, which half of
+    the work of an engagement needs. Processes do not, but each takes one or two seconds to start, and memory.
 
     Raises
     ------

@@ -57,7 +57,7 @@ def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetMo
     To first order, the difference of the Sun's attraction at two points with distance vector r is
     (K/R^3)(3 (n . r) n - r), with the direction n of the Sun. Along z it is at most (K/R^3)(1.5 |r| + 0.5 |z|), in any
     direction at most 2 K/R^3 |r|. The lengths of the model scale with V_x, which gravity changes; this adds 0.7 |z| and
-    2 (|r| + |z|) |V_z|/|V_x|. R decreases by at most the range and the distance flown. A margin of 5 % covers the
+    2 (|r| + |z|) |V_z|/|V_x|. R decreases by at most the range and the distance travelled. A margin of 5 % covers the
     second order and the change of n. docs/guarantee.md has the derivation.
     """
     if sun is None:

@@ -19,7 +19,7 @@ from sim.scenario import Scenario, Sun
 Floats = NDArray[np.float64]
 
 STEPS_BEYOND = 2
-"""Steps flown at most after the one in which x = 0."""
+"""Greatest number of simulated steps after the one in which x = 0."""
 
 
 class ScheduledMotion(KeplerMotion):
@@ -77,7 +77,7 @@ def fly_pair(
     pair: TruthPair,
     strategy: Strategy | None = None,
 ) -> PairFlight:
-    """Fly two motions with the same measurements up to the last common step.
+    """Simulate two motions with the same measurements up to the last common step.
 
     The greater one of the two misses is at least `pair.bound_m` for every deterministic strategy, up to the differences
     in the notes.
@@ -89,7 +89,7 @@ def fly_pair(
     pair : TruthPair
         Starts and accelerations of the two motions.
     strategy : Strategy or None
-        None is the scenario's own.
+        Guidance strategy; None is the scenario's.
 
     Notes
     -----

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Counts = NDArray[np.int64]
 ROWS = ("angle", "range", "rate")
-"""Sensors of a sequence's first rows, on board or not: the random numbers of a search depend on the number of rows."""
+"""Sensors of the first rows of a sequence, also if absent: the random numbers of a search depend on the row count."""
 ANGLE = 0
 
 
@@ -32,16 +32,16 @@ class Plans:
         (z, x, V_z, V_x) at t = 0, m and m/s.
     sequence : ndarray, shape (n, rows, steps)
         Errors in units of their bounds, one row per sensor, `ROWS` first.
-    given : ndarray of bool, shape (n, steps)
+    prescribed : ndarray of bool, shape (n, steps)
         Whether the errors of a step are those of the sequence. Otherwise the noise keeps the upper extreme of the
         predicted miss if the element of the angle is not negative, and the lower one if it is.
     lineage, changes : ndarray of int, shape (n,)
-        Number of the first plan that a plan comes from, and of the changes since.
+        Index of the first plan from which a plan was derived, and number of changes since then.
     """
 
     start: Floats
     sequence: Floats
-    given: Flags
+    prescribed: Flags
     lineage: Counts
     changes: Counts
 
@@ -54,7 +54,7 @@ class Plans:
 
     def join(self, other: Plans) -> Plans:
         """Return these plans and others."""
-        return Plans(*(np.concatenate([getattr(each, of.name) for each in (self, other)]) for of in fields(self)))
+        return Plans(*(np.concatenate([getattr(part, of.name) for part in (self, other)]) for of in fields(self)))
 
 
 @dataclass
@@ -89,10 +89,12 @@ class PlannedNoise:
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
         """Return the measurements of this step: with planned errors, or those that keep an extreme of the set."""
-        step, given = sight.step, self.plans.given[:, sight.step]
+        step, prescribed = sight.step, self.plans.prescribed[:, sight.step]
         kept = errors_made(sight, self._keeping.measure(sight, predicted))
         rows = {name: row for row, name in enumerate(self.names) if name in sight.sensors}
-        errors = {name: np.where(given, self.plans.sequence[:, row, step], kept[name]) for name, row in rows.items()}
+        errors = {
+            name: np.where(prescribed, self.plans.sequence[:, row, step], kept[name]) for name, row in rows.items()
+        }
         for name, row in rows.items():
             self.errors[:, row, step] = errors[name]
         return measure_with_errors(sight, errors)
@@ -123,10 +125,10 @@ class Flown:
     truth_kept: Flags
 
     def take(self, which: Counts | slice) -> Flown:
-        """Return some of them."""
-        return Flown(self.plans.take(which), *(getattr(self, each.name)[which] for each in fields(self)[1:]))
+        """Return some plans with their outcomes."""
+        return Flown(self.plans.take(which), *(getattr(self, field.name)[which] for field in fields(self)[1:]))
 
     def join(self, other: Flown) -> Flown:
-        """Return these and others."""
-        both = (np.concatenate([getattr(each, of.name) for each in (self, other)]) for of in fields(self)[1:])
+        """Return these plans with their outcomes, and others."""
+        both = (np.concatenate([getattr(part, of.name) for part in (self, other)]) for of in fields(self)[1:])
         return Flown(self.plans.join(other.plans), *both)

@@ -52,7 +52,7 @@ class StepRecord:
 
 @dataclass(frozen=True)
 class Inconsistency:
-    """The first measurement that no state of the set agreed with.
+    """The first measurement that contradicts all states of the set.
 
     Parameters
     ----------
@@ -68,24 +68,24 @@ class Inconsistency:
 
 @dataclass(frozen=True)
 class Record:
-    """The whole course of one engagement.
+    """All steps of one engagement.
 
     Parameters
     ----------
     scenario : Scenario
-        What was flown, with the noise, tie rule and range meter of this engagement.
+        Simulated scenario, with the noise, tie rule and range meter of this engagement.
     seed, run : int
-        Root seed and run number, which draw the same engagement again.
+        Root seed and run number; the same values give the same engagement.
     strategy : str
         Name of the strategy.
     result : Results
-        A batch of one.
+        Results, as a batch of one.
     steps : tuple of StepRecord
         All steps, in order.
     noise : str or None
-        Name of a noise that replaced the scenario's; None if it did not.
+        Name of the noise that replaced that of the scenario; None if none did.
     inconsistency : Inconsistency or None
-        None if no measurement contradicted the model.
+        First measurement that contradicts the model; None without one.
     """
 
     scenario: Scenario
@@ -99,7 +99,7 @@ class Record:
 
     @property
     def noise_name(self) -> str:
-        """Name of the noise that was flown."""
+        """Name of the measurement noise."""
         return self.scenario.noise.value if self.noise is None else self.noise
 
     def __repr__(self) -> str:
@@ -162,12 +162,12 @@ def fly_one(
     noise: MeasurementNoise | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Record:
-    """Fly one engagement and keep its whole course.
+    """Simulate one engagement and return the record of its steps.
 
     Parameters
     ----------
     scenario : Scenario
-        What is flown. `experiments.fly_one` also takes the name of a built-in scenario.
+        Scenario to simulate. `experiments.fly_one` also accepts the name of a built-in scenario.
     run, seed : int
         Run `run` of `simulate(..., seed=seed)` is the same engagement, number for number.
     strategy : Strategy, str or None
@@ -196,9 +196,9 @@ def fly_one(
     name = strategy_name(scenario, own_strategy)
     own = None if noise is None else getattr(noise, "name", type(noise).__name__)
     at_step, label = flight.inconsistency
-    found = Inconsistency(int(at_step[0]), float(label[0])) if at_step.count() else None
+    inconsistency = Inconsistency(int(at_step[0]), float(label[0])) if at_step.count() else None
     margins = flight.truth_margins_m()
     steps = tuple(
         replace(step, truth_margin_m=margin.tolist()[0]) for step, margin in zip(recorder.steps, margins, strict=True)
     )
-    return Record(scenario, seed, run, name, flight.results(np.array([run])), steps, own, found)
+    return Record(scenario, seed, run, name, flight.results(np.array([run])), steps, own, inconsistency)

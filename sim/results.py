@@ -117,7 +117,7 @@ class Results:
         return frame
 
     def take(self, indices: NDArray[np.intp]) -> Results:
-        """Return the results at these indices, in their order."""
+        """Return the results at some indices, in the order of the indices."""
 
         def taken(values: Any) -> Any:
             if isinstance(values, bool):

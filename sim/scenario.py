@@ -65,11 +65,11 @@ class Target:
     Parameters
     ----------
     manoeuvre : Manoeuvre
-        How it accelerates.
+        Kind of the manoeuvre.
     acceleration_m_s2 : float
-        Its acceleration along z, m/s^2.
+        Acceleration along z, m/s^2.
     switching_period_s : float
-        Time between changes of sign (bang-bang), or its mean (random telegraph), s.
+        Time between changes of sign (bang-bang), or the mean time (random telegraph), s.
 
     Raises
     ------
@@ -92,7 +92,7 @@ class Scenario:
     Parameters
     ----------
     name, description : str
-        Name, and one line of description.
+        Name, and a description of one line.
     sun : Sun or None
         None is free space.
     nominal_range_m : float
@@ -161,7 +161,7 @@ def strategy_name(scenario: Scenario, own: Strategy | None) -> str:
 
 
 def with_strategy(scenario: Scenario, strategy: Strategy | str | None) -> tuple[Scenario, Strategy | None]:
-    """Return the scenario with a strategy that is given by its registered name; a strategy object is returned as is."""
+    """Return the scenario with a strategy if it is a registered name, and the strategy if it is an object."""
     if isinstance(strategy, str):
         return replace(scenario, strategy=strategy), None
     return scenario, strategy

@@ -1,4 +1,4 @@
-"""Fly many engagements of one scenario."""
+"""Simulation of many engagements of one scenario."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def simulate(
     guarantee: bool = True,
     progress: Callable[[float], None] | None = None,
 ) -> Results:
-    """Fly engagements whose starts and measurement errors are drawn at random.
+    """Simulate engagements whose starts and measurement errors are drawn at random.
 
     Parameters
     ----------
     scenario : Scenario
-        What is flown. `experiments.simulate` also takes the name of a built-in scenario.
+        Scenario to simulate. `experiments.simulate` also accepts the name of a built-in scenario.
     runs : int or sequence of int
         Number of runs, or the run numbers. Run k of a seed is the same engagement in every call.
     seed : int
@@ -58,10 +58,12 @@ def simulate(
     scenario, own = with_strategy(scenario, strategy)
     numbers = np.asarray(runs)
     if isinstance(runs, bool) or numbers.ndim > 1 or (numbers.dtype.kind not in "iu" and numbers.size):
-        raise TypeError(f"runs must be how many runs, or a sequence of run numbers, all integers: got {shown(runs)}")
+        raise TypeError(
+            f"runs must be the number of runs or a sequence of run numbers, all integers: got {shown(runs)}"
+        )
     numbers = np.arange(int(numbers)) if numbers.ndim == 0 else numbers.astype(np.int64)
     if numbers.size == 0 or numbers.min() < 0:
-        raise ValueError(f"need at least one run, and run numbers not negative: got runs={runs}")
+        raise ValueError(f"need at least one run, and no negative run numbers: got runs={runs}")
     parts = []
     # Few engagements at once fit into the processor's cache, and into memory when there are very many sections.
     at_once = max(1, min(ENGAGEMENTS_AT_ONCE, SECTIONS_AT_ONCE // scenario.set_model.sections))

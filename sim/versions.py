@@ -10,12 +10,12 @@ CALCULATING = ("infoset", "numpy", "numba", "llvmlite")
 
 
 class VersionError(Exception):
-    """A chunk is to be flown with other versions of the packages; the message names both."""
+    """A chunk needs other versions of the packages; the message names both versions."""
 
 
 @functools.cache
 def calculating_versions() -> tuple[tuple[str, str], ...]:
-    """Return name and version of each package that computes."""
+    """Return the names and versions of the packages on which results depend."""
     return tuple((name, _version(name)) for name in CALCULATING)
 
 

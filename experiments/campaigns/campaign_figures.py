@@ -40,7 +40,7 @@ _START_LABELS = {
 
 @dataclass(frozen=True)
 class CampaignColumns:
-    """The rows of one noise, column by column.
+    """The columns of the rows of one noise.
 
     Parameters
     ----------
@@ -49,11 +49,11 @@ class CampaignColumns:
     range_meter : bool
         Whether the scenario has a range meter.
     miss_m, impulse_m_s : ndarray, shape (n,)
-        In the order of the runs.
+        Miss and impulse spent, in the order of the runs.
     guaranteed_miss_m : ndarray, shape (m,)
-        Where it is known.
+        Known values of the guaranteed miss.
     start : mapping of str to ndarray, shape (n,)
-        Initial state, by column.
+        Components of the initial state, by column.
     guarantees : bool
         Whether the guaranteed misses are guarantees.
     """
@@ -68,7 +68,7 @@ class CampaignColumns:
 
     @property
     def look(self) -> dict[str, Any]:
-        """Line style: dark and solid, or light and dashed, which differ in grey too."""
+        """Line style: dark and solid, or light and dashed, which differ also without colours."""
         return CURVE_LOOKS[1 if self.noise == "random" else 4]
 
 
@@ -114,10 +114,10 @@ def draw_convergence(columns: Sequence[CampaignColumns]) -> Figure:
                 axes.set_xlabel("runs")
                 axes.set_ylabel(label)
         handles: list[Line2D | Patch] = [
-            Line2D([], [], color=INK, linewidth=1.2, linestyle=_line(place), label=level_name(level))
-            for place, level in enumerate(CONVERGING)
+            Line2D([], [], color=INK, linewidth=1.2, linestyle=_line(index), label=level_name(level))
+            for index, level in enumerate(CONVERGING)
         ]
-        handles.append(Patch(facecolor=LIMIT, alpha=0.3, label="95 % confidence interval, where the runs give one"))
+        handles.append(Patch(facecolor=LIMIT, alpha=0.3, label="95 % confidence interval, if there are enough runs"))
         figure.legend(handles=handles, loc="lower center", ncols=len(handles))
     return figure
 
@@ -173,17 +173,17 @@ def _correlation(one: Floats, other: Floats) -> float | None:
 
 
 def _ranks(values: Floats) -> Floats:
-    """Ranks from 0; equal values share the mean of theirs."""
-    _, places, counts = np.unique(values, return_inverse=True, return_counts=True)
+    """Return the ranks of values, from 0; equal values have the mean of their ranks."""
+    _, indices, counts = np.unique(values, return_inverse=True, return_counts=True)
     first = np.cumsum(counts) - counts
-    return np.asarray((first + 0.5 * (counts - 1))[places], dtype=np.float64)
+    return np.asarray((first + 0.5 * (counts - 1))[indices], dtype=np.float64)
 
 
 def _draw_miss(axes: Axes, columns: Sequence[CampaignColumns]) -> None:
-    """Draw the misses, and dotted their guarantees; the axis has room for both."""
+    """Draw the distributions of the misses, and with dotted lines those of the guaranteed misses."""
     samples = [column.miss_m for column in columns]
     guaranteed = [column.guaranteed_miss_m for column in columns]
-    ends = scale_axis(axes, [*samples, *(each for each in guaranteed if each.size)], from_zero=True)
+    ends = scale_axis(axes, [*samples, *(sample for sample in guaranteed if sample.size)], from_zero=True)
     for column in columns:
         _distribution(axes, column.miss_m, ends, column.look, band=True)
         if column.guaranteed_miss_m.size:
@@ -203,7 +203,7 @@ def _draw_impulse(axes: Axes, columns: Sequence[CampaignColumns]) -> None:
 
 
 def _beyond(name: str, samples: Sequence[Floats], right: float) -> str:
-    """Return a note on the values beyond the axis; empty where there are none."""
+    """Return a note with the number of values beyond the axis, or an empty text without such values."""
     counts = [f"{int((sample > right).sum())} of {sample.size}" for sample in samples if (sample > right).any()]
     return f"{name} beyond the axis: {', '.join(counts)}" if counts else ""
 
@@ -228,17 +228,17 @@ def _convergence(axes: Axes, sample: Floats, colour: str) -> None:
     least = min(10, sample.size)
     counts = np.unique(np.geomspace(least, sample.size, _LOOKS).astype(np.int64))
     looks = [estimate_quantiles(sample[:count], CONVERGING, _CONFIDENCE) for count in counts.tolist()]
-    for place in range(len(CONVERGING)):
-        estimates = [look[place] for look in looks]
-        axes.plot(counts, [each.value for each in estimates], color=colour, linestyle=_line(place), zorder=3.0)
-        known = [
-            (n, each.lower, each.upper) for n, each in zip(counts, estimates, strict=True) if each.width is not None
+    for index in range(len(CONVERGING)):
+        estimates = [look[index] for look in looks]
+        axes.plot(counts, [estimate.value for estimate in estimates], color=colour, linestyle=_line(index), zorder=3.0)
+        intervals = [
+            (runs, estimate.lower, estimate.upper)
+            for runs, estimate in zip(counts, estimates, strict=True)
+            if estimate.width is not None
         ]
-        if known:
-            places, lower, upper = zip(*known, strict=True)
-            axes.fill_between(
-                places, lower, upper, facecolor=colour, alpha=0.18, linewidth=0.0, zorder=1.5 + 0.1 * place
-            )
+        if intervals:
+            runs, lower, upper = zip(*intervals, strict=True)
+            axes.fill_between(runs, lower, upper, facecolor=colour, alpha=0.18, linewidth=0.0, zorder=1.5 + 0.1 * index)
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter(
         FuncFormatter(lambda tick, _: f"{tick:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}"))
@@ -268,20 +268,20 @@ def _cloud(axes: Axes, start: Floats, miss: Floats, colour: str) -> None:
     bins = min(_BINS, miss.size // 100)
     if bins < 2 or greatest <= least:
         return
-    places = np.minimum(((start - least) / (greatest - least) * bins).astype(np.int64), bins - 1)
+    bin_of = np.minimum(((start - least) / (greatest - least) * bins).astype(np.int64), bins - 1)
     middle = least + (np.arange(bins) + 0.5) * (greatest - least) / bins
     for order, level in enumerate((0.5, 0.9)):
-        filled = np.unique(places)
-        values = [np.quantile(miss[places == each], level) for each in filled]
+        filled = np.unique(bin_of)
+        values = [np.quantile(miss[bin_of == number], level) for number in filled]
         axes.plot(middle[filled], values, color=INK, linestyle=_line(order), zorder=3.0)
 
 
-def _line(place: int) -> Any:
-    return ("-", (0, (5, 1.5)), (0, (1.5, 1.2)))[place]
+def _line(index: int) -> Any:
+    return ("-", (0, (5, 1.5)), (0, (1.5, 1.2)))[index]
 
 
 def _guarantee_name(columns: Sequence[CampaignColumns]) -> str:
-    return "guaranteed miss" if columns[0].guarantees else "published $\\Phi$, no guarantee"
+    return "guaranteed miss" if columns[0].guarantees else "the paper's $\\Phi$ (not a bound here)"
 
 
 def _handles(columns: Sequence[CampaignColumns]) -> tuple[list[Any], list[str]]:

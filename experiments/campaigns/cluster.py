@@ -1,4 +1,4 @@
-"""A Dask cluster as an executor: it answers within seconds and has the same versions of the packages."""
+"""A Dask cluster as an executor, after checks of its address, its scheduler, its workers and their versions."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _ADDRESS = re.compile(r"(?P<protocol>tcp|tls)://(?P<host>\[[0-9a-fA-F:]+\]|[^\s/
 
 @dataclass(frozen=True)
 class Cluster:
-    """A cluster that is connected.
+    """A connected cluster.
 
     Parameters
     ----------
@@ -55,8 +55,8 @@ def connected(address: str) -> Iterator[Cluster]:
         If Dask is not installed, the scheduler does not answer in time or has no workers, or a worker has other
         versions of the packages.
     """
-    found = _ADDRESS.fullmatch(address)
-    if found is None or not 0 < int(found["port"]) < 65536:
+    parts = _ADDRESS.fullmatch(address)
+    if parts is None or not 0 < int(parts["port"]) < 65536:
         raise InputError(f"--dask: must be an address such as tcp://host:8786, found {shown(address)}")
     try:
         from distributed import Client
@@ -67,7 +67,7 @@ def connected(address: str) -> Iterator[Cluster]:
     # The failure of a scheduler is one message of the command, without tracebacks of the client's threads.
     for name in ("distributed", "distributed.client", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
-    _need_listener(address, found["host"].strip("[]"), int(found["port"]))
+    _need_listener(address, parts["host"].strip("[]"), int(parts["port"]))
     _need_scheduler(address)
     try:
         client = Client(address, timeout=PATIENCE_S, set_as_default=False)
@@ -86,20 +86,20 @@ def connected(address: str) -> Iterator[Cluster]:
 
 def is_open(address: str) -> bool:
     """Whether a scheduler's address is neither encrypted nor on this machine only; False if it is not an address."""
-    found = _ADDRESS.fullmatch(address)
-    if found is None or found["protocol"] == "tls":
+    parts = _ADDRESS.fullmatch(address)
+    if parts is None or parts["protocol"] == "tls":
         return False
-    host = found["host"].strip("[]")
+    host = parts["host"].strip("[]")
     if host == "localhost":
         return False
     try:
         return not ipaddress.ip_address(host).is_loopback
-    except ValueError:  # a name, which may be any machine's
+    except ValueError:  # a host name, which may be that of any machine
         return True
 
 
 def _need_listener(address: str, host: str, port: int) -> None:
-    """Fail at once if no program listens there; the client of the cluster would retry."""
+    """Fail at once if no program listens at the address; the client of the cluster would retry."""
     try:
         with socket.create_connection((host, port), timeout=PATIENCE_S / 2):
             pass
@@ -108,7 +108,7 @@ def _need_listener(address: str, host: str, port: int) -> None:
 
 
 def _need_scheduler(address: str) -> None:
-    """Ask what program listens there, with a time limit; the client of the cluster may wait without one."""
+    """Check, with a time limit, that a scheduler listens at the address; the client may wait without a limit."""
     import asyncio
 
     from distributed.comm.core import connect
@@ -128,17 +128,17 @@ def _need_scheduler(address: str) -> None:
         return await asyncio.wait_for(kind(), PATIENCE_S / 2)
 
     try:
-        found = asyncio.run(in_time())
+        program = asyncio.run(in_time())
     except Exception as error:  # another program may send anything, and reading it may fail in any way
         raise _silent(address, error) from None
-    if found != "Scheduler":
-        raise _silent(address, OSError(0, f"it is a {str(found)[:40]}"))
+    if program != "Scheduler":
+        raise _silent(address, OSError(0, f"it is a {str(program)[:40]}"))
 
 
 def _silent(address: str, error: BaseException) -> InputError:
     reason = (error.strerror if isinstance(error, OSError) else "") or str(error) or "no answer in time"
     if not isinstance(error, OSError | TypeError):  # TypeError: no certificates for TLS
-        reason = "what it sends is not Dask's protocol"
+        reason = "the answer is not in Dask's protocol"
     return InputError(
         f"--dask: no Dask scheduler answers at {address} ({reason[:150]}); start one with: dask scheduler, and check "
         "the address that it prints"

@@ -1,4 +1,4 @@
-"""Flying a campaign or a sweep: where it is flown, its progress, and messages for what can go wrong."""
+"""Simulation of a campaign or a sweep: workers, progress and error messages."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ from sim.storage import StorageError, need_free
 from sim.versions import VersionError
 
 SCENARIO_FILE = "scenario.toml"
-"""In the folder of a campaign."""
+"""Name of the scenario file in the folder of a campaign."""
 RESUME_HINT = "; the stored runs are complete: continue with --resume"
 ESTIMATED_FROM = 50_000
 """Number of engagements from which time and disk space are estimated first."""
 
 MOST_WARNINGS = 5
-"""Warnings shown of a sweep; those of its cells are alike."""
+"""Greatest number of warnings shown for a sweep, whose cells have similar warnings."""
 BYTES_A_RUN, BYTES_A_SHARD = 66, 6_000
 _LINE_EVERY_S = 60.0
 _WARM_UP = 8
@@ -58,32 +58,32 @@ def scenario_of(options: Flight) -> Scenario:
 
 @dataclass(frozen=True)
 class Flown:
-    """A campaign or a sweep that has been flown, the warnings on its scenarios, and the time of this session."""
+    """A simulated campaign or sweep, the warnings about its scenarios, and the time of this session."""
 
     result: CampaignResult
     warnings: list[str]
     elapsed_s: float
 
 
-def fly(asked: Campaign, options: Flight) -> Flown:
-    """Fly what the folder of a campaign lacks, with messages on stderr."""
+def fly(campaign: Campaign, options: Flight) -> Flown:
+    """Simulate the engagements that the folder of a campaign does not contain yet, with messages on stderr."""
     need_free(options.out, resume=options.resume)
     note = partial(say, quiet=options.quiet)
-    files = {SCENARIO_FILE: scenario_to_toml(asked.scenario)}
-    scenarios = asked.cells or (asked.scenario,)
+    files = {SCENARIO_FILE: scenario_to_toml(campaign.scenario)}
+    scenarios = campaign.cells or (campaign.scenario,)
     warnings = list(dict.fromkeys(line for scenario in scenarios for line in scenario_warnings(scenario)))
-    for warning in warnings[: MOST_WARNINGS if asked.cells else None]:
+    for warning in warnings[: MOST_WARNINGS if campaign.cells else None]:
         note(f"warning: {warning}")
     with _workers(options, note) as workers:
-        if asked.engagements >= ESTIMATED_FROM:
-            note(f"{_estimate(asked, workers.cores)}{' at most' if asked.until else ''}")
+        if campaign.engagements >= ESTIMATED_FROM:
+            note(f"{_estimate(campaign, workers.cores)}{' at most' if campaign.until else ''}")
         began_s = time.perf_counter()
-        with campaign_progress(asked.kind, options.quiet) as progress:
-            result = asked.run(
+        with campaign_progress(campaign.kind, options.quiet) as progress:
+            result = campaign.run(
                 workers.executor, workers=workers.count, resume=options.resume, progress=progress, beside=files
             )
     for damage in result.redone:
-        note(f"{damage.file}: {damage.reason}; flown again")
+        note(f"{damage.file}: {damage.reason}; its runs were simulated again")
     return Flown(result, warnings, time.perf_counter() - began_s)
 
 
@@ -119,16 +119,16 @@ def campaign_errors(resume_hint: str = "") -> Iterator[None]:
 
 @dataclass(frozen=True)
 class _Workers:
-    """Where engagements are flown.
+    """Workers that simulate engagements.
 
     Parameters
     ----------
     executor : Executor or None
-        None is threads of this process.
+        Executor of the chunks; None uses threads of this process.
     count : int or None
         Number of threads, or of chunks that the executor gets at a time.
     cores : int
-        Engagements flown at the same time.
+        Number of engagements that are simulated at the same time.
     """
 
     executor: Executor | None
@@ -138,7 +138,7 @@ class _Workers:
 
 @contextlib.contextmanager
 def _workers(options: Flight, note: Callable[[str], None]) -> Iterator[_Workers]:
-    """Start the workers that the options name: threads or processes here, or those of a cluster."""
+    """Start the workers of the options: threads or processes on this machine, or a cluster."""
     if sum(option is not None for option in (options.dask, options.workers, options.processes)) > 1:
         raise InputError(
             "--workers (threads here), --processes (here) and --dask (a cluster) exclude each other; give one of them"
@@ -154,32 +154,32 @@ def _workers(options: Flight, note: Callable[[str], None]) -> Iterator[_Workers]
             )
         with connected(options.dask) as cluster:
             note(f"{cluster.workers} Dask workers, {cluster.threads} threads")
-            # Two chunks a thread keep all busy while results travel; workers that join later get some too.
+            # With two chunks per thread all threads have work while results are sent, and workers can join later.
             yield _Workers(cluster.executor, max(2 * cluster.threads, 16), cluster.threads)
     else:
         yield _Workers(None, options.workers, options.workers or os.cpu_count() or 1)
 
 
-def _estimate(asked: Campaign, cores: int) -> str:
+def _estimate(campaign: Campaign, cores: int) -> str:
     """Return a line with the time and the disk space of a campaign, measured on a few of its engagements.
 
     Raises
     ------
     InputError
-        If the disk has less space.
+        If the disk has too little space.
     """
-    manifest, folder = asked.manifest(), Path(asked.folder)
-    chunk = asked.chunk_at(manifest.chunks // 2, manifest)
-    pilot = range(min(ENGAGEMENTS_AT_ONCE, asked.runs))
+    manifest, folder = campaign.manifest(), Path(campaign.folder)
+    chunk = campaign.chunk_at(manifest.chunks // 2, manifest)
+    pilot = range(min(ENGAGEMENTS_AT_ONCE, campaign.runs))
     list(fly_on_threads(1, [replace(chunk, runs=range(_WARM_UP))]))  # loads or compiles the kernels
     began_s = time.perf_counter()
     list(fly_on_threads(1, [replace(chunk, runs=pilot)]))
-    seconds = (time.perf_counter() - began_s) / len(pilot) * asked.engagements / cores
-    needed = BYTES_A_RUN * asked.engagements + BYTES_A_SHARD * manifest.chunks
+    seconds = (time.perf_counter() - began_s) / len(pilot) * campaign.engagements / cores
+    needed = BYTES_A_RUN * campaign.engagements + BYTES_A_SHARD * manifest.chunks
     existing = next(path for path in (folder, *folder.absolute().parents) if path.is_dir())
     free = shutil.disk_usage(existing).free
     line = (
-        f"{asked.engagements} engagements: about {duration(seconds)} on {cores} core{'s' if cores > 1 else ''}, and "
+        f"{campaign.engagements} engagements: about {duration(seconds)} on {cores} core{'s' if cores > 1 else ''}, and "
         f"{size(needed)} in {manifest.chunks} shards"
     )
     if needed > free:
@@ -189,7 +189,7 @@ def _estimate(asked: Campaign, cores: int) -> str:
 
 @contextlib.contextmanager
 def campaign_progress(name: str, quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """Yield a function that shows progress on stderr: as a bar on a terminal, else as a line a minute."""
+    """Yield a function that shows progress on stderr: a bar on a terminal, otherwise one line per minute."""
     if quiet:
         yield lambda _: None
     elif not sys.stderr.isatty():

@@ -1,4 +1,4 @@
-"""`infoset campaign`: flight, summary and tables."""
+"""`infoset campaign`: simulation, summary and tables."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ SUMMARY = "summary.json"
 
 
 def run(options: Options) -> None:
-    """Fly the campaign, write its summary and print the tables."""
+    """Simulate the campaign, write its summary and print the tables."""
     with (
         campaign_errors(RESUME_HINT),
         output(files={"--json": options.json}, overwrite=options.overwrite, quiet=options.quiet) as written,
     ):
         need_arrow()
         scenario = scenario_of(options)
-        asked = Campaign(
+        campaign = Campaign(
             scenario,
             options.runs,
             options.out,
@@ -40,19 +40,19 @@ def run(options: Options) -> None:
             chunk=options.chunk,
             until=_rule(options.until),
         )
-        flown = fly(asked, options)
+        flown = fly(campaign, options)
         stored = flown.result.folder
-        found = samples(stored)
+        by_noise = samples(stored)
         summary = to_json(
             {
                 **heading(stored),
                 **({"warnings": flown.warnings} if flown.warnings else {}),
                 "elapsed_s": flown.elapsed_s,
                 "redone": [{"file": damage.file.name, "reason": damage.reason} for damage in flown.result.redone],
-                "samples": [sample_json(sample) for sample in found],
+                "samples": [sample_json(sample) for sample in by_noise],
             }
         )
-        tables = samples_table(found, stored.manifest.scenario.set_model.kind.value)
+        tables = samples_table(by_noise, stored.manifest.scenario.set_model.kind.value)
         folder = Output(options.out, {}, overwrite=True)
         folder.save(SUMMARY, summary)
         written.written += [options.out / "shards", options.out / SCENARIO_FILE, *folder.written]

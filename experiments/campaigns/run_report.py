@@ -1,4 +1,4 @@
-"""`infoset report`: a campaign or a sweep, from its files only."""
+"""`infoset report`: report on a campaign or a sweep from its files."""
 
 from __future__ import annotations
 
@@ -91,8 +91,8 @@ def _report_sweep(folder: CampaignFolder, options: Report, written: Output, cons
 
 def _report_campaign(folder: CampaignFolder, options: Report, written: Output, console: Console | None) -> None:
     columns = _columns(folder)
-    found = samples(folder)
-    # The replay lines name the scenario's file in the folder, or the one that the report writes.
+    by_noise = samples(folder)
+    # The commands that repeat runs name the scenario file in the folder, or the one that the report writes.
     scenario_file = folder.path / SCENARIO_FILE
     if options.out is not None and not scenario_file.is_file():
         scenario_file = options.out / SCENARIO_FILE
@@ -101,7 +101,7 @@ def _report_campaign(folder: CampaignFolder, options: Report, written: Output, c
     report = {
         **heading(folder),
         "damaged": [{"file": damage.file.name, "reason": damage.reason} for damage in folder.damaged],
-        "samples": [sample_json(sample) for sample in found],
+        "samples": [sample_json(sample) for sample in by_noise],
         "correlation_with_miss": related,
         "worst": worst,
     }
@@ -110,11 +110,11 @@ def _report_campaign(folder: CampaignFolder, options: Report, written: Output, c
         for name, draw in zip(FIGURES, (draw_campaign_distributions, draw_convergence, draw_dispersion), strict=True):
             written.figure(name, draw(columns))
     if console is not None:
-        _show(console, folder, found, related, worst)
+        _show(console, folder, by_noise, related, worst)
 
 
 def _columns(folder: CampaignFolder) -> list[CampaignColumns]:
-    """Return all rows, an entry for each noise that has some."""
+    """Return the columns of all rows, one entry for each noise with rows."""
     scenario = folder.manifest.scenario
     miss, impulse, guaranteed = (folder.numbers(name) for name in ("miss_m", "impulse_m_s", "guaranteed_miss_m"))
     start = {name: folder.numbers(name).data for name in START}
@@ -136,7 +136,7 @@ def _columns(folder: CampaignFolder) -> list[CampaignColumns]:
 def _show(
     console: Console,
     folder: CampaignFolder,
-    found: Sequence[Sample],
+    by_noise: Sequence[Sample],
     related: Correlations,
     worst: Sequence[Mapping[str, Any]],
 ) -> None:
@@ -146,7 +146,7 @@ def _show(
     manifest = folder.manifest
     stopped = "" if manifest.stopped_after is None else f", stopped by the rule {manifest.until}"
     line(f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}; quantiles with 95 % confidence limits")
-    table, notes = samples_table(found, manifest.scenario.set_model.kind.value)
+    table, notes = samples_table(by_noise, manifest.scenario.set_model.kind.value)
     console.print(table)
     for note in notes:
         line(note)
@@ -161,8 +161,8 @@ def _show(
     console.print(table)
     console.print()
     line("the worst runs, each with the command that simulates it again:")
-    for flown in worst:
-        miss, impulse = number(flown["miss_m"]), number(flown["impulse_m_s"])
-        line(f"  miss {miss} m, impulse {impulse} m/s, {flown['outcome']}: {flown['replay']}")
+    for row in worst:
+        miss, impulse = number(row["miss_m"]), number(row["impulse_m_s"])
+        line(f"  miss {miss} m, impulse {impulse} m/s, {row['outcome']}: {row['replay']}")
     if not (folder.path / SCENARIO_FILE).is_file():
         line(f"(the folder has no {SCENARIO_FILE}, which these commands need; --out writes one)")

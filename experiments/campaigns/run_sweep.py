@@ -1,4 +1,4 @@
-"""`infoset sweep`: flight, table, figure and answers."""
+"""`infoset sweep`: simulation, table, figure and the values that meet the requirement."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from sim import CampaignNoise, Sweep
 from sim.storage import need_arrow, need_free
 
 ASK_FROM = 1_000_000
-"""Number of engagements from which a sweep is started only after a question."""
+"""Number of engagements above which the command asks before it starts a sweep."""
 
 
 def run(options: Options) -> None:
-    """Fly the sweep, write its table and figure, and print where the requirement is met."""
+    """Simulate the sweep, write its table and figure, and print where the requirement is met."""
     with (
         campaign_errors(RESUME_HINT),
         output(files={"--json": options.json}, overwrite=options.overwrite, quiet=options.quiet) as written,
@@ -31,7 +31,7 @@ def run(options: Options) -> None:
         quantiles = quantile_options(options.require, options.show)
         scenario = scenario_of(options)
         axes = sweep_axes(options.vary, scenario)
-        asked = Sweep(
+        swept = Sweep(
             scenario,
             axes,
             sweep_cells(scenario, axes),
@@ -45,8 +45,8 @@ def run(options: Options) -> None:
         )
         need_free(options.out, resume=options.resume)
         if not options.yes:
-            _ask(asked)
-        flown = fly(asked, options)
+            _ask(swept)
+        flown = fly(swept, options)
         report = sweep_report(flown.result.folder, quantiles)
         summary = to_json(report.to_json(flown.elapsed_s))
         folder = Output(options.out, {}, overwrite=True)
@@ -57,14 +57,14 @@ def run(options: Options) -> None:
     if not options.quiet:
         report.show(table_console(written.stdout_taken))
         if not report.is_drawn:
-            say("a figure shows one or two keys; three keys and more are not drawn", options.quiet)
+            say("no figure: a figure can show one or two keys only", options.quiet)
 
 
-def _ask(asked: Sweep) -> None:
-    """Ask before a long sweep; refuse it where stdin is no terminal."""
-    if asked.engagements <= ASK_FROM:
+def _ask(swept: Sweep) -> None:
+    """Ask the user to confirm a long sweep; without a terminal, refuse it."""
+    if swept.engagements <= ASK_FROM:
         return
-    question = f"{len(asked.cells)} cells of {asked.runs} runs are {asked.engagements} engagements, more than a million"
+    question = f"{len(swept.cells)} cells of {swept.runs} runs are {swept.engagements} engagements, more than a million"
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         raise InputError(f"{question}; give --yes to start the sweep, or fewer --runs or values")
     if not typer.confirm(f"{question}. Continue?", err=True):

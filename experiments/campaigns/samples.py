@@ -37,7 +37,7 @@ class Sample:
     runs : int
         Number of engagements.
     quantiles : mapping of str to sequence of QuantileEstimate
-        By quantity; without the guaranteed miss where it is never known.
+        Quantiles by quantity; without the guaranteed miss if it is not known in any run.
     worst : mapping of str to float
         Largest value of each quantity.
     outcomes : mapping of str to int
@@ -64,7 +64,7 @@ def noises_of(folder: CampaignFolder) -> list[str]:
 
 
 def noise_flags(folder: CampaignFolder) -> dict[str, NDArray[np.bool_] | slice]:
-    """Return the rows of each noise, as flags, or as a slice where it has all rows."""
+    """Return the rows of each noise as flags, or as a slice if there is one noise."""
     noises = noises_of(folder)
     if len(noises) == 1:
         return {noises[0]: slice(None)}
@@ -73,18 +73,18 @@ def noise_flags(folder: CampaignFolder) -> dict[str, NDArray[np.bool_] | slice]:
 
 
 def samples(folder: CampaignFolder, cell: int | None = None, levels: Sequence[float] = LEVELS) -> list[Sample]:
-    """Summarise the stored rows, a sample for each noise that has some.
+    """Return a summary of the stored rows for each noise with rows.
 
-    One quantity of one noise is in memory at a time, 8 bytes an engagement, and a sorted copy of it.
+    One quantity of one noise is in memory at a time, with 8 bytes per engagement, and a sorted copy of it.
 
     Parameters
     ----------
     folder : CampaignFolder
         A campaign or a sweep, finished or not.
     cell : int or None
-        A cell of the sweep; None is all rows.
+        Number of a cell of the sweep; None uses all rows.
     levels : sequence of float
-        Of the quantiles.
+        Levels of the quantiles.
     """
     noises = noises_of(folder)
     counts = {noise: _Counts() for noise in noises}
@@ -107,7 +107,7 @@ def samples(folder: CampaignFolder, cell: int | None = None, levels: Sequence[fl
             if known.size:
                 quantiles[noise][quantity] = estimate_quantiles(known, levels)
                 worst[noise][quantity] = float(known.max())
-            del known  # before the next is read, not after
+            del known  # free the memory before the next quantity is read
     return [
         Sample(
             noise,
@@ -135,7 +135,7 @@ class _Counts:
 
 
 def heading(folder: CampaignFolder) -> dict[str, Any]:
-    """Return the first keys of every JSON of a campaign or a sweep."""
+    """Return the keys with which every JSON file of a campaign or a sweep begins."""
     manifest = folder.manifest
     return {
         "version": library_version(),
@@ -162,17 +162,17 @@ def worst_runs(folder: CampaignFolder, scenario_file: Path) -> list[dict[str, An
     own = f" --strategy {shlex.quote(file)}" if version and file else ""
     miss = folder.numbers("miss_m").data
     count = min(WORST, miss.size)
-    places = np.argpartition(-miss, count - 1)[:count] if count else np.zeros(0, dtype=np.int64)
-    places = places[np.lexsort((places, -miss[places]))]
+    indices = np.argpartition(-miss, count - 1)[:count] if count else np.zeros(0, dtype=np.int64)
+    indices = indices[np.lexsort((indices, -miss[indices]))]
     return [
         {key: row[key] for key in ("run", "noise", "outcome", "miss_m", "impulse_m_s")}
         | {"replay": replay_line(scenario_file, row["run"], folder.manifest.seed, row["noise"]) + own}
-        for row in folder.at(places.tolist())
+        for row in folder.at(indices.tolist())
     ]
 
 
 def replay_line(scenario_file: Path, run: int, seed: int, noise: str) -> str:
-    """Return the command that flies a run of a campaign again, step by step."""
+    """Return the command that simulates a run of a campaign again and shows its steps."""
     return f"infoset engage {shlex.quote(str(scenario_file))} --noise {noise} --seed {seed} --run {run}"
 
 
@@ -202,28 +202,28 @@ def sample_json(sample: Sample) -> dict[str, Any]:
     }
 
 
-def samples_table(found: Sequence[Sample], model: str) -> tuple[Table, list[str]]:
-    """Return the quantiles with their intervals, a block for each noise, and a line on the outcomes of each.
+def samples_table(by_noise: Sequence[Sample], model: str) -> tuple[Table, list[str]]:
+    """Return the quantiles with their intervals, a block for each noise, and a line with the outcomes of each noise.
 
     Parameters
     ----------
-    found : sequence of Sample
-        At least one.
+    by_noise : sequence of Sample
+        At least one sample.
     model : str
-        Of the information set: the paper's has no guarantee.
+        Name of the set model; the model `paper` has no guarantee.
     """
     phi = "the paper's Phi (not a bound here), m" if model == "paper" else "guaranteed miss, m"
     names = {"miss_m": "miss, m", "impulse_m_s": "impulse, m/s", "guaranteed_miss_m": phi}
     table = Table("noise", box=None, pad_edge=False)
     table.add_column("quantity", no_wrap=True)
-    for estimate in found[0].quantiles["miss_m"]:
+    for estimate in by_noise[0].quantiles["miss_m"]:
         table.add_column(level_name(estimate.level), justify="right")
     table.add_column("max", justify="right")
     notes = []
-    for sample in found:
-        for place, (quantity, estimates) in enumerate(sample.quantiles.items()):
+    for sample in by_noise:
+        for index, (quantity, estimates) in enumerate(sample.quantiles.items()):
             values = [number(estimate.value) for estimate in estimates]
-            first = sample.noise if place == 0 else ""
+            first = sample.noise if index == 0 else ""
             table.add_row(first, names[quantity], *values, number(sample.worst[quantity]))
             table.add_row("", "  lower limit", *(number(estimate.lower) for estimate in estimates), "", style="dim")
             table.add_row("", "  upper limit", *(number(estimate.upper) for estimate in estimates), "", style="dim")

@@ -1,7 +1,7 @@
 """The keys of a scenario file that a sweep varies, each over a range of values in the unit of the file.
 
 A cell is made by the reader of scenario files: the scenario is written as a file, values are replaced in its text, and
-the text is read. A cell is therefore sound exactly when a file with its values is, and has the same error messages.
+the text is read. A cell is therefore valid exactly when a file with its values is, and has the same error messages.
 """
 
 from __future__ import annotations
@@ -52,12 +52,12 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
         `table.key=FROM:TO:COUNT` or `table.key=log:FROM:TO:COUNT`, separated by commas. Of a key that is a pair,
         `table.key.least` or `table.key.greatest` is varied.
     scenario : Scenario
-        Its keys can be varied.
+        Scenario whose keys can be varied.
 
     Raises
     ------
     InputError
-        If the text has another form, or the scenario has no such key; the nearest is suggested.
+        If the text has another form, or the scenario has no such key; the message suggests the most similar key.
     """
     known = _known_keys(scenario)
     pieces = [piece.strip() for piece in text.split(",")]
@@ -70,7 +70,7 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
         raise InputError(f"--vary: {twice} is named twice; name each key once")
     cells = math.prod(len(axis.values) for axis in axes)
     if cells > MOST_CELLS:
-        raise InputError(f"--vary: makes {cells} cells, and at most {MOST_CELLS} can be; take fewer values")
+        raise InputError(f"--vary: {cells} cells are more than the limit of {MOST_CELLS}; give fewer values")
     return axes
 
 
@@ -80,7 +80,7 @@ def sweep_cells(scenario: Scenario, axes: Sequence[Axis]) -> tuple[Scenario, ...
     Raises
     ------
     InputError
-        If a cell is not a sound scenario; the message is that of a scenario file.
+        If a cell is not a valid scenario; the message is that of a scenario file.
     """
     known = _known_keys(scenario)
     text = scenario_to_toml(scenario)
@@ -97,7 +97,7 @@ def sweep_cells(scenario: Scenario, axes: Sequence[Axis]) -> tuple[Scenario, ...
 
 
 def _known_keys(scenario: Scenario) -> dict[str, _Key]:
-    """Return the keys of a scenario that hold numbers."""
+    """Return the keys of a scenario whose values are numbers."""
     known: dict[str, _Key] = {}
     for table, keys in _tables(scenario).items():
         for name, value in keys.items():
@@ -132,7 +132,7 @@ def _axis(piece: str, known: Mapping[str, _Key]) -> Axis:
         )
     first, last = (_number(part, key) for part in parts[:2])
     if first >= last:
-        raise InputError(f"--vary: {key}: must go from a lesser to a greater value, found {shown(written)}")
+        raise InputError(f"--vary: {key}: must go from a smaller to a greater value, found {shown(written)}")
     if scale == "log" and first <= 0:
         raise InputError(f"--vary: {key}: on a logarithmic scale values must be greater than 0, found {shown(written)}")
     count = _count(parts[2], key)
@@ -140,7 +140,7 @@ def _axis(piece: str, known: Mapping[str, _Key]) -> Axis:
     if len(set(values)) < count:
         raise InputError(
             f"--vary: {key}: {count} values from {parts[0]} to {parts[1]} are not all different"
-            f"{' whole numbers' if known[key].whole else ''}; take fewer"
+            f"{' whole numbers' if known[key].whole else ''}; give fewer values"
         )
     return Axis(key, values, scale)
 
@@ -153,11 +153,11 @@ def _unknown(key: str, known: Mapping[str, _Key]) -> str:
     if f"{key}.least" in known:
         return f"{key} is a pair; vary {key}.least or {key}.greatest"
     guess = nearest(key, names)
-    if guess is None:  # only its last part may have been written
+    if guess is None:  # the text may be the last part of a key only
         alike = [name for name in names if key.rsplit(".", 1)[-1] in name.split(".")]
         guess = " or ".join(alike[:3]) or None
-    hint = f"did you mean {guess}?" if guess else f"the numbers there are: {', '.join(names)}"
-    return f"the scenario has no number {shown(key)}; {hint}"
+    hint = f"did you mean {guess}?" if guess else f"its numeric keys are: {', '.join(names)}"
+    return f"the scenario has no numeric key {shown(key)}; {hint}"
 
 
 def _number(text: str, key: str) -> Decimal:
@@ -181,12 +181,12 @@ def _count(text: str, key: str) -> int:
 
 
 def _spaced(first: Decimal, last: Decimal, count: int, scale: str, *, whole: bool) -> tuple[float, ...]:
-    """Return values from the first to the last, which are kept as written."""
+    """Return evenly spaced values; the first and the last are not rounded."""
     if scale == "log":
         rise = math.log(last / first) / (count - 1)
-        between = [Decimal(float(first) * math.exp(rise * place)) for place in range(1, count - 1)]
+        between = [Decimal(float(first) * math.exp(rise * index)) for index in range(1, count - 1)]
     else:
-        between = [first + (last - first) * place / (count - 1) for place in range(1, count - 1)]
+        between = [first + (last - first) * index / (count - 1) for index in range(1, count - 1)]
     values = [first, *(_PLACES.plus(value) for value in between), last]
     return tuple(float(round(value)) if whole else float(value) for value in values)
 
@@ -195,11 +195,11 @@ def _with_value(text: str, key: _Key, literal: str) -> str:
     """Replace a value in the text of `scenario_to_toml`, which has one key on a line."""
     lines = text.split("\n")
     table = lines.index(f"[{key.table}]")
-    place = next(at for at in range(table, len(lines)) if lines[at].startswith(f"{key.name} = "))
+    row = next(index for index in range(table, len(lines)) if lines[index].startswith(f"{key.name} = "))
     if key.end is not None:
-        pair = lines[place].partition(" = ")[2].strip("[]").split(", ")
+        pair = lines[row].partition(" = ")[2].strip("[]").split(", ")
         ends = [pair[0], pair[-1]]
         ends[_ENDS.index(key.end)] = literal
         literal = f"[{ends[0]}, {ends[1]}]"
-    lines[place] = f"{key.name} = {literal}"
+    lines[row] = f"{key.name} = {literal}"
     return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""Figures of a sweep: quantiles over one key as lines, over two as heat maps, and where a requirement is met."""
+"""Figures of a sweep: quantiles as lines (one key) or heat maps (two keys), with the bound of a requirement."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 Grid = np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]
 
 MOST_NUMBERS = 120
-"""Most cells for which the numbers are written into the cells."""
+"""Greatest number of cells for which numbers are drawn in the cells."""
 
 QUANTITY_NAMES = {"miss_m": "miss, m", "impulse_m_s": "impulse spent, m/s", "guaranteed_miss_m": "guaranteed miss, m"}
 _PANEL_MM = 56.0
@@ -50,8 +50,8 @@ _HEAD_ROOM = 1.06
 def draw_sweep(table: SweepTable, shown: Sequence[QuantileName], requirement: Requirement | None) -> Figure:
     """Draw quantiles of a sweep over its one or two axes.
 
-    With one axis each quantity and noise has a panel with its quantiles as lines; with two axes each quantile and
-    noise is a heat map. The bound of the requirement is drawn where its quantile is.
+    With one axis there is a panel for each quantity and noise, with the quantiles as lines; with two axes there is a
+    heat map for each quantile and noise. The bound of the requirement is drawn in panels with its quantile.
 
     Raises
     ------
@@ -59,21 +59,21 @@ def draw_sweep(table: SweepTable, shown: Sequence[QuantileName], requirement: Re
         If there are more axes, or no quantile.
     """
     if len(table.axes) not in (1, 2) or not shown:
-        raise ValueError("a sweep of one or two axes can be drawn, and at least one quantile")
+        raise ValueError("only a sweep with one or two axes can be drawn, with at least one quantile")
     with style():
         return _lines(table, shown, requirement) if len(table.axes) == 1 else _maps(table, shown, requirement)
 
 
 def _lines(table: SweepTable, shown: Sequence[QuantileName], requirement: Requirement | None) -> Figure:
-    quantities = list(dict.fromkeys(each.quantity for each in shown))
+    quantities = list(dict.fromkeys(quantile.quantity for quantile in shown))
     rows = len(table.noises)
-    levels = sorted({each.level for each in shown}, reverse=True)
+    levels = sorted({quantile.level for quantile in shown}, reverse=True)
     figure = new_figure(height_mm=rows * (_PANEL_MM + 16.0) + 12.0, width_mm=90.0 * len(quantities))
     grid = place_axes(figure, rows, len(quantities), margins_mm=(16.0, 4.0, 22.0, 7.0), gaps_mm=(16.0, 18.0))
     letter = iter("abcdefghijklmnopqrstuvwxyz")
     for row, noise in zip(grid, table.noises, strict=True):
         for axes, quantity in zip(row, quantities, strict=True):
-            quantiles = [each for each in shown if each.quantity == quantity]
+            quantiles = [quantile for quantile in shown if quantile.quantity == quantity]
             _line_panel(axes, table, noise, quantiles, levels, requirement)
             axes.set_title(f"({next(letter)}) {noise} noise")
             axes.set_ylabel(QUANTITY_NAMES[quantity])
@@ -83,7 +83,7 @@ def _lines(table: SweepTable, shown: Sequence[QuantileName], requirement: Requir
     ]
     if requirement is not None:
         handles.append(Line2D([], [], color=IMPULSE, linewidth=0.9, label=f"required: {_words(requirement)}"))
-    note = "bars: 95 % confidence intervals; an arrow: the runs are too few for an upper end"
+    note = "bars: 95 % confidence intervals; arrow: too few runs for an upper end"
     figure.legend(handles=handles, loc="lower center", ncols=len(handles), title=note, title_fontsize=7.0)
     return figure
 
@@ -100,12 +100,14 @@ def _line_panel(
     colour = CURVE_LOOKS[1 if noise == "random" else 3]["color"]
     for quantile in quantiles:
         estimates = [table.estimate(cell, noise, quantile) for cell in range(len(axis.values))]
-        known = [(value, each) for value, each in zip(axis.values, estimates, strict=True) if each is not None]
+        known = [
+            (value, estimate) for value, estimate in zip(axis.values, estimates, strict=True) if estimate is not None
+        ]
         if not known:
             continue
-        places, values = [value for value, _ in known], [each.value for _, each in known]
+        keys, values = [value for value, _ in known], [estimate.value for _, estimate in known]
         axes.plot(
-            places,
+            keys,
             values,
             color=colour,
             linestyle=_look(levels, quantile.level),
@@ -113,20 +115,20 @@ def _line_panel(
             markersize=3.0,
             zorder=3.0,
         )
-        ends = [(each.lower, each.upper) for _, each in known]
-        for place, value, (lower, upper) in zip(places, values, ends, strict=True):
+        ends = [(estimate.lower, estimate.upper) for _, estimate in known]
+        for key, value, (lower, upper) in zip(keys, values, ends, strict=True):
             axes.plot(
-                [place, place],
+                [key, key],
                 [value if lower is None else lower, value if upper is None else upper],
                 color=colour,
                 linewidth=0.8,
                 zorder=2.0,
             )
             if upper is None:
-                axes.plot([place], [value], marker=CARETUPBASE, markersize=6.0, color=colour, zorder=2.0)
+                axes.plot([key], [value], marker=CARETUPBASE, markersize=6.0, color=colour, zorder=2.0)
         if requirement is not None and requirement.quantile == quantile:
             axes.axhline(requirement.bound, color=IMPULSE, linewidth=0.9, zorder=2.5)
-            for crossing in crossings(places, values, requirement.bound, axis.scale):
+            for crossing in crossings(keys, values, requirement.bound, axis.scale):
                 axes.plot([crossing], [requirement.bound], marker="D", markersize=4.5, color=IMPULSE, zorder=5.0)
                 axes.vlines(crossing, 0.0, requirement.bound, color=IMPULSE, linewidth=0.7, linestyle=":", zorder=2.5)
                 axes.annotate(
@@ -151,13 +153,13 @@ def _maps(table: SweepTable, shown: Sequence[QuantileName], requirement: Require
     figure = new_figure(height_mm=rows * (_PANEL_MM + 20.0) + 10.0, width_mm=90.0 * columns)
     grid = place_axes(figure, rows, columns, margins_mm=(16.0, 16.0, 20.0, 8.0), gaps_mm=(33.0, 20.0))
     for (noise, quantile), axes, letter in zip(
-        panels, (each for row in grid for each in row), "abcdefghijklmnopqrstuvwxyz", strict=False
+        panels, (axes for row in grid for axes in row), "abcdefghijklmnopqrstuvwxyz", strict=False
     ):
         _map_panel(figure, axes, table, noise, quantile, requirement)
         name, unit = QUANTITY_NAMES[quantile.quantity].split(", ")
         axes.set_title(f"({letter}) {name}, {level_name(quantile.level)}, {unit}; {noise} noise")
-    for axes in [each for row in grid for each in row][len(panels) :]:
-        axes.remove()
+    for unused in [axes for row in grid for axes in row][len(panels) :]:
+        unused.remove()
     if requirement is not None and requirement.quantile in shown:
         line = Line2D([], [], color=IMPULSE, linewidth=1.5, label=f"required: {_words(requirement)}")
         figure.legend(handles=[line], loc="lower center")
@@ -178,7 +180,7 @@ def _map_panel(
     image = axes.pcolormesh(
         _edges(across), _edges(up), values, cmap=_COLOURS, norm=norm, edgecolors="white", linewidth=0.3, zorder=1.0
     )
-    bar = figure.colorbar(image, ax=axes, cax=_beside(figure, axes))
+    bar = figure.colorbar(image, ax=axes, cax=_colour_axes(figure, axes))
     bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
     bar.ax.yaxis.set_minor_formatter(NullFormatter())
     _scale(axes, across, "x")
@@ -196,8 +198,8 @@ def _map_panel(
         limit.set_path_effects([Stroke(linewidth=3.2, foreground="white"), Stroke(linewidth=1.5, foreground=IMPULSE)])
         axes.add_collection(limit, autolim=False)
     else:
-        place = "everywhere" if met.all() else "nowhere"
-        axes.set_xlabel(f"{axes.get_xlabel()}\n{_words(requirement)}: {place}")
+        extent = "everywhere" if met.all() else "nowhere"
+        axes.set_xlabel(f"{axes.get_xlabel()}\n{_words(requirement)}: {extent}")
 
 
 def between(across: Floats, up: Floats, met: np.ma.MaskedArray[Any, Any]) -> list[list[tuple[float, float]]]:
@@ -208,16 +210,16 @@ def between(across: Floats, up: Floats, met: np.ma.MaskedArray[Any, Any]) -> lis
     across, up : ndarray, shape (n + 1,) and (m + 1,)
         Edges of the columns and of the rows.
     met : masked array of bool, shape (m, n)
-        There is no edge next to a masked cell.
+        Whether each cell meets the requirement; a masked cell has no edges.
     """
     rows, columns = met.shape
-    beside = np.ma.filled(met[:, 1:] != met[:, :-1], fill_value=False)
+    right = np.ma.filled(met[:, 1:] != met[:, :-1], fill_value=False)
     above = np.ma.filled(met[1:, :] != met[:-1, :], fill_value=False)
     upright = [
         [(float(across[column + 1]), float(up[row])), (float(across[column + 1]), float(up[row + 1]))]
         for row in range(rows)
         for column in range(columns - 1)
-        if beside[row, column]
+        if right[row, column]
     ]
     level = [
         [(float(across[column]), float(up[row + 1])), (float(across[column + 1]), float(up[row + 1]))]
@@ -230,14 +232,14 @@ def between(across: Floats, up: Floats, met: np.ma.MaskedArray[Any, Any]) -> lis
 
 def _write_numbers(axes: Axes, across: Axis, up: Axis, values: Grid, norm: Normalize) -> None:
     size = 6.5 if max(len(across.values), len(up.values)) <= 8 else 5.0
-    for row, above in enumerate(up.values):
-        for column, beside in enumerate(across.values):
+    for row, y in enumerate(up.values):
+        for column, x in enumerate(across.values):
             if np.ma.getmaskarray(values)[row, column]:
                 continue
             value = float(values[row, column])
             axes.text(
-                beside,
-                above,
+                x,
+                y,
                 f"{value:.3g}" if value < 100.0 else f"{value:.0f}",
                 ha="center",
                 va="center",
@@ -248,23 +250,23 @@ def _write_numbers(axes: Axes, across: Axis, up: Axis, values: Grid, norm: Norma
 
 
 def _norm(values: Grid) -> Normalize:
-    """Return the scale of the colours: logarithmic where the values differ by more than a factor of 10."""
+    """Return the scale of the colours: logarithmic if the values differ by more than a factor of 10."""
     low, high = float(values.min()), float(values.max())
     if low > 0.0 and high > 10.0 * low:
         return LogNorm(low, high)
     return Normalize(low, high if high > low else low + 1.0)
 
 
-def _beside(figure: Figure, axes: Axes) -> Axes:
+def _colour_axes(figure: Figure, axes: Axes) -> Axes:
     """Return axes for the colour scale to the right of a heat map."""
-    place = axes.get_position()
+    box = axes.get_position()
     width, _ = figure.get_size_inches()
     gap, thick = 2.0 / (25.4 * width), 3.0 / (25.4 * width)
-    return figure.add_axes((place.x1 + gap, place.y0, thick, place.height))
+    return figure.add_axes((box.x1 + gap, box.y0, thick, box.height))
 
 
 def _edges(axis: Axis) -> Floats:
-    """Return the edges of the cells around the values of an axis: midway on its scale."""
+    """Return the edges of the cells around the values of an axis, midway between the values on its scale."""
     values = np.log(axis.values) if axis.scale == "log" else np.array(axis.values)
     middle = 0.5 * (values[1:] + values[:-1])
     edges = np.concatenate([[2.0 * values[0] - middle[0]], middle, [2.0 * values[-1] - middle[-1]]])
@@ -292,7 +294,7 @@ def _scale(axes: Axes, axis: Axis, which: str) -> None:
 
 def _power(axis: Axis) -> int:
     """Return the power of ten of the labels of an axis."""
-    greatest = max(abs(each) for each in axis.values)
+    greatest = max(abs(value) for value in axis.values)
     return 0 if 0.01 <= greatest < 1e5 else math.floor(math.log10(greatest))
 
 

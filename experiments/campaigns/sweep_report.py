@@ -1,4 +1,4 @@
-"""The report of a sweep: its table, its figure, and where a requirement is met."""
+"""The report of a sweep: its table, its figure, and the values that meet a requirement."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MOST_LINES = 40
 
 @dataclass(frozen=True)
 class SweepReport:
-    """The stored runs of a sweep, and what is asked of them.
+    """The stored runs of a sweep, their quantiles, and a requirement.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class SweepReport:
         return len(self.table.axes) <= 2
 
     def to_json(self, elapsed_s: float | None = None) -> dict[str, object]:
-        """Return the report as JSON values; `elapsed_s` is the time of the flight, if there was one."""
+        """Return the report as JSON values; `elapsed_s` is the time of the simulation, or None."""
         table = self.table
         return {
             **heading(self.folder),
@@ -82,7 +82,7 @@ class SweepReport:
             written.figure(FIGURE, draw_sweep(self.table, self.shown, self.required))
 
     def show(self, console: Console) -> None:
-        """Print where the requirement is met; with one axis, the required quantile in every cell too."""
+        """Print where the requirement is met and, for a sweep with one axis, the required quantile of every cell."""
 
         def line(text: str) -> None:
             console.print(Text(text), soft_wrap=True)
@@ -114,7 +114,7 @@ class SweepReport:
 
 
 def quantile_options(require: str, show: str | None) -> tuple[Requirement, tuple[QuantileName, ...]]:
-    """Read the values of --require and --show; the required quantile is shown too."""
+    """Read the values of --require and --show; the required quantile is always among those shown."""
     try:
         required = Requirement.parse(require)
     except ValueError as error:

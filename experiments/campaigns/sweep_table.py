@@ -1,4 +1,4 @@
-"""The quantiles of every cell of a sweep as one table, and where a requirement is met."""
+"""The quantiles of every cell of a sweep as one table, and the values that meet a requirement."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class SweepTable:
     levels : tuple of float
         Levels of the quantiles.
     cells : tuple of tuple of Sample
-        For each cell a sample for each noise; none before it is flown.
+        Samples of each cell, one for each noise; empty for a cell without runs.
     """
 
     axes: tuple[Axis, ...]
@@ -57,11 +57,11 @@ class SweepTable:
     cells: tuple[tuple[Sample, ...], ...]
 
     def sample(self, cell: int, noise: str) -> Sample | None:
-        """Return the sample of a cell under a noise."""
+        """Return the sample of a cell and a noise; None without runs."""
         return next((sample for sample in self.cells[cell] if sample.noise == noise), None)
 
     def estimate(self, cell: int, noise: str, quantile: QuantileName) -> QuantileEstimate | None:
-        """Return a quantile of a cell; None where it is not known."""
+        """Return a quantile of a cell; None if it is not known."""
         sample = self.sample(cell, noise)
         estimates = () if sample is None else sample.quantiles.get(quantile.quantity, ())
         return next((estimate for estimate in estimates if estimate.level == quantile.level), None)
@@ -109,36 +109,36 @@ class SweepTable:
 
 
 def sweep_table(folder: CampaignFolder, quantiles: Sequence[QuantileName] = ()) -> SweepTable:
-    """Summarise a sweep, finished or not, at the usual levels and those of some more quantiles."""
+    """Summarise a sweep, finished or not, at the levels `LEVELS` and those of some more quantiles."""
     levels = tuple(sorted({*LEVELS, *(quantile.level for quantile in quantiles)}))
     cells = tuple(tuple(samples(folder, cell, levels)) for cell in range(folder.manifest.cells))
     return SweepTable(folder.manifest.axes, tuple(noises_of(folder)), levels, cells)
 
 
 def crossings(values: Sequence[float], quantile: Sequence[float | None], bound: float, scale: str) -> list[float]:
-    """Return where a quantile crosses a bound along an axis, by interpolation on the axis's scale.
+    """Return the values of an axis at which a quantile crosses a bound, by interpolation on the scale of the axis.
 
     Parameters
     ----------
     values : sequence of float
-        Of the axis.
+        Values of the axis.
     quantile : sequence of float or None
-        At each value; None where it is not known.
+        Quantile at each value; None where it is not known.
     bound : float
-        In the unit of the quantile.
+        Bound, in the unit of the quantile.
     scale : str
-        `linear` or `log`.
+        Scale of the axis, `linear` or `log`.
     """
-    places = []
+    crossed = []
     for (left, below), (right, above) in itertools.pairwise(zip(values, quantile, strict=True)):
         if below is None or above is None or (below < bound) == (above < bound):
             continue
         share = (bound - below) / (above - below)
         if scale == "log":
-            places.append(left * math.exp(share * math.log(right / left)))
+            crossed.append(left * math.exp(share * math.log(right / left)))
         else:
-            places.append(left + share * (right - left))
-    return places
+            crossed.append(left + share * (right - left))
+    return crossed
 
 
 def where_met(axis: Axis, quantile: Sequence[float | None], bound: float) -> str:
@@ -146,13 +146,13 @@ def where_met(axis: Axis, quantile: Sequence[float | None], bound: float) -> str
     known = [value for value in quantile if value is not None]
     if not known:
         return "not simulated yet"
-    crossed = [f"{place:.3g}" for place in crossings(axis.values, quantile, bound, axis.scale)]
+    crossed = [f"{value:.3g}" for value in crossings(axis.values, quantile, bound, axis.scale)]
     if not crossed:
         return "everywhere" if known[0] < bound else "nowhere"
     met, pieces = known[0] < bound, []
-    for number, place in enumerate(crossed):
+    for number, value in enumerate(crossed):
         if met:
-            pieces.append(f"up to {place}" if number == 0 else f"{crossed[number - 1]} to {place}")
+            pieces.append(f"up to {value}" if number == 0 else f"{crossed[number - 1]} to {value}")
         met = not met
     if met:
         pieces.append(f"from {crossed[-1]}")
@@ -160,17 +160,17 @@ def where_met(axis: Axis, quantile: Sequence[float | None], bound: float) -> str
 
 
 def answers(table: SweepTable, noise: str, requirement: Requirement) -> list[tuple[str, str]]:
-    """Return, for each combination of values of the other axes, where on the first axis it is met."""
+    """Return the values of the first axis that meet a requirement, for each combination of values of the others."""
     first, *others = table.axes
     grid = table.grid(noise, requirement.quantile)
     lines = []
-    for places in np.ndindex(*(len(axis.values) for axis in others)):
-        column = grid[(slice(None), *places)]
+    for indices in np.ndindex(*(len(axis.values) for axis in others)):
+        column = grid[(slice(None), *indices)]
         known = [
             None if missing else float(value)
             for value, missing in zip(column.data, np.ma.getmaskarray(column), strict=True)
         ]
-        label = ", ".join(f"{axis.key} = {axis.values[place]:g}" for axis, place in zip(others, places, strict=True))
+        label = ", ".join(f"{axis.key} = {axis.values[index]:g}" for axis, index in zip(others, indices, strict=True))
         lines.append((label, where_met(first, known, requirement.bound)))
     return lines
 

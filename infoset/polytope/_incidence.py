@@ -108,8 +108,8 @@ def _need_agreement(points: Floats, corners: Places, on_facets: Flags) -> None:
     if outside > _APART:
         raise UncertainHullError(f"a point is {outside:.2g} outside the hull of its vertices")
     covered = np.ones((len(hull.simplices), on_facets.shape[1]), dtype=bool)
-    for place in range(hull.simplices.shape[1]):
-        covered &= on_facets[corners[hull.simplices[:, place]]]
+    for corner in range(hull.simplices.shape[1]):
+        covered &= on_facets[corners[hull.simplices[:, corner]]]
     if not covered.any(axis=1).all():
         raise UncertainHullError("a part of the surface is in no facet")
 
@@ -119,8 +119,8 @@ def _widest_gap(gaps: Floats) -> float:
     sizes = np.abs(gaps)
     small = np.log(np.sort(sizes[(sizes > _LEAST_ON) & (sizes < _MOST_ON)]))
     ends = np.concatenate([[np.log(_LEAST_ON)], small, [np.log(_MOST_ON)]])
-    place = int(np.diff(ends).argmax())
-    return float(np.exp(0.5 * (ends[place] + ends[place + 1])))
+    widest = int(np.diff(ends).argmax())
+    return float(np.exp(0.5 * (ends[widest] + ends[widest + 1])))
 
 
 def together(points: Floats, within: float) -> Places:

@@ -37,9 +37,9 @@ class KeplerTargets(MovingTargets):
     targets : tuple of Target
         At least one.
     initial : ndarray, shape (n, 6)
-        Their inertial states at their epochs, m and m/s.
+        Inertial states of the targets at their epochs, m and m/s.
     epoch_s : ndarray, shape (n,)
-        Of each target.
+        Epochs of the targets.
     gravitational_parameter_m3_s2 : float
         mu.
 
@@ -75,9 +75,9 @@ class KeplerTour(Visits):
     Parameters
     ----------
     targets : KeplerTargets
-        Their epochs refer to the chaser's start.
+        Targets; their epochs refer to the start of the chaser.
     start_state : ndarray, shape (6,)
-        The chaser's at t = 0, inertial, on an ellipse, m and m/s.
+        Inertial state of the chaser at t = 0, on an ellipse, m and m/s.
 
     Raises
     ------

@@ -29,20 +29,20 @@ class BestOrder:
     Parameters
     ----------
     order : tuple of int
-        Numbers of the targets, first to last.
+        Indices of the targets, first to last.
     path : Path
-        In this order.
+        Path in this order.
     objective : float
-        Energy, and the price of the time, m^2/s^3.
+        Energy plus the price of the time, m^2/s^3.
     nodes : int
         Number of partial orders examined.
     evaluations : int
         Number of paths computed.
     lost : tuple of tuple of int
-        Partial orders that were left out because no path was found.
+        Partial orders that were skipped because no path was found.
     unfit : int
-        Number of orders that do not fit: a stay ends after the next of the given times, or stays leave no time for
-        travel before the latest time.
+        Number of infeasible orders: a stay ends after the time of the next visit, or stays leave no time for travel
+        before the latest time.
     """
 
     order: tuple[int, ...]
@@ -70,10 +70,10 @@ def best_order(
 
     Notes
     -----
-    Depth first, the cheapest partial order first. At its best times, a partial order costs no more than any order that
-    begins with it: its cost is a bound of theirs, and its times are their initial times. This holds for global minima.
-    The computed minima are local, so that the result is the best order found: a partial order is dropped only if more
-    starts find no lower minimum, for Kepler's motion also with a factor (`ruggedness`).
+    The search is depth first and starts with the cheapest partial order. The cost of a partial order at its best times
+    is a lower bound of the cost of all orders that begin with it, and its times are their initial times. This holds for
+    global minima. The computed minima are local, so the result is the best order found: a partial order is discarded
+    only if more starts find no lower minimum, and for Kepler's motion a factor is applied (`ruggedness`).
     """
     count = _checked_count(tour)
     dwell = tour.dwell_s
@@ -108,7 +108,7 @@ def best_order(
 
 
 def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | None = None) -> BestOrder:
-    """Find the best order of up to 9 targets of a `tour` for increasing times of the first, second and so on visit.
+    """Find the best order of up to 9 targets of a `tour` for increasing times of the visits.
 
     `progress` is called with the share of orders decided.
 
@@ -236,7 +236,7 @@ class _Search:
             self.progress(self.decided / factorial(self.count))
 
     def _warm(self, before: Flown | None) -> list[Floats]:
-        """Initial times: those of the previous visits, contracted to leave room, and one more gap."""
+        """Return initial times: those of the previous visits, contracted, and one more gap."""
         if before is None:
             return []
         times = before.nodes.arrive_s

@@ -22,13 +22,13 @@ class Nodes:
     Parameters
     ----------
     arrive_s, leave_s : ndarray, shape (N,)
-        Equal, except where the chaser stays with a target.
+        Times of arrival and departure; equal if the chaser does not stay with the target.
     arrive, leave : ndarray, shape (N, 6)
         States of the targets at these times.
     arrive_rate, leave_rate : ndarray, shape (N, 6)
         Their time derivatives.
     rendezvous : ndarray of bool, shape (N,)
-        Whether the velocity must agree too.
+        Whether the velocities must also agree.
     """
 
     arrive_s: Floats
@@ -49,7 +49,7 @@ class Flown(Protocol):
 
     @property
     def nodes(self) -> Nodes:
-        """Its nodes."""
+        """Nodes of the path."""
 
     @property
     def cost(self) -> float:
@@ -70,9 +70,9 @@ class Path:
     Parameters
     ----------
     motion : LinearMotion
-        Of the chaser.
+        Motion of the chaser.
     nodes : Nodes
-        N of them.
+        N nodes.
     cost : float
         I = 1/2 int |u|^2 dt, m^2/s^3.
     starts_s : ndarray, shape (N,)
@@ -139,7 +139,7 @@ class Path:
 
         Notes
         -----
-        From each time to the next one of its segment: long intervals of a time-varying motion are expensive.
+        States are propagated from one time to the next, because long intervals of a time-varying motion are expensive.
         """
         times = np.asarray(time_s, dtype=np.float64)
         which, moving = self._segment_of(times)

@@ -1,4 +1,4 @@
-"""Targets to be visited, and how each is met."""
+"""Targets of the visits, and the kinds of visit."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Integers = NDArray[np.intp]
 
 
 class Meet(Enum):
-    """How a target is met."""
+    """Kind of a visit."""
 
     FLYBY = "flyby"
     """At its position, with any velocity."""
@@ -31,11 +31,11 @@ class Target:
     Parameters
     ----------
     name : str
-        Unique.
+        Unique name.
     meet : Meet
         Whether velocities must agree.
     dwell_s : float
-        Duration of the stay with it, coasting; of a rendezvous only.
+        Duration of the stay with the target, coasting; for a rendezvous only.
 
     Raises
     ------
@@ -101,9 +101,9 @@ class DriftingTargets(MovingTargets):
     targets : tuple of Target
         At least one.
     motion : LinearMotion
-        Common to all.
+        Motion of all targets.
     initial : ndarray, shape (n, 6)
-        Their states at t = 0, m and m/s.
+        States of the targets at t = 0, m and m/s.
 
     Raises
     ------

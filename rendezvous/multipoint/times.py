@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 FlyAt = Callable[[Floats], Flown]
 
 LEAST_SHARE = 1e-6
-"""The least gap, as a share of the available time, where none is given."""
+"""Default of the least gap, as a share of the available time."""
 _POLISH_ROUNDS = 8
 _DIFFERENCE = 1e-5
 _WALL = 20.0
@@ -28,7 +28,7 @@ _MOST_RESTARTS = 4
 _SETTLED = 1e-3
 _ROUNDING = 1e-26
 _CLOCK = 1e-9
-"""Travel time, as a share of the times themselves, within their rounding: it leaves no gaps."""
+"""Travel times below this share of the times are rounding errors, and leave no gaps."""
 
 
 class Effort(Enum):
@@ -56,14 +56,14 @@ class TimeLimits:
     latest_s : float or None
         Latest end of the last visit.
     least_gap_s : float
-        Between a departure and the next arrival.
+        Least time between a departure and the next arrival.
     price_per_s : float
-        kappa, m^2/s^4, not negative: times the duration it is added to the energy.
+        kappa, m^2/s^4, not negative; kappa times the duration is added to the energy.
 
     Raises
     ------
     ValueError
-        If nothing limits the last time: the energy falls to zero as it grows, and there is no minimum.
+        If nothing limits the last time: the energy then has no minimum, because it decreases to zero as time increases.
     """
 
     latest_s: float | None = None
@@ -92,7 +92,7 @@ class BestTimes:
     flown : Flown
         The path at these times.
     objective : float
-        Energy, and the price of the time, m^2/s^3.
+        Energy plus the price of the time, m^2/s^3.
     evaluations : int
         Number of paths computed.
     """
@@ -127,7 +127,7 @@ class NoRoomError(ValueError):
 
 
 class _StoppedError(Exception):
-    """A descent has no paths around it, or its objective is low enough."""
+    """A descent found no paths in its neighbourhood, or its objective is low enough."""
 
 
 @dataclass
@@ -187,17 +187,17 @@ def optimise_times(
     Parameters
     ----------
     fly : callable
-        Returns the path of given times.
+        Function that returns the path for N times.
     start_s : float
-        Of the first segment.
+        Start of the first segment.
     dwell_s : ndarray, shape (N,)
         Duration of the stay with each target.
     limits : TimeLimits
-        Of the times.
+        Limits of the times.
     guesses : sequence of ndarray, shape (N,)
         Additional initial times, s; those outside the limits are ignored.
     effort : Effort
-        The default is for the final answer.
+        Effort of the search; the default is that of a final result.
     enough : float
         Objective, m^2/s^3, below which a descent stops.
     progress : callable or None
@@ -212,10 +212,10 @@ def optimise_times(
 
     Notes
     -----
-    The problem is not convex: of many starts, those that cost no more than their neighbours are followed first; a lower
-    minimum elsewhere is not excluded. Sequential quadratic programming in the gaps, on the logarithm of the objective,
-    with the exact gradient dI/dt; then Newton's method, with differences of the gradient, on the gaps that no limit
-    holds. Each step computes one path.
+    The problem is not convex. Many starts are evaluated, and the search begins with those that cost no more than their
+    neighbours; a lower minimum elsewhere is not excluded. The descent is sequential quadratic programming in the gaps,
+    on the logarithm of the objective, with the exact gradient dI/dt; then Newton's method, with differences of the
+    gradient, on the gaps that are not at a limit. Each step computes one path.
     """
     count = len(dwell_s)
     shifts = start_s + np.concatenate([[0.0], np.cumsum(dwell_s[:-1])])

@@ -61,13 +61,13 @@ class Tour(Visits):
     Parameters
     ----------
     motion : LinearMotion
-        Of the chaser.
+        Motion of the chaser.
     targets : MovingTargets
-        In the same motion.
+        Targets, in the same motion.
     start_state : ndarray, shape (6,)
-        The chaser's, m and m/s.
+        State of the chaser at the start, m and m/s.
     start_s : float
-        Its time.
+        Time of the start.
 
     Raises
     ------

@@ -40,15 +40,15 @@ class Craft:
     Parameters
     ----------
     name : str
-        Unique.
+        Unique name.
     state : ndarray, shape (6,)
-        (x, y, z, vx, vy, vz) at its start, in the frame of its motion, m and m/s.
+        (x, y, z, vx, vy, vz) at the start, in the frame of the motion, m and m/s.
     motion : LinearMotion
-        Of the craft.
+        Motion of the craft.
     weight : float
-        Of its excess in the group's loss; not negative.
+        Weight of its excess in the loss of the group; not negative.
     start_s : float
-        Before the meeting.
+        Time of its start, before the meeting.
     """
 
     name: str
@@ -65,13 +65,13 @@ class Encounter:
     Parameters
     ----------
     craft : tuple of Craft
-        At least one, all in one frame.
+        At least one craft, all in one frame.
     meeting_s : float
         Time of the meeting.
     free : tuple of Component
-        Free components of the terminal state; at least one, of an intercept only of the position.
+        Free components of the terminal state, at least one; for an intercept components of the position only.
     fixed : ndarray, shape (6,)
-        Values of the others, m and m/s; those of free components are ignored.
+        Values of the other components, m and m/s; those of free components are ignored.
     meeting : Meeting
         Whether velocities must agree.
 
@@ -100,7 +100,7 @@ class Encounter:
         if len(set(self.free)) < len(self.free):
             raise ValueError("a free component is named twice")
         if self.meeting is Meeting.INTERCEPT and any(component.value >= 3 for component in self.free):
-            raise ValueError("the velocities of an intercept are each craft's own; free only x, y and z")
+            raise ValueError("the velocities of the craft differ in an intercept; free only x, y and z")
         if np.shape(self.fixed) != (6,) or not np.isfinite(self.fixed).all() or not np.isfinite(self.meeting_s):
             raise ValueError("the terminal state must be six finite numbers at a finite time")
         for craft in self.craft:

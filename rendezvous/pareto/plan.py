@@ -20,11 +20,11 @@ class PlanSamples:
     Parameters
     ----------
     time_s : ndarray, shape (k,)
-        From start to meeting.
+        Times from start to meeting.
     state : ndarray, shape (k, 6)
-        m and m/s.
+        States, m and m/s.
     control_m_s2 : ndarray, shape (k, 3)
-        u.
+        Control u.
     """
 
     time_s: Floats
@@ -39,11 +39,11 @@ class Plan:
     Parameters
     ----------
     craft : Craft
-        Its start.
+        Craft, with its start.
     meeting_s : float
         End of the flight.
     costate : ndarray, shape (6,)
-        At the meeting.
+        Costate at the meeting.
     """
 
     craft: Craft

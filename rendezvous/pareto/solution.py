@@ -21,7 +21,7 @@ class CraftCost:
     Parameters
     ----------
     craft : Craft
-        Of this cost.
+        Craft of this cost.
     ideal : ndarray, shape (f,)
         p*: the cheapest free values for this craft alone.
     ideal_cost_squared : float
@@ -61,7 +61,7 @@ class EncounterSolution:
     encounter : Encounter
         The problem.
     costs : tuple of CraftCost
-        Of the craft, in order.
+        Costs of the craft, in order.
     point : ndarray, shape (f,)
         The free values that minimise the weighted sum of excesses, the norm (1.7) of the paper. The methods use it
         where their `point` is None.

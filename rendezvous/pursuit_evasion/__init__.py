@@ -1,8 +1,8 @@
 """The orbital pursuit-evasion game with free final time: solution, certificate, feedback and maps.
 
 Game and conditions are those of Wang Yanxin's slides (Bauman University), after Shen and Casalino, Journal of Guidance,
-Control, and Dynamics 41(8), 2018, p. 1823, with misprints mended; the method of solution and the certificate are
-not from there.
+Control, and Dynamics 41(8), 2018, p. 1823, with misprints corrected. The method of solution and the certificate are
+not from these sources.
 """
 
 from rendezvous.pursuit_evasion.certificate import Certificate, Deviation, certify

@@ -27,7 +27,7 @@ MOST_WORK = 20_000.0
 
 
 class Ending(Enum):
-    """Why a branch ends."""
+    """Reason for the end of a branch."""
 
     CAPTURE = "capture"
     TIME = "time"
@@ -43,9 +43,9 @@ class Branch:
     Parameters
     ----------
     nodes : tuple of Node
-        In the order in which they were found.
+        Extremals in ascending order of duration.
     ending : Ending
-        Why it ends.
+        Reason for the end.
     work : float
         Radians of extremals propagated.
     """

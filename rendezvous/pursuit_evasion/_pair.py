@@ -1,8 +1,9 @@
 """The extremals of both sides together, by Newton's method: at a duration T, or at a distance l. Nondimensional.
 
-At each duration T both sides go as far as they can along nu, and r_E - r_P = l nu. At l = 0 these are the conditions
-at the end of Wang's slides ("Optimal control"): r_P = r_E, lambda_rP + lambda_rE = 0, lambda_v = 0. Their last one,
-lambda_rP . (v_P - v_E) = 1, only fixes the scale of costates: here |nu| = 1, and the closing speed must be positive.
+At each duration T both sides reach the greatest distance along nu, and r_E - r_P = l nu. At l = 0 these are the
+terminal conditions of Wang's slides ("Optimal control"): r_P = r_E, lambda_rP + lambda_rE = 0, lambda_v = 0. The last
+condition there, lambda_rP . (v_P - v_E) = 1, only determines the scale of the costates: here |nu| = 1, and the closing
+speed must be positive.
 """
 
 from __future__ import annotations
@@ -77,15 +78,15 @@ class Node:
 
     @property
     def is_saddle(self) -> bool:
-        """Whether no small change of nu increases the evader's distance, and both sides' extremals are maxima."""
+        """Whether no small change of nu increases the distance of the evader, and both extremals are maxima."""
         return self.regular and bool(self.curvature[0] + self.distance > 0.0)
 
     @property
     def is_nearest(self) -> bool:
         """Whether no small change brings the pursuer nearer to an evader on a given path.
 
-        Beyond a conjugate point its reachable set is hollow there: the radius of curvature of the set's edge has gone
-        from plus to minus infinity, and must stay beyond -l.
+        Beyond a conjugate point the reachable set of the pursuer is locally concave: the radius of curvature of its
+        boundary has changed from plus to minus infinity, and must stay beyond -l.
         """
         least, greatest = self.curvature + self.distance
         return bool(least > 0.0) if self.regular else bool(least < 0.0 < greatest)

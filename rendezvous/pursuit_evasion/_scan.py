@@ -56,13 +56,13 @@ class _End:
 
 
 def scan(pair: Pair, node: Node) -> Scan:
-    """Look in all directions, at the duration of an extremal, from its direction outward.
+    """Compute extremals in all directions at the duration of a known extremal, from its direction outward.
 
     Notes
     -----
-    Extremals of 120 directions a side, each from a solved neighbour: 0.5 s a revolution and more. A reachable set that
-    is not convex has several extremals a direction: one that falls short of another direction's end is not the
-    farthest, and its direction counts as not found.
+    120 directions per side, each from a solved neighbour: at least 0.5 s per revolution. A reachable set that is not
+    convex has several extremals per direction. If the end of another direction is farther along a direction, its
+    extremal is not the farthest, and the direction counts as not found.
     """
     grid = directions(_DIRECTIONS)
     grid = grid[np.argsort(-(grid @ node.nu))]
@@ -80,9 +80,9 @@ def scan(pair: Pair, node: Node) -> Scan:
 
 
 def greater(pair: Pair, node: Node) -> Node | None:
-    """Return an extremal of the same duration that keeps the evader farther away, or None where none is found.
+    """Return an extremal of the same duration that keeps the evader farther away; None if none is found.
 
-    Durations of more than six revolutions are not scanned, which would take minutes.
+    Durations of more than six revolutions are not scanned, because that would take minutes.
     """
     if node.duration > _LONGEST:
         return None

@@ -1,4 +1,4 @@
-"""Checks that a capture is a saddle point, which share as little as possible with the method that found it.
+"""Checks that a capture is a saddle point; they share as little as possible with the method of solution.
 
 The Hamiltonian is that of Wang's slides, "Optimal control": H_P + H_E, constant, and one in their scale. The other
 checks are not from there.
@@ -38,16 +38,16 @@ _MOST_WORK = 2.0 * MOST_WORK
 
 @dataclass(frozen=True)
 class Deviation:
-    """One player deviates, and the other answers optimally.
+    """A deviation of one player, with the optimal response of the other.
 
     Parameters
     ----------
     name : str
         Policy of the player that deviates.
     capture_s : float or None
-        None where there is no capture by the capture time of the game.
+        Capture time; None without a capture until the capture time of the game.
     conclusive : bool
-        False where the best answer could not be followed.
+        False if the best response could not be computed.
     """
 
     name: str
@@ -80,13 +80,13 @@ class Certificate:
     above_the_planet : bool
         Whether that is above its radius.
     pursuer_alone_s : float or None
-        Earliest capture of the evader on its fixed optimal path; None where it could not be followed.
+        Earliest capture of the evader on its fixed optimal path; None if it could not be computed.
     evader_deviations : tuple of Deviation
-        The pursuer's best answers: each must capture by the capture time.
+        Deviations of the evader, with the best responses of the pursuer: each must capture until the capture time.
     capture_s : float
         Capture time of the game.
     directions_found, directions_tried : int
-        Zero where directions were not scanned.
+        Number of directions with a solution, and number of directions tried; zero without a scan.
     greatest_excess_m : float or None
         Greatest distance beyond the capture radius that some direction keeps, at the capture time.
     unit_length_m : float
@@ -112,7 +112,7 @@ class Certificate:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """Return the checks that failed, a phrase each."""
+        """Return a phrase for each check that failed."""
         failures = []
         if not self.residual < MOST_RESIDUAL:
             failures.append(f"the residual is {self.residual:.1e}")
@@ -150,7 +150,7 @@ class Certificate:
 
     @property
     def claims_saddle_point(self) -> bool:
-        """Whether every check holds: only then is a saddle point claimed."""
+        """Whether all checks are passed; otherwise the capture is not claimed to be a saddle point."""
         return not self.failures
 
 
@@ -171,8 +171,8 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
 
     Notes
     -----
-    A third of a second for one revolution; directions take another half and more. All deviations together take at most
-    twice the work limit of a game: in games of more than six revolutions the last ones may be inconclusive.
+    Cost: 0.3 s for one revolution, and at least 0.5 s more for the directions. All deviations together take at most
+    twice the work limit of a game; in games of more than six revolutions the last ones may be inconclusive.
     """
     capture = solution.capture
     if capture is None:
@@ -219,7 +219,7 @@ def _stayed_above(solution: Solution, capture: Capture) -> bool:
 def _followed(
     pursuer: Side, evader: Side, radius: float, latest: float, left: float
 ) -> tuple[float | None, bool, float]:
-    """Return the earliest capture, if any, whether the branch reached its end, and the remaining work."""
+    """Return the earliest capture or None, whether the branch reached its end, and the remaining work."""
     pair = Pair(pursuer, evader)
     first = pair.begin(latest)
     if first is None:
@@ -314,7 +314,7 @@ def _forward_rates(time: float, y: Floats, craft: Craft) -> Floats:
 
 
 def _gravity(r: Any, craft: Craft) -> Any:
-    """Gravity as textbooks write it, of a real or complex position."""
+    """Return the acceleration of gravity in its usual form, for a real or complex position."""
     q = (r * r).sum()
     cube = q * np.sqrt(q)
     if craft.oblateness == 0.0:

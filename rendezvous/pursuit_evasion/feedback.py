@@ -1,4 +1,4 @@
-"""Feedback: a pursuer that solves the game again from time to time, against an evader that steers as it chooses."""
+"""Feedback: a pursuer that solves the game repeatedly, against an evader with any steering."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 PathNow = Callable[[float], Floats]
 
 HIT_M = 100.0
-"""A point counts as captured within this distance: the accuracy of a last leg without observation."""
+"""Distance that counts as capture of a point: the accuracy of a last leg without observation."""
 
 _LOOKS = 65
 _PAST, _WIDE, _PATIENCE = 1.05, 2.0, 1.0
@@ -116,14 +116,14 @@ def fly(
     solution: Solution | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Flight:
-    """Simulate a pursuer that plans again from time to time, and follows each plan until the next.
+    """Simulate a pursuer that computes a new plan at regular times and follows each plan until the next.
 
     Parameters
     ----------
     game : Game
         The game at the start.
     steering : callable or None
-        The evader's; None is optimal against where the pursuer really is.
+        Steering of the evader; None is optimal against the true state of the pursuer.
     replan_s : float, optional
         Time between plans.
     observation : Observation or None, optional
@@ -131,22 +131,22 @@ def fly(
     seed : int or SeedSequence, optional
         Seed of the errors of observation.
     solution : Solution or None, optional
-        Solution of the game, where it is known already.
+        Solution of the game, if it is known.
     progress : callable, optional
         Called with the fraction of the predicted time that has passed.
 
     Raises
     ------
     ValueError
-        If the game ends in no capture, so that there is no first plan, or `replan_s` is not positive.
+        If the game has no capture and therefore no first plan, or `replan_s` is not positive.
     PathError
         If the evader's path cannot be followed.
 
     Notes
     -----
     Each plan starts Newton's method at the previous one: 2 ms and, for a steered evader, 2 ms of its flight. The last
-    leg is flown without observation. Where the previous plan does not lead to a new one, the game is solved from
-    scratch; the previous plan is kept where that would take much longer.
+    leg is simulated without observation. If Newton's method fails from the previous plan, the game is solved from
+    scratch; the previous plan is kept if that would take much longer.
     """
     if not 0.0 < replan_s < np.inf:
         raise ValueError("the time between plans must be positive")
@@ -178,7 +178,7 @@ def fly_many(
     game, replan_s, observation, solution
         As for `fly`.
     steering : callable
-        Returns the evader's steering, of the number of the run.
+        Function of the run number that returns the steering of the evader.
     runs : int
         Number of flights.
     seed : int, optional
@@ -201,7 +201,7 @@ def fly_many(
 def capture_quantiles_s(flights: Sequence[Flight]) -> list[float]:
     """Return the least capture time of `flights`, the quantiles 0.1, 0.5 and 0.9, and the greatest, s.
 
-    The list is empty where none captured.
+    The list is empty if no flight ended in a capture.
     """
     times = [flight.time_s for flight in flights if flight.ended is Ended.CAPTURED]
     return [float(time_s) for time_s in np.quantile(times, _QUANTILES)] if times else []
@@ -274,7 +274,7 @@ class _Pursuit:
         branch = None if first is None else follow(pair, first, self._radius, latest, self._work)
         self._work -= 0.0 if branch is None else branch.work
         afresh = branch.last if branch is not None and branch.ending is Ending.CAPTURE else None
-        # Near the end a point may be unreachable by metres: passing near it is better than another revolution.
+        # Near the end a point may be unreachable by metres: a near miss is better than another revolution.
         if kept is not None and (
             afresh is None or afresh.duration > kept.duration + _PATIENCE * (kept.duration + spell)
         ):
@@ -322,7 +322,7 @@ class _Pursuit:
         return replace(self._evader, start=state)
 
     def _look(self, pursuer: ExtremalPath, evader: PathNow, spell: float, last: bool) -> Flight | None:
-        """Return the flight if the leg ends it: by a capture, or for a point by the closest approach, last leg only."""
+        """Return the flight if it ends in the leg: by a capture, or in the last leg at the closest approach."""
 
         def distance(time: float) -> float:
             return float(np.linalg.norm(pursuer.at(time)[:3] - evader(time)[:3]))

@@ -29,7 +29,7 @@ class Gravity:
     parameter_m3_s2 : float
         Gravitational parameter.
     planet_radius_m : float
-        No orbit may reach below it; zero for none.
+        Least allowed distance from the centre; zero for no limit.
     j2 : float
         Second zonal harmonic, about the z axis; zero for a sphere.
     equatorial_radius_m : float
@@ -66,7 +66,7 @@ class Gravity:
 
 @dataclass(frozen=True)
 class Player:
-    """A craft at full thrust, in the direction it chooses, until its propellant is spent.
+    """A craft with full thrust in any direction, until its propellant is spent.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class Player:
 
     @property
     def burn_time_s(self) -> float:
-        """Return how long the propellant lasts; infinite without mass flow."""
+        """Return the time until the propellant is spent; infinite without mass flow."""
         return (self.mass_kg - self.dry_mass_kg) / self.flow_kg_s if self.flow_kg_s > 0.0 else math.inf
 
     @property
@@ -140,8 +140,8 @@ class Game:
     Raises
     ------
     ValueError
-        If the pursuer has no thrust, an orbit is no ellipse or reaches into the planet, the two are within the capture
-        radius at the start, or that radius or the longest duration is out of range.
+        If the pursuer has no thrust, an orbit is not an ellipse or intersects the planet, the distance at the start is
+        within the capture radius, or this radius or the longest duration is out of range.
 
     Notes
     -----

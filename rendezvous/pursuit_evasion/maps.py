@@ -1,4 +1,4 @@
-"""Capture time over two parameters, each point started from its neighbours."""
+"""Capture time as a function of two parameters; points are computed from their neighbours."""
 
 from __future__ import annotations
 
@@ -93,21 +93,22 @@ def capture_map(
     Parameters
     ----------
     game_at : callable
-        Returns the game of a column's and a row's value; a ValueError marks a point without a game.
+        Function of a column's and a row's value that returns the game; it raises ValueError if there is no game.
     columns : ndarray, shape (nx,)
         Values of the first parameter, in its own units.
     rows : ndarray, shape (ny,)
         Values of the second parameter, in its own units.
     follow_all : bool, optional
-        Whether to solve each point from scratch, with a change of branch where one folds: 20 ms to seconds each.
+        Whether to solve all points from scratch, with a change of branch at folds: 20 ms to seconds per point.
     progress : callable, optional
         Called with the fraction done.
 
     Notes
     -----
-    Along a row a point starts from the three before it: 1 to 2 ms. Solved from scratch are one point in 50, the last
-    point before the row has to start again, and points whose time differs from the extrapolation of the rows before.
-    Where that gives another answer, the neighbours are solved from scratch too, and theirs, until the answers agree.
+    In a row a point is computed from the three previous points, in 1 to 2 ms. One point in 50 is solved from scratch,
+    and also the last point before a new start of the row, and points whose time differs from the extrapolation of the
+    previous rows. If a result differs from the previous one, the neighbours are also solved from scratch, and their
+    neighbours, until the results agree.
     """
     grid = _Grid(game_at, np.asarray(columns, dtype=np.float64), np.asarray(rows, dtype=np.float64))
     for j in range(len(rows)):
@@ -170,7 +171,7 @@ class _Grid:
         return [(k, h) for k, h in neighbours if 0 <= k < len(self._rows) and 0 <= h < len(self._columns)]
 
     def settle(self, doubted: list[tuple[int, int]]) -> None:
-        """Solve points that came from neighbours from scratch; where the answer changes, their neighbours too."""
+        """Solve points that were computed from neighbours from scratch; if a result changes, also their neighbours."""
         while doubted:
             j, i = doubted.pop()
             if STATUSES[self._status[j, i]] is not PointStatus.NEIGHBOUR:

@@ -86,8 +86,8 @@ class Capture:
     position_m : ndarray, shape (3,)
         Position of the evader at that time.
     direction : ndarray, shape (3,)
-        nu, along which both go as far as they can; with a capture radius, from the pursuer to the evader. It is that of
-        lambda_rP at the end, which is -lambda_rE.
+        nu, the direction along which both players reach the greatest distance; with a capture radius, the direction
+        from the pursuer to the evader. It is that of lambda_rP at the end, which equals -lambda_rE.
     closing_speed_m_s : float
         Speed at which the distance falls.
     curvature : ndarray, shape (2,)
@@ -97,7 +97,7 @@ class Capture:
     residual : float
         Error of the start states and of r_E - r_P = R nu, in units of length and speed: below 1e-9.
     extremal : Node
-        The extremal, nondimensional; a first guess for games near by.
+        The extremal, nondimensional; an initial guess for similar games.
 
     Notes
     -----
@@ -128,15 +128,15 @@ class Solution:
     Parameters
     ----------
     game : Game
-        The game solved.
+        The game.
     units : Units
-        Its units.
+        Units of the nondimensional values.
     verdict : Verdict
         End of the game.
     capture : Capture or None
-        Where the verdict is captured.
+        Capture, if the verdict is `captured`.
     route : Route
-        Continuation, or that with a change of branch.
+        Continuation, with or without a change of branch.
     curve : DistanceCurve
         Distances along the branch.
     looked_at_s : float
@@ -144,9 +144,9 @@ class Solution:
     exhausted : str or None
         Player without propellant at that time: pursuer or evader.
     fallback : Capture or None
-        Capture by another route, without a claim, where the branch is not certified.
+        Capture by another route, which is not claimed to be the first one, if the branch is not certified.
     fallback_route : Route or None
-        That route.
+        Route of the fallback.
     """
 
     game: Game

@@ -1,6 +1,6 @@
-"""Solution of the game: the branch of extremals from T -> 0, changed for a better one where it folds, and other routes.
+"""Solution of the game: the branch of extremals from T -> 0, a change of branch at folds, and other routes.
 
-Homotopy and the linear game give an extremal where its branch cannot be followed. Neither excludes an earlier capture.
+Homotopy and the linear game give an extremal if its branch cannot be followed. They do not exclude earlier captures.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
     game : Game
         The game to solve.
     change_branch : bool, optional
-        Whether to look for another branch where the first one folds; seconds each.
+        Whether to search for another branch at a fold; each search takes seconds.
     all_directions : bool, optional
-        Whether to look, at the capture too, for a branch that keeps the evader farther away.
+        Whether to search also at the capture for a branch that keeps the evader farther away.
 
     Notes
     -----
-    The game of Wang's slides, after Shen and Casalino (2018); they shoot forward from a guess, which is not done here.
-    At each duration the evader takes the branch with the greatest distance l; capture is the first time at which that
-    is the capture radius. 20 to 40 ms a revolution. A capture whose residual is not below 1e-9 is rejected: the verdict
-    is then that the branch is not certified.
+    The game is that of Wang's slides, after Shen and Casalino (2018), who shoot forward from a guess. At each duration
+    the evader takes the branch with the greatest distance l; the capture is the first time at which l is the capture
+    radius. Cost: 20 to 40 ms per revolution. A capture whose residual is not below 1e-9 is rejected: the verdict is
+    then that the branch is not certified.
     """
     scaled = scaled_game(game)
     units, pair, radius, latest = scaled.units, scaled.pair, scaled.radius, scaled.latest
@@ -89,10 +89,10 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
 
 
 def solve_near(game: Game, units: Units, guess: Node) -> Capture | None:
-    """Solve a `game` near one that is solved, whose `units` and extremal are the `guess`; 2 ms.
+    """Solve a `game` from the extremal `guess` of a similar solved game with the `units`; 2 ms.
 
-    Returns a local saddle, or None where Newton's method does not lead to one whose residual is below 1e-9. Earlier
-    captures are not excluded.
+    Returns a local saddle, or None if Newton's method finds none whose residual is below 1e-9. Earlier captures are not
+    excluded.
     """
     node = _near(scaled_game(game, units), guess)
     return None if node is None else _capture(game, units, node)
@@ -143,7 +143,7 @@ def _by_another_route(game: Game) -> tuple[Capture | None, Route | None]:
 
 
 def _uncaptured(game: Game) -> tuple[Verdict, str | None]:
-    """Say why there is no capture by the end of the time looked at."""
+    """Return the verdict if there is no capture within the examined time."""
     pursuer, evader = game.pursuer, game.evader
     end_s = horizon_s(game)
     slack = 1.0 - 2e-3
@@ -193,8 +193,9 @@ def solve_by_linear_game(game: Game) -> Capture | None:
 
     Notes
     -----
-    The relative state is curvilinear: along the motion it is the arc, which keeps the linear game near the real one for
-    long distances. Its duration and direction are the guess; each side's end is found by continuation in the duration.
+    The relative state is curvilinear, with the arc as the coordinate along the motion, so that the linear game remains
+    close to the true one over long distances. Its duration and direction are the guess; the ends of both sides are
+    computed by continuation in the duration.
     """
     scaled = scaled_game(game)
     guess = _linear_guess(game, scaled)

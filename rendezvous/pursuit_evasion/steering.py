@@ -47,14 +47,14 @@ class Script:
     Parameters
     ----------
     begin_s : tuple of float
-        Start of each policy, rising, the first at zero.
+        Starting times of the policies, increasing, the first zero.
     policies : tuple of Policy
-        One for each start.
+        Policies, one for each starting time.
 
     Raises
     ------
     ValueError
-        If there is no policy, not one for each time, or the times do not rise from 0.
+        If there is no policy, their number is not that of the times, or the times do not increase from 0.
     """
 
     begin_s: tuple[float, ...]
@@ -65,7 +65,7 @@ class Script:
         if not self.begin_s or len(self.begin_s) != len(self.policies):
             raise ValueError("a script must have one time for each policy, and at least one policy")
         if self.begin_s[0] != 0.0 or any(b <= a for a, b in zip(self.begin_s, self.begin_s[1:], strict=False)):
-            raise ValueError("the times of a script must rise, from 0")
+            raise ValueError("the times of a script must increase from 0")
 
     def __call__(self, time_s: float, state: Floats) -> Floats:
         """Return the direction of the policy of that time."""
@@ -80,9 +80,9 @@ class RandomSteering:
     Parameters
     ----------
     seed, run : int
-        Each run of a seed has its own directions.
+        Seed and run number; they determine the directions.
     hold_s : float
-        How long each direction is held.
+        Time for which a direction is constant.
     """
 
     seed: int

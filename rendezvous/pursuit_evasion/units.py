@@ -1,4 +1,4 @@
-"""Nondimensional form of a game: its own units of length, time and mass, so that mu is one."""
+"""Nondimensional form of a game, in units of length, time and mass for which mu is one."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rendezvous.pursuit_evasion.game import Game, Gravity, Player
 Floats = NDArray[np.float64]
 
 LONGEST_REVOLUTIONS = 15.0
-"""Longest duration of a game that does not state one, in revolutions of the pursuer."""
+"""Default of the longest duration of a game, in revolutions of the pursuer."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Units:
 
 @dataclass(frozen=True)
 class ScaledGame:
-    """A game in units; `latest` is the longest duration that it is followed to."""
+    """A nondimensional game; `latest` is its longest duration."""
 
     units: Units
     pursuer: Craft
@@ -84,14 +84,14 @@ def scaled_craft(player: Player, gravity: Gravity, units: Units) -> Craft:
 
 
 def scaled_game(game: Game, units: Units | None = None) -> ScaledGame:
-    """Return a game in units, its own where none are given."""
+    """Return a nondimensional game; without `units` those of `units_of` are used."""
     units = units or units_of(game)
     pursuer, evader = (scaled_craft(player, game.gravity, units) for player in (game.pursuer, game.evader))
     return ScaledGame(units, pursuer, evader, game.capture_radius_m / units.length_m, horizon_s(game) / units.time_s)
 
 
 def horizon_s(game: Game) -> float:
-    """Return the longest duration of a game, s: until a player's propellant is spent, or as long as it states."""
+    """Return the longest duration of a game, s: the time until a player's propellant is spent, or that of the game."""
     longest = game.longest_s
     if not np.isfinite(longest):
         longest = 2.0 * np.pi * LONGEST_REVOLUTIONS * units_of(game).time_s

@@ -1,7 +1,7 @@
 """Rendezvous through reachable sets: every optimal control of a linear system under constraints on its states.
 
-A problem is made of a motion; solving it gives the sets of states and the set of optimal controls, from which members
-are selected and flown.
+A problem is built from a motion. Its solution contains the sets of states and the set of optimal controls. Controls are
+selected from this set and simulated.
 """
 
 from rendezvous.reachability.closed_loop import Flight, replan

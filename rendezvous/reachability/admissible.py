@@ -43,7 +43,7 @@ class Lifted:
     equal, levels : ndarray
         Equations, of shapes (e, p) and (e,).
     ball : int
-        Number m of controls a period where their norm is bounded; 0 for a box, whose bounds are among the rows.
+        Number m of controls of a period if their norm is bounded; 0 for a box, whose bounds are among the rows.
     """
 
     free: Floats
@@ -177,9 +177,10 @@ def _lifted(
 
 
 def joined(parts: Sequence[Lifted], controls: Sequence[Places], periods: int, total: int) -> Lifted:
-    """Return several blocks as one set; controls in the order of the problem, states in the order of the blocks.
+    """Return several blocks as one set, with controls in the order of the problem and states in that of the blocks.
 
-    `controls` are the indices of each block's controls among the `total` of the problem; those of no block are zero.
+    `controls` are the indices of each block's controls among the `total` controls of the problem; other controls are
+    zero.
     """
     order = [t * total + int(j) for places in controls for t in range(periods) for j in places]
     control_free, control_response = np.zeros(periods * total), np.zeros((periods * total, sum(p.size for p in parts)))
@@ -201,9 +202,9 @@ def joined(parts: Sequence[Lifted], controls: Sequence[Places], periods: int, to
 
 
 def with_thrust(program: ConeProgram, lifted: Lifted, *, deep: bool = False) -> ConeProgram:
-    """Add |u(t)| <= 1 to a program whose first variables are those of the set; nothing where thrust is in a box.
+    """Add |u(t)| <= 1 to a program whose first variables are those of the set; for thrust in a box add nothing.
 
-    If `deep`, the last variable of the program is the radius of a ball that must be inside too.
+    If `deep`, the last variable of the program is the radius of a ball that must also be inside.
     """
     if lifted.ball and lifted.size:
         free = lifted.control_free.reshape(-1, lifted.ball)
@@ -216,9 +217,9 @@ def with_thrust(program: ConeProgram, lifted: Lifted, *, deep: bool = False) -> 
 
 
 def least_relaxation(lifted: Lifted) -> tuple[float, Floats]:
-    """Return the least relaxation of all rows on states and of the equations that leaves a point, and that point.
+    """Return the least relaxation of all rows on states and of the equations with a feasible point, and that point.
 
-    It is not below -1, where the search stops, and not positive where the set is not empty. Bounds on controls are not
+    It is at least -1, where the search stops, and not positive if the set is not empty. Bounds on controls are not
     relaxed. The relaxation of equations is not negative; without equations a negative relaxation is a margin.
     """
     soft = lifted.moments >= 0
@@ -241,7 +242,7 @@ def least_relaxation(lifted: Lifted) -> tuple[float, Floats]:
 def quadratic(lifted: Lifted, matrix: Floats, vector: Floats) -> Optimum:
     """Minimise v . matrix v / 2 + vector . v over a set of controls without equations, `matrix` positive semidefinite.
 
-    For a box the solution is moved to where its active rows meet, which makes it exact to rounding.
+    For a box the solution is moved to the intersection of its active rows, so that it is exact to rounding.
     """
     if not lifted.size:
         return Optimum(np.zeros(0), np.zeros(len(lifted.limits)))
@@ -259,10 +260,10 @@ def least_sum_of_norms(lifted: Lifted, scale: Floats, group: int) -> Floats:
 
 
 def least_peak(lifted: Lifted, scale: Floats, group: int) -> tuple[float, Floats]:
-    """Return the least bound that all controls can keep, and where they keep it.
+    """Return the least common bound of all controls, and controls that attain it.
 
-    It bounds each component, or the norm of the `group` controls of a period for thrust in a ball; `scale` is the units
-    of the controls.
+    It is a bound of each component, or for thrust in a ball of the norm of the `group` controls of a period; `scale`
+    contains the units of the controls.
     """
     cost = np.concatenate([np.zeros(lifted.size), [1.0]])
     if lifted.ball:
@@ -285,7 +286,7 @@ def least_l1(lifted: Lifted, scale: Floats) -> Floats:
 
 
 def deep_point(lifted: Lifted) -> tuple[Floats, float]:
-    """Return a point deep inside a set with thrust in a ball, and the radius of a ball about it that is inside.
+    """Return a point far from the boundary of a set with thrust in a ball, and the radius of a ball inside around it.
 
     The effect of the radius on the thrust of a period is bounded by the norm of its response: the ball is inside, but
     may not be the largest.
@@ -343,9 +344,9 @@ class Maximiser:
 
     Notes
     -----
-    An interior-point method (Clarabel) reuses what depends on the constraints alone; the simplex method (HiGHS) solves
-    the programs that it does not. Most constraints on states are never active: where they are many, it begins without
-    them, and adds one, at the times near by, once a solution breaks it.
+    An interior-point method (Clarabel) reuses the factors that depend on the constraints only; the simplex method
+    (HiGHS) solves the programs on which it fails. Most constraints on states are never active. If there are many, the
+    maximiser starts without them, and adds a constraint at neighbouring times once a solution violates it.
     """
 
     def __init__(self, lifted: Lifted) -> None:

@@ -1,4 +1,4 @@
-"""Closed loop: each period the rest of the problem is solved again from the estimated state."""
+"""Closed loop: in every period the remaining problem is solved again from the estimated state."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from rendezvous.reachability.solve import OptimalControls, optimal_controls
 Floats = NDArray[np.float64]
 
 Truth = Callable[[int, Floats, Floats], Floats]
-"""Of a period, the true state and the control: the true state a period later."""
+"""A function of the period, the true state and the control that returns the true state one period later."""
 Observer = Callable[[int, Floats], Floats]
-"""Of a period and the true state: the estimated state."""
+"""A function of the period and the true state that returns the estimated state."""
 
 _MORE = 1.001
 _LEAST_RELAXATION = 1e-9
@@ -27,7 +27,7 @@ _MOST_RELAXATION = 1e3
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """A flight in closed loop.
+    """Simulation in closed loop.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Flight:
     expected_misses : ndarray, shape (T,)
         The least terminal norm of each plan, in the units of the states.
     relaxations : ndarray, shape (T,)
-        Fraction by which all constraints on states were relaxed to find each plan; 0 where they held.
+        Fraction by which all constraints on states were relaxed for each plan; 0 without relaxation.
     """
 
     states: Floats
@@ -55,24 +55,24 @@ class Flight:
 def replan(
     problem: ReachabilityProblem, truth: Truth, observe: Observer | None = None, *, relative: bool = False
 ) -> Flight:
-    """Fly a problem in closed loop: each period, apply the first control of the optimal plan of least energy.
+    """Simulate a problem in closed loop: in every period apply the first control of the optimal plan of least energy.
 
     Parameters
     ----------
     problem : ReachabilityProblem
         The model used for planning.
     truth : callable
-        Returns the true state a period later, of the period, the true state and the control.
+        Function of the period, the true state and the control that returns the true state one period later.
     observe : callable or None
-        Returns the estimated state, of the period and the true state; None for exact estimates.
+        Function of the period and the true state that returns the estimated state; None for exact estimates.
     relative : bool
-        Whether plans that cannot reach zero, for example those of the last period, minimise the norm of states divided
-        by their bounds, and not in the units of the problem.
+        Norm that plans minimise if they cannot reach zero, for example in the last period: True for states divided by
+        their bounds, False for the units of the problem.
 
     Notes
     -----
-    T optima and as many quadratic programs. From a state from which no control keeps the constraints, all of them are
-    relaxed by the same fraction, as little as helps.
+    T optima and T quadratic programs. If no control satisfies the constraints from a state, all of them are relaxed by
+    the least sufficient fraction.
     """
     state = problem.initial
     states, controls, misses, relaxations = [state], [], [], []
@@ -114,7 +114,7 @@ def _plan(problem: ReachabilityProblem, start: int, estimated: Floats, relative:
 
 
 def _worst(problem: ReachabilityProblem, time: int, state: Floats) -> float:
-    """Fraction by which constraints must be relaxed to hold at a state."""
+    """Return the fraction by which constraints must be relaxed to be satisfied at a state."""
     normals, offsets = problem.further
     beyond = (normals @ state - offsets[time]) / _sizes(problem)
     return max(float((np.abs(state) / problem.state_bounds).max()) - 1.0, float(beyond.max(initial=-np.inf)))

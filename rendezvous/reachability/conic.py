@@ -29,11 +29,11 @@ _SETTINGS: tuple[dict[str, float], ...] = (
     {"static_regularization_constant": 1e-11, "dynamic_regularization_eps": 1e-15},
     {"max_step_fraction": 0.9, "iterative_refinement_max_iter": 50},
 )
-"""Settings tried in turn. The defaults solve nearly all programs; which others solve the rest cannot be predicted."""
+"""Settings that are tried in order. The defaults solve nearly all programs; for the rest no setting is always best."""
 
 
 class NoSolutionError(ArithmeticError):
-    """No solver's answer to a program met the conditions of optimality."""
+    """No solver returned a solution that satisfies the conditions of optimality."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ _ABSOLUTE = 1e-9
 
 
 class MotionModel(Enum):
-    """Linear model: A(t) constant, as at t = 0, or following the ellipse."""
+    """Linear model: A constant, with its value at t = 0, or A(t) of the elliptic orbit."""
 
     FROZEN = "frozen"
     TIME_VARYING = "time-varying"
@@ -29,7 +29,7 @@ def motion_of(orbit: EllipticOrbit, model: MotionModel) -> ConstantMotion | Tsch
 
     Notes
     -----
-    Equation (2) of Shorikov and Goranov (2021); their numbers are of the frozen model.
+    Equation (2) of Shorikov and Goranov (2021), who use the frozen model.
     """
     return orbit.frozen(0.0, ORBITAL) if model is MotionModel.FROZEN else TschaunerHempel(orbit, ORBITAL)
 

@@ -1,4 +1,4 @@
-"""The least terminal norm of a block, and the set of all controls that reach it."""
+"""The least terminal norm of a block, and the set of all controls that attain it."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ _NEWTON_STEPS, _IDLE = 16, 5
 
 
 class EmptyTubeError(ValueError):
-    """No control keeps the constraints.
+    """No control satisfies the constraints.
 
     Parameters
     ----------
     time : int
         The first time t such that the constraints up to t cannot all be kept.
     relaxation : float
-        Least relaxation of all constraints on states, as a fraction of their bounds, with which all can be kept.
+        Least relaxation of all constraints on states, as a fraction of their bounds, with which all can be satisfied.
     names : tuple of str
         Constraints that conflict at that time.
     """
@@ -74,7 +74,7 @@ class BlockOptimum:
     optimal : Lifted
         All optimal controls, in coordinates z of their affine hull; thrust in a ball remains a constraint.
     centre : ndarray, shape (d,)
-        A point deep inside, in these coordinates.
+        A point far from the boundary of `optimal`, in its coordinates.
     """
 
     block: Block
@@ -94,7 +94,7 @@ def block_optimum(block: Block, *, relative: bool = False) -> BlockOptimum:
     """Return the least terminal norm of a block, and all controls that reach it.
 
     If `relative`, the norm is of states divided by their bounds; otherwise in the units of the problem.
-    `EmptyTubeError` is raised where no control keeps the constraints.
+    `EmptyTubeError` is raised if no control satisfies the constraints.
 
     Notes
     -----
@@ -133,14 +133,15 @@ def block_reaches_zero(block: Block) -> bool:
 
 
 def admissible(block: Block) -> Block:
-    """Return a block whose constraints some controls keep: itself, or relaxed by rounding.
+    """Return a block whose constraints can be satisfied: the block itself, or one relaxed by rounding.
 
-    Where no control keeps the constraints by 1e-9 of their sizes, all of them are relaxed until one does.
+    If no control satisfies the constraints by 1e-9 of their sizes, all of them are relaxed until one does.
 
     Raises
     ------
     EmptyTubeError
-        If that takes more than 1e-9, with the first time at which they conflict, by bisection: a linear program each.
+        If the relaxation is more than 1e-9. The first time at which constraints conflict is found by bisection, with a
+        linear program per step.
     """
     lifted = lift(block)
     relaxation = least_relaxation(lifted)[0]
@@ -226,7 +227,7 @@ def least_norm(lifted: Lifted, weights: Floats) -> LeastNorm:
 def reaches_zero(lifted: Lifted) -> bool:
     """Return whether some controls of a block, a set without equations, reach zero.
 
-    `NoSolutionError` is raised where neither such a control nor a lower bound above zero was found.
+    `NoSolutionError` is raised if neither such a control nor a positive lower bound was found.
     """
     search = _Search(lifted, np.ones(lifted.free.shape[1]))
     search.solve()
@@ -234,7 +235,7 @@ def reaches_zero(lifted: Lifted) -> bool:
 
 
 class _Search:
-    """The best point and the best lower bound so far."""
+    """Search for a point of least norm, with the best point and the best lower bound so far."""
 
     def __init__(self, lifted: Lifted, weights: Floats) -> None:
         self._lifted = lifted
@@ -270,7 +271,7 @@ class _Search:
         return self._bound > self._error
 
     def solve(self) -> None:
-        """Solve the cone program, again about its solution where that is not accurate enough, and improve on it."""
+        """Solve the cone program, repeatedly about its solution if that is not accurate enough, and improve it."""
         if not self._size:
             self._offer_point(self._point)
             self._offer_bound(self._free / max(self.value, 1e-300), self._multipliers)
@@ -294,7 +295,7 @@ class _Search:
             scale = min(scale, self.value)
 
     def result(self) -> LeastNorm:
-        """Return the solution, if it is accurate enough."""
+        """Return the solution; raise NoSolutionError if it is not accurate enough."""
         if not self._good:
             raise NoSolutionError(
                 f"the least terminal norm was not found: it lies between {self._bound:.6g} and {self.value:.6g} of the "
@@ -387,7 +388,7 @@ class _Search:
         return broken
 
     def _improve(self, point: Floats, direction: Floats, multipliers: Floats) -> None:
-        """Bring point and bound together: Newton's method on the conditions of optimality.
+        """Improve point and bound by Newton's method on the conditions of optimality.
 
         A bound is active in the next step where its multiplier is above its slack (a primal-dual active set). The
         unknowns are the step, the direction y / |y| and the multipliers: the system stays well conditioned for small y.
@@ -441,7 +442,7 @@ class _Search:
         return step, turned, forces, after
 
     def _slid(self, point: Floats, direction: Floats, multipliers: Floats, pressed: Floats, held: Flags) -> Floats:
-        """Move down a slope that Newton's method neglected, to the first bound, whose multiplier becomes positive.
+        """Move along a descent direction that Newton's method neglected, up to the first bound, which becomes active.
 
         The norm falls by rounding for a step of an ulp, and by more than rounding for the whole step.
         """

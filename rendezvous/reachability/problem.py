@@ -41,7 +41,7 @@ class InadmissibleStartError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class ReachabilityProblem:
-    """Minimise |x(T)| for x(t+1) = A(t) x(t) + B(t) u(t) from x(0), and find all controls that do.
+    """Minimise |x(T)| for x(t+1) = A(t) x(t) + B(t) u(t) from x(0), and find all minimising controls.
 
     Parameters
     ----------
@@ -60,11 +60,11 @@ class ReachabilityProblem:
     normals : ndarray, shape (k, n)
         Further constraints on states: normals x(t) <= offsets(t).
     offsets : ndarray, shape (T + 1, k)
-        In the units of normals x; infinite where a constraint does not hold.
+        Offsets in the units of normals x; infinite at times without the constraint.
     constraint_names : tuple of str
         Names of these k constraints in messages.
     between : ndarray, shape (T, s, n, n + m) or None
-        States within the periods, x = between[t, i] (x(t), u(t)), at which the constraints hold too.
+        States within the periods, x = between[t, i] (x(t), u(t)), at which the constraints also apply.
     state_names : tuple of str
         Names of the states in messages.
 
@@ -156,16 +156,16 @@ class ReachabilityProblem:
 
     @property
     def further(self) -> tuple[Floats, Floats]:
-        """`normals` and `offsets`, with k = 0 rows where there are none."""
+        """`normals` and `offsets`; arrays of k = 0 rows if they are None."""
         if self.normals is None or self.offsets is None:
             return np.zeros((0, self.states)), np.zeros((self.periods + 1, 0))
         return self.normals, self.offsets
 
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
-        """The smallest parts that do not act on each other, in the order of their first states.
+        """The smallest independent parts of the problem, in the order of their first states.
 
-        Together they have all states, and all controls that act on any.
+        Together they contain all states, and all controls that affect a state.
         """
         n, m = self.states, self.controls
         linked = np.zeros((n + m, n + m), dtype=bool)
@@ -208,7 +208,7 @@ class ReachabilityProblem:
     def excess(self, controls: ArrayLike) -> Floats:
         """Return the greatest violation of a constraint by `controls`, shape (..., T, m), relative to the bounds.
 
-        It is at most 0 where all constraints hold.
+        It is at most 0 if all constraints are satisfied.
         """
         thrust = np.asarray(controls, dtype=float)
         if self.thrust is ThrustShape.BALL:
@@ -238,7 +238,7 @@ class ReachabilityProblem:
     def rest(self, start: int, state: ArrayLike) -> ReachabilityProblem:
         """Return the problem that begins at time `start`, from 0 to T - 1, in a `state`, shape (n,).
 
-        `InadmissibleStartError` is raised where the state violates a constraint.
+        `InadmissibleStartError` is raised if the state violates a constraint.
         """
         return self._part(start, self.periods, np.asarray(state, dtype=float))
 
@@ -257,16 +257,16 @@ class ReachabilityProblem:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """States and controls that do not act on any others, divided by their bounds.
+    """An independent part of a problem, with states and controls divided by their bounds.
 
     Parameters
     ----------
     states, controls : ndarray of int
-        Their indices in the problem.
+        Indices of the states and controls in the problem.
     scale : ndarray, shape (n,)
         Bounds on the states, in their own units.
     transition, control, initial, between
-        As in the problem, scaled.
+        Arrays of the problem, scaled.
     normals, offsets : ndarray
         All constraints on states, the bounds first, of shapes (k, n) and (T + 1, k); normals of unit length.
     names : tuple of str

@@ -1,4 +1,4 @@
-"""Bounded disturbances: constraints tightened by their accumulated effect, and plans with feedback from them."""
+"""Bounded disturbances: constraints tightened by the accumulated disturbance, and plans with disturbance feedback."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _TIDY = 1e-7
 
 
 class NoRobustPlanError(ValueError):
-    """No plan keeps the constraints under every disturbance."""
+    """No plan satisfies the constraints for all disturbances."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,15 +103,15 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
     Raises
     ------
     NoRobustPlanError
-        If no plan keeps the constraints.
+        If no plan satisfies the constraints.
     ValueError
         If there are too many periods, or thrust is in a ball.
 
     Notes
     -----
-    With affine feedback every constraint is linear in (nominal, gains) but for absolute values, one more variable each:
-    one linear program (HiGHS) of some T^2 (n + m) q / 2 of them, whose solution is checked. It minimises the sum of the
-    greatest terminal states, divided by their bounds.
+    With affine feedback all constraints are linear in (nominal, gains) except for absolute values, each of which needs
+    an additional variable. The result is one linear program (HiGHS) with about T^2 (n + m) q / 2 additional variables,
+    whose solution is checked. It minimises the sum of the greatest terminal states, divided by their bounds.
     """
     _check(problem, disturbance)
     if problem.thrust is ThrustShape.BALL:
@@ -243,14 +243,14 @@ class _Program:
         self.limits.append(limit)
 
     def _absolute(self, entries: dict[int, float], constant: float) -> int:
-        """A variable not below |entries + constant|."""
+        """Add a variable that is at least |entries + constant|."""
         index = self._new()
         self._add({**entries, index: -1.0}, -constant)
         self._add({**{c: -v for c, v in entries.items()}, index: -1.0}, constant)
         return index
 
     def _spread(self, row: Floats, time: int) -> dict[int, float]:
-        """Variables whose sum is how far disturbances move row . x(time)."""
+        """Return variables whose sum is the greatest effect of disturbances on row . x(time)."""
         margins: dict[int, float] = {}
         turned = np.einsum("n,nsm->sm", row, self.response[time])
         for s in range(time):

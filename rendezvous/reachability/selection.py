@@ -24,7 +24,7 @@ _FLATTEST = 1e-15
 
 
 class TooManyVerticesError(ValueError):
-    """The optimal controls have more vertices than can be listed, or none, for thrust in a ball."""
+    """The optimal controls have too many vertices, or none because thrust is in a ball."""
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ def _barrier(space: Lifted, point: Floats) -> tuple[float, Floats, Floats]:
 
 
 def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
-    """Return every vertex of the set of `optimal` controls, shape (v, T, m).
+    """Return all vertices of the set of `optimal` controls, shape (v, T, m).
 
     Raises
     ------
@@ -231,8 +231,8 @@ def samples(optimal: OptimalControls, count: int, generator: np.random.Generator
 
     Notes
     -----
-    Hit-and-run: a chain for each from the analytic centre, 20 d steps long; the `generator` draws directions, scaled by
-    the Hessian of the barrier. Uniform in the limit; O(count r d) a step.
+    Hit-and-run: for each sample a chain of 20 d steps from the analytic centre; the `generator` draws directions, which
+    are scaled by the Hessian of the barrier. The distribution is uniform in the limit. O(count r d) per step.
     """
     if count < 1:
         raise ValueError(f"at least one sample must be drawn, not {count}")

@@ -1,4 +1,4 @@
-"""Forward sets and the tube of a problem: exact polytopes, or sets known by programs over the admissible controls."""
+"""Forward sets and the tube of a problem: exact polytopes, or programs over the admissible controls."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _SHARP = 1e-7
 
 
 class SetKind(Enum):
-    """Set of states at a time: all that admissible controls reach (forward), or that optimal controls pass (tube)."""
+    """Set of states at a time: those on paths of admissible controls (forward), or of optimal controls (tube)."""
 
     FORWARD = "forward"
     TUBE = "tube"
@@ -41,11 +41,11 @@ class Budget:
     Parameters
     ----------
     seconds : float
-        Time, s, for all blocks together; a step that is expected to exceed it is not begun.
+        Computing time, s, for all blocks; a step that is expected to exceed it is not started.
     megabytes : float
         Memory, MB, for one step.
     dimension : int
-        Largest block.
+        Greatest number of states of a block.
     """
 
     seconds: float = 5.0
@@ -66,7 +66,7 @@ class BlockSets(Protocol):
         """Return the image of a set under a matrix, shape (d, n), of few rows."""
 
     def polytope(self, kind: SetKind, time: int) -> Polytope | None:
-        """Return the set itself, where it is known."""
+        """Return the set as a polytope; None if its vertices are not known."""
 
 
 @dataclass(frozen=True)
@@ -76,11 +76,11 @@ class SetCounts:
     Parameters
     ----------
     vertices : int
-        Those nearer to each other than 1e-7 of the bounds count once.
+        Number of vertices; vertices nearer to each other than 1e-7 of the bounds count once.
     facets : int
-        Of all blocks together.
+        Number of facets of all blocks.
     dimension : int
-        Of the affine hull.
+        Dimension of the affine hull.
     """
 
     vertices: int
@@ -95,7 +95,7 @@ class ReachableSets:
     Parameters
     ----------
     problem : ReachabilityProblem
-        The problem whose states these are.
+        The problem.
     parts : tuple of BlockSets
         Sets of each block of the problem.
     """
@@ -121,7 +121,7 @@ class ReachableSets:
         return total
 
     def counts(self, kind: SetKind, time: int) -> SetCounts | None:
-        """Return the counts of the set of a `kind` at a `time`, or None where it is known by programs only."""
+        """Return the counts of the set of a `kind` at a `time`; None if its vertices are not known."""
         sets = [polytope for part in self.parts if (polytope := part.polytope(kind, time)) is not None]
         if len(sets) < len(self.parts):
             return None
@@ -139,11 +139,11 @@ class ReachableSets:
         kind : SetKind
             Forward set or tube.
         time : int
-            From 0 to T.
+            Time index, from 0 to T.
         axes : sequence of int
             Indices of the states.
         tolerance : float
-            Relative error of the projection of a set that is known by programs only.
+            Relative error of the projection of a set that is represented by programs.
         """
         wanted = list(axes)
         order: list[int] = []
@@ -159,12 +159,12 @@ class ReachableSets:
 
 
 class Meter:
-    """Measures the time that hulls take, and refuses a hull that is expected to exceed the budget.
+    """Measures the computing time of hulls, and raises an error before a hull that is expected to exceed the budget.
 
     Notes
     -----
     Qhull's time for k points in R^d grows as k^(d/2) at worst, and the memory of the check as vertices times facets.
-    Both are extrapolated from the last hull of that dimension, the first one from figures of a slow machine.
+    Both are extrapolated from the last hull of that dimension, or from values of a slow machine for the first hull.
     """
 
     def __init__(self, budget: Budget) -> None:
@@ -288,13 +288,13 @@ def _finite(normals: Floats, offsets: Floats) -> tuple[Floats, Floats]:
 
 
 class LiftedSets:
-    """Sets of a block that are known by programs over its admissible controls.
+    """Sets of a block, represented by programs over its admissible controls.
 
     Notes
     -----
-    A linear program a direction, or one with cones for thrust in a ball; the only error is the tolerance of the
-    programs, at most 1e-8 of the bounds. The variables are the controls, and where these are many the states too, since
-    the rows are sparse then.
+    Each direction needs a linear program, or a cone program for thrust in a ball. The only error is the tolerance of
+    the programs, at most 1e-8 of the bounds. The variables are the controls; if there are many, states are variables
+    too, because the rows are then sparse.
     """
 
     def __init__(self, optimum: BlockOptimum) -> None:
@@ -319,7 +319,7 @@ class LiftedSets:
                 ends = self.support(kind, t, np.vstack([-unit, unit])).reshape(2, size)
                 result[t, :, 0], result[t, :, 1] = -ends[0], ends[1]
             return result
-        # A state on the path of one optimal control is reached: where it is at its bound, there is nothing to solve.
+        # If a state on the path of an optimal control is at its bound, no program is needed.
         lifted, program = self._set(kind, periods)
         best = np.full((periods + 1, size, 2), -np.inf)
         for t in _coarse_first(periods):
@@ -365,7 +365,7 @@ class LiftedSets:
 
 
 def optimal_set(optimum: BlockOptimum) -> Lifted:
-    """Return the optimal controls of a block in the variables that suit many linear programs."""
+    """Return the optimal controls of a block in variables for which linear programs are fast."""
     if optimum.optimal.size <= _FEW_CONTROLS or not optimum.reached:
         return optimum.optimal
     lifted = lift_with_states(optimum.block)
@@ -373,7 +373,7 @@ def optimal_set(optimum: BlockOptimum) -> Lifted:
 
 
 def _coarse_first(periods: int) -> list[int]:
-    """Times 1..T - 1 in an order whose every beginning is spread over all."""
+    """Return the times 1..T - 1 in an order of which any first part is evenly spread."""
     order: list[int] = []
     step = 1
     while step < periods:

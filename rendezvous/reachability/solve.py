@@ -1,4 +1,4 @@
-"""Solution of a problem: the least terminal norm, all controls that reach it, and the sets of states on the way."""
+"""Solution of a problem: the least terminal norm, all controls that attain it, and the sets of states."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from rendezvous.reachability.sets import (
 Floats = NDArray[np.float64]
 
 MOST_STATES_BY_CHOICE = 4
-"""Greatest number of states of a block for which the exact route is tried without being asked for."""
+"""Greatest number of states of a block for which the exact route is tried by default."""
 MOST_PERIODS_BY_CHOICE = 16
 AGREEMENT = 1e-9
 """Greatest difference between the bounds of both routes, relative to the bounds on states."""
 
 
 class Route(Enum):
-    """How sets of states are known: by all their vertices and facets, or by programs over the admissible controls."""
+    """Representation of sets of states: all vertices and facets, or programs over the admissible controls."""
 
     EXACT = "exact"
     LIFTED = "lifted"
@@ -48,7 +48,7 @@ class OptimalControls:
     Parameters
     ----------
     problem : ReachabilityProblem
-        The problem solved.
+        The problem.
     blocks : tuple of BlockOptimum
         Optima of the independent parts of the problem.
     """
@@ -68,7 +68,7 @@ class OptimalControls:
 
     @property
     def centre(self) -> Floats:
-        """A point deep inside, in these coordinates, shape (dimension,)."""
+        """A point far from the boundary of `space`, shape (dimension,)."""
         return np.concatenate([part.centre for part in self.blocks])
 
     @property
@@ -92,10 +92,10 @@ class OptimalControls:
         return np.asarray((scaled * self.scale).reshape(*np.shape(point)[:-1], self.problem.periods, -1))
 
     def excess(self, controls: ArrayLike) -> Floats:
-        """Return how far `controls`, shape (..., T, m), are from optimal, relative to the bounds; shape (...).
+        """Return the deviation of `controls`, shape (..., T, m), from the set, relative to the bounds; shape (...).
 
-        It is the greatest violation of a constraint or distance of the terminal state from the best one: at most
-        rounding for members of the set.
+        It is the greatest violation of a constraint, or the distance of the terminal state from the optimal one; for
+        members of the set it is at most rounding.
         """
         thrust = np.asarray(controls, dtype=float)
         best = np.zeros(self.problem.states)
@@ -123,20 +123,20 @@ class OptimalControls:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A problem solved.
+    """The solution of a problem.
 
     Parameters
     ----------
     problem : ReachabilityProblem
-        The problem solved.
+        The problem.
     optimal : OptimalControls
         All controls of least terminal norm.
     sets : ReachableSets
         Forward sets and the tube.
     route : Route
-        EXACT where every block has its vertices and facets.
+        EXACT if the vertices and facets of all blocks are known.
     reason : str
-        Why this route.
+        Reason for the choice of the route.
     """
 
     problem: ReachabilityProblem
@@ -152,15 +152,15 @@ def optimal_controls(problem: ReachabilityProblem, *, relative: bool = False) ->
 
 
 def solve(problem: ReachabilityProblem, route: Route | None = None, budget: Budget | None = None) -> Solution:
-    """Find the least terminal norm, all controls that reach it, and the sets they lead through.
+    """Compute the least terminal norm, all controls that attain it, and the forward sets and tube.
 
     Parameters
     ----------
     problem : ReachabilityProblem
-        In any units.
+        Problem, in any consistent units.
     route : Route or None
-        None chooses: exact where blocks are small, thrust is in a box, constraints hold at whole periods and the sets
-        are expected within the budget; lifted otherwise.
+        None selects the exact route if blocks are small, thrust is in a box, constraints apply at whole periods only
+        and the expected cost is within the budget; otherwise the lifted route.
     budget : Budget or None
         Limits of the exact route.
 
@@ -169,7 +169,7 @@ def solve(problem: ReachabilityProblem, route: Route | None = None, budget: Budg
     EmptyTubeError
         If no control keeps the constraints.
     TooLargeError, UncertainHullError
-        If the exact route was asked for and cannot be taken.
+        If `route` is the exact route and it is not possible.
     """
     optimal = optimal_controls(problem)
     lifted: tuple[BlockSets, ...] = tuple(LiftedSets(optimum) for optimum in optimal.blocks)
@@ -199,7 +199,7 @@ def _exact(optima: tuple[BlockOptimum, ...], meter: Meter) -> tuple[BlockSets, .
 
 
 def _need_agreement(exact: tuple[BlockSets, ...], lifted: tuple[BlockSets, ...]) -> None:
-    """Refuse exact sets whose bounds the programs do not confirm."""
+    """Raise an error if the bounds of exact sets differ from those computed by programs."""
     for one, other in zip(exact, lifted, strict=True):
         for kind in SetKind:
             apart = float(np.abs(one.bounds(kind) - other.bounds(kind)).max())
@@ -210,7 +210,7 @@ def _need_agreement(exact: tuple[BlockSets, ...], lifted: tuple[BlockSets, ...])
 
 
 def _refusal(problem: ReachabilityProblem, *, asked: bool) -> str | None:
-    """Why exact sets are not tried, or None."""
+    """Return the reason why exact sets are not computed; None if there is none."""
     if problem.thrust is ThrustShape.BALL:
         return "for thrust in a ball the sets are not polytopes"
     if problem.between is not None:
@@ -226,12 +226,12 @@ def _refusal(problem: ReachabilityProblem, *, asked: bool) -> str | None:
 
 
 def least_periods(problem: ReachabilityProblem) -> int | None:
-    """Return the least number of periods, at most those of the `problem`, in which zero can be reached, or None.
+    """Return the least number of periods in which zero can be reached, or None if those of the `problem` are too few.
 
     Notes
     -----
-    Where zero keeps all constraints it can be kept once reached, and the least is found by bisection; otherwise all
-    numbers are tried. A linear program for each block and number.
+    If the zero state satisfies all constraints, it can be held, and the least number is computed by bisection;
+    otherwise all numbers are tried. Each block and number needs a linear program.
     """
 
     def reached(periods: int) -> bool:

@@ -37,7 +37,7 @@ class Frame:
     Parameters
     ----------
     name : str
-        In messages.
+        Name of the frame in messages.
     x, y, z : Axis
         Directions of the axes.
     order : StateOrder

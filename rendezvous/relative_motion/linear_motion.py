@@ -22,9 +22,9 @@ class Segment:
     Parameters
     ----------
     transition, gramian : ndarray, shape (..., 6, 6)
-        Of states in m and m/s.
+        Matrices of states in m and m/s.
     drift : ndarray, shape (..., 6)
-        m and m/s.
+        Drift, m and m/s.
     """
 
     transition: Floats

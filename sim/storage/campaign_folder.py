@@ -26,7 +26,7 @@ _NAME = re.compile(r"chunk-(\d{7,12})-([0-9a-f]{8})\.parquet")
 
 @dataclass(frozen=True)
 class Damage:
-    """A shard that is no longer what was written, or that belongs to another campaign.
+    """A damaged shard, or one that belongs to another campaign.
 
     Parameters
     ----------
@@ -165,14 +165,14 @@ class CampaignFolder:
         parts = [codes[name] for _, codes in self.shards([], {name: known}, cell)]
         return np.concatenate([np.zeros(0, dtype=np.int8), *parts])
 
-    def at(self, places: Sequence[int], cell: int | None = None) -> list[dict[str, Any]]:
+    def at(self, indices: Sequence[int], cell: int | None = None) -> list[dict[str, Any]]:
         """Return whole rows, as mappings by column, at some indices of the columns."""
         shards = self._wanted(cell)
         starts = np.concatenate([[0], np.cumsum([self._size(index) for index in shards])])
         rows = []
-        for place in places:
-            shard = int(np.searchsorted(starts, place, side="right")) - 1
-            rows.append(self._read(shards[shard], None).slice(int(place - starts[shard]), 1).to_pylist()[0])
+        for index in indices:
+            shard = int(np.searchsorted(starts, index, side="right")) - 1
+            rows.append(self._read(shards[shard], None).slice(int(index - starts[shard]), 1).to_pylist()[0])
         return rows
 
     def table_file(self, columns: Mapping[str, Sequence[Any]], units: Mapping[str, str]) -> bytes:
@@ -249,7 +249,7 @@ class CampaignFolder:
                 self.damaged.append(Damage(file, fault))
 
     def _fault(self, file: Path, index: int, checksum: int) -> str | None:
-        """Return what is wrong with a shard, or None."""
+        """Return a description of the damage of a shard; None if there is none."""
         try:
             if not file.is_file():
                 return "is not an ordinary file"

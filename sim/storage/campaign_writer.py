@@ -24,38 +24,38 @@ from sim.storage.files import (
 from sim.storage.manifest import MANIFEST, Manifest, made_here, need_same, read_manifest, write_manifest
 
 BEYOND = "beyond"
-"""Folder in that of the shards for those after the run where a rule stopped: flown, but no part of the result."""
+"""Subfolder for the shards after the run at which a stopping rule was met; they are not part of the result."""
 
 
 class CampaignWriter(CampaignFolder):
-    """The folder of a campaign that is being flown; made by `begin`."""
+    """The folder of a running campaign; created by `begin`."""
 
     @classmethod
     @contextlib.contextmanager
     def begin(
         cls, path: Path, manifest: Manifest, *, resume: bool, beside: Mapping[str, str] | None = None
     ) -> Iterator[CampaignWriter]:
-        """Start a campaign in a folder, or resume the one in it, and hold the folder's lock until leaving.
+        """Start a campaign in a folder, or resume the one in it, and hold the folder's lock until the context ends.
 
         Parameters
         ----------
         path : Path
-            Made if it does not exist.
+            Folder; it is created if it does not exist.
         manifest : Manifest
-            The campaign wanted; more runs than the folder's campaign extend it.
+            Manifest of the campaign; more runs than in the folder extend the campaign.
         resume : bool
-            Whether the folder may hold this campaign already.
+            Whether the folder may contain this campaign already.
         beside : mapping of str to str
             Names and contents of text files to write into the folder.
 
         Raises
         ------
         OccupiedError
-            If the folder holds something else, or another campaign is running in it.
+            If the folder contains something else, or another campaign is running in it.
         ManifestError
-            If it holds a campaign with different settings.
+            If the folder contains a campaign with different settings.
         StorageError
-            If it cannot be written.
+            If the folder cannot be written.
         """
         need_arrow()
         need_free(path, resume=resume)
@@ -64,15 +64,15 @@ class CampaignWriter(CampaignFolder):
         with locked(path):
             need_free(path, resume=resume)
             clear_leftovers(path)
-            found = read_manifest(path) if (path / MANIFEST).is_file() else None
-            if found is None:
+            stored = read_manifest(path) if (path / MANIFEST).is_file() else None
+            if stored is None:
                 manifest = replace(manifest, made_by=made_here())
             else:
-                manifest = _continued(found, manifest, path)
+                manifest = _continued(stored, manifest, path)
                 _take_back(path / SHARDS)
-                if found.runs < manifest.runs:
-                    _drop_partial_shard(path, found)
-            if found != manifest:
+                if stored.runs < manifest.runs:
+                    _drop_partial_shard(path, stored)
+            if stored != manifest:
                 write_manifest(path, manifest)
             for name, text in (beside or {}).items():
                 write_whole(path / name, text.encode())
@@ -82,7 +82,7 @@ class CampaignWriter(CampaignFolder):
             yield cls(path, manifest)
 
     def write(self, chunk: Chunk, results: Results) -> None:
-        """Write the shard of a chunk, whole or not at all.
+        """Write the shard of a chunk atomically.
 
         Raises
         ------
@@ -99,14 +99,14 @@ class CampaignWriter(CampaignFolder):
         self._checked.add(chunk.index)
 
     def discard_damaged(self) -> None:
-        """Delete the damaged shards, so that their chunks are flown again."""
+        """Delete the damaged shards, so that their chunks are simulated again."""
         for damage in self.damaged:
             with reporting(damage.file):
                 damage.file.unlink(missing_ok=True)
         self.damaged = []
 
     def stop_after(self, runs: int) -> None:
-        """Note that a rule has stopped the campaign after some runs, and move the shards beyond them aside."""
+        """Store the number of runs at which a rule stopped the campaign, and move later shards to the subfolder."""
         if runs != self.manifest.stopped_after:
             self.manifest = replace(self.manifest, stopped_after=runs)
             write_manifest(self.path, self.manifest)
@@ -117,12 +117,12 @@ class CampaignWriter(CampaignFolder):
 
 
 def need_free(path: Path, *, resume: bool) -> None:
-    """Check that a folder is empty or does not exist, or, on a resume, holds a campaign.
+    """Check that a folder is empty or does not exist, or contains a campaign to resume.
 
     Raises
     ------
     OccupiedError
-        If it holds something else.
+        If the folder contains something else.
     """
     with reporting(path):
         if not path.exists() and not path.is_symlink():
@@ -133,40 +133,40 @@ def need_free(path: Path, *, resume: bool) -> None:
     if MANIFEST in names:
         if not resume:
             raise OccupiedError(
-                f"{path}: holds a campaign already; continue it with --resume, or choose another folder"
+                f"{path}: contains a campaign already; continue it with --resume, or choose another folder"
             )
     elif names:
-        raise OccupiedError(f"{path}: is not empty, and holds no campaign; choose another folder")
+        raise OccupiedError(f"{path}: is not empty, and contains no campaign; choose another folder")
 
 
-def _continued(found: Manifest, asked: Manifest, path: Path) -> Manifest:
+def _continued(stored: Manifest, wanted: Manifest, path: Path) -> Manifest:
     """Return the manifest of a campaign that is resumed, perhaps with more runs or another rule."""
-    need_same(found, asked, path)
-    if asked.runs == found.runs and asked.until == found.until:
-        return found
-    if asked.runs < found.runs:
+    need_same(stored, wanted, path)
+    if wanted.runs == stored.runs and wanted.until == stored.until:
+        return stored
+    if wanted.runs < stored.runs:
         raise ManifestError(
-            f"{path}: the campaign in this folder has {found.runs} runs, and {asked.runs} are asked for; give --runs "
-            f"{found.runs} or more"
+            f"{path}: the campaign in this folder has {stored.runs} runs, more than --runs {wanted.runs}; give --runs "
+            f"{stored.runs} or more"
         )
-    if asked.axes and asked.runs != found.runs:
+    if wanted.axes and wanted.runs != stored.runs:
         raise ManifestError(
-            f"{path}: the sweep in this folder has {found.runs} runs a cell, and {asked.runs} are asked for; give "
-            f"--runs {found.runs}, or choose another folder"
+            f"{path}: the sweep in this folder has {stored.runs} runs per cell, not {wanted.runs}; give --runs "
+            f"{stored.runs}, or choose another folder"
         )
-    return replace(found, runs=asked.runs, until=asked.until, stopped_after=None)
+    return replace(stored, runs=wanted.runs, until=wanted.until, stopped_after=None)
 
 
 def _take_back(shards: Path) -> None:
-    """Move back the shards that a rule moved aside: they may be wanted now."""
+    """Move the shards of the subfolder back, because more runs or another rule may need them."""
     with reporting(shards):
         for kept in (shards / BEYOND).glob("*"):
             kept.replace(shards / kept.name)
 
 
-def _drop_partial_shard(path: Path, found: Manifest) -> None:
-    """Delete the last shard of a campaign if it is not full: with more runs it will be."""
-    last, rows = divmod(found.runs, found.chunk)
+def _drop_partial_shard(path: Path, stored: Manifest) -> None:
+    """Delete the last shard of a campaign if it is not full; with more runs it is written again."""
+    last, rows = divmod(stored.runs, stored.chunk)
     if not rows:
         return
     with reporting(path):

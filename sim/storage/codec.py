@@ -31,7 +31,7 @@ def to_json(value: Any) -> dict[str, Any]:
 
 
 def from_json(kind: Callable[..., Kind], value: object) -> Kind:
-    """Return the dataclass that JSON values were made of.
+    """Return a dataclass from its JSON values.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def _texts(value: object) -> Iterator[str]:
 
 
 def scenario_hash(scenario: Scenario) -> str:
-    """Return a fingerprint of every value of a scenario that can change a result: all but its name and description.
+    """Return a fingerprint of all values of a scenario except its name and description.
 
     16 hexadecimal digits, the same for equal values on every machine.
     """
@@ -74,7 +74,7 @@ def scenario_hash(scenario: Scenario) -> str:
 
 
 def _exact(value: Any) -> Any:
-    """Replace numbers by their hexadecimal form, which is equal exactly when they are."""
+    """Replace numbers by their exact hexadecimal form."""
     if isinstance(value, dict):
         return {key: _exact(inner) for key, inner in value.items()}
     if isinstance(value, list):

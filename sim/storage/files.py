@@ -1,4 +1,4 @@
-"""Files of a campaign's folder: written whole or not at all, by one campaign at a time."""
+"""Files of a campaign's folder: atomic writes, and a lock for one campaign at a time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 
 
 class StorageError(Exception):
-    """A campaign's folder cannot be used as asked; the message says what, where, and what to do."""
+    """The folder of a campaign cannot be used; the message gives the problem, the folder and a remedy."""
 
 
 class MissingLibraryError(StorageError):
@@ -24,7 +24,7 @@ class MissingLibraryError(StorageError):
 
 
 class OccupiedError(StorageError):
-    """The folder holds something else, or another campaign is running in it."""
+    """The folder contains something else, or another campaign is running in it."""
 
 
 class ManifestError(StorageError):
@@ -32,7 +32,7 @@ class ManifestError(StorageError):
 
 
 class DamagedError(StorageError):
-    """A shard is no longer what was written."""
+    """A shard has changed since it was written."""
 
 
 class DiskFullError(StorageError):
@@ -40,11 +40,11 @@ class DiskFullError(StorageError):
 
 
 def replace_file(file: Path, content: bytes) -> None:
-    """Write a file whole or not at all, whenever the process or the machine stops.
+    """Write a file atomically: if the process or the machine stops, the file is complete or unchanged.
 
-    The content goes to a temporary file in the same folder and is flushed to the disk; then the file is renamed, which
-    is atomic, and the folder is flushed so that the new name is on the disk too. Raises `OSError`; the file is then
-    what it was.
+    The content is written to a temporary file in the same folder and flushed to the disk; then the file is renamed,
+    which is atomic, and the folder is flushed so that the new name is on the disk too. Raises `OSError`; the file is
+    then unchanged.
     """
     temporary = temporary_beside(file)
     try:
@@ -70,7 +70,7 @@ def temporary_beside(file: Path) -> Path:
 
 
 def write_whole(file: Path, content: bytes) -> None:
-    """Do as `replace_file`, but raise `StorageError` (`DiskFullError` where the disk is full)."""
+    """Call `replace_file`, and raise its errors as `StorageError` (`DiskFullError` if the disk is full)."""
     with reporting(file):
         replace_file(file, content)
 
@@ -89,12 +89,12 @@ def clear_leftovers(folder: Path) -> None:
 
 @contextlib.contextmanager
 def reporting(path: Path) -> Iterator[None]:
-    """Turn an `OSError` while `path` is read or written into a message for the user.
+    """Raise an `OSError` during reading or writing of `path` as a `StorageError` with a message for the user.
 
     Raises
     ------
     StorageError
-        `DiskFullError` where the disk is full.
+        `DiskFullError` if the disk is full.
     """
     try:
         yield
@@ -109,14 +109,14 @@ def reporting(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder, which ends with the process.
+    """Hold the lock of a folder; the lock ends with the process at the latest.
 
     A forked child would keep the lock after its parent has ended: use process pools that spawn.
 
     Raises
     ------
     OccupiedError
-        If another campaign holds it.
+        If another campaign holds the lock.
     """
     with contextlib.ExitStack() as stack, reporting(folder / LOCK):
         try:

@@ -38,11 +38,11 @@ class Axis:
     Parameters
     ----------
     key : str
-        As in a scenario file, with its table and unit.
+        Key as in a scenario file, with its table and unit.
     values : tuple of float
-        At least two, in the unit of the file.
+        At least two values, in the unit of the file.
     scale : str
-        `linear` or `log`: the spacing of the values.
+        Spacing of the values, `linear` or `log`.
 
     Raises
     ------
@@ -76,25 +76,25 @@ class Manifest:
     stopped_after : int or None
         Runs after which the rule stopped it.
     scenario : Scenario
-        Of a sweep, the one that is varied.
+        Scenario; for a sweep the one that is varied.
     seed : int
         Root seed.
     noise : CampaignNoise
         Measurement noise of all cells.
     strategy : str
-        Its name, and for a strategy in a Python file the hash of the file: `mine.py:Mine sha256:0123456789abcdef`.
+        Name; for a strategy in a Python file with the hash of the file: `mine.py:Mine sha256:0123456789abcdef`.
     guarantee : bool
         Whether the guaranteed miss Phi was computed.
     chunk : int
-        Engagements of a shard; the last of a cell may be smaller. It changes no number.
+        Engagements per shard; the last shard of a cell may have fewer. Results do not depend on it.
     axes : tuple of Axis
-        Keys that a sweep varies, every value with every other; the last varies fastest. Empty in a campaign.
+        Keys that a sweep varies, in all combinations of values; the last varies fastest. Empty for a campaign.
     cells_hash : str
-        Fingerprint of the scenarios of a sweep's cells; empty in a campaign.
+        Fingerprint of the scenarios of a sweep's cells; empty for a campaign.
     versions : mapping of str to str
-        Versions of the packages that compute.
+        Versions of the packages on which results depend.
     made_by : mapping of str to str
-        Python and machine of the first session; not compared on a resume.
+        Version of Python and kind of machine of the first session; they may differ when a campaign is resumed.
 
     Raises
     ------
@@ -133,7 +133,7 @@ class Manifest:
 
     @property
     def cells(self) -> int:
-        """Number of scenarios flown."""
+        """Number of simulated scenarios."""
         return math.prod(len(axis.values) for axis in self.axes)
 
     @property
@@ -153,20 +153,20 @@ class Manifest:
 
     def runs_of(self, index: int) -> tuple[int, range]:
         """Return the cell and the numbers of the runs of a chunk."""
-        cell, place = divmod(index, self.chunks_a_cell)
-        first = place * self.chunk
+        cell, number = divmod(index, self.chunks_a_cell)
+        first = number * self.chunk
         return cell, range(first, min(first + self.chunk, self.runs))
 
     def values_of(self, cell: int) -> dict[str, float]:
-        """Return the values that a cell of a sweep has in place of the scenario's, by key."""
+        """Return the varied values of a cell of a sweep, by key."""
         values = {}
         for axis in reversed(self.axes):
-            cell, place = divmod(cell, len(axis.values))
-            values[axis.key] = axis.values[place]
+            cell, number = divmod(cell, len(axis.values))
+            values[axis.key] = axis.values[number]
         return dict(reversed(values.items()))
 
     def decisive(self) -> dict[str, Any]:
-        """Return all that must be equal in every session of a campaign, as JSON values."""
+        """Return the values that must be equal in all sessions of a campaign, as JSON values."""
         plain = to_json(self)
         for key in _PROGRESS:
             del plain[key]
@@ -174,7 +174,7 @@ class Manifest:
 
     @property
     def identity(self) -> str:
-        """Fingerprint of `decisive`, which every shard carries."""
+        """Fingerprint of `decisive`; it is stored in every shard."""
         return hashlib.sha256(json.dumps(self.decisive(), sort_keys=True).encode()).hexdigest()[:32]
 
     def to_json(self) -> dict[str, Any]:
@@ -203,7 +203,7 @@ def made_here() -> dict[str, str]:
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
-    """Write a manifest into its folder, whole or not at all."""
+    """Write a manifest into its folder atomically."""
     write_whole(folder / MANIFEST, (json.dumps(manifest.to_json(), indent=1, allow_nan=False) + "\n").encode())
 
 
@@ -213,7 +213,7 @@ def read_manifest(folder: Path) -> Manifest:
     Raises
     ------
     ManifestError
-        If there is none, or this version cannot read it; the message names the key at fault.
+        If there is none, or this version cannot read it; the message names the invalid key.
     """
     file = folder / MANIFEST
     if not file.is_file():
@@ -238,15 +238,15 @@ def read_manifest(folder: Path) -> Manifest:
     return manifest
 
 
-def need_same(found: Manifest, asked: Manifest, folder: Path) -> None:
-    """Compare the decisive values of a folder's campaign with those asked for.
+def need_same(stored: Manifest, wanted: Manifest, folder: Path) -> None:
+    """Compare the decisive values of the campaign in a folder with those of another one.
 
     Raises
     ------
     ManifestError
         If they differ; all differences are listed.
     """
-    there, here = _flat(found.decisive()), _flat(asked.decisive())
+    there, here = _flat(stored.decisive()), _flat(wanted.decisive())
     lines = [
         f"{key}: {_shown(there, key)} in the folder, {_shown(here, key)} now"
         for key in dict.fromkeys((*there, *here))

@@ -97,29 +97,29 @@ def rows(chunk: Chunk, results: Results, *, with_cell: bool) -> Any:
 
 
 def need_sound(table: Any, runs: range, cell: int) -> None:
-    """Check that whole rows are those of the runs of a cell, in order, and that all values are within their limits.
+    """Check that complete rows belong to the runs of a cell, in order, and that all values are within their limits.
 
     Raises
     ------
     ValueError
-        With the name of the column.
+        If they do not; the message names the column.
     """
     for name, wanted in (("run", np.arange(runs.start, runs.stop)), ("cell", np.full(len(runs), cell))):
         if name in table.column_names:
-            found = table.column(name).to_numpy()
-            if not np.array_equal(found, wanted):
-                wrong = int(np.flatnonzero(found != wanted)[0])
-                raise ValueError(f"{name} holds {found[wrong]} in row {wrong}, where {wanted[wrong]} belongs")
+            values = table.column(name).to_numpy()
+            if not np.array_equal(values, wanted):
+                wrong = int(np.flatnonzero(values != wanted)[0])
+                raise ValueError(f"{name} is {values[wrong]} in row {wrong}, must be {wanted[wrong]}")
     for name in table.column_names:
         column = table.column(name)
         if name in _TEXTS and not {*pc.unique(column).to_pylist()} <= {*_TEXTS[name], None}:
-            raise ValueError(f"{name} holds a text that no campaign writes")
+            raise ValueError(f"{name} contains an unknown text")
         if not pa.types.is_floating(column.type) or column.null_count == len(column):
             continue
         known = (column.drop_null() if column.null_count else column).to_numpy()
-        ends = known.min(), known.max()  # NaN is both where there is one
+        ends = known.min(), known.max()  # NaN if there is one
         if not np.isfinite(ends).all():
-            raise ValueError(f"{name} holds what is not a finite number")
+            raise ValueError(f"{name} contains a value that is not a finite number")
         for end in ends:
             problem = _LIMITS[name].problem(end)
             if problem is not None:
@@ -130,7 +130,7 @@ def to_bytes(table: Any, extra: Mapping[str, str]) -> bytes:
     """Return a table as a Parquet file, with some more entries in the metadata of its schema."""
     sink = pa.BufferOutputStream()
     whole = table.replace_schema_metadata({**(table.schema.metadata or {}), **extra})
-    # A dictionary of random numbers, which do not repeat, would only take space.
+    # Random numbers do not repeat, so dictionary encoding would only increase the size.
     pq.write_table(
         whole,
         sink,
@@ -141,38 +141,38 @@ def to_bytes(table: Any, extra: Mapping[str, str]) -> bytes:
 
 
 def largest_file(rows: int) -> int:
-    """Return the most bytes that a shard of so many rows may have, as a file and unpacked."""
+    """Return the greatest size of a shard with some number of rows, in bytes, as a file and unpacked."""
     return BYTES_BESIDE_ROWS + MOST_BYTES_A_ROW * rows
 
 
 def fault(content: bytes, wanted: Mapping[str, str], rows: int, *, with_cell: bool) -> str | None:
-    """Return what is wrong with a shard by its metadata, or None.
+    """Return a description of the damage of a shard, from its metadata; None if there is none.
 
     Parameters
     ----------
     content : bytes
-        The file.
+        Content of the file.
     wanted : mapping of str to str
         Entries that the metadata of its schema must have.
     rows : int
-        Number of rows that it must have.
+        Number of rows that the file must have.
     with_cell : bool
-        Whether it is a sweep's.
+        Whether the shard belongs to a sweep.
     """
     try:
         file = pq.ParquetFile(pa.BufferReader(content))
         metadata, columns = file.metadata, file.schema_arrow
-        found = {key.decode(): value.decode() for key, value in (columns.metadata or {}).items()}
+        entries = {key.decode(): value.decode() for key, value in (columns.metadata or {}).items()}
         groups = [metadata.row_group(number) for number in range(metadata.num_row_groups)]
         unpacked = sum(
             group.column(number).total_uncompressed_size for group in groups for number in range(len(columns))
         )
     except (pa.ArrowException, OSError, ValueError):
         return "is not a Parquet file"
-    if any(found.get(key) != value for key, value in wanted.items()):
+    if any(entries.get(key) != value for key, value in wanted.items()):
         return "belongs to another campaign"
     if metadata.num_rows != rows:
-        return f"has {metadata.num_rows} rows in place of {rows}"
+        return f"has {metadata.num_rows} rows instead of {rows}"
     # A file written before a nullable column was added lacks it.
     fields = [field for field in schema(with_cell=with_cell) if field.name in columns.names or not field.nullable]
     if not columns.equals(pa.schema(fields)):
@@ -183,14 +183,14 @@ def fault(content: bytes, wanted: Mapping[str, str], rows: int, *, with_cell: bo
 
 
 def read(file: Path, columns: Sequence[str] | None, *, with_cell: bool) -> Any:
-    """Return some columns of a shard without a `fault`, None being all.
+    """Return some columns of a shard without a `fault`; None returns all columns.
 
     Raises
     ------
     ValueError
-        If it is not what a campaign writes.
+        If the content is not that of a shard.
     OSError
-        If it cannot be read.
+        If the file cannot be read.
     """
     wanted = _some(columns, with_cell=with_cell)
     try:
@@ -204,12 +204,12 @@ def read(file: Path, columns: Sequence[str] | None, *, with_cell: bool) -> Any:
 
 
 def joined(parts: Sequence[Any], columns: Sequence[str] | None, *, with_cell: bool) -> Any:
-    """Return one table of several; without parts a table of no rows."""
+    """Return several tables as one; without tables, a table without rows."""
     return pa.concat_tables(parts or [_some(columns, with_cell=with_cell).empty_table()])
 
 
 def _some(columns: Sequence[str] | None, *, with_cell: bool) -> Any:
-    """Return the schema of some columns, None being all."""
+    """Return the schema of some columns; None returns that of all columns."""
     wanted = schema(with_cell=with_cell)
     return wanted if columns is None else pa.schema([wanted.field(name) for name in columns], metadata=wanted.metadata)
 
@@ -224,12 +224,12 @@ def numbers(table: Any, name: str) -> np.ma.MaskedArray[tuple[int], np.dtype[np.
 
 def codes(table: Any, name: str, known: Sequence[str]) -> NDArray[np.int8]:
     """Return a column of text as indices in a list of values; -1 for other values."""
-    found = pc.index_in(table.column(name), value_set=pa.array(list(known), type=pa.string()))
-    return np.asarray(pc.fill_null(found, -1).to_numpy(), dtype=np.int8)
+    indices = pc.index_in(table.column(name), value_set=pa.array(list(known), type=pa.string()))
+    return np.asarray(pc.fill_null(indices, -1).to_numpy(), dtype=np.int8)
 
 
 def plain_table(columns: Mapping[str, Sequence[Any]], units: Mapping[str, str]) -> Any:
-    """Return a table of numbers and text, None being null, with units in the metadata of its fields."""
+    """Return a table of numbers and text, with null for None and units in the metadata of its fields."""
     table = pa.table({name: pa.array(list(values)) for name, values in columns.items()})
     fields = [field.with_metadata({"unit": units.get(field.name, "")}) for field in table.schema]
     return table.cast(pa.schema(fields, metadata={"infoset_schema": str(SCHEMA_VERSION)}))

@@ -170,7 +170,7 @@ def many_rows(folder: Path, parts: int = 16) -> None:
 BOMBS: Mapping[str, tuple[Callable[[Path], None], str]] = {
     "text": (long_text, "has 100"),
     "pages": (pages_of_text, "has 240"),
-    "rows": (many_rows, "has 67108864 rows in place of 1000000"),
+    "rows": (many_rows, "has 67108864 rows instead of 1000000"),
 }
 
 
@@ -199,7 +199,7 @@ def test_billions_of_rows_are_refused_in_a_second_and_200_mb(folder: Path) -> No
     """1.4e9 of them: over 10 GB."""
     many_rows(folder, 334)
     (found,) = measured("campaign", folder)
-    check_refused(found, "has 1400897536 rows in place of 1000000")
+    check_refused(found, "has 1400897536 rows instead of 1000000")
 
 
 def changed(name: str, value: object) -> Callable[[Any, Path], None]:
@@ -219,7 +219,7 @@ def test_a_shard_that_says_what_no_campaign_writes(name: str, value: object, fol
     opened = CampaignFolder.read(folder)
     assert not opened.damaged
     with pytest.raises(
-        StorageError, match=f"{name} (holds a text that no campaign writes|holds what is not a finite number)"
+        StorageError, match=f"{name} (contains an unknown text|contains a value that is not a finite number)"
     ):
         opened.table([name])
     kind = opened.numbers if isinstance(value, float) else lambda each: opened.codes(each, ["intercepted"])
@@ -245,10 +245,10 @@ ABSURD = {
     "a negative guarantee": (some("guaranteed_miss_m", [-5.0]), "guaranteed_miss_m must be at least 0, and holds -5"),
     "a far start": (some("x_km", [1.0, -1e300]), "x_km must be finite, at most 1e+60 in size, and holds -1e+300"),
     "a margin beyond all": (some("truth_margin_m", [-1e200]), "truth_margin_m must be finite"),
-    "repeated runs": (some("run", [12, 12]), "run holds 12 in row 1, where 13 belongs"),
-    "shifted runs": (some("run", range(13, 13 + ROWS)), "run holds 13 in row 0, where 12 belongs"),
-    "negative runs": (some("run", [-1]), "run holds -1 in row 0, where 12 belongs"),
-    "runs in another order": (some("run", [13, 12]), "run holds 13 in row 0, where 12 belongs"),
+    "repeated runs": (some("run", [12, 12]), "run is 12 in row 1, must be 13"),
+    "shifted runs": (some("run", range(13, 13 + ROWS)), "run is 13 in row 0, must be 12"),
+    "negative runs": (some("run", [-1]), "run is -1 in row 0, must be 12"),
+    "runs in another order": (some("run", [13, 12]), "run is 13 in row 0, must be 12"),
 }
 
 
@@ -293,9 +293,9 @@ def test_absurd_values_under_a_sound_checksum_are_one_message(
 @pytest.mark.parametrize(
     ("name", "values", "reason"),
     [
-        ("cell", [0], "cell holds 0 in row 0, where 1 belongs"),
+        ("cell", [0], "cell is 0 in row 0, must be 1"),
         ("miss_m", [1e308], "miss_m must be finite"),
-        ("run", [1, 1], "run holds 1 in row 0, where 0 belongs"),
+        ("run", [1, 1], "run is 1 in row 0, must be 0"),
     ],
 )
 def test_absurd_values_in_a_sweep_are_one_message(

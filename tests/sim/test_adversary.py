@@ -112,7 +112,7 @@ def test_engagements_that_lose_their_set_can_be_left_out(coarse: Scenario) -> No
     fast = replace(coarse.set_model.bounds, vx_m_s=(-110.1e3, -110e3))
     wrong = replace(coarse, set_model=replace(coarse.set_model, bounds=fast))
     assert find_worst(wrong, budget=10).outcome is Outcome.SET_LOST
-    with pytest.raises(NothingCountsError, match="in every engagement flown the set was lost"):
+    with pytest.raises(NothingCountsError, match="in every simulated engagement the set was lost"):
         find_worst(wrong, budget=10, keep_set=True)
 
 

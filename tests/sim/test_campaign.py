@@ -256,7 +256,7 @@ def test_more_runs_extend_a_campaign(brief: Scenario, reference: Any, tmp_path: 
     assert result.redone == ()
     assert result.table.equals(reference)
     assert read_manifest(tmp_path).runs == 96
-    with pytest.raises(ManifestError, match="has 96 runs, and 90 are asked for"):
+    with pytest.raises(ManifestError, match="has 96 runs, more than --runs 90"):
         mixed(brief, tmp_path, 90).run(resume=True)
 
 
@@ -480,13 +480,13 @@ def test_numbers_of_other_types_are_the_same_campaign(number: Any, brief: Scenar
 def test_a_folder_that_holds_something_is_left_alone(brief: Scenario, tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("precious")
     for resume in (False, True):
-        with pytest.raises(OccupiedError, match="is not empty, and holds no campaign"):
+        with pytest.raises(OccupiedError, match="is not empty, and contains no campaign"):
             mixed(brief, tmp_path).run(resume=resume)
     assert [each.name for each in tmp_path.iterdir()] == ["thesis.tex"]
     with pytest.raises(OccupiedError, match="is a file"):
         mixed(brief, tmp_path / "thesis.tex").run()
     mixed(brief, tmp_path / "campaign", 16).run()
-    with pytest.raises(OccupiedError, match="holds a campaign already"):
+    with pytest.raises(OccupiedError, match="contains a campaign already"):
         mixed(brief, tmp_path / "campaign", 16).run()
     with pytest.raises(ManifestError, match="no campaign"):
         CampaignFolder.read(tmp_path)
@@ -643,7 +643,7 @@ def test_cells_of_a_sweep_are_campaigns_of_their_scenarios(brief: Scenario, tmp_
     other = replace(asked, cells=(cells[0], cells[2], cells[1]))
     with pytest.raises(ManifestError, match="cells_hash"):
         other.run(resume=True)
-    with pytest.raises(ManifestError, match="has 40 runs a cell, and 50 are asked"):
+    with pytest.raises(ManifestError, match="has 40 runs per cell, not 50"):
         replace(asked, runs=50).run(resume=True)
     with pytest.raises(ValueError, match="a scenario for each combination"):
         replace(asked, cells=cells[:2])

@@ -214,7 +214,7 @@ def test_damage_is_said_and_mended(infoset: Infoset, file: Path, tmp_path: Path)
     code, _, err = infoset(*asked, "--resume")
     assert code == 0
     assert f"{victim}: is cut short or changed: 500 bytes" in err
-    assert "flown again" in err
+    assert "simulated again" in err
     assert CampaignFolder.read(tmp_path / "runs").complete
 
 
@@ -241,8 +241,8 @@ def test_damage_is_said_and_mended(infoset: Infoset, file: Path, tmp_path: Path)
         (["--processes", 0], ["--processes", "greater than or equal to 1"]),
         (["--json", "missing/x.json"], ["there is no folder missing"]),
         (["--out", "brief.toml"], ["brief.toml: is a file, not a folder"]),
-        (["--out", "."], ["is not empty, and holds no campaign"]),
-        (["--out", ".", "--resume"], ["is not empty, and holds no campaign"]),
+        (["--out", "."], ["is not empty, and contains no campaign"]),
+        (["--out", ".", "--resume"], ["is not empty, and contains no campaign"]),
         (["--out", "/dev/null/x"], ["/dev/null/x"]),
         (["--out", "x" * 300], ["File name too long"]),
     ],
@@ -273,7 +273,7 @@ def test_resuming_another_campaign_shows_the_difference(infoset: Infoset, file: 
     assert infoset(*asked)[0] == 0
     code, _, err = infoset(*asked)
     assert code == 2
-    assert "holds a campaign already; continue it with --resume" in err
+    assert "contains a campaign already; continue it with --resume" in err
     code, _, err = infoset(*asked, "--resume", "--seed", 3, "--noise", "game")
     assert code == 2
     assert "  seed: 0 in the folder, 3 now" in err

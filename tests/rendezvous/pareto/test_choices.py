@@ -384,7 +384,7 @@ def test_a_sweep_over_the_meeting_time() -> None:
         ({"craft": ()}, "needs a craft"),
         ({"free": ()}, "no component"),
         ({"free": (Component.X, Component.X)}, "twice"),
-        ({"free": (Component.VX,), "meeting": Meeting.INTERCEPT}, "each craft's own"),
+        ({"free": (Component.VX,), "meeting": Meeting.INTERCEPT}, "velocities of the craft differ"),
         ({"fixed": np.array([np.nan] * 6)}, "finite"),
         ({"meeting_s": np.inf}, "finite"),
         ({"meeting_s": 0.0}, "must start before the meeting"),
