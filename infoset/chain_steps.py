@@ -74,7 +74,6 @@ def start(
 
     Parameters
     ----------
-    origins, rings, marks, n : section
     tau : float
         Time to go.
     bottom, top : tuple of float
@@ -112,7 +111,6 @@ def hand_over(
 
     Parameters
     ----------
-    rings : ndarray
     sign : float
         The side from which the giver is seen to rise.
     giver : tuple of int
@@ -127,10 +125,6 @@ def hand_over(
         Differences of V, and of heights between the origins, that are rounding.
     tau : float
         Time to go.
-
-    Returns
-    -------
-    end, front : int
 
     Notes
     -----
@@ -235,7 +229,6 @@ def cut_end(
 
     Parameters
     ----------
-    rings : ndarray
     ring : tuple of int
         Ring and mask of the chain.
     end, other_end : int
@@ -317,7 +310,6 @@ def find_peak(
 
     Parameters
     ----------
-    rings : ndarray
     ring : tuple of int
         Ring and mask of the chain.
     first, last : int
@@ -328,10 +320,6 @@ def find_peak(
         The side from which the chain is seen.
     magnitude : float
         Of what the predicted misses of the chain are made: rounding is relative to it.
-
-    Returns
-    -------
-    int
 
     Notes
     -----
@@ -388,7 +376,6 @@ def extreme_points(
 
     Parameters
     ----------
-    origins, rings, marks, n : section
     tau : float
         Time to go.
     relative, slack : float

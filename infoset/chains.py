@@ -75,9 +75,11 @@ class Chains(NamedTuple):
     Parameters
     ----------
     origins : ndarray, shape (N, 2, ORIGIN)
+        Origins of the right and of the left chain of each section.
     rings : ndarray, shape (any,)
         The vertices of all chains, each (V, m) from the origin of its chain.
     marks : ndarray of int, shape (N, 2, MARKS)
+        First and last vertex, peak, and place in `rings` of each chain.
     """
 
     origins: Floats

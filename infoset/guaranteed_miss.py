@@ -113,17 +113,12 @@ def bound_leaving(
         The limits.
     known : float
         A label between them that is known to live; less than `lower` if none is.
-    elapsed, tape, errors, law : steps so far, history with the errors of its rates, and numbers of the model
     room : Workspace
         Room for replays.
     labels, outlines, counts, values : ndarray
         Room for the replayed labels, their outlines, and supports.
     pieces : ndarray, shape (>= PIECES, 4)
         Receives the pieces.
-
-    Returns
-    -------
-    int
     """
     living = known
     if errors is not None:
@@ -302,7 +297,6 @@ class GuaranteedMiss:
 
     Parameters
     ----------
-    law : SectionLaw
     batch : int
         Number of engagements B.
     speed_error : float

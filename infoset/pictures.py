@@ -22,6 +22,7 @@ def outlines_svg(outlines: Sequence[Floats], x_title: str, y_title: str, title: 
     Parameters
     ----------
     outlines : sequence of ndarray, shape (n, 2)
+        Vertices of the polygons, in the units of the axes.
     x_title, y_title : str
         With their units.
     title : str

@@ -16,8 +16,8 @@ def hull(points: Points, count: int, out: Points) -> int:
 
     Parameters
     ----------
-    points, count : points, in any order
     out : ndarray, shape (>= count, 2)
+        Receives the vertices.
 
     Returns
     -------
@@ -98,7 +98,6 @@ def reduce_outward(points: Points, count: int, cap: int) -> int:
 
     Parameters
     ----------
-    points, count : polygon
     cap : int
         At least 4: a convex polygon of five vertices always has an edge that can go.
 

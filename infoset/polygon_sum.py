@@ -174,9 +174,8 @@ def add_polygon(points: Points, count: int, other: Points, other_count: int, out
 
     Parameters
     ----------
-    points, count : polygon
-    other, other_count : polygon
     out : ndarray, shape (>= count + other_count, 2)
+        Receives the vertices.
 
     Returns
     -------

@@ -38,13 +38,16 @@ SUMMARY_COLUMNS = 4
 
 
 class Tape(NamedTuple):
-    """The history of one engagement: what happened, the value, and whether it concerned this one.
+    """The history of one engagement: events, their values, and whether they concern this engagement.
 
     Parameters
     ----------
     kinds : ndarray of int, shape (>= events,)
+        Kinds of the events: `ANGLE`, `IMPULSE`, `PREDICTION`, `RATE` or `WIDENING`.
     values : ndarray, shape (>= events,)
+        Measured angles (rad) and rates (rad/s), and impulses (m/s).
     applies : ndarray of bool, shape (>= events,)
+        Whether an event concerns this engagement.
     events : int
         Number of events.
     nearest, farthest : float
@@ -184,7 +187,6 @@ def measure_section(
 
     Returns
     -------
-    living : bool
     overlap : float
         Least overlap of the section and the band across either border, m: negative is the distance of a dead one.
 
@@ -323,7 +325,6 @@ def measure_rate_section(
 
     Returns
     -------
-    living : bool
     overlap : float
         As `measure_section` returns it, in metres of predicted miss.
     """

@@ -48,15 +48,17 @@ class Sections(NamedTuple):
     used : ndarray of int, shape (B,)
         Number of slots in use.
     living : ndarray of bool, shape (B, S)
+        Whether the section is not empty.
     died : ndarray of int, shape (B, S)
         Event that emptied the section, or ALIVE.
     overlaps : ndarray, shape (B, S)
         Overlap of a dead section with the band that emptied it, m: negative.
     origins, rings, marks : ndarray
-        The sections themselves, as `chains` has them: slot s of engagement b is row b S + s.
+        The sections, as `chains` stores them: slot s of engagement b is row b S + s.
     summaries : ndarray, shape (B, S, columns)
+        Extremes of the predicted miss and of z, in the columns that `section_life` defines, m.
     rows : ndarray of int, shape (B S, 3)
-        Room for a list of sections: row, engagement and slot. (To divide takes longer than to read.)
+        Buffer for a list of sections: row, engagement and slot.
     """
 
     labels: Floats
@@ -295,8 +297,6 @@ def widest_all(elapsed: int, sections: Sections, law: SectionLaw, exists: Flags,
     ----------
     elapsed : int
         Steps so far.
-    sections : Sections
-    law : SectionLaw
     exists : ndarray of bool, shape (B,)
         Whether any section lives.
     ends : ndarray, shape (B, 2, 4)

@@ -116,10 +116,6 @@ def limits(values: Floats, margin: float = 0.06) -> Limits:
         At least one.
     margin : float
         Of their width.
-
-    Returns
-    -------
-    tuple of float
     """
     low, high = float(values.min()), float(values.max())
     room = margin * (high - low) or 0.05 * abs(high) or 1.0
@@ -134,17 +130,7 @@ def shade(index: int, count: int) -> str:
 
 
 def ticks(low: float, high: float, about: int = 5) -> list[float]:
-    """Return round values between two limits, about so many.
-
-    Parameters
-    ----------
-    low, high : float
-    about : int
-
-    Returns
-    -------
-    list of float
-    """
+    """Return round values between two limits, about so many."""
     rough = (high - low) / about
     power = 10.0 ** math.floor(math.log10(rough))
     step = next(each * power for each in (1.0, 2.0, 5.0, 10.0) if each * power >= 0.999 * rough)

@@ -40,7 +40,6 @@ def reduce_outward(origins: Floats, rings: Floats, marks: Integers, n: int, tau:
 
     Parameters
     ----------
-    origins, rings, marks, n : section
     tau : float
         Time to go.
     points : ndarray, shape (CAPACITY, 2)

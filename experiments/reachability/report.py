@@ -95,6 +95,7 @@ class Member:
     Parameters
     ----------
     controls : ndarray, shape (T, 3)
+        Controls of all periods.
     linear, nonlinear : ndarray, shape (T + 1, 6)
         States of the linear and of the nonlinear model.
     between : float
