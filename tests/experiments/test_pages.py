@@ -100,7 +100,7 @@ def test_replaying_gives_the_recorded_sets_bit_for_bit(name: str) -> None:
 def test_a_record_of_another_librarys_sets_is_refused(record: Record) -> None:
     step = record.steps[3]
     other = replace(step, sections=step.sections[1:])
-    with pytest.raises(InputError, match="other sets at step 3"):
+    with pytest.raises(InputError, match="different sets at step 3"):
         interception_page([replace(record, steps=(*record.steps[:3], other, *record.steps[4:]))])
 
 

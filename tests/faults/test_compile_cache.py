@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import subprocess
@@ -126,6 +127,7 @@ def test_a_linked_kernel_can_be_called_from_python() -> None:
 
 
 def test_a_long_compilation_gives_one_notice(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    kernels.LOGGER.setLevel(logging.NOTSET)  # commands with --quiet raise it
     for limit_s, notices in ((1e9, 0), (0.0, 1)):
         monkeypatch.setattr(kernels, "NOTICE_AFTER_S", limit_s)
         monkeypatch.setattr(twice, "__module__", "infoset.example")

@@ -99,7 +99,7 @@ def test_a_folder_of_any_name(name: str, infoset: Infoset, file: Path, tmp_path:
     scenario = home / "an approach, brief.toml"
     shutil.copy(file, scenario)
     done = infoset("engage", scenario, "--record", home / "flight.npz", "--json", home / "r.json")
-    assert (done.code, done.err) == (0, "")
+    assert (done.code, done.err) == (0, f"wrote r.json, flight.npz in {home}\n")
     assert infoset("replay", home / "flight.npz", "--html", home / "page.html").code == 0
     assert infoset("campaign", scenario, "--runs", 8, "--out", home / "runs", "-q").code == 0
     assert CampaignFolder.read(home / "runs").complete
