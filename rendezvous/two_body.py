@@ -28,12 +28,12 @@ def coast(states: Floats, duration_s: ArrayLike, gravitational_parameter_m3_s2: 
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = 2.0 / radius - (velocity**2).sum(axis=-1) / mu
     if not (np.isfinite(inverse).all() and (inverse > 0.0).all()):
-        raise ValueError("a state is on no ellipse about the attracting point: it escapes, or falls through it")
+        raise ValueError("a state is not on an ellipse about the attracting point: it escapes, or falls into it")
     axis = 1.0 / inverse
     cosine, sine = 1.0 - radius / axis, (position * velocity).sum(axis=-1) / np.sqrt(mu * axis)
     eccentricity, first = np.hypot(cosine, sine), np.arctan2(sine, cosine)
     if (eccentricity >= 1.0).any():
-        raise ValueError("a state falls straight through the attracting point; give it a velocity across")
+        raise ValueError("a state falls straight into the attracting point; give it a transverse velocity")
     rate = np.sqrt(mu / axis**3)
     passed = eccentric_of_mean(first - sine + rate * np.asarray(duration_s, dtype=np.float64), eccentricity) - first
     later = axis * (1.0 - cosine * np.cos(passed) + sine * np.sin(passed))

@@ -30,7 +30,8 @@ def results_html(samples: Mapping[str, Floats], outcomes: Sequence[str], truths_
         Number of engagements whose true state was inside its section at every step.
     """
     counts = ", ".join(f"{count} {outcome}" for outcome, count in Counter(outcomes).items())
-    caption = f"{len(outcomes)} engagements: {counts}; truth kept {truths_kept}/{len(outcomes)}"
+    kept = f"true state inside the set at every step: {truths_kept} of {len(outcomes)}"
+    caption = f"{len(outcomes)} engagements: {counts}; {kept}"
     rows = [(title, _quantiles(values)) for title, values in samples.items()]
     return _table(caption, ("", *(f"{level:.0%}" for level in LEVELS), "greatest"), rows)
 
@@ -74,7 +75,7 @@ def _miss_svg(time_s: Floats, miss_m: Floats) -> str:
     powers = range(1, 1 + int(np.abs(bent).max()))
     marks = [(float(sign * power), f"{sign * 10**power:g}") for power in powers for sign in (-1, 1)] + [(0.0, "0")]
     plane = Plane(
-        limits(time_s, 0.02), limits(bent), "time t, s", "m", "predicted miss, with no more impulses", levels=marks
+        limits(time_s, 0.02), limits(bent), "time t, s", "m", "predicted miss without further impulses", levels=marks
     )
     low, high = bent.T
     around = np.concatenate([np.stack([time_s, low], axis=1), np.stack([time_s, high], axis=1)[::-1]])

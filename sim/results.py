@@ -127,7 +127,7 @@ class Results:
         return Results(**{name: taken(getattr(self, name)) for name in _INPUTS})
 
     def _repr_html_(self) -> str:
-        guaranteed = "guaranteed miss, m" if self.guarantees else "published Φ, no guarantee, m"
+        guaranteed = "guaranteed miss, m" if self.guarantees else "the paper's Φ (not a bound here), m"
         samples = {
             "miss, m": self.miss_m,
             "impulse, m/s": self.impulse_m_s,

@@ -31,10 +31,10 @@ _LOOKS = 28
 _DOTTED: dict[str, Any] = {"linestyle": (0, (1, 1.2)), "linewidth": 0.9}
 _BINS = 24
 _START_LABELS = {
-    "z_km": "start z, km",
-    "x_km": "start x, km",
-    "vz_km_s": "start V$_z$, km/s",
-    "vx_km_s": "start V$_x$, km/s",
+    "z_km": "initial z, km",
+    "x_km": "initial x, km",
+    "vz_km_s": "initial V$_z$, km/s",
+    "vx_km_s": "initial V$_x$, km/s",
 }
 
 
@@ -296,5 +296,5 @@ def _handles(columns: Sequence[CampaignColumns]) -> tuple[list[Any], list[str]]:
             handles.append(Line2D([], [], **(column.look | _DOTTED)))
             labels.append(f"{column.noise} noise: {_guarantee_name(columns)}")
     handles.append(tuple(Line2D([], [], color=column.look["color"], linewidth=0.7) for column in columns))
-    labels.append("thin: 95 % confidence band (Dvoretzky-Kiefer-Wolfowitz)")
+    labels.append("thin lines: 95 % confidence band (Dvoretzky-Kiefer-Wolfowitz)")
     return handles, labels

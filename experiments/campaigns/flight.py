@@ -140,9 +140,7 @@ class _Workers:
 def _workers(options: Flight, note: Callable[[str], None]) -> Iterator[_Workers]:
     """Start the workers of the options: threads or processes on this machine, or a cluster."""
     if sum(option is not None for option in (options.dask, options.workers, options.processes)) > 1:
-        raise InputError(
-            "--workers (threads here), --processes (here) and --dask (a cluster) exclude each other; give one of them"
-        )
+        raise InputError("--workers, --processes and --dask (a cluster) cannot be combined; give only one of them")
     if options.processes is not None:
         with worker_processes(options.processes) as pool:
             yield _Workers(pool, 2 * options.processes, options.processes)

@@ -67,7 +67,7 @@ def _read(options: Report) -> CampaignFolder:
     folder = CampaignFolder.read(path)
     for damage in folder.damaged:
         say(
-            f"warning: {damage.file}: {damage.reason}; its runs are left out; simulate them again with --resume",
+            f"warning: {damage.file}: {damage.reason}; its runs are omitted; simulate them again with --resume",
             options.quiet,
         )
     if not folder.finished_runs:

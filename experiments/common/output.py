@@ -312,4 +312,6 @@ def _reporting(path: Path) -> Iterator[None]:
         raise
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise InputError(f"{path}: cannot be written: {reason}; choose a folder you may write in") from None
+        raise InputError(
+            f"{path}: cannot be written: {reason}; choose a folder in which you have write permission"
+        ) from None

@@ -336,7 +336,7 @@ def _parse(form: Form[Tables], text: str, source: str) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         column = len(lines[-1]) + 1
         reason = str(error).replace("(at end of document)", f"(at line {len(lines)}, column {column}: the end)")
-        raise InputError(f"{source}: is not TOML: {reason}; correct that line") from None
+        raise InputError(f"{source}: is not valid TOML: {reason}; correct that line") from None
     except (RecursionError, ValueError) as error:
         reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
         raise InputError(f"{source}: is not a {form.noun}: {reason}; start from `{form.begun_by}`") from None

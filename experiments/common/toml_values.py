@@ -214,7 +214,7 @@ class Pair:
                 raise wrong(f"the {which} end {problem}")
         least, greatest = (Decimal(end) for end in value)
         if least > greatest:
-            raise wrong("is reversed", f"write the lesser end first: [{greatest}, {least}]")
+            raise wrong("is reversed", f"write the smaller value first: [{greatest}, {least}]")
         return least, greatest
 
 
@@ -287,7 +287,7 @@ class Line:
         if not value.isprintable():
             raise wrong("must be one line without control characters")
         if any(character in value for character in self.forbidden):
-            raise wrong(f"must not hold any of {' '.join(self.forbidden)}", "output files are named after it")
+            raise wrong(f"must not contain any of {' '.join(self.forbidden)}", "output files are named after it")
         if value[:1] and value[0] in self.begins_badly:
             raise wrong("must begin with a letter or a digit", "output files are named after it")
         return value

@@ -49,7 +49,7 @@ def scenario_with(
     if range_meter and scenario.range_sensor is None:
         raise InputError(
             f"--range-meter: the scenario {scenario.name} has no [range_sensor]; add that table to its file, for "
-            "example period_s = 2.0 and relative_error = 0.05, or leave --range-meter out"
+            "example period_s = 2.0 and relative_error = 0.05, or omit --range-meter"
         )
     if range_meter is False:
         scenario = replace(scenario, range_sensor=None)

@@ -122,7 +122,9 @@ def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: boo
     file = record_path("record", Path(path))
     toml = scenario_to_toml(record.scenario)
     if read_scenario(toml, f"the scenario of {file}") != record.scenario:
-        raise InputError(f"{file}: the scenario {shown(record.scenario.name)} does not read back as it is; correct it")
+        raise InputError(
+            f"{file}: the scenario {shown(record.scenario.name)} changes when it is written and read again; correct it"
+        )
     arrays = _to_arrays(record)
     engagement = to_json(_Engagement(record.seed, record.run, record.strategy, record.noise, record.inconsistency))
     inconsistency = engagement.pop("inconsistency")
@@ -286,19 +288,19 @@ def _unpack(content: bytes) -> Arrays:
             missing = [name for name in wanted if name not in names and name.removesuffix(".npy") not in _MEASURED]
             if unknown or missing:
                 what = f"it has {shown(unknown[0])}" if unknown else f"it has no {missing[0]}"
-                raise _UnsoundError(f"{what}: another program has made it")
+                raise _UnsoundError(f"{what}: another program wrote it")
             if len(set(names)) != len(names):
                 raise _UnsoundError("it has a member twice")
             if any(member.compress_type != zipfile.ZIP_STORED or member.flag_bits & 1 for member in members):
                 raise _UnsoundError("it is compressed or encrypted, which no record is")
             if sum(member.file_size for member in members) > len(content):
-                raise _UnsoundError("it claims to hold more than its own size")
+                raise _UnsoundError("its declared contents are larger than the file")
             return {
                 member.filename.removesuffix(".npy"): _read_array(archive.read(member), member.filename)
                 for member in members
             }
     except zipfile.BadZipFile as error:
-        raise _UnsoundError(f"it is not a whole .npz archive ({error})") from None
+        raise _UnsoundError(f"it is not a complete .npz archive ({error})") from None
     except (OSError, ValueError, EOFError, RuntimeError, struct.error, OverflowError) as error:
         raise _UnsoundError(f"the archive is damaged ({error})") from None
 
@@ -337,7 +339,7 @@ def _read_header(header: NDArray[Any]) -> dict[str, Any]:
     except (ValueError, RecursionError):
         raise _UnsoundError("its header is not JSON") from None
     if not isinstance(found, dict) or found.get("format") != FORMAT:
-        raise _UnsoundError(f"its header does not say {FORMAT}: another program has made it")
+        raise _UnsoundError(f"its header has no format {FORMAT}: another program wrote it")
     if found.get("schema") != SCHEMA or isinstance(found["schema"], bool):
         raise _UnsoundError(
             f"it has the schema {shown(found.get('schema'))}, and this version of infoset reads {SCHEMA}"

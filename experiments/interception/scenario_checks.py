@@ -106,7 +106,7 @@ def _ranges(known: Known) -> Iterator[Problem]:
             ("guidance", "step_s"),
             f"gives {steps:.3g} steps of {shown(step)} s; the true state is integrated in steps of at most "
             f"{LONGEST_SUBSTEP_S:g} s: {leaps:.3g} of them, and {MOST_LEAPS:,} are allowed (some minutes of computing)",
-            "start nearer, approach faster, or leave the table [sun] out",
+            "start nearer, approach faster, or omit the table [sun]",
         )
 
 
@@ -160,7 +160,7 @@ def _sun(known: Known) -> Iterator[Problem]:
             ("sun", "distance_km"),
             f"must be greater than the greatest possible range, {shown(greatest)} km of {where}, "
             f"found {shown(distance)}",
-            "check the unit; for free space leave the table [sun] out",
+            "check the unit; for free space omit the table [sun]",
         )
 
 
@@ -185,8 +185,8 @@ def _closing_speeds(known: Known) -> Iterator[Problem]:
     if plain.speed_error + least >= 1.0:
         yield Problem(
             ("uncertainty", "vx_km_s"),
-            f"must differ from nominal.closing_speed_km_s, {shown(speed)}, by less than that itself in the guaranteed "
-            f"model, found closing speeds from {-vx[1] / 1000.0:g} to {-vx[0] / 1000.0:g}",
+            f"must differ from nominal.closing_speed_km_s, {shown(speed)}, by less than its own value in the "
+            f"guaranteed model, found closing speeds from {-vx[1] / 1000.0:g} to {-vx[0] / 1000.0:g}",
             "write the middle of uncertainty.vx_km_s as nominal.closing_speed_km_s, or narrow uncertainty.vx_km_s",
         )
     elif plain.speed_error + change >= 1.0:
@@ -195,7 +195,7 @@ def _closing_speeds(known: Known) -> Iterator[Problem]:
             f"is so small that gravity may change the closing speed by {change:.3g} of itself during the flight: "
             f"with uncertainty.vx_km_s the guaranteed model allows at most {1.0 - plain.speed_error:.3g}, "
             f"found {shown(known.number('sun', 'distance_km'))}",
-            "start nearer or approach faster, move the Sun away, or leave the table [sun] out",
+            "start nearer or approach faster, move the Sun away, or omit the table [sun]",
         )
     else:
         yield from _impulses_across(known, plain, sun)
@@ -216,5 +216,5 @@ def _impulses_across(known: Known, plain: SetModel, sun: Sun | None) -> Iterator
             f"lets the spacecraft move so far across that gravity may change the closing speed by {change:.3g} of "
             f"itself: the guaranteed model allows at most {1.0 - plain.speed_error:.3g}, found {shown(budget)} in "
             f"impulses of up to {shown(greatest)}",
-            "write the budget or the greatest impulse that the engine has, or leave the table [sun] out",
+            "write the budget or the greatest impulse that the engine has, or omit the table [sun]",
         )

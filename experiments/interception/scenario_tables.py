@@ -163,7 +163,7 @@ class GuidanceTable(Table):
 
     step_s: Annotated[Decimal, limited_by(SetModel)] = key("step of observation and control", "0.5")
     strategy: Annotated[str, PlainValidator(_strategy)] = key("name of the guidance strategy", '"symmetric-miss"')
-    range_threshold_km: Positive = key("sections that would come nearer leave the set", "5.0")
+    range_threshold_km: Positive = key("sections nearer than this are removed from the set", "5.0")
 
 
 class InformationSetTable(Table):
@@ -173,13 +173,13 @@ class InformationSetTable(Table):
         '"paper", as published, or "guaranteed", which keeps the true state', '"paper"'
     )
     initial_set: Annotated[InitialSet | None, PlainValidator(OneOf(InitialSet))] = key(
-        'a section at t0: "rectangle" in (omega, alpha) or "box" in (z, V)', '"rectangle"', default=None
+        'shape of a section at t0: "rectangle" in (omega, alpha) or "box" in (z, V)', '"rectangle"', default=None
     )
     sections: Annotated[int, PlainValidator(Whole(MOST_SECTIONS))] = key(
         "number of sections: a uniform grid of ranges over uncertainty.x_km", "29"
     )
     fewest_sections: Annotated[int | None, PlainValidator(Whole(MOST_SECTIONS))] = key(
-        "with fewer left, a new grid of 2 fewest_sections + 1 sections", "5", default=None
+        "if fewer remain, a new grid of 2 fewest_sections + 1 sections", "5", default=None
     )
     recovery: Annotated[Recovery, PlainValidator(OneOf(Recovery))] = key(
         'after a set became empty: "widened" enlarges it, "none" ends guidance',
@@ -198,7 +198,7 @@ class NoiseTable(Table):
         '"random", or "game": errors chosen against the guidance', '"random"'
     )
     tie: Annotated[TieRule, PlainValidator(OneOf(TieRule))] = key(
-        'ties of game noise: "upper", "lower", "alternate" or "random"',
+        'tie rule of game noise: "upper", "lower", "alternate" or "random"',
         '"upper"',
         default=TieRule.UPPER,
     )
@@ -212,16 +212,18 @@ class ScenarioTables(Table):
     )
     name: Name = key("name in results and files", '"my-scenario"')
     description: Description = key("a line for `infoset scenarios list`", '"What this scenario is about"', default="")
-    sun: SunTable | None = key("the Sun, seen from the spacecraft; without the table: free space", "", default=None)
-    nominal: NominalTable = key("expected range and closing speed", "")
+    sun: SunTable | None = key("the Sun, seen from the spacecraft; without this table: no gravity", "", default=None)
+    nominal: NominalTable = key("range and closing speed of the on-board model", "")
     uncertainty: UncertaintyTable = key("initial state of the object as known on board", "")
     dispersion: DispersionTable = key("initial true state, unknown on board", "")
     angle_sensor: AngleSensorTable = key("the line-of-sight sensor", "")
-    range_sensor: RangeSensorTable | None = key("the range meter; without the table: none", "", default=None)
+    range_sensor: RangeSensorTable | None = key("the range meter; without this table: no range meter", "", default=None)
     rate_sensor: RateSensorTable | None = key(
-        "the sensor of the line of sight's rate; without the table: none", "", default=None
+        "the sensor of the line of sight's rate; without this table: no such sensor", "", default=None
     )
-    target: TargetTable | None = key("how the object accelerates; without the table: no acceleration", "", default=None)
+    target: TargetTable | None = key(
+        "how the object accelerates; without this table: no acceleration", "", default=None
+    )
     thruster: ThrusterTable = key("the engine", "")
     guidance: GuidanceTable = key("how impulses are chosen", "")
     information_set: InformationSetTable = key("the information set", "")

@@ -214,9 +214,9 @@ def _time_problems(known: Known, paths: Sequence[KeyPath]) -> Iterator[Problem]:
         for index in range(1, len(paths)):
             first, second = times[index - 1], times[index]
             if first is not None and second is not None and second <= first + dwell[index - 1]:
-                text = f"must be later, found {second}: the chaser leaves the previous target at "
-                text += f"{first + dwell[index - 1]} s"
-                yield Problem((*paths[index], "time_s"), text, "list targets in order of time")
+                text = f"must be after {first + dwell[index - 1]} s, when the chaser leaves the previous target, "
+                text += f"found {second}"
+                yield Problem((*paths[index], "time_s"), text, "list the targets in order of time")
         last = times[-1] if times else None
         if last is not None and latest is not None and last > latest:
             text = f"is {latest}, before the last visit at {last} s"

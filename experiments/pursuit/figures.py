@@ -77,7 +77,7 @@ def draw_relative(sampled: History) -> Figure:
     figure, (plane, side, distance) = figure_grid(66.0, 1, 3, (15.0, 4.0, 12.0, 8.0), (17.0, 0.0))
     for axes, column, name, title in (
         (plane, 0, "radial", "(a) pursuer relative to the evader"),
-        (side, 2, "normal", "(b) the same, out of plane"),
+        (side, 2, "normal", "(b) out of the orbital plane"),
     ):
         axes.plot(relative[:, 1], relative[:, column], **PURSUER)
         axes.plot(relative[0, 1], relative[0, column], color=TRUTH, label="start", **_START)
@@ -109,7 +109,7 @@ def draw_control(sampled: History) -> Figure:
     outside.yaxis.set_major_locator(_few_ticks())
     outside.set(ylabel="angle out of plane, deg", title="(b) thrust out of plane")
     switching.set_ylim(bottom=0.0)
-    switching.set(ylabel="switching function / initial value", title="(c) full thrust while positive")
+    switching.set(ylabel="switching function / initial value", title="(c) full thrust if positive")
     for axes in (inside, outside, switching):
         axes.set_xlabel(f"time, {unit}")
     switching.legend(loc="best")
@@ -142,7 +142,7 @@ def draw_distance(solution: Solution) -> Figure:
         left.plot(time[-1], radius, zorder=5, clip_on=False, **_STAR)
     left.set(ylabel="distance $l(T)$ at the end, km", title=f"(a) {solution.verdict.value}")
     right.plot(time, curve.least_curvature, **dots)
-    right.set(ylabel="smallest curvature of $h_P - h_E + l$", title="(b) a saddle while positive")
+    right.set(ylabel="smallest curvature of $h_P - h_E + l$", title="(b) saddle point if positive")
     for axes in (left, right):
         axes.set_ylim(bottom=0.0)
         axes.set_xlabel(f"duration $T$, {unit}")

@@ -169,7 +169,7 @@ class PursuitProblem:
             if name not in _SETTABLE:
                 guess = nearest(name, list(_SETTABLE))
                 hint = f"did you mean {guess}?" if guess else "for example evader.thrust_N=5"
-                raise InputError(f"--set: there is no {shown(name)} to set; {hint}")
+                raise InputError(f"--set: there is no key {shown(name)}; {hint}")
             table, _, own = name.rpartition(".")
             values[name] = (document[table] if table else document)[own] = _number_text(name, text)
         return read_problem(_toml(document), f"{self.source} with --set") if values else self
@@ -249,7 +249,7 @@ def _check_orbits(known: Known) -> Iterator[Problem]:
         if problem is not None:
             remedy = "choose an orbit above the planet, or correct planet_radius_km"
             if axis_km is not None and axis_km < SUSPICIOUSLY_SMALL_KM:
-                problem += f"; a semi-major axis of {axis_km} km is suspiciously small"
+                problem += f"; a semi-major axis of {axis_km} km is very small"
                 remedy = "write it in kilometres, not in planet radii or thousands of kilometres"
             yield Problem((name, "position_km" if axis_km is None else "semi_major_axis_km"), problem, remedy)
     if len(positions) < len(PLAYERS):
@@ -294,8 +294,8 @@ def _orbit_problem(position_m: np.ndarray, velocity_m_s: np.ndarray, mu_si: floa
         return "starts a fall along a line through the planet's centre"
     if perigee <= planet_m:
         return (
-            f"gives an orbit into the planet: its perigee is {perigee / 1e3:.6g} km from the centre, and the planet's "
-            f"radius is {planet_m / 1e3:.6g} km"
+            f"gives an orbit that meets the planet: its perigee is {perigee / 1e3:.6g} km from the centre, and the "
+            f"planet's radius is {planet_m / 1e3:.6g} km"
         )
     return None
 

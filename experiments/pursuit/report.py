@@ -202,20 +202,20 @@ def _verdict(solution: Solution) -> str:
 def _certificate_lines(certificate: Certificate) -> Iterator[str]:
     yield (
         f"residual {certificate.residual:.1e}, Hamiltonian constant to {certificate.hamiltonian_drift:.1e}, "
-        f"second integrator differs by {certificate.integrator_gap_m:.2g} m"
+        f"difference of a second integrator {certificate.integrator_gap_m:.2g} m"
     )
     yield (
         f"no earlier capture: {'confirmed' if certificate.no_earlier_capture else 'not confirmed'}; smallest distance "
         f"from the planet's centre {certificate.least_distance_m / M_PER_KM:.1f} km"
     )
     if certificate.pursuer_alone_s is not None:
-        yield f"if only the pursuer deviates: capture at {certificate.pursuer_alone_s:.3f} s at the earliest"
+        yield f"earliest capture if only the pursuer deviates: {certificate.pursuer_alone_s:.3f} s"
     answers = [
         f"{deviation.name} {'not known' if deviation.capture_s is None else f'{deviation.capture_s:.1f} s'}"
         for deviation in certificate.evader_deviations
     ]
     if answers:
-        yield f"if the evader deviates and the pursuer responds, capture at: {', '.join(answers)}"
+        yield f"captures if the evader deviates and the pursuer responds: {', '.join(answers)}"
     if certificate.directions_tried:
         excess = certificate.greatest_excess_m
         largest = "no other extremal" if excess is None else f"largest excess over the capture radius {excess:.2g} m"
@@ -224,7 +224,7 @@ def _certificate_lines(certificate: Certificate) -> Iterator[str]:
             f"tolerance {certificate.excess_tolerance_m:.2g} m"
         )
         if missing := certificate.directions_tried - certificate.directions_found:
-            yield f"{missing} directions inconclusive: no farthest extremal of both craft was found"
+            yield f"{missing} directions are inconclusive: no farthest extremal was found for one craft or both"
     failures = "; ".join(certificate.failures)
     yield f"saddle point: {f'not claimed: {failures}' if failures else 'all checks hold'}"
 

@@ -60,7 +60,7 @@ _START: dict[str, Any] = {
     "zorder": 7,
     "label": "start",
 }
-_END: dict[str, Any] = {"color": INK, "marker": "*", "linestyle": "none", "label": "least terminal state"}
+_END: dict[str, Any] = {"color": INK, "marker": "*", "linestyle": "none", "label": "terminal state of least norm"}
 _SET: dict[str, Any] = {"facecolor": SET_FILL, "edgecolor": SET_EDGE, "linewidth": 0.7}
 _AXES = ("x", "y", "z", "$v_x$", "$v_y$", "$v_z$")
 _PLANES = ((0, 1), (0, 2), (3, 4), (3, 5))

@@ -84,7 +84,9 @@ def _print_report(console: Console, report: Report, comparisons: Sequence[Compar
         console.print("", _members_table(report), sep="\n")
     if comparisons:
         console.print("", _published_table(comparisons), sep="\n")
-        console.print("the printed misses do not follow from the equations of motion; see docs/reachability.md")
+        console.print(
+            "the misses printed in the paper do not follow from the equations of motion; see docs/reachability.md"
+        )
     for line in _feedback(report):
         console.print(line, soft_wrap=True)
 
@@ -92,7 +94,7 @@ def _print_report(console: Console, report: Report, comparisons: Sequence[Compar
 def _summary(report: Report) -> Iterator[str]:
     solution, least = report.solution, report.least_periods
     dimension = solution.optimal.dimension
-    reached = f"zero needs at least {least} periods" if least else f"zero not reached in {report.searched_periods}"
+    reached = f"norm 0 needs at least {least} periods" if least else f"norm 0 not reached in {report.searched_periods}"
     yield f"{report.rendezvous.name}: least terminal norm {solution.optimal.miss:.9g}; {reached}"
     yield f"route: {solution.route.value} ({solution.reason})"
     yield f"optimal controls: {f'a set of dimension {dimension}' if dimension else 'one'}"
@@ -138,7 +140,12 @@ def _members_table(report: Report) -> Table:
 
 
 def _published_table(comparisons: Sequence[Comparison]) -> Table:
-    titles = ("largest difference\nof a control", "nonlinear miss:\nas printed", "\nof the printed u", "\nof ours")
+    titles = (
+        "largest difference\nof a control",
+        "nonlinear miss\nas printed",
+        "with the\nprinted u",
+        "with our\ncontrol",
+    )
     table = number_table("paper", "our control", *titles, left=2)
     for comparison in comparisons:
         misses = (

@@ -186,7 +186,7 @@ class _Search:
         """Search all orders, and return the path of the best one."""
         self._branch((), None)
         if self.best_path is None:
-            raise NotSettledError("no order has a path that was found; give visits more time")
+            raise NotSettledError("no path was found for any order; give visits more time")
         return self.best_path
 
     def _branch(self, beginning: tuple[int, ...], before: Flown | None) -> None:
@@ -252,7 +252,7 @@ def _checked_count(tour: Visits) -> int:
     if count > MOST_TARGETS:
         raise ValueError(
             f"{count} targets have {factorial(count)} orders; a search takes at most {MOST_TARGETS}, with "
-            f"{factorial(MOST_TARGETS)}, for each more multiplies what it costs: give the order"
+            f"{factorial(MOST_TARGETS)}, and each further target multiplies the cost: give the order"
         )
     return count
 
@@ -329,6 +329,6 @@ def _by_dynamic_programming(tour: Tour, times: Floats, fits: NDArray[np.bool_], 
         best = longer
     cost, order = min(best.values())
     if not np.isfinite(cost):
-        raise NotSettledError("no order has a path that was found; give visits more time")
+        raise NotSettledError("no path was found for any order; give visits more time")
     path = tour.fly(order, times)
     return BestOrder(order, path, path.cost, len(best), evaluations + 1, tuple(lost), unfit)

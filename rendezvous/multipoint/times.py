@@ -78,8 +78,8 @@ class TimeLimits:
             raise ValueError("the latest time is not finite")
         if self.latest_s is None and self.price_per_s == 0.0:
             raise ValueError(
-                "with the last time free the energy falls to zero as it grows, so there is no best: "
-                "bound it by a latest time, or give a second a price"
+                "with the last time free the energy falls to zero as it grows, so there is no best time: "
+                "give a latest time, or a price of time"
             )
 
 
@@ -246,8 +246,8 @@ def optimise_times(
             best = _polish(trials, _descend(trials, best, best.gaps, effort.tolerance, enough))
         if not _unsettled(trials, best) <= _SETTLED:
             raise NotSettledError(
-                f"the best times that were found cost {best.objective:.6g} m^2/s^3 and are no minimum: a change of a "
-                "gap would still lower that; start from other times, or give visits more time"
+                f"the best times found cost {best.objective:.6g} m^2/s^3 and are no minimum: another gap lowers the "
+                "cost; start from other times, or give visits more time"
             )
     return BestTimes(best.flown, best.objective, trials.evaluations)
 

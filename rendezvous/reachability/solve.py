@@ -219,9 +219,9 @@ def _refusal(problem: ReachabilityProblem, *, asked: bool) -> str | None:
         return None
     largest = max(block.size for block in problem.blocks)
     if largest > MOST_STATES_BY_CHOICE:
-        return f"the constraints couple {largest} states: rounding loses facets of hulls in so many dimensions"
+        return f"the constraints couple {largest} states: in so many dimensions rounding errors lose facets of hulls"
     if problem.periods > MOST_PERIODS_BY_CHOICE:
-        return f"rounding loses facets of hulls after more than {MOST_PERIODS_BY_CHOICE} periods"
+        return f"rounding errors lose facets of hulls after more than {MOST_PERIODS_BY_CHOICE} periods"
     return None
 
 

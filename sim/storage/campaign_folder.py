@@ -210,8 +210,8 @@ class CampaignFolder:
             return table if columns is None else table.select(list(columns))
         except (OSError, ValueError) as error:
             raise DamagedError(
-                f"{file}: the shard has changed or is missing: {str(error)[:200]}; delete it, and fly its runs again "
-                "with --resume"
+                f"{file}: the shard has changed or is missing: {str(error)[:200]}; delete it, and simulate its runs "
+                "again with --resume"
             ) from None
 
     def _size(self, index: int) -> int:

@@ -217,7 +217,10 @@ def read_manifest(folder: Path) -> Manifest:
     """
     file = folder / MANIFEST
     if not file.is_file():
-        raise ManifestError(f"{folder}: holds no campaign and no sweep: it has no {MANIFEST}")
+        raise ManifestError(
+            f"{folder}: contains no campaign and no sweep (no file {MANIFEST}); name a folder of infoset campaign or "
+            "infoset sweep"
+        )
     with reporting(file), file.open("rb") as stream:
         content = stream.read(LARGEST_BYTES + 1)
     try:

@@ -279,7 +279,7 @@ def test_absurd_values_under_a_sound_checksum_are_one_message(
         out, err = capsys.readouterr()
         assert (left.value.code, out) == (2, ""), err
         assert err.splitlines()[-1].startswith(f"error: {shard}: the shard has changed or is missing: {reason}")
-        assert err.endswith("; delete it, and fly its runs again with --resume\n")
+        assert err.endswith("; delete it, and simulate its runs again with --resume\n")
         assert "Traceback" not in err
     shard.unlink()
     with pytest.raises(SystemExit) as left:
@@ -310,7 +310,7 @@ def test_absurd_values_in_a_sweep_are_one_message(
     err = capsys.readouterr().err.replace("\n", " ")
     assert left.value.code == 2
     assert reason in err
-    assert "fly its runs again with --resume" in err
+    assert "simulate its runs again with --resume" in err
     assert err.count("error: ") == 1
 
 

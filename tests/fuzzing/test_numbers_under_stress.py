@@ -335,7 +335,7 @@ def test_a_closing_speed_without_labels_is_refused_from_python_too() -> None:
     assert_works(scenario, numbers(scenario, 0), 5)
     far = replace(scenario.set_model.bounds, vx_m_s=(-2001.0, -999.0))
     wide = replace(scenario, set_model=replace(scenario.set_model, bounds=far))
-    assert "by less than that itself" in str(through_a_file(wide))
+    assert "by less than its own value" in str(through_a_file(wide))
     with pytest.raises(ValueError, match="known to better than 100 %"):
         simulate(wide, 1)
     near = replace(scenario, sun=replace(SUN, distance_m=2e6))

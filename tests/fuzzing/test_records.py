@@ -185,7 +185,7 @@ def long_header(content: bytes) -> bytes:
 
 BOMBS: Mapping[str, tuple[Callable[[bytes], bytes], str]] = {
     "deflated": (lambda _: deflated_bomb(10), "compressed"),
-    "claiming": (claiming, "claims to hold more than its own size"),
+    "claiming": (claiming, "declared contents are larger than the file"),
     "array": (array_of_10_gb, "time_s.npy holds 0 bytes"),
     "members": (many_members, "more members"),
     "header": (long_header, "header is too long"),

@@ -54,10 +54,10 @@ class Column {
       label: "Sections of the information set in the plane of rate and angle",
       ratio: 0.8,
       legend: [
-        ["sections, the nearest below", nearToFar],
+        ["sections (lowest line: the nearest one)", nearToFar],
         ["before the measurement", stroke("quiet", { dash: [3, 3], width: 1.2 })],
         ["truth", mark("cross", "ink")],
-        ["what the measurement allows", fill("measured", 0.3)],
+        ["states allowed by the measurement", fill("measured", 0.3)],
       ],
       draw: () => this.drawPlane(),
       tell: (x, y) => this.tellPlane(x, y),
@@ -68,8 +68,8 @@ class Column {
       ratio: 0.8,
       legend: [
         ["sections", nearToFar],
-        ["truth, and its range", mark("cross", "ink")],
-        ["ranges the range meter allows", stroke("measured", { dash: [5, 3] })],
+        ["true state and its range", mark("cross", "ink")],
+        ["ranges allowed by the range meter", stroke("measured", { dash: [5, 3] })],
       ],
       draw: () => this.drawScene(),
       tell: (x, y) => this.tellScene(x, y),
@@ -77,7 +77,7 @@ class Column {
     this.numbers = element("table", { "aria-label": `Numbers at this time: ${record.title}` });
     low.append(element("figure", {}, element("figcaption", {}, "Numbers at this time"), this.numbers));
     this.miss = new Chart(low, {
-      caption: "Predicted miss, with no more impulses",
+      caption: "Predicted miss without further impulses",
       label: "Predicted-miss interval against time",
       ratio: 0.3,
       legend: [

@@ -101,7 +101,7 @@ def _draw_labels(axes: Axes, lower: LowerBound) -> None:
     handles, names = axes.get_legend_handles_labels()
     if banded:
         handles.append(Patch(facecolor=LIMIT, alpha=0.25))
-        names.append("labels within one step")
+        names.append("spread over labels within one step")
     axes.legend(handles, names, title="closing speed", loc="best")
 
 
@@ -138,14 +138,16 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
     axes.plot([], [], color=INK, linewidth=0.8, linestyle=":", label="with the largest correction")
     axes.axvline(alike_until, ymax=0.72, color=LIMIT, linewidth=0.8, linestyle="--")
     top = float(max(half[-1], corridor[-1])) * 1.12
-    axes.text(alike_until, -0.93 * top, "  equal until here", color=LIMIT, ha="left", va="bottom", fontsize=7.0)
+    axes.text(
+        alike_until, -0.93 * top, "  measurements equal until here", color=LIMIT, ha="left", va="bottom", fontsize=7.0
+    )
     _bracket(axes, shown, float(half[-1]), pair.correction_m)
     axes.set_xlim(shown, -0.3 * shown)
     axes.set_ylim(-top, top)
     axes.set_xticks([tick for tick in axes.get_xticks() if 0.0 <= tick <= shown])
-    axes.set_title("(b) pair of true states that proves it")
+    axes.set_title("(b) pair of true states that proves the bound")
     axes.set_xlabel("time to arrival, s")
-    axes.set_ylabel("$z$ from their midpoint, m")
+    axes.set_ylabel("$z$ relative to the midpoint, m")
     axes.legend(loc="upper right", handlelength=2.0, borderaxespad=0.2)
 
 

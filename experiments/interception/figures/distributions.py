@@ -256,5 +256,5 @@ def _handles(curves: Sequence[Curve], confidence: float) -> tuple[list[Any], lis
     middle = (len(handles) + 1) // 2
     colours = [CURVE_LOOKS[curve.number]["color"] for curve in curves]
     handles.insert(middle, tuple(Line2D([], [], color=colour, linewidth=0.7) for colour in colours))
-    labels.insert(middle, f"thin: {100.0 * confidence:g} % confidence band (Dvoretzky-Kiefer-Wolfowitz)")
+    labels.insert(middle, f"thin lines: {100.0 * confidence:g} % confidence band (Dvoretzky-Kiefer-Wolfowitz)")
     return handles, labels

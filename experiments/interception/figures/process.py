@@ -181,7 +181,7 @@ def _note_exit(axes: Axes, values: Floats, record: Record, scale: float, unit: s
     value = float(values[worst]) * scale
     if abs(value) >= 1e3:
         value, unit = 1e-3 * value, unit.removeprefix("m")
-    text = f"to {_signed(value)} {unit} at {record.steps[worst].time_s:g} s"
+    text = f"reaches {_signed(value)} {unit} at {record.steps[worst].time_s:g} s"
     down = values[worst] < low
     axes.annotate(
         text,

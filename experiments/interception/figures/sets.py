@@ -85,7 +85,7 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
             Line2D([], [], label=TRUTH_MARK, **_TRUTH_LOOK),
             Line2D([], [], label=MEASUREMENT_MARK, **_MEASUREMENT_LOOK),
             Line2D([], [], color=_colour(0, 2), label="section of the set, with its range in km"),
-            Patch(facecolor=MEASURED, alpha=0.22, label="angles that the measurement allows at these ranges"),
+            Patch(facecolor=MEASURED, alpha=0.22, label="angles allowed by the measurement at these ranges"),
         ]
         figure.legend(handles=handles, loc="lower center", ncols=2, columnspacing=2.5)
     return figure

@@ -52,7 +52,7 @@ def run(options: Adversary) -> None:
             )
         except NothingCountsError as error:
             raise InputError(
-                f"{scenario.name}: {error}; {'leave --keep-set out, or ' if options.keep_set else ''}check the units "
+                f"{scenario.name}: {error}; {'omit --keep-set, or ' if options.keep_set else ''}check the units "
                 "of the scenario with: infoset scenarios check FILE"
             ) from None
         elapsed_s = perf_counter() - began_s

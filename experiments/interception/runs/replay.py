@@ -16,7 +16,7 @@ from experiments.interception.terminal.engagement import play
 def run(options: Replay) -> None:
     """Read the records, write the files and print the table or the terminal replay."""
     if len(options.records) > MOST_RECORDS:
-        raise InputError(f"replay shows one record, or two side by side; found {len(options.records)}: omit some")
+        raise InputError(f"replay needs one record or two records, found {len(options.records)}; omit some")
     animation_path("--gif", options.gif, GIF)
     animation_path("--mp4", options.mp4, MP4)
     files = {"--html": options.html, "--gif": options.gif, "--mp4": options.mp4}

@@ -90,7 +90,7 @@ def test_a_report_writes_nothing_unasked(infoset: Infoset, folder: Path, tmp_pat
     ("what", "parts"),
     [
         ("missing", ["there is no such folder"]),
-        (".", ["holds no campaign and no sweep"]),
+        (".", ["contains no campaign and no sweep"]),
         ("empty", ["contains no runs yet"]),
         ("broken", ["is not a readable manifest"]),
     ],
@@ -153,7 +153,7 @@ def test_figures_of_few_runs_and_of_many(size: int) -> None:
     assert all(each.get_xlabel() == "runs" for each in panels)
     clouds = draw_dispersion(both).axes
     assert [each.get_xlabel() for each in clouds[:4]] == [
-        *("start z, km", "start x, km", "start V$_z$, km/s", "start V$_x$, km/s"),
+        *("initial z, km", "initial x, km", "initial V$_z$, km/s", "initial V$_x$, km/s"),
     ]
     assert max(len(np.asarray(line.get_xdata())) for line in clouds[0].get_lines()) <= MOST_POINTS
 

@@ -76,7 +76,7 @@ def test_values_come_as_they_were_written() -> None:
         ("bound = 2", "rate_rad_s = 2", "craft #2.rate_rad_s: is not a key of [[craft]]; move rate_rad_s to [orbit]"),
         ('kind = "meeting"', "", 'kind: must be "meeting", which is missing'),
         ('kind = "meeting"', 'kind = "tour"', 'kind: must be "meeting", found "tour"'),
-        ('kind = "meeting"', 'kind = "meeting"\ncraft = 3', "is not TOML"),
+        ('kind = "meeting"', 'kind = "meeting"\ncraft = 3', "is not valid TOML"),
     ],
 )
 def test_what_is_wrong_is_named_with_its_place(wrong: str, right: str, said: str) -> None:

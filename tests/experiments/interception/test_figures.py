@@ -87,7 +87,7 @@ def test_process_rows_share_limits_and_hold_the_impulse_limit(records: list[Reco
 def test_process_says_where_a_curve_leaves_the_axes(records: list[Record]) -> None:
     texts = [text.get_text() for text in draw_process(records).axes[3].texts]
     last = records[1].steps[-1]
-    assert texts == [f"to −{abs(last.true_rate_rad_s) * 1e3:.3g} mrad/s at {last.time_s:g} s"]
+    assert texts == [f"reaches −{abs(last.true_rate_rad_s) * 1e3:.3g} mrad/s at {last.time_s:g} s"]
 
 
 def test_process_gives_a_fast_rate_in_whole_units_and_breaks_a_long_title(records: list[Record]) -> None:
@@ -96,7 +96,7 @@ def test_process_gives_a_fast_rate_in_whole_units_and_breaks_a_long_title(record
     scenario = replace(records[1].scenario, name=text)
     fast = replace(records[1], scenario=scenario, steps=(*records[1].steps[:-1], last))
     figure = draw_process([records[1], fast])
-    assert [each.get_text() for each in figure.axes[3].texts] == [f"to −2.07 rad/s at {last.time_s:g} s"]
+    assert [each.get_text() for each in figure.axes[3].texts] == [f"reaches −2.07 rad/s at {last.time_s:g} s"]
     title = figure.axes[1].get_title().splitlines()
     assert text in " ".join(title)
     assert max(map(len, title)) <= 45

@@ -225,8 +225,8 @@ BAD_VALUES = [
     # (table, key, value, parts of the message)
     ("", "name", '""', ["must not be empty", "for example name ="]),
     ("", "name", "7", ["text in quotes", "found 7"]),
-    ("", "name", '"a/b"', ["must not hold", "files are named after it"]),
-    ("", "name", '"a$b$"', ["must not hold"]),
+    ("", "name", '"a/b"', ["must not contain", "files are named after it"]),
+    ("", "name", '"a$b$"', ["must not contain"]),
     ("", "name", '".."', ["must begin with a letter or a digit", "files are named after it"]),
     ("", "name", '"-rf"', ["must begin with a letter or a digit"]),
     ("", "name", '"a\\u001bb"', ["control characters"]),
@@ -236,7 +236,7 @@ BAD_VALUES = [
     ("", "description", "1.5", ["text in quotes"]),
     ("sun", "gravitational_parameter_km3_s2", "0.0", ["greater than 0"]),
     ("sun", "distance_km", "-1.0", ["greater than 0", "found -1.0", "for example distance_km = 150.0e6"]),
-    ("sun", "distance_km", "100.0", ["6301.3 km of uncertainty.x_km", "found 100.0", "leave the table [sun] out"]),
+    ("sun", "distance_km", "100.0", ["6301.3 km of uncertainty.x_km", "found 100.0", "omit the table [sun]"]),
     ("sun", "direction_deg", "nan", ["finite"]),
     ("sun", "direction_deg", "361.0", ["at most 360"]),
     ("nominal", "range_km", "0", ["greater than 0", "found 0"]),
@@ -387,7 +387,7 @@ def test_missing_table(table: str) -> None:
         ("noise", "guidance", ["write [guidance] as a separate table"]),
         ("noise", "zebra", ["remove it; valid here: kind, tie"]),
         ("", "descripton", ["is not a key of a scenario", "did you mean description?"]),
-        ("", "step_s", ["is not a key of the top", "move step_s to [guidance]"]),
+        ("", "step_s", ["is not a key of the top level", "move step_s to [guidance]"]),
         ("", "zzz", ["remove it; valid here: schema, name"]),
     ],
 )
@@ -477,7 +477,7 @@ def test_flight_that_would_take_hours_to_integrate() -> None:
 
 def test_closing_speeds_that_have_no_labels() -> None:
     text = GUARANTEED.replace("[-59.0, -57.0]", "[-116.5, -57.0]")
-    assert_one_problem(text, "uncertainty.vx_km_s", "less than that itself", "57 to 116.5", "narrow")
+    assert_one_problem(text, "uncertainty.vx_km_s", "less than its own value", "57 to 116.5", "narrow")
     assert read_scenario(text.replace("116.5", "115.9"), "mine.toml").set_model.is_guaranteed
     assert read_scenario(text.replace('"guaranteed"', '"paper"'), "mine.toml")
 
@@ -531,7 +531,7 @@ def test_step_that_would_never_end() -> None:
 )
 def test_syntax_error_says_where(text: str, parts: list[str]) -> None:
     message = message_of(text)
-    assert message.startswith("mine.toml: is not TOML: ")
+    assert message.startswith("mine.toml: is not valid TOML: ")
     assert message.endswith("; correct that line")
     for part in parts:
         assert part in message

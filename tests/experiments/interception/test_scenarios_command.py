@@ -125,7 +125,7 @@ def test_quiet_check_prints_nothing() -> None:
     [
         ("step_s = 0.5", "step_s = -0.5", ["guidance.step_s", "greater than 0", "for example step_s = 0.5"]),
         ("step_s = 0.5", "stp_s = 0.5", ["guidance.step_s", "is missing", "guidance.stp_s", "did you mean step_s?"]),
-        ("distance_km = 150.0e6", "distance_km = ", ["is not TOML", "line 9"]),
+        ("distance_km = 150.0e6", "distance_km = ", ["is not valid TOML", "line 9"]),
         ("x_km = [5301.3", "x_km = [inf", ["uncertainty.x_km", "finite"]),
         ('"symmetric-miss"', '"[red]odd[/red]"', ["guidance.strategy", 'found "[red]odd[/red]"']),
     ],
@@ -205,7 +205,7 @@ def test_new_in_a_folder_that_may_not_be_written(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(Path, "open", refuse)
     code, _, err = invoke("new", str(tmp_path / "mine.toml"))
     assert code == 2
-    assert "cannot be written: Permission denied; choose a folder you may write in" in err
+    assert "cannot be written: Permission denied; choose a folder in which you have write permission" in err
 
 
 @pytest.mark.parametrize("command", [[], ["list"], ["show"], ["check"], ["new"]])

@@ -257,8 +257,8 @@ ORBIT = "orbit_rate_rad_s = 1.13e-3"
 @pytest.mark.parametrize(
     ("text", "options", "parts"),
     [
-        (changed("2600.0", "900.0"), [], ["target #2.time_s: must be later, found 900.0", "leaves the previous"]),
-        (changed("2600.0", "1200.0"), [], ["target #2.time_s: must be later, found 1200.0"]),
+        (changed("2600.0", "900.0"), [], ["target #2.time_s: must be after", "previous target, found 900.0"]),
+        (changed("2600.0", "1200.0"), [], ["target #2.time_s: must be after ", "found 1200.0"]),
         (changed("2600.0", "nan"), [], ["target #2.time_s: must be a finite number, found nan"]),
         (changed("2600.0", "-5"), [], ["target #2.time_s: must be greater than 0"]),
         (changed("2600.0", "1e300"), [], ["target #2.time_s: must be at most 1e+15 in size"]),

@@ -241,7 +241,7 @@ def test_what_is_wrong_is_said_before_the_work(
         (changed("schema = 1", "schema = 2"), ["schema: must be 1"]),
         (changed('kind = "pareto-encounter"', 'kind = "multipoint"'), ["kind", f'must be "{KIND}"']),
         (changed("duration_s", "duraton_s"), ["duraton_s: is not a key", "did you mean duration_s?"]),
-        ("kind = [", ["is not TOML"]),
+        ("kind = [", ["is not valid TOML"]),
     ],
 )  # fmt: skip
 def test_unsound_files_are_told(

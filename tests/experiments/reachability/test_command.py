@@ -95,7 +95,7 @@ def test_reach_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
     ]
     assert len(first) == 12
     assert max(first) <= 0.5e-4
-    for piece in ("least terminal norm 0", "zero needs at least 3 periods", "route: exact", "table 3", "replanned"):
+    for piece in ("least terminal norm 0", "norm 0 needs at least 3 periods", "route: exact", "table 3", "replanned"):
         assert piece in out
 
 
@@ -269,7 +269,7 @@ SQUARE = "[[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0],
             ["keep_in #1.offsets_m", "one number for each of the 5 normals, found 1"],
         ),
         (edited("rendezvous-2021") + "[cones]\n", ["cones", "did you mean cone?"]),
-        ("kind = [", ["is not TOML"]),
+        ("kind = [", ["is not valid TOML"]),
     ],
 )
 def test_unsound_files_are_told(text: str, parts: list[str], infoset: Infoset, tmp_path: Path) -> None:
@@ -336,7 +336,7 @@ def test_figures_show_sets_members_and_ranges() -> None:
     # The least sum of norms is the least L1 here, and is drawn once.
     assert [each.get_text() for each in planes.legends[0].get_texts()][2:] == [
         "start",
-        "least terminal state",
+        "terminal state of least norm",
         "tube at t",
     ]
     assert len(controls.axes) == 3

@@ -119,7 +119,10 @@ def test_route_is_told(paper: Paper) -> None:
     assert chosen.route is Route.EXACT
     assert chosen.reason == "blocks of 4, 2 states"
     assert solve(paper(thrust=ThrustShape.BALL)).reason == "for thrust in a ball the sets are not polytopes"
-    assert solve(paper(periods=32, period_s=22.5)).reason == "rounding loses facets of hulls after more than 16 periods"
+    assert (
+        solve(paper(periods=32, period_s=22.5)).reason
+        == "rounding errors lose facets of hulls after more than 16 periods"
+    )
 
 
 def test_least_norms(paper: Paper, exact: Solution) -> None:
