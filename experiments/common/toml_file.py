@@ -410,7 +410,7 @@ def _unknown(form: Form[Tables], path: KeyPath, value: object) -> tuple[str, str
             return what, f"write {_heading(form.tables, name)} as a separate table"
         return what, f"move {name} above the first table"
     if homes and not isinstance(value, dict):
-        return f"is not a key of {heading or 'the top'}", f"move {name} to {' or '.join(homes)}"
+        return f"is not a key of {heading or 'the top level'}", f"move {name} to {' or '.join(homes)}"
     valid = [*keys_of(form.tables, home)]
     guess = nearest(name, valid)
     if heading is not None:

@@ -137,7 +137,7 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
 
 
 def default_initial_set(model: Model) -> InitialSet:
-    """Return the default shape of a section at t0: the paper's rectangle in the model `paper`, else the box."""
+    """Return the default section at t0: the paper's rectangle in the model `paper`, else the box."""
     return {Model.PAPER: InitialSet.RECTANGLE}.get(model, InitialSet.BOX)
 
 

@@ -173,13 +173,13 @@ class InformationSetTable(Table):
         '"paper", as published, or "guaranteed", which keeps the true state', '"paper"'
     )
     initial_set: Annotated[InitialSet | None, PlainValidator(OneOf(InitialSet))] = key(
-        'shape of a section at t0: "rectangle" in (omega, alpha) or "box" in (z, V)', '"rectangle"', default=None
+        'section at t0: "rectangle" in (omega, alpha) or "box" in (z, V)', '"rectangle"', default=None
     )
     sections: Annotated[int, PlainValidator(Whole(MOST_SECTIONS))] = key(
         "number of sections: a uniform grid of ranges over uncertainty.x_km", "29"
     )
     fewest_sections: Annotated[int | None, PlainValidator(Whole(MOST_SECTIONS))] = key(
-        "if fewer remain, a new grid of 2 fewest_sections + 1 sections", "5", default=None
+        "if fewer remain: a new grid of 2 fewest_sections + 1 sections", "5", default=None
     )
     recovery: Annotated[Recovery, PlainValidator(OneOf(Recovery))] = key(
         'after a set became empty: "widened" enlarges it, "none" ends guidance',
@@ -217,7 +217,7 @@ class ScenarioTables(Table):
     uncertainty: UncertaintyTable = key("initial state of the object as known on board", "")
     dispersion: DispersionTable = key("initial true state, unknown on board", "")
     angle_sensor: AngleSensorTable = key("the line-of-sight sensor", "")
-    range_sensor: RangeSensorTable | None = key("the range meter; without this table: no range meter", "", default=None)
+    range_sensor: RangeSensorTable | None = key("the range meter; without this table: none", "", default=None)
     rate_sensor: RateSensorTable | None = key(
         "the sensor of the line of sight's rate; without this table: no such sensor", "", default=None
     )
