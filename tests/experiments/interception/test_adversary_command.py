@@ -164,4 +164,4 @@ def test_where_no_engagement_counts_it_is_said(infoset: Command, tmp_path: Path)
     message = infoset("adversary", file, "--keep-set", "--budget", 2, "-q")
     assert message[0] == 2
     assert "in every simulated engagement the set was lost" in message[2]
-    assert "leave --keep-set out" in message[2]
+    assert "omit --keep-set" in message[2]
