@@ -35,9 +35,9 @@ def essential(points: Floats, normals: Floats, offsets: Floats) -> tuple[Floats,
     points : ndarray, shape (k, d)
         All vertices, and perhaps other points of the polytope, in coordinates in which its width is about one.
     normals : ndarray, shape (m, d)
-        Of all facets, and perhaps of other half-spaces that contain the polytope.
+        Normals of all facets, and perhaps of other half-spaces that contain the polytope.
     offsets : ndarray, shape (m,)
-        Of the same.
+        Offsets of these half-spaces.
 
     Returns
     -------
@@ -47,16 +47,17 @@ def essential(points: Floats, normals: Floats, offsets: Floats) -> tuple[Floats,
     Raises
     ------
     UncertainHullError
-        If a point is outside, or the result is no polytope, because of rounding.
+        If, because of rounding, a point is outside or the result is not a polytope.
 
     Notes
     -----
-    A plane is a facet where the points on it span d - 1 dimensions and are not among those of another one. A point is
-    a vertex where the planes through it have only that in common. O(k m d^2) and O(m^2 k) of matrix products.
+    A plane is a facet if the points on it span d - 1 dimensions and are not a subset of the points on another plane. A
+    point is a vertex if it is the only common point of the planes through it. O(k m d^2), and O(m^2 k) for matrix
+    products.
 
     The hull of the vertices is computed again as a check: it must contain all points, and each simplex of its surface
     must lie in a facet. Distances of points from planes are either rounding or real: the widest gap among them
-    separates the two. Where that fails the check, fixed tolerances are tried.
+    separates the two. If the check fails, fixed tolerances are tried.
     """
     lengths = np.linalg.norm(normals, axis=1)
     normals, offsets = normals / lengths[:, None], offsets / lengths
@@ -99,7 +100,7 @@ def _agreeing(points: Floats, normals: Floats, on: Flags, negligible: float) -> 
 
 
 def _need_agreement(points: Floats, corners: Places, on_facets: Flags) -> None:
-    """Check that the hull of the vertices holds all points, and that each simplex of its surface is in a facet."""
+    """Check that the hull of the vertices contains all points, and that each simplex of its surface is in a facet."""
     try:
         hull = ConvexHull(points[corners])
     except QhullError as error:
@@ -115,7 +116,7 @@ def _need_agreement(points: Floats, corners: Places, on_facets: Flags) -> None:
 
 
 def _widest_gap(gaps: Floats) -> float:
-    """Return the middle, by order of magnitude, of the widest gap among small distances."""
+    """Return the geometric mean of the ends of the widest gap among small distances."""
     sizes = np.abs(gaps)
     small = np.log(np.sort(sizes[(sizes > _LEAST_ON) & (sizes < _MOST_ON)]))
     ends = np.concatenate([[np.log(_LEAST_ON)], small, [np.log(_MOST_ON)]])
@@ -132,7 +133,7 @@ def together(points: Floats, within: float) -> Places:
 
 
 def _largest(on: Flags, least: int) -> Places:
-    """Return the planes whose points are not all on another plane too; of planes with the same points, the first."""
+    """Return the planes whose points are not all on another plane; of planes with the same points, the first."""
     planes = np.flatnonzero(on.sum(axis=0) >= least)
     held = on[:, planes].astype(np.float32)
     counts = held.sum(axis=0)
@@ -158,7 +159,7 @@ def _ranks(rows: Floats, groups: Flags, negligible: float) -> Places:
 
 
 def _batched(count: int, height: int, stack: Callable[[slice], Floats], negligible: float) -> Places:
-    """Return the ranks of matrices that are made some at a time."""
+    """Return the ranks of matrices, which are built in batches."""
     size = max(1, _ENTRIES // max(1, height))
     ranks = [np.zeros(0, np.int64)]
     for start in range(0, count, size):

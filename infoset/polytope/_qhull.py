@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 _OPTIONS = ("Qt", "QJ Pp")
 _APART = 1e-9
 _ROUND = 30.0
-"""Sets this many times longer than thin are intersected again, in coordinates in which they are round."""
+"""Ratio of length to thickness above which sets are intersected again, in coordinates in which they are round."""
 
 
 Description = tuple[Floats, Floats, Floats, Floats, Floats]
@@ -44,7 +44,7 @@ def intersection_of_halfspaces(
     Raises
     ------
     EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
-        If it is empty, unbounded where it is not known to be bounded, or decided by rounding.
+        If the set is empty, is unbounded, or depends on rounding.
     """
     inside = relative_interior(normals, offsets, across, levels, bounded=bounded)
     if not inside.dimension:

@@ -1,4 +1,4 @@
-"""The affine hull of a set given by half-spaces and equations, and a point deep inside it."""
+"""The affine hull of a set defined by half-spaces and equations, and the centre of a largest ball inside."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HIGHS = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e
 
 @dataclass(frozen=True, eq=False)
 class RelativeInterior:
-    """{point + basis z: rows z <= limits}, of which z = centre is deep inside.
+    """The set {point + basis z: rows z <= limits}, with the centre of a largest ball inside.
 
     Parameters
     ----------
@@ -29,9 +29,9 @@ class RelativeInterior:
     basis : ndarray, shape (n, d)
         Orthonormal columns.
     rows : ndarray, shape (k, d)
-        Of unit length.
+        Rows of unit length.
     limits : ndarray, shape (k,)
-        Of the rows.
+        Limits of the rows.
     kept : ndarray of int, shape (k,)
         Index of each row's half-space; the others are always tight, or do not depend on z.
     centre : ndarray, shape (d,)
@@ -68,7 +68,7 @@ def relative_interior(
     Parameters
     ----------
     normals, offsets, across, levels : ndarray
-        Of shapes (m, n), (m,), (e, n) and (e,).
+        Arrays of shapes (m, n), (m,), (e, n) and (e,).
     bounded : bool
         Whether the set is known to be bounded, which saves a linear program.
     member : ndarray, shape (n,), optional
@@ -85,8 +85,8 @@ def relative_interior(
 
     Notes
     -----
-    Where a largest ball has no radius there are equations hidden among the half-spaces; linear programs (HiGHS) find
-    the rows that are always tight. A set is flat where it is thinner than 1e-9 of its width.
+    If the radius of a largest ball is zero, some half-spaces imply equations; linear programs (HiGHS) find the rows
+    that are always tight. A set is flat in a direction in which it is thinner than 1e-9 of its width.
     """
     lengths = np.linalg.norm(normals, axis=1)
     long = lengths > ROUNDING * float(lengths.max(initial=0.0))
@@ -131,7 +131,7 @@ def relative_interior(
 def chebyshev_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
     """Return the centre, shape (d,), and radius of a largest ball in {z: rows z <= limits}, rows of unit length.
 
-    The radius is negative where the set is empty: the rows must be relaxed by its size.
+    The radius is negative if the set is empty; its absolute value is the least relaxation of the rows that has a point.
 
     Raises
     ------
@@ -144,7 +144,7 @@ def chebyshev_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
     cost[-1] = -1.0
     optimum = linprog(cost, A_ub=matrix, b_ub=limits, bounds=(None, None), method="highs", options=HIGHS)
     if optimum.status != 0:
-        raise UncertainHullError("no largest ball inside was found")
+        raise UncertainHullError("the linear program of a largest ball inside was not solved")
     return optimum.x[:-1], float(optimum.x[-1])
 
 
@@ -173,7 +173,7 @@ def null_space_basis(across: Floats) -> Floats:
 
 
 def _need_bounded(rows: Floats, basis: Floats) -> None:
-    """Refuse a set with a direction of recession: rows d <= 0 without d = 0."""
+    """Raise an error if the set has a direction of recession d: rows d <= 0 and d not zero."""
     if np.linalg.matrix_rank(rows, tol=FLAT) < rows.shape[1]:
         raise UnboundedPolytopeError(basis @ null_space(rows, rcond=FLAT)[:, 0])
     optimum = linprog(rows.sum(axis=0), A_ub=rows, b_ub=np.zeros(len(rows)), bounds=(-1.0, 1.0), method="highs")

@@ -20,23 +20,23 @@ _TOGETHER = 1e-7
 
 @dataclass(frozen=True)
 class Polytope:
-    """A convex polytope that contains at least a point; it may be flat, a segment or a point.
+    """A convex polytope that is not empty; it may be flat, a segment or a point.
 
-    Make one with `from_vertices` or `from_halfspaces`. Coordinates should be of one size: scale them first, since a set
-    that is 1e9 times thinner than it is long counts as flat.
+    Construct it with `from_vertices` or `from_halfspaces`. Coordinates should be of similar size: scale them first,
+    because a set that is 1e9 times thinner than it is long counts as flat.
 
     Parameters
     ----------
     vertices : ndarray, shape (v, n)
-        Essential ones only.
+        Vertices, without redundant points.
     normals : ndarray, shape (f, n)
-        Outward, of unit length, in the directions of the affine hull.
+        Outward normals of the facets, of unit length, in the directions of the affine hull.
     offsets : ndarray, shape (f,)
-        normals x <= offsets, one row for each facet.
+        Offsets of the facets: normals x <= offsets.
     across : ndarray, shape (n - dimension, n)
-        Orthonormal rows.
+        Orthonormal rows, normal to the affine hull.
     levels : ndarray, shape (n - dimension,)
-        across x = levels is the affine hull.
+        Levels of the affine hull: across x = levels.
     """
 
     vertices: Floats
@@ -52,7 +52,7 @@ class Polytope:
         Parameters
         ----------
         points : array_like, shape (k, n)
-            At least one.
+            Points, at least one.
         flat : float
             Relative thickness below which a set counts as flat: greater for points that are known to fewer digits.
 

@@ -176,9 +176,10 @@ class ShotPath:
 
 
 def shoot(block: Block, near: Floats | None = None) -> Shot | None:
-    """Find a block's trajectory by Newton's method, as the residual at the nodes is reduced in steps; None if it fails.
+    """Find the trajectory of a block by Newton's method, with the residual reduced in steps; None if it fails.
 
-    The initial unknowns are `near`, of other times; if they fail, or with None, those of the coasting orbit.
+    The initial unknowns are `near`, of other times; if Newton's method fails from them, or they are None, those of the
+    coasting orbit.
     """
     coasting = np.zeros(3 + 3 * len(block.time_s))
     initials = [] if near is None else [(near, LEAST_STEP_FROM_NEAR)]

@@ -42,7 +42,7 @@ class Coalition:
     Parameters
     ----------
     members : tuple of int
-        Numbers of the craft.
+        Indices of the craft.
     excess : float
         c(S): their least weighted sum of excesses at a common meeting, m^2/s^3.
     regret : float
@@ -68,7 +68,7 @@ class Coalitions:
         Payment to each craft that leaves it with its Shapley value: its weighted excess minus that value, m^2/s^3; of
         sum zero.
     core : Core
-        Of the cost game.
+        Core of the cost game.
     """
 
     coalitions: tuple[Coalition, ...]
