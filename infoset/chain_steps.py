@@ -1,6 +1,7 @@
-"""Compiled operations of a step on sections, as `chains` has them: only a few vertices at the ends are looked at.
+"""Compiled operations of a time step on sections stored as in `chains`; they access only the ends of the chains.
 
-A section is begun, its level turns, it is pulled apart, shifted, cut, and asked for its heights and predicted misses.
+The operations are the start, the turn of the level, the sum with a segment, the shift, the cut, and the extremes of
+the height and of the predicted miss.
 """
 
 from __future__ import annotations
@@ -36,12 +37,12 @@ from infoset.chains import (
 
 _, FORWARD = constants(2)
 BACKWARD = -FORWARD
-"""Ways along a chain."""
+"""Directions along a chain."""
 
 
 @inlined
 def move_part(origins: Floats, n: int, side: int, part: int, value: float) -> None:
-    """Add to a coordinate of an origin; its rest keeps what rounding takes away."""
+    """Add to a coordinate of an origin; the second float of the coordinate takes the rounding error."""
     before = origins[n, side, part]
     after = before + value
     added = after - before
@@ -51,7 +52,7 @@ def move_part(origins: Floats, n: int, side: int, part: int, value: float) -> No
 
 @inlined
 def product_error(a: float, b: float, product: float) -> float:
-    """What rounding took from a product of two floats: a b - product (Dekker)."""
+    """Rounding error of a product of two floats: a b - product (Dekker)."""
     split = 134217729.0
     a_high = split * a - (split * a - a)
     b_high = split * b - (split * b - b)
@@ -70,14 +71,14 @@ def start(
     bottom: tuple[float, float, float],
     top: tuple[float, float, float],
 ) -> None:
-    """Begin with a trapezium between two levels.
+    """Write a trapezium between two levels.
 
     Parameters
     ----------
     tau : float
-        Time to go.
+        Time to go, s.
     bottom, top : tuple of float
-        Least V, greatest V, and z, of either level.
+        Least V, greatest V, m/s, and z, m, of each level.
     """
     reach = 0.0
     for side in (RIGHT, LEFT):
@@ -107,31 +108,36 @@ def hand_over(
     same: tuple[float, float],
     tau: float,
 ) -> tuple[int, int]:
-    """Give the last vertices of a chain, past its highest now, to the front of the other chain.
+    """Move the vertices of a chain after its highest one to the front of the other chain.
 
     Parameters
     ----------
     sign : float
-        The side from which the giver is seen to rise.
+        Sign of the giver's side.
     giver : tuple of int
-        Ring and mask of the chain that gives.
+        Offset and mask of the ring of the first chain.
     first, end : int
-        Its first vertex, and one past its last.
+        Number of its first vertex, and one past that of its last.
     taker, front : tuple of int, int
-        Ring and mask of the other chain, and its first vertex.
+        Offset and mask of the ring of the other chain, and number of its first vertex.
     between : tuple of float
-        V, m and height of the giver's origin, from the taker's.
+        V, m and height of the giver's origin relative to the taker's.
     same : tuple of float
-        Differences of V, and of heights between the origins, that are rounding.
+        Rounding errors of a difference of V, and of the difference of the origins' heights.
     tau : float
-        Time to go.
+        Time to go, s.
+
+    Returns
+    -------
+    end, front : int
+        New end of the giver and new front of the taker.
 
     Notes
     -----
-    A falling time to go lifts what is on the right: only a vertex with the one before it on its outer side is passed.
-    Where the level has not turned, heights along it are equal to within rounding, and must not pass the others. Where
-    both chains end in one vertex, rounding alone tells them apart: to give it again would be a vertex more at every
-    second step, and a branch that no processor can foretell.
+    A decreasing time to go raises the right side, so only vertices whose predecessor is on the outer side are moved.
+    Without a turn of the level, heights along it are equal to within rounding, and no vertex may be moved. Where both
+    chains end in the same vertex, their copies differ only by rounding: moving it again would add a vertex at every
+    second step.
     """
     back = end - 1
     v, m = read(rings, place_in(giver, back))
@@ -151,7 +157,7 @@ def hand_over(
         before_rise = sign * (before_m - tau * before_v)
         if before_rise < rise - same_rise or sign * (v - before_v) > same_v:
             break
-        # Vertices that are the same to within rounding tell nothing: they must not hide those before them.
+        # Vertices that coincide to within rounding must not stop the search.
         if before_rise < rise and abs(v - before_v) > same_v:
             break
         back -= 1
@@ -161,7 +167,7 @@ def hand_over(
 
 @inlined
 def turn(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float) -> None:
-    """Let the time to go fall to `tau`: the level turns, and each chain ends where it is highest or lowest now."""
+    """Decrease the time to go to `tau`: the level turns, and the chains get new highest and lowest ends."""
     right = (marks[n, RIGHT, RING], marks[n, RIGHT, MASK])
     left = (marks[n, LEFT, RING], marks[n, LEFT, MASK])
     right_begin, left_begin = marks[n, RIGHT, BEGIN], marks[n, LEFT, BEGIN]
@@ -185,7 +191,7 @@ def turn(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float) ->
 
 @inlined
 def spread(origins: Floats, n: int, tau: float, half_v: float) -> None:
-    """Minkowski sum with the segment of V from -half_v to half_v that lies along the level of `tau`."""
+    """Add the segment of V from -half_v to half_v along the level of `tau` (Minkowski sum)."""
     half_m = half_v * tau
     move_part(origins, n, RIGHT, V_ORIGIN, half_v)
     move_part(origins, n, RIGHT, M_ORIGIN, half_m)
@@ -196,7 +202,7 @@ def spread(origins: Floats, n: int, tau: float, half_v: float) -> None:
 
 @inlined
 def shift(origins: Floats, n: int, tau: float, v: float) -> None:
-    """Move by V along the level of `tau`: z stays, the predicted miss changes by V tau."""
+    """Move a section by `v` along the level of `tau`: z is unchanged, the predicted miss changes by v tau."""
     m = v * tau
     rest = product_error(v, tau, m)
     for side in (RIGHT, LEFT):
@@ -208,7 +214,7 @@ def shift(origins: Floats, n: int, tau: float, v: float) -> None:
 
 @inlined
 def heights(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float) -> tuple[float, float]:
-    """Least and greatest z of a section that is turned to `tau`."""
+    """Least and greatest z of a section at time to go `tau`."""
     right, left = origin_height(origins, n, RIGHT, tau), origin_height(origins, n, LEFT, tau)
     least = min(
         right + rise(rings, marks, n, RIGHT, begin_of(marks, n, RIGHT), tau),
@@ -225,27 +231,27 @@ def heights(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float)
 def cut_end(
     rings: Floats, ring: tuple[int, int], end: int, other_end: int, way: int, up: float, tau: float, level: float
 ) -> int:
-    """Cut off what is above a level at one end of a chain, and put a vertex where the level crosses it.
+    """Remove the part of a chain above a level, and add a vertex at the intersection.
 
     Parameters
     ----------
     ring : tuple of int
-        Ring and mask of the chain.
+        Offset and mask of the chain's ring.
     end, other_end : int
-        Its vertex that may be too high, and the one at its other end.
+        Numbers of the end vertex to cut and of the one at the other end.
     way : int
-        From the one to the other: 1 or -1.
+        Direction from the first to the second: 1 or -1.
     up : float
-        1 if above is toward greater z, -1 if toward lesser.
+        1 to remove greater z, -1 to remove lesser z.
     tau : float
-        Time to go.
+        Time to go, s.
     level : float
-        From the chain's origin, counted upward.
+        `up` times the height of the level relative to the chain's origin, m.
 
     Returns
     -------
     int
-        Number of the vertex that is the end now.
+        Number of the new end vertex.
     """
     v, m = read(rings, place_in(ring, end))
     height = up * (m - tau * v)
@@ -255,7 +261,7 @@ def cut_end(
         inner_v, inner_m = read(rings, place_in(ring, end + way))
         inner_height = up * (inner_m - tau * inner_v)
         if inner_height <= level:
-            # From the nearer end of the edge: least rounding.
+            # Interpolated from the nearer end of the edge, for the least rounding error.
             if level - inner_height <= height - level:
                 v = inner_v + (level - inner_height) / (height - inner_height) * (v - inner_v)
             else:
@@ -271,14 +277,14 @@ def cut_end(
 def cut(
     origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, lower: float, upper: float
 ) -> tuple[bool, float]:
-    """Keep the band lower <= z <= upper of a section that is turned to `tau`.
+    """Intersect a section at time to go `tau` with the band lower <= z <= upper.
 
     Returns
     -------
     living : bool
-        False if nothing is left; the section is then as it was.
+        False if the intersection is empty; the section is then unchanged.
     overlap : float
-        Least overlap of the section and the band across either border; negative is the distance between them.
+        Smaller overlap of section and band at the two borders, m; minus their distance if they do not intersect.
     """
     least, greatest = heights(origins, rings, marks, n, tau)
     overlap = min(greatest - lower, upper - least)
@@ -306,25 +312,25 @@ def cut(
 def find_peak(
     rings: Floats, ring: tuple[int, int], first: int, last: int, peak: int, sign: float, magnitude: float
 ) -> int:
-    """Number of the vertex of a chain whose predicted miss is the greatest (right) or the least (left).
+    """Return the number of the vertex with the greatest (right chain) or least (left chain) predicted miss.
 
     Parameters
     ----------
     ring : tuple of int
-        Ring and mask of the chain.
+        Offset and mask of the chain's ring.
     first, last : int
-        Its ends.
+        Numbers of its end vertices.
     peak : int
-        Where the peak was.
+        Previous peak.
     sign : float
-        The side from which the chain is seen.
+        Sign of the chain's side.
     magnitude : float
-        Of what the predicted misses of the chain are made: rounding is relative to it.
+        Magnitude of the terms of the predicted misses, to which their rounding error is relative, m.
 
     Notes
     -----
-    The search starts where the peak was. It ends where the miss falls by more than rounding: vertices that repeat
-    one another, or nearly so, must not stop it.
+    The search starts at the previous peak and ends where the miss decreases by more than rounding, so that vertices
+    that nearly coincide do not stop it.
     """
     peak = min(max(peak, first), last)
     miss = sign * read(rings, place_in(ring, peak))[1]
@@ -344,7 +350,7 @@ def find_peak(
 
 @inlined
 def first_near_peak(rings: Floats, ring: tuple[int, int], first: int, peak: int, sign: float, tolerance: float) -> int:
-    """First vertex of the edge through the peak along which the predicted miss is the same to within a tolerance."""
+    """First vertex before the peak whose predicted miss equals that of the peak to within a tolerance."""
     level = sign * read(rings, place_in(ring, peak))[1] - tolerance
     while peak > first and sign * read(rings, place_in(ring, peak - 1))[1] >= level:
         peak -= 1
@@ -353,11 +359,11 @@ def first_near_peak(rings: Floats, ring: tuple[int, int], first: int, peak: int,
 
 @inlined
 def greatest_and_least_miss(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float) -> tuple[float, float]:
-    """Greatest and least predicted miss of a section; the chains note where they are reached."""
+    """Return the greatest and the least predicted miss of a section; store their vertices as peaks."""
     right = (marks[n, RIGHT, RING], marks[n, RIGHT, MASK])
     left = (marks[n, LEFT, RING], marks[n, LEFT, MASK])
     right_first, left_first = marks[n, RIGHT, BEGIN], marks[n, LEFT, BEGIN]
-    # A miss is z + V tau, and both may be far greater than the sum.
+    # A miss is z + V tau; both terms may be far greater than the sum.
     reach = tau * origins[n, RIGHT, REACH]
     right_m, left_m = abs(origins[n, RIGHT, M_ORIGIN]) + reach, abs(origins[n, LEFT, M_ORIGIN]) + reach
     upper_at = find_peak(rings, right, right_first, marks[n, RIGHT, END] - 1, marks[n, RIGHT, PEAK], 1.0, right_m)
@@ -372,19 +378,19 @@ def greatest_and_least_miss(origins: Floats, rings: Floats, marks: Integers, n: 
 def extreme_points(
     origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, relative: float, slack: float
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Points that reach the extremes of the predicted miss, as `greatest_and_least_miss` has found them.
+    """Return points with the extremes of the predicted miss; `greatest_and_least_miss` must have stored the peaks.
 
     Parameters
     ----------
     tau : float
-        Time to go.
+        Time to go, s.
     relative, slack : float
-        What is the same to within these parts of the interval and of the magnitudes is the same.
+        Tolerances for equal misses, relative to the interval and to the magnitudes of the terms.
 
     Returns
     -------
     upper, lower : tuple of float
-        V and m of the lowest point that reaches the greatest miss, and of the highest that reaches the least.
+        V and m of the lowest point with the greatest miss, and of the highest point with the least.
     """
     right = (marks[n, RIGHT, RING], marks[n, RIGHT, MASK])
     left = (marks[n, LEFT, RING], marks[n, LEFT, MASK])

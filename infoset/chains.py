@@ -1,26 +1,27 @@
-"""Compiled operations on sections: convex polygons that turn as time passes, kept as two chains of vertices.
+"""Storage of sections: convex polygons, each stored as two chains of vertices.
 
-A section is handled in the coordinates (V, m), m = z + V tau, with tau the time to go: m is the predicted miss, free
-motion leaves it alone, and z = m - tau V. What happens to a section then happens along one line of sight only,
-the one that tells heights z: a cut takes away what is highest or lowest, a disturbance pulls the two sides apart
-along the level. So the boundary is kept as a RIGHT chain from its lowest vertex to its highest and a LEFT chain
-from its highest to its lowest:
+The coordinates are (V, m) with m = z + V tau, where tau is the time to go: m is the predicted miss, which is constant
+in free motion, and z = m - tau V. The height of a vertex is z, and a level is a line of constant z. Cuts and
+disturbances act relative to the levels: a cut removes the highest or the lowest part, and a disturbance moves the two
+sides apart along the level. Therefore the boundary is stored as a RIGHT chain from the lowest vertex to the highest and
+a LEFT chain from the highest vertex to the lowest:
 
-* a disturbance moves each chain as a whole, an impulse both: their origins move, no vertex does;
-* a cut drops vertices from the ends of the chains and puts the crossing in their place;
-* as tau falls the level turns, always the same way, and the last vertices of each chain go over to the other;
-* the greatest predicted miss is at the peak of the right chain, the least at that of the left one: both stay where
-  they are until a cut takes them away.
+* a disturbance moves each chain as a whole, an impulse moves both: only the origins of the chains change;
+* a cut removes vertices from the ends of the chains and inserts the intersections with its line;
+* as tau decreases, the levels turn in a constant direction, and the last vertices of each chain pass to the other one;
+* the greatest predicted miss is at the peak of the right chain, the least at the peak of the left one. A peak changes
+  only when a cut removes it.
 
-A vertex enters, changes chains a time or two, and leaves: the cost of a step does not depend on their number.
+A vertex is inserted once, changes chains once or twice and is removed once, so the cost of a step does not depend on
+the number of vertices.
 
-Both chains are the same thing turned by 180 degrees: their vertices rise from the front to the back, seen
-from the chain's own side (`SIDE`). Each is a ring buffer; the ends of a chain are joined to those of the other by
-edges along the level, of no length where the two meet.
+The left chain has the structure of the right one rotated by 180 degrees: the sign of its side times the height
+increases along each chain. Each chain is a ring buffer. Edges along the level join its ends to those of the other
+chain; their length is zero where the chains meet.
 
-A batch of sections is three arrays, `origins`, `rings` and `marks`; a kernel takes them and a row `n`. (Views of rows,
-or a tuple of arrays, cost more than the work: each is counted, atomically, wherever it is handed on.) A ring is as wide
-as its section needs, not as the widest of the batch does: what a step touches lies close together.
+A batch of sections is stored in three arrays, `origins`, `rings` and `marks`; a kernel takes these and a row `n`,
+because views of rows or tuples of arrays would cost more, by reference counting, than the operations themselves. Each
+ring has the size that its own section needs, so that a step accesses compact memory.
 """
 
 from __future__ import annotations
@@ -41,45 +42,46 @@ EPSILON = float(np.finfo(np.float64).eps)
 RIGHT, LEFT = constants(2)
 
 CAPACITY = 256
-"""Vertices a section may have: a power of two."""
+"""Greatest number of vertices of a section, a power of two."""
 ROOM_AT_START = 64
-"""Vertices each chain has room for at first, a power of two."""
+"""Initial room of a chain, in vertices, a power of two."""
 MOST_ADDED = 4
-"""Vertices that one step can add, two at each of its two turns."""
+"""Greatest number of vertices that one step adds: two at each of its two turns."""
 ROOM_AHEAD = 8 * MOST_ADDED
-"""Vertices that a section is given room for beyond those it has."""
+"""Additional room, in vertices, allocated when a section grows."""
 REDUCED = 160
-"""Vertices left in a section that has grown to CAPACITY."""
+"""Number of vertices to which a section of CAPACITY vertices is reduced."""
 
-# The marks, for each chain: the number of its first vertex, one past the last, and that of the peak; then where its
-# ring is, and the ring's room less one, a power of two less one. Numbers only grow or fall: the ring holds a vertex at
-# its number modulo its room.
+# Marks of a chain: the number of its first vertex, one past that of the last, and that of the peak; then the offset of
+# its ring, and the ring's size minus one. The size is a power of two, and a vertex is stored at its number modulo the
+# size.
 BEGIN, END, PEAK, RING, MASK = range(5)
 MARKS = 5
 
-# An origin moves at every step and must not wear, so it is a sum of two floats. The right chain's holds a bound on |V|
-# too, over all that the section ever was: rounding is relative to it. The rest makes it a line of the cache.
+# An origin is a sum of two floats, since it moves at every step and rounding errors must not accumulate. The origin of
+# the right chain also contains a bound of |V| over the section's history, to which rounding errors are relative. The
+# unused floats fill a cache line.
 V_ORIGIN, V_REST, M_ORIGIN, M_REST, REACH = constants(5)
 ORIGIN = 8
 
 TAKEN = 0
-"""Where the rings say how many of their floats belong to chains; rings that were outgrown stay taken."""
+"""Index in the rings of the number of floats in use; rings that were replaced remain in use."""
 FIRST_RING = 8
 LINE = 8
-"""Floats in a line of the cache."""
+"""Floats in a cache line."""
 
 
 class Chains(NamedTuple):
-    """The chains of N sections.
+    """Chains of N sections.
 
     Parameters
     ----------
     origins : ndarray, shape (N, 2, ORIGIN)
-        Origins of the right and of the left chain of each section.
-    rings : ndarray, shape (any,)
-        The vertices of all chains, each (V, m) from the origin of its chain.
+        Origins of the chains, m/s and m.
+    rings : ndarray, 1-D
+        Vertices of all chains, each (V, m) relative to the origin of its chain.
     marks : ndarray of int, shape (N, 2, MARKS)
-        First and last vertex, peak, and place in `rings` of each chain.
+        Numbers of the first, last and peak vertex, and location of the ring.
     """
 
     origins: Floats
@@ -88,9 +90,9 @@ class Chains(NamedTuple):
 
 
 def empty_sections(number: int, room: int = CAPACITY) -> Chains:
-    """Sections not begun yet, with room for so many vertices (a power of two) in each chain.
+    """Return empty chains with room for `room` vertices each, a power of two.
 
-    The rings have what all may ever need: what is not written takes no memory.
+    The rings are allocated at their greatest size; the operating system provides memory when it is written.
     """
     marks = np.zeros((number, 2, MARKS), dtype=np.int64)
     marks[:, :, RING] = FIRST_RING + (2 * room + LINE) * np.arange(2 * number).reshape(number, 2)
@@ -101,7 +103,7 @@ def empty_sections(number: int, room: int = CAPACITY) -> Chains:
 
 
 def with_room(rings: Floats, floats: int) -> Floats:
-    """The same rings with room for so many floats more; themselves if they have it."""
+    """Return rings with room for `floats` more floats: the same array if it has the room."""
     taken = int(rings[TAKEN])
     if taken + floats <= rings.size:
         return rings
@@ -109,7 +111,7 @@ def with_room(rings: Floats, floats: int) -> Floats:
 
 
 def copy_of_rings(rings: Floats, size: int) -> Floats:
-    """The same rings in other memory, of so many floats."""
+    """Return a copy of the rings with `size` floats."""
     taken = int(rings[TAKEN])
     copy = np.empty(size)
     copy[:taken] = rings[:taken]
@@ -117,34 +119,34 @@ def copy_of_rings(rings: Floats, size: int) -> Floats:
 
 
 def working_room() -> Floats:
-    """Room that some operations need to work in."""
+    """Return the working array of the operations on whole chains."""
     return np.empty((CAPACITY + 2, 2))
 
 
 @inlined
 def place_in(ring: tuple[int, int], i: int) -> int:
-    """Where a ring, of which the first place and the mask are given, has a vertex."""
+    """Offset of a vertex in a ring, given as its offset and mask."""
     return ring[0] + 2 * (i & ring[1])
 
 
 @inlined
 def place(marks: Integers, n: int, side: int, i: int) -> int:
-    """Where the rings have a vertex of a chain."""
+    """Offset of a vertex of a chain in the rings."""
     return int(marks[n, side, RING] + 2 * (i & marks[n, side, MASK]))
 
 
 @inlined
 def read(rings: Floats, at: int) -> tuple[float, float]:
-    """V and m at a place of the rings, from the origin of the chain.
+    """Return V and m at an offset in the rings, relative to the origin of the chain.
 
-    Places are unsigned: a signed index may count from the end, and to find out takes longer than to read.
+    Offsets are unsigned: the test for negative indices would take longer than the access.
     """
     return rings[np.uint64(at)], rings[np.uint64(at + 1)]
 
 
 @inlined
 def write(rings: Floats, at: int, v: float, m: float) -> None:
-    """Write V and m at a place of the rings."""
+    """Write V and m at an offset in the rings."""
     rings[np.uint64(at)] = v
     rings[np.uint64(at + 1)] = m
 
@@ -170,7 +172,7 @@ def count_of(marks: Integers, n: int) -> int:
 
 @inlined
 def expect(rings: Floats, marks: Integers, n: int) -> None:
-    """Ask for the vertices of a section that a step reads: it comes next, and memory is slow."""
+    """Prefetch the vertices of a section that the next step reads."""
     for side in (RIGHT, LEFT):
         prefetch(rings, place(marks, n, side, begin_of(marks, n, side)))
         prefetch(rings, place(marks, n, side, end_of(marks, n, side) - 1))
@@ -179,13 +181,13 @@ def expect(rings: Floats, marks: Integers, n: int) -> None:
 
 @inlined
 def room_of(marks: Integers, n: int) -> int:
-    """Vertices that either chain of a section has room for."""
+    """Room of each chain of a section, in vertices."""
     return int(marks[n, RIGHT, MASK] + 1)
 
 
 @allocation_free
 def widen_rings(rings: Floats, marks: Integers, n: int, room: int) -> None:
-    """Give both chains of a section rings of so much room, a power of two, from what is not taken."""
+    """Move both chains of a section to new rings of `room` vertices, a power of two, at the end of those in use."""
     for side in (RIGHT, LEFT):
         first = int(rings[TAKEN])
         rings[TAKEN] = first + floats_of(room)
@@ -198,13 +200,13 @@ def widen_rings(rings: Floats, marks: Integers, n: int, room: int) -> None:
 
 @inlined
 def floats_of(room: int) -> int:
-    """Floats that a ring takes: a line more than its vertices, lest all rings begin in the same lines of a cache."""
+    """Floats of a ring. One cache line more than its vertices: rings must not all start in the same cache lines."""
     return 2 * room + LINE
 
 
 @inlined
 def room_for(vertices: int, room: int) -> int:
-    """Room that a chain needs for so many vertices, at least what it has: a power of two."""
+    """Room for `vertices` vertices, a power of two and at least `room`."""
     while room < vertices:
         room *= 2
     return room
@@ -212,13 +214,13 @@ def room_for(vertices: int, room: int) -> int:
 
 @inlined
 def sign_of(side: int) -> float:
-    """The side from which a chain is seen to rise: 1 for the right one, -1 for the left one."""
+    """Sign of the height's change along a chain: 1 for the right one, -1 for the left one."""
     return 1.0 - 2.0 * side
 
 
 @inlined
 def rise(rings: Floats, marks: Integers, n: int, side: int, i: int, tau: float) -> float:
-    """Height of a vertex over the origin of its chain, seen from the chain's own side: it rises along the chain."""
+    """Height of a vertex relative to the origin of its chain, times the sign of the side: increases along the chain."""
     v, m = read(rings, place(marks, n, side, i))
     return float(sign_of(side) * (m - tau * v))
 
@@ -232,7 +234,7 @@ def origin_height(origins: Floats, n: int, side: int, tau: float) -> float:
 
 @inlined
 def vertex(origins: Floats, rings: Floats, marks: Integers, n: int, side: int, i: int) -> tuple[float, float]:
-    """A vertex: V and m."""
+    """Return V and m of a vertex."""
     v, m = read(rings, place(marks, n, side, i))
     v = (v + origins[n, side, V_REST]) + origins[n, side, V_ORIGIN]
     m = (m + origins[n, side, M_REST]) + origins[n, side, M_ORIGIN]
@@ -241,7 +243,7 @@ def vertex(origins: Floats, rings: Floats, marks: Integers, n: int, side: int, i
 
 @inlined
 def put(rings: Floats, marks: Integers, n: int, side: int, i: int, v: float, m: float) -> None:
-    """Write a vertex, from the origin of its chain."""
+    """Write a vertex relative to the origin of its chain."""
     write(rings, place(marks, n, side, i), v, m)
 
 
@@ -256,7 +258,7 @@ def copy_section(
     to_marks: Integers,
     to: int,
 ) -> None:
-    """Copy a section to a row of other chains, which have room for it, and more, that is not taken."""
+    """Copy a section to row `to` of other chains, whose rings must have enough unused room."""
     for side in (RIGHT, LEFT):
         to_marks[to, side, BEGIN] = to_marks[to, side, END] = 0
     wanted = room_for(min(count_of(marks, n) + ROOM_AHEAD, CAPACITY), room_of(to_marks, to))

@@ -1,4 +1,4 @@
-"""Bounds of a concave function between places where it is known: of supports over labels, and of their overlaps."""
+"""Bounds of a concave function of the label between sampled labels: of supports and of overlaps."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from infoset._compile import ZERO, allocation_free
 from infoset.section_life import Floats, Integers
 
 CERTAIN = 1e-13
-"""Overlap, relative to the label, by which a label must be beyond life before those about it count as dead."""
+"""Labels count as dead if their overlap is certainly less than minus this number times the label."""
 
 
 @allocation_free
@@ -21,24 +21,25 @@ def line_at(x: float, x0: float, y0: float, x1: float, y1: float) -> float:
 def bound_between(
     labels: Floats, values: Floats, number: int, first: int, p: float, q: float, slope: float, centre: float
 ) -> float:
-    """Greatest value on [p, q] that a concave function with these values may have, plus slope (x - centre).
+    """Upper bound on [p, q] of a concave function with given values, plus slope (x - centre).
 
     Parameters
     ----------
     labels, values : ndarray
-        Rising arguments, and the function there.
+        Increasing arguments, and the values of the function.
     number : int
-        How many of them.
+        Number of arguments.
     first : int
-        How many of the arguments are at most p; the others are at least q.
+        Number of arguments that are at most p; the others are at least q.
     p, q : float
-        Ends of the stretch.
+        Ends of the interval.
     slope, centre : float
-        What is added.
+        Coefficients of the added linear function.
 
     Notes
     -----
-    Beyond two of its points a concave function stays below the line through them. Infinite where neither side has two.
+    Outside of two of its points, a concave function lies below the line through them. The bound is infinite if neither
+    side has two points.
     """
     has_left, has_right = first >= 2, number - first >= 2
     left_p = left_q = right_p = right_q = np.inf
@@ -60,13 +61,13 @@ def bound_between(
 
 @allocation_free
 def is_dead_between(labels: Floats, died: Integers, overlaps: Floats, number: int, latest: Floats) -> bool:
-    """Whether no label from the first of these dead ones to the last can live, in rising order.
+    """Return whether all labels from the first to the last of some dead labels, in increasing order, are dead.
 
-    `latest`, of shape (2, number), is room for those that died last.
+    `latest`, shape (2, number), is a working array.
 
     Notes
     -----
-    The overlap at the latest of their deaths is concave in the label, among the labels that lived to see it.
+    The overlap at the latest event at which one of them became empty is a concave function of the label.
     """
     last_event = died[0]
     for i in range(1, number):

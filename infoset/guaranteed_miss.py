@@ -1,8 +1,8 @@
-"""The guaranteed miss Phi: a bound on the true miss that is known on board, over the continuum of labels.
+"""The guaranteed miss Phi: an upper bound of the true miss over all labels, computed on board.
 
-Labels leave the set step by step, as their range falls below the threshold. Whatever leaves is bounded here, between
-the replayed labels too, and then follows the impulses that are still fired before its range is zero. docs/guarantee.md
-has the theorem and its proof.
+Labels leave the set step by step as their range passes below the threshold. This module bounds the predicted misses of
+the labels that leave, between the replayed labels too, and then follows the impulses until their range is zero.
+docs/guarantee.md contains the theorem and its proof.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from infoset.section_passes import Sections, tape_of
 from infoset.section_stack import SectionStack
 
 LABELS = 4
-"""Labels replayed in what leaves at one step; with one more on either side for extrapolation."""
+"""Labels replayed for one step; one more on each side serves for extrapolation."""
 MOST_LABELS = LABELS + 2
 PIECES = LABELS + 1
 MOST_LEAVING_WINDOWS = 16
-"""Windows that what leaves at one step may be bounded in, where rates were measured: a power of two."""
+"""Greatest number of windows of the labels that leave at one step, with rates: a power of two."""
 LOOSE = 1.25
-"""A window is halved if its bound exceeds what is known to be reached by this factor."""
+"""A window is halved if its bound exceeds the greatest value known to be reached by this factor."""
 LEAST, GREATEST, NEAREST, FARTHEST = range(4)
-"""Columns of a piece: bounds of its predicted miss, and its ends as labels, all in m."""
+"""Columns of a piece: bounds of its predicted miss, and the labels of its ends, m."""
 RESOLUTION = 1e-10
 SLACK = 1e-9
 
@@ -58,13 +58,13 @@ def bound_piece(
     law: SectionLaw,
     values: Floats,
 ) -> tuple[float, float]:
-    """Bounds of z + V x/e over all sections with labels from p to q.
+    """Return bounds of z + V x/e over all sections with labels from p to q.
 
     Notes
     -----
-    For a fixed direction the support of the sections is concave in the label; z + V x/e has a direction that
-    turns with the label. About the middle c of the piece, z + V x/e = (z + V x_c/e) + V (x - x_c)/e: the first is a
-    fixed direction, and V of the second is within its own extrapolated bounds V_c +- r.
+    The support of the sections in a fixed direction is a concave function of the label, but the direction of z + V x/e
+    turns with the label. With the middle c of the piece, z + V x/e = (z + V x_c/e) + V (x - x_c)/e: the first term has
+    a fixed direction, and the V of the second lies within its extrapolated bounds V_c +- r.
     """
     e = law.closing_speed
     centre = 0.5 * (p + q)
@@ -103,26 +103,26 @@ def bound_leaving(
     values: Floats,
     pieces: Floats,
 ) -> int:
-    """Bound the predicted miss of all labels that live between two limits; return the number of pieces written.
+    """Bound the predicted miss of all living labels between two limits; return the number of pieces written.
 
-    Where rates were measured the tape has these limits for its window.
+    With rates, the window of the tape consists of these limits.
 
     Parameters
     ----------
     lower, upper : float
-        The limits.
+        The limits, m.
     known : float
-        A label between them that is known to live; less than `lower` if none is.
+        A label between them that lives; less than `lower` if none is known.
     room : Workspace
-        Room for replays.
+        Working arrays of replays.
     labels, outlines, counts, values : ndarray
-        Room for the replayed labels, their outlines, and supports.
+        Working arrays for the replayed labels, their outlines and supports.
     pieces : ndarray, shape (>= PIECES, 4)
         Receives the pieces.
     """
     living = known
     if errors is not None:
-        # Labels beyond the window need not form an interval with those in it, so that it must be searched.
+        # The living labels need not form an interval, so that the window must be searched.
         probe = known if known >= lower else 0.5 * (lower + upper)
         if not search_window(lower, upper, probe, LABEL_RESOLUTION * upper, tape, errors, law, room):
             return 0
@@ -138,7 +138,7 @@ def bound_leaving(
     elif upper_died == ALIVE:
         living = upper
     if living < lower:
-        # The living labels are an interval. One beyond the limits lives, or none does: nothing between dead limits.
+        # The living labels form an interval, and both limits are dead: no label between them lives.
         return 0
     resolution = RESOLUTION * upper
     first_dead, last_dead = lower, upper
@@ -161,7 +161,7 @@ def bound_leaving(
         if (spacing == 0.0 and k != 0) or (k < 0 and lower_died != ALIVE) or (k == LABELS and upper_died != ALIVE):
             continue
         if outside and errors is not None:
-            # The window is where the bands are convex.
+            # The bands are convex only on the window.
             continue
         label = last if k == LABELS - 1 and spacing > 0.0 else first + k * spacing
         row = PROBE
@@ -180,19 +180,21 @@ def bound_leaving(
         counts[number] = whole_chains.outline(room.origins, room.rings, room.marks, row, tau, outlines[number])
         number += 1
     if spacing == 0.0 or number < 3:
-        # So few labels live that they are one to within what is located: a hair's breadth stands for the rest.
+        # The living labels are equal to within the resolution: one outline and a small margin bound them all.
         width = last_dead - first_dead
         tau = (first - travelled) / law.closing_speed
         least, greatest = extremes_along(outlines[0], counts[0], tau)
-        hair = SLACK * (abs(least) + abs(greatest)) + width * (abs(least) + abs(greatest)) / max(first - travelled, 1.0)
+        margin = SLACK * (abs(least) + abs(greatest)) + width * (abs(least) + abs(greatest)) / max(
+            first - travelled, 1.0
+        )
         drift = 0.5 * law.disturbance * tau * tau
-        pieces[0, LEAST], pieces[0, GREATEST] = least - hair - drift, greatest + hair + drift
+        pieces[0, LEAST], pieces[0, GREATEST] = least - margin - drift, greatest + margin + drift
         pieces[0, NEAREST], pieces[0, FARTHEST] = first_dead, last_dead
         return 1
     made = 0
     inside = number - inner - outer
     for piece in range(inside + 1):
-        # Piece 0 ends at the first living label, the last begins at the last one.
+        # The first piece ends at the first living label, the last one begins at the last living label.
         at = inner + piece
         p = first_dead if piece == 0 else labels[at - 1]
         q = last_dead if piece == inside else labels[at]
@@ -228,12 +230,12 @@ def bound_leaving_all(
     pieces: Floats,
     made: Integers,
 ) -> None:
-    """Write the pieces of every active engagement, and how many there are.
+    """Write the pieces of the active engagements and their numbers.
 
     Notes
     -----
-    Where rates were measured a window of labels is halved while its bound is loose: the bands that are convex over it
-    are the wider the wider it is. Much less than `floor`, a bound of labels that have arrived, would not lessen Phi.
+    With rates, a window of labels is halved while its bound is loose, since the bands that are convex on a window are
+    wider on a wider window. `floor` is the bound of the labels that have arrived: Phi is no less.
     """
     stored, used, living = sections.labels, sections.used, sections.living
     for b in range(active.shape[0]):
@@ -261,16 +263,16 @@ def bound_leaving_all(
                 if spread > LOOSE * reached:
                     reached = max(reached, spread_at(middle, elapsed, tape, errors, law, room, outlines[0]))
             number = ZERO
-            own = pieces[b, made[b] :]
+            new_pieces = pieces[b, made[b] :]
             if spread <= LOOSE * reached:
                 number = bound_leaving(
-                    near, far, known, elapsed, window, errors, law, room, labels, outlines, counts, supports, own
+                    near, far, known, elapsed, window, errors, law, room, labels, outlines, counts, supports, new_pieces
                 )
                 least, greatest = np.inf, -np.inf
                 for piece in range(number):
-                    least, greatest = min(least, own[piece, LEAST]), max(greatest, own[piece, GREATEST])
+                    least, greatest = min(least, new_pieces[piece, LEAST]), max(greatest, new_pieces[piece, GREATEST])
                 spread = 0.5 * (greatest - least) if number > 0 else 0.0
-            # Impulses still to come may centre an interval, so that its width is what counts.
+            # Later impulses may centre the interval, so that its width determines Phi.
             if may_halve and spread > LOOSE * reached:
                 room.windows[count, 0], room.windows[count, 1] = near, middle
                 room.windows[count + 1, 0], room.windows[count + 1, 1] = middle, far
@@ -283,7 +285,7 @@ def bound_leaving_all(
 def spread_at(
     label: float, elapsed: int, tape: Tape, errors: Floats | None, law: SectionLaw, room: Workspace, outline: Floats
 ) -> float:
-    """Half the interval of the predicted miss at one label, by the bands of the tape, m; zero if it is dead."""
+    """Return half the width of the predicted-miss interval at one label, m; zero if the label is dead."""
     if run(label, tape, errors, law, room)[0] != ALIVE:
         return 0.0
     tau = (label - law.closing_speed * (law.step * elapsed)) / law.closing_speed
@@ -293,37 +295,37 @@ def spread_at(
 
 
 class GuaranteedMiss:
-    """Phi of a batch of engagements, as far as it is known: a bound on the true miss of whatever has left the set.
+    """Phi of a batch of engagements: an upper bound of the true miss over the labels that have left the set.
 
     Parameters
     ----------
     batch : int
         Number of engagements B.
     speed_error : float
-        Greatest |eta|.
+        Greatest |eta|, the relative error of the closing speed.
     """
 
     def __init__(self, law: SectionLaw, batch: int, speed_error: float) -> None:
         self._law, self._speed_error = law, speed_error
         self._settled = np.zeros(batch)
         self.exists: Flags = np.zeros(batch, dtype=bool)
-        # Pieces whose range is not yet zero: impulses still move them.
+        # Pieces whose range is not zero yet, so that impulses move them.
         self._pending: list[tuple[Floats, Flags]] = []
 
     @property
     def bound_m(self) -> Floats:
-        """Phi so far, m, shape (B,); zero where nothing has left."""
+        """Phi so far, m, shape (B,); zero where no label has left."""
         return np.maximum(self._settled, self._worst(self._pending))
 
     def copy(self) -> GuaranteedMiss:
-        """A Phi of its own that starts from this one."""
+        """Return an independent copy."""
         twin = GuaranteedMiss(self._law, len(self._settled), self._speed_error)
         twin._settled, twin.exists = self._settled.copy(), self.exists.copy()
         twin._pending = [(pieces.copy(), real.copy()) for pieces, real in self._pending]
         return twin
 
     def fire(self, impulse_m_s: Floats, elapsed: int) -> None:
-        """Let impulses move what has left but not yet arrived."""
+        """Apply impulses, m/s, to the labels that have left but not arrived."""
         e, error = self._law.closing_speed, self._law.impulse_error
         travelled = e * (self._law.step * elapsed)
         still = []
@@ -344,7 +346,7 @@ class GuaranteedMiss:
         self._pending = still
 
     def leave(self, active: Flags, lower: Floats, upper: Floats, stack: SectionStack, history: History) -> None:
-        """Bound the labels that leave now: those that live from `lower` to `upper`."""
+        """Add the bound of the labels that leave now: the living ones from `lower` to `upper`."""
         batch = len(active)
         errors = history.errors_if_any
         most = PIECES if errors is None else PIECES * MOST_LEAVING_WINDOWS

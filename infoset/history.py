@@ -1,4 +1,4 @@
-"""The history of a batch of engagements: what was measured and done, in order."""
+"""History of a batch of engagements: measurements, impulses and predictions in order."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ ROOM_AT_START = 64
 
 
 class Tapes(NamedTuple):
-    """The histories of a batch, as kernels take them: the fields of `Tape`, values and applies of shape (events, B)."""
+    """Histories of a batch for the kernels: the fields of `Tape`, with values and applies of shape (events, B)."""
 
     kinds: Integers
     values: Floats
@@ -21,7 +21,7 @@ class Tapes(NamedTuple):
 
 
 class History:
-    """A tape of events shared by a batch: the kinds are common, the values one an engagement.
+    """Events of a batch: the kinds are common to all engagements, the values belong to one engagement each.
 
     Parameters
     ----------
@@ -35,13 +35,13 @@ class History:
     errors : ndarray, shape (>= events,)
         Error bound of each measured rate, rad/s; zero for the other kinds.
     values : ndarray, shape (>= events, B)
-        Measured angle (rad), impulse (m/s) or measured rate (rad/s); nothing for the other kinds.
+        Measured angle, rad, impulse, m/s, or measured rate, rad/s; unused for the other kinds.
     applies : ndarray of bool, shape (>= events, B)
-        Whether the event concerned the engagement; a prediction concerns all.
+        Whether the event applies to the engagement; a prediction applies to all.
     events : int
         Number of events.
     elapsed : int
-        Number of predictions among them.
+        Number of predictions.
     """
 
     def __init__(self, batch: int) -> None:
@@ -54,7 +54,7 @@ class History:
         self._has_rates = False
 
     def record(self, kind: int, values: Floats | None = None, applies: Flags | bool = True, error: float = 0.0) -> int:
-        """Add an event; return its number."""
+        """Append an event and return its number."""
         event = self.events
         if event == self.kinds.size:
             self.kinds = np.concatenate((self.kinds, np.zeros_like(self.kinds)))
@@ -72,31 +72,31 @@ class History:
         return event
 
     def retract(self, event: int, where: Flags) -> None:
-        """Let an event not have concerned some engagements."""
+        """Remove an event from the history of some engagements."""
         self.applies[event, where] = False
 
     def total_impulse(self) -> Floats:
-        """Sum of the moduli of all impulses of each engagement, m/s, shape (B,)."""
+        """Return the sum of the impulses' magnitudes in each engagement, m/s, shape (B,)."""
         fired = self.applies[: self.events] & (self.kinds[: self.events] == IMPULSE)[:, None]
         return np.asarray(np.where(fired, np.abs(self.values[: self.events]), 0.0).sum(axis=0))
 
     @property
     def tapes(self) -> Tapes:
-        """The histories of the whole batch."""
+        """Histories of the whole batch."""
         return Tapes(self.kinds, self.values, self.applies, self.events)
 
     def tape(self, engagement: int) -> Tape:
-        """The history of one engagement."""
+        """Return the history of one engagement."""
         values, applies = self.values[:, engagement].copy(), self.applies[:, engagement].copy()
         return Tape(self.kinds, values, applies, self.events, *NO_WINDOW)
 
     @property
     def errors_if_any(self) -> Floats | None:
-        """The errors, or None if no rate was measured, as replays take them."""
+        """Error bounds for `replay`: None if no rate was measured."""
         return self.errors if self._has_rates else None
 
     def copy(self) -> History:
-        """A history of its own that starts from this one."""
+        """Return an independent copy."""
         twin = History.__new__(History)
         twin.kinds, twin.errors = self.kinds.copy(), self.errors.copy()
         twin.values, twin.applies = self.values.copy(), self.applies.copy()

@@ -1,9 +1,9 @@
-"""Where the living labels are, found exactly by replaying the history at chosen labels.
+"""Search for the living labels: those whose section is not empty. Each probe of a label replays the history.
 
-Where the sets are convex in (z, V, label) the living labels form one interval: in the guaranteed model that starts
-from a box and measures no rates. Elsewhere they need not. With rates the search finds one interval of them, the limits
-within which labels may live are not narrowed to it, and before it says that none lives, it looks through windows of
-labels with bands that are convex there. docs/guarantee.md says what is done in the other cases.
+If the set is convex in (z, V, label), the living labels form one interval. This holds for the guaranteed model with a
+box as initial set and without rates. With rates the search finds one interval and does not narrow the limits of the
+labels to it; before it reports that no label lives, it searches windows of labels with bands that are convex there.
+See docs/guarantee.md for the other cases.
 """
 
 from __future__ import annotations
@@ -36,19 +36,17 @@ MOST_PROBES = 200
 
 
 class Living(NamedTuple):
-    """The interval of living labels [lower, upper], each end bracketed by a label known to be dead.
-
-    Where an end is the limit of the search itself, the bracket is that limit.
+    """Interval of living labels [lower, upper], and a bracket of each end.
 
     Parameters
     ----------
-    found : bool
-        Whether any label lives.
+    exists : bool
+        Whether a label lives.
     below, lower, upper, above : float
-        In rising order, m; those in the middle live, the outer two are dead.
+        Increasing labels, m. The middle two live. The outer two are dead, or equal to an end at a limit of the search.
     """
 
-    found: bool
+    exists: bool
     below: float
     lower: float
     upper: float
@@ -70,13 +68,13 @@ def locate_end(
 ) -> tuple[float, float]:
     """Narrow the bracket between a dead and a living label; return the bracket (dead, living).
 
-    The section at the living one is left in a row of the workspace.
+    The section at the living label is stored in `row` of the workspace.
 
     Notes
     -----
-    The overlap at the measurement that kills is concave in the label, so the Illinois form of false position
-    converges fast; where four probes have not narrowed the bracket to an eighth, against a change of the killing
-    measurement, one halves it.
+    The overlap at the event that makes the section empty is a concave function of the label, so that the Illinois
+    variant of regula falsi converges fast. If four probes have not narrowed the bracket to an eighth, because that
+    event changes with the label, one bisection follows.
     """
     run(living, tape, errors, law, room)
     keep_living(room, tape.events, row)
@@ -93,7 +91,7 @@ def locate_end(
             before = width
         fraction = 0.5
         if not slow and weight_living > weight_dead:
-            # A probe on either end would tell nothing: it goes half a resolution inside.
+            # A probe at an end gives no information: keep half a resolution away from both.
             least = 0.5 * resolution / width
             fraction = min(max(-weight_dead / (weight_living - weight_dead), least), 1.0 - least)
         label = dead + fraction * (living - dead)
@@ -123,17 +121,17 @@ def search_living(
     law: SectionLaw,
     room: Workspace,
 ) -> int:
-    """Look for a living label between dead ones; the arrays hold three, of which the middle outlives the others.
+    """Search for a living label between three dead ones, of which the middle outlives the others.
 
     Returns
     -------
     int
-        1 if the middle label now lives, 0 if the bracket closed without one.
+        1 if the middle label now lives, 0 if there is no living label in the bracket.
 
     Notes
     -----
-    (time of death, overlap) is unimodal in the label: the larger half of the bracket is probed in its middle. It ends
-    where the bracket closes, or where no label in it can live.
+    The pair (event, overlap) is a unimodal function of the label: the larger half of the bracket is probed at its
+    middle. The search ends if the bracket is narrower than the resolution, or if no label in it can live.
     """
     for _ in range(MOST_PROBES):
         if labels[2] - labels[0] <= resolution:
@@ -173,9 +171,9 @@ def search_window(
     law: SectionLaw,
     room: Workspace,
 ) -> bool:
-    """Whether a label of the tape's window lives, by the bands that are convex there; the first found is put second.
+    """Return whether a label of the tape's window lives with the bands that are convex on the window.
 
-    `probe` is tried before any but the ends. The labels of the bracket are left in the workspace.
+    `probe` is the first label replayed. The bracket is left in the workspace, with a living label second.
     """
     known, died, overlaps = room.labels, room.died, room.label_overlaps
     known[0], known[1], known[2] = lower, probe, upper
@@ -203,12 +201,12 @@ def search_everywhere(
     law: SectionLaw,
     room: Workspace,
 ) -> tuple[bool, float]:
-    """Find a living label within limits, where they need not form an interval, or make sure that there is none.
+    """Find a living label within limits if the living labels need not form an interval, or prove that none lives.
 
     Notes
     -----
-    A window in which none lives by the bands that are convex there is done with; another is halved, as far as it is
-    wider than the resolution. The next is that in which a label, or an end, came nearest to living by its own bands.
+    A window without living labels under the bands that are convex on it is discarded. The others are halved until they
+    are narrower than the resolution, beginning with the one in which a probed label lived longest with its own bands.
     """
     windows, died, overlaps = room.windows, room.windows_died, room.windows_overlaps
     windows[0, 0], windows[0, 1] = lower, upper
@@ -235,11 +233,11 @@ def search_everywhere(
             died[count], overlaps[count] = -1, -np.inf
             inside = room.labels[1]
             for label in (inside, p, q):
-                own_died, own_overlap = run(label, tape, errors, law, room)
-                if own_died == ALIVE:
+                label_died, label_overlap = run(label, tape, errors, law, room)
+                if label_died == ALIVE:
                     return True, label
-                if outlives(own_died, own_overlap, died[count], overlaps[count]):
-                    died[count], overlaps[count] = own_died, own_overlap
+                if outlives(label_died, label_overlap, died[count], overlaps[count]):
+                    died[count], overlaps[count] = label_died, label_overlap
             count += q - p > resolution
     return False, lower
 
@@ -257,15 +255,15 @@ def locate_living(
     law: SectionLaw,
     room: Workspace,
 ) -> Living:
-    """Find the living labels within limits, starting from what is known of the stored ones (in rising order).
+    """Locate the living labels within limits, from the stored labels, which are in increasing order.
 
     The sections at both ends are left in the workspace.
     """
-    nothing = Living(False, limit_below, limit_below, limit_above, limit_above)
+    none_lives = Living(False, limit_below, limit_below, limit_above, limit_above)
     if limit_below > limit_above:
-        return nothing
+        return none_lives
     resolution = LABEL_RESOLUTION * max(abs(limit_below), abs(limit_above))
-    # The stored labels within the limits, between the limits themselves.
+    # The limits, and the stored labels between them.
     known, known_died, known_overlap = room.labels, room.died, room.label_overlaps
     end = 1
     first = last = 0
@@ -280,7 +278,7 @@ def locate_living(
             end += 1
     known[0], known[end] = limit_below, limit_above
     some_live = last > 0
-    # A limit matters only where no dead label stands between it and the living ones.
+    # A limit must be replayed only if no dead label separates it from the living ones.
     if not some_live or first == 1:
         known_died[0], known_overlap[0] = run(limit_below, tape, errors, law, room)
         if known_died[0] == ALIVE:
@@ -297,7 +295,7 @@ def locate_living(
         for i in range(1, end + 1):
             if outlives(known_died[i], known_overlap[i], known_died[best], known_overlap[best]):
                 best = i
-        # The best of the dead and its neighbours, at the front of the same room.
+        # Bracket of the dead label that lived longest: this label and its neighbours, at the front of the same arrays.
         first, last = max(best - 1, 0), min(best + 1, end)
         known[0], known_died[0], known_overlap[0] = known[first], known_died[first], known_overlap[first]
         middle, middle_died, middle_overlap = known[best], known_died[best], known_overlap[best]
@@ -307,10 +305,10 @@ def locate_living(
         first, last, end = 1, 1, 2
         if not alive_now:
             if errors is None:
-                return nothing
+                return none_lives
             alive_now, label = search_everywhere(limit_below, limit_above, resolution, tape, errors, law, room)
             if not alive_now:
-                return nothing
+                return none_lives
             known[0], known[1], known[2] = limit_below, label, limit_above
             for s in range(labels.shape[0]):
                 if known[0] < labels[s] < label:
@@ -369,13 +367,18 @@ def refine_all(
     law: SectionLaw,
     room: Workspace,
 ) -> int:
-    """Give each wanted engagement a new grid of sections over its living labels, ends included, by replay.
+    """Replace the sections of the wanted engagements by a grid over the living labels, ends included.
+
+    Returns
+    -------
+    int
+        Number of vertices that every new section may gain.
 
     Notes
     -----
-    `limit_below` and `limit_above` are narrowed to labels known to be dead, unless rates were measured or a guaranteed
-    model starts from the rectangle: then others may live beyond. Where nothing lives, the engagement is left with no
-    living section. Returned is how many vertices the fullest of the new sections may gain.
+    `limit_below` and `limit_above` are narrowed to dead labels, except with rates or with the rectangle as initial set
+    of the guaranteed model, since other labels may live beyond them. If no label lives, the engagement has no living
+    section afterwards.
     """
     spare = CAPACITY
     labels, used, alive, died = sections.labels, sections.used, sections.living, sections.died
@@ -399,7 +402,7 @@ def refine_all(
             room,
         )
         alive[b, :stored] = False
-        if not living.found:
+        if not living.exists:
             continue
         if errors is None and not (law.rectangle and law.exact_angles):
             limit_below[b] = living.below

@@ -1,4 +1,4 @@
-"""Pictures of polygons and predicted misses for notebooks, as SVG text made from arrays."""
+"""SVG pictures of polygons and predicted misses for notebooks, drawn from arrays."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def outlines_svg(outlines: Sequence[Floats], x_title: str, y_title: str, title: 
     outlines : sequence of ndarray, shape (n, 2)
         Vertices of the polygons, in the units of the axes.
     x_title, y_title : str
-        With their units.
+        Names of the axes, with units.
     title : str
-        Over the picture.
+        Text above the picture.
     """
     shown = [outlines[index] for index in evenly(len(outlines), MOST_OUTLINES)]
     shown = [outline for outline in shown if len(outline)]
@@ -40,20 +40,20 @@ def outlines_svg(outlines: Sequence[Floats], x_title: str, y_title: str, title: 
 
 
 def sections_svg(outlines: Sequence[Floats], title: str) -> str:
-    """Return a picture of sections in the (omega, alpha) plane, from the nearest (dark) to the farthest.
+    """Return a picture of sections in the (omega, alpha) plane, coloured from the nearest (dark) to the farthest.
 
     Parameters
     ----------
     outlines : sequence of ndarray, shape (n, 2)
         Vertices (omega, alpha) of each section, rad/s and rad.
     title : str
-        Over the picture.
+        Text above the picture.
     """
     return outlines_svg([outline * 1e6 for outline in outlines], "rate ω, µrad/s", "angle α, µrad", title)
 
 
 def predicted_miss_svg(exists: Flags, lower_m: Floats, upper_m: Floats) -> str:
-    """Return a picture of the predicted-miss intervals of the engagements in which one exists, one bar each."""
+    """Return a picture of the predicted-miss intervals that exist, one bar per engagement."""
     known = np.flatnonzero(exists)[:MOST_INTERVALS]
     if not len(known):
         return note("predicted miss: no set is left")

@@ -1,4 +1,4 @@
-"""The predicted-miss interval of a set."""
+"""Predicted-miss interval of an information set."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ExtremePoints:
-    """Points of the sets at which an extreme of the predicted miss is reached, one an engagement.
+    """States that reach an end of the predicted-miss interval, one for each engagement.
 
     Parameters
     ----------
     alpha_rad, omega_rad_s, range_m : ndarray, shape (B,)
-        Line-of-sight angle, its rate, and range.
+        Line-of-sight angle, its rate, and range: rad, rad/s, m.
     """
 
     alpha_rad: Floats
@@ -29,16 +29,16 @@ class ExtremePoints:
 
 @dataclass(frozen=True)
 class PredictedMiss:
-    """The interval of misses still possible without control, disturbance included.
+    """Interval of the misses that are possible without control, for all disturbances within the bound.
 
     Parameters
     ----------
     exists : ndarray of bool, shape (B,)
-        False where the set has no section; the other fields are zero there.
+        Whether the set has a living section; the other fields are zero where it has none.
     lower_m, upper_m : ndarray, shape (B,)
-        pi_* and pi^*, signed, m.
+        Ends pi_* and pi^* of the interval, signed, m.
     lower_point, upper_point : ExtremePoints
-        Where they are reached.
+        States that reach the ends.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""Replays of a history at chosen labels, and the room that they and a search among labels need."""
+"""Replays of a history at chosen labels, and the working arrays of replays and of searches over labels."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from infoset.section_law import SectionLaw
 from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape, replay
 
 MOST_HALVED_WINDOWS = 1000
-"""Windows of labels that a search may halve. A search that would need more gives up: the set then counts as empty."""
+"""Greatest number of windows of labels that a search halves. If more are needed, the set counts as empty."""
 
 PROBE, LOWER, UPPER = constants(3)
-"""Rows of the workspace: the section of the last replay, and those at the ends of the living labels."""
+"""Rows of the workspace: the section of the last replay, and the sections at the ends of the living labels."""
 
 
 class Workspace(NamedTuple):
-    """Room for replays of E events and a search among K labels.
+    """Working arrays for replays of E events and a search over K labels.
 
     Parameters
     ----------
     values, applies : ndarray, shape (E,)
-        The history of one engagement, in one piece: angles, rates and impulses (SI), and which events are its own.
+        History of one engagement in contiguous arrays: angles, rates and impulses, SI, and the events that apply.
     origins, rings, marks : ndarray
-        Three sections, `PROBE`, `LOWER` and `UPPER`, as `chains.empty_sections` makes them.
+        The sections `PROBE`, `LOWER` and `UPPER`, stored as in `chains`.
     overlaps, living_overlaps : ndarray, shape (E,)
-        Overlap of section and band at each measurement, of the last replay and of the last label that lived; m.
+        Overlap of section and band at each measurement, m, in the last replay and at the last living label.
     points : ndarray, shape (n, 2)
-        Room for the outline of a section.
+        Vertices of a section.
     labels, died, label_overlaps : ndarray, shape (K,)
-        Labels that are known, m; the event at which each died, or `ALIVE`; its overlap there.
+        Replayed labels, m; the event at which each became empty, or `ALIVE`; its overlap there, m.
     four_labels, four_died, four_overlaps : ndarray, shape (4,)
-        The same of a bracket and the label probed in it.
+        The same for a bracket of three labels and the label probed in it.
     latest : ndarray, shape (2, 4)
-        Labels and overlaps of those of them that died last.
+        Labels and overlaps of those that became empty at the latest event.
     windows, windows_died, windows_overlaps : ndarray, shape (MOST_HALVED_WINDOWS + 2, 2) and (MOST_HALVED_WINDOWS + 2,)
-        Windows of labels still to be searched, and how near to living a label of each came.
+        Windows of labels to be searched, with the latest event and overlap that a label of each reached.
     """
 
     values: Floats
@@ -62,7 +62,7 @@ class Workspace(NamedTuple):
 
 
 def workspace(events: int, slots: int) -> Workspace:
-    """Room for replays of histories of so many events, and for a search among so many stored labels."""
+    """Allocate the arrays for replays of `events` events and a search over `slots` stored labels."""
     known = slots + 2
     return Workspace(
         np.empty(events),
@@ -86,20 +86,20 @@ def workspace(events: int, slots: int) -> Workspace:
 
 @allocation_free
 def run(label: float, tape: Tape, errors: Floats | None, law: SectionLaw, room: Workspace) -> tuple[int, float]:
-    """Event at which a label died (or ALIVE) and its overlap there (0 if alive)."""
+    """Replay a label; return the event at which it became empty, or ALIVE, and the overlap there, or zero."""
     died = replay(label, tape, errors, law, room.origins, room.rings, room.marks, PROBE, room.overlaps, room.points)
     return died, room.overlaps[died] if died != ALIVE else 0.0
 
 
 @allocation_free
 def keep_section(room: Workspace, row: int) -> None:
-    """Keep the section of the last replay as that of an end."""
+    """Copy the section of the last replay to a row of the workspace."""
     copy_section(room.origins, room.rings, room.marks, PROBE, room.origins, room.rings, room.marks, row)
 
 
 @allocation_free
 def keep_living(room: Workspace, events: int, row: int) -> None:
-    """Keep section and overlaps of the last replay as those of the living label."""
+    """Copy section and overlaps of the last replay to those of the living label."""
     keep_section(room, row)
     for event in range(events):
         room.living_overlaps[event] = room.overlaps[event]
@@ -107,5 +107,5 @@ def keep_living(room: Workspace, events: int, row: int) -> None:
 
 @allocation_free
 def outlives(died: int, overlap: float, other_died: int, other_overlap: float) -> bool:
-    """Whether a dead label is nearer to living than another: it died later, or at less distance."""
+    """Whether a label became empty later than another one, or at the same event with a greater overlap."""
     return died > other_died or (died == other_died and overlap > other_overlap)

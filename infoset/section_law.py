@@ -1,4 +1,4 @@
-"""The numbers of a set model that the kernels need."""
+"""Constants of a set model for the kernels."""
 
 from __future__ import annotations
 
@@ -9,40 +9,41 @@ from typing import NamedTuple
 from infoset.model import InitialSet, Interval, SetModel
 
 BOUND_SLACK = 1e-9
-"""Relative, of bounds that the guaranteed model computes: what rounding may take from them is far less."""
+"""Relative enlargement of the bounds of the guaranteed model; rounding errors are far smaller."""
 ROUNDING = 16.0 * sys.float_info.epsilon
 
 
 class SectionLaw(NamedTuple):
-    """The numbers of a set model that the kernels need.
+    """Constants of a set model for the kernels.
 
     Parameters
     ----------
     closing_speed : float
         Nominal e, m/s.
     step : float
-        s.
+        Time step, s.
     disturbance : float
         Bound nu of the acceleration along z, m/s^2.
     half_v : float
-        What the disturbance does to V in a step, nu times the step, m/s; either way.
+        Greatest change of V by the disturbance in one step, nu times the step, m/s.
     half_v_at_start : float
-        What is added at t = 0, m/s: where the model guarantees, a step's half stands at its start and half at its end,
-        so that all that follow are added in pairs.
+        Part of `half_v` added at t = 0, m/s. The guaranteed model adds half of the change at the start of a step and
+        half at its end; after t = 0 the two halves of adjacent steps are added together.
     disturbance_lead : float
-        How long before the end of a step its disturbance is added, s: half a step as published, else none.
+        Time before the end of a step at which its disturbance is added, s: half a step in the paper's model, zero in
+        the guaranteed one.
     impulse_error : float
-        Relative error of an impulse as the set sees it.
+        Relative error bound of an impulse.
     error_at_zero_range, error_slope : float
-        Angle's error bound: rad, and rad/m of range.
+        Error bound of an angle: rad, and rad per metre of range.
     exact_angles : bool
-        Whether an angle is told as its tangent; else as the angle itself, as published.
+        Whether z/x is the tangent of the angle. The paper's model takes the angle itself.
     label_least, label_greatest : float
-        Labels that a truth can have, m.
+        Limits of the labels of a true state, m.
     z_least, z_greatest, vz_least, vz_greatest, vx_least, vx_greatest : float
-        The box of the start, m and m/s, grown by the error of the scale where the model guarantees.
+        Box of initial states, m and m/s; the guaranteed model enlarges it by the error of the scale.
     rectangle : bool
-        Whether the start is the paper's rectangle in (omega, alpha) in place of the box.
+        Whether the initial set is the paper's rectangle in (omega, alpha). Otherwise it is the box.
     """
 
     closing_speed: float
@@ -67,14 +68,14 @@ class SectionLaw(NamedTuple):
 
 
 def section_law(model: SetModel) -> SectionLaw:
-    """The numbers of a model as the kernels take them.
+    """Return the constants of a model for the kernels.
 
     Notes
     -----
-    Angles do not tell scale: a truth with closing speed e (1 + eta) looks like a motion of the model whose lengths,
-    velocities and impulses are those of the truth divided by 1 + eta. So in the guaranteed model bounds of lengths and
-    velocities grow outward by eta, an angle bound is the greatest over the ranges that a label can mean, and an
-    impulse is known to within eta and the engine's error. See docs/guarantee.md.
+    Angles contain no information about scale: a true motion with closing speed e (1 + eta) has the angles of a motion
+    of the model with all lengths, velocities and impulses divided by 1 + eta. Therefore the guaranteed model enlarges
+    the bounds of lengths and velocities by eta, takes the greatest error bound of an angle over the ranges that
+    correspond to a label, and adds eta to the engine's error of an impulse. See docs/guarantee.md.
     """
     box, sensor, eta = model.bounds, model.angle_sensor, model.speed_error
     slope, error = sensor.error_slope_rad_per_m, sensor.error_at_zero_range_rad
@@ -89,8 +90,8 @@ def section_law(model: SetModel) -> SectionLaw:
     if guaranteed:
         offset, speed = max(abs(z) for z in box.z_m), max(abs(v) for v in box.vz_m_s)
         rate = model.closing_speed_m_s / least_label
-        # Gravity turns the scale, 1/(1 + eta), which moves V where z is not zero; and a coordinate known exactly
-        # must not be lost to rounding.
+        # Gravity changes the scale 1/(1 + eta), and thereby V where z is not zero. The rounding term keeps coordinates
+        # that are known exactly inside the set.
         slack = rate * offset * model.gravity_speed_change + ROUNDING * (speed + rate * offset)
         vz_least, vz_greatest = vz_least - slack, vz_greatest + slack
         slack = ROUNDING * (offset + speed * greatest_label / model.closing_speed_m_s)
@@ -100,8 +101,8 @@ def section_law(model: SetModel) -> SectionLaw:
         step=float(model.step_s),
         disturbance=float(model.acceleration_m_s2),
         half_v=float(half_v),
-        # The exact disturbance is a thin lens. The paper takes the segment between its ends; a sound set takes half of
-        # the change of V at the start of the step and half at its end, which together contain the lens.
+        # The exact disturbance is a thin lens. The paper takes the segment between its ends. The guaranteed model adds
+        # half of the change of V at the start of the step and half at its end: their sum contains the lens.
         half_v_at_start=0.5 * float(half_v) if guaranteed else 0.0,
         disturbance_lead=0.0 if guaranteed else 0.5 * float(model.step_s),
         impulse_error=(1.0 + model.execution_error_relative) / (1.0 - eta) - 1.0 if guaranteed else 0.0,
@@ -121,7 +122,7 @@ def section_law(model: SetModel) -> SectionLaw:
 
 
 def _scaled_outward(interval: Interval, eta: float) -> Interval:
-    """Interval of all a / (1 + h) with a of the interval and |h| <= eta, an ulp or two wider if eta is not zero."""
+    """Return an interval that contains a / (1 + h) for all a in the interval and |h| <= eta."""
     least, greatest = interval
     if eta == 0.0:
         return float(least), float(greatest)

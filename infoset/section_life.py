@@ -1,10 +1,10 @@
-"""Compiled life of one section: how it starts, is cut, shifted and predicted.
+"""Compiled operations on one section: start, measurements, shift, prediction, summary, and replay of a history.
 
-A section is the polygon of all (V, z) that agree with the history, under the hypothesis that the range is
-`x = label - e t`. With z = alpha x and V = omega x - e alpha the motion (9) of the paper is z' = V, V' = v_z:
-an angle measurement is a band of z, an impulse a shift of V; `chain_steps` does that. Each section is a filter of its
-own, a function of its label and the history alone, so a section at a new label is had exactly by replaying the
-history: `replay` calls the very functions that carry the stored sections in `section_passes`.
+A section is the polygon of all (V, z) that agree with the history under the hypothesis that the range is
+x = label - e t. With z = alpha x and V = omega x - e alpha, the motion (9) of the paper is z' = V, V' = v_z: an angle
+measurement is a band of z, and an impulse is a shift of V. A section depends only on its label and on the history.
+Therefore `replay` computes the section at any label exactly, with the functions that update the stored sections in
+`section_passes`.
 """
 
 from __future__ import annotations
@@ -38,21 +38,21 @@ SUMMARY_COLUMNS = 4
 
 
 class Tape(NamedTuple):
-    """The history of one engagement: events, their values, and whether they concern this engagement.
+    """History of one engagement.
 
     Parameters
     ----------
     kinds : ndarray of int, shape (>= events,)
-        Kinds of the events: `ANGLE`, `IMPULSE`, `PREDICTION`, `RATE` or `WIDENING`.
+        Kind of each event.
     values : ndarray, shape (>= events,)
-        Measured angles (rad) and rates (rad/s), and impulses (m/s).
+        Angle, rad, impulse, m/s, or rate, rad/s.
     applies : ndarray of bool, shape (>= events,)
-        Whether an event concerns this engagement.
+        Whether the event applies to this engagement.
     events : int
         Number of events.
     nearest, farthest : float
-        Window of labels, m, over which the bands of measured rates are made convex; an empty one, from infinity to
-        minus infinity, is that of each label alone.
+        Window of labels, m, over which the bands of measured rates are convex. The empty window, from infinity to
+        minus infinity, makes the window of each label the label itself.
     """
 
     kinds: Integers
@@ -64,24 +64,24 @@ class Tape(NamedTuple):
 
 
 NO_WINDOW = (np.inf, -np.inf)
-"""No window: each label has rate bands of its own."""
+"""The empty window: the rate band of each label is exact for that label."""
 
 
 class LastSight(NamedTuple):
-    """The last angle measurement of a replayed history, and what has happened since.
+    """The last angle measurement of a history, and the impulses since.
 
     Parameters
     ----------
     known : bool
-        Whether an angle was measured; without one the box of the start stands for it.
+        Whether an angle was measured. If not, the initial box bounds the angle.
     alpha : float
         The measured angle, rad.
     steps : int
-        Steps since then.
+        Steps since the measurement.
     moved, doubt : float
-        Sum of the impulses since, each times the time from the measurement to it, m, and the bound of its error.
+        Sum of the later impulses, each times its time since the measurement, and the error bound of that sum, m.
     fired : float
-        Sum of the moduli of all impulses so far, m/s.
+        Sum of the magnitudes of all impulses, m/s.
     """
 
     known: bool
@@ -110,8 +110,8 @@ def start_section(origins: Floats, rings: Floats, marks: Integers, n: int, label
 
     Notes
     -----
-    The rectangle is the paper's (section 4), with V_x taken at whichever end of D makes it larger: the printed
-    formula has the lower end always, which is the same whenever z may have either sign.
+    The rectangle is that of the paper (section 4), but with V_x at the end of its interval that makes the rectangle
+    larger. The printed formula always takes the lower end; both agree if z can have either sign.
     """
     x = label
     e = law.closing_speed
@@ -139,13 +139,13 @@ def start_section(origins: Floats, rings: Floats, marks: Integers, n: int, label
 
 @entry
 def steepest_angle(alpha: float, range_m: float, law: SectionLaw) -> float:
-    """Greatest |alpha| that a measured angle admits up to a range, rad; a right angle where there is no such bound.
+    """Return the greatest |alpha|, rad, that agrees with a measured angle up to a range; pi/2 if it is unbounded.
 
     Notes
     -----
-    An error that grows with the distance r = x/cos(alpha) grows with the angle: what is admitted ends at the first s
-    with s = |alpha_m| + a + h(x/cos(s)). Three steps toward it from below, and one more as long as the last, which is
-    past it if s does not become less there.
+    An error bound that grows with the distance r = x/cos(alpha) grows with the angle. The greatest angle is the least
+    solution of s = |alpha_m| + a + h(x/cos(s)). Three fixed-point iterations approach it from below; a fourth step of
+    the length of the third passes it if the right-hand side does not exceed s there.
     """
     growth = max(law.error_slope, 0.0) * range_m
     least = abs(alpha) + law.error_at_zero_range
@@ -160,15 +160,15 @@ def steepest_angle(alpha: float, range_m: float, law: SectionLaw) -> float:
 
 @inlined
 def slope_band(alpha: float, label: float, x: float, law: SectionLaw) -> tuple[float, float]:
-    """Least and greatest slope z/x that a measured angle admits for a label at range x."""
+    """Return the least and the greatest slope z/x that agree with a measured angle, for a label at range x."""
     bound = law.error_at_zero_range + law.error_slope * x
     lower, upper = alpha - bound, alpha + bound
     if law.exact_angles and law.error_slope > 0.0:
-        # x h(x) is convex then. What is claimed over all labels needs it concave: a chord and a tangent lie above it.
+        # x h(x) is convex here. Bounds over all labels need a concave function: a chord and a tangent are above it.
         travelled = label - x
         near, far = max(law.label_least - travelled, 0.0), law.label_greatest - travelled
         steepest = steepest_angle(alpha, far, law)
-        # The error is that of the true distance, x/cos(alpha).
+        # The error bound depends on the true distance, x/cos(alpha).
         longest = (near + far - near * far / x) / math.cos(steepest) if steepest < RIGHT_ANGLE else np.inf
         half = law.error_at_zero_range + law.error_slope * longest
         half = half / math.cos(steepest) ** 2 if steepest < RIGHT_ANGLE else np.inf
@@ -187,13 +187,15 @@ def measure_section(
 
     Returns
     -------
+    living : bool
+        False if the section became empty.
     overlap : float
-        Least overlap of the section and the band across either border, m: negative is the distance of a dead one.
+        Smaller overlap of section and band at the two borders, m; minus their distance if they do not intersect.
 
     Notes
     -----
-    The band is widened by 16 ulp: against extremal noise the truth sits on the border, and rounding must not lose it.
-    The ulp is that of what is subtracted to find a height, so it does not shrink with the range.
+    The band is widened by 16 ulp, so that rounding does not exclude true states on the border, which extremal noise
+    produces. The ulp is that of the terms of a height and does not decrease with the range.
     """
     x = range_of(label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x
@@ -207,7 +209,7 @@ NO_SIGHT = LastSight(False, 0.0, 0, 0.0, 0.0, 0.0)
 
 @inlined
 def sight_after(sight: LastSight, kind: int, value: float, applies: bool, law: SectionLaw) -> LastSight:
-    """What is known of the last sight after one more event of the history."""
+    """Return the last sight after one more event of the history."""
     known, alpha, steps, moved, doubt, fired = sight
     if kind == PREDICTION:
         steps += 1
@@ -223,7 +225,7 @@ def sight_after(sight: LastSight, kind: int, value: float, applies: bool, law: S
 
 @allocation_free
 def last_sight(tape: Tape, law: SectionLaw) -> LastSight:
-    """What is known of the last sight after a whole history."""
+    """Return the last sight after a whole history."""
     sight = NO_SIGHT
     for event in range(tape.events):
         sight = sight_after(sight, tape.kinds[event], tape.values[event], tape.applies[event], law)
@@ -241,21 +243,21 @@ def rate_band(
     sight: LastSight,
     law: SectionLaw,
 ) -> tuple[float, float]:
-    """Bounds of z + V x_c/e that a measured rate admits, x_c the middle of a window of labels, m.
+    """Return the bounds of z + V x_c/e, m, that agree with a measured rate; x_c is the middle of a window of labels.
 
-    On the window the lower bound is convex in the label and the upper one concave: sets that are cut by it are convex
-    in (z, V, label) there, which those cut by the bands of single labels are not.
+    On the window the lower bound is a convex function of the label and the upper one is concave. Sets that are cut by
+    this band are convex in (z, V, label) on the window; sets that are cut by the exact bands of the labels are not.
 
     Notes
     -----
-    What is measured is (V_z x - V_x z)/(x^2 + z^2), less than the model's V/x + e z/x^2 by the square of cos(alpha).
-    With z_j = alpha_j x_j at the last measured angle, and what was fired since, the predicted miss m = z + V x/e
-    gives V = (e/x_j)(m - alpha_j x_j - moved), so that
+    The measured rate is (V_z x - V_x z)/(x^2 + z^2): the model's V/x + e z/x^2 times the square of cos(alpha). With
+    z_j = alpha_j x_j at the last measured angle and the impulses since, the predicted miss m = z + V x/e gives
+    V = (e/x_j)(m - alpha_j x_j - moved), so that
 
         z + V x_c/e = m x_jc/x_j + (x - x_c) (alpha_j + moved/x_j).
 
-    m x_jc/x_j is within omega -+ error times x^2 x_jc/(e x_j), a convex function of x: where it bounds on the wrong
-    side its chord does. alpha_j is known to within its band, which bounds the second term. See docs/guarantee.md.
+    m x_jc/x_j lies between (omega -+ error) times x^2 x_jc/(e x_j), a convex function of x. Its chord replaces it in
+    the bound that needs a concave function. The band of alpha_j bounds the second term. See docs/guarantee.md.
     """
     e = law.closing_speed
     travelled = label - range_of(label, elapsed, law)
@@ -302,7 +304,7 @@ def rate_band(
 
 @inlined
 def scaled_square(x: float, middle: float, then: float) -> float:
-    """Square of a range x times x_jc/x_j: as `then` was added to both since."""
+    """Return x^2 x_jc/x_j, where x_j = x + `then` and x_jc = `middle` + `then`."""
     return x * (middle + then) * (x / (x + then) if then > 0.0 else 1.0)
 
 
@@ -321,28 +323,30 @@ def measure_rate_section(
     law: SectionLaw,
     points: Floats,
 ) -> tuple[bool, float]:
-    """Cut a section by a measurement of the line of sight's rate: a band of the predicted miss, omega x^2 / e.
+    """Cut a section by a line-of-sight rate, which is a band of the predicted miss omega x^2 / e.
 
     Returns
     -------
+    living : bool
+        False if the section became empty.
     overlap : float
-        As `measure_section` returns it, in metres of predicted miss.
+        As in `measure_section`, in metres of predicted miss.
     """
     if whole_chains.is_crowded(marks, n):
         whole_chains.reduce_outward(origins, rings, marks, n, time_to_go(label, elapsed, law), points)
     near, far = min(label, window[0]), max(label, window[1])
     lower, upper = rate_band(label, near, far, elapsed, omega, error, sight, law)
-    # The band is one of z + V x_c/e, and `tilt` is (x_c - x)/e.
+    # The band bounds z + V x_c/e = m + V tilt.
     tau, tilt = time_to_go(label, elapsed, law), (0.5 * (near + far) - label) / law.closing_speed
     slack = CUT_SLACK * (label * (abs(omega) + error) + origins[n, RIGHT, REACH]) * (label / law.closing_speed)
-    # The next step's half of the disturbance is in the section already, and it does not commute with this band.
+    # The section already contains the first half of the next step's disturbance, which does not commute with the cut.
     slack += (tau + tilt) * law.half_v_at_start
     return whole_chains.cut_misses(origins, rings, marks, n, tau, tilt, lower - slack, upper + slack, points)
 
 
 @inlined
 def widen_section(origins: Floats, n: int, label: float, elapsed: int, law: SectionLaw) -> None:
-    """Widen a section by what one angle measurement may err, b: by e b in V, which is x b in the predicted miss."""
+    """Enlarge a section by the error bound b of one angle measurement: by e b in V, or x b in the predicted miss."""
     x = range_of(label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x
     chain_steps.spread(origins, n, x / law.closing_speed, law.closing_speed * bound)
@@ -350,7 +354,7 @@ def widen_section(origins: Floats, n: int, label: float, elapsed: int, law: Sect
 
 @inlined
 def shift_section(origins: Floats, n: int, label: float, elapsed: int, impulse: float, law: SectionLaw) -> None:
-    """Shift a section by an impulse: V becomes V - k, for every k that the commanded one may have been."""
+    """Shift a section by an impulse: V becomes V - k, for all k within the error bound of the commanded impulse."""
     tau = time_to_go(label, elapsed, law)
     chain_steps.shift(origins, n, tau, -impulse)
     if law.impulse_error > 0.0:
@@ -361,7 +365,7 @@ def shift_section(origins: Floats, n: int, label: float, elapsed: int, impulse: 
 def predict_section(
     origins: Floats, rings: Floats, marks: Integers, n: int, label: float, elapsed: int, law: SectionLaw
 ) -> None:
-    """Move a section on to step `elapsed`: time to go falls, and the disturbance adds its segment, 8 ulp longer."""
+    """Move a section to step `elapsed`: the level turns, and the segment of the disturbance, 8 ulp longer, is added."""
     tau = time_to_go(label, elapsed, law)
     chain_steps.turn(origins, rings, marks, n, tau + law.disturbance_lead)
     chain_steps.spread(origins, n, tau + law.disturbance_lead, law.half_v + SUM_SLACK * origins[n, RIGHT, REACH])
@@ -382,7 +386,7 @@ def summarise_section(
     b: int,
     s: int,
 ) -> None:
-    """Write the extremes of the predicted miss (13), (14) of a section: those of z + V x/e -+ nu/2 (x/e)^2."""
+    """Write the extremes (13), (14) of the predicted miss of a section, those of z + V x/e -+ nu/2 (x/e)^2."""
     tau = time_to_go(label, elapsed, law)
     upper, lower = chain_steps.greatest_and_least_miss(origins, rings, marks, n, tau)
     drift = 0.5 * law.disturbance * tau * tau
@@ -403,34 +407,34 @@ def replay(
     overlaps: Floats,
     points: Floats,
 ) -> int:
-    """Carry the section at any label through a whole history.
+    """Compute the section at any label from a whole history.
 
     Parameters
     ----------
     label : float
-        Range at t = 0 of the hypothesis, m.
+        Range at t = 0, m.
     tape : Tape
         The history.
     errors : ndarray, shape (>= events,), or None
-        Error bound of each rate; None where there is none. It stands apart, since only an argument that is None lets
-        the compiler leave out the code for rates.
+        Error bound of each rate, rad/s; None without rates. It is not a field of the tape because the compiler omits
+        the code for rates only if an argument is None.
     law : SectionLaw
-        The numbers of the model.
+        Constants of the model.
     origins, rings, marks, n : section
-        Where it goes.
+        Receives the section.
     overlaps : ndarray, shape (>= events,)
-        Receives the overlap with the band of each angle measurement that the section lived to see.
-    points : ndarray, shape (CAPACITY, 2)
-        Room to work in.
+        Receives the overlap of the section with the band of each measurement, up to the one that makes it empty.
+    points : ndarray, shape (CAPACITY + 2, 2)
+        Working array.
 
     Returns
     -------
     int
-        The event that killed it, or ALIVE.
+        Number of the event that made the section empty, or ALIVE.
 
     Notes
     -----
-    Some 30 ns an event.
+    About 30 ns per event.
     """
     kinds, values, applies, events, nearest, farthest = tape
     window = nearest, farthest
@@ -454,7 +458,7 @@ def replay(
         elif kinds[event] == WIDENING:
             widen_section(origins, n, label, elapsed, law)
         elif errors is not None:
-            # Compiled only for a history that has rates: this branch would be the greater part of the work.
+            # Not compiled for histories without rates: this branch is most of the code.
             living, overlaps[event] = measure_rate_section(
                 origins, rings, marks, n, label, elapsed, values[event], errors[event], sight, window, law, points
             )

@@ -1,4 +1,4 @@
-"""Compiled passes over the sections of a batch of engagements: each does to all what `section_life` does to one."""
+"""Compiled operations on all sections of a batch of engagements; `section_life` contains those on one section."""
 
 from __future__ import annotations
 
@@ -39,26 +39,26 @@ TIE_TOLERANCE = 1e-9
 
 
 class Sections(NamedTuple):
-    """B engagements x S slots of one section each.
+    """B engagements x S slots for one section each.
 
     Parameters
     ----------
     labels : ndarray, shape (B, S)
-        Range at t = 0 of each slot's hypothesis, m; the slots in use come first, in rising order.
+        Label of each slot, m; the slots in use are first, with increasing labels.
     used : ndarray of int, shape (B,)
         Number of slots in use.
     living : ndarray of bool, shape (B, S)
-        Whether the section is not empty.
+        Whether the slot contains a section that is not empty.
     died : ndarray of int, shape (B, S)
-        Event that emptied the section, or ALIVE.
+        Number of the event that made the section empty, or ALIVE.
     overlaps : ndarray, shape (B, S)
-        Overlap of a dead section with the band that emptied it, m: negative.
+        Overlap of an empty section with the band that made it empty, m: negative.
     origins, rings, marks : ndarray
-        The sections, as `chains` stores them: slot s of engagement b is row b S + s.
+        The polygons, stored as in `chains`: slot s of engagement b is row b S + s.
     summaries : ndarray, shape (B, S, columns)
-        Extremes of the predicted miss and of z, in the columns that `section_life` defines, m.
+        Extremes of the predicted miss and of z, m.
     rows : ndarray of int, shape (B S, 3)
-        Buffer for a list of sections: row, engagement and slot.
+        Working array for a list of sections: row, engagement and slot.
     """
 
     labels: Floats
@@ -74,7 +74,7 @@ class Sections(NamedTuple):
 
 
 def room_for_sections(labels: Floats, used: Integers) -> Sections:
-    """Arrays for a batch of sections, none of them written yet."""
+    """Allocate the arrays of a batch of sections."""
     shape = labels.shape
     origins, rings, marks = chains.empty_sections(labels.size, chains.ROOM_AT_START)
     return Sections(
@@ -93,7 +93,7 @@ def room_for_sections(labels: Floats, used: Integers) -> Sections:
 
 @entry
 def start_all(sections: Sections, law: SectionLaw) -> None:
-    """Write the initial sections of a batch; they are not summarised yet."""
+    """Write the initial sections of a batch, without their summaries."""
     labels, used, living = sections.labels, sections.used, sections.living
     origins, rings, marks = sections.origins, sections.rings, sections.marks
     for b in range(labels.shape[0]):
@@ -104,12 +104,12 @@ def start_all(sections: Sections, law: SectionLaw) -> None:
 
 
 @allocation_free
-def list_rows(first: Flags, second: Flags, third: Flags, everyone: bool, sections: Sections) -> int:
-    """List the living sections of the engagements in any of three groups, or of all; return how many."""
+def list_rows(first: Flags, second: Flags, third: Flags, every: bool, sections: Sections) -> int:
+    """List the living sections of the engagements in any of three groups, or of all; return their number."""
     used, living, rows = sections.used, sections.living, sections.rows
     count = 0
     for b in range(living.shape[0]):
-        if first[b] or second[b] or third[b] or everyone:
+        if first[b] or second[b] or third[b] or every:
             for s in range(used[b]):
                 if living[b, s]:
                     rows[count, 0], rows[count, 1], rows[count, 2] = b * living.shape[1] + s, b, s
@@ -129,24 +129,24 @@ def step_all(
     sections: Sections,
     law: SectionLaw,
 ) -> int:
-    """Predict, cut and summarise the living sections in one pass; return how many died.
+    """Predict, cut and summarise the living sections in one pass; return the number of sections that became empty.
 
     Parameters
     ----------
     behind : ndarray of bool, shape (B,)
-        Engagements whose sections are still at step `elapsed - 1`: they are moved to step `elapsed`.
+        Engagements whose sections are at step `elapsed - 1` and are moved to step `elapsed`.
     measured : ndarray of bool, shape (B,)
         Engagements whose sections are cut by an angle measurement and summarised.
     stale : ndarray of bool, shape (B,)
         Engagements whose sections are summarised.
     heights_wanted : bool
-        Whether the least and the greatest z of all sections are written.
+        Whether to write the least and the greatest z of all sections.
     alpha : ndarray, shape (B,)
         Measured angles, rad.
     elapsed, event : int
-        Steps so far, and number of the measurement.
+        Present step, and number of the measurement.
     sections, law : Sections, SectionLaw
-        The sections, which are changed in place, and the numbers of the model.
+        The sections, changed in place, and the constants of the model.
     """
     deaths = 0
     labels, living, died, overlaps = sections.labels, sections.living, sections.died, sections.overlaps
@@ -178,7 +178,7 @@ def step_all(
 
 @allocation_free
 def tape_of(tapes: Tapes, b: int, values: Floats, applies: Flags) -> Tape:
-    """Lay the history of one engagement out in one piece: it is read many times."""
+    """Copy the history of one engagement to contiguous arrays, for many replays."""
     for event in range(tapes.events):
         values[event] = tapes.values[event, b]
         applies[event] = tapes.applies[event, b]
@@ -199,9 +199,9 @@ def measure_rate_all(
     law: SectionLaw,
     points: Floats,
 ) -> int:
-    """Cut every living section of the active engagements by measured rates, and summarise it; return how many died.
+    """Cut the living sections of the active engagements by rates and summarise them; return how many became empty.
 
-    `values` and `applies` are room for the history of one engagement.
+    `values` and `applies` are working arrays for the history of one engagement.
     """
     deaths = 0
     labels, used, living, died = sections.labels, sections.used, sections.living, sections.died
@@ -229,7 +229,7 @@ def measure_rate_all(
 
 @entry
 def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, law: SectionLaw) -> None:
-    """Shift every living section, and its summary, by its engagement's impulse."""
+    """Shift the living sections and their summaries by the impulses of the engagements."""
     labels, used, living = sections.labels, sections.used, sections.living
     origins, summaries = sections.origins, sections.summaries
     for b in range(labels.shape[0]):
@@ -248,23 +248,23 @@ def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, 
 def make_room_all(
     active: Flags, added: int, elapsed: int, sections: Sections, law: SectionLaw, points: Floats, widen: bool
 ) -> tuple[int, int]:
-    """Find the room of the living sections of the active engagements, and widen their rings if that is wanted.
+    """Compute the room that the living sections of the active engagements need; with `widen`, enlarge their rings.
 
     Parameters
     ----------
     added : int
-        Vertices that every section must be able to gain.
+        Number of vertices that every section must be able to gain.
     active, elapsed, sections, law, points
-        Engagements, steps so far, their sections, the numbers of the model, and working room.
+        Engagements, present step, sections, constants of the model, and working array.
     widen : bool
-        Whether to widen the rings, for which there must be memory; sections with `CAPACITY` vertices are reduced first.
+        Whether to enlarge rings, for which memory must be allocated, and to reduce sections of `CAPACITY` vertices.
 
     Returns
     -------
     floats : int
-        Floats that the rings lack before the sections can gain so many vertices.
+        Number of floats by which the rings are too small.
     spare : int
-        Vertices that every section may gain; negative where one must be reduced first.
+        Number of vertices that every section may gain; negative if a section must be reduced first.
     """
     labels, used, living = sections.labels, sections.used, sections.living
     origins, rings, marks = sections.origins, sections.rings, sections.marks
@@ -291,29 +291,29 @@ def make_room_all(
 
 @entry
 def widest_all(elapsed: int, sections: Sections, law: SectionLaw, exists: Flags, ends: Floats) -> None:
-    """Write the predicted-miss interval of each engagement, over its living sections.
+    """Write the predicted-miss interval of each engagement.
 
     Parameters
     ----------
     elapsed : int
-        Steps so far.
+        Present step.
     exists : ndarray of bool, shape (B,)
-        Whether any section lives.
+        Whether the engagement has a living section.
     ends : ndarray, shape (B, 2, 4)
-        For the lower and the upper end: predicted miss, and alpha, omega and range where it is reached; left as they
-        are where no section lives.
+        For the lower and the upper end: the predicted miss, m, and alpha, rad, omega, rad/s, and range, m, of a state
+        that reaches it. Not written for engagements without a living section.
 
     Notes
     -----
-    An extreme is usually a whole edge; the point is its lowest for the upper extreme and its highest for the lower
-    one, so that a mirrored engagement is mirrored exactly.
+    An extreme is usually reached on a whole edge. The lowest point is taken for the upper end and the highest for the
+    lower end, so that a mirrored engagement gives exactly mirrored results.
     """
     labels, used, living, summaries = sections.labels, sections.used, sections.living, sections.summaries
     origins, rings, marks = sections.origins, sections.rings, sections.marks
     for b in range(labels.shape[0]):
         lowest = highest = -1
         for s in range(used[b]):
-            # A section at a range of zero is of an engagement that is followed no longer.
+            # Only sections of stopped engagements can be at range zero.
             if not living[b, s] or range_of(labels[b, s], elapsed, law) == 0.0:
                 continue
             if lowest < 0 or summaries[b, s, LOWER_MISS] < summaries[b, lowest, LOWER_MISS]:
@@ -337,7 +337,7 @@ def widest_all(elapsed: int, sections: Sections, law: SectionLaw, exists: Flags,
 
 @entry
 def margins_all(v: Floats, z: Floats, elapsed: int, sections: Sections, law: SectionLaw, margins: Floats) -> None:
-    """Write the signed margin of a state (V, z) in the first section of each engagement, m; -inf where it is dead."""
+    """Write the signed distance, m, of a state to the boundary of each first section; -inf if that is empty."""
     labels, living = sections.labels, sections.living
     origins, rings, marks = sections.origins, sections.rings, sections.marks
     for b in range(v.shape[0]):
@@ -349,17 +349,17 @@ def margins_all(v: Floats, z: Floats, elapsed: int, sections: Sections, law: Sec
 
 @allocation_free
 def margin_in(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, v: float, z: float) -> float:
-    """Signed margin of a state (V, z), m: distances are taken with V counted as V x/e, the miss that it is worth."""
+    """Signed distance of a state to the boundary of a section in the plane of V x/e and z, m; positive inside."""
     nearest, inside = np.inf, False
     last_v, last_m = chains.vertex(origins, rings, marks, n, chains.LEFT, chains.end_of(marks, n, chains.LEFT) - 1)
     last = (tau * (last_v - v), (last_m - tau * last_v) - z)
     for side in (chains.RIGHT, chains.LEFT):
-        # What the origin of the chain is from the state is added once to each vertex.
-        from_v = tau * (origins[n, side, chains.V_ORIGIN] - v + origins[n, side, chains.V_REST])
-        from_z = chains.origin_height(origins, n, side, tau) - z
+        # Origin of the chain relative to the state, in the plane of the distance.
+        offset_v = tau * (origins[n, side, chains.V_ORIGIN] - v + origins[n, side, chains.V_REST])
+        offset_z = chains.origin_height(origins, n, side, tau) - z
         for i in range(chains.begin_of(marks, n, side), chains.end_of(marks, n, side)):
             own_v, own_m = chains.read(rings, chains.place(marks, n, side, i))
-            vertex = (tau * own_v + from_v, (own_m - tau * own_v) + from_z)
+            vertex = (tau * own_v + offset_v, (own_m - tau * own_v) + offset_z)
             nearest, inside = polygon.pass_edge(nearest, inside, last, vertex, 0.0, 0.0)
             last = vertex
     return math.sqrt(nearest) if inside else -math.sqrt(nearest)

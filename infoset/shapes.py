@@ -1,4 +1,4 @@
-"""To shapely and back, for pictures and proofs."""
+"""Conversion of polygons to and from shapely."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def from_shapely(geometry: BaseGeometry) -> ConvexPolygons:
     Raises
     ------
     ValueError
-        If the geometry is of another kind or not convex.
+        If the geometry is not convex, or not a Point, LineString or Polygon.
     """
     from shapely.geometry.polygon import orient
 

@@ -1,4 +1,4 @@
-"""Small pictures as SVG text: what a notebook shows of a thing. No file, no screen, no script."""
+"""Small SVG pictures for the representation of objects in notebooks."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ _LEFT, _RIGHT, _TOP, _BOTTOM = 58, 12, 26, 40
 
 
 class Plane:
-    """A plane with axes that collects what is drawn on it.
+    """A plane with axes, to which lines are added.
 
     Parameters
     ----------
     x, y : tuple of float
         Limits of the axes.
     x_title, y_title : str
-        With their units.
+        Names of the axes, with units.
     title : str
-        Over the plane; any text.
+        Text above the plane.
     height : int
-        Of the picture, in pixels.
+        Height of the picture in pixels.
     levels : sequence of (float, str), or None
-        Where y has marks, and what they are called; None leaves it to round values.
+        Ticks of the y axis and their labels; None chooses round values.
     """
 
     def __init__(
@@ -63,12 +63,12 @@ class Plane:
         self._text(title, _LEFT, 16, "start", INK, ' font-weight="bold"')
 
     def line(self, points: Floats, colour: str, *, closed: bool = False, width: float = 1.4) -> None:
-        """Draw a line through points of shape (n, 2); a closed one is filled faintly, a single point is a dot."""
-        places = [(self._across(x), self._up(y)) for x, y in points.tolist()]
-        if len(places) == 1:
-            self._add(f'<circle cx="{places[0][0]:.1f}" cy="{places[0][1]:.1f}" r="3" fill="{colour}"/>')
+        """Draw a line through points, shape (n, 2); fill a closed one lightly, and draw a single point as a dot."""
+        pixels = [(self._across(x), self._up(y)) for x, y in points.tolist()]
+        if len(pixels) == 1:
+            self._add(f'<circle cx="{pixels[0][0]:.1f}" cy="{pixels[0][1]:.1f}" r="3" fill="{colour}"/>')
             return
-        path = "L".join(f"{x:.1f} {y:.1f}" for x, y in places)
+        path = "L".join(f"{x:.1f} {y:.1f}" for x, y in pixels)
         end, fill = ("Z", f'fill="{colour}" fill-opacity=".08"') if closed else ("", 'fill="none"')
         self._add(f'<path d="M{path}{end}" {fill} stroke="{colour}" stroke-width="{width}" stroke-linejoin="round"/>')
 
@@ -94,12 +94,12 @@ class Plane:
 
     def _text(self, text: str, x: float, y: float, anchor: str, colour: str, more: str = "") -> None:
         if text:
-            said = html.escape(text)
-            self._add(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}"{more}>{said}</text>')
+            escaped = html.escape(text)
+            self._add(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}"{more}>{escaped}</text>')
 
 
 def note(text: str) -> str:
-    """Return a picture that only says something."""
+    """Return a picture that contains only a text."""
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="34" role="img" font-family="sans-serif" '
         f'font-size="12"><rect width="{WIDTH}" height="34" fill="#ffffff"/>'
@@ -108,14 +108,14 @@ def note(text: str) -> str:
 
 
 def limits(values: Floats, margin: float = 0.06) -> Limits:
-    """Return limits a little wider than the values, never of no width.
+    """Return limits slightly wider than the values, of nonzero width.
 
     Parameters
     ----------
     values : ndarray
-        At least one.
+        One value or more.
     margin : float
-        Of their width.
+        Added on each side, relative to the width of the values.
     """
     low, high = float(values.min()), float(values.max())
     room = margin * (high - low) or 0.05 * abs(high) or 1.0
@@ -123,19 +123,19 @@ def limits(values: Floats, margin: float = 0.06) -> Limits:
 
 
 def shade(index: int, count: int) -> str:
-    """Return the colour of one of so many things in a row, from dark to light."""
+    """Return the colour of item `index` in a sequence of `count` items, from dark to light."""
     share = index / max(count - 1, 1)
     pairs = ((int(NEAR[at : at + 2], 16), int(FAR[at : at + 2], 16)) for at in (1, 3, 5))
     return "#" + "".join(f"{round((1.0 - share) * near + share * far):02x}" for near, far in pairs)
 
 
 def ticks(low: float, high: float, about: int = 5) -> list[float]:
-    """Return round values between two limits, about so many."""
+    """Return approximately `about` round values between two limits."""
     rough = (high - low) / about
     power = 10.0 ** math.floor(math.log10(rough))
-    step = next(each * power for each in (1.0, 2.0, 5.0, 10.0) if each * power >= 0.999 * rough)
+    step = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= 0.999 * rough)
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
-    return [each * step for each in range(first, last + 1)]
+    return [multiple * step for multiple in range(first, last + 1)]
 
 
 def _tick(value: float) -> str:
@@ -143,5 +143,5 @@ def _tick(value: float) -> str:
 
 
 def evenly(count: int, most: int) -> Sequence[int]:
-    """Return up to so many places of a row, evenly spread, both ends among them."""
-    return range(count) if count <= most else sorted({round(each) for each in np.linspace(0, count - 1, most)})
+    """Return at most `most` evenly spaced indices of a sequence, both ends included."""
+    return range(count) if count <= most else sorted({round(index) for index in np.linspace(0, count - 1, most)})

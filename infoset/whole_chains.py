@@ -1,4 +1,4 @@
-"""Compiled operations on sections, as `chains` has them, that look at every vertex: outline, reduction, cut across."""
+"""Compiled operations on all vertices of a section: outline, reduction, cut by a band of the predicted miss."""
 
 from __future__ import annotations
 
@@ -30,26 +30,26 @@ from infoset.chains import (
 
 @inlined
 def is_crowded(marks: Integers, n: int) -> bool:
-    """Whether a section may have more vertices than there is room for before the next step is over."""
+    """Whether the next step may increase the number of vertices beyond CAPACITY."""
     return bool(count_of(marks, n) > CAPACITY - MOST_ADDED)
 
 
 @allocation_free
 def reduce_outward(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, points: Floats) -> None:
-    """Drop edges of the longer chain, outward, until the section has `REDUCED` vertices.
+    """Enlarge a section by removing edges of the longer chain until it has `REDUCED` vertices.
 
     Parameters
     ----------
     tau : float
-        Time to go.
+        Time to go, s.
     points : ndarray, shape (CAPACITY, 2)
-        Room to work in.
+        Working array.
 
     Notes
     -----
-    The edge whose neighbours, extended until they meet, add least area goes first. O(CAPACITY) an edge. A vertex that
-    rounding has put inside the others goes before; where no edge can be dropped, the chain becomes three sides
-    of a box around it.
+    An edge is removed by extending its neighbours to their intersection; the edge that adds the least area is removed
+    first, at O(CAPACITY) per edge. Vertices that are not convex because of rounding are removed before. If no edge can
+    be removed, three sides of a box around the chain replace it.
     """
     right = marks[n, RIGHT, END] - marks[n, RIGHT, BEGIN]
     other = min(right, count_of(marks, n) - right)
@@ -71,7 +71,7 @@ def reduce_outward(origins: Floats, rings: Floats, marks: Integers, n: int, tau:
         count -= 1
     for i in range(count):
         put(rings, marks, n, side, i, points[i, 0], points[i, 1])
-        # New vertices may be farther out than any that the section ever had.
+        # |V| of a new vertex may exceed the previous bound.
         v, _ = vertex(origins, rings, marks, n, side, i)
         origins[n, RIGHT, REACH] = max(origins[n, RIGHT, REACH], abs(v))
     marks[n, side, BEGIN] = 0
@@ -81,7 +81,7 @@ def reduce_outward(origins: Floats, rings: Floats, marks: Integers, n: int, tau:
 
 @allocation_free
 def box_around(points: Floats, count: int, sign: float, tau: float) -> int:
-    """Replace a chain by its ends and their images moved out along the level as far as its outermost vertex."""
+    """Replace a chain by three sides of a box: from its ends along the level to the outermost vertex."""
     out = 0.0
     for end in (0, count - 1):
         for i in range(count):
@@ -99,11 +99,11 @@ def box_around(points: Floats, count: int, sign: float, tau: float) -> int:
 
 @allocation_free
 def outline(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, out: Floats) -> int:
-    """Write the vertices (V, z), counter-clockwise; return how many: at most CAPACITY.
+    """Write the vertices (V, z), counter-clockwise; return their number, at most CAPACITY.
 
     Notes
     -----
-    Where the chains meet in one point they hold it twice, equal up to rounding: it is written once.
+    A point in which the chains meet is stored in both, equal to within rounding. It is written once.
     """
     made = ZERO
     for side in (RIGHT, LEFT):
@@ -120,7 +120,7 @@ def outline(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float,
 
 @allocation_free
 def meets(points: Floats, i: int, v: float, z: float, reach: float, tau: float) -> bool:
-    """Whether a vertex is (V, z) up to the rounding of a change of chains."""
+    """Whether a vertex equals (V, z) to within the rounding error of a change of chains."""
     close_v = abs(points[i, 0] - v) <= 4.0 * EPSILON * reach
     return bool(close_v and abs(points[i, 1] - z) <= 4.0 * EPSILON * (abs(z) + 2.0 * tau * reach))
 
@@ -137,12 +137,12 @@ def cut_misses(
     upper: float,
     points: Floats,
 ) -> tuple[bool, float]:
-    """Keep the band lower <= m + V tilt <= upper of predicted miss; the rest is as in `cut`.
+    """Intersect a section with the band lower <= m + V tilt <= upper; returns are those of `chain_steps.cut`.
 
     Notes
     -----
-    This band is not along the line of sight, so it may cut anywhere: the chains are taken apart and made anew.
-    O(vertices). `points` has room for CAPACITY + 2.
+    This band is not parallel to the level, so that it may cut any edge: the chains are computed anew. O(vertices).
+    `points` is a working array of CAPACITY + 2 vertices.
     """
     count = ZERO
     for side in (RIGHT, LEFT):
@@ -158,7 +158,7 @@ def cut_misses(
     bottom, top = polygon.extremes(points, count, -tau, 1.0)
     thickness = polygon.height(points, top, -tau, 1.0) - polygon.height(points, bottom, -tau, 1.0)
     if thickness <= 16.0 * EPSILON * (abs(points[top, 1]) + abs(points[bottom, 1]) + tau * origins[n, RIGHT, REACH]):
-        # Level to within rounding: its ends are to the right and to the left, and each chain has both.
+        # All heights are equal to within rounding: the vertices of extreme V are the ends of both chains.
         bottom, top = polygon.extremes(points, count, -1.0, 0.0)
     for side in (RIGHT, LEFT):
         first, last = (bottom, top) if side == RIGHT else (top, bottom)
