@@ -26,8 +26,8 @@ from infoset.chains import (
     Integers,
     begin_of,
     end_of,
+    offset_in,
     origin_height,
-    place_in,
     put,
     read,
     rise,
@@ -140,20 +140,20 @@ def hand_over(
     second step.
     """
     back = end - 1
-    v, m = read(rings, place_in(giver, back))
+    v, m = read(rings, offset_in(giver, back))
     rise = sign * (m - tau * v)
     same_v, same_rise = same[0], same[1] + 4.0 * EPSILON * abs(m)
-    front_v, front_m = read(rings, place_in(taker, front))
+    front_v, front_m = read(rings, offset_in(taker, front))
     front_rise = sign * (front_m - tau * front_v)
     while True:
         if rise + sign * between[2] > front_rise + same_rise:
             front -= 1
             front_v, front_m = v + between[0], m + between[1]
-            write(rings, place_in(taker, front), front_v, front_m)
+            write(rings, offset_in(taker, front), front_v, front_m)
             front_rise = sign * (front_m - tau * front_v)
         if back == first:
             break
-        before_v, before_m = read(rings, place_in(giver, back - 1))
+        before_v, before_m = read(rings, offset_in(giver, back - 1))
         before_rise = sign * (before_m - tau * before_v)
         if before_rise < rise - same_rise or sign * (v - before_v) > same_v:
             break
@@ -253,12 +253,12 @@ def cut_end(
     int
         Number of the new end vertex.
     """
-    v, m = read(rings, place_in(ring, end))
+    v, m = read(rings, offset_in(ring, end))
     height = up * (m - tau * v)
     if height <= level:
         return end
     while end != other_end:
-        inner_v, inner_m = read(rings, place_in(ring, end + way))
+        inner_v, inner_m = read(rings, offset_in(ring, end + way))
         inner_height = up * (inner_m - tau * inner_v)
         if inner_height <= level:
             # Interpolated from the nearer end of the edge, for the least rounding error.
@@ -269,7 +269,7 @@ def cut_end(
             break
         v, height = inner_v, inner_height
         end += way
-    write(rings, place_in(ring, end), v, up * level + tau * v)
+    write(rings, offset_in(ring, end), v, up * level + tau * v)
     return end
 
 
@@ -333,13 +333,13 @@ def find_peak(
     that nearly coincide do not stop it.
     """
     peak = min(max(peak, first), last)
-    miss = sign * read(rings, place_in(ring, peak))[1]
+    miss = sign * read(rings, offset_in(ring, peak))[1]
     rounding = 16.0 * EPSILON * (abs(miss) + magnitude)
     start_at = peak
     for way in (1, -1):
         i = start_at + way
         while first <= i <= last:
-            here = sign * read(rings, place_in(ring, i))[1]
+            here = sign * read(rings, offset_in(ring, i))[1]
             if here > miss:
                 peak, miss = i, here
             elif here < miss - rounding:
@@ -351,8 +351,8 @@ def find_peak(
 @inlined
 def first_near_peak(rings: Floats, ring: tuple[int, int], first: int, peak: int, sign: float, tolerance: float) -> int:
     """First vertex before the peak whose predicted miss equals that of the peak to within a tolerance."""
-    level = sign * read(rings, place_in(ring, peak))[1] - tolerance
-    while peak > first and sign * read(rings, place_in(ring, peak - 1))[1] >= level:
+    level = sign * read(rings, offset_in(ring, peak))[1] - tolerance
+    while peak > first and sign * read(rings, offset_in(ring, peak - 1))[1] >= level:
         peak -= 1
     return peak
 

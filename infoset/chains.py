@@ -124,13 +124,13 @@ def working_room() -> Floats:
 
 
 @inlined
-def place_in(ring: tuple[int, int], i: int) -> int:
+def offset_in(ring: tuple[int, int], i: int) -> int:
     """Offset of a vertex in a ring, given as its offset and mask."""
     return ring[0] + 2 * (i & ring[1])
 
 
 @inlined
-def place(marks: Integers, n: int, side: int, i: int) -> int:
+def offset_of(marks: Integers, n: int, side: int, i: int) -> int:
     """Offset of a vertex of a chain in the rings."""
     return int(marks[n, side, RING] + 2 * (i & marks[n, side, MASK]))
 
@@ -174,9 +174,9 @@ def count_of(marks: Integers, n: int) -> int:
 def expect(rings: Floats, marks: Integers, n: int) -> None:
     """Prefetch the vertices of a section that the next step reads."""
     for side in (RIGHT, LEFT):
-        prefetch(rings, place(marks, n, side, begin_of(marks, n, side)))
-        prefetch(rings, place(marks, n, side, end_of(marks, n, side) - 1))
-        prefetch(rings, place(marks, n, side, marks[n, side, PEAK]))
+        prefetch(rings, offset_of(marks, n, side, begin_of(marks, n, side)))
+        prefetch(rings, offset_of(marks, n, side, end_of(marks, n, side) - 1))
+        prefetch(rings, offset_of(marks, n, side, marks[n, side, PEAK]))
 
 
 @inlined
@@ -192,8 +192,8 @@ def widen_rings(rings: Floats, marks: Integers, n: int, room: int) -> None:
         first = int(rings[TAKEN])
         rings[TAKEN] = first + floats_of(room)
         for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
-            v, m = read(rings, place(marks, n, side, i))
-            write(rings, place_in((first, room - 1), i), v, m)
+            v, m = read(rings, offset_of(marks, n, side, i))
+            write(rings, offset_in((first, room - 1), i), v, m)
         marks[n, side, RING] = first
         marks[n, side, MASK] = room - 1
 
@@ -221,7 +221,7 @@ def sign_of(side: int) -> float:
 @inlined
 def rise(rings: Floats, marks: Integers, n: int, side: int, i: int, tau: float) -> float:
     """Height of a vertex relative to the origin of its chain, times the sign of the side: increases along the chain."""
-    v, m = read(rings, place(marks, n, side, i))
+    v, m = read(rings, offset_of(marks, n, side, i))
     return float(sign_of(side) * (m - tau * v))
 
 
@@ -235,7 +235,7 @@ def origin_height(origins: Floats, n: int, side: int, tau: float) -> float:
 @inlined
 def vertex(origins: Floats, rings: Floats, marks: Integers, n: int, side: int, i: int) -> tuple[float, float]:
     """Return V and m of a vertex."""
-    v, m = read(rings, place(marks, n, side, i))
+    v, m = read(rings, offset_of(marks, n, side, i))
     v = (v + origins[n, side, V_REST]) + origins[n, side, V_ORIGIN]
     m = (m + origins[n, side, M_REST]) + origins[n, side, M_ORIGIN]
     return v, m
@@ -244,7 +244,7 @@ def vertex(origins: Floats, rings: Floats, marks: Integers, n: int, side: int, i
 @inlined
 def put(rings: Floats, marks: Integers, n: int, side: int, i: int, v: float, m: float) -> None:
     """Write a vertex relative to the origin of its chain."""
-    write(rings, place(marks, n, side, i), v, m)
+    write(rings, offset_of(marks, n, side, i), v, m)
 
 
 @allocation_free
@@ -270,5 +270,5 @@ def copy_section(
         for part in (BEGIN, END, PEAK):
             to_marks[to, side, part] = marks[n, side, part]
         for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
-            v, m = read(rings, place(marks, n, side, i))
+            v, m = read(rings, offset_of(marks, n, side, i))
             put(to_rings, to_marks, to, side, i, v, m)

@@ -1,4 +1,4 @@
-"""Batches of convex polygons, and what can be done with them."""
+"""Batches of convex polygons, and operations on them."""
 
 from __future__ import annotations
 
@@ -21,21 +21,22 @@ _NAMES = ("empty set", "point", "segment", "triangle", "quadrangle", "pentagon",
 
 
 class ConvexPolygons:
-    """A batch of convex polygons of any shape; a single polygon is a batch of shape ().
+    """A batch of convex polygons with any batch shape; a single polygon is a batch of shape ().
 
     Parameters
     ----------
     vertices : array_like, shape (..., V, 2)
-        The first `counts` rows are the vertices, counter-clockwise. One is a point, two a segment, none the empty set.
+        The first `counts` rows are the vertices, counter-clockwise: one for a point, two for a segment, none for the
+        empty set.
     counts : array_like of int, shape (...)
         Number of vertices.
 
     Raises
     ------
     TypeError
-        If a vertex or a count is no real number.
+        If a vertex or a count is not a real number.
     ValueError
-        If shapes disagree, a vertex is not finite or a count no whole number.
+        If shapes disagree, a vertex is not finite or a count is not a whole number.
 
     Notes
     -----
@@ -44,10 +45,10 @@ class ConvexPolygons:
     """
 
     def __init__(self, vertices: ArrayLike, counts: ArrayLike) -> None:
-        counted = real_values("counts", counts)
-        if not np.isfinite(counted).all() or (counted != np.floor(counted)).any():
+        numbers = real_values("counts", counts)
+        if not np.isfinite(numbers).all() or (numbers != np.floor(numbers)).any():
             raise ValueError(f"counts must be whole numbers: got {shown(counts)}")
-        self.counts: Integers = counted.astype(np.int64)
+        self.counts: Integers = numbers.astype(np.int64)
         self.vertices: Floats = real_values("vertices", vertices)
         if self.vertices.ndim < 2 or self.vertices.shape[-1] != 2 or self.vertices.shape[:-2] != self.counts.shape:
             raise ValueError(
@@ -62,12 +63,12 @@ class ConvexPolygons:
 
     @classmethod
     def from_points(cls, points: ArrayLike) -> ConvexPolygons:
-        """Convex hull of points.
+        """Return the convex hull of points.
 
         Parameters
         ----------
         points : array_like, shape (n, 2)
-            In any order; none gives the empty set.
+            Points in any order; no points give the empty set.
 
         Returns
         -------
@@ -77,22 +78,22 @@ class ConvexPolygons:
         Raises
         ------
         ValueError
-            If a point is not finite, or not of two coordinates.
+            If a point is not finite or does not have two coordinates.
         """
-        given = real_values("points", points)
-        if given.size and given.shape[1:] != (2,):
-            raise ValueError(f"points must have the shape (n, 2): got {given.shape}")
-        if not np.isfinite(given).all():
+        array = real_values("points", points)
+        if array.size and array.shape[1:] != (2,):
+            raise ValueError(f"points must have the shape (n, 2): got {array.shape}")
+        if not np.isfinite(array).all():
             raise ValueError("points must be finite")
-        if len(given) == 0:
+        if len(array) == 0:
             return cls.empty()
-        vertices = np.zeros((len(given), 2))
-        count = polygon_hull.hull(given, len(given), vertices)
+        vertices = np.zeros((len(array), 2))
+        count = polygon_hull.hull(array, len(array), vertices)
         return cls(vertices[:count], count)
 
     @classmethod
     def box(cls, x: tuple[float, float], y: tuple[float, float]) -> ConvexPolygons:
-        """Axis-parallel box from the intervals `x` and `y`; equal ends give a segment or a point.
+        """Return the axis-parallel box of the intervals `x` and `y`; equal ends give a segment or a point.
 
         Raises
         ------
@@ -107,7 +108,7 @@ class ConvexPolygons:
 
     @classmethod
     def empty(cls, shape: tuple[int, ...] = ()) -> ConvexPolygons:
-        """Empty sets, a batch of a `shape`."""
+        """Return a batch of empty sets."""
         return cls(np.zeros((*shape, 0, 2)), np.zeros(shape, dtype=np.int64))
 
     @property
@@ -117,7 +118,7 @@ class ConvexPolygons:
 
     @property
     def is_empty(self) -> NDArray[np.bool_]:
-        """Which are empty, shape (...)."""
+        """Whether each polygon is empty, shape (...)."""
         return np.asarray(self.counts == 0)
 
     def __len__(self) -> int:
@@ -153,7 +154,7 @@ class ConvexPolygons:
         return f"<{name}, area {self.area():.3g}>"
 
     def polygon(self) -> Floats:
-        """Vertices of a single polygon, shape (count, 2).
+        """Return the vertices of a single polygon, shape (count, 2).
 
         Raises
         ------
@@ -165,14 +166,14 @@ class ConvexPolygons:
         return self.vertices[: int(self.counts)].copy()
 
     def clip(self, normal: ArrayLike, lower: ArrayLike = -np.inf, upper: ArrayLike = np.inf) -> ConvexPolygons:
-        """Intersection with the band lower <= normal . p <= upper.
+        """Return the intersection with the band lower <= normal . p <= upper.
 
         Parameters
         ----------
         normal : array_like, shape (2,) or (..., 2)
-            Not zero; of any length.
+            Normal of the band, of any nonzero length.
         lower, upper : array_like, shape () or (...)
-            Bounds; infinite ones give half-planes, a reversed pair the empty set.
+            Bounds; infinite ones give half-planes, and lower > upper gives the empty set.
 
         Raises
         ------
@@ -182,10 +183,10 @@ class ConvexPolygons:
         normals = self._vectors(normal, "normal")
         if (np.abs(normals).max(axis=-1, initial=0.0) == 0.0).any():
             raise ValueError("the normal of a band must not be zero")
-        return self._make(2, _clip_each, normals, self._scalars(lower, "lower"), self._scalars(upper, "upper"))
+        return self._make(2, _clip_all, normals, self._scalars(lower, "lower"), self._scalars(upper, "upper"))
 
     def linear_map(self, matrix: ArrayLike) -> ConvexPolygons:
-        """Image under a matrix, shape (2, 2) or (..., 2, 2); a singular one gives segments or points.
+        """Return the image under a matrix, shape (2, 2) or (..., 2, 2); a singular one gives segments or points.
 
         Raises
         ------
@@ -195,29 +196,29 @@ class ConvexPolygons:
         matrices = self._spread(real_values("matrix", matrix), "matrix", (2, 2)).reshape(-1, 2, 2)
         if not np.isfinite(matrices).all():
             raise ValueError("matrix must be finite")
-        return self._make(0, _map_each, np.ascontiguousarray(matrices))
+        return self._make(0, _map_all, np.ascontiguousarray(matrices))
 
     def translate(self, offset: ArrayLike) -> ConvexPolygons:
-        """Move by an offset, shape (2,) or (..., 2)."""
+        """Return the polygons moved by an offset, shape (2,) or (..., 2)."""
         moved = self.vertices + np.reshape(self._vectors(offset, "offset"), (*self.shape, 1, 2))
         return ConvexPolygons(moved, self.counts)
 
     def add_segment(self, half: ArrayLike) -> ConvexPolygons:
-        """Minkowski sum with the segment from -half to +half, shape (2,) or (..., 2)."""
-        return self._make(2, _add_segment_each, self._vectors(half, "half"))
+        """Return the Minkowski sum with the segment from -half to +half, shape (2,) or (..., 2)."""
+        return self._make(2, _add_segment_all, self._vectors(half, "half"))
 
     def minkowski_sum(self, other: ConvexPolygons) -> ConvexPolygons:
-        """Minkowski sum with `other` polygons of the same batch shape, or with a single one."""
+        """Return the Minkowski sum with polygons of the same batch shape, or with a single polygon."""
         shape = self.shape if not other.shape else np.broadcast_shapes(self.shape, other.shape)
         first, second = self._broadcast(shape), other._broadcast(shape)
-        return first._make(second.vertices.shape[-2], _add_polygon_each, *second._flat())
+        return first._make(second.vertices.shape[-2], _add_polygon_all, *second._flat())
 
     def support(self, direction: ArrayLike) -> Floats:
-        """Support function: greatest direction . p, shape (...); -inf for the empty set."""
-        return self._measure(_support_each, self._vectors(direction, "direction"))[:, 0].reshape(self.shape)
+        """Return the support function max(direction . p), shape (...); -inf for the empty set."""
+        return self._measure(_support_all, self._vectors(direction, "direction"))[:, 0].reshape(self.shape)
 
     def support_vector(self, direction: ArrayLike) -> Floats:
-        """A vertex farthest along a direction, shape (..., 2).
+        """Return a vertex farthest along a direction, shape (..., 2).
 
         Raises
         ------
@@ -225,22 +226,22 @@ class ConvexPolygons:
             If a set is empty.
         """
         self._need_points("support vector")
-        return self._measure(_support_each, self._vectors(direction, "direction"))[:, 1:].reshape(*self.shape, 2)
+        return self._measure(_support_all, self._vectors(direction, "direction"))[:, 1:].reshape(*self.shape, 2)
 
     def margin(self, point: ArrayLike) -> Floats:
-        """Signed distance of a `point`, shape (2,) or (..., 2), to the boundary: positive inside, -inf if empty."""
-        return self._measure(_margin_each, self._vectors(point, "point"))[:, 0].reshape(self.shape)
+        """Signed distance of a point, shape (2,) or (..., 2), to the boundary; positive inside, -inf if empty."""
+        return self._measure(_margin_all, self._vectors(point, "point"))[:, 0].reshape(self.shape)
 
     def contains(self, point: ArrayLike) -> NDArray[np.bool_]:
-        """Whether a `point`, shape (2,) or (..., 2), lies inside or on the boundary."""
+        """Return whether a point, shape (2,) or (..., 2), lies inside or on the boundary."""
         return np.asarray(self.margin(point) >= 0.0)
 
     def area(self) -> Floats:
-        """Area, shape (...)."""
-        return self._measure(_area_each, np.zeros((self.counts.size, 2)))[:, 0].reshape(self.shape)
+        """Return the area, shape (...)."""
+        return self._measure(_area_all, np.zeros((self.counts.size, 2)))[:, 0].reshape(self.shape)
 
     def centroid(self) -> Floats:
-        """Centroid, shape (..., 2).
+        """Return the centroid, shape (..., 2).
 
         Raises
         ------
@@ -248,10 +249,10 @@ class ConvexPolygons:
             If a set is empty.
         """
         self._need_points("centroid")
-        return self._measure(_centroid_each, np.zeros((self.counts.size, 2)))[:, :2].reshape(*self.shape, 2)
+        return self._measure(_centroid_all, np.zeros((self.counts.size, 2)))[:, :2].reshape(*self.shape, 2)
 
     def bounding_box(self) -> tuple[Floats, Floats]:
-        """Least and greatest coordinates, two arrays of shape (..., 2).
+        """Return the least and the greatest coordinates, two arrays of shape (..., 2).
 
         Raises
         ------
@@ -263,7 +264,7 @@ class ConvexPolygons:
         return np.stack((-ends[0], -ends[1]), axis=-1), np.stack(ends[2:], axis=-1)
 
     def reduce_outward(self, cap: int) -> ConvexPolygons:
-        """Polygons of at most `cap` (>= 4) vertices that contain these, by dropping edges of least added area.
+        """Return polygons of at most `cap` (>= 4) vertices that contain these, by removing edges with least added area.
 
         Raises
         ------
@@ -271,11 +272,11 @@ class ConvexPolygons:
             If `cap` is less than 4.
         """
         _CAP.need("cap", cap)
-        return self._make(0, _reduce_each, np.full(self.counts.size, cap))
+        return self._make(0, _reduce_all, np.full(self.counts.size, cap))
 
-    def _need_points(self, what: str) -> None:
+    def _need_points(self, quantity: str) -> None:
         if self.is_empty.any():
-            raise ValueError(f"the empty set has no {what}")
+            raise ValueError(f"the empty set has no {quantity}")
 
     def _vectors(self, value: ArrayLike, name: str) -> Floats:
         vectors = real_values(name, value)
@@ -290,7 +291,7 @@ class ConvexPolygons:
         return np.ascontiguousarray(self._spread(scalars, name, ()).reshape(-1))
 
     def _spread(self, values: Floats, name: str, last: tuple[int, ...]) -> Floats:
-        """Broadcast over the batch; `last` is the shape of what belongs to one polygon."""
+        """Broadcast values over the batch; `last` is the shape of the value for one polygon."""
         shape = (*self.shape, *last)
         with contextlib.suppress(ValueError):
             if not last or values.shape[-len(last) :] == last:
@@ -309,20 +310,20 @@ class ConvexPolygons:
         vertices = np.require(self.vertices.reshape(self.counts.size, room, 2), requirements=["C", "W"])
         return vertices, np.require(self.counts.reshape(-1), requirements=["C", "W"])
 
-    def _make(self, more: int, each: Callable[..., None], *arguments: object) -> ConvexPolygons:
-        """Apply an operation that makes polygons of at most `more` vertices more than these have."""
+    def _make(self, more: int, kernel: Callable[..., None], *arguments: object) -> ConvexPolygons:
+        """Apply a kernel whose results have at most `more` vertices more than these polygons."""
         vertices, counts = self._flat()
         out = np.zeros((counts.size, vertices.shape[1] + more, 2))
         made = np.zeros(counts.size, dtype=np.int64)
-        each(vertices, counts, out, made, *arguments)
+        kernel(vertices, counts, out, made, *arguments)
         room = int(made.max(initial=0))
         return ConvexPolygons(out[:, :room].reshape(*self.shape, room, 2), made.reshape(self.shape))
 
-    def _measure(self, each: Callable[..., None], vectors: Floats) -> Floats:
-        """Apply an operation that gives up to three numbers a polygon."""
+    def _measure(self, kernel: Callable[..., None], vectors: Floats) -> Floats:
+        """Apply a kernel that computes up to three numbers for each polygon."""
         vertices, counts = self._flat()
         out = np.zeros((counts.size, 3))
-        each(vertices, counts, vectors, out)
+        kernel(vertices, counts, vectors, out)
         return out
 
 
@@ -334,7 +335,7 @@ def _copy(vertices: Floats, count: int, out: Floats) -> None:
 
 
 @compiled
-def _clip_each(
+def _clip_all(
     vertices: Floats, counts: Integers, out: Floats, made: Integers, normal: Floats, lower: Floats, upper: Floats
 ) -> None:
     for i in range(counts.size):
@@ -343,21 +344,21 @@ def _clip_each(
 
 
 @compiled
-def _map_each(vertices: Floats, counts: Integers, out: Floats, made: Integers, matrix: Floats) -> None:
+def _map_all(vertices: Floats, counts: Integers, out: Floats, made: Integers, matrix: Floats) -> None:
     for i in range(counts.size):
         m = matrix[i]
         made[i] = polygon.map_linearly(vertices[i], counts[i], m[0, 0], m[0, 1], m[1, 0], m[1, 1], out[i])
 
 
 @compiled
-def _add_segment_each(vertices: Floats, counts: Integers, out: Floats, made: Integers, half: Floats) -> None:
+def _add_segment_all(vertices: Floats, counts: Integers, out: Floats, made: Integers, half: Floats) -> None:
     for i in range(counts.size):
         _copy(vertices[i], counts[i], out[i])
         made[i] = polygon_sum.add_segment(out[i], counts[i], half[i, 0], half[i, 1])
 
 
 @compiled
-def _add_polygon_each(
+def _add_polygon_all(
     vertices: Floats, counts: Integers, out: Floats, made: Integers, other: Floats, other_counts: Integers
 ) -> None:
     for i in range(counts.size):
@@ -365,14 +366,14 @@ def _add_polygon_each(
 
 
 @compiled
-def _reduce_each(vertices: Floats, counts: Integers, out: Floats, made: Integers, cap: Integers) -> None:
+def _reduce_all(vertices: Floats, counts: Integers, out: Floats, made: Integers, cap: Integers) -> None:
     for i in range(counts.size):
         _copy(vertices[i], counts[i], out[i])
         made[i] = polygon_hull.reduce_outward(out[i], counts[i], cap[i])
 
 
 @compiled
-def _support_each(vertices: Floats, counts: Integers, direction: Floats, out: Floats) -> None:
+def _support_all(vertices: Floats, counts: Integers, direction: Floats, out: Floats) -> None:
     for i in range(counts.size):
         if counts[i] == 0:
             out[i, 0] = -np.inf
@@ -385,18 +386,18 @@ def _support_each(vertices: Floats, counts: Integers, direction: Floats, out: Fl
 
 
 @compiled
-def _margin_each(vertices: Floats, counts: Integers, point: Floats, out: Floats) -> None:
+def _margin_all(vertices: Floats, counts: Integers, point: Floats, out: Floats) -> None:
     for i in range(counts.size):
         out[i, 0] = polygon.margin(vertices[i], counts[i], point[i, 0], point[i, 1])
 
 
 @compiled
-def _area_each(vertices: Floats, counts: Integers, unused: Floats, out: Floats) -> None:
+def _area_all(vertices: Floats, counts: Integers, unused: Floats, out: Floats) -> None:
     for i in range(counts.size):
         out[i, 0] = polygon.area(vertices[i], counts[i])
 
 
 @compiled
-def _centroid_each(vertices: Floats, counts: Integers, unused: Floats, out: Floats) -> None:
+def _centroid_all(vertices: Floats, counts: Integers, unused: Floats, out: Floats) -> None:
     for i in range(counts.size):
         out[i, 0], out[i, 1] = polygon.centroid(vertices[i], counts[i])

@@ -184,9 +184,8 @@ def bound_leaving(
         width = last_dead - first_dead
         tau = (first - travelled) / law.closing_speed
         least, greatest = extremes_along(outlines[0], counts[0], tau)
-        margin = SLACK * (abs(least) + abs(greatest)) + width * (abs(least) + abs(greatest)) / max(
-            first - travelled, 1.0
-        )
+        magnitude = abs(least) + abs(greatest)
+        margin = SLACK * magnitude + width * magnitude / max(first - travelled, 1.0)
         drift = 0.5 * law.disturbance * tau * tau
         pieces[0, LEAST], pieces[0, GREATEST] = least - margin - drift, greatest + margin + drift
         pieces[0, NEAREST], pieces[0, FARTHEST] = first_dead, last_dead

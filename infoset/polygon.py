@@ -1,12 +1,12 @@
 """Compiled operations on one convex polygon of the plane.
 
 A polygon is an array `points` of shape (capacity, 2) whose first `count` rows are its vertices, counter-clockwise.
-One vertex is a point and two are a segment: they are polygons like any other; none is the empty set.
+One vertex is a point, two are a segment, and none is the empty set; all operations accept them.
 Operations that may change the number of vertices write to `out`, which must not overlap `points`, and return the
 new count. No tolerance is absolute: a cut or a sum is exact up to rounding of the coordinates, a few ulp.
 
-Rounding leaves a polygon convex only up to a few ulp: a tiny edge may point anywhere, vertices may coincide, those of
-a set as thin as rounding may come in any order. Every operation stands that.
+Because of rounding, a polygon is convex only up to a few ulp: the direction of a tiny edge is arbitrary, vertices may
+coincide, and the vertices of a set as thin as the rounding error may have any order. All operations accept that.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from infoset._compile import compiled, inlined
 
 Points = NDArray[np.float64]
 
-# A difference of heights below this, relative to the products it is made of, may be rounding.
+# A difference of heights may be a rounding error if it is below this, relative to the products in the heights.
 ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
 
 SMALLEST = float(np.finfo(np.float64).tiny)
@@ -41,7 +41,7 @@ def unsigned(i: int) -> Any:
 
 @inlined
 def move(points: Points, source: int, target: int) -> None:
-    """Copy a vertex to another place."""
+    """Copy a vertex to another row."""
     i, j = unsigned(source), unsigned(target)
     points[j, 0] = points[i, 0]
     points[j, 1] = points[i, 1]
@@ -59,7 +59,7 @@ def append(out: Points, count: int, x: float, y: float) -> int:
 
 @inlined
 def close(out: Points, count: int) -> int:
-    """Drop trailing vertices that repeat the first; return the new count."""
+    """Remove trailing vertices that repeat the first; return the new count."""
     while count > 1 and out[count - 1, 0] == out[0, 0] and out[count - 1, 1] == out[0, 1]:
         count -= 1
     return count
@@ -67,17 +67,17 @@ def close(out: Points, count: int) -> int:
 
 @inlined
 def height(points: Points, i: int, normal_x: float, normal_y: float) -> float:
-    """How far a vertex lies along a direction: normal . p."""
+    """Height of a vertex along a direction: normal . p."""
     return float(normal_x * points[i, 0] + normal_y * points[i, 1])
 
 
 @inlined
 def crossing(points: Points, i: int, j: int, normal_x: float, normal_y: float, level: float) -> tuple[float, float]:
-    """Point of the edge i-j at a level of `normal . p`, counted from its nearer end: least rounding.
+    """Return the point of the edge i-j at a level of `normal . p`, interpolated from the nearer end.
 
     Notes
     -----
-    The same point, bit for bit, whichever way the edge is run: a cut segment stays a segment.
+    The result does not depend, bit for bit, on the order of i and j, so that a cut segment stays a segment.
     """
     height_i = height(points, i, normal_x, normal_y)
     height_j = height(points, j, normal_x, normal_y)
@@ -97,16 +97,16 @@ def crossing(points: Points, i: int, j: int, normal_x: float, normal_y: float, l
 
 @compiled
 def cut_cap(points: Points, count: int, top: int, normal_x: float, normal_y: float, level: float) -> int:
-    """Cut off, in place, what is higher than a level; vertex `top` is higher, another is not.
+    """Remove, in place, the part higher than a level. Vertex `top` must be higher, and some vertex must not be.
 
     Parameters
     ----------
     points, count : polygon
-        With room for one vertex more.
+        The array needs room for one more vertex.
     top : int
         The highest vertex.
     normal_x, normal_y, level : float
-        Kept is normal . p <= level.
+        The result satisfies normal . p <= level.
 
     Returns
     -------
@@ -115,8 +115,8 @@ def cut_cap(points: Points, count: int, top: int, normal_x: float, normal_y: flo
 
     Notes
     -----
-    O(count). The run of high vertices about the top is replaced by the two points where the boundary crosses the
-    level: only that run, so rounding elsewhere cannot tear the polygon.
+    O(count). The two points where the boundary crosses the level replace the sequence of high vertices around the top;
+    other vertices do not change, so that rounding errors elsewhere have no effect.
     """
     first = last = top
     before = first - 1 if first > 0 else count - 1
@@ -129,13 +129,13 @@ def cut_cap(points: Points, count: int, top: int, normal_x: float, normal_y: flo
         after = last + 1 if last + 1 < count else 0
     x, y = crossing(points, before, first, normal_x, normal_y, level)
     other_x, other_y = crossing(points, last, after, normal_x, normal_y, level)
-    # A border through a vertex, or both crossings in one place, adds no vertex.
+    # A line through a vertex, or two equal crossings, adds no vertex.
     entering = height(points, before, normal_x, normal_y) < level and (x != other_x or y != other_y)
     leaving = height(points, after, normal_x, normal_y) < level
     added = int(entering) + int(leaving)
     if first <= last:
         kept = count - last - 1
-        place = first
+        target = first
         step = first + added - (last + 1)
         if step > 0:
             for i in range(count - 1, last, -1):
@@ -145,15 +145,15 @@ def cut_cap(points: Points, count: int, top: int, normal_x: float, normal_y: flo
                 move(points, i, i + step)
         count = first + added + kept
     else:
-        place = first - last - 1
-        for i in range(place):
+        target = first - last - 1
+        for i in range(target):
             move(points, i + last + 1, i)
-        count = place + added
+        count = target + added
     if entering:
-        put(points, place, x, y)
-        place += 1
+        put(points, target, x, y)
+        target += 1
     if leaving:
-        put(points, place, other_x, other_y)
+        put(points, target, other_x, other_y)
     return count
 
 
@@ -161,14 +161,14 @@ def cut_cap(points: Points, count: int, top: int, normal_x: float, normal_y: flo
 def clip_to_band(
     points: Points, count: int, normal_x: float, normal_y: float, lower: float, upper: float
 ) -> tuple[int, float]:
-    """Intersection, in place, with the band lower <= normal . p <= upper.
+    """Intersect in place with the band lower <= normal . p <= upper.
 
     Parameters
     ----------
     points, count : polygon
-        With room for two vertices more.
+        The array needs room for two more vertices.
     normal_x, normal_y : float
-        Normal of the band, of any length but zero.
+        Normal of the band, of any nonzero length.
     lower, upper : float
         Bounds; infinite ones give a half-plane.
 
@@ -177,11 +177,11 @@ def clip_to_band(
     count : int
         Vertices of the intersection; 0 if it is empty.
     overlap : float
-        Least overlap of the polygon and the band across either border; negative is the distance between them.
+        Smaller overlap of polygon and band at the two borders; minus their distance if they do not intersect.
 
     Notes
     -----
-    O(count). A vertex on the border is inside. An axis-parallel cut leaves its vertices exactly on its line.
+    O(count). A vertex on a border is inside. The new vertices of an axis-parallel cut lie exactly on its line.
     """
     if count == 0 or lower > upper:
         return 0, -np.inf
@@ -194,7 +194,7 @@ def clip_to_band(
     if greatest > upper:
         count = cut_cap(points, count, top, normal_x, normal_y, upper)
         bottom, top = extremes(points, count, normal_x, normal_y)
-        # Across a band as thin as rounding the cut itself may lie an ulp below the lower border: keep the cut.
+        # If the band is as thin as the rounding error, the cut may lie an ulp below the lower border: keep the cut.
         lower = min(lower, height(points, top, normal_x, normal_y))
         least = height(points, bottom, normal_x, normal_y)
     if least < lower:
@@ -204,7 +204,7 @@ def clip_to_band(
 
 @inlined
 def extremes(points: Points, count: int, normal_x: float, normal_y: float) -> tuple[int, int]:
-    """Indices of a lowest and a highest vertex along a direction: the first of equals."""
+    """Return the indices of a lowest and a highest vertex along a direction; of equal ones the first."""
     least = np.inf
     greatest = -np.inf
     bottom = top = 0
@@ -229,7 +229,7 @@ def translate(points: Points, count: int, x: float, y: float) -> None:
 
 @compiled
 def map_linearly(points: Points, count: int, xx: float, xy: float, yx: float, yy: float, out: Points) -> int:
-    """Image under the matrix [[xx, xy], [yx, yy]]; a singular one gives a segment or a point. O(count)."""
+    """Write the image under the matrix [[xx, xy], [yx, yy]]; a singular one gives a segment or a point. O(count)."""
     determinant = scaled_determinant(xx, xy, yx, yy)
     made = 0
     for i in range(count):
@@ -251,7 +251,7 @@ def map_linearly(points: Points, count: int, xx: float, xy: float, yx: float, yy
 
 @compiled
 def scaled_determinant(xx: float, xy: float, yx: float, yy: float) -> float:
-    """Determinant of a matrix divided by a power of two near its largest entry, lest it underflow or overflow."""
+    """Determinant of a matrix divided by a power of two near its largest entry, against underflow and overflow."""
     exponent = math.frexp(max(abs(xx), abs(xy), abs(yx), abs(yy)))[1]
     return cross(
         math.ldexp(xx, -exponent), math.ldexp(yx, -exponent), math.ldexp(xy, -exponent), math.ldexp(yy, -exponent)
@@ -260,7 +260,7 @@ def scaled_determinant(xx: float, xy: float, yx: float, yy: float) -> float:
 
 @inlined
 def support_index(points: Points, count: int, normal_x: float, normal_y: float) -> int:
-    """Index of a vertex farthest along a direction: the first of equals. O(count)."""
+    """Return the index of a vertex farthest along a direction; of equal ones the first. O(count)."""
     best = 0
     best_height = normal_x * points[0, 0] + normal_y * points[0, 1]
     for i in range(1, count):
@@ -300,11 +300,11 @@ def fan_area(points: Points, i: int) -> float:
 
 @compiled
 def centroid(points: Points, count: int) -> tuple[float, float]:
-    """Centroid of a polygon that is not empty; the middle of a segment or of a set without area.
+    """Return the centroid of a nonempty polygon; the middle of a segment or of a set without area.
 
     Notes
     -----
-    O(count). A convex combination of the triangles of a fan, so it lies in the hull however thin the polygon is.
+    O(count). It is a convex combination of the centroids of a triangle fan, so that it lies in the hull.
     """
     weight = 0.0
     x = 0.0
@@ -331,35 +331,35 @@ def centroid(points: Points, count: int) -> tuple[float, float]:
 def pass_edge(
     nearest: float, inside: bool, start: tuple[float, float], end: tuple[float, float], x: float, y: float
 ) -> tuple[float, bool]:
-    """Square of the distance from (x, y) to the nearest edge so far, and whether it is inside so far, one edge on.
+    """Add one edge to the squared distance of (x, y) to the boundary and to the parity test for inside.
 
     Notes
     -----
-    Without a branch: which edges are near cannot be foretold, and a wrong guess costs more than a division.
+    Without branches: a mispredicted branch costs more than a division.
     """
     edge_x, edge_y = end[0] - start[0], end[1] - start[1]
     from_x, from_y = x - start[0], y - start[1]
     to_x, to_y = x - end[0], y - end[1]
-    beside = cross(edge_x, edge_y, from_x, from_y)
+    offset = cross(edge_x, edge_y, from_x, from_y)
     squared_length = edge_x * edge_x + edge_y * edge_y
     along = from_x * edge_x + from_y * edge_y
-    off_line = beside * beside / max(squared_length, SMALLEST)
+    off_line = offset * offset / max(squared_length, SMALLEST)
     off_start, off_end = from_x * from_x + from_y * from_y, to_x * to_x + to_y * to_y
     squared = off_line if along < squared_length else off_end
     squared = squared if along > 0.0 else off_start
     rises = end[1] > start[1]
-    inside ^= ((end[1] > y) != (start[1] > y)) & ((beside > 0.0) == rises)
+    inside ^= ((end[1] > y) != (start[1] > y)) & ((offset > 0.0) == rises)
     return min(nearest, squared), inside
 
 
 @compiled
 def margin(points: Points, count: int, x: float, y: float) -> float:
-    """Signed distance from (x, y) to the boundary: positive inside, negative outside, -inf for the empty set.
+    """Return the signed distance from (x, y) to the boundary: positive inside, negative outside, -inf if empty.
 
     Notes
     -----
-    O(count). Inside or outside is decided by the parity of the edges to the right, the distance by the nearest
-    edge: an edge of a few ulp that points the wrong way spoils neither, as it would the signed distance to a line.
+    O(count). The parity of the edges to the right gives the sign, and the nearest edge the distance. An edge of a few
+    ulp with a wrong direction has no effect on either; the signed distance to its line would be wrong.
     """
     nearest = np.inf
     inside = False

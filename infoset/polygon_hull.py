@@ -1,4 +1,4 @@
-"""Compiled convex hulls, and polygons with fewer vertices around a polygon, as `polygon` has them."""
+"""Compiled convex hulls, and outer approximations of polygons by fewer vertices, stored as in `polygon`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from infoset.polygon import ROUNDING, Points, append, close, cross
 
 @compiled
 def hull(points: Points, count: int, out: Points) -> int:
-    """Convex hull of any points: counter-clockwise, without repeated vertices or vertices along an edge.
+    """Write the convex hull of points: counter-clockwise, without repeated vertices or vertices along an edge.
 
     Parameters
     ----------
@@ -26,9 +26,8 @@ def hull(points: Points, count: int, out: Points) -> int:
 
     Notes
     -----
-    Andrew's monotone chain: O(count) once the points are in order; putting them so takes O(count^2) at worst. A
-    point is dropped where it sticks out by less than rounding. The directions of the edges increase strictly,
-    rounding or not.
+    Andrew's monotone chain: O(count) for sorted points; the sort takes O(count^2) in the worst case. Points that
+    protrude by less than rounding are removed. The directions of the edges increase strictly in spite of rounding.
 
     References
     ----------
@@ -58,7 +57,7 @@ def hull(points: Points, count: int, out: Points) -> int:
 
 @compiled
 def sort_points(points: Points, count: int) -> None:
-    """Order points by x, then by y, in place, by insertion: O(count) if they are nearly in order."""
+    """Sort points by x, then by y, in place, by insertion: O(count) if they are nearly sorted."""
     for i in range(1, count):
         x = points[i, 0]
         y = points[i, 1]
@@ -73,7 +72,7 @@ def sort_points(points: Points, count: int) -> None:
 
 @allocation_free
 def drop_turned(out: Points, made: int, fewest: int, x: float, y: float) -> int:
-    """Drop last vertices, down to `fewest`, at which the way to (x, y) does not turn left; return the new count."""
+    """Remove last vertices, down to `fewest`, at which the path to (x, y) does not turn left; return the new count."""
     while made > fewest:
         along_x = out[made - 1, 0] - out[made - 2, 0]
         along_y = out[made - 1, 1] - out[made - 2, 1]
@@ -85,7 +84,7 @@ def drop_turned(out: Points, made: int, fewest: int, x: float, y: float) -> int:
 
 @compiled
 def drop_repeats(points: Points, count: int) -> int:
-    """Drop vertices that repeat the one before, in place; return the new count. O(count)."""
+    """Remove vertices that repeat the previous one, in place; return the new count. O(count)."""
     made = 0
     for i in range(count):
         made = append(points, made, points[i, 0], points[i, 1])
@@ -94,12 +93,12 @@ def drop_repeats(points: Points, count: int) -> int:
 
 @compiled
 def reduce_outward(points: Points, count: int, cap: int) -> int:
-    """Drop edges, in place, until at most `cap` vertices are left; the result contains the polygon.
+    """Remove edges, in place, until at most `cap` vertices are left; the result contains the polygon.
 
     Parameters
     ----------
     cap : int
-        At least 4: a convex polygon of five vertices always has an edge that can go.
+        At least 4, because a convex polygon of five vertices always has an edge that can be removed.
 
     Returns
     -------
@@ -108,8 +107,9 @@ def reduce_outward(points: Points, count: int, cap: int) -> int:
 
     Notes
     -----
-    The edge whose neighbours, extended until they meet, add least area goes first. O(count) an edge. Where rounding
-    has turned an edge the wrong way the hull is taken first; a hull too thin for that becomes a rectangle.
+    An edge is removed by extending its neighbours to their intersection; the edge that adds the least area is removed
+    first, at O(count) per edge. If rounding has given an edge a wrong direction, the hull is taken first; a rectangle
+    replaces a hull that is too thin.
     """
     is_hull = False
     while count > cap:
@@ -133,11 +133,11 @@ def reduce_outward(points: Points, count: int, cap: int) -> int:
 
 @allocation_free
 def cheapest_edge(points: Points, count: int, first: int, last: int) -> tuple[int, float, float]:
-    """First vertex of the edge that costs least area to drop, and where its neighbours meet; -1 if not convex.
+    """Return the edge whose removal adds the least area, and where its neighbours meet; -1 if not convex.
 
     Notes
     -----
-    Only the edges whose first vertex is one of first .. last can go: all of them, or those inside a chain.
+    Only the edges whose first vertex is one of first .. last are considered: all edges, or those inside a chain.
     """
     least = np.inf
     chosen = -1
@@ -163,7 +163,7 @@ def cheapest_edge(points: Points, count: int, first: int, last: int) -> tuple[in
         added = reach * bend
         x = points[i, 0] + reach * from_x
         y = points[i, 1] + reach * from_y
-        # The new vertex must not fall short of the far end of the edge: at a sharp tip that would cut the tip off.
+        # The new vertex must not be before the far end of the edge: that would cut off a sharp tip.
         if added < least and (points[j, 0] - x) * to_x + (points[j, 1] - y) * to_y >= 0.0:
             least = added
             chosen = i
@@ -174,7 +174,7 @@ def cheapest_edge(points: Points, count: int, first: int, last: int) -> tuple[in
 
 @compiled
 def make_rectangle(points: Points, count: int) -> int:
-    """Replace a polygon by the rectangle around it along its longest direction from vertex 0, in place. O(count)."""
+    """Replace a polygon by its bounding rectangle along the longest direction from vertex 0, in place. O(count)."""
     origin_x = points[0, 0]
     origin_y = points[0, 1]
     length = 0.0

@@ -1,4 +1,4 @@
-"""Compiled Minkowski sums of convex polygons, as `polygon` has them: with a segment, and with one another."""
+"""Compiled Minkowski sums of convex polygons, stored as in `polygon`, with segments and with polygons."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def add_segment(points: Points, count: int, half_x: float, half_y: float) -> int
     Parameters
     ----------
     points, count : polygon
-        With room for two vertices more.
+        The array needs room for two more vertices.
     half_x, half_y : float
         Half of the segment.
 
@@ -27,10 +27,10 @@ def add_segment(points: Points, count: int, half_x: float, half_y: float) -> int
 
     Notes
     -----
-    O(count). The boundary is cut where it is extreme across the segment; the part to the right of the segment's
-    direction moves by +half, the rest by -half. Cutting at extremes, not where edges change sign, keeps the result
-    sound when rounding makes tiny edges turn the wrong way. Where rounding could mistake an extreme - an edge along
-    the segment, a set thin across it, a point - `add_segment_carefully` does the work.
+    O(count). The boundary is divided at its extremes across the segment; the part to the right of the segment's
+    direction moves by +half, the rest by -half. A division at extremes, and not at sign changes of edges, is correct
+    for tiny edges with a wrong direction. If rounding could hide an extreme (an edge along the segment, a set thin
+    across it, a point), `add_segment_carefully` computes the sum.
     """
     if count == 0 or (half_x == 0.0 and half_y == 0.0):
         return count
@@ -39,24 +39,24 @@ def add_segment(points: Points, count: int, half_x: float, half_y: float) -> int
         return add_segment_carefully(points, count, half_x, half_y)
     if bottom < top:
         half_x, half_y = -half_x, -half_y
-    # Unsigned indices spare the check for negative ones, which costs as much as the rest of this loop.
+    # Unsigned indices avoid the test for negative ones, which takes as long as the rest of this loop.
     turns = unsigned(bottom), unsigned(top)
-    place = unsigned(count + 2)
+    target = unsigned(count + 2)
     for k in range(count):
         i = unsigned(count - 1 - k)
         x, y = points[i, 0], points[i, 1]
-        place -= unsigned(1)
-        put(points, place, x + half_x, y + half_y)
+        target -= unsigned(1)
+        put(points, target, x + half_x, y + half_y)
         if i in turns:
             half_x, half_y = -half_x, -half_y
-            place -= unsigned(1)
-            put(points, place, x + half_x, y + half_y)
+            target -= unsigned(1)
+            put(points, target, x + half_x, y + half_y)
     return count + 2
 
 
 @inlined
 def is_lowest(points: Points, count: int, i: int, x: float, y: float) -> bool:
-    """Whether a vertex is lower across (x, y) than its neighbours by more than rounding."""
+    """Whether a vertex is lower, across (x, y), than its neighbours by more than rounding."""
     before = i - 1 if i > 0 else count - 1
     after = i + 1 if i + 1 < count else 0
     height = cross(x, y, points[i, 0], points[i, 1])
@@ -68,14 +68,14 @@ def is_lowest(points: Points, count: int, i: int, x: float, y: float) -> bool:
 
 @compiled
 def add_segment_carefully(points: Points, count: int, half_x: float, half_y: float) -> int:
-    """Minkowski sum, in place, of a segment and any set: with an edge along it, as thin as rounding, a point.
+    """Minkowski sum, in place, with a segment, for all sets: thin ones, points, edges along the segment.
 
     Notes
     -----
-    O(count). Heights are counted from a vertex, so that their rounding is relative to the set's own size. In a set
-    longer along the segment than across it the hindmost and foremost vertices are certain, and the lowest is sought
-    only from the one to the other, the highest only on the way back: taken on the wrong side, it would leave the
-    foremost behind. In a set longer across the segment it is the lowest and highest that are certain.
+    O(count). Heights are relative to a vertex, so that their rounding errors are relative to the size of the set. If
+    the set is longer along the segment than across it, rounding does not affect which vertices are first and last along
+    the segment: the lowest vertex is searched between the first and the last, and the highest between the last and the
+    first. Otherwise rounding does not affect which vertices are lowest and highest.
     """
     source = points[:count].copy()
     scale = max(abs(half_x), abs(half_y))
@@ -115,7 +115,7 @@ def add_segment_carefully(points: Points, count: int, half_x: float, half_y: flo
 
 @compiled
 def lowest_between(points: Points, count: int, first: int, last: int, x: float, y: float) -> tuple[int, int]:
-    """First and last of the vertices lowest across (x, y) from vertex first to vertex last, counter-clockwise."""
+    """First and last of the lowest vertices across (x, y) between two vertices, counter-clockwise."""
     lowest = 0.0
     lowest_first = lowest_last = first
     i = first
@@ -132,7 +132,7 @@ def lowest_between(points: Points, count: int, first: int, last: int, x: float, 
 
 @compiled
 def level_stretch(points: Points, count: int, i: int, x: float, y: float) -> tuple[int, int]:
-    """First and last of the vertices around vertex i that are exactly as high as it across (x, y)."""
+    """First and last of the vertices next to vertex i that have exactly its height across (x, y)."""
     first = last = i
     for _ in range(count - 1):
         before = first - 1 if first > 0 else count - 1
@@ -149,7 +149,7 @@ def level_stretch(points: Points, count: int, i: int, x: float, y: float) -> tup
 
 @compiled
 def append_moved(points: Points, count: int, first: int, last: int, x: float, y: float, out: Points, made: int) -> int:
-    """Add the vertices from first to last, counter-clockwise, moved by (x, y); return the new count."""
+    """Append the vertices from first to last, counter-clockwise, moved by (x, y); return the new count."""
     i = first
     while True:
         made = append(out, made, points[i, 0] + x, points[i, 1] + y)
@@ -160,7 +160,7 @@ def append_moved(points: Points, count: int, first: int, last: int, x: float, y:
 
 @compiled
 def lowest_index(points: Points, count: int) -> int:
-    """Index of the lowest vertex, the leftmost of equally low ones."""
+    """Index of the lowest vertex; of equally low ones the leftmost."""
     best = 0
     for i in range(1, count):
         if points[i, 1] < points[best, 1] or (points[i, 1] == points[best, 1] and points[i, 0] < points[best, 0]):
@@ -170,7 +170,7 @@ def lowest_index(points: Points, count: int) -> int:
 
 @compiled
 def add_polygon(points: Points, count: int, other: Points, other_count: int, out: Points) -> int:
-    """Minkowski sum with another convex polygon, by merging their edges in order of direction.
+    """Write the Minkowski sum of two convex polygons by merging their edges in order of direction.
 
     Parameters
     ----------
@@ -184,9 +184,9 @@ def add_polygon(points: Points, count: int, other: Points, other_count: int, out
 
     Notes
     -----
-    O(count + other_count); more if rounding has turned an edge of either the wrong way, for then its hull is taken
-    first: one tiny edge out of order would spoil the whole merge. Each vertex of the sum is one addition of two
-    vertices: nothing accumulates.
+    O(count + other_count). If rounding has given an edge a wrong direction, the hull is taken first, which costs more:
+    the merge needs edges in order. Each vertex of the sum is one addition of two vertices, so that rounding errors do
+    not accumulate.
     """
     if count == 0 or other_count == 0:
         return 0
@@ -221,7 +221,7 @@ def add_polygon(points: Points, count: int, other: Points, other_count: int, out
 
 @compiled
 def with_edges_in_order(points: Points, count: int) -> tuple[Points, int]:
-    """The polygon itself, or its hull where rounding has turned an edge the wrong way."""
+    """Return the polygon, or its hull if rounding has given an edge a wrong direction."""
     if edges_in_order(points, count):
         return points, count
     ordered = np.empty((count, 2))
@@ -230,7 +230,7 @@ def with_edges_in_order(points: Points, count: int) -> tuple[Points, int]:
 
 @compiled
 def edges_in_order(points: Points, count: int) -> bool:
-    """Whether the edges' directions, from the lowest vertex on, go round once without turning back. O(count)."""
+    """Whether the directions of the edges, from the lowest vertex on, increase over one revolution. O(count)."""
     if count == 1:
         return True
     i = lowest_index(points, count)
@@ -250,7 +250,7 @@ def edges_in_order(points: Points, count: int) -> bool:
 
 @compiled
 def direction_order(ax: float, ay: float, bx: float, by: float) -> int:
-    """1 if direction a comes before b counted counter-clockwise from +x, -1 if after, 0 if they agree."""
+    """Return 1 if direction a is before b, counter-clockwise from +x, -1 if it is after, and 0 if they are equal."""
     a_returns = ay < 0.0 or (ay == 0.0 and ax < 0.0)
     b_returns = by < 0.0 or (by == 0.0 and bx < 0.0)
     if a_returns != b_returns:

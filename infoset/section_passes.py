@@ -358,8 +358,8 @@ def margin_in(origins: Floats, rings: Floats, marks: Integers, n: int, tau: floa
         offset_v = tau * (origins[n, side, chains.V_ORIGIN] - v + origins[n, side, chains.V_REST])
         offset_z = chains.origin_height(origins, n, side, tau) - z
         for i in range(chains.begin_of(marks, n, side), chains.end_of(marks, n, side)):
-            own_v, own_m = chains.read(rings, chains.place(marks, n, side, i))
-            vertex = (tau * own_v + offset_v, (own_m - tau * own_v) + offset_z)
+            chain_v, chain_m = chains.read(rings, chains.offset_of(marks, n, side, i))
+            vertex = (tau * chain_v + offset_v, (chain_m - tau * chain_v) + offset_z)
             nearest, inside = polygon.pass_edge(nearest, inside, last, vertex, 0.0, 0.0)
             last = vertex
     return math.sqrt(nearest) if inside else -math.sqrt(nearest)

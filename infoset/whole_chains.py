@@ -20,7 +20,7 @@ from infoset.chains import (
     begin_of,
     count_of,
     end_of,
-    place,
+    offset_of,
     put,
     read,
     sign_of,
@@ -56,7 +56,7 @@ def reduce_outward(origins: Floats, rings: Floats, marks: Integers, n: int, tau:
     side = RIGHT if right > other else LEFT
     count = ZERO
     for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
-        v, m = read(rings, place(marks, n, side, i))
+        v, m = read(rings, offset_of(marks, n, side, i))
         count = polygon.append(points, polygon_hull.drop_turned(points, count, 1, v, m), v, m)
     while count > REDUCED - other:
         chosen, v, m = polygon_hull.cheapest_edge(points, count, 1, count - 3)

@@ -199,7 +199,7 @@ class Section:
 
     def local(self, side: int) -> list[tuple[float, float]]:
         """Vertices from the origin of their chain."""
-        places = [chains.place(self.chains.marks, ROW, side, i) for i in self.numbers(side)]
+        places = [chains.offset_of(self.chains.marks, ROW, side, i) for i in self.numbers(side)]
         return [(float(self.chains.rings[at]), float(self.chains.rings[at + 1])) for at in places]
 
     def chain(self, side: int) -> list[Exact]:
