@@ -67,7 +67,7 @@ def columns_of(owner: Any) -> tuple[Column, ...]:
 
 
 def values_of(owner: object, column: Column) -> list[Any]:
-    """Return one column as plain Python values, one per run: texts for an enumeration, None where unknown."""
+    """Return one column as plain Python values, one per run: texts for an enumeration, None if unknown."""
     values: Any = getattr(owner, column.field)
     if isinstance(values, tuple):
         return [value.value for value in values]

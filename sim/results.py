@@ -95,7 +95,7 @@ class Results:
         return len(self.runs)
 
     def to_dict(self) -> dict[str, list[Any]]:
-        """Return the columns by name as plain values, one per run: texts for outcomes, None where unknown."""
+        """Return the columns by name as plain values, one per run: texts for outcomes, None if unknown."""
         return {column.name: values_of(self, column) for column in columns_of(Results)}
 
     def to_pandas(self) -> Any:

@@ -1,4 +1,4 @@
-"""Integrals of the magnitude and direction of a vector over time, to a tolerance, also where it passes near zero."""
+"""Integrals of the magnitude and direction of a vector over time to a tolerance, also for one that passes near zero."""
 
 from __future__ import annotations
 

@@ -18,8 +18,9 @@ def nearest_in_hull(points: Floats, target: Floats) -> Floats:
 
     Notes
     -----
-    Wolfe (1976): a corral of affinely independent points grows by the farthest point ahead and drops those that the
-    nearest point of their affine hull leaves behind. Finite; a few small least-squares problems in practice.
+    Wolfe (1976): a set of affinely independent points (corral) is extended by the point that is farthest in the
+    direction of the target, and points with negative weights in the nearest point of its affine hull are removed. The
+    method is finite; in practice it solves a few small least-squares problems.
     """
     offsets = points - target
     size = float((offsets**2).sum(axis=1).max())

@@ -120,7 +120,7 @@ def least_greatest_excess(solution: EncounterSolution) -> Floats:
 def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
     """Return the Pareto-optimal free values of a `solution` nearest to `preferred` ones, shape (f,).
 
-    The norm is that of M; that of the weighted mean of the M if they differ.
+    The norm is that of M, or that of the weighted mean of the M if they differ.
 
     Raises
     ------

@@ -99,7 +99,7 @@ class Node:
 
 @dataclass(frozen=True)
 class _Linear:
-    """Both sides linearised at a guess, and the system of three that joins them solved."""
+    """Both sides linearised at a guess, and the solution of the 3 x 3 system that couples them."""
 
     pursuer: Response
     evader: Response
@@ -165,20 +165,20 @@ class Pair:
         close: float = CLOSE,
         latest: float = math.inf,
     ) -> Node | None:
-        """Return the extremal near a guess, or None where Newton's method does not converge.
+        """Return the extremal near a guess, or None if Newton's method does not converge.
 
         Parameters
         ----------
         guess : ndarray, shape (15,)
             End states and nu.
         duration, distance : float
-            A given value, and a guess of the free one.
+            The known value, and a guess of the free one.
         time_free : bool
             Whether the duration is free; otherwise the distance is.
         tolerance : float
             Tolerance of the propagation.
         linear_tolerance : float
-            Tolerance of the propagation of derivatives, where that is less fine.
+            Tolerance of the propagation of derivatives, if it is larger.
         close : float
             Greatest size of the last correction.
         latest : float
@@ -186,8 +186,8 @@ class Pair:
 
         Notes
         -----
-        A propagation of each side with its variations, then some without, with the same derivatives, as long as each
-        correction is a fraction of the one before: half a millisecond and 0.1 ms a revolution.
+        Both sides are propagated with their variations, then several times without, with the same derivatives, while
+        each correction is a fraction of the previous one: 0.5 ms and 0.1 ms per revolution.
         """
         state = np.concatenate([guess[:12], guess[12:] / np.sqrt(guess[12:] @ guess[12:]), [duration, distance]])
         before, uses = math.inf, 0

@@ -1,4 +1,4 @@
-"""One side of a game by a given time: the derivatives of its end state by the direction it goes in. Nondimensional."""
+"""One side of a game at a time: its end state and the derivatives by its direction. Nondimensional."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Side(Protocol):
     def respond(
         self, end_state: Floats, nu: Floats, plane: Floats, duration: float, tolerance: float
     ) -> Response | None:
-        """Linearise at a guess of the end state; None where it cannot be propagated."""
+        """Linearise at a guess of the end state; None if it cannot be propagated."""
 
     def correct(
         self, response: Response, end_state: Floats, nu: Floats, duration: float, tolerance: float
