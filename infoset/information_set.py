@@ -23,7 +23,7 @@ class InformationSetView(SetQueries):
     def copy(self) -> InformationSet:
         """Return an independent information set that starts from the state of this one."""
         twin = InformationSet.__new__(InformationSet)
-        twin._state = self._state.copy()
+        SetQueries.__init__(twin, self._state.copy())
         return twin
 
 

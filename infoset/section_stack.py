@@ -185,7 +185,7 @@ class SectionStack:
         self._catch_up()
         self._make_room(active)
         self._behind = active.copy()
-        self._stale = self._stale | active
+        self._stale = self._stale | active if self._freshness < Freshness.SUMMARISED else self._behind
         self._freshness = Freshness.BEHIND
         self._elapsed = elapsed
 

@@ -12,7 +12,6 @@ from infoset import section_life, section_passes
 from infoset.chains import empty_sections, working_room
 from infoset.convex_polygons import ConvexPolygons
 from infoset.limits import NUMBER, POSITIVE, WHOLE
-from infoset.model import SetModel
 from infoset.pictures import sections_svg
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
 from infoset.section_stack import outline
@@ -86,15 +85,16 @@ class SetQueries:
     ----------
     state : SetState
         The state to read. It may be shared with the set that changes it.
+
+    Attributes
+    ----------
+    model : SetModel
+        Known constants and assumptions.
     """
 
     def __init__(self, state: SetState) -> None:
+        self.model = state.model
         self._state = state
-
-    @property
-    def model(self) -> SetModel:
-        """Known constants and assumptions."""
-        return self._state.model
 
     @property
     def batch(self) -> int:
