@@ -112,7 +112,7 @@ def test_results_show_their_quantiles(results: Results) -> None:
     text = results._repr_html_()
     for level in (0.1, 0.5, 0.9):
         assert f"<td>{np.quantile(results.miss_m, level):.4g}</td>" in text
-    assert f"{int(results.truth_kept.sum())}/4" in text
+    assert f"{int(results.truth_kept.sum())} of 4" in text
     assert "<script" not in text
 
 
