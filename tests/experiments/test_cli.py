@@ -330,7 +330,7 @@ def test_replay_of_one_record(infoset: Command, tmp_path: Path) -> None:
     assert "asteroid-1997" in out
     assert "--out DIR writes the figures" in err
     assert names_in(tmp_path) == ["a.npz"]
-    assert "one record, or two" in infoset.refused("replay", "a.npz", "a.npz", "a.npz")
+    assert "one record or two records" in infoset.refused("replay", "a.npz", "a.npz", "a.npz")
     assert "there is no such file" in infoset.refused("replay", "b.npz", "--out", "out")
     assert names_in(tmp_path) == ["a.npz"]
 

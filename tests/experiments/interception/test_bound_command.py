@@ -91,7 +91,7 @@ def test_bound_into_a_folder(infoset: Infoset, short: Scenario, short_file: Path
         assert all(all(flight["truth_kept"]) for flight in each["flights"])
         assert each["name"] in out
     assert f"no strategy can guarantee a miss below {found['lower_bound_m']:.3g} m" in out
-    for title in ("worst miss", "closing speed", "equal until", "guaranteed", "outcome"):
+    for title in ("worst miss", "closing speed", "equal measurements until", "guaranteed", "outcome"):
         assert title in out
 
 

@@ -233,10 +233,10 @@ def test_what_is_wrong_is_said_before_the_work(
         ("0,costa\n", "did you mean coast"),
         ("soon,coast\n", "is not a time"),
         ("0,coast\nnan,prograde\n", "is not a time"),
-        pytest.param("0" * 99_000 + ",coast\n0,coast", "must rise, from 0", id="long"),
+        pytest.param("0" * 99_000 + ",coast\n0,coast", "must increase from 0", id="long"),
         pytest.param("0" * 200_000 + ",coast\n", "is over 100 kB", id="longer"),
         ("0,coast,1\n", "found 3 values"),
-        ("5,coast\n", "must rise, from 0"),
+        ("5,coast\n", "must increase from 0"),
         ("", "at least one policy"),
     ],
 )
