@@ -51,7 +51,10 @@ class Kernels:
     """
 
     def __init__(self, *fastmath: str) -> None:
-        self._options = {"nogil": True, "error_model": "numpy", "fastmath": set(fastmath)}
+        # Without the wrapper for C, which is not used, compilation is shorter; but where a product and a sum may become
+        # one operation (`contract`), LLVM joins others then, and the last digits of results change.
+        exact = "contract" not in fastmath
+        self._options = {"nogil": True, "error_model": "numpy", "fastmath": set(fastmath), "no_cfunc_wrapper": exact}
 
     def compiled(self, function: F) -> F:
         """Compile a kernel that may allocate arrays; its machine code is stored on disk."""
@@ -79,7 +82,7 @@ class Kernels:
         before = CONFIG.CACHE_DIR
         try:
             CONFIG.CACHE_DIR = "" if folder is None else str(folder)
-            stored = JIT(cache=folder is not None, no_cfunc_wrapper=True, **self._options, **options)
+            stored = JIT(cache=folder is not None, **self._options, **options)
             return cast(F, stored(function))
         finally:
             CONFIG.CACHE_DIR = before
@@ -88,7 +91,6 @@ class Kernels:
         kernel: Any = JIT(
             _nrt=False,
             no_cpython_wrapper=True,
-            no_cfunc_wrapper=True,
             pipeline_class=_LinkedCompiler,
             **self._options,
             **options,
