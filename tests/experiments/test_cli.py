@@ -62,7 +62,7 @@ class Command:
         code, out, err = self(*arguments)
         assert (code, out) == (2, "")
         assert err.startswith(("error: ", "Usage: "))
-        assert err.lower().count("error: ") <= 1
+        assert err.count("error: ") + err.count("─ Error ─") == 1
         return err if err.startswith("error: ") else " ".join(err.replace("│", " ").split())
 
     def json(self, *arguments: object) -> Any:

@@ -199,6 +199,7 @@ def test_bad_input(infoset: Infoset, tmp_path: Path, arguments: list[str], parts
     message = " ".join(err.replace("│", " ").split())
     assert all(part in message for part in parts), err
     assert err.startswith(("error: ", "Usage: "))
+    assert err.count("error: ") + err.count("─ Error ─") == 1
     assert list(tmp_path.iterdir()) == []
 
 
