@@ -3,13 +3,13 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from experiments.cli import main
 from experiments.common.published_number import (
     CUT_OR_ROUNDED,
     Band,
@@ -34,20 +34,10 @@ def silent(_done: float) -> None:
 
 
 @pytest.fixture
-def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Infoset:
-    """Run the command in an empty folder: exit code, stdout and stderr."""
-    monkeypatch.setenv("NO_COLOR", "1")
+def infoset(infoset: Infoset, monkeypatch: pytest.MonkeyPatch) -> Infoset:
+    """Run `infoset reproduce` in an empty folder."""
     monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as left:
-            main(["reproduce", *(str(each) for each in arguments)])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.err
-        return int(left.value.code or 0), captured.out, captured.err
-
-    return run
+    return partial(infoset, "reproduce")
 
 
 @pytest.fixture(scope="module")

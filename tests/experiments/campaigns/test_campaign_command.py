@@ -20,7 +20,6 @@ import pytest
 
 from experiments.campaigns.flight import duration, size
 from experiments.campaigns.samples import replay_line
-from experiments.cli import main
 from experiments.common.errors import InputError
 from experiments.interception.own_strategy import load_strategy
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
@@ -32,23 +31,6 @@ from sim.versions import install_command
 
 Infoset = Callable[..., tuple[int, str, str]]
 FILES = [".lock", "manifest.json", "scenario.toml", "shards", "summary.json"]
-
-
-@pytest.fixture
-def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Infoset:
-    """Run the command in an empty folder: exit code, stdout and stderr."""
-    monkeypatch.setenv("NO_COLOR", "1")
-    monkeypatch.setenv("COLUMNS", "100")
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as left:
-            main([str(each) for each in arguments])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.err
-        return int(left.value.code or 0), captured.out, captured.err
-
-    return run
 
 
 @pytest.fixture

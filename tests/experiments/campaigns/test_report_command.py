@@ -19,7 +19,6 @@ from experiments.campaigns.campaign_figures import (
     draw_convergence,
     draw_dispersion,
 )
-from experiments.cli import main
 from experiments.interception.scenario_file import load_scenario
 from sim import Campaign, CampaignNoise, Scenario
 
@@ -35,23 +34,6 @@ def folder(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("campaign") / "runs"
     Campaign(brief, 300, path, noise=CampaignNoise.MIXED).run()
     return path
-
-
-@pytest.fixture
-def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Infoset:
-    """Run the command in an empty folder: exit code, stdout and stderr."""
-    monkeypatch.setenv("NO_COLOR", "1")
-    monkeypatch.setenv("COLUMNS", "100")
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as left:
-            main([str(each) for each in arguments])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.err
-        return int(left.value.code or 0), captured.out, captured.err
-
-    return run
 
 
 def test_a_report_of_files_alone(infoset: Infoset, brief: Scenario, folder: Path, tmp_path: Path) -> None:

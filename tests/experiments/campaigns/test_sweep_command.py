@@ -18,7 +18,6 @@ from hypothesis import strategies as st
 from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
 from experiments.campaigns.sweep_figures import between, draw_sweep
 from experiments.campaigns.sweep_table import SHOWN, crossings, key_label, sweep_table, unit_of, where_met
-from experiments.cli import main
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
 from sim import CampaignNoise, QuantileName, Requirement, Scenario, Sweep, quantiles, simulate
 from sim.storage import Axis, CampaignFolder
@@ -29,23 +28,6 @@ FILES = [
     "sweep.parquet",
 ]
 TWO = "angle_sensor.error_at_zero_range_rad=1e-4:4e-4:3,thruster.greatest_impulse_m_s=log:2:8:2"
-
-
-@pytest.fixture
-def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Infoset:
-    """Run the command in an empty folder: exit code, stdout and stderr."""
-    monkeypatch.setenv("NO_COLOR", "1")
-    monkeypatch.setenv("COLUMNS", "100")
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as left:
-            main([str(each) for each in arguments])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.err
-        return int(left.value.code or 0), captured.out, captured.err
-
-    return run
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.cli import main
 from experiments.interception.figures.bound import draw_bound, ripples
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
 from guidance import strategy_names
@@ -29,20 +29,10 @@ Infoset = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Infoset:
-    """Run the command in an empty folder: exit code, stdout and stderr."""
-    monkeypatch.setenv("NO_COLOR", "1")
+def infoset(infoset: Infoset, monkeypatch: pytest.MonkeyPatch) -> Infoset:
+    """Run `infoset bound` in an empty folder."""
     monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as left:
-            main(["bound", *(str(each) for each in arguments)])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.err
-        return int(left.value.code or 0), captured.out, captured.err
-
-    return run
+    return partial(infoset, "bound")
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ import io
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,6 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from experiments.cli import main
 from experiments.interception.comparison import Comparison, flights, gather, summary
 from experiments.interception.figures.comparison import draw_comparison
 from experiments.interception.scenario_file import load_scenario, scenario_hash
@@ -28,20 +28,10 @@ Infoset = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def infoset(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Infoset:
-    """Run the command in an empty folder: exit code, stdout and stderr."""
-    monkeypatch.setenv("NO_COLOR", "1")
+def infoset(infoset: Infoset, monkeypatch: pytest.MonkeyPatch) -> Infoset:
+    """Run `infoset compare` in an empty folder."""
     monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as left:
-            main(["compare", *(str(each) for each in arguments)])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.err
-        return int(left.value.code or 0), captured.out, captured.err
-
-    return run
+    return partial(infoset, "compare")
 
 
 def as_json(infoset: Infoset, *arguments: object) -> Any:
