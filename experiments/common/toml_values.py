@@ -6,12 +6,14 @@ Numbers stay decimal, as written; the change to SI units rounds them once.
 from __future__ import annotations
 
 import difflib
+import types
+import typing
 from dataclasses import dataclass
 from decimal import Context, Decimal
-from enum import Enum
-from typing import Annotated, Any, Generic, TypeVar
+from enum import Enum, EnumMeta
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from experiments.common.errors import InputError
@@ -25,7 +27,6 @@ LONGEST_SHOWN = 60
 KILO = 3
 
 DecimalPair = tuple[Decimal, Decimal]
-Choice = TypeVar("Choice", bound=Enum)
 
 _EXACT = Context(prec=60)
 _RADIANS_PER_DEGREE = _EXACT.divide(
@@ -257,17 +258,6 @@ class Whole:
 
 
 @dataclass(frozen=True)
-class OneOf(Generic[Choice]):
-    """One of the names of an enumeration."""
-
-    choices: type[Choice]
-
-    def __call__(self, value: object) -> Choice:
-        """Check and return it."""
-        return self.choices(known_name(value, tuple(choice.value for choice in self.choices)))
-
-
-@dataclass(frozen=True)
 class Line:
     """A line of printable text."""
 
@@ -337,9 +327,17 @@ Constant = Annotated[Any, PlainValidator(lambda value: value)]
 
 
 class Table(BaseModel):
-    """A table of a file; unknown keys are errors."""
+    """A table of a file; unknown keys are errors, members of enumerations are written by value."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _member(cls, value: object, info: ValidationInfo) -> object:
+        hint = cls.model_fields[str(info.field_name)].annotation
+        kinds = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
+        kind = next((kind for kind in kinds if isinstance(kind, EnumMeta)), None)
+        return value if kind is None else kind(known_name(value, tuple(member.value for member in kind)))
 
     def si(self, name: str) -> Any:
         """Return the value of a key in SI, or None if the file does not have it."""

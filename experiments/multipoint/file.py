@@ -25,7 +25,6 @@ from experiments.common.toml_values import (
     Name,
     NotNegative,
     Numbers,
-    OneOf,
     Positive,
     Table,
     Vector,
@@ -112,7 +111,7 @@ class TargetTable(BodyTable):
 
     name: Name = key("name of the target", '"T1"')
     time_s: Positive | None = key("time of the visit; a first guess if times are optimised", "1500.0", default=None)
-    meet: Annotated[Meet, PlainValidator(OneOf(Meet))] = key(
+    meet: Meet = key(
         '"flyby" (same position) or "rendezvous" (same position and velocity)', '"flyby"', default=Meet.FLYBY
     )
     dwell_s: NotNegative = key("how long the chaser stays at a rendezvous", "0.0", default=ZERO)
@@ -131,7 +130,7 @@ class MultipointTables(ProblemTables):
     """A problem file of kind `multipoint`."""
 
     name: Name = key("name of the results", '"my-tour"', default="tour")
-    axes: Annotated[Axes, PlainValidator(OneOf(Axes))] = key('"hill" or "inertial"', '"hill"')
+    axes: Axes = key('"hill" or "inertial"', '"hill"')
     orbit_rate_rad_s: Positive | None = key("mean motion of the reference orbit", "1.13e-3", default=None)
     eccentricity: Eccentricity = key("of the reference orbit", "0.0", default=ZERO)
     true_anomaly_deg: Degrees = key("of the reference orbit at t = 0", "0.0", default=ZERO)

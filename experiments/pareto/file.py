@@ -20,7 +20,6 @@ from experiments.common.toml_values import (
     ZERO,
     Name,
     NotNegative,
-    OneOf,
     Positive,
     Table,
     Vector,
@@ -82,7 +81,7 @@ class ParetoTables(ProblemTables):
     free: Annotated[tuple[Component, ...], PlainValidator(_free)] = key(
         "free components of the meeting, of x, y, z, vx, vy, vz", '["y", "z"]'
     )
-    meet: Annotated[Meeting, PlainValidator(OneOf(Meeting))] = key(
+    meet: Meeting = key(
         '"rendezvous", or "intercept" (the same position, any velocities)',
         '"rendezvous"',
         default=Meeting.RENDEZVOUS,

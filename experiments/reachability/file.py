@@ -23,7 +23,6 @@ from experiments.common.toml_values import (
     Eccentricity,
     Number,
     Numbers,
-    OneOf,
     Positive,
     Table,
     Vector,
@@ -147,10 +146,8 @@ class ReachabilityTables(ProblemTables):
     periods: Annotated[int, PlainValidator(Whole(MOST_PERIODS))] = key("number of periods, T", "4")
     period_s: Positive = key("length of a period", "180.0")
     acceleration_m_s2: Positive = key("acceleration of a unit control", "0.15")
-    model: Annotated[MotionModel, PlainValidator(OneOf(MotionModel))] = key(
-        "frozen at t = 0, or time-varying", '"frozen"', default=MotionModel.FROZEN
-    )
-    thrust: Annotated[ThrustShape, PlainValidator(OneOf(ThrustShape))] = key(
+    model: MotionModel = key("frozen at t = 0, or time-varying", '"frozen"', default=MotionModel.FROZEN)
+    thrust: ThrustShape = key(
         "box (each component is bounded) or ball (the norm is bounded)", '"box"', default=ThrustShape.BOX
     )
     checks_between_periods: FromPeriod = key(
