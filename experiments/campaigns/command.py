@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.options import Json, Out, Overwrite, Quiet, Seed
+from experiments.common.options import Json, Out, Overwrite, Quiet, Seed, Settings
 from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, ScenarioName, StrategyName, TieName
 
 MOST_WORKERS = 1024
@@ -38,6 +38,7 @@ class Flight:
     """Options of a campaign and of a sweep."""
 
     scenario: ScenarioName = "asteroid-1997"
+    settings: Settings = None
     runs: Annotated[
         int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs; in a sweep, of each cell.")
     ]

@@ -48,6 +48,7 @@ def scenario_of(options: Flight) -> Scenario:
     """Return the scenario that the options describe, with the campaign's noise."""
     scenario = scenario_with(
         options.scenario,
+        options.settings,
         strategy=options.strategy,
         model=options.model,
         tie=options.tie,

@@ -1,7 +1,7 @@
 """The keys of a scenario file that a sweep varies, each over a range of values in the unit of the file.
 
-A cell is made by the reader of scenario files: the scenario is written as a file, values are replaced in its text, and
-the text is read. A cell is therefore valid exactly when a file with its values is, and has the same error messages.
+A cell is made by the reader of scenario files: the scenario is written as a file, which is read with other values. A
+cell is therefore valid exactly when a file with its values is, and has the same error messages.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ import math
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from decimal import Context, Decimal, InvalidOperation
 from typing import Any, Literal
 
 from experiments.common.errors import InputError
-from experiments.common.toml_values import LARGEST, SMALLEST, nearest, number_text, shown
+from experiments.common.settings import ENDS, similar_key
+from experiments.common.toml_values import LARGEST, SMALLEST, number_text, shown
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
 from experiments.interception.scenario_tables import OPTIONAL_SENSORS
 from sim.scenario import Scenario
@@ -30,17 +30,6 @@ _PLACES = Context(prec=12)
 """Values between the ends are rounded to 12 digits."""
 
 _OPTIONAL = ("sun", *OPTIONAL_SENSORS, "target")
-_ENDS = ("least", "greatest")
-
-
-@dataclass(frozen=True)
-class _Key:
-    """A key that can be varied: its table, the end of a pair, and whether it must be a whole number."""
-
-    table: str
-    name: str
-    end: str | None = None
-    whole: bool = False
 
 
 def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
@@ -86,28 +75,27 @@ def sweep_cells(scenario: Scenario, axes: Sequence[Axis]) -> tuple[Scenario, ...
     text = scenario_to_toml(scenario)
     cells = []
     for values in itertools.product(*(axis.values for axis in axes)):
-        changed, replaced = text, []
-        for axis, value in zip(axes, values, strict=True):
-            key = known[axis.key]
-            literal = str(round(value)) if key.whole else number_text(value)
-            changed = _with_value(changed, key, literal)
-            replaced.append(f"{axis.key} = {literal}")
-        cells.append(read_scenario(changed, f"{scenario.name} with {', '.join(replaced)}"))
+        replaced = {
+            axis.key: str(round(value)) if known[axis.key] else number_text(value)
+            for axis, value in zip(axes, values, strict=True)
+        }
+        changes = ", ".join(f"{key} = {literal}" for key, literal in replaced.items())
+        cells.append(read_scenario(text, f"{scenario.name} with {changes}", replaced))
     return tuple(cells)
 
 
-def _known_keys(scenario: Scenario) -> dict[str, _Key]:
-    """Return the keys of a scenario whose values are numbers."""
-    known: dict[str, _Key] = {}
+def _known_keys(scenario: Scenario) -> dict[str, bool]:
+    """Return the keys of a scenario whose values are numbers, and whether a value must be a whole number."""
+    known: dict[str, bool] = {}
     for table, keys in _tables(scenario).items():
         for name, value in keys.items():
             path = f"{table}.{name}"
             if isinstance(value, list) or table == "dispersion":
-                known |= {f"{path}.{end}": _Key(table, name, end) for end in _ENDS}
+                known |= {f"{path}.{end}": False for end in ENDS}
             if table == "dispersion":  # a start that is fixed
-                known[path] = _Key(table, name)
+                known[path] = False
             elif isinstance(value, int | float) and not isinstance(value, bool):
-                known[path] = _Key(table, name, whole=isinstance(value, int))
+                known[path] = isinstance(value, int)
     return known
 
 
@@ -116,7 +104,7 @@ def _tables(scenario: Scenario) -> Mapping[str, Mapping[str, Any]]:
     return {table: keys for table, keys in values.items() if isinstance(keys, dict)}
 
 
-def _axis(piece: str, known: Mapping[str, _Key]) -> Axis:
+def _axis(piece: str, known: Mapping[str, bool]) -> Axis:
     key, equals, written = (part.strip() for part in piece.partition("="))
     if not equals or not key:
         raise InputError(f"--vary: {shown(piece)} is not written as KEY=FROM:TO:COUNT; for example {EXAMPLE}")
@@ -136,26 +124,23 @@ def _axis(piece: str, known: Mapping[str, _Key]) -> Axis:
     if scale == "log" and first <= 0:
         raise InputError(f"--vary: {key}: on a logarithmic scale values must be greater than 0, found {shown(written)}")
     count = _count(parts[2], key)
-    values = _spaced(first, last, count, scale, whole=known[key].whole)
+    values = _spaced(first, last, count, scale, whole=known[key])
     if len(set(values)) < count:
         raise InputError(
             f"--vary: {key}: {count} values from {parts[0]} to {parts[1]} are not all different"
-            f"{' whole numbers' if known[key].whole else ''}; give fewer values"
+            f"{' whole numbers' if known[key] else ''}; give fewer values"
         )
     return Axis(key, values, scale)
 
 
-def _unknown(key: str, known: Mapping[str, _Key]) -> str:
+def _unknown(key: str, known: Mapping[str, bool]) -> str:
     names = list(known)
     table = key.partition(".")[0]
-    if table in _OPTIONAL and table not in {other.table for other in known.values()}:
+    if table in _OPTIONAL and table not in {other.partition(".")[0] for other in known}:
         return f"the scenario has no [{table}]; add that table to its file, or vary something else"
     if f"{key}.least" in known:
         return f"{key} is a pair; vary {key}.least or {key}.greatest"
-    guess = nearest(key, names)
-    if guess is None:  # the text may be the last part of a key only
-        alike = [name for name in names if key.rsplit(".", 1)[-1] in name.split(".")]
-        guess = " or ".join(alike[:3]) or None
+    guess = similar_key(key, names)
     hint = f"did you mean {guess}?" if guess else f"its numeric keys are: {', '.join(names)}"
     return f"the scenario has no numeric key {shown(key)}; {hint}"
 
@@ -189,17 +174,3 @@ def _spaced(first: Decimal, last: Decimal, count: int, scale: str, *, whole: boo
         between = [first + (last - first) * index / (count - 1) for index in range(1, count - 1)]
     values = [first, *(_PLACES.plus(value) for value in between), last]
     return tuple(float(round(value)) if whole else float(value) for value in values)
-
-
-def _with_value(text: str, key: _Key, literal: str) -> str:
-    """Replace a value in the text of `scenario_to_toml`, which has one key on a line."""
-    lines = text.split("\n")
-    table = lines.index(f"[{key.table}]")
-    row = next(index for index in range(table, len(lines)) if lines[index].startswith(f"{key.name} = "))
-    if key.end is not None:
-        pair = lines[row].partition(" = ")[2].strip("[]").split(", ")
-        ends = [pair[0], pair[-1]]
-        ends[_ENDS.index(key.end)] = literal
-        literal = f"[{ends[0]}, {ends[1]}]"
-    lines[row] = f"{key.name} = {literal}"
-    return "\n".join(lines)

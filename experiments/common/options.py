@@ -35,6 +35,15 @@ def finite(value: float | None) -> float | None:
 ProblemName = Annotated[
     str, typer.Argument(metavar="[PROBLEM]", help="A built-in problem (see: infoset problems list), or a problem file.")
 ]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Replace a value of the file, in the unit of the file; a key of a table is written TABLE.KEY. May be "
+        "given several times.",
+    ),
+]
 Seed = Annotated[
     int, typer.Option("--seed", metavar="N", min=0, help="Root seed. The same seed gives the same random numbers.")
 ]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import tomllib
 import typing
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 from importlib import resources
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -15,7 +15,8 @@ from typing import Any, Generic, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from experiments.common.errors import InputError
-from experiments.common.toml_values import WRONG, DecimalPair, nearest, shown
+from experiments.common.settings import read_settings, replace_values
+from experiments.common.toml_values import LONGEST_DESCRIPTION, WRONG, DecimalPair, decimal_of, nearest, shown
 
 LARGEST_FILE_BYTES = 100_000
 LONGEST_LINE = 1000
@@ -145,7 +146,9 @@ def built_in_text(form: Form[Tables], name: str) -> str:
     return resources.files("experiments").joinpath(form.folder, f"{name}.toml").read_text(encoding="utf-8")
 
 
-def load_tables(form: Form[Tables], name_or_path: str | os.PathLike[str]) -> Tables:
+def load_tables(
+    form: Form[Tables], name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None
+) -> Tables:
     """Read a built-in file or a file of the user.
 
     Parameters
@@ -153,6 +156,9 @@ def load_tables(form: Form[Tables], name_or_path: str | os.PathLike[str]) -> Tab
     name_or_path : str or path
         A built-in name, or the path of a TOML file. A name wins over a file of that name, unless the argument has a
         path separator or ends in ``.toml``.
+    settings : sequence of str or None, optional
+        KEY=VALUE: values in place of those of the file, in its units; see `experiments.common.settings`. They are
+        added to the description.
 
     Returns
     -------
@@ -167,14 +173,22 @@ def load_tables(form: Form[Tables], name_or_path: str | os.PathLike[str]) -> Tab
     given = os.fspath(name_or_path)
     marks = [mark for mark in (os.sep, os.altsep) if mark]
     is_name = isinstance(name_or_path, str) and not given.endswith(".toml") and not any(mark in given for mark in marks)
+    values = read_settings(settings or ())
     if is_name and given in built_in_names(form):
-        return read_tables(form, built_in_text(form, given), f"{given} (built in)")
-    if is_name and not _exists(given):
+        text, source = built_in_text(form, given), f"{given} (built in)"
+    elif is_name and not _exists(given):
         raise _no_such_name(form, given, f"no file and no built-in {form.noun}")
-    return read_tables(form, _text_of_file(form, given), given)
+    else:
+        text, source = _text_of_file(form, given), given
+    if not values:
+        return read_tables(form, text, source)
+    tables = read_tables(form, text, f"{source} with --set", values)
+    changes = ", ".join(f"{key} = {' '.join(value.split())}" for key, value in values.items() if key != "description")
+    lines = [line for line in (getattr(tables, "description", ""), changes and f"with {changes}") if line]
+    return tables.model_copy(update={"description": "; ".join(lines)[:LONGEST_DESCRIPTION]})
 
 
-def read_tables(form: Form[Tables], text: str, source: str) -> Tables:
+def read_tables(form: Form[Tables], text: str, source: str, values: Mapping[str, str] | None = None) -> Tables:
     """Check the text of a file, and return its values.
 
     Parameters
@@ -183,6 +197,8 @@ def read_tables(form: Form[Tables], text: str, source: str) -> Tables:
         TOML.
     source : str
         Name of the file in messages.
+    values : mapping of str to str or None, optional
+        TOML values that replace those of the text, by key; see `experiments.common.settings.replace_values`.
 
     Returns
     -------
@@ -195,6 +211,8 @@ def read_tables(form: Form[Tables], text: str, source: str) -> Tables:
         With all problems of the text: place, value and what to do.
     """
     document = _parse(form, text, source)
+    if values:
+        replace_values(document, values, settable_keys(form.tables), form.noun, form.begun_by)
     schema = document.get("schema", form.schema)
     if isinstance(schema, bool) or not isinstance(schema, int) or schema != form.schema:
         raise InputError(
@@ -247,6 +265,17 @@ def keys_of(tables: type[BaseModel], path: KeyPath = ()) -> dict[str, Any]:
 def tables_of(tables: type[BaseModel]) -> tuple[str, ...]:
     """Return the names of the tables of a file, in their order."""
     return tuple(name for name, field in _fields(tables).items() if _table_in(field.annotation) is not None)
+
+
+def settable_keys(tables: type[BaseModel]) -> list[str]:
+    """Return the keys of a file that ``--set`` replaces, with their tables; ``craft.1.weight`` in an array."""
+    inner = tables_of(tables)
+    top = [name for name in keys_of(tables) if name not in (*inner, "schema", "kind")]
+    return top + [
+        f"{table}.1.{name}" if _is_array(tables, table) else f"{table}.{name}"
+        for table in inner
+        for name in keys_of(tables, (table,))
+    ]
 
 
 def _fields(model: type[BaseModel]) -> dict[str, Any]:
@@ -315,14 +344,6 @@ def _text_of_file(form: Form[Tables], path: str) -> str:
         raise InputError(f"{path}: is not UTF-8 text (line {line}); save it as UTF-8") from None
 
 
-def _decimal(literal: str) -> Decimal:
-    """Read a TOML float as written."""
-    try:
-        return Decimal(literal)
-    except InvalidOperation:  # an exponent beyond what a Decimal holds: zero or infinity, as for a float
-        return Decimal(repr(float(literal)))
-
-
 def _parse(form: Form[Tables], text: str, source: str) -> dict[str, Any]:
     """Parse TOML; raise `InputError` for texts that would take the parser too long."""
     if len(text) > LARGEST_FILE_BYTES:
@@ -332,7 +353,7 @@ def _parse(form: Form[Tables], text: str, source: str) -> dict[str, Any]:
         if len(line) > LONGEST_LINE:  # the parser's time grows as the square of a dotted key's length
             raise InputError(f"{source}: line {number} is over {LONGEST_LINE} characters; no line of a {form.noun} is")
     try:
-        return tomllib.loads(text, parse_float=_decimal)
+        return tomllib.loads(text, parse_float=decimal_of)
     except tomllib.TOMLDecodeError as error:
         column = len(lines[-1]) + 1
         reason = str(error).replace("(at end of document)", f"(at line {len(lines)}, column {column}: the end)")

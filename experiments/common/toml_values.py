@@ -9,7 +9,7 @@ import difflib
 import types
 import typing
 from dataclasses import dataclass
-from decimal import Context, Decimal
+from decimal import Context, Decimal, InvalidOperation
 from enum import Enum, EnumMeta
 from typing import Annotated, Any
 
@@ -32,6 +32,14 @@ _EXACT = Context(prec=60)
 _RADIANS_PER_DEGREE = _EXACT.divide(
     Decimal("3.14159265358979323846264338327950288419716939937510582097494459"), Decimal(180)
 )
+
+
+def decimal_of(literal: str) -> Decimal:
+    """Read a TOML float as written."""
+    try:
+        return Decimal(literal)
+    except InvalidOperation:  # an exponent beyond what a Decimal holds: zero or infinity, as for a float
+        return Decimal(repr(float(literal)))
 
 
 def si(value: Decimal, power_of_ten: int = 0) -> float:
@@ -188,7 +196,8 @@ class Number:
         """Check and return it."""
         problem = self.problem(value)
         if problem is not None or not isinstance(value, int | Decimal):
-            raise wrong(problem or "must be a number", "write it without quotes" if isinstance(value, str) else "")
+            quoted = isinstance(value, str) and value.strip()[:1] in tuple("+-.0123456789")
+            raise wrong(problem or "must be a number", "write it without quotes" if quoted else "")
         return Decimal(value)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from experiments.common.errors import InputError
@@ -18,6 +18,7 @@ from sim.scenario import strategy_name
 
 def scenario_with(
     name: str,
+    settings: Sequence[str] | None = None,
     *,
     strategy: str | None = None,
     model: str | None = None,
@@ -31,6 +32,8 @@ def scenario_with(
     ----------
     name : str
         A built-in name or a path.
+    settings : sequence of str or None
+        Values of ``--set``; the other options have precedence.
     strategy : str or None
         A built-in name. ``FILE.py:CLASS`` leaves the strategy of the scenario; `own_strategy` returns it.
     sections : int or None
@@ -41,7 +44,7 @@ def scenario_with(
     InputError
         If the scenario is unsound, or an option does not fit it.
     """
-    scenario = load_scenario(name)
+    scenario = load_scenario(name, settings)
     if strategy is not None and not is_own_strategy(strategy):
         scenario = replace(scenario, strategy=choice("--strategy", strategy, strategy_names()))
     if tie is not None:

@@ -7,7 +7,7 @@ written (as its shortest decimal with the point moved) and is read back bit for 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
 from pydantic import BaseModel
@@ -60,7 +60,7 @@ def scenario_text(name: str) -> str:
     return built_in_text(FORM, name)
 
 
-def load_scenario(name_or_path: str | os.PathLike[str]) -> Scenario:
+def load_scenario(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Scenario:
     """Read a built-in scenario or a scenario file.
 
     Parameters
@@ -68,6 +68,8 @@ def load_scenario(name_or_path: str | os.PathLike[str]) -> Scenario:
     name_or_path : str or path
         A built-in name, or the path of a TOML file. A name wins over a file of that name, unless the argument has a
         path separator or ends in ``.toml``.
+    settings : sequence of str or None, optional
+        KEY=VALUE: values in place of those of the file, for example ``["thruster.greatest_impulse_m_s=5"]``.
 
     Returns
     -------
@@ -79,12 +81,18 @@ def load_scenario(name_or_path: str | os.PathLike[str]) -> Scenario:
     InputError
         If there is no such scenario or file, or the file is not a valid scenario; the message lists all its problems.
     """
-    return _to_scenario(load_tables(FORM, name_or_path), str(name_or_path))
+    return _to_scenario(load_tables(FORM, name_or_path, settings), str(name_or_path))
 
 
-def read_scenario(text: str, source: str) -> Scenario:
-    """Return the scenario of the text of a scenario file, as `load_scenario`; messages name `source`."""
-    return _to_scenario(read_tables(FORM, text, source), source)
+def read_scenario(text: str, source: str, values: Mapping[str, str] | None = None) -> Scenario:
+    """Return the scenario of the text of a scenario file, as `load_scenario`; messages name `source`.
+
+    Parameters
+    ----------
+    values : mapping of str to str or None, optional
+        TOML values that replace those of the text, by key, for example ``{"uncertainty.x_km.least": "5200.0"}``.
+    """
+    return _to_scenario(read_tables(FORM, text, source, values), source)
 
 
 def scenario_warnings(scenario: Scenario) -> list[str]:

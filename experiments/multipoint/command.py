@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.options import FileOptions, Html, ProblemName
+from experiments.common.options import FileOptions, Html, ProblemName, Settings
 
 GIVEN, BEST = "given", "best"
 
@@ -21,6 +21,7 @@ class Multipoint(FileOptions):
     """
 
     problem: ProblemName = "service-3"
+    settings: Settings = None
     order: Annotated[
         Literal["given", "best"], typer.Option(help="Order of the targets: that of the file, or the best one.")
     ] = "given"

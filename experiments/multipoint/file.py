@@ -279,20 +279,22 @@ class MultipointProblem:
             raise InputError(f"{self.source}: {error}: latest_s or price_per_s under [times]") from None
 
 
-def load_multipoint(name_or_path: str) -> MultipointProblem:
+def load_multipoint(name_or_path: str, settings: Sequence[str] | None = None) -> MultipointProblem:
     """Read a built-in problem or a file.
 
     Parameters
     ----------
     name_or_path : str or path
         A built-in name, or the path of a TOML file.
+    settings : sequence of str or None, optional
+        KEY=VALUE: values in place of those of the file.
 
     Raises
     ------
     InputError
         If there is no such problem, or it is not sound.
     """
-    tables = load_tables(FORM, name_or_path)
+    tables = load_tables(FORM, name_or_path, settings)
     try:
         tour = _hill(tables) if tables.axes is Axes.HILL else _inertial(tables)
     except ValueError as error:

@@ -28,7 +28,7 @@ Progress = Callable[[float], None]
 
 def run(options: Multipoint) -> None:
     """Solve the problem, write the files and print the tables."""
-    problem = load_multipoint(options.problem)
+    problem = load_multipoint(options.problem, options.settings)
     search = Search(options.order, options.times or (BEST if problem.optimise else GIVEN))
     _check(problem, search)
     with (

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.options import FileOptions, Html, ProblemName
+from experiments.common.options import FileOptions, Html, ProblemName, Settings
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,7 @@ class Pareto(FileOptions):
     """
 
     problem: ProblemName = "pareto-2008"
+    settings: Settings = None
     prefer: Annotated[
         str | None,
         typer.Option(

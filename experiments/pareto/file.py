@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Annotated
@@ -130,20 +130,22 @@ class ParetoProblem:
     greatest_control_m_s2: float | None
 
 
-def load_pareto(name_or_path: str) -> ParetoProblem:
+def load_pareto(name_or_path: str, settings: Sequence[str] | None = None) -> ParetoProblem:
     """Read a built-in problem or a file.
 
     Parameters
     ----------
     name_or_path : str or path
         A built-in name, or the path of a TOML file.
+    settings : sequence of str or None, optional
+        KEY=VALUE: values in place of those of the file.
 
     Raises
     ------
     InputError
         If there is no such problem, or it is not sound.
     """
-    tables = load_tables(FORM, name_or_path)
+    tables = load_tables(FORM, name_or_path, settings)
     motion = ClohessyWiltshire(tables.si("orbit_rate_rad_s"), ORBITAL)
     craft = tuple(
         Craft(

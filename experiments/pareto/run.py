@@ -47,7 +47,7 @@ SWEEP = (0.5, 2.0, 31)
 
 def run(options: Pareto) -> None:
     """Solve the problem, write the files and print the tables."""
-    problem = load_pareto(options.problem)
+    problem = load_pareto(options.problem, options.settings)
     preferred = None if options.prefer is None else _preferred(options.prefer, problem)
     with (
         output_of(options, ("results.json", *figure_files(*FIGURES))) as written,

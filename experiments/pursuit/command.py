@@ -7,18 +7,9 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.options import Csv, FileOptions, Html, ProblemName, Seed, finite
+from experiments.common.options import Csv, FileOptions, Html, ProblemName, Seed, Settings, finite
 
 ROWS = "thrust_ratio=0:0.8:17"
-
-Settings = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Replace a value of the problem, for example evader.thrust_N=5. May be given several times.",
-    ),
-]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 from typing import Annotated, Any
 
 import numpy as np
@@ -20,7 +20,6 @@ from experiments.common.problem_file import ProblemTables, problem_form, problem
 from experiments.common.toml_file import Known, Problem, load_tables, read_tables
 from experiments.common.toml_values import (
     KILO,
-    LARGEST,
     NUMBER,
     ONE,
     ZERO,
@@ -32,10 +31,8 @@ from experiments.common.toml_values import (
     Table,
     Vector,
     key,
-    nearest,
     quoted_text,
     radians,
-    shown,
     si,
     wrong,
 )
@@ -142,37 +139,6 @@ class PursuitProblem:
             If a value is impossible.
         """
         return _game(self.tables, changes or {})
-
-    def with_settings(self, settings: Sequence[str]) -> PursuitProblem:
-        """Return the problem with the values of ``--set``, checked like those of a file.
-
-        Parameters
-        ----------
-        settings : sequence of str
-            KEY=VALUE, for example ``evader.thrust_N=5``.
-
-        Raises
-        ------
-        InputError
-            If a setting has another form, a key is unknown, or the problem is not sound.
-        """
-        values: dict[str, str] = {}
-        document = _document(self.tables)
-        for setting in settings:
-            name, mark, text = (part.strip() for part in setting.partition("="))
-            if not mark or not name or not text:
-                raise InputError(
-                    f"--set: must be KEY=VALUE, found {shown(setting)}; for example --set evader.thrust_N=5"
-                )
-            if name in values:
-                raise InputError(f"--set: {name} is set twice; set each key once")
-            if name not in _SETTABLE:
-                guess = nearest(name, list(_SETTABLE))
-                hint = f"did you mean {guess}?" if guess else "for example evader.thrust_N=5"
-                raise InputError(f"--set: there is no key {shown(name)}; {hint}")
-            table, _, own = name.rpartition(".")
-            values[name] = (document[table] if table else document)[own] = _number_text(name, text)
-        return read_problem(_toml(document), f"{self.source} with --set") if values else self
 
     def to_toml(self) -> str:
         """Return a file that reads back as the same problem."""
@@ -303,20 +269,22 @@ def _orbit_problem(position_m: np.ndarray, velocity_m_s: np.ndarray, mu_si: floa
 FORM = problem_form(KIND, PursuitTables, _checks)
 
 
-def load_pursuit(name_or_path: str) -> PursuitProblem:
+def load_pursuit(name_or_path: str, settings: Sequence[str] | None = None) -> PursuitProblem:
     """Read a built-in problem or a file.
 
     Parameters
     ----------
     name_or_path : str or path
         A built-in name, or the path of a TOML file.
+    settings : sequence of str or None, optional
+        KEY=VALUE: values in place of those of the file, for example ``["evader.thrust_N=5"]``.
 
     Raises
     ------
     InputError
         If there is no such problem, or it is not sound.
     """
-    return PursuitProblem(load_tables(FORM, name_or_path), name_or_path)
+    return PursuitProblem(load_tables(FORM, name_or_path, settings), name_or_path)
 
 
 def read_problem(text: str, source: str) -> PursuitProblem:
@@ -391,16 +359,6 @@ def _player(table: PlayerTable, values: Mapping[str, float], mu_si: float) -> Pl
         thrust_n=values["thrust_N"],
         specific_impulse_s=values["specific_impulse_s"],
     )
-
-
-def _number_text(name: str, text: str) -> str:
-    try:
-        number = Decimal(text)
-    except InvalidOperation:
-        raise InputError(f"--set: {name} must be a number, found {shown(text)}; for example --set {name}=1.5") from None
-    if not number.is_finite() or number.copy_abs() > LARGEST:
-        raise InputError(f"--set: {name} must be a finite number of at most {LARGEST:g} in size, found {shown(text)}")
-    return str(number)
 
 
 def _document(tables: PursuitTables) -> dict[str, Any]:

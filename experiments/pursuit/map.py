@@ -39,7 +39,7 @@ class Axis:
 
 def run(options: PursuitMap) -> None:
     """Solve the games of the grid, write the files and print a summary."""
-    problem = load_pursuit(options.problem).with_settings(options.settings or ())
+    problem = load_pursuit(options.problem, options.settings)
     x = read_axis("--x", _columns(problem) if options.columns is None else options.columns)
     y = read_axis("--y", options.rows)
     if x.parameter == y.parameter:

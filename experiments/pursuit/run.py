@@ -30,7 +30,7 @@ Begin = Callable[[str], Callable[[float], None]]
 def run(options: Pursuit) -> None:
     """Solve the game, simulate it with feedback, write the files and print the results."""
     _check_feedback(options)
-    problem = load_pursuit(options.problem).with_settings(options.settings or ())
+    problem = load_pursuit(options.problem, options.settings)
     evader = None if options.feedback is None else evader_policy(options.feedback, options.seed)
     names = FIGURES if evader is None else (*FIGURES, FEEDBACK_FIGURE)
     with output_of(options, ("problem.toml", "results.json", *figure_files(*names))) as written:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.options import FileOptions, Html, ProblemName, Seed
+from experiments.common.options import FileOptions, Html, ProblemName, Seed, Settings
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,7 @@ class Reach(FileOptions):
     """
 
     problem: ProblemName = "rendezvous-2021"
+    settings: Settings = None
     select: Annotated[
         str,
         typer.Option(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property
@@ -209,20 +209,22 @@ class Rendezvous:
         return replace(problem, transition=transition, control=control, offsets=offsets, between=between)
 
 
-def load_rendezvous(name_or_path: str | os.PathLike[str]) -> Rendezvous:
+def load_rendezvous(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Rendezvous:
     """Read a built-in problem or a file.
 
     Parameters
     ----------
     name_or_path : str or path
         A built-in name, or the path of a TOML file.
+    settings : sequence of str or None, optional
+        KEY=VALUE: values in place of those of the file.
 
     Raises
     ------
     InputError
         If there is no such problem, or it is not sound.
     """
-    tables = load_tables(problem_form(KIND, ReachabilityTables, _checks), name_or_path)
+    tables = load_tables(problem_form(KIND, ReachabilityTables, _checks), name_or_path, settings)
     try:
         return _rendezvous(tables)
     except InadmissibleStartError as error:

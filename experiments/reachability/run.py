@@ -37,7 +37,7 @@ def run(options: Reach) -> None:
     names, samples = _selection(options.select)
     route = None if options.route == "auto" else Route(options.route)
     request = Request(names, samples, options.seed, route, options.replan, options.noisy_flights)
-    rendezvous = load_rendezvous(options.problem)
+    rendezvous = load_rendezvous(options.problem, options.settings)
     published = is_published(rendezvous)
     files = ("results.json", *((TABLES,) if published else ()), *figure_files(*FIGURES))
     with output_of(options, files) as written, progress_bar(options.quiet) as begin:

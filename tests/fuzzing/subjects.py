@@ -64,7 +64,7 @@ def text_files() -> Mapping[str, TextFile]:
     problems: dict[str, list[str]] = {}
     for each in built_in_problems():
         problems.setdefault(each.kind, []).append(each.text)
-    readers = {
+    readers: dict[str, Callable[[str], object]] = {
         "pareto-encounter": load_pareto,
         "multipoint": lambda path: load_multipoint(path).tour,
         "pursuit-evasion": _read_pursuit,

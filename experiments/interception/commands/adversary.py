@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.options import Json, Overwrite, Quiet, Seed
+from experiments.common.options import Json, Overwrite, Quiet, Seed, Settings
 from experiments.interception.options import (
     MOST_RUNS,
     ModelName,
@@ -28,6 +28,7 @@ class Adversary:
     """
 
     scenario: ScenarioName = "asteroid-1997"
+    settings: Settings = None
     strategy: StrategyName = None
     model: ModelName = None
     range_meter: RangeMeter = None

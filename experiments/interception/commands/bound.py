@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.options import FileOptions, Seed
+from experiments.common.options import FileOptions, Seed, Settings
 from experiments.interception.options import MOST_RUNS, ModelName, ScenarioName, Strategies
 
 
@@ -21,6 +21,7 @@ class Bound(FileOptions):
     """
 
     scenario: ScenarioName = "asteroid-1997"
+    settings: Settings = None
     strategies: Strategies = None
     model: ModelName = None
     budget: Annotated[

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.options import Csv, FileOptions, Seed
+from experiments.common.options import Csv, FileOptions, Seed, Settings
 from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, ScenarioName, Strategies
 
 
@@ -22,6 +22,7 @@ class Compare(FileOptions):
     """
 
     scenario: ScenarioName = "asteroid-1997"
+    settings: Settings = None
     strategies: Strategies = None
     runs: Annotated[
         int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs for each strategy and noise.")

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.options import Csv, FileOptions, Seed
+from experiments.common.options import Csv, FileOptions, Seed, Settings
 from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, ScenarioName, StrategyName, TieName
 
 
@@ -21,6 +21,7 @@ class Engage(FileOptions):
     """
 
     scenario: ScenarioName = "asteroid-1997"
+    settings: Settings = None
     noise: Annotated[
         Literal["random", "game", "both"] | None, typer.Option(help="Measurement noise. Default: that of the scenario.")
     ] = None

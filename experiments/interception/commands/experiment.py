@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.options import Csv, FileOptions, Seed
+from experiments.common.options import Csv, FileOptions, Seed, Settings
 from experiments.interception.options import MOST_RUNS, ModelName, ScenarioName, StrategyName, TieName
 
 
@@ -20,6 +20,7 @@ class Experiment(FileOptions):
     """
 
     scenario: ScenarioName = "asteroid-1997"
+    settings: Settings = None
     runs: Annotated[int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs of each case.")] = 50
     seed: Seed = 0
     strategy: StrategyName = None

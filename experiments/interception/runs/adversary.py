@@ -27,7 +27,11 @@ def run(options: Adversary) -> None:
     if options.record is not None:
         record_path("--record", options.record)
     scenario = scenario_with(
-        options.scenario, strategy=options.strategy, model=options.model, range_meter=options.range_meter
+        options.scenario,
+        options.settings,
+        strategy=options.strategy,
+        model=options.model,
+        range_meter=options.range_meter,
     )
     own = own_strategy(options.strategy)
     with (

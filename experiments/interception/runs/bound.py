@@ -80,7 +80,7 @@ class WorstOfStrategy:
 
 def run(options: Bound) -> None:
     """Compute the bound, simulate the strategies, write the files and print the tables."""
-    scenario = scenario_with(options.scenario, model=options.model)
+    scenario = scenario_with(options.scenario, options.settings, model=options.model)
     strategies = chosen_strategies(scenario, options.strategies)
     with (
         output_of(options, ("scenario.toml", "results.json", *figure_files(FIGURE))) as written,

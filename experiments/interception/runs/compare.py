@@ -33,7 +33,7 @@ COLUMNS = ("strategy", "noise", "tie", "run", "miss_m", "impulse_m_s", "outcome"
 
 def run(options: Compare) -> None:
     """Simulate the strategies, write the files and print the table."""
-    scenario = scenario_with(options.scenario, model=options.model, range_meter=options.range_meter)
+    scenario = scenario_with(options.scenario, options.settings, model=options.model, range_meter=options.range_meter)
     strategies = chosen_strategies(scenario, options.strategies)
     with (
         output_of(options, ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE))) as written,

@@ -29,6 +29,7 @@ def run(options: Engage) -> None:
     """Simulate one or two engagements, write the files and print the table."""
     scenario = scenario_with(
         options.scenario,
+        options.settings,
         strategy=options.strategy,
         model=options.model,
         tie=options.tie,

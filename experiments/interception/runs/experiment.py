@@ -43,6 +43,7 @@ def run(options: Experiment) -> None:
     """Simulate the curves, write the files and print the table."""
     scenario = scenario_with(
         options.scenario,
+        options.settings,
         strategy=options.strategy,
         model=options.model,
         tie=options.tie,

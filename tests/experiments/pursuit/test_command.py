@@ -119,7 +119,7 @@ def test_what_is_no_game_is_told_in_a_line_with_a_remedy(settings: list[str], in
     options = [part for setting in settings for part in ("--set", setting)]
     code, out, err = infoset("pursuit", *options, "--out", "found")
     assert (code, out) == (2, "")
-    assert err.startswith("error: geo-pursuit with --set: ")
+    assert err.startswith("error: geo-pursuit (built in) with --set")
     assert settings[-1].split("=")[0] in err
     assert ";" in err
     assert list(tmp_path.iterdir()) == []
