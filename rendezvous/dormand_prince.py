@@ -6,12 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
+from rendezvous._arrays import Floats
 from rendezvous._compile import allocation_free
-
-Floats = NDArray[np.float64]
 
 STAGES = 12
 _NODES = np.ascontiguousarray(DOP853.C[:STAGES])

@@ -13,12 +13,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from rendezvous._arrays import Floats
 from rendezvous.relative_motion import ClohessyWiltshire
-
-Floats = NDArray[np.float64]
 
 CONTACT = 1e-12
 """A gap is contact if it is at most this share of the lengths that it is the difference of."""

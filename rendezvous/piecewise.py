@@ -1,4 +1,4 @@
-"""Smooth functions of time as polynomials on panels that are refined until the functions are resolved."""
+"""Smooth functions of time as polynomials on panels, refined until they are resolved; the greatest control."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rendezvous._arrays import Floats
 
 NODES = 12
 RESOLVED = 1e-11
 ROUNDING = 1e-7
 _AT_ONCE = 2048
+TOLERANCE = 1e-11
+_MOST_HALVINGS = 40
 
 
 def chebyshev_points(count: int) -> Floats:
@@ -36,6 +37,13 @@ def chebyshev_halves(count: int) -> list[Floats]:
 
 
 _POINTS, _FIT = chebyshev_points(NODES), chebyshev_fit(NODES)
+# The square of a control, a polynomial of twice the degree, at samples that bound it.
+_DEGREE = 2 * (NODES - 1)
+_SAMPLES = 4 * _DEGREE
+_FACTOR = 1.0 / np.cos(0.5 * np.pi * _DEGREE / _SAMPLES)
+_AT_SQUARES = chebyshev.chebvander(chebyshev_points(_DEGREE + 1), NODES - 1)
+_FIT_SQUARES, _HALVES = chebyshev_fit(_DEGREE + 1), chebyshev_halves(_DEGREE + 1)
+_AT_SAMPLES = chebyshev.chebvander(chebyshev_points(_SAMPLES), _DEGREE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,3 +111,38 @@ def _fitted(function: Callable[[Floats], Floats], starts: Floats, ends: Floats) 
             raise ValueError("a value is not finite; check the units")
         parts.append(_FIT @ values.reshape(len(low), NODES, -1))
     return np.concatenate(parts)
+
+
+def greatest_control(control: Callable[[Floats], Floats], breaks_s: Floats) -> float:
+    """Return the greatest |u| of a control, m/s^2, to 1e-9, relative.
+
+    `control` returns u, shape (k, 3), m/s^2, at k times, s. It is smooth between `breaks_s`, which do not decrease, and
+    its motion turns by about a radian at most between two of them (`LinearMotion.breaks`). Between short panels at late
+    times the error is the effect of the rounding of times.
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite, or no break is later than another.
+
+    Notes
+    -----
+    On panels u is a polynomial of degree 11 to 1e-11 (`resolve`), |u|^2 one of degree 22. A polynomial p
+    of degree d is bounded by its values at the zeros of the Chebyshev polynomial of degree M > d (Ehlich and Zeller,
+    1964): max |p| <= max_j |p(x_j)| / cos(pi d / (2 M)). Applied to |u|^2 minus the middle of its samples, this bounds
+    each panel from above; panels that may contain the greatest are halved until bound and sample agree to 1e-11. No
+    peak between samples is missed.
+    """
+    pieces = resolve(control, breaks_s)
+    squares = (_FIT_SQUARES @ ((_AT_SQUARES @ pieces.coefficients) ** 2).sum(axis=2)[..., None])[..., 0]
+    greatest = 0.0
+    for _ in range(_MOST_HALVINGS):
+        values = squares @ _AT_SAMPLES.T
+        top, bottom = values.max(axis=1), values.min(axis=1)
+        bounds = 0.5 * (top + bottom) + 0.5 * _FACTOR * (top - bottom)
+        greatest = max(greatest, float(top.max()))
+        open_ = bounds > greatest * (1.0 + 2.0 * TOLERANCE)
+        if not open_.any():
+            break
+        squares = np.concatenate([squares[open_] @ half.T for half in _HALVES])
+    return float(np.sqrt(greatest))

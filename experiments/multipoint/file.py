@@ -34,9 +34,8 @@ from experiments.common.toml_values import (
     wrong,
 )
 from rendezvous.multipoint import DriftingTargets, KeplerTargets, KeplerTour, Meet, Target, TimeLimits, Tour, Visits
-from rendezvous.orbital_elements import OrbitalElements
 from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
-from rendezvous.two_body import coast
+from rendezvous.two_body import OrbitalElements, coast
 
 Floats = NDArray[np.float64]
 

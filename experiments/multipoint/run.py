@@ -18,8 +18,8 @@ from experiments.multipoint.file import MultipointProblem, load_multipoint
 from experiments.multipoint.page import multipoint_page
 from experiments.multipoint.report import Report, Search, print_report, report_json
 from experiments.multipoint.scene import Scene, cost_curves
-from rendezvous.greatest_control import greatest_control
 from rendezvous.multipoint import MOST_TARGETS, best_order, best_order_of_slots, best_times
+from rendezvous.piecewise import greatest_control
 
 FIGURES = ("figure-path", "figure-control", "figure-costates", "figure-times")
 

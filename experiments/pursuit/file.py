@@ -36,8 +36,8 @@ from experiments.common.toml_values import (
     si,
     wrong,
 )
-from rendezvous.orbital_elements import OrbitalElements, perigee_m, semi_major_axis_m
 from rendezvous.pursuit_evasion import Game, Gravity, Player
+from rendezvous.two_body import OrbitalElements, perigee_m, semi_major_axis_m
 
 KIND = "pursuit-evasion"
 SUSPICIOUSLY_SMALL_KM = Decimal(100)

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 
-from infoset.polytope._frame import FLAT, frame_of
-from infoset.polytope._incidence import together
-from infoset.polytope._qhull import hull_of_points, intersection_of_halfspaces
+from infoset.polytope._affine_hull import FLAT, frame_of
+from infoset.polytope._qhull import hull_of_points, intersection_of_halfspaces, together
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -6,13 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rendezvous._arrays import Floats
 from rendezvous.multipoint.segments import Nodes, Path
 from rendezvous.relative_motion import TimeVaryingMotion
 from rendezvous.two_body import coast
-
-Floats = NDArray[np.float64]
 
 NODES = 12
 PANEL_RAD = 0.6

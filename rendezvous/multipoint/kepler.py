@@ -7,18 +7,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from rendezvous.multipoint._hamiltonian import LEAST_RADIUS
+from rendezvous._arrays import Floats, Integers
 from rendezvous.multipoint._reference import Mixture, Reference, TracedPath, panels_of
-from rendezvous.multipoint._shooting import ROUNDING, ShotPath, blocks_of, shoot, unknowns_of
+from rendezvous.multipoint._shooting import LEAST_RADIUS, ROUNDING, ShotPath, blocks_of, shoot, unknowns_of
 from rendezvous.multipoint.segments import Flown, Nodes, NotSettledError, Path, check_times, solve_segments
-from rendezvous.multipoint.targets import Integers, MovingTargets, Target
-from rendezvous.multipoint.tour import Visits, nodes_of
+from rendezvous.multipoint.tour import MovingTargets, Target, Visits, nodes_of
 from rendezvous.relative_motion import TimeVaryingMotion
 from rendezvous.two_body import coast, coasting_rates, gravity_gradient
-
-Floats = NDArray[np.float64]
 
 SETTLED = 1e-11
 MOST_ROUNDS = 30

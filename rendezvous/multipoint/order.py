@@ -8,14 +8,13 @@ from dataclasses import dataclass, field
 from math import factorial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rendezvous._arrays import Flags, Floats
 from rendezvous.multipoint.segments import Flown, NotSettledError, Path, check_times, solve_segments
-from rendezvous.multipoint.targets import Meet
 from rendezvous.multipoint.times import BestTimes, Effort, NoRoomError, TimeLimits, optimise_times, room_s
-from rendezvous.multipoint.tour import SMOOTH, Tour, Visits, nodes_of
+from rendezvous.multipoint.tour import SMOOTH, Meet, Tour, Visits, nodes_of
 
-Floats = NDArray[np.float64]
 Report = Callable[[float], None]
 
 MOST_TARGETS = 9
@@ -173,7 +172,7 @@ class _Search:
     horizon_s: float | None
     slack: float
     looks_twice: bool
-    fits: NDArray[np.bool_] | None = None
+    fits: Flags | None = None
     best: tuple[int, ...] = ()
     best_path: Flown | None = None
     best_objective: float = np.inf
@@ -276,7 +275,7 @@ def _orders_without_room(start_s: float, dwell_s: Floats, limits: TimeLimits) ->
     return unfit
 
 
-def _orders_that_fit(fits: NDArray[np.bool_]) -> int:
+def _orders_that_fit(fits: Flags) -> int:
     """Count the orders that use only pairs of slots and targets that fit, shape (slot, target)."""
     ways = {frozenset[int](): 1}
     for slot in fits:
@@ -288,12 +287,12 @@ def _orders_that_fit(fits: NDArray[np.bool_]) -> int:
     return sum(ways.values())
 
 
-def _unvisited(slot: NDArray[np.bool_], visited: frozenset[int]) -> list[int]:
+def _unvisited(slot: Flags, visited: frozenset[int]) -> list[int]:
     """Targets that fit a slot and are not visited yet."""
     return [target for target in np.flatnonzero(slot).tolist() if target not in visited]
 
 
-def _by_dynamic_programming(tour: Tour, times: Floats, fits: NDArray[np.bool_], unfit: int) -> BestOrder:
+def _by_dynamic_programming(tour: Tour, times: Floats, fits: Flags, unfit: int) -> BestOrder:
     """Held and Karp's recursion over sets of visited targets."""
     count, targets, dwell = len(times), tour.targets, tour.dwell_s
     best: dict[tuple[frozenset[int], int], tuple[float, tuple[int, ...]]] = {}

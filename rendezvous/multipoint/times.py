@@ -8,14 +8,13 @@ from enum import Enum
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 from scipy.stats import qmc
 
+from rendezvous._arrays import Floats
 from rendezvous.multipoint.segments import Flown, NotSettledError, Path
 
-Floats = NDArray[np.float64]
 FlyAt = Callable[[Floats], Flown]
 
 LEAST_SHARE = 1e-6

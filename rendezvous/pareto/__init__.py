@@ -21,8 +21,14 @@ from rendezvous.pareto.front import (
 )
 from rendezvous.pareto.plan import Plan, PlanSamples
 from rendezvous.pareto.selections import NotOptimalError, least_greatest_excess, least_sum_of_costs, nearest_to
-from rendezvous.pareto.solution import CraftCost, EncounterSolution, solve_encounter, weighted_point
-from rendezvous.pareto.sweep import DurationSweep, sweep_meeting_time
+from rendezvous.pareto.solution import (
+    CraftCost,
+    DurationSweep,
+    EncounterSolution,
+    solve_encounter,
+    sweep_meeting_time,
+    weighted_point,
+)
 
 __all__ = [
     "BoundCheck",

@@ -8,11 +8,9 @@ from itertools import combinations
 from math import factorial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rendezvous._arrays import Floats
 from rendezvous.pareto.solution import EncounterSolution, weighted_point
-
-Floats = NDArray[np.float64]
 
 MOST_CRAFT = 12
 _RELATIVE = 1e-12

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rendezvous._arrays import Floats
 from rendezvous.relative_motion import Frame, LinearMotion
-
-Floats = NDArray[np.float64]
 
 
 class Component(Enum):

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
+from rendezvous._arrays import Floats
 from rendezvous.pareto.solution import EncounterSolution
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rendezvous._arrays import Floats
 
 _RELATIVE = 1e-13
 _MOST_ROUNDS = 1000

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
+from rendezvous._arrays import Floats
 from rendezvous.pareto.front import simplex_weights
 from rendezvous.pareto.hull import nearest_in_hull
 from rendezvous.pareto.solution import EncounterSolution
-
-Floats = NDArray[np.float64]
 
 _MOST_STEPS = 200
 _TRIED, _FOLLOWED, _MOST_ROUNDS = 500, 4, 20

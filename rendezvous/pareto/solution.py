@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rendezvous._arrays import Floats
 from rendezvous.pareto.encounter import Craft, Encounter
 from rendezvous.pareto.plan import Plan
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,3 +178,39 @@ def _craft_cost(craft: Craft, whiten: Floats, missing: Floats, opening: Floats) 
     if not np.isfinite(ideal).all():
         raise ValueError(f"craft {craft.name!r}: the numbers overflow; check the units")
     return CraftCost(craft, ideal, float(rest @ rest), upper, base, slope, to_costate)
+
+
+@dataclass(frozen=True)
+class DurationSweep:
+    """An encounter at k meeting times.
+
+    Parameters
+    ----------
+    meeting_s : ndarray, shape (k,)
+        Times of the meeting.
+    points : ndarray, shape (k, f)
+        Free values that minimise the group loss.
+    cost_squared, ideal_cost_squared : ndarray, shape (k, n)
+        J_i^2 and J_i*^2, m^2/s^3.
+    group_loss : ndarray, shape (k,)
+        m^2/s^3.
+    """
+
+    meeting_s: Floats
+    points: Floats
+    cost_squared: Floats
+    ideal_cost_squared: Floats
+    group_loss: Floats
+
+
+def sweep_meeting_time(encounter: Encounter, meeting_s: ArrayLike) -> DurationSweep:
+    """Solve an `encounter` at k meeting times, each after every craft's start."""
+    times = np.atleast_1d(np.asarray(meeting_s, dtype=np.float64))
+    solutions = [solve_encounter(replace(encounter, meeting_s=float(time))) for time in times]
+    return DurationSweep(
+        times,
+        np.array([solution.point for solution in solutions]),
+        np.array([solution.cost_squared() for solution in solutions]),
+        np.array([[cost.ideal_cost_squared for cost in solution.costs] for solution in solutions]),
+        np.array([float(solution.group_loss()) for solution in solutions]),
+    )

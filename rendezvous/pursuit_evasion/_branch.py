@@ -13,11 +13,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._pair import COARSE, FINE, MOST_RESIDUAL, ROUGH, Node, Pair
-
-Floats = NDArray[np.float64]
 
 _LONGEST_STEP, _SHORTEST_STEP = 0.3, 1e-6
 _PREDICTED_WITHIN = 3e-3

@@ -12,12 +12,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rendezvous.pursuit_evasion._elimination import eliminate
+from rendezvous._arrays import Floats
+from rendezvous.pursuit_evasion._extremal import eliminate
 from rendezvous.pursuit_evasion._side import KnownPath, Response, Side, across
-
-Floats = NDArray[np.float64]
 
 FINE, COARSE = 1e-13, 1e-9
 """Tolerances of propagation: of results, and of intermediate iterations."""

@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._pair import COARSE, ROUGH, Node, Pair
 from rendezvous.pursuit_evasion._side import Response, Side, across
-
-Floats = NDArray[np.float64]
 
 _DIRECTIONS = 120
 _SEEDS, _MOST_PARTS = 2, 4

@@ -7,13 +7,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rendezvous.pursuit_evasion._elimination import eliminate
-from rendezvous.pursuit_evasion._extremal import rate, shoot_back, shoot_state_back
-from rendezvous.pursuit_evasion._gravity import acceleration
-
-Floats = NDArray[np.float64]
+from rendezvous._arrays import Floats
+from rendezvous.pursuit_evasion._extremal import acceleration, eliminate, rate, shoot_back, shoot_state_back
 
 _IDENTITY = np.eye(6)
 

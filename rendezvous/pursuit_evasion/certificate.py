@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
 from rendezvous.pursuit_evasion._pair import MOST_RESIDUAL, Node, Pair
 from rendezvous.pursuit_evasion._scan import greater, scan
@@ -21,8 +21,6 @@ from rendezvous.pursuit_evasion.paths import ExtremalPath, PathError, extremal_p
 from rendezvous.pursuit_evasion.solution import Capture, Solution
 from rendezvous.pursuit_evasion.steering import Policy
 from rendezvous.pursuit_evasion.units import scaled_game
-
-Floats = NDArray[np.float64]
 
 MOST_HAMILTONIAN_DRIFT = 1e-8
 MOST_INTEGRATOR_GAP = 1e-7

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
+from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
 from rendezvous.pursuit_evasion._pair import FINE, Node, Pair
 from rendezvous.pursuit_evasion._side import Craft
@@ -20,7 +20,6 @@ from rendezvous.pursuit_evasion.solver import solve
 from rendezvous.pursuit_evasion.steering import Steering
 from rendezvous.pursuit_evasion.units import Units, scaled_game
 
-Floats = NDArray[np.float64]
 PathNow = Callable[[float], Floats]
 
 HIT_M = 100.0

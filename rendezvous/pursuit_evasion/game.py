@@ -10,11 +10,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rendezvous.orbital_elements import perigee_m, semi_major_axis_m
+from rendezvous.two_body import perigee_m, semi_major_axis_m
 
-Floats = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 STANDARD_GRAVITY_M_S2 = 9.80665

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rendezvous._arrays import Floats, Places
 from rendezvous.pursuit_evasion._pair import Node
 from rendezvous.pursuit_evasion.game import Game
 from rendezvous.pursuit_evasion.solution import Verdict
 from rendezvous.pursuit_evasion.solver import solve
 from rendezvous.pursuit_evasion.units import Units, scaled_game
-
-Floats = NDArray[np.float64]
 
 CHECKED_EVERY = 50
 """Distance between points of a row that are solved from scratch; shifted from row to row."""
@@ -64,7 +62,7 @@ class CaptureMap:
     columns: Floats
     rows: Floats
     capture_s: np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]
-    status: NDArray[np.int64]
+    status: Places
     closing_speed_m_s: np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]
     solved_from_nothing: int
 

@@ -6,16 +6,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._extremal import STATES, flow_back, rate
 from rendezvous.pursuit_evasion._pair import FINE, Node
 from rendezvous.pursuit_evasion._side import Craft
 from rendezvous.pursuit_evasion.solution import Solution
 from rendezvous.pursuit_evasion.units import Units, scaled_game
 
-Floats = NDArray[np.float64]
 Direction = Callable[[float, Floats], Floats]
 """Direction of thrust, shape (3,), of a time and a state: any length, zero to coast."""
 

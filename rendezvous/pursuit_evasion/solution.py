@@ -5,14 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._pair import Node
 from rendezvous.pursuit_evasion.game import Game
 from rendezvous.pursuit_evasion.units import Units
-
-Floats = NDArray[np.float64]
 
 
 class Verdict(Enum):

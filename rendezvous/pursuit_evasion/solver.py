@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rendezvous._arrays import Floats
 from rendezvous.linear_game import LinearGameError, circular_orbit_capture
 from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow, polish
 from rendezvous.pursuit_evasion._pair import COARSE, Node
@@ -20,8 +20,6 @@ from rendezvous.pursuit_evasion.paths import orbital_axes, steered_path
 from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
 from rendezvous.pursuit_evasion.steering import Policy
 from rendezvous.pursuit_evasion.units import ScaledGame, Units, horizon_s, scaled_game, units_of
-
-Floats = NDArray[np.float64]
 
 _MOST_BRANCHES = 6
 _REACH_STEP, _MOST_REACH_STEPS, _REACHED = 0.1, 400, 1e-6

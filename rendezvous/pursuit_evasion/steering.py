@@ -9,9 +9,8 @@ from enum import Enum
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rendezvous._arrays import Floats
 
 Steering = Callable[[float, Floats], Floats]
 """Direction of thrust, shape (3,), of the time (s) and the evader's state (m, m/s): any length, zero to coast."""

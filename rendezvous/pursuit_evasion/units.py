@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rendezvous.orbital_elements import semi_major_axis_m
+from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._pair import Pair
 from rendezvous.pursuit_evasion._side import Craft
 from rendezvous.pursuit_evasion.game import Game, Gravity, Player
-
-Floats = NDArray[np.float64]
+from rendezvous.two_body import semi_major_axis_m
 
 LONGEST_REVOLUTIONS = 15.0
 """Default of the longest duration of a game, in revolutions of the pursuer."""

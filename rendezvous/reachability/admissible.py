@@ -7,15 +7,12 @@ from dataclasses import dataclass, replace
 
 import clarabel
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from rendezvous._arrays import Flags, Floats, Places
 from rendezvous.reachability.conic import STEADY, ConeProgram, NoSolutionError, Optimum
 from rendezvous.reachability.problem import Block
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Places = NDArray[np.int64]
 Constraints = tuple[Floats, Floats, Places, Places]
 
 _BROKEN = 3e-10

@@ -6,14 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rendezvous._arrays import Floats
 from rendezvous.reachability.optimum import EmptyTubeError
 from rendezvous.reachability.problem import InadmissibleStartError, ReachabilityProblem
 from rendezvous.reachability.selection import minimum_energy
 from rendezvous.reachability.solve import OptimalControls, optimal_controls
-
-Floats = NDArray[np.float64]
 
 Truth = Callable[[int, Floats, Floats], Floats]
 """A function of the period, the true state and the control that returns the true state one period later."""

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 
 import clarabel
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.sparse import csc_matrix, issparse, vstack
 
 from infoset.polytope import HIGHS
-
-Floats = NDArray[np.float64]
+from rendezvous._arrays import Floats
 
 _GAP = 1e-10
 _BROKEN, _APART = 1e-9, 1e-8

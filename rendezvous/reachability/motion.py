@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
+from rendezvous._arrays import Floats
 from rendezvous.relative_motion import ORBITAL, ConstantMotion, EllipticOrbit, TschaunerHempel
-
-Floats = NDArray[np.float64]
 
 _RELATIVE = 1e-12
 _ABSOLUTE = 1e-9

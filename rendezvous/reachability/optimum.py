@@ -5,17 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lstsq
 
 from infoset.polytope import null_space_basis, relative_interior
+from rendezvous._arrays import Flags, Floats, Places
 from rendezvous.reachability.admissible import Lifted, deep_point, least_relaxation, lift
 from rendezvous.reachability.conic import ConeProgram, NoSolutionError
 from rendezvous.reachability.problem import Block
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Places = NDArray[np.int64]
 
 _REACHED = 1e-9
 """Constraints that are broken by less than this, relative to their sizes, count as kept."""
@@ -313,7 +309,7 @@ class _Search:
             multipliers[hard] = np.maximum(-self._lifted.rows[hard] @ residual, 0.0)
         return LeastNorm(self._point, value, min(self._bound, value), multipliers, residual)
 
-    def _program(self, start: Floats, scale: float) -> tuple[ConeProgram, NDArray[np.int64]]:
+    def _program(self, start: Floats, scale: float) -> tuple[ConeProgram, Places]:
         """The cone program in v = start + scale z, without the constraints that z cannot reach."""
         lifted, size = self._lifted, self._size
         slack = (lifted.limits - lifted.rows @ start) / scale

@@ -7,12 +7,11 @@ from enum import Enum
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-Floats = NDArray[np.float64]
-Places = NDArray[np.int64]
+from rendezvous._arrays import Floats, Places
 
 MOST_PERIODS = 256
 
@@ -224,7 +223,7 @@ class ReachabilityProblem:
                 worst = np.maximum(worst, self._state_excess(inner[..., instant, :], np.arange(self.periods)))
         return np.asarray(worst)
 
-    def _state_excess(self, states: Floats, times: NDArray[np.int64]) -> Floats:
+    def _state_excess(self, states: Floats, times: Places) -> Floats:
         """Worst over the last two axes (time, state); a constraint holds between t and t + 1 where it does at t."""
         worst = (np.abs(states) / self.state_bounds).max(axis=(-1, -2)) - 1.0
         normals, offsets = self.further

@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 from scipy.sparse import coo_array
 
 from infoset.polytope import HIGHS
+from rendezvous._arrays import Floats
 from rendezvous.reachability.conic import ConeProgram, NoSolutionError
 from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
-
-Floats = NDArray[np.float64]
 
 MOST_PERIODS_WITH_FEEDBACK = 24
 _TIDY = 1e-7

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from infoset.polytope import EmptyPolytopeError, Polytope, UncertainHullError, relative_interior
+from rendezvous._arrays import Floats
 from rendezvous.reachability.admissible import Lifted, least_l1, least_peak, least_sum_of_norms, quadratic
 from rendezvous.reachability.conic import NoSolutionError
 from rendezvous.reachability.solve import OptimalControls
-
-Floats = NDArray[np.float64]
 
 MOST_VERTICES = 2000
 _MOST_DIMENSIONS = 8

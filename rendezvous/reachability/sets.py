@@ -9,14 +9,12 @@ from time import perf_counter
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from infoset.polytope import Polytope, cut, intersection, linear_image, shadow
+from rendezvous._arrays import Floats
 from rendezvous.reachability.admissible import Lifted, Maximiser, lift, lift_with_states
 from rendezvous.reachability.optimum import BlockOptimum
 from rendezvous.reachability.problem import ReachabilityProblem
-
-Floats = NDArray[np.float64]
 
 _FEW_CONTROLS = 24
 _AT_BOUND = 1.0 - 1e-10

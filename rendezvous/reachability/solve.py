@@ -7,9 +7,10 @@ from enum import Enum
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from infoset.polytope import EmptyPolytopeError, UncertainHullError
+from rendezvous._arrays import Floats
 from rendezvous.reachability.admissible import Lifted, Maximiser, joined
 from rendezvous.reachability.optimum import BlockOptimum, block_optimum, block_reaches_zero
 from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
@@ -24,8 +25,6 @@ from rendezvous.reachability.sets import (
     TooLargeError,
     optimal_set,
 )
-
-Floats = NDArray[np.float64]
 
 MOST_STATES_BY_CHOICE = 4
 """Greatest number of states of a block for which the exact route is tried by default."""

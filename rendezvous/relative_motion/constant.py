@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
+from rendezvous._arrays import Floats
 from rendezvous.relative_motion.frames import HILL, Frame
 from rendezvous.relative_motion.linear_motion import LinearMotion, checked_durations, even_breaks
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

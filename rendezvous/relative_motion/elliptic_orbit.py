@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rendezvous._arrays import Floats
 from rendezvous.relative_motion.constant import ConstantMotion
 from rendezvous.relative_motion.frames import HILL, Frame
 from rendezvous.relative_motion.linear_motion import checked_rate
-
-Floats = NDArray[np.float64]
 
 _MOST_STEPS = 60
 

@@ -7,9 +7,8 @@ from enum import Enum
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rendezvous._arrays import Floats
 
 
 class Axis(Enum):

@@ -6,11 +6,10 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rendezvous._arrays import Floats
 from rendezvous.relative_motion.frames import HILL, Frame, StateOrder
-
-Floats = NDArray[np.float64]
 
 MOST_PANELS = 200_000
 

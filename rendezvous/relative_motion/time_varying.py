@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rendezvous._arrays import Floats
 from rendezvous.relative_motion.frames import HILL, Frame
 from rendezvous.relative_motion.linear_motion import LinearMotion, Segment, checked_durations
 
-Floats = NDArray[np.float64]
 OfTime = Callable[[Floats], Floats]
 
 NODES = 8

@@ -6,14 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rendezvous._arrays import Flags, Floats
 from rendezvous.relative_motion.elliptic_orbit import EllipticOrbit
 from rendezvous.relative_motion.frames import HILL, Frame
 from rendezvous.relative_motion.linear_motion import LinearMotion, checked_durations, even_breaks
 from rendezvous.relative_motion.time_varying import TimeVaryingMotion
 
-Floats = NDArray[np.float64]
 _OfIntervals = Callable[[Floats, Floats], Floats]
 
 SHORT_RAD = 0.1
@@ -99,7 +99,7 @@ class TschaunerHempel(LinearMotion):
     def _collocated(self) -> TimeVaryingMotion:
         return TimeVaryingMotion(self.orbit.dynamics)
 
-    def _short(self, starts: Floats, ends: Floats) -> NDArray[np.bool_]:
+    def _short(self, starts: Floats, ends: Floats) -> Flags:
         anomalies = self.orbit.true_anomaly(starts), self.orbit.true_anomaly(ends)
         return np.asarray(np.abs(anomalies[1] - anomalies[0]) < SHORT_RAD)
 
