@@ -37,14 +37,9 @@ class LinearGameError(RuntimeError):
 
 @dataclass(frozen=True)
 class Thruster:
-    """Constant thrust of a craft in free space.
+    """Constant thrust of a craft in free space; mass is that at the start of the game.
 
-    Parameters
-    ----------
-    thrust_n, mass_kg : float
-        Thrust, and mass at the start of the game.
-    exhaust_speed_m_s : float
-        Specific impulse times standard gravity.
+    `exhaust_speed_m_s` is the specific impulse times standard gravity.
 
     Raises
     ------
@@ -64,8 +59,6 @@ class Thruster:
     def travel_m(self, time_s: float) -> float:
         """Return the distance covered from rest by full thrust along a line.
 
-        Notes
-        -----
         c [t - (tau - t) ln(tau / (tau - t))], tau = m c / T; a series where t / tau is small, as the difference cancels
         there.
         """
@@ -101,14 +94,8 @@ class Thruster:
 class LinearCapture:
     """Capture in a linear game.
 
-    Parameters
-    ----------
-    time_s : float
-        First zero of the gap.
-    direction : ndarray, shape (3,)
-        nu, in the axes of the positions.
-    is_grazing : bool
-        Whether the gap comes within the tolerance of zero, but not clearly below it (see Notes).
+    `time_s` is that of the first zero of the gap, and `direction`, shape (3,), is nu, in the axes of the positions.
+    `is_grazing` says that the gap comes within the tolerance of zero, but not clearly below it.
 
     Notes
     -----

@@ -75,14 +75,12 @@ def perigee_m(position_m: Floats, velocity_m_s: Floats, gravitational_parameter_
 def coast(states: Floats, duration_s: ArrayLike, gravitational_parameter_m3_s2: float) -> Floats:
     """Return `states` (r, v), shape (..., 6), about the attracting point, after coasting; `duration_s` may be negative.
 
+    Lagrange's f and g functions of the change of the eccentric anomaly.
+
     Raises
     ------
     ValueError
         If a state is not on an ellipse.
-
-    Notes
-    -----
-    Lagrange's f and g functions of the change of the eccentric anomaly.
     """
     mu = gravitational_parameter_m3_s2
     position, velocity = states[..., :3], states[..., 3:]

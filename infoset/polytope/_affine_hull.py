@@ -25,16 +25,8 @@ HIGHS = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e
 class Frame:
     """Coordinates y = (x - centre) basis / extents of an affine subspace of dimension d in R^n.
 
-    Parameters
-    ----------
-    centre : ndarray, shape (n,)
-        Mean of the points.
-    basis : ndarray, shape (n, d)
-        Orthonormal columns.
-    extents : ndarray, shape (d,)
-        Greatest distance of a point from the centre along each column.
-    across : ndarray, shape (n, n - d)
-        Orthonormal columns that complete the basis.
+    `centre` is the mean of the points, `basis`, shape (n, d), has orthonormal columns, and `extents`, shape (d,), are
+    the greatest distances of a point from the centre along them. `across`, shape (n, n - d), completes the basis.
     """
 
     centre: Floats
@@ -65,8 +57,6 @@ class Frame:
 def frame_of(points: Floats, flat: float = FLAT) -> Frame:
     """Return the frame of the affine hull of points, shape (k, n), at least one.
 
-    Notes
-    -----
     A singular-value decomposition, O(k n^2). A direction counts where the points are wider along it than `flat` times
     their greatest width, and wider than the rounding of their coordinates.
     """
@@ -82,24 +72,11 @@ def frame_of(points: Floats, flat: float = FLAT) -> Frame:
 
 @dataclass(frozen=True, eq=False)
 class RelativeInterior:
-    """The set {point + basis z: rows z <= limits}, with the centre of a largest ball inside.
+    """The set {point + basis z: rows z <= limits}, with the centre and radius of a largest ball inside.
 
-    Parameters
-    ----------
-    point : ndarray, shape (n,)
-        Origin of the coordinates z.
-    basis : ndarray, shape (n, d)
-        Orthonormal columns.
-    rows : ndarray, shape (k, d)
-        Rows of unit length.
-    limits : ndarray, shape (k,)
-        Limits of the rows.
-    kept : ndarray of int, shape (k,)
-        Index of each row's half-space; the others are always tight, or do not depend on z.
-    centre : ndarray, shape (d,)
-        The Chebyshev centre.
-    radius : float
-        Radius of a largest ball inside.
+    `point`, shape (n,), is the origin of the coordinates z, `basis`, shape (n, d), has orthonormal columns, and `rows`,
+    shape (k, d), have unit length. `kept`, shape (k,), is the index of each row's half-space; the others are always
+    tight, or do not depend on z. `centre`, shape (d,), is the Chebyshev centre.
     """
 
     point: Floats
@@ -159,7 +136,7 @@ def relative_interior(
     # A row whose length is rounding has no direction.
     void = np.flatnonzero(~long & (offsets < -ROUNDING * size))
     if len(void):
-        raise EmptyPolytopeError(float(-offsets[void].min()), void)
+        raise EmptyPolytopeError(float(-offsets[void].min()))
     used = np.flatnonzero(long)
     normals, offsets = normals[used] / lengths[used, None], offsets[used] / lengths[used]
     for _ in range(len(normals) + 1):
@@ -170,7 +147,7 @@ def relative_interior(
         kept = np.flatnonzero(lengths > FLAT)
         worst = float(np.delete(limits, kept).min(initial=np.inf))
         if worst < -slack:
-            raise EmptyPolytopeError(-worst, used[np.flatnonzero((lengths <= FLAT) & (limits < -slack))])
+            raise EmptyPolytopeError(-worst)
         if not basis.shape[1]:
             return RelativeInterior(point, basis, rows[:0], limits[:0], used[:0], np.zeros(0), 0.0)
         rows, limits = rows[kept] / lengths[kept, None], limits[kept] / lengths[kept]

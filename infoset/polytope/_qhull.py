@@ -147,19 +147,9 @@ def _single(point: Floats) -> Description:
 def essential(points: Floats, normals: Floats, offsets: Floats) -> tuple[Floats, Floats, Floats]:
     """Return the points that are vertices and the planes that are facets of a full-dimensional polytope, d >= 2.
 
-    Parameters
-    ----------
-    points : ndarray, shape (k, d)
-        All vertices, and perhaps other points of the polytope, in coordinates in which its width is about one.
-    normals : ndarray, shape (m, d)
-        Normals of all facets, and perhaps of other half-spaces that contain the polytope.
-    offsets : ndarray, shape (m,)
-        Offsets of these half-spaces.
-
-    Returns
-    -------
-    tuple of ndarray
-        Vertices, shape (v, d), and the normals, of unit length, and offsets of the facets.
+    `points`, shape (k, d), contain all vertices, and perhaps other points of the polytope, in coordinates in which its
+    width is about one. `normals`, shape (m, d), and `offsets` contain all facets, and perhaps other half-spaces that
+    contain the polytope. Normals of the returned facets have unit length.
 
     Raises
     ------
@@ -170,10 +160,8 @@ def essential(points: Floats, normals: Floats, offsets: Floats) -> tuple[Floats,
     -----
     A plane is a facet if the points on it span d - 1 dimensions and are not a subset of the points on another plane. A
     point is a vertex if it is the only common point of the planes through it. O(k m d^2), and O(m^2 k) for matrix
-    products.
-
-    The hull of the vertices is computed again as a check: it must contain all points, and each simplex of its surface
-    must lie in a facet. Distances of points from planes are either rounding or real: the widest gap among them
+    products. The hull of the vertices is computed again as a check: it must contain all points, and each simplex of its
+    surface must lie in a facet. Distances of points from planes are either rounding or real: the widest gap among them
     separates the two. If the check fails, fixed tolerances are tried.
     """
     lengths = np.linalg.norm(normals, axis=1)

@@ -148,8 +148,6 @@ def panels_of(path: Path, before: Reference, *, keep: bool = False) -> Panels:
 class Mixture:
     """Mixes the last rounds of an iteration x -> g(x) of references on the same panels.
 
-    Notes
-    -----
     Anderson (1965): the combination of the g(x_j), of sum one, whose residuals g(x_j) - x_j cancel best.
     """
 

@@ -69,12 +69,9 @@ _step = step_of(_rates)
 def propagate(z: Floats, duration: float) -> bool:
     """Propagate (r, v, lambda_r, lambda_v, energy), in column 0 of z, and its variations in place; z is (13, 1 + m).
 
-    Returns whether the trajectory neither falls into the centre nor takes too many steps. The energy is not varied.
-
-    Notes
-    -----
-    The method of Dormand and Prince of order 8 in steps of 0.1 radians of the circular orbit at the present distance:
-    relative errors of about 1e-12 a revolution.
+    Lengths and times are such that the gravitational parameter is one. Returns whether the trajectory neither falls
+    into the centre nor takes too many steps. The energy is not varied. Steps of 0.1 radians of the circular orbit at
+    the present distance have relative errors of about 1e-12 a revolution.
     """
     slopes, z_next = np.zeros((STAGES, *z.shape)), np.zeros(z.shape)
     no_y, no_slopes = np.zeros(0), np.zeros((STAGES, 0))
@@ -214,11 +211,9 @@ class ShotPath:
 
     @property
     def time_gradient(self) -> Floats:
-        """Slopes dI / dt_i, shape (N,).
+        """Slopes dI / dt_i, shape (N,): D'(V_i - V) at a flyby.
 
-        Notes
-        -----
-        D'(V_i - V) at a flyby; at a rendezvous H - lambda' x_i' is the power 1/2 |u|^2, after minus before.
+        At a rendezvous H - lambda' x_i' is the power 1/2 |u|^2, after minus before.
         """
         states, before, starts = (np.concatenate([shot.ends[part] for shot in self.shots]) for part in range(3))
         after = np.concatenate([starts[1:], np.zeros((1, 6))])

@@ -29,16 +29,7 @@ GREATEST_CHANGE = 2.0
 class KeplerTargets(MovingTargets):
     """Targets on ellipses.
 
-    Parameters
-    ----------
-    targets : tuple of Target
-        At least one.
-    initial : ndarray, shape (n, 6)
-        Inertial states of the targets at their epochs, m and m/s.
-    epoch_s : ndarray, shape (n,)
-        Epochs of the targets.
-    gravitational_parameter_m3_s2 : float
-        mu.
+    `initial`, shape (n, 6), are their inertial states, m and m/s, at their epochs, `epoch_s`, shape (n,).
 
     Raises
     ------
@@ -69,12 +60,8 @@ class KeplerTargets(MovingTargets):
 class KeplerTour(Visits):
     """A chaser and the targets it visits, all under the gravity of one point.
 
-    Parameters
-    ----------
-    targets : KeplerTargets
-        Targets; their epochs refer to the start of the chaser.
-    start_state : ndarray, shape (6,)
-        Inertial state of the chaser at t = 0, on an ellipse, m and m/s.
+    `start_state`, shape (6,), is the chaser's inertial state at t = 0, on an ellipse, m and m/s; epochs of the targets
+    refer to the same time.
 
     Raises
     ------

@@ -29,8 +29,6 @@ class BestOrder:
     ----------
     order : tuple of int
         Indices of the targets, first to last.
-    path : Path
-        Path in this order.
     objective : float
         Energy plus the price of the time, m^2/s^3.
     nodes : int
@@ -182,7 +180,6 @@ class _Search:
     lost: list[tuple[int, ...]] = field(default_factory=list)
 
     def run(self) -> Flown:
-        """Search all orders, and return the path of the best one."""
         self._branch((), None)
         if self.best_path is None:
             raise NotSettledError("no path was found for any order; give visits more time")
@@ -288,7 +285,6 @@ def _orders_that_fit(fits: Flags) -> int:
 
 
 def _unvisited(slot: Flags, visited: frozenset[int]) -> list[int]:
-    """Targets that fit a slot and are not visited yet."""
     return [target for target in np.flatnonzero(slot).tolist() if target not in visited]
 
 

@@ -16,16 +16,9 @@ from rendezvous.relative_motion import LinearMotion, TimeVaryingMotion
 class Nodes:
     """States through which a path must pass, and their times, in order.
 
-    Parameters
-    ----------
-    arrive_s, leave_s : ndarray, shape (N,)
-        Times of arrival and departure; equal if the chaser does not stay with the target.
-    arrive, leave : ndarray, shape (N, 6)
-        States of the targets at these times.
-    arrive_rate, leave_rate : ndarray, shape (N, 6)
-        Their time derivatives.
-    rendezvous : ndarray of bool, shape (N,)
-        Whether the velocities must also agree.
+    `arrive` and `leave`, shape (N, 6), are the targets' states at the arrivals and departures, `arrive_s` and
+    `leave_s`, shape (N,), which are equal if the chaser does not stay; `arrive_rate` and `leave_rate` are their time
+    derivatives. `rendezvous`, shape (N,), says whether the velocities must also agree.
     """
 
     arrive_s: Floats
@@ -62,14 +55,10 @@ class Flown(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The minimum-energy path through nodes.
+    """The minimum-energy path through N nodes.
 
     Parameters
     ----------
-    motion : LinearMotion
-        Motion of the chaser.
-    nodes : Nodes
-        N nodes.
     cost : float
         I = 1/2 int |u|^2 dt, m^2/s^3.
     starts_s : ndarray, shape (N,)
@@ -107,8 +96,6 @@ class Path:
     def costate(self, time_s: Floats) -> Floats:
         """Return lambda (m/s^3, m/s^2), shape (k, 6), at k times: after the jump at a node, zero during a stay.
 
-        Notes
-        -----
         From the end of each segment where the motion has a closed form; else together with the states.
         """
         if isinstance(self.motion, TimeVaryingMotion):
@@ -134,8 +121,6 @@ class Path:
     def along(self, time_s: Floats) -> tuple[Floats, Floats]:
         """Return states and costates, shapes (k, 6), at k times from the start to the last node.
 
-        Notes
-        -----
         States are propagated from one time to the next, because long intervals of a time-varying motion are expensive.
         """
         times = np.asarray(time_s, dtype=np.float64)
@@ -310,8 +295,6 @@ def solve_path(
     `pinned` says whether the velocity at the end is given. Returns whether all blocks are positive definite, and I;
     otherwise the outputs are invalid.
 
-    Notes
-    -----
     y_k = L_k^-1 S_k^-1 (x_k - Phi_k x_(k-1) - d_k) with S = (T, T, T, 1, 1, 1); ahead and behind are its slopes along
     the velocities at the end and, negated, at the start. Normal equations by blocks of 3, factored as they are built.
     """

@@ -86,14 +86,7 @@ class TimeLimits:
 class BestTimes:
     """Visits at their best times.
 
-    Parameters
-    ----------
-    flown : Flown
-        The path at these times.
-    objective : float
-        Energy plus the price of the time, m^2/s^3.
-    evaluations : int
-        Number of paths computed.
+    `objective` is the energy plus the price of the time, m^2/s^3; `evaluations` is the number of paths computed.
     """
 
     flown: Flown

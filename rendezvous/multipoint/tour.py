@@ -29,16 +29,7 @@ class Meet(Enum):
 
 @dataclass(frozen=True)
 class Target:
-    """A target.
-
-    Parameters
-    ----------
-    name : str
-        Unique name.
-    meet : Meet
-        Whether velocities must agree.
-    dwell_s : float
-        Duration of the stay with the target, coasting; for a rendezvous only.
+    """A target; `dwell_s` is the duration of the stay with it, coasting, for a rendezvous only.
 
     Raises
     ------
@@ -97,22 +88,7 @@ class MovingTargets(ABC):
 
 @dataclass(frozen=True, eq=False)
 class DriftingTargets(MovingTargets):
-    """Targets that coast in a linear motion.
-
-    Parameters
-    ----------
-    targets : tuple of Target
-        At least one.
-    motion : LinearMotion
-        Motion of all targets.
-    initial : ndarray, shape (n, 6)
-        States of the targets at t = 0, m and m/s.
-
-    Raises
-    ------
-    ValueError
-        If there is no target, two have one name, or a state is not six finite numbers.
-    """
+    """Targets that coast in a linear motion; `initial`, shape (n, 6), are their states at t = 0, m and m/s."""
 
     targets: tuple[Target, ...]
     motion: LinearMotion
@@ -166,23 +142,9 @@ class Visits(ABC):
 
 @dataclass(frozen=True, eq=False)
 class Tour(Visits):
-    """A chaser and the targets it visits, in linear motion.
+    """A chaser and the targets it visits, in the same linear motion.
 
-    Parameters
-    ----------
-    motion : LinearMotion
-        Motion of the chaser.
-    targets : MovingTargets
-        Targets, in the same motion.
-    start_state : ndarray, shape (6,)
-        State of the chaser at the start, m and m/s.
-    start_s : float
-        Time of the start.
-
-    Raises
-    ------
-    ValueError
-        If the start is not finite.
+    `start_state`, shape (6,), is the chaser's at the start, m and m/s.
     """
 
     motion: LinearMotion

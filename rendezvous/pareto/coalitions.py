@@ -35,16 +35,10 @@ class Core(Enum):
 
 @dataclass(frozen=True)
 class Coalition:
-    """A coalition of craft.
+    """A coalition of craft, whose `members` are indices.
 
-    Parameters
-    ----------
-    members : tuple of int
-        Indices of the craft.
-    excess : float
-        c(S): their least weighted sum of excesses at a common meeting, m^2/s^3.
-    regret : float
-        Increase of their sum at the common meeting of all, m^2/s^3.
+    `excess` is c(S), their least weighted sum of excesses at a common meeting, and `regret` its increase at the common
+    meeting of all; both in m^2/s^3.
     """
 
     members: tuple[int, ...]
@@ -54,19 +48,11 @@ class Coalition:
 
 @dataclass(frozen=True)
 class Coalitions:
-    """All coalitions of an encounter.
+    """All coalitions of an encounter, by size, from single craft to the coalition of all.
 
-    Parameters
-    ----------
-    coalitions : tuple of Coalition
-        By size, from single craft to the coalition of all.
-    shapley : ndarray, shape (n,)
-        The Shapley value of the cost game c, m^2/s^3.
-    transfers : ndarray, shape (n,)
-        Payment to each craft that leaves it with its Shapley value: its weighted excess minus that value, m^2/s^3; of
-        sum zero.
-    core : Core
-        Core of the cost game.
+    `shapley`, shape (n,), is the Shapley value of the cost game c, and `core` the core of this game. `transfers`, shape
+    (n,), are payments to each craft that leave it with its Shapley value: its weighted excess minus that value, of sum
+    zero. Both are in m^2/s^3.
     """
 
     coalitions: tuple[Coalition, ...]

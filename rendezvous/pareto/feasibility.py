@@ -44,12 +44,8 @@ class Feasibility(Enum):
 class BoundCheck:
     """The control of a meeting compared with a bound.
 
-    Parameters
-    ----------
-    feasibility : Feasibility
-        The verdict.
-    peak_m_s2, least_peak_m_s2 : float
-        Greatest |u| of the minimum-energy control, and a lower bound of that of any control, to 1e-6.
+    `peak_m_s2` is the greatest |u| of the minimum-energy control, `least_peak_m_s2` a lower bound of that of any
+    control, to 1e-6.
     """
 
     feasibility: Feasibility
@@ -234,8 +230,6 @@ def integrate_size(coefficients: Floats, half_s: Floats, tolerance: float, direc
     panels. Tolerances are relative: `tolerance` of the integral of |w|, `direction` of the integral of w / |w|, to the
     time.
 
-    Notes
-    -----
     Gauss and Legendre's rule of 12 nodes on an interval and on its two halves; if they differ by more than the
     interval's share of the tolerance the halves are treated in the same way. |w| has a corner and w / |w| a jump where
     w passes through zero: intervals become short only there.

@@ -16,14 +16,8 @@ from rendezvous.pareto.solution import EncounterSolution
 class ParetoSet:
     """Pareto-optimal meetings.
 
-    Parameters
-    ----------
-    weights : ndarray, shape (k, n)
-        Weights of the craft, of sum one, whose weighted sum of excesses each meeting minimises.
-    points : ndarray, shape (k, f)
-        Free terminal values.
-    excess : ndarray, shape (k, n)
-        J_i^2 - J_i*^2, m^2/s^3.
+    Each meeting minimises the weighted sum of excesses with its row of `weights`, shape (k, n), of sum one. `points`,
+    shape (k, f), are free terminal values, and `excess`, shape (k, n), is J_i^2 - J_i*^2, m^2/s^3.
     """
 
     weights: Floats
@@ -34,8 +28,6 @@ class ParetoSet:
 def pareto_set(solution: EncounterSolution, weights: Floats) -> ParetoSet:
     """Return the Pareto-optimal meetings of a `solution` for k rows of `weights` (k, n), not negative and not all zero.
 
-    Notes
-    -----
     (sum w_i M_i)^-1 sum w_i M_i p_i*: with one M the convex hull of the ideals, otherwise curved. All weights together
     cover the set, as the excesses are convex.
     """

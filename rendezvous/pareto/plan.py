@@ -14,17 +14,7 @@ from rendezvous.relative_motion import TimeVaryingMotion
 
 @dataclass(frozen=True)
 class PlanSamples:
-    """A flight sampled at k times.
-
-    Parameters
-    ----------
-    time_s : ndarray, shape (k,)
-        Times from start to meeting.
-    state : ndarray, shape (k, 6)
-        States, m and m/s.
-    control_m_s2 : ndarray, shape (k, 3)
-        Control u.
-    """
+    """A flight sampled at k times: `state`, shape (k, 6), in m and m/s, and the control u, shape (k, 3)."""
 
     time_s: Floats
     state: Floats
@@ -33,16 +23,8 @@ class PlanSamples:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The minimum-energy flight of one craft; times are from its start to the meeting.
-
-    Parameters
-    ----------
-    craft : Craft
-        Craft, with its start.
-    meeting_s : float
-        End of the flight.
-    costate : ndarray, shape (6,)
-        Costate at the meeting.
+    """The minimum-energy flight of one craft from its start to the meeting; `costate`, shape (6,), is at the
+    meeting.
     """
 
     craft: Craft

@@ -25,8 +25,6 @@ class NotOptimalError(ValueError):
 def least_sum_of_costs(solution: EncounterSolution) -> Floats:
     """Return the free values, shape (f,), that minimise sum w_i J_i of a `solution`: costs like impulses.
 
-    Notes
-    -----
     A sum of norms of affine functions, convex: damped Newton steps. If an ideal costs nothing, its norm has a corner
     there, which is the minimum if the others' slopes do not outweigh it.
     """
@@ -74,10 +72,8 @@ def least_sum_of_costs(solution: EncounterSolution) -> Floats:
 def least_greatest_excess(solution: EncounterSolution) -> Floats:
     """Return the free values, shape (f,), that minimise the greatest weighted excess of a `solution`.
 
-    Notes
-    -----
-    With one M, the centre of the smallest enclosing ball. Sequential quadratic programming on (p, t), least t with
-    w_i e_i(p) <= t, then Newton's method on the conditions of the active craft.
+    With one M, the centre of the smallest enclosing ball. Sequential quadratic programming on (p, t), least t with w_i
+    e_i(p) <= t, then Newton's method on the conditions of the active craft.
     """
     roots, centres, _, weights = _parts(solution)
     matrices = np.einsum("n,nca,ncb->nab", weights, roots, roots)

@@ -19,8 +19,6 @@ class CraftCost:
 
     Parameters
     ----------
-    craft : Craft
-        Craft of this cost.
     ideal : ndarray, shape (f,)
         p*: the cheapest free values for this craft alone.
     ideal_cost_squared : float
@@ -55,15 +53,8 @@ class CraftCost:
 class EncounterSolution:
     """A solved encounter: the meeting of least group loss, and the costs of any other meeting.
 
-    Parameters
-    ----------
-    encounter : Encounter
-        The problem.
-    costs : tuple of CraftCost
-        Costs of the craft, in order.
-    point : ndarray, shape (f,)
-        The free values that minimise the weighted sum of excesses, the norm (1.7) of the paper. The methods use it
-        where their `point` is None.
+    `point`, shape (f,), contains the free values that minimise the weighted sum of excesses, the norm (1.7) of the
+    paper. The methods use it where their `point` is None.
     """
 
     encounter: Encounter
@@ -135,8 +126,6 @@ def solve_encounter(encounter: Encounter) -> EncounterSolution:
 def weighted_point(costs: Sequence[CraftCost], weights: ArrayLike) -> Floats:
     """Return the free values, shape (f,), that minimise the sum of excesses with `weights`, not negative, shape (n,).
 
-    Notes
-    -----
     (sum w_i M_i)^-1 sum w_i M_i p_i*, as a least-squares problem of the roots of M_i of the `costs`.
     """
     roots = np.sqrt(np.asarray(weights, dtype=np.float64))
@@ -184,16 +173,8 @@ def _craft_cost(craft: Craft, whiten: Floats, missing: Floats, opening: Floats) 
 class DurationSweep:
     """An encounter at k meeting times.
 
-    Parameters
-    ----------
-    meeting_s : ndarray, shape (k,)
-        Times of the meeting.
-    points : ndarray, shape (k, f)
-        Free values that minimise the group loss.
-    cost_squared, ideal_cost_squared : ndarray, shape (k, n)
-        J_i^2 and J_i*^2, m^2/s^3.
-    group_loss : ndarray, shape (k,)
-        m^2/s^3.
+    `points`, shape (k, f), are the free values that minimise the `group_loss`, shape (k,); `cost_squared` and
+    `ideal_cost_squared`, shape (k, n), are J_i^2 and J_i*^2. Costs are in m^2/s^3.
     """
 
     meeting_s: Floats

@@ -36,17 +36,7 @@ class Ending(Enum):
 
 @dataclass(frozen=True)
 class Branch:
-    """A branch of extremals.
-
-    Parameters
-    ----------
-    nodes : tuple of Node
-        Extremals in ascending order of duration.
-    ending : Ending
-        Reason for the end.
-    work : float
-        Radians of extremals propagated.
-    """
+    """A branch of extremals, `nodes` in ascending order of duration; `work` is the radians of extremals propagated."""
 
     nodes: tuple[Node, ...]
     ending: Ending
@@ -62,11 +52,8 @@ def follow(pair: Pair, first: Node, radius: float, latest: float, most_work: flo
     """Follow a branch from its first extremal, as the duration grows, to the capture, to `latest`, or to a fold.
 
     A `radius` of minus infinity follows the branch beyond the capture. `most_work` limits the radians of extremals
-    propagated: the same limit on every machine. A capture that ends the branch is computed to full precision.
-
-    Notes
-    -----
-    Some 20 steps a revolution, of two or three iterations each.
+    propagated: the same limit on every machine. A capture that ends the branch is computed to full precision. Some 20
+    steps a revolution, of two or three iterations each.
     """
     nodes, step, work = [first], first.duration, 0.0
     while work < most_work:

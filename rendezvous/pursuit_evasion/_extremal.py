@@ -30,8 +30,6 @@ _Parameters = tuple[Floats, Floats, Floats]
 def acceleration(r: Floats, mu: float, oblateness: float, g: Floats) -> None:
     """Put the acceleration at `r` into `g`; `oblateness` is mu J2 R^2 / 2, the axis z.
 
-    Notes
-    -----
     The potential is mu/r + oblateness (1/r^3 - 3 z^2/r^5).
     """
     q = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
@@ -53,10 +51,8 @@ def derivatives(
 ) -> None:
     """Put the acceleration, its gradient (3, 3) and, if wanted, the gradient of gradient times `p` (3, 3) into arrays.
 
-    Notes
-    -----
-    For a function f of q = r . r: the gradient is 2 f' r, its gradient 4 f'' r r^T + 2 f' I, and along p
-    8 f''' s r r^T + 4 f'' (r p^T + p r^T + s I) with s = r . p. The oblate part is a power of q, less z^2 times one.
+    For a function f of q = r . r: the gradient is 2 f' r, its gradient 4 f'' r r^T + 2 f' I, and along p 8 f''' s r r^T
+    + 4 f'' (r p^T + p r^T + s I) with s = r . p. The oblate part is a power of q, less z^2 times one.
     """
     q = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
     s = r[0] * p[0] + r[1] * p[1] + r[2] * p[2]
@@ -119,11 +115,8 @@ def _subtract_axial(
 def eliminate(matrix: Floats, right: Floats) -> float:
     """Solve matrix @ x = right, shapes (n, n) and (n, m), by Gauss-Jordan elimination with partial pivoting.
 
-    Both are overwritten, `right` with x. Returns the determinant; where it is zero, `right` has no meaning.
-
-    Notes
-    -----
-    n^2 (n + m) operations: a microsecond for n = 6, where a call of LAPACK takes ten.
+    Both are overwritten, `right` with x. Returns the determinant; where it is zero, `right` has no meaning. A
+    microsecond for n = 6, where a call of LAPACK takes ten.
     """
     size, width = matrix.shape[0], right.shape[1]
     determinant = 1.0
@@ -212,28 +205,12 @@ _step = step_of(_rates)
 def flow_back(y: Floats, z: Floats | None, craft: Floats, begin: float, end: float, tolerance: float) -> bool:
     """Integrate a state and its variations from time to go `begin` to `end`, in place; either may be the greater.
 
-    Parameters
-    ----------
-    y : ndarray, shape (12,)
-        Position, velocity, p_r, p_v.
-    z : ndarray, shape (12, 9), or None
-        Their derivatives; None to integrate y alone.
-    craft : ndarray, shape (5,)
-        mu, oblateness, thrust, mass at the end of the game, mass flow.
-    begin, end : float
-        Times to go.
-    tolerance : float
-        Tolerance of a step's error, relative and absolute, in y.
+    `y`, shape (12,), is (position, velocity, p_r, p_v), and `z`, shape (12, 9), contains its derivatives; None
+    integrates y alone. `craft`, shape (5,), is (mu, oblateness, thrust, mass at the end of the game, mass flow).
+    Returns False where the steps are too many or too small, or a number overflows.
 
-    Returns
-    -------
-    bool
-        False where the steps are too many or too small, or a number overflows.
-
-    Notes
-    -----
-    The Dormand-Prince method of order 8 (SciPy's coefficients); the error of y alone controls the steps. A step costs
-    12 stages of some 0.3 us, or 0.1 us for y alone.
+    The `tolerance` of a step's error, relative and absolute, applies to y alone. A step costs 12 stages of some 0.3 us,
+    or 0.1 us for y alone.
     """
     if begin == end:
         return True

@@ -35,30 +35,17 @@ _FARTHEST, _NEAR, _FRACTION, _NEAR_ENOUGH = 0.7, 1e-2, 0.2, 1e-3
 
 @dataclass(frozen=True)
 class Node:
-    """An extremal of the game of one duration.
+    """An extremal of the game of one duration T, with the distance l.
 
-    Parameters
-    ----------
-    duration, distance : float
-        T and l.
-    nu : ndarray, shape (3,)
-        Unit vector from the pursuer's end to the evader's.
-    pursuer, evader : ndarray, shape (6,)
-        End states.
-    curvature : ndarray, shape (2,)
-        Eigenvalues of the Hessian of h_P - h_E across nu, ascending.
-    closing : float
-        nu . (v_P - v_E), the rate at which l falls.
-    regular : bool
-        Whether neither side's extremal has a conjugate point.
-    slope : ndarray, shape (15,)
-        d/dT of (pursuer, evader, nu) at l free; of the last guess, so to first order.
-    correction : float
-        Size of the last step of Newton's method: the remaining error is about its square.
-    costates : ndarray, shape (2, 6)
-        p at the start, pursuer's and evader's, of the last guess that was linearised.
-    residual : float
-        Error of the start states of that guess, and of r_E - r_P = l nu at the ends of this extremal.
+    `nu`, shape (3,), is the unit vector from the pursuer's end to the evader's; `pursuer` and `evader`, shape (6,), are
+    the end states. `curvature`, shape (2,), contains the eigenvalues of the Hessian of h_P - h_E across nu, ascending;
+    `closing` is nu . (v_P - v_E), the rate at which l falls; `regular` says that neither side's extremal has a
+    conjugate point.
+
+    The rest is that of Newton's method. `slope`, shape (15,), is d/dT of (pursuer, evader, nu) at l free, of the last
+    guess, so to first order. `correction` is the size of the last step: the remaining error is about its square.
+    `costates`, shape (2, 6), are p at the start, pursuer's and evader's, of the last guess that was linearised.
+    `residual` is the error of the start states of that guess, and of r_E - r_P = l nu at the ends of this extremal.
     """
 
     duration: float
@@ -163,27 +150,13 @@ class Pair:
         close: float = CLOSE,
         latest: float = math.inf,
     ) -> Node | None:
-        """Return the extremal near a guess, or None if Newton's method does not converge.
+        """Return the extremal near a guess, shape (15,), of end states and nu, or None if Newton's method does not
+        converge.
 
-        Parameters
-        ----------
-        guess : ndarray, shape (15,)
-            End states and nu.
-        duration, distance : float
-            The known value, and a guess of the free one.
-        time_free : bool
-            Whether the duration is free; otherwise the distance is.
-        tolerance : float
-            Tolerance of the propagation.
-        linear_tolerance : float
-            Tolerance of the propagation of derivatives, if it is larger.
-        close : float
-            Greatest size of the last correction.
-        latest : float
-            Longest duration that can be propagated.
+        If `time_free`, the distance is known and the duration a guess, otherwise the reverse. The propagation has a
+        `tolerance`, that of derivatives `linear_tolerance` if it is larger; `close` is the greatest size of the last
+        correction, and `latest` the longest duration that can be propagated.
 
-        Notes
-        -----
         Both sides are propagated with their variations, then several times without, with the same derivatives, while
         each correction is a fraction of the previous one: 0.5 ms and 0.1 ms per revolution.
         """

@@ -25,18 +25,10 @@ _CLIMBS, _MOST_CLIMBING, _APART, _LEAST_STRIDE = 4, 40, 0.9, 1e-4
 
 @dataclass(frozen=True)
 class Scan:
-    """Distances along all directions, at one duration.
+    """Distances h_E - h_P, shape (n,), along directions `nu`, shape (n, 3), at one duration.
 
-    Parameters
-    ----------
-    nu : ndarray, shape (n, 3)
-        Directions for which both sides' extremals were found.
-    distance : ndarray, shape (n,)
-        h_E - h_P along them.
-    tried : int
-        Number of directions tried.
-    maxima : tuple of Node
-        Local maxima among them, computed exactly, the greatest first.
+    Of the directions `tried`, these are the ones for which both sides' extremals were found. `maxima` are local maxima
+    among them, computed exactly, the greatest first.
     """
 
     nu: Floats
@@ -56,8 +48,6 @@ class _End:
 def scan(pair: Pair, node: Node) -> Scan:
     """Compute extremals in all directions at the duration of a known extremal, from its direction outward.
 
-    Notes
-    -----
     120 directions per side, each from a solved neighbour: at least 0.5 s per revolution. A reachable set that is not
     convex has several extremals per direction. If the end of another direction is farther along a direction, its
     extremal is not the farthest, and the direction counts as not found.

@@ -18,22 +18,11 @@ _IDENTITY = np.eye(6)
 class Response:
     """Linear dependence of an end state at a guess of it: rho + by_nu dnu + by_time dT leads to the true one.
 
-    Parameters
-    ----------
-    rho : ndarray, shape (6,)
-        Newton's correction of the guess.
-    by_nu : ndarray, shape (6, 2)
-        Derivatives along two directions across nu.
-    by_time : ndarray, shape (6,)
-        Derivative by the duration.
-    regular : bool
-        Whether there is no conjugate point: the map from end states near by to start states preserves orientation.
-    inverse : ndarray, shape (6, 6)
-        Inverse of the derivative of the start state by the end state.
-    costate : ndarray, shape (6,)
-        p_r and p_v at the start.
-    residual : float
-        Greatest component of the error of the start state.
+    `rho`, shape (6,), is Newton's correction of the guess; `by_nu`, shape (6, 2), and `by_time`, shape (6,), are the
+    derivatives along two directions across nu and by the duration. `regular` says that there is no conjugate point: the
+    map from end states near by to start states preserves orientation. `inverse`, shape (6, 6), is the inverse of the
+    derivative of the start state by the end state, `costate`, shape (6,), p_r and p_v at the start, and `residual` the
+    greatest component of the error of the start state.
     """
 
     rho: Floats

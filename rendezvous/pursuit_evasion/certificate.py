@@ -36,16 +36,10 @@ _MOST_WORK = 2.0 * MOST_WORK
 
 @dataclass(frozen=True)
 class Deviation:
-    """A deviation of one player, with the optimal response of the other.
+    """A deviation of one player by a policy, with the optimal response of the other.
 
-    Parameters
-    ----------
-    name : str
-        Policy of the player that deviates.
-    capture_s : float or None
-        Capture time; None without a capture until the capture time of the game.
-    conclusive : bool
-        False if the best response could not be computed.
+    `capture_s` is None without a capture until the capture time of the game; `conclusive` is False if the best response
+    could not be computed.
     """
 
     name: str
@@ -75,20 +69,14 @@ class Certificate:
         Whether l was followed from the start of the game and stayed above the capture radius.
     least_distance_m : float
         Least distance of both paths from the planet's centre.
-    above_the_planet : bool
-        Whether that is above its radius.
     pursuer_alone_s : float or None
         Earliest capture of the evader on its fixed optimal path; None if it could not be computed.
     evader_deviations : tuple of Deviation
         Deviations of the evader, with the best responses of the pursuer: each must capture until the capture time.
-    capture_s : float
-        Capture time of the game.
     directions_found, directions_tried : int
         Number of directions with a solution, and number of directions tried; zero without a scan.
     greatest_excess_m : float or None
         Greatest distance beyond the capture radius that some direction keeps, at the capture time.
-    unit_length_m : float
-        Unit of nondimensional lengths.
     """
 
     residual: float
@@ -153,24 +141,16 @@ class Certificate:
 
 
 def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
-    """Check a capture.
+    """Check the capture of a `solution`; `all_directions` also scans all directions at the capture time.
 
-    Parameters
-    ----------
-    solution : Solution
-        With a capture.
-    all_directions : bool, optional
-        Whether to scan all directions at the capture time for one that keeps the evader farther away.
+    The scan looks for a direction that keeps the evader farther away. Cost: 0.3 s for one revolution, and at least 0.5
+    s more for the directions. All deviations together take at most twice the work limit of a game; in games of more
+    than six revolutions the last ones may be inconclusive.
 
     Raises
     ------
     ValueError
         If there is no capture.
-
-    Notes
-    -----
-    Cost: 0.3 s for one revolution, and at least 0.5 s more for the directions. All deviations together take at most
-    twice the work limit of a game; in games of more than six revolutions the last ones may be inconclusive.
     """
     capture = solution.capture
     if capture is None:

@@ -35,12 +35,8 @@ _QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
 class Observation:
     """The pursuer's observation of the evader when it plans.
 
-    Parameters
-    ----------
-    delay_s : float, optional
-        Age of the observation; the pursuer assumes that the evader has been optimal since.
-    position_error_m, velocity_error_m_s : float, optional
-        Standard deviations of each component.
+    `delay_s` is its age; the pursuer assumes that the evader has been optimal since. The errors are standard deviations
+    of each component.
 
     Raises
     ------
@@ -53,7 +49,6 @@ class Observation:
     velocity_error_m_s: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the values."""
         values = (self.delay_s, self.position_error_m, self.velocity_error_m_s)
         if not all(np.isfinite(value) and value >= 0.0 for value in values):
             raise ValueError("delay and errors of the observation must be finite and not negative")
@@ -79,20 +74,9 @@ class Ended(Enum):
 class Flight:
     """A pursuit with feedback.
 
-    Parameters
-    ----------
-    ended : Ended
-        How it ends.
-    time_s : float
-        Time of the capture, of the closest approach, or of the end.
-    distance_m : float
-        Distance at that time.
-    planned_s, predicted_s : ndarray, shape (n,)
-        Times of the plans, and the capture times that they predict.
-    distances_m : ndarray, shape (n,)
-        Distances at the times of the plans.
-    pursuer_m, evader_m : ndarray, shape (n, 3)
-        Positions at the times of the plans.
+    It ends at `time_s`, at the capture, at the closest approach or for another reason, at `distance_m`. At the times of
+    the n plans, `planned_s`, which predict captures at `predicted_s`, the distances are `distances_m`, shape (n,), and
+    the positions `pursuer_m` and `evader_m`, shape (n, 3).
     """
 
     ended: Ended
@@ -119,8 +103,6 @@ def fly(
 
     Parameters
     ----------
-    game : Game
-        The game at the start.
     steering : callable or None
         Steering of the evader; None is optimal against the true state of the pursuer.
     replan_s : float, optional
@@ -172,18 +154,8 @@ def fly_many(
 ) -> list[Flight]:
     """Simulate a pursuit several times; flights are in the order of the runs.
 
-    Parameters
-    ----------
-    game, replan_s, observation, solution
-        As for `fly`.
-    steering : callable
-        Function of the run number that returns the steering of the evader.
-    runs : int
-        Number of flights.
-    seed : int, optional
-        Root seed: each run has its own stream.
-    progress : callable, optional
-        Called with the fraction done.
+    `steering` returns the steering of the evader of a run number; each run has a stream of the root `seed`. `progress`
+    is called with the fraction done. The other parameters are those of `fly`.
     """
     solution = solve(game) if solution is None else solution
     flights = []
@@ -227,7 +199,6 @@ class _Pursuit:
         self._log: list[tuple[float, float, Floats, Floats]] = []
 
     def run(self, plan: Node, leg: float, progress: Callable[[float], None] | None) -> Flight:
-        """Simulate to the end."""
         own = plan
         while len(self._log) < _MOST_PLANS:
             self._log.append((self._time, self._time + plan.duration, self._pursuer.start[:3], self._evader.start[:3]))
@@ -355,7 +326,6 @@ class _Pursuit:
         return self._flight(ended, self._time, apart)
 
     def _flight(self, ended: Ended, time: float, distance: float) -> Flight:
-        """Return the flight in SI units."""
         units = self._units
         planned, predicted, pursuer, evader = (np.array(column) for column in zip(*self._log, strict=True))
         return Flight(

@@ -49,7 +49,6 @@ class Gravity:
     equatorial_radius_m: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the values."""
         _need(0.0 < self.parameter_m3_s2 < math.inf, "the gravitational parameter must be positive")
         _need(0.0 <= self.planet_radius_m < math.inf, "the radius of the planet must not be negative")
         _need(math.isfinite(self.j2) and abs(self.j2) < 0.1, "J2 must be small: that of the Earth is 1.0826e-3")
@@ -66,16 +65,8 @@ class Gravity:
 class Player:
     """A craft with full thrust in any direction, until its propellant is spent.
 
-    Parameters
-    ----------
-    position_m, velocity_m_s : tuple of float
-        In an inertial frame whose z axis is the planet's.
-    mass_kg, dry_mass_kg : float
-        At the start, and without propellant.
-    thrust_n : float
-        Zero for a craft that coasts.
-    specific_impulse_s : float
-        Infinite for a craft of constant mass.
+    Its state is in an inertial frame whose z axis is the planet's. A craft with no thrust coasts; one with an infinite
+    specific impulse has a constant mass.
 
     Raises
     ------
@@ -97,7 +88,6 @@ class Player:
     specific_impulse_s: float
 
     def __post_init__(self) -> None:
-        """Check the values."""
         _need(np.isfinite((*self.position_m, *self.velocity_m_s)).all(), "position and velocity must be finite")
         _need(0.0 < self.mass_kg < math.inf, "the mass must be positive")
         _need(0.0 <= self.dry_mass_kg < self.mass_kg, "the dry mass must be at least 0 and below the mass")
@@ -124,16 +114,8 @@ class Player:
 class Game:
     """A pursuer that minimises the capture time and an evader that maximises it.
 
-    Parameters
-    ----------
-    gravity : Gravity
-        Gravity of the planet.
-    pursuer, evader : Player
-        The pursuer's thrust must be positive.
-    capture_radius_m : float
-        Distance that counts as capture; zero for a point.
-    longest_s : float
-        Longest duration considered; infinite for 15 revolutions of the pursuer.
+    `capture_radius_m` is the distance that counts as capture; zero for a point. `longest_s` is the longest duration
+    considered; infinite for 15 revolutions of the pursuer.
 
     Raises
     ------
@@ -153,7 +135,6 @@ class Game:
     longest_s: float = math.inf
 
     def __post_init__(self) -> None:
-        """Check the values."""
         _need(self.pursuer.thrust_n > 0.0, "the pursuer's thrust must be positive")
         _need(0.0 <= self.capture_radius_m < math.inf, "the capture radius must not be negative")
         _need(self.longest_s > 0.0, "the longest duration must be positive")

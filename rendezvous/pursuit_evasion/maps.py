@@ -43,20 +43,11 @@ STATUSES = tuple(PointStatus)
 
 @dataclass(frozen=True)
 class CaptureMap:
-    """Capture times over a grid.
+    """Capture times over a grid of `columns`, shape (nx,), and `rows`, shape (ny,), in the units of the two parameters.
 
-    Parameters
-    ----------
-    columns, rows : ndarray, shape (nx,) and (ny,)
-        Values of the two parameters, in their own units.
-    capture_s : masked array, shape (ny, nx)
-        Masked where there is no capture, or none that is certified.
-    status : ndarray of int, shape (ny, nx)
-        Indices in `STATUSES`.
-    closing_speed_m_s : masked array, shape (ny, nx)
-        Masked as the capture times.
-    solved_from_nothing : int
-        Number of points solved from scratch.
+    `capture_s` and `closing_speed_m_s`, shape (ny, nx), are masked where there is no capture, or none that is
+    certified. `status`, shape (ny, nx), contains indices in `STATUSES`. `solved_from_nothing` is the number of points
+    solved from scratch.
     """
 
     columns: Floats
@@ -86,16 +77,12 @@ def capture_map(
     follow_all: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> CaptureMap:
-    """Solve a game at each point of a grid.
+    """Solve a game at each point of a grid of `columns`, shape (nx,), and `rows`, shape (ny,).
 
     Parameters
     ----------
     game_at : callable
         Function of a column's and a row's value that returns the game; it raises ValueError if there is no game.
-    columns : ndarray, shape (nx,)
-        Values of the first parameter, in its own units.
-    rows : ndarray, shape (ny,)
-        Values of the second parameter, in its own units.
     follow_all : bool, optional
         Whether to solve all points from scratch, with a change of branch at folds: 20 ms to seconds per point.
     progress : callable, optional
@@ -132,18 +119,15 @@ class _Grid:
         self._afresh = 0
 
     def game(self, j: int, i: int) -> Game | None:
-        """Return the game of a point, or None."""
         try:
             return self._game_at(float(self._columns[i]), float(self._rows[j]))
         except ValueError:
             return None
 
     def games(self, j: int) -> list[Game | None]:
-        """Return the games of a row."""
         return [self.game(j, i) for i in range(len(self._columns))]
 
     def put(self, j: int, i: int, point: _Point) -> None:
-        """Store a point."""
         self._afresh += point.status is not PointStatus.NEIGHBOUR
         self._status[j, i] = STATUSES.index(point.status)
         self._hidden[j, i] = point.node is None or point.units is None
@@ -180,7 +164,6 @@ class _Grid:
                 doubted += self.about(j, i)
 
     def map(self) -> CaptureMap:
-        """Return the map."""
         return CaptureMap(
             self._columns,
             self._rows,

@@ -97,14 +97,12 @@ class SteeredPath:
 def steered_path(craft: Craft, direction: Direction, duration: float) -> SteeredPath:
     """Return the path of a craft that steers by a rule: full thrust along the direction, or none where that is zero.
 
+    SciPy's DOP853 to 1e-12: some 3 ms a revolution.
+
     Raises
     ------
     PathError
         If the direction turns so fast that integration takes too long, or the path comes too near the planet's centre.
-
-    Notes
-    -----
-    SciPy's DOP853 to 1e-12: some 3 ms a revolution.
     """
     calls = 0
 
@@ -140,12 +138,10 @@ def _rates(time: float, state: Floats, craft: Craft, direction: Direction) -> Fl
 
 @dataclass(frozen=True)
 class PlayerHistory:
-    """One player at times.
+    """One player at n times, in the inertial frame; vectors have shape (n, 3).
 
     Parameters
     ----------
-    position_m, velocity_m_s : ndarray, shape (n, 3)
-        In the inertial frame.
     mass_kg : ndarray, shape (n,)
         Mass with propellant.
     thrust_direction : ndarray, shape (n, 3)
@@ -164,15 +160,7 @@ class PlayerHistory:
 
 @dataclass(frozen=True)
 class History:
-    """Both players at times.
-
-    Parameters
-    ----------
-    time_s : ndarray, shape (n,)
-        Times from the start.
-    pursuer, evader : PlayerHistory
-        At these times.
-    """
+    """Both players at times from the start, shape (n,)."""
 
     time_s: Floats
     pursuer: PlayerHistory

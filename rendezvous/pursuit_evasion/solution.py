@@ -35,17 +35,10 @@ class Route(Enum):
 
 @dataclass(frozen=True)
 class PlayerEnd:
-    """One player at the end of the game.
+    """One player at the end of the game, in the inertial frame.
 
-    Parameters
-    ----------
-    propellant_kg : float
-        Propellant spent.
-    position_m, velocity_m_s : ndarray, shape (3,)
-        In the inertial frame.
-    costate_at_start : ndarray, shape (6,)
-        lambda_r, lambda_v at t = 0 in the units of the solution, scaled so that the Hamiltonian is one: H_f = 1 of
-        Wang's slides, "Optimal control".
+    `propellant_kg` is the propellant spent. `costate_at_start`, shape (6,), is (lambda_r, lambda_v) at t = 0 in the
+    units of the solution, scaled so that the Hamiltonian is one: H_f = 1 of Wang's slides, "Optimal control".
     """
 
     propellant_kg: float
@@ -56,14 +49,10 @@ class PlayerEnd:
 
 @dataclass(frozen=True)
 class DistanceCurve:
-    """The distance l that the evader can keep at each duration.
+    """The distance l that the evader can keep at each duration T, rising, both of shape (n,).
 
-    Parameters
-    ----------
-    duration_s, distance_m : ndarray, shape (n,)
-        T, rising, and l.
-    least_curvature : ndarray, shape (n,)
-        Lesser eigenvalue of the Hessian of h_P - h_E + l across nu, in units of length: a saddle while it is positive.
+    `least_curvature`, shape (n,), is the lesser eigenvalue of the Hessian of h_P - h_E + l across nu, in units of
+    length: a saddle while it is positive.
     """
 
     duration_s: Floats
@@ -77,10 +66,8 @@ class Capture:
 
     Parameters
     ----------
-    time_s : float
-        Capture time.
     position_m : ndarray, shape (3,)
-        Position of the evader at that time.
+        Position of the evader at the capture time.
     direction : ndarray, shape (3,)
         nu, the direction along which both players reach the greatest distance; with a capture radius, the direction
         from the pursuer to the evader. It is that of lambda_rP at the end, which equals -lambda_rE.
@@ -88,8 +75,6 @@ class Capture:
         Speed at which the distance falls.
     curvature : ndarray, shape (2,)
         Eigenvalues of the Hessian of h_P - h_E on the plane normal to nu, in units of length, ascending.
-    pursuer, evader : PlayerEnd
-        Both players.
     residual : float
         Error of the start states and of r_E - r_P = R nu, in units of length and speed: below 1e-9.
     extremal : Node
@@ -119,16 +104,10 @@ class Capture:
 
 @dataclass(frozen=True)
 class Solution:
-    """A game with its verdict.
+    """A game with its verdict; `units` are those of nondimensional values.
 
     Parameters
     ----------
-    game : Game
-        The game.
-    units : Units
-        Units of the nondimensional values.
-    verdict : Verdict
-        End of the game.
     capture : Capture or None
         Capture, if the verdict is `captured`.
     route : Route
@@ -141,8 +120,6 @@ class Solution:
         Player without propellant at that time: pursuer or evader.
     fallback : Capture or None
         Capture by another route, which is not claimed to be the first one, if the branch is not certified.
-    fallback_route : Route or None
-        Route of the fallback.
     """
 
     game: Game

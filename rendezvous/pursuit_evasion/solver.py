@@ -34,8 +34,6 @@ def solve(game: Game, *, change_branch: bool = True, all_directions: bool = Fals
 
     Parameters
     ----------
-    game : Game
-        The game to solve.
     change_branch : bool, optional
         Whether to search for another branch at a fold; each search takes seconds.
     all_directions : bool, optional
@@ -107,7 +105,6 @@ def _polished(scaled: ScaledGame, guess: Floats, duration: float, radius: float)
 
 
 def _capture(game: Game, units: Units, node: Node) -> Capture:
-    """Return an extremal in SI units."""
     time_s = node.duration * units.time_s
 
     def end(player: Player, state: Floats, costate: Floats) -> PlayerEnd:
@@ -187,13 +184,9 @@ def _with_thrust(game: Game, share: float) -> Game:
 def solve_by_linear_game(game: Game) -> Capture | None:
     """Solve a `game` from the solution of its linear game about the pursuer's circular orbit.
 
-    Returns a local saddle; earlier captures are not excluded.
-
-    Notes
-    -----
-    The relative state is curvilinear, with the arc as the coordinate along the motion, so that the linear game remains
-    close to the true one over long distances. Its duration and direction are the guess; the ends of both sides are
-    computed by continuation in the duration.
+    Returns a local saddle; earlier captures are not excluded. The relative state is curvilinear, with the arc as the
+    coordinate along the motion, so that the linear game remains close to the true one over long distances. Its duration
+    and direction are the guess; the ends of both sides are computed by continuation in the duration.
     """
     scaled = scaled_game(game)
     guess = _linear_guess(game, scaled)

@@ -18,16 +18,8 @@ LONGEST_REVOLUTIONS = 15.0
 
 @dataclass(frozen=True)
 class Units:
-    """Units of a game.
-
-    Parameters
-    ----------
-    length_m : float
-        The pursuer's semi-major axis at the start.
-    time_s : float
-        Time of a radian of a circular orbit of that size.
-    mass_kg : float
-        The pursuer's mass at the start.
+    """Units of a game: the pursuer's semi-major axis and mass at the start, and the time of a radian of a circular
+    orbit of that size.
     """
 
     length_m: float

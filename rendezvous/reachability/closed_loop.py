@@ -25,18 +25,10 @@ _MOST_RELAXATION = 1e3
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """Simulation in closed loop.
+    """Simulation in closed loop: true states, shape (T + 1, n), and the controls applied, shape (T, m).
 
-    Parameters
-    ----------
-    states : ndarray, shape (T + 1, n)
-        True states.
-    controls : ndarray, shape (T, m)
-        Controls applied.
-    expected_misses : ndarray, shape (T,)
-        The least terminal norm of each plan, in the units of the states.
-    relaxations : ndarray, shape (T,)
-        Fraction by which all constraints on states were relaxed for each plan; 0 without relaxation.
+    `expected_misses`, shape (T,), are the least terminal norms of the plans, in the units of the states. `relaxations`,
+    shape (T,), are the fractions by which all constraints on states were relaxed for each plan; 0 without relaxation.
     """
 
     states: Floats
@@ -57,8 +49,6 @@ def replan(
 
     Parameters
     ----------
-    problem : ReachabilityProblem
-        The model used for planning.
     truth : callable
         Function of the period, the true state and the control that returns the true state one period later.
     observe : callable or None

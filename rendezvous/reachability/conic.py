@@ -177,13 +177,9 @@ class ConeProgram:
         """Return the violation of the constraints at a point, and its duality gap; both relative.
 
         Multipliers, of all constraints in their order, are moved into the dual cone first. A `cost` is used in place of
-        the program's.
-
-        Notes
-        -----
-        The gap is relative to the value, or to the change of the value that the allowed violation can cause. By weak
-        duality no solution y is below - v . matrix v / 2 - multipliers . limits - |residual| . |y|; y is assumed to be
-        at most twice as large as the point.
+        the program's. The gap is relative to the value, or to the change of the value that the allowed violation can
+        cause. By weak duality no solution y is below - v . matrix v / 2 - multipliers . limits - |residual| . |y|; y is
+        assumed to be at most twice as large as the point.
         """
         linear = self.cost if cost is None else cost
         rows, ends = self._all()

@@ -26,8 +26,6 @@ class MotionModel(Enum):
 def motion_of(orbit: EllipticOrbit, model: MotionModel) -> ConstantMotion | TschaunerHempel:
     """Return the linear motion about an `orbit` by a `model`, in axes x against the motion, y outward.
 
-    Notes
-    -----
     Equation (2) of Shorikov and Goranov (2021), who use the frozen model.
     """
     return orbit.frozen(0.0, ORBITAL) if model is MotionModel.FROZEN else TschaunerHempel(orbit, ORBITAL)
@@ -93,16 +91,8 @@ def _repeated(matrices: Floats, periods: int) -> Floats:
 class NonlinearMotion:
     """Relative motion in a central field, in the orbital frame: x against the motion, y outward, z completes.
 
-    Parameters
-    ----------
-    orbit : EllipticOrbit
-        Orbit of the passive craft.
-    semi_major_axis_m : float
-        Semi-major axis of that orbit.
-
-    Notes
-    -----
-    Equations (1) of Shorikov and Goranov (2021), with w^2 r^4 / p = mu; DOP853 to 1e-12.
+    Equations (1) of Shorikov and Goranov (2021), with w^2 r^4 / p = mu; DOP853 to 1e-12. The passive craft is on the
+    `orbit`.
     """
 
     orbit: EllipticOrbit

@@ -33,14 +33,9 @@ _NEWTON_STEPS, _IDLE = 16, 5
 class EmptyTubeError(ValueError):
     """No control satisfies the constraints.
 
-    Parameters
-    ----------
-    time : int
-        The first time t such that the constraints up to t cannot all be kept.
-    relaxation : float
-        Least relaxation of all constraints on states, as a fraction of their bounds, with which all can be satisfied.
-    names : tuple of str
-        Constraints that conflict at that time.
+    `time` is the first time t such that the constraints up to t cannot all be kept, and `names` lists those that
+    conflict there. `relaxation` is the least relaxation of all constraints on states, as a fraction of their bounds,
+    with which all can be satisfied.
     """
 
     def __init__(self, time: int, relaxation: float, names: tuple[str, ...]) -> None:
@@ -55,22 +50,12 @@ class EmptyTubeError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class BlockOptimum:
-    """The least terminal norm of a block.
+    """The least terminal norm of a `block`, relaxed by rounding where needed, with all its admissible controls
+    `lifted`.
 
-    Parameters
-    ----------
-    block : Block
-        The block, relaxed by rounding where needed.
-    lifted : Lifted
-        All admissible controls.
-    terminal : ndarray, shape (n,)
-        The terminal state of least norm, which is unique, scaled; exactly zero where that is reachable.
-    reached : bool
-        Whether it is zero.
-    optimal : Lifted
-        All optimal controls, in coordinates z of their affine hull; thrust in a ball remains a constraint.
-    centre : ndarray, shape (d,)
-        A point far from the boundary of `optimal`, in its coordinates.
+    `terminal`, shape (n,), is the terminal state of least norm, which is unique, scaled; exactly zero where that is
+    `reached`. `optimal` contains all optimal controls, in coordinates z of their affine hull; thrust in a ball remains
+    a constraint. `centre`, shape (d,), is a point far from its boundary, in its coordinates.
     """
 
     block: Block
@@ -169,18 +154,10 @@ def _relaxed(block: Block, relaxation: float) -> Block:
 class LeastNorm:
     """The controls of least terminal norm.
 
-    Parameters
-    ----------
-    point : ndarray, shape (p,)
-        The controls, divided by their bounds.
-    value : float
-        The norm; exactly zero where it is below rounding.
-    bound : float
-        A lower bound on the norm over all admissible controls.
-    multipliers : ndarray, shape (r,)
-        Of the rows, those of a box included: derivative of the norm by a limit, sign reversed.
-    pressures : ndarray, shape (p,)
-        Derivative of the norm, without its constraints' part, by each control: the bounds on controls balance it.
+    `point`, shape (p,), contains the controls, divided by their bounds; `value` is the norm, exactly zero where it is
+    below rounding, and `bound` a lower bound on the norm over all admissible controls. `multipliers`, shape (r,), are
+    those of the rows, a box included: the derivative of the norm by a limit, sign reversed. `pressures`, shape (p,), is
+    the derivative of the norm, without its constraints' part, by each control: the bounds on controls balance it.
     """
 
     point: Floats

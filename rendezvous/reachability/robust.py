@@ -24,12 +24,10 @@ class NoRobustPlanError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class FeedbackPlan:
-    """Controls u(t) = nominal(t) + sum over s < t of gains[t, s] w(s).
+    """Controls u(t) = nominal(t) + sum over s < t of gains[t, s] w(s), for a problem with a disturbance.
 
     Parameters
     ----------
-    problem : ReachabilityProblem
-        The problem without disturbance.
     disturbance : ndarray, shape (T, n, q)
         x(t + 1) = A x + B u + disturbance[t] w(t), |w_k(t)| <= 1, in the units of the states.
     nominal : ndarray, shape (T, m)

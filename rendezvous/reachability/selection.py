@@ -27,18 +27,10 @@ class TooManyVerticesError(ValueError):
 
 @dataclass(frozen=True)
 class Effort:
-    """Costs of a control.
+    """Costs of a control, dimensionless.
 
-    Parameters
-    ----------
-    energy : float
-        Sum of squares of all components, dimensionless.
-    l1 : float
-        Sum of their absolute values, dimensionless.
-    norms : float
-        Sum of the Euclidean norms over the periods, dimensionless.
-    peak : float
-        Greatest absolute value, dimensionless.
+    `energy` is the sum of squares of all components, `l1` that of their absolute values, `norms` that of the Euclidean
+    norms over the periods, and `peak` the greatest absolute value.
     """
 
     energy: float
@@ -123,16 +115,13 @@ def analytic_centre(optimal: OptimalControls) -> Floats:
 def analytic_point(space: Lifted, start: Floats) -> tuple[Floats, Floats]:
     """Return the analytic centre, shape (d,), of a set without equations, and the Hessian of its barrier there.
 
-    `start`, shape (d,), is inside.
+    `start`, shape (d,), is inside. Newton's method with halved steps on - sum log(slack) - sum log(1 - |u(t)|^2), which
+    is self-concordant.
 
     Raises
     ------
     NoSolutionError
         If Newton's method does not converge.
-
-    Notes
-    -----
-    Newton's method with halved steps on - sum log(slack) - sum log(1 - |u(t)|^2), which is self-concordant.
     """
     point = start.copy()
     if not space.size:

@@ -36,14 +36,8 @@ class TooLargeError(ArithmeticError):
 class Budget:
     """Limits of the exact route.
 
-    Parameters
-    ----------
-    seconds : float
-        Computing time, s, for all blocks; a step that is expected to exceed it is not started.
-    megabytes : float
-        Memory, MB, for one step.
-    dimension : int
-        Greatest number of states of a block.
+    `seconds` is the computing time, s, for all blocks; a step that is expected to exceed it is not started. `megabytes`
+    is the memory, MB, for one step, and `dimension` the greatest number of states of a block.
     """
 
     seconds: float = 5.0
@@ -69,16 +63,9 @@ class BlockSets(Protocol):
 
 @dataclass(frozen=True)
 class SetCounts:
-    """Size and dimension of a polytope.
+    """Size and dimension of a polytope: `facets` are those of all blocks.
 
-    Parameters
-    ----------
-    vertices : int
-        Number of vertices; vertices nearer to each other than 1e-7 of the bounds count once.
-    facets : int
-        Number of facets of all blocks.
-    dimension : int
-        Dimension of the affine hull.
+    Vertices nearer to each other than 1e-7 of the bounds count once.
     """
 
     vertices: int
@@ -88,15 +75,7 @@ class SetCounts:
 
 @dataclass(frozen=True, eq=False)
 class ReachableSets:
-    """Sets of states at t = 0..T, in the units of the problem.
-
-    Parameters
-    ----------
-    problem : ReachabilityProblem
-        The problem.
-    parts : tuple of BlockSets
-        Sets of each block of the problem.
-    """
+    """Sets of states at t = 0..T, in the units of the problem; `parts` are those of each block of the problem."""
 
     problem: ReachabilityProblem
     parts: tuple[BlockSets, ...]
@@ -132,16 +111,8 @@ class ReachableSets:
     def shadow(self, kind: SetKind, time: int, axes: Sequence[int], tolerance: float = 1e-9) -> Floats:
         """Return the vertices of the projection of a set on two or three states, shape (v, len(axes)), in no order.
 
-        Parameters
-        ----------
-        kind : SetKind
-            Forward set or tube.
-        time : int
-            Time index, from 0 to T.
-        axes : sequence of int
-            Indices of the states.
-        tolerance : float
-            Relative error of the projection of a set that is represented by programs.
+        `axes` are indices of states, `time` is from 0 to T, and `tolerance` is the relative error of the projection of
+        a set that is represented by programs.
         """
         wanted = list(axes)
         order: list[int] = []
@@ -159,8 +130,6 @@ class ReachableSets:
 class Meter:
     """Measures the computing time of hulls, and raises an error before a hull that is expected to exceed the budget.
 
-    Notes
-    -----
     Qhull's time for k points in R^d grows as k^(d/2) at worst, and the memory of the check as vertices times facets.
     Both are extrapolated from the last hull of that dimension, or from values of a slow machine for the first hull.
     """
@@ -288,8 +257,6 @@ def _finite(normals: Floats, offsets: Floats) -> tuple[Floats, Floats]:
 class LiftedSets:
     """Sets of a block, represented by programs over its admissible controls.
 
-    Notes
-    -----
     Each direction needs a linear program, or a cone program for thrust in a ball. The only error is the tolerance of
     the programs, at most 1e-8 of the bounds. The variables are the controls; if there are many, states are variables
     too, because the rows are then sparse.

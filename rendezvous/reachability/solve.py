@@ -42,15 +42,7 @@ class Route(Enum):
 
 @dataclass(frozen=True, eq=False)
 class OptimalControls:
-    """{u: |x(T)| is least and every constraint kept}: a polytope for thrust in a box.
-
-    Parameters
-    ----------
-    problem : ReachabilityProblem
-        The problem.
-    blocks : tuple of BlockOptimum
-        Optima of the independent parts of the problem.
-    """
+    """{u: |x(T)| is least and every constraint kept}, from the optima of the blocks: a polytope for thrust in a box."""
 
     problem: ReachabilityProblem
     blocks: tuple[BlockOptimum, ...]
@@ -122,20 +114,9 @@ class OptimalControls:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The solution of a problem.
+    """The solution of a problem: all controls of least terminal norm, and the forward sets and the tube.
 
-    Parameters
-    ----------
-    problem : ReachabilityProblem
-        The problem.
-    optimal : OptimalControls
-        All controls of least terminal norm.
-    sets : ReachableSets
-        Forward sets and the tube.
-    route : Route
-        EXACT if the vertices and facets of all blocks are known.
-    reason : str
-        Reason for the choice of the route.
+    The `route` is EXACT if the vertices and facets of all blocks are known; `reason` explains its choice.
     """
 
     problem: ReachabilityProblem
@@ -155,8 +136,6 @@ def solve(problem: ReachabilityProblem, route: Route | None = None, budget: Budg
 
     Parameters
     ----------
-    problem : ReachabilityProblem
-        Problem, in any consistent units.
     route : Route or None
         None selects the exact route if blocks are small, thrust is in a box, constraints apply at whole periods only
         and the expected cost is within the budget; otherwise the lifted route.
@@ -227,8 +206,6 @@ def _refusal(problem: ReachabilityProblem, *, asked: bool) -> str | None:
 def least_periods(problem: ReachabilityProblem) -> int | None:
     """Return the least number of periods in which zero can be reached, or None if those of the `problem` are too few.
 
-    Notes
-    -----
     If the zero state satisfies all constraints, it can be held, and the least number is computed by bisection;
     otherwise all numbers are tried. Each block and number needs a linear program.
     """

@@ -15,23 +15,14 @@ from rendezvous.relative_motion.linear_motion import LinearMotion, checked_durat
 
 @dataclass(frozen=True, eq=False)
 class ConstantMotion(LinearMotion):
-    """x' = A x + (0, u)'.
+    """x' = A x + (0, u)' with a constant `matrix` A, shape (6, 6), in the frame.
 
-    Parameters
-    ----------
-    matrix : ndarray, shape (6, 6)
-        A, in the frame.
-    frame : Frame
-        Of states and controls; position before velocity.
+    Van Loan's block exponential, 12 x 12 for each interval, in states divided by (T, T, T, 1, 1, 1) to balance it.
 
     Raises
     ------
     ValueError
         If A has another shape or is not finite, or the frame interleaves positions and velocities.
-
-    Notes
-    -----
-    Van Loan's block exponential, 12 x 12 for each interval, in states divided by (T, T, T, 1, 1, 1) to balance it.
     """
 
     matrix: Floats

@@ -18,12 +18,7 @@ MOST_PANELS = 200_000
 class Segment:
     """Motion between two times: x(end) = transition x(start) + drift + the effect of the control.
 
-    Parameters
-    ----------
-    transition, gramian : ndarray, shape (..., 6, 6)
-        Matrices of states in m and m/s.
-    drift : ndarray, shape (..., 6)
-        Drift, m and m/s.
+    `transition` and `gramian`, shape (..., 6, 6), and `drift`, shape (..., 6), are those of states in m and m/s.
     """
 
     transition: Floats
@@ -34,7 +29,8 @@ class Segment:
 class LinearMotion(ABC):
     """x' = A(t) x + B(t) u + w(t), x = (position, velocity) in a frame; by default B = (0, 1)' and w = 0.
 
-    Times are scalars or arrays, in seconds, broadcast against each other; the results have their shape in front.
+    Times are scalars or arrays, in seconds, broadcast against each other; the results have their shape in front. The
+    `frame` is that of states and controls.
 
     Raises
     ------

@@ -37,18 +37,11 @@ class TimeVaryingMotion(LinearMotion):
     ----------
     matrix_at : callable
         A of times of shape (k,), s: shape (k, 6, 6).
-    frame : Frame
-        Of states and controls; position before velocity.
     input_at : callable or None
-        B, shape (k, 6, 3); None is an acceleration, (0, 1)'. An actuator with the cost u' R u has
-        B = (0, 1)' R^(-1/2), and controls R^(1/2) u.
+        B, shape (k, 6, 3); None is an acceleration, (0, 1)'. An actuator with the cost u' R u has B = (0, 1)' R^(-1/2),
+        and controls R^(1/2) u.
     drift_at : callable or None
         w, shape (k, 6); None is zero.
-
-    Raises
-    ------
-    ValueError
-        If the frame interleaves positions and velocities.
 
     Notes
     -----
@@ -104,8 +97,6 @@ class TimeVaryingMotion(LinearMotion):
     def breaks(self, start_s: float, end_s: float) -> Floats:
         """Times from start to end, inclusive, a radian of the fastest motion seen in between apart at most.
 
-        Notes
-        -----
         Panels are halved where A at their Gauss points turns by more than a radian over them.
 
         Raises

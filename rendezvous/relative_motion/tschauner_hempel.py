@@ -22,22 +22,8 @@ _NODES, _WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.l
 
 @dataclass(frozen=True)
 class TschaunerHempel(LinearMotion):
-    """Relative motion about an elliptic orbit.
+    """Relative motion about an elliptic `orbit`.
 
-    Parameters
-    ----------
-    orbit : EllipticOrbit
-        The reference orbit.
-    frame : Frame
-        Of states and controls; position before velocity.
-
-    Raises
-    ------
-    ValueError
-        If the frame interleaves positions and velocities.
-
-    Notes
-    -----
     Yamanaka and Ankersen (2002), which holds from e = 0 on. Its two factors cancel over short times, where the
     equations are collocated instead. Gramians by Gauss and Legendre's rule in the eccentric anomaly.
     """
@@ -81,8 +67,6 @@ class TschaunerHempel(LinearMotion):
     def breaks(self, start_s: float, end_s: float) -> Floats:
         """Times from start to end, inclusive, a radian of the eccentric anomaly apart at most.
 
-        Notes
-        -----
         The motion has poles at cos E = 1 / e; panels are no longer than the distance to them.
         """
         first, last = (float(anomaly) for anomaly in self.orbit.eccentric_anomaly(np.array([start_s, end_s])))
