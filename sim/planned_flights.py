@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance import GameNoise, LineOfSight, TieRule
+from guidance.game_noise import SwitchingNoise
 from guidance.scripted_noise import errors_made, measure_with_errors
-from guidance.switching_noise import SwitchingNoise
 from infoset import InformationSetView
 from infoset.sensors import Measurements
 

@@ -22,10 +22,10 @@ from guidance import (
     ZeroEffortMiss,
     strategy_names,
 )
-from guidance.estimated_miss import impulse_beyond_dead_zone
 from guidance.kalman import KalmanState
 from guidance.least_squares import LeastSquaresState
 from guidance.patient import correctable_later_m
+from guidance.predicted_miss import impulse_beyond_dead_zone
 from infoset import AngleSensor, ExtremePoints, InformationSet, PredictedMiss, RangeSensor, SetModel, StateBox
 from sim import Results, Scenario, simulate
 from sim.draws import Draws, draw
