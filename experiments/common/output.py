@@ -131,24 +131,24 @@ def output(
     printed = [option for option, path in single.items() if str(path) == STDOUT]
     if len(printed) > 1:
         raise InputError(f"{' and '.join(printed)} cannot both be printed on stdout; name a file for one of them")
+    wanted = [("", folder / name) for name in names] if folder is not None else []
+    wanted += [(option, path) for option, path in single.items() if option not in printed]
     created: list[Path] = []
+    owners: dict[Path, str] = {}
     try:
-        owners: dict[Path, str] = {}
         if folder is not None:
-            created = _check_folder(folder, overwrite)
-            for name in names:
-                check_file(folder / name, overwrite=overwrite)
-            owners = {_resolved(folder / name): "a file of --out" for name in names}
-        for option, path in single.items():
-            if option in printed:
-                continue
-            check_file(path, overwrite=overwrite)
-            if (other := owners.setdefault(_resolved(path), f"the file of {option}")) != f"the file of {option}":
+            _make_folder(folder, overwrite, created)
+        for option, path in wanted:
+            _check_file(path, overwrite)
+            owner = f"the file of {option}" if option else "a file of --out"
+            if (other := owners.setdefault(path.resolve(), owner)) != owner:
                 raise InputError(f"{option}: {path} is also {other}; choose another name")
         opened = Output(folder, single, overwrite)
         yield opened
     finally:
-        _remove_empty(created)
+        for path in reversed(created):
+            with contextlib.suppress(OSError):
+                path.rmdir()
     if opened.written and not quiet:
         typer.echo(on_a_screen("\n".join(_listed(opened.written))), err=True)
 
@@ -168,14 +168,8 @@ def _listed(files: Sequence[Path]) -> Iterator[str]:
         yield f"wrote {names}" + (f" in {folder}" if folder != Path() else "")
 
 
-def check_file(file: Path, *, overwrite: bool = False) -> None:
-    """Check that a file can be written, by creating a temporary file in its folder.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written, is a link, or exists and `overwrite` is false.
-    """
+def _check_file(file: Path, overwrite: bool) -> None:
+    """Check that a file can be written, by creating a temporary file in its folder."""
     with _reporting(file):
         _check_name(file, overwrite)
         probe = temporary_beside(file)
@@ -267,40 +261,18 @@ def _check_name(file: Path, overwrite: bool) -> None:
         file.lstat()  # raises OSError if the name is too long
 
 
-def _check_folder(folder: Path, overwrite: bool) -> list[Path]:
-    """Create a folder if needed, try to write in it, and return the created folders, the outermost first."""
-    created: list[Path] = []
-    try:
-        with _reporting(folder):
-            if os.path.lexists(folder) and not folder.is_dir():
-                raise InputError(f"{folder}: is a file, not a folder; choose another name for the output folder")
-            missing = [parent for parent in (folder, *folder.parents) if not parent.exists()]
-            for parent in reversed(missing):
-                parent.mkdir()
-                created.append(parent)
-            if not overwrite and next(folder.iterdir(), None) is not None:
-                raise InputError(
-                    f"{folder}: is not empty; choose another folder, or give --overwrite to replace files in it"
-                )
-            probe = temporary_beside(folder / "probe")
-            with probe.open("x"):
-                pass
-            probe.unlink()
-    except InputError:
-        _remove_empty(created)
-        raise
-    return created
-
-
-def _remove_empty(folders: Sequence[Path]) -> None:
-    for folder in reversed(folders):
-        with contextlib.suppress(OSError):
-            folder.rmdir()
-
-
-def _resolved(path: Path) -> Path:
-    with _reporting(path):
-        return path.resolve()
+def _make_folder(folder: Path, overwrite: bool, created: list[Path]) -> None:
+    """Create a folder if needed, and append the created folders to a list, the outermost first."""
+    with _reporting(folder):
+        if os.path.lexists(folder) and not folder.is_dir():
+            raise InputError(f"{folder}: is a file, not a folder; choose another name for the output folder")
+        for parent in reversed([parent for parent in (folder, *folder.parents) if not parent.exists()]):
+            parent.mkdir()
+            created.append(parent)
+        if not overwrite and next(folder.iterdir(), None) is not None:
+            raise InputError(
+                f"{folder}: is not empty; choose another folder, or give --overwrite to replace files in it"
+            )
 
 
 @contextlib.contextmanager
