@@ -5,6 +5,7 @@ from sim.bound import BoundError, LowerBound, lower_bound
 from sim.campaign import Campaign, CampaignResult, Sweep
 from sim.chunk import CampaignNoise
 from sim.record import Inconsistency, Record, StepRecord, fly_one
+from sim.requirement import Requirement
 from sim.results import Outcome, Results
 from sim.scenario import Manoeuvre, Scenario, Sun, Target
 from sim.simulate import simulate
@@ -16,7 +17,7 @@ from sim.statistics import (
     estimate_quantiles,
     quantiles,
 )
-from sim.stopping_rule import QuantileName, Requirement, StoppingRule
+from sim.stopping_rule import QuantileName, StoppingRule
 from sim.storage import Axis
 
 __all__ = [

@@ -17,9 +17,10 @@ from matplotlib.patheffects import Stroke
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
-from experiments.campaigns.sweep_table import SweepTable, crossings, key_label, unit_of
+from experiments.campaigns.sweep_table import SweepTable, key_label, limits, unit_of
 from experiments.common.figure_style import CURVE_LOOKS, IMPULSE, INK, new_figure, place_axes, style
 from sim import QuantileName, Requirement
+from sim.requirement import Decision
 from sim.stopping_rule import level_name
 from sim.storage import Axis
 
@@ -47,7 +48,7 @@ _HEAD_ROOM = 1.06
 """Factor of the axis, for the arrow of the topmost point."""
 
 
-def draw_sweep(table: SweepTable, shown: Sequence[QuantileName], requirement: Requirement | None) -> Figure:
+def draw_sweep(table: SweepTable, shown: Sequence[QuantileName]) -> Figure:
     """Draw quantiles of a sweep over its one or two axes.
 
     With one axis there is a panel for each quantity and noise, with the quantiles as lines; with two axes there is a
@@ -61,10 +62,11 @@ def draw_sweep(table: SweepTable, shown: Sequence[QuantileName], requirement: Re
     if len(table.axes) not in (1, 2) or not shown:
         raise ValueError("only a sweep with one or two axes can be drawn, with at least one quantile")
     with style():
-        return _lines(table, shown, requirement) if len(table.axes) == 1 else _maps(table, shown, requirement)
+        return _lines(table, shown) if len(table.axes) == 1 else _maps(table, shown)
 
 
-def _lines(table: SweepTable, shown: Sequence[QuantileName], requirement: Requirement | None) -> Figure:
+def _lines(table: SweepTable, shown: Sequence[QuantileName]) -> Figure:
+    requirement = table.required
     quantities = list(dict.fromkeys(quantile.quantity for quantile in shown))
     rows = len(table.noises)
     levels = sorted({quantile.level for quantile in shown}, reverse=True)
@@ -74,15 +76,14 @@ def _lines(table: SweepTable, shown: Sequence[QuantileName], requirement: Requir
     for row, noise in zip(grid, table.noises, strict=True):
         for axes, quantity in zip(row, quantities, strict=True):
             quantiles = [quantile for quantile in shown if quantile.quantity == quantity]
-            _line_panel(axes, table, noise, quantiles, levels, requirement)
+            _line_panel(axes, table, noise, quantiles, levels)
             axes.set_title(f"({next(letter)}) {noise} noise")
             axes.set_ylabel(QUANTITY_NAMES[quantity])
     handles = [
         Line2D([], [], color=INK, linestyle=_look(levels, level), marker="o", markersize=3, label=level_name(level))
         for level in levels
     ]
-    if requirement is not None:
-        handles.append(Line2D([], [], color=IMPULSE, linewidth=0.9, label=f"required: {_words(requirement)}"))
+    handles.append(Line2D([], [], color=IMPULSE, linewidth=0.9, label=f"required: {_words(requirement)}"))
     note = "bars: 95 % confidence intervals; arrow: too few runs for an upper end"
     figure.legend(handles=handles, loc="lower center", ncols=len(handles), title=note, title_fontsize=7.0)
     return figure
@@ -94,9 +95,8 @@ def _line_panel(
     noise: str,
     quantiles: Sequence[QuantileName],
     levels: Sequence[float],
-    requirement: Requirement | None,
 ) -> None:
-    (axis,) = table.axes
+    (axis,), requirement = table.axes, table.required
     colour = CURVE_LOOKS[1 if noise == "random" else 3]["color"]
     for quantile in quantiles:
         estimates = [table.estimate(cell, noise, quantile) for cell in range(len(axis.values))]
@@ -126,9 +126,14 @@ def _line_panel(
             )
             if upper is None:
                 axes.plot([key], [value], marker=CARETUPBASE, markersize=6.0, color=colour, zorder=2.0)
-        if requirement is not None and requirement.quantile == quantile:
+        if requirement.quantile == quantile:
             axes.axhline(requirement.bound, color=IMPULSE, linewidth=0.9, zorder=2.5)
-            for crossing in crossings(keys, values, requirement.bound, axis.scale):
+            verdicts = [table.verdict(cell, noise) for cell in range(len(axis.values))]
+            for limit in limits(axis, verdicts, requirement.bound):
+                axes.axvspan(limit.lower, limit.upper, color=IMPULSE, alpha=0.15, linewidth=0.0, zorder=0.5)
+                crossing = limit.value
+                if crossing is None:
+                    continue
                 axes.plot([crossing], [requirement.bound], marker="D", markersize=4.5, color=IMPULSE, zorder=5.0)
                 axes.vlines(crossing, 0.0, requirement.bound, color=IMPULSE, linewidth=0.7, linestyle=":", zorder=2.5)
                 axes.annotate(
@@ -146,7 +151,8 @@ def _line_panel(
     _scale(axes, axis, "x")
 
 
-def _maps(table: SweepTable, shown: Sequence[QuantileName], requirement: Requirement | None) -> Figure:
+def _maps(table: SweepTable, shown: Sequence[QuantileName]) -> Figure:
+    requirement = table.required
     panels = [(noise, quantile) for noise in table.noises for quantile in shown]
     columns = min(2, len(panels))
     rows = -(-len(panels) // columns)
@@ -155,12 +161,12 @@ def _maps(table: SweepTable, shown: Sequence[QuantileName], requirement: Require
     for (noise, quantile), axes, letter in zip(
         panels, (axes for row in grid for axes in row), "abcdefghijklmnopqrstuvwxyz", strict=False
     ):
-        _map_panel(figure, axes, table, noise, quantile, requirement)
+        _map_panel(figure, axes, table, noise, quantile)
         name, unit = QUANTITY_NAMES[quantile.quantity].split(", ")
         axes.set_title(f"({letter}) {name}, {level_name(quantile.level)}, {unit}; {noise} noise")
     for unused in [axes for row in grid for axes in row][len(panels) :]:
         unused.remove()
-    if requirement is not None and requirement.quantile in shown:
+    if requirement.quantile in shown:
         line = Line2D([], [], color=IMPULSE, linewidth=1.5, label=f"required: {_words(requirement)}")
         figure.legend(handles=[line], loc="lower center")
     return figure
@@ -172,9 +178,8 @@ def _map_panel(
     table: SweepTable,
     noise: str,
     quantile: QuantileName,
-    requirement: Requirement | None,
 ) -> None:
-    across, up = table.axes
+    (across, up), requirement = table.axes, table.required
     values = table.grid(noise, quantile).T
     norm = _norm(values)
     image = axes.pcolormesh(
@@ -188,18 +193,19 @@ def _map_panel(
     axes.grid(visible=False)
     if values.size <= MOST_NUMBERS:
         _write_numbers(axes, across, up, values, norm)
-    if requirement is None or requirement.quantile != quantile:
+    if requirement.quantile != quantile:
         return
-    met = values < requirement.bound
-    if met.any() and not met.all():
-        limit = LineCollection(
-            between(_edges(across), _edges(up), met), colors=IMPULSE, capstyle="projecting", zorder=4.0
-        )
-        limit.set_path_effects([Stroke(linewidth=3.2, foreground="white"), Stroke(linewidth=1.5, foreground=IMPULSE)])
-        axes.add_collection(limit, autolim=False)
-    else:
-        extent = "everywhere" if met.all() else "nowhere"
-        axes.set_xlabel(f"{axes.get_xlabel()}\n{_words(requirement)}: {extent}")
+    verdicts = [table.verdict(cell, noise) for cell in range(len(table.cells))]
+    decisions = [Decision.UNDECIDED if verdict is None else verdict.decision for verdict in verdicts]
+    met = np.ma.MaskedArray(
+        [decision is Decision.MET for decision in decisions],
+        mask=[decision is Decision.UNDECIDED for decision in decisions],
+    ).reshape(values.T.shape)
+    limit = LineCollection(
+        between(_edges(across), _edges(up), met.T), colors=IMPULSE, capstyle="projecting", zorder=4.0
+    )
+    limit.set_path_effects([Stroke(linewidth=3.2, foreground="white"), Stroke(linewidth=1.5, foreground=IMPULSE)])
+    axes.add_collection(limit, autolim=False)
 
 
 def between(across: Floats, up: Floats, met: np.ma.MaskedArray[Any, Any]) -> list[list[tuple[float, float]]]:

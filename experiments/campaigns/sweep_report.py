@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -14,8 +17,9 @@ from experiments.campaigns.sweep_figures import draw_sweep
 from experiments.campaigns.sweep_table import SHOWN, SweepTable, answers, sweep_table, unit_of
 from experiments.common.errors import InputError
 from experiments.common.output import Output
-from experiments.common.screen import number
+from experiments.common.screen import number, number_table
 from sim import QuantileName, Requirement
+from sim.requirement import CONFIDENCE, MOST_RUNS_NEEDED, Decision, Verdict
 from sim.storage import CampaignFolder
 
 TABLE = "sweep.parquet"
@@ -33,16 +37,13 @@ class SweepReport:
     folder : CampaignFolder
         The sweep, finished or not.
     table : SweepTable
-        The quantiles of its cells.
-    required : Requirement
-        Bound of a quantile.
+        The quantiles of its cells, and the decisions about the requirement.
     shown : sequence of QuantileName
         Quantiles that the figure shows.
     """
 
     folder: CampaignFolder
     table: SweepTable
-    required: Requirement
     shown: Sequence[QuantileName]
 
     @property
@@ -60,16 +61,28 @@ class SweepReport:
                 {"key": axis.key, "unit": unit_of(axis.key), "scale": axis.scale, "values": list(axis.values)}
                 for axis in table.axes
             ],
-            "require": str(self.required),
+            "require": str(table.required),
+            "confidence": CONFIDENCE,
             "answers": [
-                {"noise": noise, "at": at, "met": met}
+                {
+                    "noise": noise,
+                    "at": answer.at,
+                    "met": answer.met,
+                    "limits": [
+                        {"value": limit.value, "lower": limit.lower, "upper": limit.upper} for limit in answer.limits
+                    ],
+                }
                 for noise in table.noises
-                for at, met in answers(table, noise, self.required)
+                for answer in answers(table, noise)
             ],
             "cells": [
                 {
                     "values": self.folder.manifest.values_of(cell),
-                    "samples": [sample_json(sample) for sample in samples],
+                    "requirement": table.decision(cell).value,
+                    "samples": [
+                        {**sample_json(sample), "requirement": _verdict_json(table.verdict(cell, sample.noise))}
+                        for sample in samples
+                    ],
                 }
                 for cell, samples in enumerate(table.cells)
             ],
@@ -79,38 +92,111 @@ class SweepReport:
         """Write the table, and the figure of one or two axes, into the output's folder."""
         written.save(TABLE, self.folder.table_file(*self.table.columns()))
         if self.is_drawn and written.folder is not None:
-            written.figure(FIGURE, draw_sweep(self.table, self.shown, self.required))
+            written.figure(FIGURE, draw_sweep(self.table, self.shown))
 
     def show(self, console: Console) -> None:
-        """Print where the requirement is met and, for a sweep with one axis, the required quantile of every cell."""
+        """Print the decision of every cell, and the limits of the values that meet the requirement."""
 
         def line(text: str) -> None:
             console.print(Text(text), soft_wrap=True)
 
-        folder, table, required = self.folder, self.table, self.required
-        first = table.axes[0]
+        folder, table = self.folder, self.table
         line(
             f"{folder.manifest.scenario.name}, {len(table.cells)} cells, {folder.finished_runs} of "
-            f"{folder.wanted_runs} runs"
+            f"{folder.wanted_runs} runs; each decision has a confidence of at least 95 %"
         )
         for noise in table.noises:
-            lines = answers(table, noise, required)
-            line(f"{noise} noise: {required} is met for these values of {first.key}:")
-            for at, met in lines[:MOST_LINES]:
-                line(f"  {met}{f' (at {at})' if at else ''}")
-            if len(lines) > MOST_LINES:
-                line(f"  {len(lines) - MOST_LINES} more lines are in the JSON report (--json)")
-        if len(table.axes) != 1:
-            return
-        shown = Table(first.key, "noise", box=None, pad_edge=False)
-        for title in ("lower limit", str(required.quantile), "upper limit"):
-            shown.add_column(title, justify="right")
-        for noise in table.noises:
-            for cell, value in enumerate(first.values):
-                estimate = table.estimate(cell, noise, required.quantile)
-                ends = (None,) * 3 if estimate is None else (estimate.lower, estimate.value, estimate.upper)
-                shown.add_row(f"{value:g}", noise, *map(number, ends))
-        console.print(shown)
+            verdicts = [table.verdict(cell, noise) for cell in range(len(table.cells))]
+            counts = Counter(verdict.decision for verdict in verdicts if verdict is not None)
+            decisions = ", ".join(f"{decision} in {counts[decision]}" for decision in Decision)
+            line(f"{noise} noise: {table.required} is {decisions} of {len(verdicts)} cells")
+            self._show_answers(line, noise)
+            for title, part in decision_tables(table, noise, console.width):
+                if title:
+                    line(title)
+                console.print(part)
+            for note in _undecided_notes(verdicts):
+                line(note)
+
+    def _show_answers(self, line: Callable[[str], None], noise: str) -> None:
+        lines = answers(self.table, noise)
+        line(f"along {self.table.axes[0].key}:")
+        for answer in lines[:MOST_LINES]:
+            line(f"  {answer.met}{f' (at {answer.at})' if answer.at else ''}")
+        if len(lines) > MOST_LINES:
+            line(f"  {len(lines) - MOST_LINES} more lines are in the JSON report (--json)")
+
+
+def _verdict_json(verdict: Verdict | None) -> dict[str, object] | None:
+    if verdict is None:
+        return None
+    return {
+        "decision": verdict.decision.value,
+        "value": verdict.value,
+        "lower": verdict.lower,
+        "upper": verdict.upper,
+        "runs_needed": verdict.runs_needed,
+    }
+
+
+def _undecided_notes(verdicts: Sequence[Verdict | None]) -> list[str]:
+    """Return a line about the runs of the undecided cells, and how many more may decide them."""
+    undecided = [verdict for verdict in verdicts if verdict is not None and verdict.decision is Decision.UNDECIDED]
+    if not undecided:
+        return []
+    runs = sorted({verdict.runs for verdict in undecided})
+    rest = f"{runs[0]}" if len(runs) == 1 else f"{runs[0]} to {runs[-1]}"
+    more = sorted(verdict.runs_needed - verdict.runs for verdict in undecided if verdict.runs_needed is not None)
+    text = f"undecided cells: {len(undecided)}, each after {rest} runs; "
+    if more:
+        amount = " to ".join(dict.fromkeys((_about(more[0]), _about(more[-1]))))
+        text += f"about {amount} more runs per cell would decide {'them' if len(more) == len(undecided) else len(more)}"
+    else:
+        text += f"even {MOST_RUNS_NEEDED} runs per cell would not decide them"
+    return [text]
+
+
+def _about(count: int) -> str:
+    """Return a number of runs with two digits, rounded up."""
+    step = 10 ** max(0, len(str(count)) - 2)
+    return str(-(-count // step) * step)
+
+
+def decision_tables(table: SweepTable, noise: str, width: int) -> Iterator[tuple[str, Table]]:
+    """Yield decisions and estimates as tables with titles: a row for each value of an axis, or a grid of two axes.
+
+    With more axes there is a grid for each combination of the other values. A grid wider than `width` characters is
+    divided. At most `MOST_LINES` grids are returned.
+    """
+    first, *others = table.axes
+    if not others:
+        shown = number_table(first.key, "decision", "runs", *("95 % CI from", str(table.required.quantile), "to"))
+        for cell, value in enumerate(first.values):
+            verdict = table.verdict(cell, noise)
+            if verdict is not None:
+                ends = (verdict.lower, verdict.value, verdict.upper)
+                shown.add_row(f"{value:g}", str(verdict.decision), str(verdict.runs), *map(number, ends))
+        yield "", shown
+        return
+    second, *rest = others
+    shape = [len(axis.values) for axis in table.axes]
+    cells = np.arange(len(table.cells)).reshape(shape)
+    columns = max(1, (width - 14) // 12)
+    for indices in itertools.islice(np.ndindex(*shape[2:]), MOST_LINES):
+        grid = cells[(slice(None), slice(None), *indices)]
+        at = ", ".join(f"{axis.key} = {axis.values[index]:g}" for axis, index in zip(rest, indices, strict=True))
+        for begin in range(0, len(second.values), columns):
+            block = second.values[begin : begin + columns]
+            title = f"{first.key} (rows) and {second.key} (columns){f', at {at}' if at else ''}"
+            shown = number_table("", *(f"{value:g}" for value in block))
+            for row, value in enumerate(first.values):
+                entries = grid[row, begin : begin + columns].tolist()
+                shown.add_row(f"{value:g}", *(_entry(table.verdict(cell, noise)) for cell in entries))
+            yield title, shown
+
+
+def _entry(verdict: Verdict | None) -> str:
+    return "-" if verdict is None else f"{verdict.decision}\n{number(verdict.value)}"
 
 
 def quantile_options(require: str, show: str | None) -> tuple[Requirement, tuple[QuantileName, ...]]:
@@ -131,4 +217,4 @@ def quantile_options(require: str, show: str | None) -> tuple[Requirement, tuple
 def sweep_report(folder: CampaignFolder, quantiles: tuple[Requirement, tuple[QuantileName, ...]]) -> SweepReport:
     """Summarise a sweep, finished or not, for the quantiles of `quantile_options`."""
     required, shown = quantiles
-    return SweepReport(folder, sweep_table(folder, shown), required, shown)
+    return SweepReport(folder, sweep_table(folder, required, shown), shown)

@@ -247,7 +247,7 @@ def _expressions() -> tuple[Parse, Mutate, list[bytes]]:
     from experiments.interception.scenario_file import load_scenario
     from experiments.pursuit.file import load_pursuit
     from experiments.pursuit.map import read_axis
-    from sim.stopping_rule import QuantileName, Requirement, StoppingRule
+    from sim import QuantileName, Requirement, StoppingRule
 
     from .mutations import mutated_bytes
     from .subjects import attempted

@@ -17,9 +17,10 @@ from hypothesis import strategies as st
 
 from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
 from experiments.campaigns.sweep_figures import between, draw_sweep
-from experiments.campaigns.sweep_table import SHOWN, crossings, key_label, sweep_table, unit_of, where_met
+from experiments.campaigns.sweep_table import SHOWN, Limit, answer, key_label, limits, sweep_table, unit_of
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
 from sim import CampaignNoise, QuantileName, Requirement, Scenario, Sweep, quantiles, simulate
+from sim.requirement import Decision, Verdict
 from sim.storage import Axis, CampaignFolder
 
 Infoset = Callable[..., tuple[int, str, str]]
@@ -27,6 +28,7 @@ FILES = [
     *(".lock", "figure-sweep.pdf", "figure-sweep.png", "manifest.json", "scenario.toml", "shards", "summary.json"),
     "sweep.parquet",
 ]
+REQUIRED = Requirement(SHOWN[1], 10.0)
 TWO = "angle_sensor.error_at_zero_range_rad=1e-4:4e-4:3,thruster.greatest_impulse_m_s=log:2:8:2"
 
 
@@ -92,7 +94,8 @@ def test_a_sweep_of_one_key_mixed_and_resumed(infoset: Infoset, file: Path, tmp_
     asked = ("sweep", file, "--vary", "thruster.greatest_impulse_m_s=2:8:4", "--runs", 20, "--noise", "mixed")
     code, out, _ = infoset(*asked, "--out", tmp_path / "a", "--require", "miss_m p90<3")
     assert code == 0
-    assert out.count("noise: miss_m p90<3 is met for these values of thruster.greatest_impulse_m_s:") == 2
+    assert out.count("noise: miss_m p90<3 is met in") == 2
+    assert out.count("along thruster.greatest_impulse_m_s:") == 2
     table = pq.read_table(tmp_path / "a" / "sweep.parquet")
     assert table.column("noise").to_pylist() == ["random", "game"] * 4
     assert set(table.column("runs").to_pylist()) == {10}
@@ -110,7 +113,8 @@ def test_a_sweep_of_one_key_mixed_and_resumed(infoset: Infoset, file: Path, tmp_
 def test_the_report_of_a_sweep_is_from_its_files_alone(infoset: Infoset, swept: Path, tmp_path: Path) -> None:
     code, out, _ = infoset("report", swept, "--out", tmp_path / "report", "--require", "impulse_m_s p50<60")
     assert code == 0
-    assert "impulse_m_s p50<60 is met for these values of angle_sensor.error_at_zero_range_rad:" in out
+    assert "impulse_m_s p50<60 is met in" in out
+    assert "angle_sensor.error_at_zero_range_rad (rows) and thruster.greatest_impulse_m_s (columns)" in out
     names = ["figure-sweep.pdf", "figure-sweep.png", "report.json", "scenario.toml", "sweep.parquet"]
     assert sorted(each.name for each in (tmp_path / "report").iterdir()) == names
     assert pq.read_table(tmp_path / "report" / "sweep.parquet").num_rows == 6
@@ -198,29 +202,67 @@ def test_a_large_sweep_asks_on_a_terminal(
     assert questions == ["6 cells of 300000 runs are 1800000 engagements, more than a million. Continue?"]
 
 
-def test_where_a_quantile_crosses_its_bound_by_hand() -> None:
-    assert crossings((1.0, 2.0, 4.0), (5.0, 15.0, 5.0), 10.0, "linear") == [1.5, 3.0]
-    assert crossings((1.0, 100.0), (5.0, 15.0), 10.0, "log") == pytest.approx([10.0])
-    assert crossings((1.0, 2.0, 3.0), (5.0, None, 15.0), 10.0, "linear") == []
-    axis = Axis("a", (1.0, 2.0, 4.0))
-    assert where_met(axis, (5.0, 15.0, 25.0), 10.0) == "up to 1.5"
-    assert where_met(axis, (15.0, 5.0, 5.0), 10.0) == "from 1.5"
-    assert where_met(axis, (5.0, 15.0, 5.0), 10.0) == "up to 1.5, from 3"
-    assert where_met(axis, (15.0, 5.0, 15.0), 10.0) == "1.5 to 3"
-    assert where_met(axis, (5.0, 6.0, 7.0), 10.0) == "everywhere"
-    assert where_met(axis, (15.0, 16.0, 17.0), 10.0) == "nowhere"
-    assert where_met(axis, (None, None, None), 10.0) == "not simulated yet"
+MET, NOT_MET, OPEN = Decision.MET, Decision.NOT_MET, Decision.UNDECIDED
+
+
+def verdict(value: float, decision: Decision, half: float = 1.0) -> Verdict:
+    return Verdict(decision, 20, value, value - half, value + half, 20)
+
+
+def test_limits_are_interpolated_between_neighbouring_decided_cells_only() -> None:
+    axis = Axis("guidance.step_s", (1.0, 2.0, 4.0))
+    met, missed, undecided = verdict(5.0, MET), verdict(15.0, NOT_MET), verdict(10.5, OPEN)
+    assert limits(axis, (met, missed, met), 10.0) == [Limit(1.5, 1.4, 1.6), Limit(3.0, 2.8, 3.2)]
+    (limit,) = limits(Axis("a", (1.0, 100.0), "log"), (met, missed), 10.0)
+    assert (limit.value, limit.lower, limit.upper) == pytest.approx((10.0, 10.0**0.8, 10.0**1.2))
+    assert limits(axis, (met, undecided, missed), 10.0) == [Limit(None, 1.0, 4.0)]
+    assert limits(axis, (met, None, missed), 10.0) == [Limit(None, 1.0, 4.0)]
+    assert limits(axis, (undecided, missed, undecided), 10.0) == []
+    unbounded = replace(missed, upper=None)
+    assert limits(axis, (met, unbounded, missed), 10.0) == [Limit(1.5, 1.0, 1.6)]
+    assert limits(axis, (unbounded, met, met), 10.0) == [Limit(1.5, 1.4, 2.0)]
+
+
+def test_answers_in_words() -> None:
+    axis = Axis("guidance.step_s", (1.0, 2.0, 4.0))
+    met, missed, undecided = verdict(5.0, MET), verdict(15.0, NOT_MET), verdict(10.5, OPEN)
+    assert answer(axis, (met, missed, missed), 10.0).met == (
+        "met at 1 s, not met from 2 to 4 s; limit 1.5 s, with 95 % confidence between 1.4 and 1.6 s"
+    )
+    assert answer(axis, (met, undecided, missed), 10.0).met == (
+        "met at 1 s, undecided at 2 s, not met at 4 s; limit between 1 and 4 s"
+    )
+    assert answer(axis, (met, met, met), 10.0).met == "met at all 3 values"
+    assert answer(axis, (undecided, undecided, undecided), 10.0).met == "undecided at all 3 values"
+    assert answer(axis, (None, None, None), 10.0).met == "not simulated at all 3 values"
 
 
 @given(values=st.lists(st.floats(0.0, 20.0), min_size=2, max_size=12), bound=st.floats(1.0, 19.0))
-def test_crossings_lie_between_cells_on_either_side_of_the_bound(values: list[float], bound: float) -> None:
-    places = tuple(float(each) for each in range(len(values)))
-    found = crossings(places, values, bound, "linear")
+def test_limits_lie_between_cells_on_either_side_of_the_bound(values: list[float], bound: float) -> None:
+    axis = Axis("a", tuple(float(index) for index in range(len(values))))
+    verdicts = [verdict(value, MET if value < bound else NOT_MET, 0.0) for value in values]
+    found = limits(axis, verdicts, bound)
     changes = [left for left in range(len(values) - 1) if (values[left] < bound) != (values[left + 1] < bound)]
     assert len(found) == len(changes)
-    for place, left in zip(found, changes, strict=True):
-        assert left <= place <= left + 1
-        assert np.interp(place, places, values) == pytest.approx(bound, rel=1e-9)
+    for limit, left in zip(found, changes, strict=True):
+        assert limit.value is not None
+        assert left <= limit.lower <= limit.value <= limit.upper <= left + 1
+        assert np.interp(limit.value, axis.values, values) == pytest.approx(bound, rel=1e-9)
+
+
+def test_twenty_runs_decide_no_99_percent_quantile(infoset: Infoset, file: Path, tmp_path: Path) -> None:
+    key = "angle_sensor.error_at_zero_range_rad"
+    code, out, _ = infoset("sweep", file, "--vary", f"{key}=1e-5:2e-5:2", "--runs", 20, "--out", tmp_path / "sweep")
+    assert code == 0
+    assert "miss_m p99<10 is met in 0, not met in 0, undecided in 2 of 2 cells" in out
+    assert "  undecided at all 2 values" in out
+    assert "undecided cells: 2, each after 20 runs; about 350 more runs per cell would decide them" in out
+    summary = json.loads((tmp_path / "sweep" / "summary.json").read_text())
+    assert [cell["requirement"] for cell in summary["cells"]] == ["undecided"] * 2
+    for cell in summary["cells"]:
+        required = cell["samples"][0]["requirement"]
+        assert required["value"] < 10.0
+        assert (required["upper"], required["runs_needed"]) == (None, 368)
 
 
 def test_keys_as_labels() -> None:
@@ -232,23 +274,24 @@ def test_keys_as_labels() -> None:
 
 
 def test_figures_of_sweeps(brief: Scenario, swept: Path, tmp_path: Path) -> None:
-    table = sweep_table(CampaignFolder.read(swept))
+    table = sweep_table(CampaignFolder.read(swept), REQUIRED)
     middle = float(np.median(table.grid("random", SHOWN[1]).compressed()))
-    figure = draw_sweep(table, SHOWN, Requirement(SHOWN[1], middle))
+    table = sweep_table(CampaignFolder.read(swept), Requirement(SHOWN[1], middle))
+    figure = draw_sweep(table, SHOWN)
     panels = [each for each in figure.axes if each.get_xlabel()]
     assert [each.get_xlabel() for each in panels] == ["angle sensor: error at zero range, $10^{-4}$ rad"] * 4
     assert {each.get_ylabel() for each in panels} == {"thruster: greatest impulse, m/s"}
     assert all(len(each.texts) == 6 for each in panels)
     axes = sweep_axes("thruster.greatest_impulse_m_s=2:8:3", brief)
     Sweep(brief, axes, sweep_cells(brief, axes), 30, tmp_path / "one", noise=CampaignNoise.MIXED).run()
-    table = sweep_table(CampaignFolder.read(tmp_path / "one"))
-    figure = draw_sweep(table, SHOWN, None)
+    table = sweep_table(CampaignFolder.read(tmp_path / "one"), REQUIRED)
+    figure = draw_sweep(table, SHOWN)
     assert [each.get_title() for each in figure.axes] == [
         *("(a) random noise", "(b) random noise", "(c) game noise", "(d) game noise"),
     ]
     assert [each.get_ylabel() for each in figure.axes] == ["miss, m", "impulse spent, m/s"] * 2
     with pytest.raises(ValueError, match="one or two axes"):
-        draw_sweep(table, [], None)
+        draw_sweep(table, [])
 
 
 def test_an_unfinished_sweep_is_reported_as_far_as_it_is(infoset: Infoset, swept: Path, tmp_path: Path) -> None:
