@@ -79,6 +79,9 @@ INTEGER = Limits(whole=True)
 WHOLE = Limits(least=0, whole=True)
 COUNT = Limits(least=1, whole=True)
 
+ADDED_LATER = {"added_later": True}
+"""Metadata of an optional field that the first version of the files lacks: they omit it if it has its default."""
+
 Number = Annotated[float, NUMBER]
 Positive = Annotated[float, POSITIVE]
 NotNegative = Annotated[float, NOT_NEGATIVE]

@@ -241,7 +241,7 @@ class _Search:
         outcomes = np.array(results.outcomes, dtype=object)
         counts = np.isfinite(results.miss_m)
         if self._keep_set:
-            counts &= outcomes != Outcome.SET_LOST
+            counts &= outcomes != Outcome.SET_EMPTY
         if tie is not None:  # the errors of the game become the plan
             plans.sequence[:], plans.prescribed[:] = noise.errors, True
         value = np.where(counts, results.miss_m, -np.inf)

@@ -270,6 +270,7 @@ class Engagements:
             payoff, known = self._information.guaranteed_miss()
         # Without a closest approach within the greatest number of steps, the miss is the present range.
         miss = np.where(np.isfinite(self._miss), self._miss, self._truth.sight().range_m)
+        body = self.scenario.body
         return Results(
             runs=runs,
             miss_m=miss,
@@ -278,6 +279,8 @@ class Engagements:
             outcomes=tuple(
                 _outcome(*flags) for flags in zip(miss > self.scenario.nominal_range_m, lost, self._spent, strict=True)
             ),
+            set_empty=np.ma.MaskedArray(lost, mask=False),
+            hit=np.ma.MaskedArray(miss <= (0.0 if body is None else body.radius_m), mask=body is None),
             truth_margin_m=margin,
             position_m=self._draws.position_m,
             velocity_m_s=self._draws.velocity_m_s,
@@ -289,8 +292,8 @@ def _outcome(diverged: bool, lost: bool, spent: bool) -> Outcome:
     if diverged:
         return Outcome.DIVERGED
     if lost:
-        return Outcome.SET_LOST
-    return Outcome.BUDGET_SPENT if spent else Outcome.INTERCEPTED
+        return Outcome.SET_EMPTY
+    return Outcome.BUDGET_SPENT if spent else Outcome.ARRIVED
 
 
 def _make_noise(scenario: Scenario, draws: Draws) -> MeasurementNoise:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Annotated
 
 from guidance.noise import NoiseKind, TieRule
 from guidance.strategy import Strategy
 from guidance.thruster import Thruster
-from infoset.limits import Limits, NotNegative, Positive, check_fields
+from infoset.limits import ADDED_LATER, Limits, NotNegative, Positive, check_fields
 from infoset.model import SetModel, StateBox
 from infoset.sensors import RangeSensor, RateSensor, Sensor
 
@@ -86,6 +86,27 @@ class Target:
 
 
 @dataclass(frozen=True)
+class Body:
+    """The size of the object.
+
+    Parameters
+    ----------
+    radius_m : float
+        Radius of a sphere, m: an engagement hits if its miss is at most this radius.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the radius is not a positive number.
+    """
+
+    radius_m: Positive
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True)
 class Scenario:
     """An interception: true motion, sensors, engine, guidance and noise.
 
@@ -115,6 +136,8 @@ class Scenario:
         The sensor of the line-of-sight rate, if there is one.
     target : Target or None
         A target that manoeuvres; None does not.
+    body : Body or None
+        The size of the object; None is a point, and no engagement has a hit or a miss.
 
     Raises
     ------
@@ -135,6 +158,7 @@ class Scenario:
     tie: TieRule = TieRule.UPPER
     rate_sensor: RateSensor | None = None
     target: Target | None = None
+    body: Body | None = field(default=None, metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -144,6 +168,11 @@ class Scenario:
             raise ValueError(
                 f"sun.distance_m must be greater than the greatest possible range, {greatest:g} m: "
                 f"got {self.sun.distance_m!r}"
+            )
+        least = min(self.dispersion.x_m[0], self.set_model.bounds.x_m[0])
+        if self.body is not None and self.body.radius_m >= least:
+            raise ValueError(
+                f"body.radius_m must be less than the least possible range, {least:g} m: got {self.body.radius_m!r}"
             )
 
     @property

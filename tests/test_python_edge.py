@@ -51,6 +51,7 @@ from rendezvous.multipoint import DriftingTargets, Tour
 from rendezvous.multipoint import Target as Visited
 from rendezvous.relative_motion import ClohessyWiltshire
 from sim import (
+    Body,
     Campaign,
     Manoeuvre,
     QuantileName,
@@ -61,6 +62,7 @@ from sim import (
     Target,
     band_half_width,
     empirical_distribution,
+    estimate_hits,
     estimate_quantiles,
     fly_one,
     quantiles,
@@ -127,6 +129,7 @@ SCENARIO: dict[str, Any] = {
     "tie": TieRule.UPPER,
     "rate_sensor": None,
     "target": None,
+    "body": None,
 }
 SOUND: Mapping[Any, Mapping[str, Any]] = {
     AngleSensor: SENSOR,
@@ -137,6 +140,7 @@ SOUND: Mapping[Any, Mapping[str, Any]] = {
     Thruster: THRUSTER,
     Sun: {"gravitational_parameter_m3_s2": 1.3e20, "distance_m": 1.5e11, "direction_rad": 1.0},
     Target: {"manoeuvre": Manoeuvre.BANG_BANG, "acceleration_m_s2": 0.1, "switching_period_s": 10.0},
+    Body: {"radius_m": 80.0},
     Scenario: SCENARIO,
     QuantileName: {"quantity": "miss_m", "level": 0.9},
     StoppingRule: {"quantile": QuantileName("miss_m", 0.9), "width": 1.0, "confidence": 0.95},
@@ -482,6 +486,14 @@ def test_what_is_no_level(level: float) -> None:
     refused(lambda: estimate_quantiles([1.0, 2.0], [level]), "levels")
 
 
+@pytest.mark.parametrize(
+    ("hits", "runs", "confidence", "name"),
+    [(0, 0, 0.95, "runs"), (3, 2, 0.95, "hits"), (-1, 2, 0.95, "hits"), (1.0, 2, 0.95, "hits"), (1, 2, 1.0, "confid")],
+)
+def test_hits_are_a_part_of_the_runs(hits: Any, runs: int, confidence: float, name: str) -> None:
+    refused(lambda: estimate_hits(hits, runs, confidence), name)
+
+
 @pytest.mark.parametrize("order", [(-1, 0), (0, 2), (0, 5), (0.5, 1.0), (0, 10**30)])
 def test_what_is_no_order_of_targets(order: Any) -> None:
     motion = ClohessyWiltshire(1e-3)
@@ -496,7 +508,7 @@ NOT_CALLED = {
     "guidance": {"LineOfSight", "MeasurementNoise", "NoiseKind", "Situation", "Strategy", "ZeroEffortMiss"},
     "sim": {
         *("BoundError", "CampaignResult", "Distribution", "Inconsistency", "LowerBound", "NothingCountsError"),
-        *("Outcome", "QuantileEstimate", "Record", "Results", "WorstEngagement"),
+        *("HitEstimate", "Outcome", "QuantileEstimate", "Record", "Results", "WorstEngagement"),
     },
 }
 """What is exported to be read, not to be given numbers."""
@@ -543,6 +555,7 @@ NESTED: list[tuple[tuple[str, ...], type]] = [
     (("rate_sensor",), RateSensor),
     (("thruster",), Thruster),
     (("target",), Target),
+    (("body",), Body),
 ]
 NUMBERS = [
     (path, field)
@@ -563,7 +576,8 @@ def changed(owner: Any, path: tuple[str, ...], field: str, value: Any) -> Any:
 def agree(place: tuple[tuple[str, ...], str], first: float, second: float) -> bool:
     """Give a field a value; whatever Python takes, a file takes. Return whether it was taken."""
     scenario = load_scenario("asteroid-1997")
-    whole = replace(scenario, rate_sensor=RateSensor(1.0, 1e-6), target=Target(Manoeuvre.CONSTANT, 0.001))
+    target = Target(Manoeuvre.CONSTANT, 0.001)
+    whole = replace(scenario, rate_sensor=RateSensor(1.0, 1e-6), target=target, body=Body(80.0))
     path, field = place
     if place in (((), "nominal_range_m"), (("set_model", "angle_sensor"), "nominal_range_m")):
         return False  # a file has one for both

@@ -227,10 +227,10 @@ def samples_table(by_noise: Sequence[Sample], model: str) -> tuple[Table, list[s
             table.add_row(first, names[quantity], *values, number(sample.worst[quantity]))
             table.add_row("", "  lower limit", *(number(estimate.lower) for estimate in estimates), "", style="dim")
             table.add_row("", "  upper limit", *(number(estimate.upper) for estimate in estimates), "", style="dim")
-        others = [f"{count} {name}" for name, count in sample.outcomes.items() if name != Outcome.INTERCEPTED.value]
+        outcomes = ", ".join(f"{count} {name}" for name, count in sample.outcomes.items())
         held = f"; miss within the bound Phi: {sample.phi_held} of {sample.phi_known} runs" if sample.phi_known else ""
         notes.append(
             f"{sample.noise} noise: true state inside the set at every step: {sample.truth_kept} of {sample.runs} "
-            f"runs{held}; other outcomes than intercepted: {', '.join(others) or 'none'}"
+            f"runs{held}; outcomes: {outcomes}"
         )
     return table, notes

@@ -29,7 +29,7 @@ EXAMPLE = "--vary angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:8,thruster
 _PLACES = Context(prec=12)
 """Values between the ends are rounded to 12 digits."""
 
-_OPTIONAL = ("sun", *OPTIONAL_SENSORS, "target")
+_OPTIONAL = ("sun", *OPTIONAL_SENSORS, "target", "body")
 
 
 def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:

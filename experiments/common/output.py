@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from experiments.common.options import FileOptions
-    from sim import Results
+    from sim import HitEstimate, Results
 
 STDOUT = "-"
 
@@ -197,8 +197,13 @@ def library_version() -> str:
 
 
 def outcome_columns(results: Results) -> dict[str, list[Cell]]:
-    """Return the columns of results by name, without run numbers and starts."""
-    return {name: values for name, values in results.to_dict().items() if not name.startswith(("run", "start_"))}
+    """Return the columns of results by name, without run numbers, starts and hits."""
+    return {name: values for name, values in results.to_dict().items() if not name.startswith(("run", "start_", "hit"))}
+
+
+def hit_key(hits: HitEstimate | None) -> dict[str, object]:
+    """Return the key `hit` of a curve, a sample or a cell in JSON; nothing if the body has no size."""
+    return {} if hits is None else {"hit": vars(hits)}
 
 
 def to_json(value: object) -> str:

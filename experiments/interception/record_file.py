@@ -429,7 +429,11 @@ def _result_from_json(found: object, run: int, guarantees: bool) -> Results:
 def _problem(column: Column, value: object) -> str | None:
     """Return what is wrong with a value of a column, or None."""
     if issubclass(column.kind, Enum):
-        return None if value in [member.value for member in column.kind] else f"is {shown(value)}"
+        try:
+            column.kind(value)
+        except ValueError:
+            return f"is {shown(value)}"
+        return None
     if value is None and column.nullable:
         return None
     if type(value) is not column.kind:
@@ -442,7 +446,7 @@ def _array(column: Column, values: list[Any]) -> Any:
     if issubclass(column.kind, Enum):
         return (column.kind(values[0]),)
     if column.nullable:
-        return np.ma.MaskedArray([values[0] or 0.0], mask=[values[0] is None])
+        return np.ma.MaskedArray([values[0] or 0], mask=[values[0] is None], dtype=column.kind)
     return np.array(values if column.component is None else [values])
 
 

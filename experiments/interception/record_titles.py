@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from sim import Outcome, Record
 
-_OUTCOMES = {Outcome.SET_LOST: "set lost", Outcome.BUDGET_SPENT: "budget spent", Outcome.DIVERGED: "diverged"}
+_OUTCOMES = {Outcome.SET_EMPTY: "set empty", Outcome.BUDGET_SPENT: "budget spent", Outcome.DIVERGED: "diverged"}
 
 
 def noise_title(record: Record) -> str:
@@ -34,7 +34,7 @@ def record_titles(records: Sequence[Record]) -> list[str]:
 
 
 def outcome_title(record: Record) -> str:
-    """Return miss and impulse, and the outcome if it is not an interception."""
+    """Return miss and impulse, and the outcome if it is not the arrival."""
     result = record.result
     text = f"miss {_shown(float(result.miss_m[0]))} m, impulse spent {float(result.impulse_m_s[0]):.1f} m/s"
     outcome = _OUTCOMES.get(result.outcomes[0])

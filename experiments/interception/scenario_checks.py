@@ -28,6 +28,7 @@ def cross_problems(known: Known) -> Iterator[Problem]:
     yield from _error_law(known)
     yield from _sections(known)
     yield from _sun(known)
+    yield from _body(known)
     yield from _closing_speeds(known)
 
 
@@ -161,6 +162,20 @@ def _sun(known: Known) -> Iterator[Problem]:
             f"must be greater than the greatest possible range, {shown(greatest)} km of {where}, "
             f"found {shown(distance)}",
             "check the unit; for free space omit the table [sun]",
+        )
+
+
+def _body(known: Known) -> Iterator[Problem]:
+    radius = known.number("body", "radius_m")
+    spans = list(_spans(known, "x_km"))
+    if radius is None or not spans:
+        return
+    where, (least, _) = min(spans, key=lambda span: span[1][0])
+    if radius >= least * 1000:
+        yield Problem(
+            ("body", "radius_m"),
+            f"must be less than the least possible range, {shown(least)} km of {where}, found {shown(radius)}",
+            "check the unit; for a point omit the table [body]",
         )
 
 

@@ -28,7 +28,7 @@ from experiments.interception.scenario_tables import OPTIONAL_SENSORS, SCHEMA, S
 from guidance.thruster import Thruster
 from infoset.model import InitialSet, Interval, Model, SetModel, StateBox
 from infoset.sensors import AngleSensor
-from sim.scenario import Scenario, Sun, Target
+from sim.scenario import Body, Scenario, Sun, Target
 from sim.storage.codec import scenario_hash as scenario_hash  # noqa: PLC0414 (users import it from here)
 
 DEFAULT_FEWEST_SECTIONS = 5
@@ -46,7 +46,7 @@ FORM = Form(
 )
 
 Part = TypeVar("Part")
-UNUSUAL_TABLES = (*(table for table in OPTIONAL_SENSORS if table != "range_sensor"), "target")
+UNUSUAL_TABLES = (*(table for table in OPTIONAL_SENSORS if table != "range_sensor"), "target", "body")
 """Tables that the template contains as comments."""
 
 
@@ -200,7 +200,7 @@ def scenario_to_toml(scenario: Scenario) -> str:
         key: pair[0] if pair[0] == pair[1] else pair for key, pair in _box(scenario.dispersion).items()
     }
     tables["angle_sensor"] = {key: value for key, value in vars(sensor).items() if key != "nominal_range_m"}
-    for table in (*OPTIONAL_SENSORS, "target"):
+    for table in (*OPTIONAL_SENSORS, "target", "body"):
         if (fitted := getattr(scenario, table)) is not None:
             tables[table] = vars(fitted)
     tables["thruster"] = vars(scenario.thruster)
@@ -253,6 +253,7 @@ def _composed(tables: ScenarioTables) -> Scenario:
             **chosen,
         ),
         target=_fitted(Target, tables.target),
+        body=_fitted(Body, tables.body),
         thruster=Thruster(**si_values(tables.thruster)),
         strategy=tables.guidance.strategy,
         noise=tables.noise.kind,

@@ -33,7 +33,7 @@ from guidance.thruster import Thruster
 from infoset.limits import limits_of
 from infoset.model import MOST_SECTIONS, InitialSet, Model, Recovery, SetModel, StateBox
 from infoset.sensors import AngleSensor, RangeSensor, RateSensor
-from sim.scenario import Manoeuvre, Scenario, Sun, Target
+from sim.scenario import Body, Manoeuvre, Scenario, Sun, Target
 
 SCHEMA = 1
 SPEED_OF_LIGHT_KM_S = Decimal("299792.458")
@@ -136,6 +136,12 @@ class TargetTable(Table):
     )
 
 
+class BodyTable(Table):
+    """[body]."""
+
+    radius_m: Annotated[Decimal, limited_by(Body)] = key("a miss of at most this radius is a hit", "80.0")
+
+
 class ThrusterTable(Table):
     """[thruster]."""
 
@@ -205,6 +211,7 @@ class ScenarioTables(Table):
     target: TargetTable | None = key(
         "how the object accelerates; without this table: no acceleration", "", default=None
     )
+    body: BodyTable | None = key("the size of the object; without this table: a point", "", default=None)
     thruster: ThrusterTable = key("the engine", "")
     guidance: GuidanceTable = key("how impulses are chosen", "")
     information_set: InformationSetTable = key("the information set", "")

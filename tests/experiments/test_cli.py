@@ -31,11 +31,12 @@ CURVE_KEYS = [
     "impulse_m_s",
     "guaranteed_miss_m",
     "outcome",
+    "set_empty",
     "truth_kept",
     "truth_margin_m",
     "phi_held",
 ]
-OUTCOMES = {"intercepted", "set-lost", "budget-spent", "diverged"}
+OUTCOMES = {"arrived", "set-empty", "budget-spent", "diverged"}
 
 
 @pytest.fixture(autouse=True)
@@ -238,6 +239,7 @@ def test_engage_as_json(infoset: Command, tmp_path: Path) -> None:
     assert [key for key in found if key not in {"run", "runs"}] == [
         *("version", "scenario", "scenario_hash", "seed", "elapsed_s"),
         *CURVE_KEYS,
+        "hit",
         "inconsistency",
         "steps",
     ]
@@ -297,7 +299,7 @@ def test_engage_under_both_noises(infoset: Command, tmp_path: Path) -> None:
         "scenario.toml",
         "steps.csv",
     ]
-    for part in ("4.3", "244.7", "9.5", "521.7", "paper", "intercepted", "the paper's Phi (not a bound here), m"):
+    for part in ("4.3", "244.7", "9.5", "521.7", "paper", "arrived", "the paper's Phi (not a bound here), m"):
         assert part in out
     found = json.loads((folder / "results.json").read_text())
     assert [key for key in found if key in {"random", "game"}] == ["random", "game"]

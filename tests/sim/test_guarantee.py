@@ -245,7 +245,7 @@ def test_faulty_sensors_are_told_and_survived(
         flight.advance()
     results = flight.results(np.arange(30))
     assert np.isfinite(results.miss_m).all()
-    lost = np.array([outcome is Outcome.SET_LOST for outcome in results.outcomes])
+    lost = np.array([outcome is Outcome.SET_EMPTY for outcome in results.outcomes])
     if fault == "outlier":
         assert lost.all()
         step, label = flight.inconsistency

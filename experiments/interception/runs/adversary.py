@@ -119,9 +119,9 @@ def _show(console: Console, scenario: Scenario, worst: WorstEngagement, options:
     print_lines(console, [f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}"])
     console.print(table)
     notes = ["this miss was simulated: the strategy cannot guarantee a smaller one, and greater misses may exist"]
-    if worst.outcome is Outcome.SET_LOST and not options.keep_set:
+    if worst.outcome is Outcome.SET_EMPTY and not options.keep_set:
         notes.append(
-            "set-lost: a measurement contradicted all states of the set; to exclude such engagements, use --keep-set"
+            "set-empty: a measurement contradicted all states of the set; to exclude such engagements, use --keep-set"
         )
     if options.record is not None:
         notes.append(f"to draw it: infoset replay {options.record} --out DIR")

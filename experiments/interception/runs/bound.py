@@ -228,7 +228,7 @@ def _show(console: Console, scenario: Scenario, lower: LowerBound, worst: Sequen
     )
     console.print(bounds, "", strategies, sep="\n")
     notes = ["worst miss: the greatest miss in simulations of these pairs and in a search (see: infoset adversary)"]
-    if any(strategy.outcome is Outcome.SET_LOST for strategy in worst):
+    if any(strategy.outcome is Outcome.SET_EMPTY for strategy in worst):
         hint = "" if scenario.set_model.is_guaranteed else "; try --model guaranteed"
-        notes.append(f"set-lost: a measurement contradicted all states of the set{hint}")
+        notes.append(f"set-empty: a measurement contradicted all states of the set{hint}")
     print_lines(console, notes)

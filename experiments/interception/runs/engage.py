@@ -87,6 +87,7 @@ def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
         "noise": scenario.noise.value,
         "range_meter": scenario.range_sensor is not None,
         **{name: values[0] for name, values in outcome_columns(record.result).items()},
+        "hit": record.result.hit.tolist()[0],
         "inconsistency": None if contradiction is None else _where(record, contradiction),
         "steps": [
             {

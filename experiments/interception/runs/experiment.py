@@ -9,7 +9,7 @@ from time import perf_counter
 from rich.console import Console
 from rich.table import Table
 
-from experiments.common.output import outcome_columns, output_of, to_csv, to_json
+from experiments.common.output import hit_key, outcome_columns, output_of, to_csv, to_json
 from experiments.common.screen import (
     figure_files,
     number,
@@ -75,7 +75,9 @@ def run(options: Experiment) -> None:
             "seed": options.seed,
             "runs": options.runs,
             "elapsed_s": elapsed_s,
-            "curves": [{**_key(curve), **outcome_columns(curve.results)} for curve in curves],
+            "curves": [
+                {**_key(curve), **hit_key(curve.results.hits), **outcome_columns(curve.results)} for curve in curves
+            ],
         }
         written.save("scenario.toml", scenario_to_toml(scenario))
         written.save("results.json", to_json(summary), "--json")
@@ -107,7 +109,7 @@ def _show(console: Console, scenario: Scenario, curves: Sequence[Curve]) -> None
         table.add_column(f"{level:.0%}", justify="right")
     enlarged = scenario.set_model.recovery is Recovery.WIDENED
     endings = {
-        Outcome.SET_LOST: f"the set became empty{'; it was enlarged and guidance continued' if enlarged else ''}",
+        Outcome.SET_EMPTY: f"the set became empty{'; it was enlarged and guidance continued' if enlarged else ''}",
         Outcome.BUDGET_SPENT: "too little of the impulse budget was left",
         Outcome.DIVERGED: "the closest approach was farther than the nominal range",
     }
@@ -123,7 +125,7 @@ def _show(console: Console, scenario: Scenario, curves: Sequence[Curve]) -> None
             table.add_row(title, quantity, *(number(float(value)) for value in quantiles(values, LEVELS)))
         median = number(float(quantiles(bounds, 0.5))) if len(bounds) else "-"
         table.add_row("", bound_name(scenario), "", median)
-        counts = Counter(outcome for outcome in results.outcomes if outcome is not Outcome.INTERCEPTED)
+        counts = Counter(outcome for outcome in results.outcomes if outcome is not Outcome.ARRIVED)
         lines = [
             f"in {count} run{'s' if count > 1 else ''} {endings[outcome]} ({outcome.value})"
             for outcome, count in counts.items()

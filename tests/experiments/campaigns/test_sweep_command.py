@@ -82,7 +82,7 @@ def test_a_sweep_of_two_keys(infoset: Infoset, brief: Scenario, file: Path, tmp_
         assert row["miss_m_p99_upper"] is None
         assert row["miss_m_p50_lower"] in flown.miss_m
         assert row["truth_kept"] == int(flown.truth_kept.sum())
-        assert row["intercepted"] + row["set_lost"] + row["budget_spent"] + row["diverged"] == 30
+        assert row["arrived"] + row["set_empty"] + row["budget_spent"] + row["diverged"] == 30
     found = json.loads((folder / "summary.json").read_text())
     assert (found["kind"], found["scenario_hash"], found["runs"]) == ("sweep", scenario_hash(brief), 180)
     assert [each["unit"] for each in found["axes"]] == ["rad", "m/s"]

@@ -31,7 +31,7 @@ from guidance.thruster import Thruster
 from infoset.model import InitialSet, Model, SetModel, StateBox
 from infoset.sensors import AngleSensor, RangeSensor
 from sim.gravity import on_board_model
-from sim.scenario import Scenario, Sun
+from sim.scenario import Body, Scenario, Sun
 
 BUILT_IN = ("asteroid-1997", "asteroid-1997-single", "comet-fast")
 PAPER = scenario_text("asteroid-1997")
@@ -797,3 +797,26 @@ def test_any_sound_scenario_comes_back_bit_for_bit(scenario: Scenario) -> None:
     assert repr(again) == repr(scenario)  # equality does not see the sign of a zero
     assert scenario_hash(again) == scenario_hash(scenario)
     assert scenario_to_toml(again) == text
+
+
+def test_a_body_is_written_and_read_again() -> None:
+    scenario = dataclasses.replace(load_scenario("asteroid-1997"), body=Body(0.1 + 0.2))
+    text = scenario_to_toml(scenario)
+    assert "\n[body]\nradius_m = 0.30000000000000004\n" in text
+    assert read_scenario(text, "mine.toml") == scenario
+    assert "[body]" not in scenario_to_toml(load_scenario("asteroid-1997"))
+
+
+@pytest.mark.parametrize(
+    ("table", "problem"),
+    [
+        ("[body]\nradius_m = 0", "body.radius_m: must be greater than 0"),
+        ("[body]\nradius_m = -80", "body.radius_m: must be greater than 0"),
+        ("[body]\nradius_km = 0.08", "body.radius_km: is not a key"),
+        ("[body]", "body.radius_m: is missing"),
+        ("[body]\nradius_m = 5.3013e6", "body.radius_m: must be less than the least possible range, 5301.3 km"),
+    ],
+)
+def test_a_body_with_problems(table: str, problem: str) -> None:
+    with pytest.raises(InputError, match=re.escape(problem)):
+        read_scenario(f"{PAPER}\n{table}\n", "mine.toml")
