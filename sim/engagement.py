@@ -279,7 +279,7 @@ class Engagements:
             outcomes=tuple(
                 _outcome(*flags) for flags in zip(miss > self.scenario.nominal_range_m, lost, self._spent, strict=True)
             ),
-            set_empty=np.ma.MaskedArray(lost, mask=False),
+            set_emptied=lost,
             hit=np.ma.MaskedArray(miss <= (0.0 if body is None else body.radius_m), mask=body is None),
             truth_margin_m=margin,
             position_m=self._draws.position_m,

@@ -53,7 +53,7 @@ _MARGIN = (
     "measured"
 )
 _HELD = "Miss at most the guaranteed miss; unknown without a guarantee"
-_EMPTY = "A measurement left the set empty, whatever the outcome is; unknown in old files"
+_EMPTY = "A measurement left the set empty, whatever the outcome is; old files lack it, and the outcome says so"
 _HIT = "Miss at most the radius of the body; unknown if the body has no size"
 
 
@@ -81,7 +81,7 @@ class Results:
         metadata=columns(Column("guaranteed_miss_m", "m", _PHI, nullable=True, limits=NOT_NEGATIVE))
     )
     outcomes: tuple[Outcome, ...] = field(metadata=columns(Column("outcome", "", "How the engagement ended", Outcome)))
-    set_empty: MaskedFlags = field(metadata=columns(Column("set_empty", "", _EMPTY, bool, nullable=True)))
+    set_emptied: NDArray[np.bool_] = field(metadata=columns(Column("set_emptied", "", _EMPTY, bool, nullable=True)))
     hit: MaskedFlags = field(metadata=columns(Column("hit", "", _HIT, bool, nullable=True)))
     truth_kept: NDArray[np.bool_] = field(
         init=False, metadata=columns(Column("truth_kept", "", "True state inside its section at every step", bool))
@@ -100,6 +100,9 @@ class Results:
 
     def __post_init__(self) -> None:
         unknown = np.ma.getmaskarray(self.guaranteed_miss_m) | (not self.guarantees)
+        if isinstance(self.set_emptied, np.ma.MaskedArray):
+            emptied = [outcome is Outcome.SET_EMPTY for outcome in self.outcomes]
+            object.__setattr__(self, "set_emptied", np.where(self.set_emptied.mask, emptied, self.set_emptied.data))
         within = self.miss_m <= self.guaranteed_miss_m.filled(np.inf)
         object.__setattr__(self, "truth_kept", self.truth_margin_m.filled(0.0) >= 0.0)
         object.__setattr__(self, "phi_held", np.ma.MaskedArray(within, mask=unknown))

@@ -38,7 +38,10 @@ def test_a_campaign_is_read() -> None:
     table = folder.table()
     outcomes = ["arrived", "arrived", "arrived", "set-empty", "set-empty", "arrived", "arrived", "arrived"]
     assert table.column("outcome").to_pylist() == outcomes
-    assert table.column("hit").to_pylist() == table.column("set_empty").to_pylist() == [None] * 8
+    assert table.column("hit").to_pylist() == [None] * 8
+    emptied = [outcome == "set-empty" for outcome in outcomes]
+    assert table.column("set_emptied").to_pylist() == emptied
+    assert folder.numbers("set_emptied").tolist() == emptied
     np.testing.assert_allclose(folder.numbers("miss_m").max(), 509.2, atol=0.05)
 
 
@@ -55,6 +58,7 @@ def test_a_record_is_read_and_written_again(tmp_path: Path) -> None:
     record = load_record(DATA / "record.npz")
     assert record.result.outcomes == (Outcome.SET_EMPTY,)
     assert record.result.hit.mask.all()
+    assert record.result.set_emptied.tolist() == [True]
     assert record.result.hits is None
     assert record.scenario.body is None
     write_record(record, tmp_path / "again.npz")

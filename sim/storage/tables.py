@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from guidance import NoiseKind, TieRule
 from sim.chunk import Chunk
 from sim.columns import Column, columns_of, values_of
-from sim.results import OLD_OUTCOMES, Results
+from sim.results import OLD_OUTCOMES, Outcome, Results
 
 SCHEMA_VERSION = 2
 M_PER_KM = 1e3
@@ -194,15 +194,19 @@ def read(file: Path, columns: Sequence[str] | None, *, with_cell: bool) -> Any:
     """
     wanted = _some(columns, with_cell=with_cell)
     try:
-        table = pq.ParquetFile(file).read(columns=wanted.names, use_threads=False)
+        names = {*wanted.names, *(["outcome"] if "set_emptied" in wanted.names else [])}
+        table = pq.ParquetFile(file).read(columns=list(names), use_threads=False)
         for field in wanted:
             if field.name not in table.column_names:
                 table = table.append_column(field.name, pa.nulls(len(table), field.type))
-        if "outcome" in wanted.names:
+        if "outcome" in names:
             texts = table.column("outcome")
             for old, outcome in OLD_OUTCOMES.items():
                 texts = pc.if_else(pc.equal(texts, old), outcome.value, texts)
             table = table.set_column(table.column_names.index("outcome"), "outcome", texts)
+        if "set_emptied" in wanted.names:
+            emptied = pc.coalesce(table.column("set_emptied"), pc.equal(texts, Outcome.SET_EMPTY.value))
+            table = table.set_column(table.column_names.index("set_emptied"), "set_emptied", emptied)
         return table.select(wanted.names).cast(wanted).replace_schema_metadata(wanted.metadata)
     except (pa.ArrowException, KeyError) as error:
         raise ValueError(str(error)) from None

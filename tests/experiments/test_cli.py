@@ -31,7 +31,7 @@ CURVE_KEYS = [
     "impulse_m_s",
     "guaranteed_miss_m",
     "outcome",
-    "set_empty",
+    "set_emptied",
     "truth_kept",
     "truth_margin_m",
     "phi_held",

@@ -51,7 +51,7 @@ from sim.versions import VersionError
 
 COLUMNS = [
     *("run", "noise", "tie", "range_meter", "miss_m", "impulse_m_s", "guaranteed_miss_m", "outcome"),
-    *("set_empty", "hit", "truth_margin_m"),
+    *("set_emptied", "hit", "truth_margin_m"),
     *("z_km", "x_km", "vz_km_s", "vx_km_s"),
 ]
 

@@ -48,18 +48,18 @@ def test_an_arrival_far_away_is_a_miss_and_an_empty_set_may_hit(published: Scena
     assert far.miss_m.min() > 80.0
     assert far.outcomes == (Outcome.ARRIVED, Outcome.ARRIVED)
     assert far.hit.tolist() == [False, False]
-    assert far.set_empty.tolist() == [False, False]
+    assert far.set_emptied.tolist() == [False, False]
     near = simulate(replace(published, body=Body(80.0)), 20)
     emptied = np.array([outcome is Outcome.SET_EMPTY for outcome in near.outcomes])
     assert emptied.any()
     assert near.hit[emptied & (near.miss_m < 80.0)].all()
-    np.testing.assert_array_equal(near.set_empty, emptied)
+    np.testing.assert_array_equal(near.set_emptied, emptied)
 
 
 def test_a_diverged_run_with_an_empty_set_is_counted_as_both(published: Scenario) -> None:
     results = simulate(replace(published, nominal_range_m=1.0), 20)
     assert Outcome.DIVERGED in results.outcomes
-    assert results.set_empty.any()
+    assert results.set_emptied.any()
 
 
 def test_a_body_is_smaller_than_the_least_range(published: Scenario) -> None:
