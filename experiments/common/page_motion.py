@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -130,23 +130,12 @@ def motion_page(
     about: Sequence[str],
     time_s: Floats,
     views: Sequence[View],
-    graphs: Sequence[Graph],
+    graphs: Sequence[Graph] = (),
     choices: Sequence[str] = (),
+    own_script: str | None = None,
+    own_data: Mapping[str, object] | None = None,
 ) -> str:
-    """Return a page of moving craft as HTML; the parameters are those of `motion_data`."""
-    data = motion_data(heading, about, time_s, views, graphs, choices)
-    return page(heading, ["motion.js", "start-motion.js"], data)
-
-
-def motion_data(
-    heading: str,
-    about: Sequence[str],
-    time_s: Floats,
-    views: Sequence[View],
-    graphs: Sequence[Graph],
-    choices: Sequence[str] = (),
-) -> dict[str, object]:
-    """Return the data that the scripts of a page of moving craft draw.
+    """Return a page of moving craft as HTML.
 
     Parameters
     ----------
@@ -156,9 +145,13 @@ def motion_data(
         The times that the page shows.
     choices : sequence of str
         Names of alternative controls, to show one of them.
+    own_script : str or None
+        Text of the script that starts the page, if it is not the common one.
+    own_data : mapping of str to object, or None
+        Further data for that script.
     """
     name, factor = time_unit(float(np.ptp(time_s)))
-    return {
+    data = {
         "heading": heading,
         "about": list(about),
         "time_s": time_s,
@@ -168,7 +161,9 @@ def motion_data(
         "views": views,
         "graphs": graphs,
         "choices": choices,
+        **(own_data or {}),
     }
+    return page(heading, ["motion.js"] if own_script else ["motion.js", "start-motion.js"], data, own_script)
 
 
 def faces_of(points: Floats) -> list[Floats]:

@@ -18,9 +18,7 @@ from hypothesis import strategies as st
 
 from experiments.common.errors import InputError
 from experiments.common.page_document import asset, embedded_json, page
-from experiments.common.page_packing import STEPS_OF_A_BOX, packed_outlines
-from experiments.interception.page import interception_page
-from experiments.interception.replayed_sets import replayed
+from experiments.interception.page import STEPS_OF_A_BOX, interception_page, packed_outlines, replayed
 from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind
 from infoset import InitialSet, Model, RateSensor, Recovery
