@@ -80,8 +80,6 @@ class SwitchingNoise(GameNoise):
 
     Parameters
     ----------
-    tie : TieRule
-        Not used.
     tie_draws : ndarray, shape (B, steps)
         The upper extreme is kept where the value is not negative, the lower one elsewhere.
     """

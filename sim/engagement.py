@@ -41,16 +41,10 @@ class Step:
 
     Parameters
     ----------
-    step : int
-        Number of the step.
-    time_s : float
-        Time since the start, s.
     tracking : ndarray of bool, shape (B,)
         Engagements that still measure and decide.
     flying : ndarray of bool, shape (B,)
         Engagements before their closest approach.
-    sight : Sight
-        True geometry.
     measured : mapping of str to ndarray, shape (B,)
         Values measured in this step, by sensor.
     predicted_miss : PredictedMiss
@@ -77,10 +71,6 @@ class Engagements:
 
     Parameters
     ----------
-    scenario : Scenario
-        Scenario to simulate.
-    draws : Draws
-        Starts and random numbers of the batch.
     strategy : Strategy or None
         Guidance strategy; None is the scenario's.
     truth : TrueMotion or None

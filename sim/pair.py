@@ -54,8 +54,6 @@ class PairFlight:
 
     Parameters
     ----------
-    results : Results
-        Results of the two flights.
     impulse_m_s : ndarray, shape (steps, 2)
         Impulses at each step.
     greatest_error_share : float

@@ -24,8 +24,6 @@ def results_html(samples: Mapping[str, Floats], outcomes: Sequence[str], truths_
     ----------
     samples : mapping of str to ndarray
         Known values by title, unit included; each is a row with its quantiles.
-    outcomes : sequence of str
-        Outcome of each engagement.
     truths_kept : int
         Number of engagements whose true state was inside its section at every step.
     """
@@ -49,14 +47,8 @@ def course_html(
 
     Parameters
     ----------
-    caption : str
-        Caption of the table of facts.
-    facts : mapping of str to str
-        Rows of that table.
     time_s, impulse_m_s : ndarray, shape (steps,)
         Impulse of each step.
-    greatest_impulse_m_s : float
-        Greatest impulse of the thruster, m/s.
     miss_time_s : ndarray, shape (n,)
         Times at which a predicted miss exists, s.
     miss_m : ndarray, shape (n, 2)

@@ -63,8 +63,6 @@ class PlannedNoise:
 
     Parameters
     ----------
-    plans : Plans
-        Plans of the batch.
     names : sequence of str
         Sensors of the rows of a sequence.
     tie : TieRule or None
@@ -106,14 +104,10 @@ class Flown:
 
     Parameters
     ----------
-    plans : Plans
-        Plans of n engagements.
     value : ndarray, shape (n,)
         Miss, m; -inf if the engagement does not count.
     errors : ndarray, shape (n, rows, steps)
         Errors made, in units of their bounds.
-    outcomes : ndarray of Outcome, shape (n,)
-        How the engagements ended.
     truth_kept : ndarray of bool, shape (n,)
         Whether the true state was inside its section at every step.
     """

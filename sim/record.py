@@ -23,14 +23,10 @@ class StepRecord:
 
     Parameters
     ----------
-    time_s : float
-        Time since the start, s.
     measured : mapping of str to float
         Values measured in this step by sensor: "angle" (rad), "range" (m), "rate" (rad/s).
     true_angle_rad, true_rate_rad_s, true_range_m : float
         True line of sight.
-    impulse_m_s : float
-        Impulse k of this step.
     predicted_miss_m : tuple of float, or None
         (pi_*, pi^*) after the measurement and before the impulse; None without a set.
     truth_margin_m : float or None
@@ -56,8 +52,6 @@ class Inconsistency:
 
     Parameters
     ----------
-    step : int
-        Number of the step.
     label_m : float
         Label nearest to consistency: its range at t = 0.
     """
@@ -76,12 +70,8 @@ class Record:
         Simulated scenario, with the noise, tie rule and range meter of this engagement.
     seed, run : int
         Root seed and run number; the same values give the same engagement.
-    strategy : str
-        Name of the strategy.
     result : Results
         Results, as a batch of one.
-    steps : tuple of StepRecord
-        All steps, in order.
     noise : str or None
         Name of the noise that replaced that of the scenario; None if none did.
     inconsistency : Inconsistency or None

@@ -64,8 +64,6 @@ class Target:
 
     Parameters
     ----------
-    manoeuvre : Manoeuvre
-        Kind of the manoeuvre.
     acceleration_m_s2 : float
         Acceleration along z, m/s^2.
     switching_period_s : float
@@ -112,8 +110,6 @@ class Scenario:
 
     Parameters
     ----------
-    name, description : str
-        Name, and a description of one line.
     sun : Sun or None
         None is free space.
     nominal_range_m : float
@@ -122,18 +118,10 @@ class Scenario:
         True starts (B0 x D0), uniform, unknown on board. A fixed value has equal ends.
     set_model : SetModel
         Knowledge and assumptions on board, with the closing speed, the step and the angle sensor.
-    range_sensor : RangeSensor or None
-        The range meter, if there is one.
-    thruster : Thruster
-        Limits of the engine.
-    strategy : str
-        Name of the guidance strategy.
     noise : NoiseKind
         How measurement errors are chosen.
     tie : TieRule
         How game noise breaks ties.
-    rate_sensor : RateSensor or None
-        The sensor of the line-of-sight rate, if there is one.
     target : Target or None
         A target that manoeuvres; None does not.
     body : Body or None

@@ -39,8 +39,6 @@ class Output:
         The folder of ``--out``.
     files : mapping of str to Path
         Single files, by the option that names them; the path ``-`` is stdout.
-    overwrite : bool
-        Whether existing files are replaced.
     """
 
     def __init__(self, folder: Path | None, files: Mapping[str, Path], overwrite: bool) -> None:

@@ -30,8 +30,6 @@ def page(title: str, scripts: Sequence[str], data: Mapping[str, object], own_scr
 
     Parameters
     ----------
-    title : str
-        Of the window; any text.
     scripts : sequence of str
         Names of scripts of the folder `assets`, after the common blocks.
     data : mapping
@@ -60,11 +58,6 @@ def page(title: str, scripts: Sequence[str], data: Mapping[str, object], own_scr
 
 def embedded_json(value: object) -> str:
     """Return a value as JSON that can stand inside a script element of HTML.
-
-    Parameters
-    ----------
-    value : object
-        As in `experiments.common.output.to_json`; a dataclass becomes an object of its fields.
 
     Returns
     -------

@@ -70,12 +70,8 @@ class View:
 
     Parameters
     ----------
-    axes : tuple of str
-        Names of the three axes, without units.
     plane : tuple of int, or None
         The horizontal and the vertical axis; None is space.
-    equal : bool
-        Whether all axes have the same scale.
     """
 
     caption: str
@@ -104,10 +100,6 @@ class Graph:
 
     Parameters
     ----------
-    caption : str
-        Text above the graph.
-    title : str
-        Name of the vertical axis.
     levels : sequence of float
         Values at which horizontal lines are drawn, SI.
     band : ndarray, shape (n, 2), or None
@@ -139,10 +131,6 @@ def motion_page(
 
     Parameters
     ----------
-    about : sequence of str
-        Lines below the heading.
-    time_s : ndarray, shape (n,)
-        The times that the page shows.
     choices : sequence of str
         Names of alternative controls, to show one of them.
     own_script : str or None

@@ -30,14 +30,10 @@ def scenario_with(
 
     Parameters
     ----------
-    name : str
-        A built-in name or a path.
     settings : sequence of str or None
         Values of ``--set``; the other options have precedence.
     strategy : str or None
         A built-in name. ``FILE.py:CLASS`` leaves the strategy of the scenario; `own_strategy` returns it.
-    sections : int or None
-        Number of sections at the start.
 
     Raises
     ------

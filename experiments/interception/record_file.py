@@ -110,12 +110,8 @@ def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: boo
 
     Parameters
     ----------
-    record : Record
-        From `fly_one`.
     path : str or path
         Name of the file; it ends in ``.npz``.
-    overwrite : bool
-        Whether an existing file is replaced.
 
     Raises
     ------

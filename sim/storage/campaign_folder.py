@@ -26,15 +26,7 @@ _NAME = re.compile(r"chunk-(\d{7,12})-([0-9a-f]{8})\.parquet")
 
 @dataclass(frozen=True)
 class Damage:
-    """A damaged shard, or one that belongs to another campaign.
-
-    Parameters
-    ----------
-    file : Path
-        The shard.
-    reason : str
-        What is wrong with it.
-    """
+    """A damaged shard, or one that belongs to another campaign."""
 
     file: Path
     reason: str
@@ -42,13 +34,6 @@ class Damage:
 
 class CampaignFolder:
     """The stored runs of a campaign or a sweep.
-
-    Parameters
-    ----------
-    path : Path
-        The folder.
-    manifest : Manifest
-        Read from it.
 
     Attributes
     ----------

@@ -39,8 +39,6 @@ class CampaignWriter(CampaignFolder):
 
         Parameters
         ----------
-        path : Path
-            Folder; it is created if it does not exist.
         manifest : Manifest
             Manifest of the campaign; more runs than in the folder extend the campaign.
         resume : bool

@@ -41,8 +41,6 @@ class Axis:
         Key as in a scenario file, with its table and unit.
     values : tuple of float
         At least two values, in the unit of the file.
-    scale : str
-        Spacing of the values, `linear` or `log`.
 
     Raises
     ------
@@ -77,14 +75,8 @@ class Manifest:
         Runs after which the rule stopped it.
     scenario : Scenario
         Scenario; for a sweep the one that is varied.
-    seed : int
-        Root seed.
-    noise : CampaignNoise
-        Measurement noise of all cells.
     strategy : str
         Name; for a strategy in a Python file with the hash of the file: `mine.py:Mine sha256:0123456789abcdef`.
-    guarantee : bool
-        Whether the guaranteed miss Phi was computed.
     chunk : int
         Engagements per shard; the last shard of a cell may have fewer. Results do not depend on it.
     axes : tuple of Axis

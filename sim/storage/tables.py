@@ -150,14 +150,10 @@ def fault(content: bytes, wanted: Mapping[str, str], rows: int, *, with_cell: bo
 
     Parameters
     ----------
-    content : bytes
-        Content of the file.
     wanted : mapping of str to str
         Entries that the metadata of its schema must have.
     rows : int
         Number of rows that the file must have.
-    with_cell : bool
-        Whether the shard belongs to a sweep.
     """
     try:
         file = pq.ParquetFile(pa.BufferReader(content))

@@ -30,8 +30,6 @@ def simulate_in_threads(
     ----------
     jobs : sequence
         Scenario, own strategy and progress callback of each simulation, the slowest first.
-    runs, seed : int
-        As in `simulate`.
 
     Raises
     ------

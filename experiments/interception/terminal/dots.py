@@ -21,8 +21,6 @@ class Dots:
         Size in characters.
     x, y : tuple of float
         Limits of the plane.
-    braille : bool
-        Whether the terminal has Braille characters.
     """
 
     def __init__(

@@ -26,13 +26,7 @@ _DECADE_M = 10.0
 
 
 def play(records: Sequence[Record], console: Console, steps_per_s: float) -> None:
-    """Play engagements in a terminal; print a few times of them if the output is no terminal.
-
-    Parameters
-    ----------
-    steps_per_s : float
-        Speed.
-    """
+    """Play engagements in a terminal; print a few times of them if the output is no terminal."""
     count = max(len(record.steps) for record in records)
     if not console.is_terminal:
         for step in np.unique(np.linspace(0, count - 1, MOMENTS_IN_PRINT).round().astype(int)).tolist():
