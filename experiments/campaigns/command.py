@@ -15,12 +15,14 @@ MOST_WORKERS = 1024
 MOST_AT_ONCE = 1_000_000
 EXECUTION = "Execution"
 
+DEFAULT_REQUIREMENT = "miss_m p99<10"
 Required = Annotated[
-    str,
+    str | None,
     typer.Option(
         "--require",
         metavar="RULE",
-        help="Requirement on a quantile: its upper bound, in the unit of the name. The figure shows it as a contour.",
+        help="Requirement on a quantile: its upper bound, in the unit of the name. Each cell meets it, does not meet "
+        f'it, or is undecided, with 95 % confidence. Default: "{DEFAULT_REQUIREMENT}".',
     ),
 ]
 Shown = Annotated[
@@ -149,7 +151,20 @@ class Sweep(Flight):
             "logarithmic spacing. If the value is a pair, vary KEY.least or KEY.greatest.",
         ),
     ]
-    require: Required = "miss_m p99<10"
+    require: Required = None
+    until: Annotated[
+        Literal["decided"] | None,
+        typer.Option(
+            help="decided: add runs to each cell until the requirement is met or not met there, at most --most-runs. "
+            "The decisions allow for the repeated tests."
+        ),
+    ] = None
+    most_runs: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", min=1, max=MOST_RUNS, help="Greatest number of runs of a cell with --until. Default: 2000."
+        ),
+    ] = None
     show: Shown = None
     guarantee: Annotated[
         bool,
@@ -170,7 +185,7 @@ class Report:
     """
 
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder written by infoset campaign or infoset sweep.")]
-    require: Required = "miss_m p99<10"
+    require: Required = None
     show: Shown = None
     out: Out = None
     json: Json = None

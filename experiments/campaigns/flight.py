@@ -198,7 +198,8 @@ def campaign_progress(name: str, quiet: bool) -> Iterator[Callable[[Progress], N
             nonlocal last_s
             if time.monotonic() - last_s >= _LINE_EVERY_S:
                 last_s = time.monotonic()
-                typer.echo(f"{name}: {progress.done} of {progress.total}, {_pace(progress)}", err=True)
+                of = "" if progress.undecided is not None else f" of {progress.total}"
+                typer.echo(f"{name}: {progress.done}{of}, {_pace(progress)}", err=True)
 
         yield line
     else:
@@ -220,6 +221,8 @@ def _pace(progress: Progress) -> str:
     if not progress.flown:
         return "- runs/s"
     rate = progress.flown / max(progress.elapsed_s, 1e-9)
+    if progress.undecided is not None:
+        return f"{number(rate)} runs/s, {progress.undecided} cells undecided"
     return f"{number(rate)} runs/s, {duration((progress.total - progress.done) / rate)} left"
 
 

@@ -16,7 +16,7 @@ from experiments.campaigns.campaign_figures import (
     draw_convergence,
     draw_dispersion,
 )
-from experiments.campaigns.command import Report
+from experiments.campaigns.command import DEFAULT_REQUIREMENT, Report
 from experiments.campaigns.flight import SCENARIO_FILE, campaign_errors
 from experiments.campaigns.samples import (
     START,
@@ -73,15 +73,18 @@ def _read(options: Report) -> CampaignFolder:
     if not folder.finished_runs:
         raise InputError(f"{path}: contains no runs yet; continue with: infoset {folder.manifest.kind} --resume")
     if not folder.complete:
+        stopped = folder.manifest.axes and folder.manifest.until
         say(
-            f"warning: {folder.finished_runs} of {folder.wanted_runs} runs are stored; the others are missing",
+            f"warning: {folder.finished_runs} of {'at most ' if stopped else ''}{folder.wanted_runs} runs are stored; "
+            f"{'--resume adds runs to the undecided cells' if stopped else 'the others are missing'}",
             options.quiet,
         )
     return folder
 
 
 def _report_sweep(folder: CampaignFolder, options: Report, written: Output, console: Console | None) -> None:
-    report = sweep_report(folder, quantile_options(options.require, options.show))
+    default = folder.manifest.until or DEFAULT_REQUIREMENT
+    report = sweep_report(folder, *quantile_options(options.require, options.show, default))
     written.save("report.json", to_json(report.to_json()), "--json")
     if options.out is not None:
         report.save(written)

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from experiments.campaigns.command import DEFAULT_REQUIREMENT
 from experiments.campaigns.samples import heading, sample_json
 from experiments.campaigns.sweep_figures import draw_sweep
 from experiments.campaigns.sweep_table import SHOWN, SweepTable, answers, sweep_table, unit_of
@@ -20,7 +21,7 @@ from experiments.common.output import Output
 from experiments.common.screen import number, number_table
 from sim import QuantileName, Requirement
 from sim.requirement import CONFIDENCE, MOST_RUNS_NEEDED, Decision, Verdict
-from sim.storage import CampaignFolder
+from sim.storage import CampaignFolder, Manifest
 
 TABLE = "sweep.parquet"
 FIGURE = "figure-sweep"
@@ -101,10 +102,9 @@ class SweepReport:
             console.print(Text(text), soft_wrap=True)
 
         folder, table = self.folder, self.table
-        line(
-            f"{folder.manifest.scenario.name}, {len(table.cells)} cells, {folder.finished_runs} of "
-            f"{folder.wanted_runs} runs; each decision has a confidence of at least 95 %"
-        )
+        watched = " although runs are added until it is made" if folder.manifest.until else ""
+        line(f"{folder.manifest.scenario.name}, {len(table.cells)} cells, {folder.finished_runs} runs")
+        line(f"the decision in each cell has a confidence of at least 95 %{watched}")
         for noise in table.noises:
             verdicts = [table.verdict(cell, noise) for cell in range(len(table.cells))]
             counts = Counter(verdict.decision for verdict in verdicts if verdict is not None)
@@ -115,7 +115,7 @@ class SweepReport:
                 if title:
                     line(title)
                 console.print(part)
-            for note in _undecided_notes(verdicts):
+            for note in _undecided_notes(verdicts, folder.manifest):
                 line(note)
 
     def _show_answers(self, line: Callable[[str], None], noise: str) -> None:
@@ -139,7 +139,7 @@ def _verdict_json(verdict: Verdict | None) -> dict[str, object] | None:
     }
 
 
-def _undecided_notes(verdicts: Sequence[Verdict | None]) -> list[str]:
+def _undecided_notes(verdicts: Sequence[Verdict | None], manifest: Manifest) -> list[str]:
     """Return a line about the runs of the undecided cells, and how many more may decide them."""
     undecided = [verdict for verdict in verdicts if verdict is not None and verdict.decision is Decision.UNDECIDED]
     if not undecided:
@@ -153,7 +153,8 @@ def _undecided_notes(verdicts: Sequence[Verdict | None]) -> list[str]:
         text += f"about {amount} more runs per cell would decide {'them' if len(more) == len(undecided) else len(more)}"
     else:
         text += f"even {MOST_RUNS_NEEDED} runs per cell would not decide them"
-    return [text]
+    hint = f"a greater --most-runs than {manifest.runs}" if manifest.until else "--until decided"
+    return [text, f"to add runs to these cells: repeat infoset sweep with --resume and {hint}"]
 
 
 def _about(count: int) -> str:
@@ -199,10 +200,12 @@ def _entry(verdict: Verdict | None) -> str:
     return "-" if verdict is None else f"{verdict.decision}\n{number(verdict.value)}"
 
 
-def quantile_options(require: str, show: str | None) -> tuple[Requirement, tuple[QuantileName, ...]]:
+def quantile_options(
+    require: str | None, show: str | None, default: str = DEFAULT_REQUIREMENT
+) -> tuple[Requirement, tuple[QuantileName, ...]]:
     """Read the values of --require and --show; the required quantile is always among those shown."""
     try:
-        required = Requirement.parse(require)
+        required = Requirement.parse(default if require is None else require)
     except ValueError as error:
         raise InputError(f"--require: {error}") from None
     try:
@@ -211,10 +214,9 @@ def quantile_options(require: str, show: str | None) -> tuple[Requirement, tuple
         raise InputError(f"--show: {error}") from None
     if len(chosen) > MOST_SHOWN:
         raise InputError(f"--show: at most {MOST_SHOWN} quantiles can be drawn, found {len(chosen)}; leave some out")
-    return required, tuple(dict.fromkeys((*chosen, required.quantile)))
+    return required, tuple(dict.fromkeys((required.quantile, *chosen)))
 
 
-def sweep_report(folder: CampaignFolder, quantiles: tuple[Requirement, tuple[QuantileName, ...]]) -> SweepReport:
-    """Summarise a sweep, finished or not, for the quantiles of `quantile_options`."""
-    required, shown = quantiles
+def sweep_report(folder: CampaignFolder, required: Requirement, shown: tuple[QuantileName, ...]) -> SweepReport:
+    """Summarise a sweep, finished or not."""
     return SweepReport(folder, sweep_table(folder, required, shown), shown)

@@ -135,7 +135,11 @@ def sweep_table(folder: CampaignFolder, required: Requirement, quantiles: Sequen
     cells = tuple(tuple(samples(folder, cell, levels)) for cell in numbers)
     known = [{noise: folder.sample(required.quantity, noise, cell) for noise in noises} for cell in numbers]
     verdicts = tuple(
-        {noise: judge(values, required, watched=False) for noise, values in samples.items() if values.size}
+        {
+            noise: judge(values, required, watched=folder.manifest.until is not None)
+            for noise, values in samples.items()
+            if values.size
+        }
         for samples in known
     )
     return SweepTable(folder.manifest.axes, noises, levels, cells, required, verdicts)

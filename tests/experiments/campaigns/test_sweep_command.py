@@ -265,6 +265,47 @@ def test_twenty_runs_decide_no_99_percent_quantile(infoset: Infoset, file: Path,
         assert (required["upper"], required["runs_needed"]) == (None, 368)
 
 
+def test_runs_are_added_until_each_cell_is_decided(infoset: Infoset, file: Path, tmp_path: Path) -> None:
+    key = "angle_sensor.error_at_zero_range_rad"
+    asked = ("sweep", file, "--vary", f"{key}=1e-5:3e-4:4", "--require", "miss_m p80<3", "--out", tmp_path / "sweep")
+    code, out, _ = infoset(*asked, "--runs", 10)
+    assert code == 0
+    assert "to add runs to these cells: repeat infoset sweep with --resume and --until decided" in out
+    code, out, _ = infoset(*asked, "--runs", 10, "--until", "decided", "--most-runs", 300, "--resume")
+    assert code == 0
+    assert "the decision in each cell has a confidence of at least 95 % although runs are added until it is made" in out
+    summary = json.loads((tmp_path / "sweep" / "summary.json").read_text())
+    assert (summary["complete"], summary["until"], summary["require"]) == (True, "miss_m p80<3", "miss_m p80<3")
+    runs = [cell["samples"][0]["runs"] for cell in summary["cells"]]
+    assert min(runs) == 50
+    assert sum(runs) == summary["runs"] == summary["wanted_runs"]
+    for cell in summary["cells"]:
+        assert cell["requirement"] in ("met", "not-met") or cell["samples"][0]["runs"] == 300
+    assert pq.read_table(tmp_path / "sweep" / "sweep.parquet").column("runs").to_pylist() == runs
+    # The report uses the requirement of the sweep, and the test that allows for the added runs.
+    code, out, _ = infoset("report", tmp_path / "sweep", "--json", "-")
+    report = json.loads(out)
+    assert report["require"] == "miss_m p80<3"
+    assert report["cells"] == summary["cells"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--most-runs", 30), "--most-runs is the limit of --until; add --until decided"),
+        (("--until", "decided", "--most-runs", 9), "--most-runs: must be at least --runs, 10, found 9"),
+        (("--until", "never"), "--until"),
+    ],
+)
+def test_limits_of_the_runs_that_do_not_fit(
+    arguments: tuple[object, ...], message: str, infoset: Infoset, file: Path, tmp_path: Path
+) -> None:
+    code, _, err = infoset("sweep", file, "--vary", TWO, "--runs", 10, "--out", tmp_path / "sweep", *arguments)
+    assert code == 2
+    assert message in err
+    assert not (tmp_path / "sweep").exists()
+
+
 def test_keys_as_labels() -> None:
     assert key_label("angle_sensor.error_at_zero_range_rad") == "angle sensor: error at zero range, rad"
     assert key_label("uncertainty.vx_km_s.least") == "uncertainty: vx least, km/s"
