@@ -21,6 +21,8 @@ from experiments.common.toml_values import LONGEST_DESCRIPTION, WRONG, DecimalPa
 LARGEST_FILE_BYTES = 100_000
 LONGEST_LINE = 1000
 MOST_PROBLEMS = 100
+MISSING = "is missing"
+DID_YOU_MEAN = "did you mean {}?"
 
 KeyPath = tuple[str, ...]
 Tables = TypeVar("Tables", bound=BaseModel)
@@ -232,6 +234,13 @@ def read_tables(form: Form[Tables], text: str, source: str, values: Mapping[str,
     except ValidationError as error:
         found_wrong = error.errors(include_url=False)
         problems = [_problem(form, details) for details in found_wrong[: MOST_PROBLEMS + 1]]
+        # A key with a misspelt name is not missing too.
+        misspelt = {(*each.path[:-1], each.remedy) for each in problems}
+        problems = [
+            each
+            for each in problems
+            if each.text != MISSING or (*each.path[:-1], DID_YOU_MEAN.format(each.path[-1])) not in misspelt
+        ]
         known = Known(document, frozenset(tuple(str(part) for part in each["loc"]) for each in found_wrong))
     else:
         known = Known(document, frozenset())
@@ -390,7 +399,7 @@ def _problem(form: Form[Tables], details: Any) -> Problem:
     """Return the problem of an error of pydantic."""
     path = tuple(str(part) for part in details["loc"])
     if details["type"] == "missing":
-        return Problem(path, "is missing", _remedy_of_missing(form.tables, path))
+        return Problem(path, MISSING, _remedy_of_missing(form.tables, path))
     if details["type"] == "extra_forbidden":
         return Problem(path, *_unknown(form, path, details["input"]))
     found = shown(details["input"])
@@ -438,4 +447,4 @@ def _unknown(form: Form[Tables], path: KeyPath, value: object) -> tuple[str, str
         what = f"is not a key of {heading}"
     else:
         what = f"is not a {'table' if isinstance(value, dict) else 'key'} of a {form.noun}"
-    return what, f"did you mean {guess}?" if guess else f"remove it; valid here: {', '.join(valid)}"
+    return what, DID_YOU_MEAN.format(guess) if guess else f"remove it; valid here: {', '.join(valid)}"

@@ -18,18 +18,47 @@ from sim.scenario import Sun
 MOST_LEAPS = 10_000_000
 """Largest number of integration steps of one engagement: some minutes of computing."""
 WHOLE_STEPS_TOLERANCE = Decimal("1e-9")
+AGREE, OTHER_UNIT = 10, 100
+"""Ratio of two values below which they are in the same unit, and from which they are in different units."""
 
 
 def cross_problems(known: Known) -> Iterator[Problem]:
     """Yield the problems between valid values."""
     yield from _impulses(known)
     yield from _periods(known)
-    yield from _ranges(known)
-    yield from _error_law(known)
     yield from _sections(known)
+<<<<<<< HEAD
     yield from _sun(known)
     yield from _body(known)
     yield from _closing_speeds(known)
+=======
+    geometric = [*_ranges(known), *_error_law(known), *_sun(known), *_closing_speeds(known)]
+    # A range or a speed in another unit causes problems of other keys.
+    yield from [*_other_units(known)] or geometric if geometric else ()
+
+
+def _other_units(known: Known) -> Iterator[Problem]:
+    """Yield the range or speed that differs by a large factor from two others, which agree with each other."""
+    for nominal, state, unit in (("closing_speed_km_s", "vx_km_s", "km/s"), ("range_km", "x_km", "km")):
+        single = known.number("nominal", nominal)
+        if single is None:
+            continue
+        sizes = {f"nominal.{nominal}": single}
+        sizes |= {where: abs(pair[0] + pair[1]) / 2 for where, pair in _spans(known, state)}
+        for where, size in sizes.items():
+            # The nominal range sets the error bound of the angle sensor only: `scenario_warnings` reports it.
+            others = [other for name, other in sizes.items() if name != where]
+            if where == "nominal.range_km" or len(others) < 2 or not 0 < max(others) < AGREE * min(others):
+                continue
+            factor = size / max(others)
+            if not 1 / Decimal(OTHER_UNIT) < factor < OTHER_UNIT:
+                yield Problem(
+                    (*where.split("."),),
+                    f"is {float(factor):.4g} times {' and '.join(name for name in sizes if name != where)}, "
+                    f"found {shown(known.value(*where.split('.')))}",
+                    f"write it in {unit}",
+                )
+>>>>>>> 43b3a6f (The option parser and the reader of files blame the value at fault: found value, example, unit)
 
 
 def _impulses(known: Known) -> Iterator[Problem]:
@@ -55,7 +84,7 @@ def _periods(known: Known) -> Iterator[Problem]:
             yield Problem(
                 (sensor, "period_s"),
                 f"must be a whole number of steps of guidance.step_s, {shown(step)} s, found {shown(period)}",
-                f"write period_s = {shown((whole * step).normalize())}, or a step that divides it",
+                f"write period_s = {(whole * step).normalize():f}, or a step that divides it",
             )
 
 

@@ -32,6 +32,8 @@ from sim.scenario import Body, Scenario, Sun, Target
 from sim.storage.codec import scenario_hash as scenario_hash  # noqa: PLC0414 (users import it from here)
 
 DEFAULT_FEWEST_SECTIONS = 5
+FAR = 10.0
+"""Ratio of the nominal range to the possible ranges from which `scenario_warnings` reports it."""
 SMALL_ANGLE_RAD = 0.01
 """Largest line-of-sight angle for the model `paper`, which replaces tangents by their angles."""
 
@@ -117,6 +119,12 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
         lines.append(
             f"nominal.closing_speed_km_s is {outside / 1000:.6g} km/s outside uncertainty.vx_km_s: "
             "the on-board model uses a speed that is known to be wrong"
+        )
+    ranges = (uncertainty.x_m[0] / FAR, uncertainty.x_m[1] * FAR)
+    if not ranges[0] <= scenario.nominal_range_m <= ranges[1]:
+        lines.append(
+            f"nominal.range_km is {scenario.nominal_range_m / 1000:.6g} km, far outside uncertainty.x_km: "
+            "the error bound of the angle sensor is defined at this range; check its unit"
         )
     thruster = scenario.thruster
     target, model = scenario.target, scenario.set_model

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.options import Csv, FileOptions, Html, ProblemName, Seed, Settings, finite
+from experiments.common.options import Csv, FileOptions, Html, ProblemName, Seed, Settings
 
 ROWS = "thrust_ratio=0:0.8:17"
 
@@ -42,24 +42,17 @@ class Pursuit(FileOptions):
         typer.Option(
             metavar="S",
             min=1.0,
-            callback=finite,
             help="Time between plans, s. Default: 600 s, or 1/50 of the duration of the game if that is shorter.",
         ),
     ] = None
-    delay_s: Annotated[
-        float, typer.Option(metavar="S", min=0.0, callback=finite, help="Delay of the pursuer's observation, s.")
-    ] = 0.0
+    delay_s: Annotated[float, typer.Option(metavar="S", min=0.0, help="Delay of the pursuer's observation, s.")] = 0.0
     position_noise_m: Annotated[
         float,
-        typer.Option(
-            metavar="M", min=0.0, callback=finite, help="Standard deviation of each observed position component, m."
-        ),
+        typer.Option(metavar="M", min=0.0, help="Standard deviation of each observed position component, m."),
     ] = 0.0
     velocity_noise_m_s: Annotated[
         float,
-        typer.Option(
-            metavar="M/S", min=0.0, callback=finite, help="Standard deviation of each observed velocity component, m/s."
-        ),
+        typer.Option(metavar="M/S", min=0.0, help="Standard deviation of each observed velocity component, m/s."),
     ] = 0.0
     runs: Annotated[int, typer.Option(metavar="N", min=1, max=10_000, help="Number of simulations with feedback.")] = 1
     seed: Seed = 0

@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments.common.errors import InputError
-from experiments.common.options import choice, whole_number
+from experiments.common.options import choice, read_number
 from experiments.common.output import output_of, to_csv, to_json
 from experiments.common.screen import figure_files, number, number_table, progress_bar, table_console
 from experiments.reachability.command import Reach
@@ -68,9 +68,9 @@ def _selection(text: str) -> tuple[list[str], int]:
         if name in names:
             raise InputError(f"--select: {name} is named twice; name each choice once")
         if name == SAMPLES:
-            if not digits.isascii() or not digits.isdigit() or len(digits) > 6:
-                raise InputError(f"--select {SAMPLES}: needs a number, for example --select {SAMPLES}:20")
-            count = whole_number(f"--select {SAMPLES}", int(digits), 1, MOST_SAMPLES, 20)
+            count = read_number(
+                f"--select {SAMPLES}", int, digits, least=1, greatest=MOST_SAMPLES, example="--select samples:20"
+            )
         elif digits:
             raise InputError(f"--select {name}: takes no number, found {digits[:20]!r}; write --select {name}")
         names.append(name)

@@ -177,9 +177,12 @@ def test_a_wrong_rate_is_seen(infoset: Infoset, monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
-        (["--paper", "paretto"], ["--paper", "'paretto' is not one of 'interception', 'pareto', "]),
-        (["--paper", "number"], ["'number' is not one of 'interception', 'pareto'"]),
-        (["--paper", "../pareto"], ["'../pareto' is not one of"]),
+        (
+            ["--paper", "paretto"],
+            ["--paper", 'there is no "paretto"; did you mean pareto? choose one of: interception, '],
+        ),
+        (["--paper", "number"], ['there is no "number"; choose one of: interception, pareto']),
+        (["--paper", "../pareto"], ['there is no "../pareto"']),
         (["--json", "missing/numbers.json"], ["there is no folder"]),
     ],
 )

@@ -137,7 +137,7 @@ def test_three_keys_are_a_table_only(infoset: Infoset, file: Path, tmp_path: Pat
     [
         (["--vary", "thruster.budget=1:2:2"], ["did you mean thruster.budget_m_s?"]),
         (["--vary", "thruster.greatest_impulse_m_s=0.01:5:3"], ["brief with thruster.greatest_impulse_m_s = 0.01"]),
-        (["--runs", 0], ["--runs", "greater than or equal to 1"]),
+        (["--runs", 0], ["--runs", "must be from 1 to "]),
         (["--require", "miss_m<10"], ["--require: must be a quantity, a quantile and a bound"]),
         (["--show", "miss_m p99,fuel p50"], ["--show: there is no quantity fuel"]),
         (["--show", ",".join(f"miss_m p{each}" for each in range(1, 20))], ["--show: at most 8"]),

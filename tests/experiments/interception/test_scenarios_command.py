@@ -124,7 +124,7 @@ def test_quiet_check_prints_nothing() -> None:
     ("old", "new", "parts"),
     [
         ("step_s = 0.5", "step_s = -0.5", ["guidance.step_s", "greater than 0", "for example step_s = 0.5"]),
-        ("step_s = 0.5", "stp_s = 0.5", ["guidance.step_s", "is missing", "guidance.stp_s", "did you mean step_s?"]),
+        ("step_s = 0.5", "stp_s = 0.5", ["guidance.stp_s: is not a key of [guidance]; did you mean step_s?"]),
         ("distance_km = 150.0e6", "distance_km = ", ["is not valid TOML", "line 9"]),
         ("x_km = [5301.3", "x_km = [inf", ["uncertainty.x_km", "finite"]),
         ('"symmetric-miss"', '"[red]odd[/red]"', ["guidance.strategy", 'found "[red]odd[/red]"']),
