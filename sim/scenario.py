@@ -150,6 +150,9 @@ class Scenario:
 
     def __post_init__(self) -> None:
         check_fields(self)
+        for name, sensor in (("range_sensor", self.range_sensor), ("rate_sensor", self.rate_sensor)):
+            if sensor is not None:
+                self.set_model.check_period(name, sensor)
         self.set_model.check_start("dispersion", self.dispersion)
         greatest = max(self.dispersion.x_m[1], self.set_model.bounds.x_m[1])
         if self.sun is not None and self.sun.distance_m <= greatest:

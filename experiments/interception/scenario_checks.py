@@ -10,6 +10,7 @@ from experiments.common.toml_values import KILO, DecimalPair, shown, si
 from experiments.interception.scenario_tables import OPTIONAL_SENSORS
 from guidance import Thruster
 from infoset import AngleSensor, Model, SetModel, StateBox
+from infoset.model import WHOLE_STEPS_TOLERANCE
 from sim.draws import MOST_STEPS
 from sim.gravity import greatest_impulses_m_s, with_gravity
 from sim.kepler import LONGEST_SUBSTEP_S
@@ -17,7 +18,6 @@ from sim.scenario import Sun
 
 MOST_LEAPS = 10_000_000
 """Largest number of integration steps of one engagement: some minutes of computing."""
-WHOLE_STEPS_TOLERANCE = Decimal("1e-9")
 AGREE, OTHER_UNIT = 10, 100
 """Ratio of two values below which they are in the same unit, and from which they are in different units."""
 
@@ -80,7 +80,7 @@ def _periods(known: Known) -> Iterator[Problem]:
             continue
         steps = period / step
         whole = max(Decimal(1), steps.to_integral_value())
-        if abs(steps - whole) > WHOLE_STEPS_TOLERANCE * whole:
+        if abs(steps - whole) > Decimal(WHOLE_STEPS_TOLERANCE) * whole:
             yield Problem(
                 (sensor, "period_s"),
                 f"must be a whole number of steps of guidance.step_s, {shown(step)} s, found {shown(period)}",
