@@ -27,12 +27,7 @@ def cross_problems(known: Known) -> Iterator[Problem]:
     yield from _impulses(known)
     yield from _periods(known)
     yield from _sections(known)
-<<<<<<< HEAD
-    yield from _sun(known)
-    yield from _body(known)
-    yield from _closing_speeds(known)
-=======
-    geometric = [*_ranges(known), *_error_law(known), *_sun(known), *_closing_speeds(known)]
+    geometric = [*_ranges(known), *_error_law(known), *_sun(known), *_body(known), *_closing_speeds(known)]
     # A range or a speed in another unit causes problems of other keys.
     yield from [*_other_units(known)] or geometric if geometric else ()
 
@@ -58,7 +53,6 @@ def _other_units(known: Known) -> Iterator[Problem]:
                     f"found {shown(known.value(*where.split('.')))}",
                     f"write it in {unit}",
                 )
->>>>>>> 43b3a6f (The option parser and the reader of files blame the value at fault: found value, example, unit)
 
 
 def _impulses(known: Known) -> Iterator[Problem]:
