@@ -11,6 +11,7 @@ import typing
 from dataclasses import dataclass
 from decimal import Context, Decimal, InvalidOperation
 from enum import Enum, EnumMeta
+from numbers import Integral
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo, field_validator
@@ -88,7 +89,7 @@ def value_text(name: str, value: Any) -> str:
         return quoted_text(value.value if isinstance(value, Enum) else value)
     if isinstance(value, tuple):
         return f"[{', '.join(value_text(name, item) for item in value)}]"
-    if isinstance(value, int):
+    if isinstance(value, Integral):
         return str(value)
     return degrees_text(value) if name.endswith("_deg") else number_text(value, power_of_ten(name))
 

@@ -7,7 +7,7 @@ written (as its shortest decimal with the point moved) and is read back bit for 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
 from pydantic import BaseModel
@@ -22,7 +22,7 @@ from experiments.common.toml_file import (
     read_tables,
     tables_of,
 )
-from experiments.common.toml_values import shown, si_values, value_text
+from experiments.common.toml_values import shown, si_name, si_values, value_text
 from experiments.interception.scenario_checks import cross_problems
 from experiments.interception.scenario_tables import OPTIONAL_SENSORS, SCHEMA, ScenarioTables
 from guidance.thruster import Thruster
@@ -187,46 +187,36 @@ def scenario_to_toml(scenario: Scenario) -> str:
     InputError
         If no file can contain the scenario: a number is not finite, or its angle sensor has another nominal range.
     """
-    model, sensor, sun = scenario.set_model, scenario.set_model.angle_sensor, scenario.sun
+    model, sensor = scenario.set_model, scenario.set_model.angle_sensor
     if sensor.nominal_range_m != scenario.nominal_range_m:
         raise InputError(
             f"scenario {shown(scenario.name)}: its angle sensor has the nominal range {sensor.nominal_range_m!r} m and "
             f"it has {scenario.nominal_range_m!r} m; a scenario file has one, nominal.range_km"
         )
-    tables: dict[str, dict[str, object]] = {
-        "": {"schema": SCHEMA, "name": scenario.name, "description": scenario.description}
+    start = vars(scenario.dispersion).items()
+    tables: dict[str, dict[str, object] | None] = {
+        "sun": _values(scenario.sun),
+        "nominal": {"range_m": scenario.nominal_range_m, "closing_speed_m_s": model.closing_speed_m_s},
+        "uncertainty": vars(model.bounds),
+        "dispersion": {name: pair[0] if pair[0] == pair[1] else pair for name, pair in start},
+        "angle_sensor": vars(sensor),
+        **{table: _values(getattr(scenario, table)) for table in (*OPTIONAL_SENSORS, "target", "body")},
+        "thruster": vars(scenario.thruster),
+        "guidance": {**vars(model), "strategy": scenario.strategy},
+        "information_set": {**vars(model), "model": model.kind},
+        "noise": {"kind": scenario.noise, "tie": scenario.tie},
     }
-    if sun is not None:
-        tables["sun"] = {
-            "gravitational_parameter_km3_s2": sun.gravitational_parameter_m3_s2,
-            "distance_km": sun.distance_m,
-            "direction_deg": sun.direction_rad,
-        }
-    tables["nominal"] = {"range_km": scenario.nominal_range_m, "closing_speed_km_s": model.closing_speed_m_s}
-    tables["uncertainty"] = {**_box(model.bounds)}
-    tables["dispersion"] = {
-        key: pair[0] if pair[0] == pair[1] else pair for key, pair in _box(scenario.dispersion).items()
-    }
-    tables["angle_sensor"] = {key: value for key, value in vars(sensor).items() if key != "nominal_range_m"}
-    for table in (*OPTIONAL_SENSORS, "target", "body"):
-        if (fitted := getattr(scenario, table)) is not None:
-            tables[table] = vars(fitted)
-    tables["thruster"] = vars(scenario.thruster)
-    tables["guidance"] = {
-        "step_s": model.step_s,
-        "strategy": scenario.strategy,
-        "range_threshold_km": model.range_threshold_m,
-    }
-    tables["information_set"] = {
-        "model": model.kind,
-        "initial_set": model.initial_set,
-        "sections": int(model.sections),
-        "fewest_sections": int(model.fewest_sections),
-        "recovery": model.recovery,
-        "disturbance_m_s2": model.disturbance_m_s2,
-    }
-    tables["noise"] = {"kind": scenario.noise, "tie": scenario.tie}
-    return "\n".join(_table_lines(tables))
+    top = {"schema": SCHEMA, "name": scenario.name, "description": scenario.description}
+    lines = [f"{key} = {value_text(key, value)}" for key, value in top.items()]
+    for table, values in tables.items():
+        if values is not None:
+            lines += ["", f"[{table}]"]
+            lines += [f"{key} = {value_text(key, values[si_name(key)])}" for key in keys_of(ScenarioTables, (table,))]
+    return "\n".join(lines) + "\n"
+
+
+def _values(part: object | None) -> dict[str, object] | None:
+    return None if part is None else vars(part)
 
 
 def _to_scenario(tables: ScenarioTables, source: str) -> Scenario:
@@ -273,18 +263,6 @@ def _composed(tables: ScenarioTables) -> Scenario:
 def _fitted(owner: type[Part], table: BaseModel | None) -> Part | None:
     """Return the dataclass of an optional table."""
     return None if table is None else owner(**si_values(table))
-
-
-def _box(box: StateBox) -> dict[str, Interval]:
-    return {"z_km": box.z_m, "x_km": box.x_m, "vz_km_s": box.vz_m_s, "vx_km_s": box.vx_m_s}
-
-
-def _table_lines(tables: dict[str, dict[str, object]]) -> Iterator[str]:
-    for table, keys in tables.items():
-        if table:
-            yield f"\n[{table}]"
-        yield from (f"{key} = {value_text(key, value)}" for key, value in keys.items())
-    yield ""
 
 
 def _template_key(name: str, field: Any) -> list[str]:
