@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import fields
 from decimal import Decimal
+from typing import Any
 
 import pytest
 
@@ -21,9 +22,8 @@ Infoset = Callable[..., tuple[int, str, str]]
 
 
 def test_every_command_that_takes_a_file_has_the_option() -> None:
-    takes = [
-        options for _, options, _, _ in COMMANDS if {"scenario", "problem"} & {each.name for each in fields(options)}
-    ]
+    every: list[Any] = [options for rows in COMMANDS.values() for options, _, _ in rows]
+    takes = [options for options in every if {"scenario", "problem"} & {each.name for each in fields(options)}]
     assert len(takes) == 12
     assert [options for options in takes if "settings" not in {each.name for each in fields(options)}] == []
     assert "settings" not in {each.name for each in fields(Report)}
