@@ -25,7 +25,7 @@ from infoset.sensors import Measurements
 from infoset.set_queries import MaskedFloats, MaskedIntegers
 from sim.draws import Draws
 from sim.gravity import on_board_model
-from sim.kepler import KeplerMotion, Sight, TrueMotion
+from sim.kepler import KeplerMotion, Sight
 from sim.results import Outcome, Results
 from sim.scenario import Scenario
 from sim.target import acceleration_m_s2
@@ -73,7 +73,7 @@ class Engagements:
     ----------
     strategy : Strategy or None
         Guidance strategy; None is the scenario's.
-    truth : TrueMotion or None
+    truth : KeplerMotion or None
         True motion; None is Kepler motion with the Sun of the scenario.
     noise : MeasurementNoise or None
         Measurement noise; None is the scenario's.
@@ -91,7 +91,7 @@ class Engagements:
         scenario: Scenario,
         draws: Draws,
         strategy: Strategy | None = None,
-        truth: TrueMotion | None = None,
+        truth: KeplerMotion | None = None,
         noise: MeasurementNoise | None = None,
         *,
         guarantee: bool = True,

@@ -64,11 +64,6 @@ class PairFlight:
     impulse_m_s: Floats
     greatest_error_share: float
 
-    @property
-    def worst_miss_m(self) -> float:
-        """Greater one of the two misses, m."""
-        return float(self.results.miss_m.max())
-
 
 def fly_pair(
     scenario: Scenario,

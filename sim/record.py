@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -122,27 +122,6 @@ class Record:
         )
 
 
-@dataclass
-class _Recorder:
-    steps: list[StepRecord] = field(default_factory=list)
-
-    def __call__(self, step: Step) -> None:
-        miss = step.predicted_miss
-        self.steps.append(
-            StepRecord(
-                time_s=step.time_s,
-                measured={name: float(values[0]) for name, values in step.measured.items()},
-                true_angle_rad=float(step.sight.alpha_rad[0]),
-                true_rate_rad_s=float(step.sight.omega_rad_s[0]),
-                true_range_m=float(step.sight.range_m[0]),
-                impulse_m_s=float(step.impulse_m_s[0]),
-                predicted_miss_m=(float(miss.lower_m[0]), float(miss.upper_m[0])) if miss.exists[0] else None,
-                truth_margin_m=None,
-                sections=tuple(step.information.sections()),
-            )
-        )
-
-
 def fly_one(
     scenario: Scenario,
     run: int = 0,
@@ -178,9 +157,26 @@ def fly_one(
     scenario, own_strategy = with_strategy(scenario, strategy)
     draws = draw(scenario, [run], seed)
     flight = Engagements(scenario, draws, own_strategy, noise=noise)
-    recorder = _Recorder()
+    recorded: list[StepRecord] = []
+
+    def record(step: Step) -> None:
+        miss = step.predicted_miss
+        recorded.append(
+            StepRecord(
+                time_s=step.time_s,
+                measured={name: float(values[0]) for name, values in step.measured.items()},
+                true_angle_rad=float(step.sight.alpha_rad[0]),
+                true_rate_rad_s=float(step.sight.omega_rad_s[0]),
+                true_range_m=float(step.sight.range_m[0]),
+                impulse_m_s=float(step.impulse_m_s[0]),
+                predicted_miss_m=(float(miss.lower_m[0]), float(miss.upper_m[0])) if miss.exists[0] else None,
+                truth_margin_m=None,
+                sections=tuple(step.information.sections()),
+            )
+        )
+
     while flight.flying:
-        flight.advance(recorder)
+        flight.advance(record)
         if progress is not None:
             progress(min(1.0, flight.step / draws.steps))
     name = strategy_name(scenario, own_strategy)
@@ -189,6 +185,6 @@ def fly_one(
     inconsistency = Inconsistency(int(at_step[0]), float(label[0])) if at_step.count() else None
     margins = flight.truth_margins_m()
     steps = tuple(
-        replace(step, truth_margin_m=margin.tolist()[0]) for step, margin in zip(recorder.steps, margins, strict=True)
+        replace(step, truth_margin_m=margin.tolist()[0]) for step, margin in zip(recorded, margins, strict=True)
     )
     return Record(scenario, seed, run, name, flight.results(np.array([run])), steps, own, inconsistency)
