@@ -31,6 +31,7 @@ from experiments.campaigns.samples import (
 from experiments.campaigns.sweep_report import FIGURE as SWEEP_FIGURE
 from experiments.campaigns.sweep_report import TABLE, quantile_options, sweep_report
 from experiments.common.errors import InputError
+from experiments.common.file_kinds import use_of_file
 from experiments.common.output import Output, output, to_json
 from experiments.common.screen import figure_files, number, say, table_console
 from experiments.interception.scenario_file import scenario_to_toml
@@ -62,6 +63,8 @@ def run(options: Report) -> None:
 
 def _read(options: Report) -> CampaignFolder:
     path = options.folder
+    if path.is_file():
+        raise InputError(f"{path}: {use_of_file(path) or 'is a file; name the folder of a campaign or of a sweep'}")
     if not path.is_dir():
         raise InputError(f"{path}: there is no such folder; name the folder of infoset campaign or infoset sweep")
     folder = CampaignFolder.read(path)

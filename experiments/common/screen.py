@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -109,3 +109,17 @@ def show_built_in(rows: Sequence[Mapping[str, str]], json: bool, quiet: bool) ->
         for row in rows:
             table.add_row(*row.values())
         table_console(False).print(table)
+
+
+def show_checked(summary: Mapping[str, Any], fingerprint: str, json: bool, quiet: bool) -> None:
+    """Print that a file is valid, with its name, its fingerprint and its warnings, or the summary as JSON."""
+    if json:
+        typer.echo(to_json(summary), nl=False)
+    elif not quiet:
+        from rich.console import Console
+        from rich.text import Text
+
+        console = Console(soft_wrap=True)
+        console.print(Text.assemble(("ok", "bold green"), f"  {summary['name']}  {fingerprint}"))
+        for warning in summary["warnings"]:
+            console.print(Text.assemble(("warning: ", "yellow"), warning))

@@ -303,9 +303,13 @@ def known_name(value: object, names: tuple[str, ...]) -> str:
     raise wrong(problem, f'did you mean "{guess}"?' if guess else "")
 
 
-def key(meaning: str, example: str, **options: Any) -> Any:
-    """Describe a key: its meaning for the template, and an example as TOML."""
-    return Field(description=meaning, examples=[example], **options)
+def key(meaning: str, *examples: str, **options: Any) -> Any:
+    """Describe a key: its meaning for the template, and examples as TOML.
+
+    The example of an optional key is its default. Several examples are for the first tables that have the key, such as
+    the first two craft.
+    """
+    return Field(description=meaning, examples=list(examples), **options)
 
 
 def limited_by(owner: type, field: str | None = None) -> PlainValidator:

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from experiments.common.errors import InputError
+from experiments.common.file_kinds import ZIP, use_of_file, use_of_folder
 from experiments.common.output import library_version, write_file
 from experiments.common.toml_values import shown
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
@@ -170,7 +171,7 @@ def load_record(path: str | os.PathLike[str]) -> Record:
     file = Path(path)
     try:
         if file.is_dir():
-            raise InputError(f"{file}: is a folder; name a record in it, a file ending in .npz")
+            raise InputError(f"{file}: {use_of_folder(file, 'record')}")
         if file.exists() and not file.is_file():
             raise InputError(f"{file}: is not an ordinary file; {REMEDY}")
         size = file.stat().st_size
@@ -189,7 +190,8 @@ def load_record(path: str | os.PathLike[str]) -> Record:
             raise _UnsoundError("its contents are not what was written (the checksum differs): the file is damaged")
         return _to_record(header, arrays, str(file))
     except _UnsoundError as error:
-        raise InputError(f"{file}: is not a readable record: {error}; {REMEDY}") from None
+        use = None if content.startswith(ZIP) else use_of_file(file)
+        raise InputError(f"{file}: {use or f'is not a readable record: {error}; {REMEDY}'}") from None
 
 
 def record_path(option: str, path: Path) -> Path:

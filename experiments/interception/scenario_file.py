@@ -8,19 +8,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from pydantic import BaseModel
 
 from experiments.common.errors import InputError
+from experiments.common.file_kinds import SCENARIO, built_in, built_in_names
+from experiments.common.template import template
 from experiments.common.toml_file import (
     Form,
-    built_in_names,
-    built_in_text,
-    keys_of,
     load_tables,
     read_tables,
-    tables_of,
 )
 from experiments.common.toml_values import shown, si_name, si_values, value_text
 from experiments.interception.scenario_checks import cross_problems
@@ -39,27 +37,25 @@ SMALL_ANGLE_RAD = 0.01
 
 FORM = Form(
     noun="scenario",
-    folder="scenarios",
     listed_by="infoset scenarios list",
     begun_by="infoset scenarios new FILE",
     tables=ScenarioTables,
     checks=cross_problems,
+    written=("sun", "range_sensor"),
     schema=SCHEMA,
 )
 
 Part = TypeVar("Part")
-UNUSUAL_TABLES = (*(table for table in OPTIONAL_SENSORS if table != "range_sensor"), "target", "body")
-"""Tables that the template contains as comments."""
 
 
 def scenario_names() -> tuple[str, ...]:
     """Return the names of the built-in scenarios, in alphabetical order."""
-    return built_in_names(FORM)
+    return tuple(built_in_names([SCENARIO]))
 
 
 def scenario_text(name: str) -> str:
     """Return the file of a built-in scenario, with its comments; `InputError` if there is no such scenario."""
-    return built_in_text(FORM, name)
+    return built_in(name, [SCENARIO], "no built-in scenario").text
 
 
 def load_scenario(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Scenario:
@@ -159,24 +155,14 @@ def default_initial_set(model: Model) -> InitialSet:
 
 def scenario_template() -> str:
     """Return a valid scenario file with a comment on every key, as a start for other scenarios."""
-    lines = [
-        "# A scenario. Check it with: infoset scenarios check FILE",
-        "# Every key carries its unit in its name. z is across the nominal line of approach, x along it, and the",
-        "# spacecraft is the origin. A line `# key = value` is optional: the default or an example.",
-        "",
-    ]
-    for name, field in keys_of(ScenarioTables).items():
-        if name not in tables_of(ScenarioTables):
-            lines += _template_key(name, field)
-    for table in tables_of(ScenarioTables):
-        field = keys_of(ScenarioTables)[table]
-        optional = "" if field.is_required() else " (an optional table)"
-        keys = [line for name, key in keys_of(ScenarioTables, (table,)).items() for line in _template_key(name, key)]
-        if table in UNUSUAL_TABLES:
-            keys = [f"# {line.removeprefix('# ')}" for line in keys]
-        lines += ["", f"# {field.description}{optional}", f"# [{table}]" if table in UNUSUAL_TABLES else f"[{table}]"]
-        lines += keys
-    return "\n".join(lines) + "\n"
+    return template(
+        FORM,
+        [
+            "A scenario. Check it with: infoset scenarios check FILE",
+            "Every key carries its unit in its name. z is across the nominal line of approach, x along it, and the",
+            "spacecraft is the origin. A line `# key = value` is optional: the default or an example.",
+        ],
+    )
 
 
 def scenario_to_toml(scenario: Scenario) -> str:
@@ -263,8 +249,3 @@ def _composed(tables: ScenarioTables) -> Scenario:
 def _fitted(owner: type[Part], table: BaseModel | None) -> Part | None:
     """Return the dataclass of an optional table."""
     return None if table is None else owner(**si_values(table))
-
-
-def _template_key(name: str, field: Any) -> list[str]:
-    line = f"{name} = {field.examples[0]}"
-    return [f"{line if field.is_required() else f'# {line}':<44}  # {field.description}"]

@@ -89,15 +89,27 @@ Time = Annotated[Decimal, PlainValidator(NUMBER)]
 class BodyTable(Table):
     """State of a body: at t = 0 in Hill axes, or at an epoch in inertial axes."""
 
-    position_m: Vector | None = key("at t = 0 in Hill axes", "[0.0, 2000.0, 0.0]", default=None)
-    velocity_m_s: Vector | None = key("at t = 0 in Hill axes", "[0.0, 0.0, 0.0]", default=None)
+    position_m: Vector | None = key(
+        "at t = 0: x radial, y along the motion, z along the normal of the orbit",
+        "[0.0, 0.0, 0.0]",
+        "[100.0, 2000.0, 50.0]",
+        "[-150.0, 3500.0, -80.0]",
+        default=None,
+    )
+    velocity_m_s: Vector | None = key(
+        "velocity at t = 0 in the same axes",
+        "[0.0, 0.0, 0.0]",
+        "[0.05, -0.226, 0.02]",
+        "[-0.10, 0.339, 0.05]",
+        default=None,
+    )
     elements: Elements | None = key(
-        "a km, e, then i, RAAN, argument of periapsis, true anomaly in degrees, epoch s",
+        'with axes = "inertial": a km, e, then i, RAAN, argument of periapsis, true anomaly in degrees, epoch s',
         "[1.5e8, 0.02, 0.0, 0.0, 103.0, 0.0, 0.0]",
         default=None,
     )
-    position_km: Vector | None = key("in place of elements", "[7000.0, 0.0, 0.0]", default=None)
-    velocity_km_s: Vector | None = key("in place of elements", "[0.0, 7.5, 0.0]", default=None)
+    position_km: Vector | None = key("position, in place of elements", "[7000.0, 0.0, 0.0]", default=None)
+    velocity_km_s: Vector | None = key("velocity, in place of elements", "[0.0, 7.5, 0.0]", default=None)
     epoch_s: Time = key("epoch of position_km and velocity_km_s", "0.0", default=ZERO)
 
 
@@ -108,8 +120,10 @@ class ChaserTable(BodyTable):
 class TargetTable(BodyTable):
     """[[target]]."""
 
-    name: Name = key("name of the target", '"T1"')
-    time_s: Positive | None = key("time of the visit; a first guess if times are optimised", "1500.0", default=None)
+    name: Name = key("name of the target", '"T1"', '"T2"')
+    time_s: Positive | None = key(
+        "time of the visit; a first guess if times are optimised", "1500.0", "3000.0", default=None
+    )
     meet: Meet = key(
         '"flyby" (same position) or "rendezvous" (same position and velocity)', '"flyby"', default=Meet.FLYBY
     )
@@ -120,9 +134,9 @@ class TimesTable(Table):
     """[times]."""
 
     optimise: Annotated[bool, PlainValidator(_flag)] = key("whether times are optimised", "false", default=False)
-    latest_s: Positive | None = key("latest time of the last visit", "4000.0", default=None)
+    latest_s: Positive | None = key("latest time of the last visit; without this key: none", "4000.0", default=None)
     least_gap_s: NotNegative = key("shortest travel time between two targets", "0.0", default=ZERO)
-    price_per_s: NotNegative = key("price of one second of the last time, added to the cost", "1e-6", default=ZERO)
+    price_per_s: NotNegative = key("price of one second of the last time, added to the cost", "0.0", default=ZERO)
 
 
 class MultipointTables(ProblemTables):
@@ -130,11 +144,15 @@ class MultipointTables(ProblemTables):
 
     name: Name = key("name of the results", '"my-tour"', default="tour")
     axes: Axes = key('"hill" or "inertial"', '"hill"')
-    orbit_rate_rad_s: Positive | None = key("mean motion of the reference orbit", "1.13e-3", default=None)
-    eccentricity: Eccentricity = key("of the reference orbit", "0.0", default=ZERO)
-    true_anomaly_deg: Degrees = key("of the reference orbit at t = 0", "0.0", default=ZERO)
-    gravitational_parameter_km3_s2: Positive | None = key("of the attracting body", "398600.4418", default=None)
-    greatest_control_m_s2: Positive | None = key("bound on the control", "0.01", default=None)
+    orbit_rate_rad_s: Positive | None = key(
+        'mean motion of the reference orbit, with axes = "hill"', "1.13e-3", default=None
+    )
+    eccentricity: Eccentricity = key("eccentricity of the reference orbit", "0.0", default=ZERO)
+    true_anomaly_deg: Degrees = key("true anomaly of the reference orbit at t = 0", "0.0", default=ZERO)
+    gravitational_parameter_km3_s2: Positive | None = key(
+        'gravitational parameter of the attracting body, with axes = "inertial"', "398600.4418", default=None
+    )
+    greatest_control_m_s2: Positive | None = key("bound on the control; without this key: none", "0.02", default=None)
     chaser: ChaserTable = key("initial state of the chaser", "")
     target: Annotated[list[TargetTable], Field(min_length=1, max_length=MOST_TARGETS)] = key("the targets", "")
     times: TimesTable = key("choice of the times", "", default=TimesTable())
@@ -233,7 +251,16 @@ def _time_problems(known: Known, paths: Sequence[KeyPath]) -> Iterator[Problem]:
         )
 
 
-FORM = problem_form(KIND, MultipointTables, _checks)
+FORM = problem_form(
+    KIND,
+    MultipointTables,
+    _checks,
+    (
+        "orbit_rate_rad_s",
+        *(f"{body}.{name}" for body in ("chaser", "target") for name in KEYS[Axes.HILL]),
+        "target.time_s",
+    ),
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,9 +65,11 @@ class TerminalTable(Table):
 class CraftTable(Table):
     """[[craft]]."""
 
-    name: Name = key("name of the craft", '"first"')
-    position_m: Vector = key("x against the motion, y outward, z along the normal", "[0.0, 60.0, 80.0]")
-    velocity_m_s: Vector = key("velocity in the same axes", "[-1.2, -4.1, 0.04]")
+    name: Name = key("name of the craft", '"first"', '"second"')
+    position_m: Vector = key(
+        "x against the motion, y outward, z along the normal", "[0.0, 60.0, 80.0]", "[40.0, -50.0, 60.0]"
+    )
+    velocity_m_s: Vector = key("velocity in the same axes", "[-1.2, -4.1, 0.04]", "[-9.0, 7.6, 0.07]")
     weight: NotNegative = key("weight of its excess in the group loss", "1.0", default=Decimal(1))
     start_s: NotNegative = key("start time", "0.0", default=ZERO)
 
@@ -86,7 +88,9 @@ class ParetoTables(ProblemTables):
         '"rendezvous"',
         default=Meeting.RENDEZVOUS,
     )
-    greatest_control_m_s2: Positive | None = key("bound on each craft's control", "1.0", default=None)
+    greatest_control_m_s2: Positive | None = key(
+        "bound on each craft's control; without this key: none", "20.0", default=None
+    )
     terminal: TerminalTable = key("fixed components of the meeting", "", default=TerminalTable())
     craft: Annotated[list[CraftTable], Field(min_length=1, max_length=MOST_CRAFT)] = key("the craft", "")
 

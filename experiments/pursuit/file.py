@@ -81,16 +81,16 @@ class PlayerTable(Table):
     """[pursuer] and [evader]."""
 
     semi_major_axis_km: Axis | None = key("semi-major axis", "42166.0", default=None)
-    eccentricity: Eccentricity | None = key("eccentricity", "0.00013", default=None)
-    inclination_deg: Inclination | None = key("inclination", "1.565", default=None)
-    raan_deg: Degrees | None = key("right ascension of the ascending node", "47.0", default=None)
+    eccentricity: Eccentricity | None = key("eccentricity", "0.00013", "0.00016", default=None)
+    inclination_deg: Inclination | None = key("inclination", "1.565", "0.828", default=None)
+    raan_deg: Degrees | None = key("right ascension of the ascending node", "47.0", "79.0", default=None)
     argument_of_perigee_deg: Degrees | None = key("argument of perigee", "0.0", default=None)
-    true_anomaly_deg: Degrees | None = key("true anomaly", "350.0", default=None)
+    true_anomaly_deg: Degrees | None = key("true anomaly", "350.0", "309.0", default=None)
     position_km: Vector | None = key("position, in place of the elements", "[42166.0, 0.0, 0.0]", default=None)
     velocity_km_s: Vector | None = key("velocity, in place of the elements", "[0.0, 3.07, 0.0]", default=None)
     mass_kg: Positive = key("initial mass, with propellant", "2000.0")
     dry_mass_kg: NotNegative = key("mass without propellant", "1000.0")
-    thrust_newton: NotNegative = key("thrust; 0 for an evader that coasts", "20.0", alias="thrust_N")
+    thrust_newton: NotNegative = key("thrust; 0 for an evader that coasts", "20.0", "10.0", alias="thrust_N")
     specific_impulse_s: Positive = key("specific impulse", "350.0")
 
 
@@ -100,12 +100,16 @@ class PursuitTables(ProblemTables):
     name: Name = key("name of the results", '"my-pursuit"', default="pursuit")
     gravitational_parameter_km3_s2: Positive = key("gravitational parameter of the planet", "398600.4418")
     planet_radius_km: NotNegative = key("the orbits stay above it", "6378.137", default=EARTH_RADIUS_KM)
-    j2: Oblateness = key("second zonal harmonic", "1.08262668e-3", default=ZERO)
-    equatorial_radius_km: Positive | None = key("radius that j2 refers to", "6378.1363", default=None)
-    capture_radius_km: NotNegative = key("distance of a capture; 0 for the same point", "1.0", default=ZERO)
-    longest_s: Positive | None = key("longest game searched; 15 revolutions by default", "200000.0", default=None)
-    pursuer: PlayerTable = key("minimizes the time of capture", "")
-    evader: PlayerTable = key("maximizes the time of capture", "")
+    j2: Oblateness = key("second zonal harmonic, for example 1.08262668e-3 for the Earth", "0.0", default=ZERO)
+    equatorial_radius_km: Positive | None = key(
+        "radius that j2 refers to; needed only if j2 is not 0", "6378.1363", default=None
+    )
+    capture_radius_km: NotNegative = key("distance of a capture; 0 for the same point", "0.0", default=ZERO)
+    longest_s: Positive | None = key(
+        "longest game searched; without this key: 15 revolutions", "200000.0", default=None
+    )
+    pursuer: PlayerTable = key("the pursuer, which minimizes the time of capture", "")
+    evader: PlayerTable = key("the evader, which maximizes the time of capture", "")
 
 
 @dataclass(frozen=True)
@@ -266,7 +270,7 @@ def _orbit_problem(position_m: np.ndarray, velocity_m_s: np.ndarray, mu_si: floa
     return None
 
 
-FORM = problem_form(KIND, PursuitTables, _checks)
+FORM = problem_form(KIND, PursuitTables, _checks, [f"{player}.{element}" for player in PLAYERS for element in ELEMENTS])
 
 
 def load_pursuit(name_or_path: str, settings: Sequence[str] | None = None) -> PursuitProblem:

@@ -112,7 +112,7 @@ class ConeTable(Table):
 
     apex_m: Vector = key("apex", "[-20.0, 0.0, 0.0]")
     axis: Vector = key("direction of the axis, of any length", "[1.0, 0.0, 0.0]")
-    half_angle_deg: OpenAngle = key("angle between axis and cone", "20.0")
+    half_angle_deg: OpenAngle = key("angle between axis and cone", "60.0")
     faces: Annotated[int, PlainValidator(Whole(MOST_FACES))] = key(
         "number of faces of the pyramid, at least 3", "8", default=8
     )
@@ -122,8 +122,12 @@ class ConeTable(Table):
 class KeepInTable(Table):
     """[[keep_in]]: a bounded polytope for the position, normals . position <= offsets_m."""
 
-    normals: Annotated[Rows, PlainValidator(_rows)] = key("one array for each half-space", "[[1.0, 0.0, 0.0]]")
-    offsets_m: Annotated[tuple[Decimal, ...], PlainValidator(_row)] = key("one number for each half-space", "[2000.0]")
+    normals: Annotated[Rows, PlainValidator(_rows)] = key(
+        "one array for each half-space", "[[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]"
+    )
+    offsets_m: Annotated[tuple[Decimal, ...], PlainValidator(_row)] = key(
+        "one number for each half-space", "[2900, 2900, 2900, 2900, 2900, 2900]"
+    )
     from_period: FromPeriod = key("first t at which it holds", "0", default=0)
 
 
@@ -146,9 +150,9 @@ class ReachabilityTables(ProblemTables):
     periods: Annotated[int, PlainValidator(Whole(MOST_PERIODS))] = key("number of periods, T", "4")
     period_s: Positive = key("length of a period", "180.0")
     acceleration_m_s2: Positive = key("acceleration of a unit control", "0.15")
-    model: MotionModel = key("frozen at t = 0, or time-varying", '"frozen"', default=MotionModel.FROZEN)
+    model: MotionModel = key('"frozen" at t = 0, or "time-varying"', '"frozen"', default=MotionModel.FROZEN)
     thrust: ThrustShape = key(
-        "box (each component is bounded) or ball (the norm is bounded)", '"box"', default=ThrustShape.BOX
+        '"box" (each component is bounded) or "ball" (the norm is bounded)', '"box"', default=ThrustShape.BOX
     )
     checks_between_periods: FromPeriod = key(
         "number of instants within a period at which the constraints also hold", "0", default=0
@@ -224,7 +228,7 @@ def load_rendezvous(name_or_path: str | os.PathLike[str], settings: Sequence[str
     InputError
         If there is no such problem, or it is not sound.
     """
-    tables = load_tables(problem_form(KIND, ReachabilityTables, _checks), name_or_path, settings)
+    tables = load_tables(FORM, name_or_path, settings)
     try:
         return _rendezvous(tables)
     except InadmissibleStartError as error:
@@ -339,6 +343,9 @@ def _keep_in_problems(known: Known) -> Iterator[Problem]:
             yield Problem(path, f"is unbounded along ({along})", "add half-spaces that bound it")
         except UncertainHullError:
             yield Problem(path, "is so flat or small that rounding errors hide it", "make it wider")
+
+
+FORM = problem_form(KIND, ReachabilityTables, _checks)
 
 
 def _rendezvous(tables: ReachabilityTables) -> Rendezvous:

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from experiments.common.problem_file import built_in_problems
+from experiments.common.file_kinds import PROBLEM_COMMANDS, built_in_files
 from experiments.interception import record_file
 from experiments.interception.scenario_file import (
     load_scenario,
@@ -62,8 +62,9 @@ class TextFile:
 def text_files() -> Mapping[str, TextFile]:
     """Return the kinds of files that people write, by name."""
     problems: dict[str, list[str]] = {}
-    for each in built_in_problems():
-        problems.setdefault(each.kind, []).append(each.text)
+    for each in built_in_files().values():
+        if each.kind in PROBLEM_COMMANDS:
+            problems.setdefault(each.kind, []).append(each.text)
     readers: dict[str, Callable[[str], object]] = {
         "pareto-encounter": load_pareto,
         "multipoint": lambda path: load_multipoint(path).tour,

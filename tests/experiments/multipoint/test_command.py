@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.common.problem_file import built_in_problems, problem_text
+from experiments.common.file_kinds import built_in_files
+from experiments.common.problem_file import problem_text
 from experiments.multipoint.figures import draw_control, draw_costates, draw_path, draw_times
 from experiments.multipoint.file import KIND, Axes, load_multipoint
 from experiments.multipoint.scene import Scene, cost_curves
@@ -212,7 +213,7 @@ def test_help_has_an_example(infoset: Infoset) -> None:
 
 
 def test_every_built_in_problem_is_sound() -> None:
-    mine = [each for each in built_in_problems() if each.kind == KIND]
+    mine = [each for each in built_in_files().values() if each.kind == KIND]
     assert {each.name for each in mine} == {"asteroid-tour", "service-2", "service-3", "service-5"}
     for each in mine:
         loaded = load_multipoint(each.name)
@@ -225,7 +226,7 @@ def test_every_built_in_problem_is_sound() -> None:
     ("arguments", "parts"),
     [
         (["service-4"], ["service-4", "did you mean"]),
-        (["pareto-2008"], ["pareto-2008", "service-3"]),
+        (["pareto-2008"], ["pareto-2008: this is a problem of kind pareto-encounter; use infoset pareto pareto-2008"]),
         (["missing.toml"], ["missing.toml: there is no such file"]),
         (["bad\x1b[31mname"], ["bad?[31mname"]),
         (["--order", "bets"], ['--order: there is no "bets"; did you mean best?']),

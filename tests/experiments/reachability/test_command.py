@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.common.problem_file import built_in_problems, problem_text
+from experiments.common.file_kinds import built_in_files
+from experiments.common.problem_file import problem_text
 from experiments.reachability.figures import drawings, shown_times
 from experiments.reachability.file import KIND, load_rendezvous
 from experiments.reachability.printed_tables import TABLES, compare_published, corrected, is_published
@@ -126,7 +127,7 @@ def test_help_has_an_example(infoset: Infoset) -> None:
 
 
 def test_every_built_in_problem_is_sound() -> None:
-    mine = [each for each in built_in_problems() if each.kind == KIND]
+    mine = [each for each in built_in_files().values() if each.kind == KIND]
     assert {each.name for each in mine} == {"approach-cone", "rendezvous-16-periods", "rendezvous-2021"}
     for each in mine:
         loaded = load_rendezvous(each.name)
