@@ -17,6 +17,7 @@ from experiments.common.file_kinds import SCENARIO, built_in, built_in_names
 from experiments.common.template import template
 from experiments.common.toml_file import (
     Form,
+    keys_of,
     load_tables,
     read_tables,
 )
