@@ -71,7 +71,7 @@ nitpick_ignore = [
         "rendezvous.reachability.problem": ("Block",),
         "rendezvous.reachability.admissible": ("Lifted",),
         "rendezvous.reachability.optimum": ("BlockOptimum",),
-        "sim.bound": ("LabelBound", "TruthPair"),
+        "sim.bound": ("TruthPair",),
         "sim.chunk": ("Chunk",),
         "sim.storage.campaign_folder": ("CampaignFolder", "Damage"),
         "sim.storage.manifest": ("Manifest",),

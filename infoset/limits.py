@@ -75,7 +75,6 @@ POSITIVE = Limits(above=0.0)
 NOT_NEGATIVE = Limits(least=0.0)
 FRACTION = Limits(above=0.0, below=1.0)
 PART = Limits(least=0.0, below=1.0)
-INTEGER = Limits(whole=True)
 WHOLE = Limits(least=0, whole=True)
 COUNT = Limits(least=1, whole=True)
 

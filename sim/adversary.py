@@ -14,7 +14,7 @@ import numpy as np
 from guidance import Strategy, TieRule, make_strategy
 from guidance.scripted_noise import ScriptedNoise
 from infoset import StateBox
-from infoset.limits import INTEGER
+from infoset.limits import COUNT, WHOLE
 from sim.draws import Draws, corners, draw
 from sim.engagement import Engagements
 from sim.planned_flights import ANGLE, ROWS, Floats, Flown, PlannedNoise, Plans
@@ -54,14 +54,8 @@ class WorstEngagement:
     ----------
     scenario : Scenario
         Scenario of the search, with the start of this engagement as its dispersion.
-    seed : int
-        The seed of the search.
-    strategy : str
-        Name of the strategy.
     miss_m : float
         True miss, m.
-    outcome : Outcome
-        How the engagement ended.
     truth_kept : bool
         Whether the true state was inside its section after every measurement.
     position_m, velocity_m_s : ndarray, shape (2,)
@@ -71,10 +65,6 @@ class WorstEngagement:
         these errors repeats the engagement, bit for bit.
     construction : str
         Kind of the first plan from which the engagement was derived.
-    changes : int
-        Number of changes from the first plan.
-    evaluations : int
-        Number of simulated engagements.
     history : tuple of (int, float)
         Evaluations and greatest miss so far, m, at each increase.
     """
@@ -126,22 +116,18 @@ def find_worst(
         The search covers all starts in `set_model.bounds` (B x D), not only its dispersion.
     strategy : Strategy, str or None
         A strategy of your own, the name of a registered one, or None for the scenario's.
-    budget : int
-        Number of engagements to simulate.
     seed : int
         Root seed. The same seed and budget give the same engagement for any number of threads.
     keep_set : bool
         Count only engagements whose set was never lost. In the model `paper` a set can be lost at the start; then
         nothing is corrected, and the miss says nothing about the strategy.
-    threads : int
-        Number of threads.
     progress : callable or None
         Called with the fraction done, from 0 to 1.
 
     Raises
     ------
-    ValueError
-        If the budget or the number of threads is not positive, or the seed is negative.
+    TypeError, ValueError
+        If the budget or the number of threads is not an integer from 1, or the seed not one from 0.
     NothingCountsError
         If in every simulated engagement the set was lost, or the miss was not finite.
 
@@ -157,13 +143,9 @@ def find_worst(
     ----------
     Kumkov and Patsko (1997), section 7, for the rule of the game noise.
     """
-    for name, count in (("budget", budget), ("threads", threads), ("seed", seed)):
-        INTEGER.need(name, count)
-    if budget < 1 or threads < 1 or seed < 0:
-        raise ValueError(
-            f"need a positive budget and number of threads, and a seed not negative: got budget={budget}, "
-            f"threads={threads}, seed={seed}"
-        )
+    COUNT.need("budget", budget)
+    COUNT.need("threads", threads)
+    WHOLE.need("seed", seed)
     search = _Search(*with_strategy(scenario, strategy), seed, keep_set)
     with ThreadPoolExecutor(threads) as pool:
         try:

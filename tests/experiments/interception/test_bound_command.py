@@ -17,7 +17,7 @@ from experiments.interception.scenario_file import load_scenario, scenario_hash,
 from guidance import strategy_names
 from infoset import StateBox
 from sim import Scenario
-from sim.bound import LabelBound, LowerBound, lower_bound, pair_at
+from sim.bound import LowerBound, lower_bound, pair_at
 
 FILES = ["figure-bound.pdf", "figure-bound.png", "results.json", "scenario.toml"]
 KEYS = [
@@ -167,9 +167,10 @@ def test_figure_of_few_labels_and_of_many(short: Scenario) -> None:
     assert "s" in right.get_xlabel()
     assert not left.collections
     places = np.concatenate([first + np.linspace(0.0, 29e3, 9) for first in (5.3e6, 5.8e6, 6.2e6)])
+    pair = pair_at(short, 1745e3, -58e3, 0.005)
     many = LowerBound(
-        (pair_at(short, 1745e3, -58e3, 0.005),),
-        tuple(LabelBound(label, -58e3, 1, 20.0 + math.sin(label)) for label in places),
+        (pair,),
+        tuple(replace(pair, label_m=at, apart_m=40.0 + 2.0 * math.sin(at), correction_m=0.0) for at in places),
         0.005,
     )
     (left, _) = draw_bound(short, many).axes
