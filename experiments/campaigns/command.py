@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 from experiments.common.options import Json, Out, Overwrite, Quiet, Seed, Settings
-from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, ScenarioName, StrategyName, TieName
+from experiments.interception.options import MOST_RUNS, RangeMeter, ScenarioName, StrategyName, StudyModel, TieName
 
 MOST_WORKERS = 1024
 MOST_AT_ONCE = 1_000_000
@@ -53,7 +53,7 @@ class Flight:
     ] = None
     seed: Seed = 0
     strategy: StrategyName = None
-    model: ModelName = None
+    model: StudyModel = None
     tie: TieName = None
     range_meter: RangeMeter = None
     json: Json = None
@@ -114,7 +114,7 @@ class Campaign(Flight):
     A shard is written as soon as its runs are complete. After any interruption, the same command with --resume
     continues the campaign; with a greater --runs it extends the campaign. The numbers depend only on the scenario, the
     seed and the run, not on workers, shards or interruptions. Run K with a noise is the same engagement as in:
-    infoset engage --noise NOISE --run K. To see the results: infoset report DIR.
+    infoset engage DIR/scenario.toml --noise NOISE --run K. To see the results: infoset report DIR.
     """
 
     until: Annotated[

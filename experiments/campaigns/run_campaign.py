@@ -28,7 +28,7 @@ def run(options: Options) -> None:
         output(files={"--json": options.json}, overwrite=options.overwrite, quiet=options.quiet) as written,
     ):
         need_arrow()
-        scenario = scenario_of(options)
+        scenario, notes = scenario_of(options)
         campaign = Campaign(
             scenario,
             options.runs,
@@ -40,7 +40,7 @@ def run(options: Options) -> None:
             chunk=options.chunk,
             until=_rule(options.until),
         )
-        flown = fly(campaign, options)
+        flown = fly(campaign, options, notes)
         stored = flown.result.folder
         by_noise = samples(stored)
         summary = to_json(

@@ -31,7 +31,7 @@ def run(options: Options) -> None:
     ):
         need_arrow()
         required, shown = quantile_options(options.require, options.show)
-        scenario = scenario_of(options)
+        scenario, notes = scenario_of(options)
         axes = sweep_axes(options.vary, scenario)
         swept = Sweep(
             scenario,
@@ -50,7 +50,7 @@ def run(options: Options) -> None:
         need_free(options.out, resume=options.resume)
         if not options.yes:
             _ask(swept)
-        flown = fly(swept, options)
+        flown = fly(swept, options, notes)
         report = sweep_report(flown.result.folder, required, shown)
         summary = to_json(report.to_json(flown.elapsed_s))
         folder = Output(options.out, {}, overwrite=True)

@@ -34,8 +34,10 @@ def say(message: str, quiet: bool) -> None:
         typer.echo(on_a_screen(message), err=True)
 
 
-def say_warnings(warnings: Iterable[str], quiet: bool) -> None:
-    """Print warnings on stderr, one line each."""
+def say_warnings(warnings: Iterable[str], quiet: bool, notes: Iterable[str] = ()) -> None:
+    """Print notes and warnings on stderr, one line each."""
+    for note in notes:
+        say(note, quiet)
     for warning in warnings:
         say(f"warning: {warning}", quiet)
 

@@ -38,6 +38,15 @@ ModelName = Annotated[
         "from its default initial set.",
     ),
 ]
+StudyModel = Annotated[
+    Literal["paper", "guaranteed"] | None,
+    typer.Option(
+        "--model",
+        help="Model of the information set, whatever the scenario file says. A model other than the file's starts from "
+        "its default initial set.",
+        show_default="guaranteed",
+    ),
+]
 TieName = Annotated[
     Literal["upper", "lower", "alternate", "random"] | None,
     typer.Option("--tie", help="How game noise breaks ties."),

@@ -164,9 +164,9 @@ class GuidanceTable(Table):
 class InformationSetTable(Table):
     """[information_set]."""
 
-    model: Model = key('"paper", as published, or "guaranteed", which keeps the true state', '"paper"')
+    model: Model = key('"guaranteed", which keeps the true state, or "paper", as published', '"guaranteed"')
     initial_set: InitialSet | None = key(
-        'section at t0: "rectangle" in (omega, alpha) or "box" in (z, V)', '"rectangle"', default=None
+        'section at t0: "rectangle" in (omega, alpha) or "box" in (z, V)', '"box"', default=None
     )
     sections: Annotated[int, PlainValidator(Whole(MOST_SECTIONS))] = key(
         "number of sections: a uniform grid of ranges over uncertainty.x_km", "29"

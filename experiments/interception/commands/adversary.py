@@ -10,11 +10,11 @@ import typer
 from experiments.common.options import Json, Overwrite, Quiet, Seed, Settings
 from experiments.interception.options import (
     MOST_RUNS,
-    ModelName,
     RangeMeter,
     RecordFile,
     ScenarioName,
     StrategyName,
+    StudyModel,
 )
 
 
@@ -30,7 +30,7 @@ class Adversary:
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
     strategy: StrategyName = None
-    model: ModelName = None
+    model: StudyModel = None
     range_meter: RangeMeter = None
     budget: Annotated[
         int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of engagements to simulate.")

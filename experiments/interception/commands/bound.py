@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from experiments.common.options import FileOptions, Seed, Settings
-from experiments.interception.options import MOST_RUNS, ModelName, ScenarioName, Strategies
+from experiments.interception.options import MOST_RUNS, ScenarioName, Strategies, StudyModel
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Bound(FileOptions):
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
     strategies: Strategies = None
-    model: ModelName = None
+    model: StudyModel = None
     budget: Annotated[
         int,
         typer.Option(

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from experiments.common.options import Csv, FileOptions, Seed, Settings
-from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, ScenarioName, Strategies
+from experiments.interception.options import MOST_RUNS, RangeMeter, ScenarioName, Strategies, StudyModel
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Compare(FileOptions):
 
     Run K has the same initial state and the same random errors for all strategies. Game noise is simulated with each
     of its four tie rules, and a run is represented by the worst of the four. Run K is the same engagement as in:
-    infoset engage --run K.
+    infoset engage --model guaranteed --run K.
     Without --out, --json or --csv no file is written.
     """
 
@@ -28,6 +28,6 @@ class Compare(FileOptions):
         int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs for each strategy and noise.")
     ] = 50
     seed: Seed = 0
-    model: ModelName = None
+    model: StudyModel = None
     range_meter: RangeMeter = None
     csv: Csv = None

@@ -12,7 +12,7 @@ from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
 from experiments.common.output import output, to_json
 from experiments.common.screen import number, print_lines, progress_bar, say_warnings, table_console
-from experiments.interception.choices import own_strategy, scenario_with
+from experiments.interception.choices import own_strategy, scenario_with, study_scenario
 from experiments.interception.commands.adversary import Adversary
 from experiments.interception.record_file import record_path, write_record
 from experiments.interception.runs.shared import summary_head
@@ -33,6 +33,7 @@ def run(options: Adversary) -> None:
         model=options.model,
         range_meter=options.range_meter,
     )
+    scenario, notes = study_scenario(scenario, options.model, options.settings)
     own = own_strategy(options.strategy)
     with (
         output(
@@ -42,7 +43,7 @@ def run(options: Adversary) -> None:
         ) as written,
         progress_bar(options.quiet) as begin,
     ):
-        say_warnings(scenario_warnings(scenario), options.quiet)
+        say_warnings(scenario_warnings(scenario), options.quiet, notes)
         began_s = perf_counter()
         try:
             worst = find_worst(

@@ -23,7 +23,7 @@ from experiments.common.screen import (
     say_warnings,
     table_console,
 )
-from experiments.interception.choices import chosen_strategies, scenario_with
+from experiments.interception.choices import chosen_strategies, scenario_with, study_scenario
 from experiments.interception.commands.bound import Bound
 from experiments.interception.figures.bound import draw_bound
 from experiments.interception.runs.shared import need_finite, summary_head
@@ -81,12 +81,13 @@ class WorstOfStrategy:
 def run(options: Bound) -> None:
     """Compute the bound, simulate the strategies, write the files and print the tables."""
     scenario = scenario_with(options.scenario, options.settings, model=options.model)
+    scenario, notes = study_scenario(scenario, options.model, options.settings)
     strategies = chosen_strategies(scenario, options.strategies)
     with (
         output_of(options, ("scenario.toml", "results.json", *figure_files(FIGURE))) as written,
         progress_bar(options.quiet) as begin,
     ):
-        say_warnings(scenario_warnings(scenario), options.quiet)
+        say_warnings(scenario_warnings(scenario), options.quiet, notes)
         began_s = perf_counter()
         try:
             lower = lower_bound(scenario, progress=begin("lower bound"))

@@ -18,7 +18,7 @@ from experiments.common.screen import (
     say_warnings,
     table_console,
 )
-from experiments.interception.choices import chosen_strategies, scenario_with
+from experiments.interception.choices import chosen_strategies, scenario_with, study_scenario
 from experiments.interception.commands.compare import Compare
 from experiments.interception.comparison import QUANTILES, Comparison, flights, gather, summary
 from experiments.interception.figures.comparison import draw_comparison
@@ -34,12 +34,13 @@ COLUMNS = ("strategy", "noise", "tie", "run", "miss_m", "impulse_m_s", "outcome"
 def run(options: Compare) -> None:
     """Simulate the strategies, write the files and print the table."""
     scenario = scenario_with(options.scenario, options.settings, model=options.model, range_meter=options.range_meter)
+    scenario, notes = study_scenario(scenario, options.model, options.settings)
     strategies = chosen_strategies(scenario, options.strategies)
     with (
         output_of(options, ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE))) as written,
         progress_bar(options.quiet) as begin,
     ):
-        say_warnings(scenario_warnings(scenario), options.quiet)
+        say_warnings(scenario_warnings(scenario), options.quiet, notes)
         began_s = perf_counter()
         reports = {name: begin(name) for name in strategies}
         compared = _simulate(scenario, strategies, options.runs, options.seed, reports)

@@ -50,7 +50,9 @@ def swept(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_sweep_of_two_keys(infoset: Infoset, brief: Scenario, file: Path, tmp_path: Path) -> None:
     folder = tmp_path / "sweep"
-    code, out, err = infoset("sweep", file, "--vary", TWO, "--runs", 30, "--out", folder, "--seed", 2)
+    code, out, err = infoset(
+        "sweep", file, "--model", "paper", "--vary", TWO, "--runs", 30, "--out", folder, "--seed", 2
+    )
     assert code == 0
     assert (
         f"wrote shards, scenario.toml, sweep.parquet, figure-sweep.pdf, figure-sweep.png, summary.json in {folder}"

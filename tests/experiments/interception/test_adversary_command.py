@@ -10,8 +10,10 @@ from typing import Any
 import pytest
 
 from experiments.cli import main
+from experiments.interception.choices import with_model
 from experiments.interception.record_file import load_record
 from experiments.interception.scenario_file import load_scenario, scenario_hash
+from infoset import Model
 from sim.adversary import find_worst
 
 KEYS = [
@@ -83,11 +85,11 @@ def test_the_worst_as_json_and_as_a_record_that_replays(infoset: Command, tmp_pa
     assert (code, err) == (0, "")
     found: dict[str, Any] = json.loads(out)
     assert list(found) == KEYS
-    scenario = load_scenario("asteroid-1997")
+    scenario = with_model(load_scenario("asteroid-1997"), Model.GUARANTEED)
     assert found["version"] == version("infoset")
     assert (found["scenario"], found["scenario_hash"]) == (scenario.name, scenario_hash(scenario))
     assert (found["seed"], found["evaluations"], found["record"]) == (5, BUDGET, "worst.npz")
-    assert (found["strategy"], found["model"], found["range_meter"]) == ("symmetric-miss", "paper", True)
+    assert (found["strategy"], found["model"], found["range_meter"]) == ("symmetric-miss", "guaranteed", True)
     worst = find_worst(scenario, budget=BUDGET, seed=5)
     assert found["worst_miss_m"] == worst.miss_m == found["history"][-1]["worst_miss_m"]
     assert list(found["start"].values()) == [*worst.position_m.tolist(), *worst.velocity_m_s.tolist()]
@@ -161,7 +163,7 @@ def test_where_no_engagement_counts_it_is_said(infoset: Command, tmp_path: Path)
     text = text.replace("vx_km_s = [-58.1, -57.9]", "vx_km_s = [-110.05, -110.0]")
     file = tmp_path / "fast.toml"
     file.write_text(text)
-    message = infoset("adversary", file, "--keep-set", "--budget", 2, "-q")
+    message = infoset("adversary", file, "--model", "paper", "--keep-set", "--budget", 2, "-q")
     assert message[0] == 2
     assert "in every simulated engagement the set was lost" in message[2]
     assert "omit --keep-set" in message[2]

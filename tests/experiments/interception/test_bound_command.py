@@ -86,7 +86,9 @@ def test_bound_into_a_folder(infoset: Infoset, short: Scenario, short_file: Path
 
 
 def test_bound_as_json_alone(infoset: Infoset, short_file: Path, tmp_path: Path) -> None:
-    code, out, err = infoset(short_file, "--strategies", "symmetric-miss", "--json", "-", "--budget", 0)
+    code, out, err = infoset(
+        short_file, "--strategies", "symmetric-miss", "--model", "paper", "--json", "-", "--budget", 0
+    )
     assert code == 0
     found: Any = json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
     (only,) = found["strategies"]
@@ -154,7 +156,7 @@ def test_a_program_without_a_solution_is_one_message(
         raise BoundError("label 1 m")
 
     monkeypatch.setattr("experiments.interception.runs.bound.lower_bound", fail)
-    code, out, err = infoset(short_file)
+    code, out, err = infoset(short_file, "-q")
     assert (code, out) == (2, "")
     assert err.startswith("error: short: a linear program of the bound has no solution (label 1 m)")
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from experiments.common.errors import InputError
 from experiments.interception import scenario_file
+from experiments.interception.choices import with_model
 from experiments.interception.scenario_file import (
     default_initial_set,
     load_scenario,
@@ -158,7 +159,7 @@ def test_built_in_is_sound_described_and_silent(name: str) -> None:
 def test_template_is_sound_and_comments_every_key() -> None:
     template = scenario_template()
     scenario = read_scenario(template, "template")
-    assert scenario.set_model == load_scenario("asteroid-1997").set_model
+    assert scenario.set_model == with_model(load_scenario("asteroid-1997"), Model.GUARANTEED).set_model
     assert scenario_warnings(scenario) == []
     assert all("  # " in line for line in template.splitlines() if " = " in line and "`" not in line[:60])
     assert max(len(line) for line in template.splitlines()) <= 120
