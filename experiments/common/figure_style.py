@@ -92,7 +92,7 @@ def place_axes(
     margins_mm: tuple[float, float, float, float],
     gaps_mm: tuple[float, float],
 ) -> list[list[Axes]]:
-    """Return a grid of axes at fixed positions, without the cost of an automatic layout.
+    """Return a grid of axes at fixed positions by row, the top one first, without the cost of an automatic layout.
 
     Parameters
     ----------
@@ -100,11 +100,6 @@ def place_axes(
         Left, right, bottom, top.
     gaps_mm : tuple of float
         Between columns and between rows.
-
-    Returns
-    -------
-    list of list of Axes
-        By row, the top one first.
     """
     width, height = (float(size) * _MM_PER_INCH for size in figure.get_size_inches())
     left, right, bottom, top = margins_mm

@@ -63,7 +63,7 @@ def built_in_names(kinds: Collection[str]) -> list[str]:
 
 
 def built_in(name: str, kinds: Collection[str], missing: str) -> BuiltIn:
-    """Return the built-in file of a name.
+    """Return the built-in file of a name; `InputError` if there is none, or it has another kind.
 
     Parameters
     ----------
@@ -71,11 +71,6 @@ def built_in(name: str, kinds: Collection[str], missing: str) -> BuiltIn:
         Kinds that fit.
     missing : str
         What does not exist otherwise, for the message: ``no built-in problem``.
-
-    Raises
-    ------
-    InputError
-        If there is no built-in file of this name, or it has another kind.
     """
     file = built_in_files().get(name)
     if file is not None and file.kind in kinds:

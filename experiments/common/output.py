@@ -179,10 +179,7 @@ def _check_file(file: Path, overwrite: bool) -> None:
 def write_file(file: Path, content: str | bytes, *, overwrite: bool = False) -> None:
     """Write a file completely or not at all; text is written as UTF-8.
 
-    Raises
-    ------
-    InputError
-        If it cannot be written, is a link, or exists and `overwrite` is false.
+    `InputError` if it cannot be written, is a link, or exists and `overwrite` is false.
     """
     with _reporting(file):
         _check_name(file, overwrite)

@@ -57,12 +57,10 @@ def page(title: str, scripts: Sequence[str], data: Mapping[str, object], own_scr
 
 
 def embedded_json(value: object) -> str:
-    """Return a value as JSON that can stand inside a script element of HTML.
+    """Return a value as JSON that can stand inside a script element of HTML, and is read as the same value.
 
-    Returns
-    -------
-    str
-        Without ``<``, ``>``, ``&`` and the line separators that scripts stumble over; reads back as the same value.
+    It has no ``<``, ``>``, ``&`` and line separators that scripts stumble over. The value is one for
+    `experiments.common.output.to_json`.
     """
     text = json.dumps(value, allow_nan=False, ensure_ascii=False, separators=(",", ":"), default=json_value)
     # A half of a surrogate pair is no character that a file can hold.

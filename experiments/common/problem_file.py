@@ -37,19 +37,10 @@ def problem_form(
 
     Parameters
     ----------
-    kind : str
-        Value of ``kind`` in the file.
     tables : type
         The pydantic model of the whole file; it has `schema`, `kind` and `name` among its keys.
-    checks : callable, optional
-        Checks of relations between values.
-    written : sequence of str, optional
-        Optional tables and keys that the template contains, not as comments: ``chaser.position_m``.
-
-    Returns
-    -------
-    Form
-        To be given to `experiments.common.toml_file.load_tables`.
+    checks, written
+        As in `Form`.
     """
     return Form(
         "problem",
@@ -65,10 +56,7 @@ def problem_form(
 def problem_hash(tables: Tables) -> str:
     """Return a short hash of all values of a problem except its name and description.
 
-    Returns
-    -------
-    str
-        16 hexadecimal digits, the same for equal values on every machine.
+    It has 16 hexadecimal digits, the same for equal values on every machine.
     """
     values = tables.model_dump(exclude={"name", "description"})
     return hashlib.sha256(json.dumps(values, sort_keys=True, default=_plain).encode()).hexdigest()[:16]

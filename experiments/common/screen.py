@@ -69,10 +69,7 @@ def number_table(*titles: str, left: int = 1) -> Table:
 def progress_bar(quiet: bool) -> Iterator[BeginProgress]:
     """Show progress bars on stderr if that is a terminal.
 
-    Yields
-    ------
-    callable
-        Starts a bar with a title and returns a function that sets the fraction done.
+    The context is a function that starts a bar with a title, and returns a function that sets the fraction done.
     """
     if quiet or not sys.stderr.isatty():
         yield lambda _name: lambda _done: None

@@ -24,17 +24,9 @@ _FIRST = "1"
 
 
 def read_settings(settings: Sequence[str]) -> dict[str, str]:
-    """Return the values of ``--set`` by key, as written.
+    """Return the values of ``--set KEY=VALUE`` by key, as written.
 
-    Parameters
-    ----------
-    settings : sequence of str
-        KEY=VALUE, for example ``thruster.greatest_impulse_m_s=5``.
-
-    Raises
-    ------
-    InputError
-        If a setting has another form, or a key is set twice.
+    `InputError` if a setting has another form, or a key is set twice.
     """
     values: dict[str, str] = {}
     for setting in settings:

@@ -140,7 +140,7 @@ class Form(Generic[Tables]):
 def load_tables(
     form: Form[Tables], name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None
 ) -> Tables:
-    """Read a built-in file or a file of the user.
+    """Read a built-in file or a file of the user; the numbers stay as written.
 
     Parameters
     ----------
@@ -150,11 +150,6 @@ def load_tables(
     settings : sequence of str or None, optional
         KEY=VALUE: values in place of those of the file, in its units; see `experiments.common.settings`. They are
         added to the description.
-
-    Returns
-    -------
-    pydantic model
-        ``form.tables``, numbers as written.
 
     Raises
     ------
@@ -188,21 +183,14 @@ def _text_of(form: Form[Tables], name_or_path: str | os.PathLike[str]) -> tuple[
 
 
 def read_tables(form: Form[Tables], text: str, source: str, values: Mapping[str, str] | None = None) -> Tables:
-    """Check the text of a file, and return its values.
+    """Check the text of a file, and return its values, numbers as written.
 
     Parameters
     ----------
-    text : str
-        TOML.
     source : str
         Name of the file in messages.
     values : mapping of str to str or None, optional
         TOML values that replace those of the text, by key; see `experiments.common.settings.replace_values`.
-
-    Returns
-    -------
-    pydantic model
-        ``form.tables``, numbers as written.
 
     Raises
     ------

@@ -124,10 +124,7 @@ def study_scenario(
 def own_strategy(text: str | None) -> Strategy | None:
     """Return the strategy that ``--strategy FILE.py:CLASS`` names; None for a built-in name.
 
-    Raises
-    ------
-    InputError
-        If the file has no such strategy, or its code raises an exception.
+    `InputError` if the file has no such strategy, or its code raises an exception.
     """
     return load_strategy(text) if text is not None and is_own_strategy(text) else None
 

@@ -165,15 +165,7 @@ def replayed(record: Record) -> Iterator[Stages]:
 def packed_outlines(outlines: Sequence[Floats]) -> dict[str, str]:
     """Return outlines with their boxes exactly and their vertices on a grid of `STEPS_OF_A_BOX` across the box.
 
-    Parameters
-    ----------
-    outlines : sequence of ndarray, shape (n, d)
-        At least one vertex each.
-
-    Returns
-    -------
-    dict
-        ``boxes`` (least of each coordinate, then greatest), ``counts`` and ``vertices``.
+    An outline has at least one vertex. A box is the least of each coordinate, then the greatest.
     """
     counts = np.array([len(outline) for outline in outlines], dtype=np.int64)
     if not len(counts):

@@ -151,17 +151,12 @@ def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: boo
 
 
 def load_record(path: str | os.PathLike[str]) -> Record:
-    """Read the record of an engagement.
+    """Read the record of an engagement: equal, bit for bit, to the record that was written.
 
     Parameters
     ----------
     path : str or path
         A file of `write_record` or ``infoset engage --record``.
-
-    Returns
-    -------
-    Record
-        Equal, bit for bit, to the record that was written.
 
     Raises
     ------

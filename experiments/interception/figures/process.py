@@ -49,15 +49,7 @@ _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 def draw_process(records: Sequence[Record]) -> Figure:
     """Draw angle, angular rate, impulse and predicted miss over time, one column per record.
 
-    Parameters
-    ----------
-    records : sequence of Record
-        At least one.
-
-    Returns
-    -------
-    Figure
-        Four rows of axes; the axes of a row have the same limits.
+    The axes of a row have the same limits. At least one record is needed.
     """
     if not records:
         raise ValueError("at least one record is needed")
