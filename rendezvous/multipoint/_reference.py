@@ -19,15 +19,9 @@ MOST_MIXED = 6
 _SAMPLES = 64
 
 
-def _chebyshev() -> tuple[Floats, Floats]:
-    """Return increasing Chebyshev points on [0, 1], and their barycentric weights."""
-    index = np.arange(NODES)
-    weights = np.where(index % 2 == 0, 1.0, -1.0)
-    weights[[0, -1]] *= 0.5
-    return 0.5 - 0.5 * np.cos(np.pi * index / (NODES - 1)), weights
-
-
-_POINTS, _WEIGHTS = _chebyshev()
+_POINTS = 0.5 - 0.5 * np.cos(np.pi * np.arange(NODES) / (NODES - 1))
+_WEIGHTS = np.array([0.5, *[-1.0, 1.0] * (NODES // 2 - 1), -0.5])
+"""Increasing Chebyshev points on [0, 1], and their barycentric weights."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,6 @@ from rendezvous.pareto.feasibility import (
 from rendezvous.pareto.front import (
     ParetoSet,
     distances,
-    front_of_three,
     front_of_two,
     pareto_set,
     simplex_weights,
@@ -51,7 +50,6 @@ __all__ = [
     "analyse_coalitions",
     "check_bound",
     "distances",
-    "front_of_three",
     "front_of_two",
     "least_greatest_excess",
     "least_peak",

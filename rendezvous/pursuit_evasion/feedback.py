@@ -214,8 +214,9 @@ class _Pursuit:
             if ended is not None:
                 return ended
             self._past.append((self._time, evader))
-            self._pursuer = _moved(self._pursuer, pursuer.at(spell)[:6], self._pursuer.flow * spell)
-            self._evader = _moved(self._evader, evader(spell), self._evader.mass - evader_mass)
+            mass = self._pursuer.mass - self._pursuer.flow * spell
+            self._pursuer = replace(self._pursuer, start=pursuer.at(spell)[:6], mass=mass)
+            self._evader = replace(self._evader, start=evader(spell), mass=evader_mass)
             self._time += spell
             planned, known = self._plan(plan, spell, self._seen(plan)), plan
             if planned is None:
@@ -344,7 +345,3 @@ def _lasts(craft: Craft, dry: float) -> float:
     """Return how long the propellant lasts; a little less for a craft without dry mass, whose acceleration diverges."""
     share = 1.0 if dry > 0.0 else 0.999
     return share * (craft.mass - dry) / craft.flow if craft.flow > 0.0 else np.inf
-
-
-def _moved(craft: Craft, state: Floats, burnt: float) -> Craft:
-    return replace(craft, start=state, mass=craft.mass - burnt)

@@ -182,8 +182,9 @@ def _row(games: list[Game | None], follow_all: bool, offset: int) -> tuple[list[
 
     def check() -> None:
         if points and points[-1].status is PointStatus.NEIGHBOUR:
-            seeded, points[-1] = points[-1], _from_nothing(games[len(points) - 1], follow_all)
-            if not _agree(points[-1], seeded):
+            seeded, points[-1] = points[-1].node, _from_nothing(games[len(points) - 1], follow_all)
+            node = points[-1].node
+            if node is None or seeded is None or not abs(node.duration - seeded.duration) < _SAME * node.duration:
                 wrong.append(len(points) - 1)
 
     for i, game in enumerate(games):
@@ -234,9 +235,3 @@ def _seeded(game: Game, points: list[_Point]) -> _Point | None:
     if node is None or not node.is_saddle or node.closing <= 0.0:
         return None
     return _Point(PointStatus.NEIGHBOUR, scaled.units, node)
-
-
-def _agree(first: _Point, second: _Point) -> bool:
-    if first.node is None or second.node is None:
-        return False
-    return abs(first.node.duration - second.node.duration) < _SAME * first.node.duration

@@ -51,7 +51,7 @@ def effort(controls: Floats) -> Effort:
 
 def minimum_energy(optimal: OptimalControls) -> Floats:
     """Return the `optimal` control of least sum of squares, shape (T, m), which is unique, by a quadratic program."""
-    return optimal.at(_least_energy(optimal.space, optimal.scale))
+    return optimal.at(_nearest(optimal.space, optimal.scale))
 
 
 def minimum_l1(optimal: OptimalControls) -> Floats:
@@ -87,15 +87,12 @@ def minimum_peak(optimal: OptimalControls) -> Floats:
     limits = np.concatenate([space.limits, bound - fixed, bound + fixed])
     face = relative_interior(rows, limits, space.equal, space.levels, bounded=True, member=point)
     inner = replace(space.within(face.point, face.basis), rows=face.rows, limits=face.limits)
-    return optimal.at(face.point + face.basis @ _least_energy(inner, scale))
+    return optimal.at(face.point + face.basis @ _nearest(inner, scale))
 
 
 def nearest(optimal: OptimalControls, control: Floats) -> Floats:
     """Return the `optimal` control nearest to a `control`, both of shape (T, m), by a quadratic program."""
-    space, scale = optimal.space, optimal.scale
-    turned = scale[:, None] * space.control_response
-    away = scale * space.control_free - control.ravel()
-    return optimal.at(quadratic(space, turned.T @ turned, turned.T @ away).point)
+    return optimal.at(_nearest(optimal.space, optimal.scale, control.ravel()))
 
 
 def chebyshev_centre(optimal: OptimalControls) -> Floats:
@@ -263,6 +260,6 @@ def _chord(space: Lifted, points: Floats, directions: Floats) -> tuple[Floats, F
     return np.minimum(least, 0.0), np.maximum(most, 0.0)
 
 
-def _least_energy(space: Lifted, scale: Floats) -> Floats:
+def _nearest(space: Lifted, scale: Floats, control: Floats | float = 0.0) -> Floats:
     turned = scale[:, None] * space.control_response
-    return quadratic(space, turned.T @ turned, turned.T @ (scale * space.control_free)).point
+    return quadratic(space, turned.T @ turned, turned.T @ (scale * space.control_free - control)).point

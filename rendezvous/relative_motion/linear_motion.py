@@ -103,6 +103,13 @@ def checked_durations(start_s: ArrayLike, end_s: ArrayLike) -> Floats:
     return durations
 
 
+def state_scales(durations: Floats) -> Floats:
+    """Return (T, T, T, 1, 1, 1) of each interval, shape (..., 6), from durations in s; T = 1 s for an empty one."""
+    scale = np.ones((*durations.shape, 6))
+    scale[..., :3] = np.where(durations == 0.0, 1.0, np.abs(durations))[..., None]
+    return scale
+
+
 def checked_rate(rate_rad_s: float) -> None:
     """Check an orbit rate.
 

@@ -147,7 +147,7 @@ def _closed(orbit: EllipticOrbit, starts: Floats, ends: Floats) -> Floats:
     plane[:, 2, 3] = -s
     plane[:, 3, 1], plane[:, 3, 2], plane[:, 3, 3] = 3.0 * rho + e * e - 1.0, -(rho**2), e * s
     plane /= 1.0 - e * e
-    from_state = _scaled_states(rho, np.sin(at_start), e, k2)
+    from_state = _scaling(rho, -e * np.sin(at_start), 1.0 / (k2 * rho))
 
     rho = 1.0 + e * np.cos(at_end)
     s, c = rho * np.sin(at_end), rho * np.cos(at_end)
@@ -167,24 +167,12 @@ def _closed(orbit: EllipticOrbit, starts: Floats, ends: Floats) -> Floats:
     turn = at_end - at_start
     in_plane[:, 2, 2] = in_plane[:, 5, 5] = np.cos(turn)
     in_plane[:, 2, 5], in_plane[:, 5, 2] = np.sin(turn), -np.sin(turn)
-    return _states_of_scaled(rho, np.sin(at_end), e, k2) @ in_plane @ from_state
+    return _scaling(1.0 / rho, k2 * e * np.sin(at_end), k2 * rho) @ in_plane @ from_state
 
 
-def _scaled_states(rho: Floats, sine: Floats, e: float, k2: float) -> Floats:
-    """(r, v) to (rho r, -e sin(nu) r + v / (k^2 rho)), shape (n, 6, 6)."""
-    matrix = np.zeros((len(rho), 6, 6))
+def _scaling(position: Floats, mixed: Floats, velocity: Floats) -> Floats:
+    """The map from (r, v) to (position r, mixed r + velocity v), shape (n, 6, 6)."""
+    matrix = np.zeros((len(position), 6, 6))
     for axis in range(3):
-        matrix[:, axis, axis] = rho
-        matrix[:, 3 + axis, axis] = -e * sine
-        matrix[:, 3 + axis, 3 + axis] = 1.0 / (k2 * rho)
-    return matrix
-
-
-def _states_of_scaled(rho: Floats, sine: Floats, e: float, k2: float) -> Floats:
-    """The inverse of `_scaled_states`."""
-    matrix = np.zeros((len(rho), 6, 6))
-    for axis in range(3):
-        matrix[:, axis, axis] = 1.0 / rho
-        matrix[:, 3 + axis, axis] = k2 * e * sine
-        matrix[:, 3 + axis, 3 + axis] = k2 * rho
+        matrix[:, axis, axis], matrix[:, 3 + axis, axis], matrix[:, 3 + axis, 3 + axis] = position, mixed, velocity
     return matrix

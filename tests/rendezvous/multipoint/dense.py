@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rendezvous._arrays import Floats
 from rendezvous.multipoint.segments import Nodes, check_times
 from rendezvous.relative_motion import LinearMotion
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
