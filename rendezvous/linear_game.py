@@ -131,14 +131,12 @@ def free_space_capture(
     Position and velocity, shapes (3,), are the evader's, relative to the pursuer; the accelerations are the greatest
     values. The evader escapes if its acceleration is not the smaller one and the players are not on a collision course.
 
+    The first root of |r + v t| = (a_P - a_E) t^2 / 2; nu is along r + v t.
+
     Raises
     ------
     ValueError
         If position or velocity are not three finite numbers, or the position is zero.
-
-    Notes
-    -----
-    The first root of |r + v t| = (a_P - a_E) t^2 / 2; nu is along r + v t.
     """
     position, velocity = _relative(position_m, velocity_m_s)
     advantage = pursuer_m_s2 - evader_m_s2
@@ -164,15 +162,13 @@ def mass_loss_capture(
 
     Position and velocity, shapes (3,), are the evader's, relative to the pursuer; the thrusters are as at t = 0.
 
+    The first root of |r + v t| = S_P(t) - S_E(t), S the travel of full thrust. The distance is convex; the second
+    derivative of the rest is bounded by S_P'' at the end of a step minus S_E'' at its start.
+
     Raises
     ------
     ValueError
         If position or velocity are not three finite numbers, or the position is zero.
-
-    Notes
-    -----
-    The first root of |r + v t| = S_P(t) - S_E(t), S the travel of full thrust. The distance is convex; the second
-    derivative of the rest is bounded by S_P'' at the end of a step minus S_E'' at its start.
     """
     position, velocity = _relative(position_m, velocity_m_s)
     last = min(pursuer.lasts_s, evader.lasts_s)
@@ -207,18 +203,16 @@ def circular_orbit_capture(
     accelerations are the greatest ones, the rate is the mean motion. The search ends at `longest_s`, by default after
     50 revolutions; there is no capture if the evader's acceleration is not the smaller one.
 
+    The first root of l(T) = max over |nu| <= 1 of nu . (Phi x)_r - (a_P - a_E) int |Phi_rv(T - t)^T nu| dt, a concave
+    function of nu with one maximum: the evader's greatest distance at T, as both reachable sets have the same shape.
+    With nu fixed it is a lower bound at other times, whose second derivative is at least -|x''| - (a_P - a_E) |Phi_vv|.
+
     Raises
     ------
     ValueError
         If position or velocity are not three finite numbers, the position is zero, or the mean motion is not positive.
     LinearGameError
         If the greatest distance is not computed to its tolerance.
-
-    Notes
-    -----
-    The first root of l(T) = max over |nu| <= 1 of nu . (Phi x)_r - (a_P - a_E) int |Phi_rv(T - t)^T nu| dt, a concave
-    function of nu with one maximum: the evader's greatest distance at T, as both reachable sets have the same shape.
-    With nu fixed it is a lower bound at other times, whose second derivative is at least -|x''| - (a_P - a_E) |Phi_vv|.
     """
     position, velocity = _relative(position_m, velocity_m_s)
     if not rate_rad_s > 0.0:

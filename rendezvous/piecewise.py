@@ -64,17 +64,15 @@ def resolve(function: Callable[[Floats], Floats], breaks_s: Floats) -> Piecewise
     `function` returns values, shape (k, m), at k times, s. `breaks_s`, not decreasing, are the ends of the initial
     panels; the functions may jump there and are not evaluated there.
 
-    Raises
-    ------
-    ValueError
-        If a value is not finite, or no break is later than another.
-
-    Notes
-    -----
     A panel is halved until the last two Chebyshev coefficients are below 1e-11 of the greatest value on all panels, or
     below 1e-7 of it and no longer decreasing (rounding), or below the effect of the rounding of times. Sinusoids on
     panels of one radian have an error below 1e-13 at once: the remainder of the interpolation is at most (1/2)^12 /
     (2^11 12!) = 2.5e-16 of their amplitude.
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite, or no break is later than another.
     """
     starts, ends = breaks_s[:-1], breaks_s[1:]
     starts, ends = starts[ends > starts], ends[ends > starts]

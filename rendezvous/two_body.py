@@ -42,19 +42,15 @@ class OrbitalElements:
         cosine, sine = np.cos(self.true_anomaly_rad), np.sin(self.true_anomaly_rad)
         radius = latus_rectum / (1.0 + self.eccentricity * cosine)
         speed = np.sqrt(gravitational_parameter_m3_s2 / latus_rectum)
-        toward_perigee, ahead = self._axes()
-        position = radius * (cosine * toward_perigee + sine * ahead)
-        return position, speed * (-sine * toward_perigee + (self.eccentricity + cosine) * ahead)
-
-    def _axes(self) -> tuple[Floats, Floats]:
-        """Unit vectors toward perigee and, in the plane, a quarter of a turn ahead of it."""
         (cn, sn), (ci, si), (cp, sp) = (
             (np.cos(angle), np.sin(angle))
             for angle in (self.raan_rad, self.inclination_rad, self.argument_of_perigee_rad)
         )
+        # In the plane, ahead is a quarter of a turn from the direction of the perigee.
         toward_perigee = np.array([cn * cp - sn * ci * sp, sn * cp + cn * ci * sp, si * sp])
         ahead = np.array([-cn * sp - sn * ci * cp, -sn * sp + cn * ci * cp, si * cp])
-        return toward_perigee, ahead
+        position = radius * (cosine * toward_perigee + sine * ahead)
+        return position, speed * (-sine * toward_perigee + (self.eccentricity + cosine) * ahead)
 
 
 def semi_major_axis_m(position_m: Floats, velocity_m_s: Floats, gravitational_parameter_m3_s2: float) -> float:

@@ -190,10 +190,16 @@ def _agreeing(points: Floats, normals: Floats, on: Flags, negligible: float) -> 
     """Return which points are vertices and which planes facets, given which points are on which planes."""
     size = points.shape[1]
     facets = _largest(on, size)
-    facets = facets[_affine_ranks(points, on[:, facets], negligible) >= size - 1]
+    members = on[:, facets].T
+    means = (members @ points) / members.sum(axis=1)[:, None]
+    spans = _ranks(
+        len(means), len(points), lambda one: (points - means[one, None, :]) * members[one, :, None], negligible
+    )
+    facets = facets[spans >= size - 1]
     through = on[:, facets]
     corners = np.flatnonzero(through.sum(axis=1) >= size)
-    corners = corners[_ranks(normals[facets], through[corners].T, negligible) == size]
+    planes, met = normals[facets], through[corners]
+    corners = corners[_ranks(len(met), len(planes), lambda one: planes * met[one, :, None], negligible) == size]
     if len(corners) <= size or len(facets) <= size:
         raise UncertainHullError(f"{len(corners)} vertices and {len(facets)} facets are no polytope in R^{size}")
     if float(through[corners].sum(axis=0).min()) < size:
@@ -249,21 +255,7 @@ def _largest(on: Flags, least: int) -> Places:
     return np.asarray(planes[~beaten.any(axis=1)])
 
 
-def _affine_ranks(points: Floats, groups: Flags, negligible: float) -> Places:
-    """Return the dimension that each group, a column of flags, of points spans."""
-    counts = groups.sum(axis=0)
-    means = (groups.T @ points) / counts[:, None]
-    return _batched(
-        len(means), len(points), lambda one: (points - means[one, None, :]) * groups.T[one, :, None], negligible
-    )
-
-
-def _ranks(rows: Floats, groups: Flags, negligible: float) -> Places:
-    """Return the rank of each group, a column of flags, of rows."""
-    return _batched(groups.shape[1], len(rows), lambda one: rows * groups.T[one, :, None], negligible)
-
-
-def _batched(count: int, height: int, stack: Callable[[slice], Floats], negligible: float) -> Places:
+def _ranks(count: int, height: int, stack: Callable[[slice], Floats], negligible: float) -> Places:
     """Return the ranks of matrices, which are built in batches."""
     size = max(1, _ENTRIES // max(1, height))
     ranks = [np.zeros(0, np.int64)]

@@ -102,7 +102,9 @@ class KeplerTour(Visits):
         nodes = nodes_of(self.targets, order, time_s)
         check_times(self.start_s, nodes.arrive_s, nodes.leave_s)
         with contextlib.suppress(NotSettledError):
-            return self._relinearise(nodes, self._coasting(nodes), rounds=FEW_ROUNDS)
+            start, mu = self.start_state, self.targets.gravitational_parameter_m3_s2
+            coasting = self._reference(nodes, lambda times: coast(np.broadcast_to(start, (len(times), 6)), times, mu))
+            return self._relinearise(nodes, coasting, rounds=FEW_ROUNDS)
         return self.flyer(order)(nodes.arrive_s).settled()
 
     def flyer(self, order: Sequence[int], near: Path | None = None) -> Callable[[Floats], Flown]:
@@ -165,10 +167,6 @@ class KeplerTour(Visits):
 
     def _settled(self, shot: ShotPath) -> Path:
         return self._relinearise(shot.nodes, self._reference(shot.nodes, shot.states))
-
-    def _coasting(self, nodes: Nodes) -> Reference:
-        start, mu = self.start_state, self.targets.gravitational_parameter_m3_s2
-        return self._reference(nodes, lambda times: coast(np.broadcast_to(start, (len(times), 6)), times, mu))
 
     def _reference(self, nodes: Nodes, states: Callable[[Floats], Floats]) -> Reference:
         starts = np.concatenate([[self.start_s], nodes.leave_s[:-1]])

@@ -152,19 +152,17 @@ class Path:
 def solve_segments(motion: LinearMotion, start_s: float, start_state: Floats, nodes: Nodes) -> Path:
     """Find the minimum-energy path of a `motion` from the `start_state` (m, m/s) through `nodes`.
 
+    Unknowns are the velocities at flybys. The cost is the sum of 1/2 |L_k^-1 e_k|^2, e_k = x_k - Phi_k x_(k-1) - d_k,
+    with L_k the Cholesky factor of the Gramian, in states divided by (T, T, T, 1, 1, 1): a least-squares problem whose
+    normal equations are symmetric positive definite with 3 x 3 blocks on three diagonals. In contrast to R13 in the
+    paper's elimination, no inverted block is singular in a well-posed problem. O(N) time and memory.
+
     Raises
     ------
     ValueError
         If times do not increase.
     NotSettledError
         If the numbers overflow, or a Gramian is singular in floating point.
-
-    Notes
-    -----
-    Unknowns are the velocities at flybys. The cost is the sum of 1/2 |L_k^-1 e_k|^2, e_k = x_k - Phi_k x_(k-1) - d_k,
-    with L_k the Cholesky factor of the Gramian, in states divided by (T, T, T, 1, 1, 1): a least-squares problem whose
-    normal equations are symmetric positive definite with 3 x 3 blocks on three diagonals. In contrast to R13 in the
-    paper's elimination, no inverted block is singular in a well-posed problem. O(N) time and memory.
     """
     starts = np.concatenate([[start_s], nodes.leave_s[:-1]])
     durations = nodes.arrive_s - starts

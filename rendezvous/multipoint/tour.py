@@ -183,12 +183,9 @@ def nodes_of(targets: MovingTargets, order: Sequence[int], time_s: ArrayLike) ->
         raise ValueError("a time is not finite")
     rendezvous = np.array([targets.targets[index].meet is Meet.RENDEZVOUS for index in order])
     leave_s = times + targets.dwell_s[which]
-    if not rendezvous.any():  # rates and departures are not used
-        arrive = targets.states(which, times)
-        return Nodes(times, times, arrive, arrive, arrive, arrive, rendezvous)
     if (leave_s == times).all():
         arrive = targets.states(which, times)
-        rate = targets.rates(times, arrive)
+        rate = targets.rates(times, arrive) if rendezvous.any() else arrive  # rates at flybys are not used
         return Nodes(times, times, arrive, arrive, rate, rate, rendezvous)
     both, count = np.concatenate([times, leave_s]), len(times)
     states = targets.states(np.concatenate([which, which]), both)

@@ -67,17 +67,15 @@ def total_impulse(plan: Plan) -> float:
 def check_bound(plan: Plan, greatest_m_s2: float, common: int = 6) -> BoundCheck:
     """Compare a `plan` with a bound u_max on the control; `common` components, 6 or 3 (an intercept), must be met.
 
+    IMPOSSIBLE is certain: the bound is below a lower bound of every control's peak. A bound less than 1e-6 above that
+    counts as possible.
+
     Raises
     ------
     ValueError
         If the bound is not positive and finite.
     NotCertifiedError
         If the least peak is not computed to 1e-6.
-
-    Notes
-    -----
-    IMPOSSIBLE is certain: the bound is below a lower bound of every control's peak. A bound less than 1e-6 above that
-    counts as possible.
     """
     if not (np.isfinite(greatest_m_s2) and greatest_m_s2 > 0.0):
         raise ValueError(f"the bound on the control must be positive and finite, found {greatest_m_s2!r} m/s^2")

@@ -30,7 +30,8 @@ def least_sum_of_costs(solution: EncounterSolution) -> Floats:
     there, which is the minimum if the others' slopes do not outweigh it.
     """
     roots, centres, floors, weights = _parts(solution)
-    size = _size(roots, centres)
+    between = np.einsum("nab,nmb->nma", roots, centres[None] - centres[:, None])
+    size = float(np.sqrt((between**2).sum(axis=-1).max()))
     active = weights > 0.0
 
     def parts(point: Floats) -> tuple[Floats, Floats]:
@@ -117,17 +118,15 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
 
     The norm is that of M, or that of the weighted mean of the M if they differ.
 
+    With one M, or multiples of one, an exact projection onto the convex hull of the ideals; otherwise sequential
+    quadratic programming over the weights from the nearest of many meetings of the set, which finds a local minimum.
+
     Raises
     ------
     ValueError
         If the preferred values are not f finite numbers.
     NotOptimalError
         If the computed point does not satisfy the conditions of the nearest one.
-
-    Notes
-    -----
-    With one M, or multiples of one, an exact projection onto the convex hull of the ideals; otherwise sequential
-    quadratic programming over the weights from the nearest of many meetings of the set, which finds a local minimum.
     """
     preferred = np.asarray(preferred, dtype=np.float64)
     if preferred.shape != solution.point.shape or not np.isfinite(preferred).all():
@@ -227,12 +226,6 @@ def _parts(solution: EncounterSolution) -> tuple[Floats, Floats, Floats, Floats]
     )
 
 
-def _size(roots: Floats, centres: Floats) -> float:
-    """The greatest distance between ideals, in the norms of M."""
-    apart = np.einsum("nab,nmb->nma", roots, centres[None] - centres[:, None])
-    return float(np.sqrt((apart**2).sum(axis=-1).max()))
-
-
 def _bound_craft(
     point: Floats, excess: Callable[[Floats], Floats], slopes: Callable[[Floats], Floats], matrices: Floats
 ) -> Floats:
@@ -264,8 +257,6 @@ def nearest_in_hull(points: Floats, target: Floats) -> Floats:
 
     The weights, shape (n,), are not negative and of sum one; distances are Euclidean.
 
-    Notes
-    -----
     Wolfe (1976): a set of affinely independent points (corral) is extended by the point that is farthest in the
     direction of the target, and points with negative weights in the nearest point of its affine hull are removed. The
     method is finite; in practice it solves a few small least-squares problems.

@@ -42,10 +42,9 @@ class Node:
     `closing` is nu . (v_P - v_E), the rate at which l falls; `regular` says that neither side's extremal has a
     conjugate point.
 
-    The rest is that of Newton's method. `slope`, shape (15,), is d/dT of (pursuer, evader, nu) at l free, of the last
-    guess, so to first order. `correction` is the size of the last step: the remaining error is about its square.
-    `costates`, shape (2, 6), are p at the start, pursuer's and evader's, of the last guess that was linearised.
-    `residual` is the error of the start states of that guess, and of r_E - r_P = l nu at the ends of this extremal.
+    `slope`, shape (15,), is d/dT of (pursuer, evader, nu) at l free, of the last guess, so to first order. `costates`,
+    shape (2, 6), are p at the start, pursuer's and evader's, of the last guess that was linearised. `residual` is the
+    error of the start states of that guess, and of r_E - r_P = l nu at the ends of this extremal.
     """
 
     duration: float
@@ -57,7 +56,6 @@ class Node:
     closing: float
     regular: bool
     slope: Floats
-    correction: float
     costates: Floats
     residual: float
 
@@ -106,7 +104,7 @@ class _Linear:
         step[15], step[16] = dt, dl
         return step
 
-    def node(self, state: Floats, correction: float) -> Node:
+    def node(self, state: Floats) -> Node:
         """Return the extremal that the last step led to."""
         p, e, drift = self.pursuer, self.evader, self.drift[:2]
         hessian = self.plane @ (p.by_nu[:3] - e.by_nu[:3])
@@ -121,7 +119,6 @@ class _Linear:
             closing=float(state[12:15] @ (state[3:6] - state[9:12])),
             regular=p.regular and e.regular,
             slope=np.concatenate([p.by_nu @ drift + p.by_time, e.by_nu @ drift + e.by_time, drift @ self.plane]),
-            correction=correction,
             costates=np.stack([p.costate, e.costate]),
             residual=max(p.residual, e.residual, float(np.abs(apart).max())),
         )
@@ -171,10 +168,12 @@ class Pair:
             if fresh and tolerance >= linear_tolerance:
                 rho = np.concatenate([linear.pursuer.rho, linear.evader.rho])
             else:
-                corrections = self._corrections(linear, state, tolerance)
-                if corrections is None:
+                nu, length = state[12:15], float(state[15])
+                p = self.pursuer.correct(linear.pursuer, state[:6], nu, length, tolerance)
+                e = self.evader.correct(linear.evader, state[6:12], nu, length, tolerance)
+                if p is None or e is None:
                     return None
-                rho = corrections
+                rho = np.concatenate([p, e])
             step = linear.step(rho, state)
             correction = float(np.abs(step).max())
             if not correction < min(_FARTHEST, 4.0 * before):
@@ -184,20 +183,13 @@ class Pair:
             if not 0.0 < state[15] <= latest:
                 return None
             if correction < close:
-                return linear.node(state, correction)
+                return linear.node(state)
             # The first correction only restores the start states: the second may be as great.
             uses = 0 if fresh else uses + 1
             if correction > _NEAR_ENOUGH or (uses > 1 and correction > _FRACTION * before):
                 linear = None
             before = correction
         return None
-
-    def _corrections(self, linear: _Linear, state: Floats, tolerance: float) -> Floats | None:
-        """Newton's corrections of both end states, with derivatives from near by; shape (12,)."""
-        nu, duration = state[12:15], float(state[15])
-        p = self.pursuer.correct(linear.pursuer, state[:6], nu, duration, tolerance)
-        e = self.evader.correct(linear.evader, state[6:12], nu, duration, tolerance)
-        return None if p is None or e is None else np.concatenate([p, e])
 
     def _linearised(self, state: Floats, tolerance: float, time_free: bool) -> _Linear | None:
         nu, duration, distance = state[12:15], float(state[15]), float(state[16])

@@ -160,11 +160,19 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
     pursuer, evader, radius = scaled.pursuer, scaled.evader, scaled.radius
     paths = extremal_paths(pursuer, evader, node)
     drift, least_distance = _along(paths, node)
-    alone, left = _best_answer(pursuer, KnownPath(paths[1].state_at), radius, node.duration, _MOST_WORK)
+    latest = node.duration * _BEYOND
+    alone, conclusive, left = _followed(pursuer, KnownPath(paths[1].state_at), radius, latest, _MOST_WORK)
+    if alone is None and conclusive:
+        alone = node.duration
     deviations: list[Deviation] = []
     for policy in Policy if evader.thrust > 0.0 else ():
-        deviation, left = _deviation(policy, pursuer, evader, radius, node.duration, units.time_s, left)
-        deviations.append(deviation)
+        try:
+            path = steered_path(evader, policy.direction, latest)
+        except PathError:
+            deviations.append(Deviation(policy.value, None, False))
+            continue
+        found, conclusive, left = _followed(pursuer, KnownPath(path.state_at), radius, latest, left)
+        deviations.append(Deviation(policy.value, None if found is None else found * units.time_s, conclusive))
     looked = scan(scaled.pair, node) if all_directions else None
     excess = None
     if looked is not None:
@@ -213,25 +221,6 @@ def _followed(
     if branch.ending is Ending.CAPTURE:
         return branch.last.duration, True, left
     return None, branch.ending is Ending.TIME, left
-
-
-def _best_answer(
-    pursuer: Side, evader: Side, radius: float, duration: float, left: float
-) -> tuple[float | None, float]:
-    """Return the earliest capture, the end of the game if there is none before it, or None if unknown."""
-    capture, conclusive, left = _followed(pursuer, evader, radius, duration * _BEYOND, left)
-    return capture if capture is not None else duration if conclusive else None, left
-
-
-def _deviation(
-    policy: Policy, pursuer: Craft, evader: Craft, radius: float, duration: float, time_s: float, left: float
-) -> tuple[Deviation, float]:
-    try:
-        path = steered_path(evader, policy.direction, duration * _BEYOND)
-    except PathError:
-        return Deviation(policy.value, None, False), left
-    capture, conclusive, left = _followed(pursuer, KnownPath(path.state_at), radius, duration * _BEYOND, left)
-    return Deviation(policy.value, None if capture is None else capture * time_s, conclusive), left
 
 
 def _along(paths: tuple[ExtremalPath, ExtremalPath], node: Node) -> tuple[float, float]:

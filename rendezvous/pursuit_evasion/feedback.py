@@ -14,7 +14,7 @@ from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
 from rendezvous.pursuit_evasion._pair import FINE, Node, Pair
 from rendezvous.pursuit_evasion._side import Craft
 from rendezvous.pursuit_evasion.game import Game
-from rendezvous.pursuit_evasion.paths import ExtremalPath, SteeredPath, extremal_paths, steered_path
+from rendezvous.pursuit_evasion.paths import ExtremalPath, extremal_paths, steered_path
 from rendezvous.pursuit_evasion.solution import Solution
 from rendezvous.pursuit_evasion.solver import solve
 from rendezvous.pursuit_evasion.steering import Steering
@@ -257,18 +257,15 @@ class _Pursuit:
         if self._steering is None:
             path = ExtremalPath(self._evader, own.evader, own.nu, own.duration)
             return (lambda time: path.at(time)[:6]), self._evader.mass - self._evader.flow * spell
-        steered = self._steered(self._evader, self._steering, spell)
-        return (lambda time: np.asarray(steered.solution(time)[:6])), steered.mass_at(spell)
-
-    def _steered(self, craft: Craft, steering: Steering, spell: float) -> SteeredPath:
-        units, begin = self._units, self._time
+        units, begin, steering = self._units, self._time, self._steering
         scale = np.repeat([units.length_m, units.speed_m_s], 3)
-        spent = craft.mass <= self._dry[1] + craft.flow * spell
+        spent = self._evader.mass <= self._dry[1] + self._evader.flow * spell
 
         def direction(time: float, state: Floats) -> Floats:
             return np.zeros(3) if spent else np.asarray(steering((begin + time) * units.time_s, state * scale))
 
-        return steered_path(craft, direction, spell)
+        steered = steered_path(self._evader, direction, spell)
+        return (lambda time: np.asarray(steered.solution(time)[:6])), float(steered.solution(spell)[6])
 
     def _seen(self, plan: Node) -> Craft:
         """Return the evader as the pursuer observes it."""
@@ -298,7 +295,8 @@ class _Pursuit:
         def distance(time: float) -> float:
             return float(np.linalg.norm(pursuer.at(time)[:3] - evader(time)[:3]))
 
-        if not last and min(distance(0.0), distance(spell)) - self._radius > _WIDE * self._drift(spell):
+        drift = spell * float(np.linalg.norm(self._pursuer.start[3:] - self._evader.start[3:]))
+        if not last and min(distance(0.0), distance(spell)) - self._radius > _WIDE * drift:
             return None
         times = np.linspace(0.0, spell, _LOOKS)
         if self._radius > 0.0:
@@ -317,10 +315,6 @@ class _Pursuit:
         at = float(minimize_scalar(distance, bounds=(low, high), method="bounded", options={"xatol": 1e-12}).x)
         ended = Ended.CAPTURED if distance(at) <= self._hit else Ended.MISSED
         return self._flight(ended, self._time + at, distance(at))
-
-    def _drift(self, spell: float) -> float:
-        """Approximate relative displacement of the two in a leg."""
-        return spell * float(np.linalg.norm(self._pursuer.start[3:] - self._evader.start[3:]))
 
     def _end(self, ended: Ended) -> Flight:
         apart = float(np.linalg.norm(self._pursuer.start[:3] - self._evader.start[:3]))

@@ -68,16 +68,14 @@ class Player:
     Its state is in an inertial frame whose z axis is the planet's. A craft with no thrust coasts; one with an infinite
     specific impulse has a constant mass.
 
+    r' = v, v' = g + (T/m) u, m' = -T/c (Wang's slides, "Modelling of the motion"), c the specific impulse times
+    standard gravity: the slides write the former for c.
+
     Raises
     ------
     ValueError
         If position or velocity is not finite, mass or specific impulse not positive, the dry mass negative or not below
         the mass, or the thrust negative.
-
-    Notes
-    -----
-    r' = v, v' = g + (T/m) u, m' = -T/c (Wang's slides, "Modelling of the motion"), c the specific impulse times
-    standard gravity: the slides write the former for c.
     """
 
     position_m: Vector
@@ -117,15 +115,13 @@ class Game:
     `capture_radius_m` is the distance that counts as capture; zero for a point. `longest_s` is the longest duration
     considered; infinite for 15 revolutions of the pursuer.
 
+    Wang's slides, "Modelling of the motion": the payoff is t_f, at which r_P = r_E; the capture radius is ours.
+
     Raises
     ------
     ValueError
         If the pursuer has no thrust, an orbit is not an ellipse or intersects the planet, the distance at the start is
         within the capture radius, or this radius or the longest duration is out of range.
-
-    Notes
-    -----
-    Wang's slides, "Modelling of the motion": the payoff is t_f, at which r_P = r_E; the capture radius is ours.
     """
 
     gravity: Gravity

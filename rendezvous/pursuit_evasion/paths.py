@@ -89,10 +89,6 @@ class SteeredPath:
         state = np.asarray(self.solution(time), dtype=np.float64)
         return state[:6], _rates(time, state, self.craft, self.direction)[3:6]
 
-    def mass_at(self, time: float) -> float:
-        """Return the mass at a time."""
-        return float(self.solution(time)[6])
-
 
 def steered_path(craft: Craft, direction: Direction, duration: float) -> SteeredPath:
     """Return the path of a craft that steers by a rule: full thrust along the direction, or none where that is zero.

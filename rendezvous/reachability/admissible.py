@@ -328,8 +328,6 @@ def _polished(optimum: Optimum, matrix: Floats, vector: Floats, rows: Floats, li
 class Maximiser:
     """Maximise many linear functions over one set of controls, which is not empty.
 
-    Notes
-    -----
     An interior-point method (Clarabel) reuses the factors that depend on the constraints only; the simplex method
     (HiGHS) solves the programs on which it fails. Most constraints on states are never active. If there are many, the
     maximiser starts without them, and adds a constraint at neighbouring times once a solution violates it.

@@ -39,14 +39,12 @@ def discretised(
     A(t), shape (periods, 6, 6), is of states in m and m/s of the `motion`; B(t), shape (periods, 6, 3), is in m and m/s
     for a unit control, of acceleration `acceleration_m_s2`.
 
+    Equation (3). A block exponential for the frozen model, closed forms and quadrature for the other.
+
     Raises
     ------
     ValueError
         If `periods` is less than 1.
-
-    Notes
-    -----
-    Equation (3). A block exponential for the frozen model, closed forms and quadrature for the other.
     """
     if periods < 1:
         raise ValueError("there must be at least one period")

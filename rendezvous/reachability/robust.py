@@ -97,18 +97,16 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
     The `problem`, with thrust in a box, and the `disturbance` are as for `tightened`; w(t) is known from t + 1 on, by
     the state.
 
+    With affine feedback all constraints are linear in (nominal, gains) except for absolute values, each of which needs
+    an additional variable. The result is one linear program (HiGHS) with about T^2 (n + m) q / 2 additional variables,
+    whose solution is checked. It minimises the sum of the greatest terminal states, divided by their bounds.
+
     Raises
     ------
     NoRobustPlanError
         If no plan satisfies the constraints.
     ValueError
         If there are too many periods, or thrust is in a ball.
-
-    Notes
-    -----
-    With affine feedback all constraints are linear in (nominal, gains) except for absolute values, each of which needs
-    an additional variable. The result is one linear program (HiGHS) with about T^2 (n + m) q / 2 additional variables,
-    whose solution is checked. It minimises the sum of the greatest terminal states, divided by their bounds.
     """
     _check(problem, disturbance)
     if problem.thrust is ThrustShape.BALL:

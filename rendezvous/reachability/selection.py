@@ -208,15 +208,13 @@ def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
 def samples(optimal: OptimalControls, count: int, generator: np.random.Generator) -> Floats:
     """Draw `count` random members, at least 1, of the set of `optimal` controls, shape (count, T, m).
 
+    Hit-and-run: for each sample a chain of 20 d steps from the analytic centre; the `generator` draws directions, which
+    are scaled by the Hessian of the barrier. The distribution is uniform in the limit. O(count r d) per step.
+
     Raises
     ------
     ValueError
         If the count is less than 1.
-
-    Notes
-    -----
-    Hit-and-run: for each sample a chain of 20 d steps from the analytic centre; the `generator` draws directions, which
-    are scaled by the Hessian of the barrier. The distribution is uniform in the limit. O(count r d) per step.
     """
     if count < 1:
         raise ValueError(f"at least one sample must be drawn, not {count}")

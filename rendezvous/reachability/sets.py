@@ -170,18 +170,16 @@ class Meter:
 class ExactSets:
     """Sets of a block with all vertices and facets, for thrust in a box and constraints at whole periods only.
 
+    Shorikov and Goranov (2021): G+(t + 1) = (A G+(t) + B U) cut by X; G-(t) = {x in X: A x in G-(t + 1) - B U}, whose
+    half-spaces need no inverse of A; the tube is the intersection of both. Where zero is not reached the tube is a face
+    of G+ that rounding would lose; it is then the image of the vertices of the optimal controls.
+
     Raises
     ------
     TooLargeError
         If the block exceeds the budget of the meter, or a hull is expected to.
     UncertainHullError
         If rounding decides which points are vertices of a set.
-
-    Notes
-    -----
-    Shorikov and Goranov (2021): G+(t + 1) = (A G+(t) + B U) cut by X; G-(t) = {x in X: A x in G-(t + 1) - B U}, whose
-    half-spaces need no inverse of A; the tube is the intersection of both. Where zero is not reached the tube is a face
-    of G+ that rounding would lose; it is then the image of the vertices of the optimal controls.
     """
 
     def __init__(self, optimum: BlockOptimum, meter: Meter) -> None:
