@@ -102,16 +102,12 @@ def relative_interior(
     bounded: bool = False,
     member: Floats | None = None,
 ) -> RelativeInterior:
-    """Return the affine hull of {x: normals x <= offsets, across x = levels}.
+    """Return the affine hull of {x: normals x <= offsets, across x = levels}, of shapes (m, n), (m,), (e, n) and (e,).
 
-    Parameters
-    ----------
-    normals, offsets, across, levels : ndarray
-        Arrays of shapes (m, n), (m,), (e, n) and (e,).
-    bounded : bool
-        Whether the set is known to be bounded, which saves a linear program.
-    member : ndarray, shape (n,), optional
-        A point that is known to be in the set: the rows are relaxed by its rounding.
+    A set that is known to be `bounded` saves a linear program. `member`, shape (n,), is a point that is known to be in
+    the set: the rows are relaxed by its rounding. If the radius of a largest ball is zero, some half-spaces imply
+    equations; linear programs (HiGHS) find the rows that are always tight. A set is flat in a direction in which it is
+    thinner than 1e-9 of its width.
 
     Raises
     ------
@@ -121,11 +117,6 @@ def relative_interior(
         If the set is unbounded.
     UncertainHullError
         If a linear program was not solved.
-
-    Notes
-    -----
-    If the radius of a largest ball is zero, some half-spaces imply equations; linear programs (HiGHS) find the rows
-    that are always tight. A set is flat in a direction in which it is thinner than 1e-9 of its width.
     """
     lengths = np.linalg.norm(normals, axis=1)
     long = lengths > ROUNDING * float(lengths.max(initial=0.0))

@@ -20,32 +20,18 @@ def shadow(
 ) -> Polytope:
     """Return a polytope from its support vectors: a projection of a set that is known only by programs over it.
 
-    Parameters
-    ----------
-    furthest : callable
-        Returns a point of the set furthest along a direction, both of shape (space,).
-    space : int
-        2 or 3; more works but the cost grows fast.
-    tolerance : float
-        Greatest relative distance by which a facet may be inside the set.
-    most_facets : int
-        Limit of the number of facets.
+    `furthest` returns a point of the set furthest along a direction, both of shape (space,). `space` is 2 or 3; more
+    works but the cost grows fast. Vertices of the result are points of the set; the set extends beyond its facets, at
+    most `most_facets`, by no more than the relative `tolerance`.
 
-    Returns
-    -------
-    Polytope
-        Its vertices are points of the set; its facets are supported to within the tolerance.
+    The hull of the points known is enlarged: each facet (and each direction across it, where it is flat) beyond which
+    the set extends gives a new point. It ends when none does, after a program a facet and a vertex: exact, for a
+    polytope.
 
     Raises
     ------
     ArithmeticError
         If it has too many facets.
-
-    Notes
-    -----
-    The hull of the points known is enlarged: each facet (and each direction across it, where it is flat) beyond which
-    the set extends gives a new point. It ends when none does, after a program a facet and a vertex: exact, for a
-    polytope.
     """
     unit = np.eye(space)
     points = np.array([furthest(direction) for direction in np.vstack([unit, -unit])])

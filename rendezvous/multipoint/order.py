@@ -23,23 +23,12 @@ _MARGIN = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class BestOrder:
-    """Targets visited in their best order.
+    """Targets visited in their best `order`, first to last.
 
-    Parameters
-    ----------
-    order : tuple of int
-        Indices of the targets, first to last.
-    objective : float
-        Energy plus the price of the time, m^2/s^3.
-    nodes : int
-        Number of partial orders examined.
-    evaluations : int
-        Number of paths computed.
-    lost : tuple of tuple of int
-        Partial orders that were skipped because no path was found.
-    unfit : int
-        Number of infeasible orders: a stay ends after the time of the next visit, or stays leave no time for travel
-        before the latest time.
+    `objective` is the energy plus the price of the time, m^2/s^3. The search examined `nodes` partial orders and
+    computed `evaluations` paths; partial orders in `lost` were skipped because no path was found. `unfit` is the number
+    of infeasible orders: a stay ends after the time of the next visit, or stays leave no time for travel before the
+    latest time.
     """
 
     order: tuple[int, ...]
@@ -250,8 +239,7 @@ def _checked_count(tour: Visits) -> int:
 
 
 def _orders_without_room(start_s: float, dwell_s: Floats, limits: TimeLimits) -> int:
-    """Count the orders that do not fit before the latest time; this depends on the last target, whose stay may end
-    later.
+    """Count the orders that do not fit before the latest time; the stay with the last target may end later.
 
     Raises
     ------

@@ -184,12 +184,8 @@ def optimise_times(
         Start of the first segment.
     dwell_s : ndarray, shape (N,)
         Duration of the stay with each target.
-    limits : TimeLimits
-        Limits of the times.
     guesses : sequence of ndarray, shape (N,)
         Additional initial times, s; those outside the limits are ignored.
-    effort : Effort
-        Effort of the search; the default is that of a final result.
     enough : float
         Objective, m^2/s^3, below which a descent stops.
     progress : callable or None

@@ -99,22 +99,11 @@ def fly(
     solution: Solution | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Flight:
-    """Simulate a pursuer that computes a new plan at regular times and follows each plan until the next.
+    """Simulate a pursuer that computes a new plan at regular times, `replan_s` apart, and follows each until the next.
 
-    Parameters
-    ----------
-    steering : callable or None
-        Steering of the evader; None is optimal against the true state of the pursuer.
-    replan_s : float, optional
-        Time between plans.
-    observation : Observation or None, optional
-        None observes the evader exactly.
-    seed : int or SeedSequence, optional
-        Seed of the errors of observation.
-    solution : Solution or None, optional
-        Solution of the game, if it is known.
-    progress : callable, optional
-        Called with the fraction of the predicted time that has passed.
+    `steering` is that of the evader; None is optimal against the true state of the pursuer. No `observation` observes
+    the evader exactly; otherwise `seed` is that of its errors. `solution` is that of the game, if it is known.
+    `progress` is called with the fraction of the predicted time that has passed.
 
     Raises
     ------

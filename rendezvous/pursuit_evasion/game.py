@@ -22,25 +22,14 @@ STANDARD_GRAVITY_M_S2 = 9.80665
 class Gravity:
     """Gravity of the planet.
 
-    Parameters
-    ----------
-    parameter_m3_s2 : float
-        Gravitational parameter.
-    planet_radius_m : float
-        Least allowed distance from the centre; zero for no limit.
-    j2 : float
-        Second zonal harmonic, about the z axis; zero for a sphere.
-    equatorial_radius_m : float
-        Radius that J2 refers to.
+    `planet_radius_m` is the least allowed distance from the centre; zero for no limit. `j2` is the second zonal
+    harmonic, about the z axis, which refers to `equatorial_radius_m`; zero for a sphere. J2 is not in the slides:
+    without it gravity is that of their first equation, -mu r / |r|^3.
 
     Raises
     ------
     ValueError
         If the gravitational parameter is not positive, a radius negative, J2 not small, or without its radius.
-
-    Notes
-    -----
-    J2 is not in the slides: without it gravity is that of their first equation, -mu r / |r|^3.
     """
 
     parameter_m3_s2: float

@@ -79,17 +79,10 @@ def capture_map(
 ) -> CaptureMap:
     """Solve a game at each point of a grid of `columns`, shape (nx,), and `rows`, shape (ny,).
 
-    Parameters
-    ----------
-    game_at : callable
-        Function of a column's and a row's value that returns the game; it raises ValueError if there is no game.
-    follow_all : bool, optional
-        Whether to solve all points from scratch, with a change of branch at folds: 20 ms to seconds per point.
-    progress : callable, optional
-        Called with the fraction done.
+    `game_at` returns the game of a column's and a row's value, and raises ValueError if there is no game. `follow_all`
+    solves all points from scratch, with a change of branch at folds: 20 ms to seconds per point. `progress` is called
+    with the fraction done.
 
-    Notes
-    -----
     In a row a point is computed from the three previous points, in 1 to 2 ms. One point in 50 is solved from scratch,
     and also the last point before a new start of the row, and points whose time differs from the extrapolation of the
     previous rows. If a result differs from the previous one, the neighbours are also solved from scratch, and their

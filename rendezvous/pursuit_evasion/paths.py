@@ -136,15 +136,9 @@ def _rates(time: float, state: Floats, craft: Craft, direction: Direction) -> Fl
 class PlayerHistory:
     """One player at n times, in the inertial frame; vectors have shape (n, 3).
 
-    Parameters
-    ----------
-    mass_kg : ndarray, shape (n,)
-        Mass with propellant.
-    thrust_direction : ndarray, shape (n, 3)
-        Unit vectors; zero for a craft without thrust.
-    switching : ndarray, shape (n,)
-        |lambda_v| / m - k lambda_m / c over its value at the start: full thrust is optimal while it is positive. It is
-        the factor of k T in the Hamiltonian of Wang's slides, "Optimal control".
+    `thrust_direction` has unit vectors; zero for a craft without thrust. `switching`, shape (n,), is |lambda_v| / m - k
+    lambda_m / c over its value at the start: full thrust is optimal while it is positive. It is the factor of k T in
+    the Hamiltonian of Wang's slides, "Optimal control".
     """
 
     position_m: Floats

@@ -74,16 +74,12 @@ class Capture:
     closing_speed_m_s : float
         Speed at which the distance falls.
     curvature : ndarray, shape (2,)
-        Eigenvalues of the Hessian of h_P - h_E on the plane normal to nu, in units of length, ascending.
+        Eigenvalues of the Hessian of h_P - h_E on the plane normal to nu, in units of length, ascending; not from the
+        slides.
     residual : float
         Error of the start states and of r_E - r_P = R nu, in units of length and speed: below 1e-9.
     extremal : Node
         The extremal, nondimensional; an initial guess for similar games.
-
-    Notes
-    -----
-    The conditions at the end of Wang's slides, "Optimal control", after Shen and Casalino (2018); the curvature is not
-    from there.
     """
 
     time_s: float
@@ -106,20 +102,10 @@ class Capture:
 class Solution:
     """A game with its verdict; `units` are those of nondimensional values.
 
-    Parameters
-    ----------
-    capture : Capture or None
-        Capture, if the verdict is `captured`.
-    route : Route
-        Continuation, with or without a change of branch.
-    curve : DistanceCurve
-        Distances along the branch.
-    looked_at_s : float
-        Longest duration that was solved.
-    exhausted : str or None
-        Player without propellant at that time: pursuer or evader.
-    fallback : Capture or None
-        Capture by another route, which is not claimed to be the first one, if the branch is not certified.
+    There is a `capture` if the verdict is `captured`. `curve` contains the distances along the branch, and
+    `looked_at_s` is the longest duration that was solved; `exhausted` is the player without propellant at that time,
+    pursuer or evader. If the branch is not certified, `fallback` is a capture by another route, which is not claimed to
+    be the first one.
     """
 
     game: Game

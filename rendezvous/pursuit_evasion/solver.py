@@ -32,12 +32,8 @@ _LONGEST = 40.0
 def solve(game: Game, *, change_branch: bool = True, all_directions: bool = False) -> Solution:
     """Solve a game without a guess.
 
-    Parameters
-    ----------
-    change_branch : bool, optional
-        Whether to search for another branch at a fold; each search takes seconds.
-    all_directions : bool, optional
-        Whether to search also at the capture for a branch that keeps the evader farther away.
+    `change_branch` searches for another branch at a fold; each search takes seconds. `all_directions` searches also at
+    the capture for a branch that keeps the evader farther away.
 
     Notes
     -----

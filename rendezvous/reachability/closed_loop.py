@@ -47,18 +47,11 @@ def replan(
 ) -> Flight:
     """Simulate a problem in closed loop: in every period apply the first control of the optimal plan of least energy.
 
-    Parameters
-    ----------
-    truth : callable
-        Function of the period, the true state and the control that returns the true state one period later.
-    observe : callable or None
-        Function of the period and the true state that returns the estimated state; None for exact estimates.
-    relative : bool
-        Norm that plans minimise if they cannot reach zero, for example in the last period: True for states divided by
-        their bounds, False for the units of the problem.
+    `truth` returns the true state one period later from the period, the true state and the control; `observe` returns
+    the estimated state from the period and the true state, and is None for exact estimates. If a plan cannot reach
+    zero, for example in the last period, it minimises the norm of the states in the units of the problem, or divided by
+    their bounds if `relative`.
 
-    Notes
-    -----
     T optima and T quadratic programs. If no control satisfies the constraints from a state, all of them are relaxed by
     the least sufficient fraction.
     """

@@ -134,13 +134,8 @@ def optimal_controls(problem: ReachabilityProblem, *, relative: bool = False) ->
 def solve(problem: ReachabilityProblem, route: Route | None = None, budget: Budget | None = None) -> Solution:
     """Compute the least terminal norm, all controls that attain it, and the forward sets and tube.
 
-    Parameters
-    ----------
-    route : Route or None
-        None selects the exact route if blocks are small, thrust is in a box, constraints apply at whole periods only
-        and the expected cost is within the budget; otherwise the lifted route.
-    budget : Budget or None
-        Limits of the exact route.
+    No `route` selects the exact route if blocks are small, thrust is in a box, constraints apply at whole periods only
+    and the expected cost is within the `budget`; otherwise the lifted route.
 
     Raises
     ------
