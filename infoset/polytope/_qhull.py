@@ -11,8 +11,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError, cKDTree
 
-from infoset.polytope._affine_hull import FLAT, Frame, chebyshev_ball, frame_of, relative_interior
-from infoset.polytope.errors import UncertainHullError
+from infoset.polytope._affine_hull import FLAT, Frame, UncertainHullError, chebyshev_ball, frame_of, relative_interior
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

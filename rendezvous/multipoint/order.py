@@ -64,7 +64,7 @@ def best_order(
     unfit = _orders_without_room(tour.start_s, dwell, limits)
     horizon = limits.latest_s
 
-    def solve(order: tuple[int, ...], warm: Sequence[Floats], careful: bool) -> tuple[float, Flown, int]:
+    def solve(order: tuple[int, ...], warm: Sequence[Floats], careful: bool) -> tuple[float, Flown]:
         complete, held, enough = len(order) == count, limits, -np.inf
         if not complete:
             if horizon is not None:
@@ -80,7 +80,8 @@ def best_order(
         times = optimise_times(
             tour.flyer(order), tour.start_s, dwell[list(order)], held, begins, effort=effort, enough=enough
         )
-        return times.objective, times.flown, times.evaluations
+        search.evaluations += times.evaluations
+        return times.objective, times.flown
 
     # A local minimum of a partial order is no bound; divided by the slack, it is used as one.
     slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0 / (1.0 - _MARGIN)
@@ -121,9 +122,10 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
     if isinstance(tour, Tour) and all(target.meet is Meet.RENDEZVOUS for target in tour.targets.targets):
         return _by_dynamic_programming(tour, times, fits, unfit)
 
-    def solve(order: tuple[int, ...], _warm: Sequence[Floats], _careful: bool) -> tuple[float, Flown, int]:
+    def solve(order: tuple[int, ...], _warm: Sequence[Floats], _careful: bool) -> tuple[float, Flown]:
         flown = tour.flyer(order)(times[: len(order)])
-        return flown.cost, flown, 1
+        search.evaluations += 1
+        return flown.cost, flown
 
     slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0
     search = _Search(solve, count, progress, tour.start_s, None, slack, looks_twice=False, fits=fits)
@@ -148,7 +150,7 @@ def best_times(
 class _Search:
     """A depth-first search through partial orders."""
 
-    solve: Callable[[tuple[int, ...], Sequence[Floats], bool], tuple[float, Flown, int]]
+    solve: Callable[[tuple[int, ...], Sequence[Floats], bool], tuple[float, Flown]]
     count: int
     progress: Report | None
     start_s: float
@@ -180,7 +182,7 @@ class _Search:
                 continue
             self.nodes += 1
             try:
-                objective, path = self._look(order, self._warm(before), careful=False)
+                objective, path = self.solve(order, self._warm(before), False)
             except NoRoomError:
                 self._done(order)
             except NotSettledError:
@@ -194,7 +196,7 @@ class _Search:
             if self.looks_twice and (complete or objective >= self.slack * self.best_objective):
                 # This is a local minimum: try more starts before an order is accepted, or a partial order is dropped.
                 with suppress(NotSettledError):
-                    again, other = self._look(order, [path.nodes.arrive_s], careful=True)
+                    again, other = self.solve(order, [path.nodes.arrive_s], True)
                     if again < objective:
                         lowest, best_path = again, other
             if complete:
@@ -205,11 +207,6 @@ class _Search:
                 self._branch(order, best_path)
             else:
                 self._done(order)
-
-    def _look(self, order: tuple[int, ...], warm: Sequence[Floats], careful: bool) -> tuple[float, Flown]:
-        objective, path, evaluations = self.solve(order, warm, careful)
-        self.evaluations += evaluations
-        return objective, path
 
     def _done(self, order: tuple[int, ...]) -> None:
         self.decided += factorial(self.count - len(order))

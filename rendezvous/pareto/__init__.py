@@ -18,12 +18,13 @@ from rendezvous.pareto.front import (
     pareto_set,
     simplex_weights,
 )
-from rendezvous.pareto.plan import Plan, PlanSamples
 from rendezvous.pareto.selections import NotOptimalError, least_greatest_excess, least_sum_of_costs, nearest_to
 from rendezvous.pareto.solution import (
     CraftCost,
     DurationSweep,
     EncounterSolution,
+    Plan,
+    PlanSamples,
     solve_encounter,
     sweep_meeting_time,
     weighted_point,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
 from rendezvous._arrays import Floats, Integers
-from rendezvous.pareto.plan import Plan
+from rendezvous.pareto.solution import Plan
 from rendezvous.piecewise import NODES, chebyshev_halves, greatest_control, resolve
 
 _IMPULSE = 1e-10

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rendezvous._arrays import Floats
-from rendezvous.pursuit_evasion._pair import COARSE, ROUGH, Node, Pair
-from rendezvous.pursuit_evasion._side import Response, Side, across
+from rendezvous.pursuit_evasion._pair import COARSE, ROUGH, Node, Pair, Response, Side, across
 
 _DIRECTIONS = 120
 _SEEDS, _MOST_PARTS = 2, 4

@@ -14,11 +14,10 @@ from scipy.integrate import solve_ivp
 
 from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
-from rendezvous.pursuit_evasion._pair import MOST_RESIDUAL, Node, Pair
+from rendezvous.pursuit_evasion._pair import MOST_RESIDUAL, Craft, KnownPath, Node, Pair, Side
 from rendezvous.pursuit_evasion._scan import greater, scan
-from rendezvous.pursuit_evasion._side import Craft, KnownPath, Side
 from rendezvous.pursuit_evasion.paths import ExtremalPath, PathError, extremal_paths, steered_path
-from rendezvous.pursuit_evasion.solution import Capture, Solution
+from rendezvous.pursuit_evasion.solution import Solution
 from rendezvous.pursuit_evasion.steering import Policy
 from rendezvous.pursuit_evasion.units import scaled_game
 
@@ -174,6 +173,7 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
         found, conclusive, left = _followed(pursuer, KnownPath(path.state_at), radius, latest, left)
         deviations.append(Deviation(policy.value, None if found is None else found * units.time_s, conclusive))
     looked = scan(scaled.pair, node) if all_directions else None
+    earlier_m = solution.curve.distance_m[solution.curve.duration_s < capture.time_s * (1.0 - 1e-9)]
     excess = None
     if looked is not None:
         excess = max([float(looked.distance.max(initial=-np.inf)), *(peak.distance for peak in looked.maxima)]) - radius
@@ -184,7 +184,7 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
         closing_speed_m_s=capture.closing_speed_m_s,
         least_curvature=float(node.curvature[0] + node.distance),
         no_conjugate_point=node.regular,
-        no_earlier_capture=_stayed_above(solution, capture),
+        no_earlier_capture=bool(len(earlier_m)) and bool((earlier_m > game.capture_radius_m).all()),
         least_distance_m=least_distance * units.length_m,
         above_the_planet=least_distance * units.length_m > game.gravity.planet_radius_m,
         pursuer_alone_s=None if alone is None else alone * units.time_s,
@@ -195,11 +195,6 @@ def certify(solution: Solution, *, all_directions: bool = False) -> Certificate:
         greatest_excess_m=None if excess is None or not np.isfinite(excess) else float(excess) * units.length_m,
         unit_length_m=units.length_m,
     )
-
-
-def _stayed_above(solution: Solution, capture: Capture) -> bool:
-    before = solution.curve.duration_s < capture.time_s * (1.0 - 1e-9)
-    return bool(before.any()) and bool((solution.curve.distance_m[before] > solution.game.capture_radius_m).all())
 
 
 def _followed(

@@ -11,8 +11,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
-from rendezvous.pursuit_evasion._pair import FINE, Node, Pair
-from rendezvous.pursuit_evasion._side import Craft
+from rendezvous.pursuit_evasion._pair import FINE, Craft, Node, Pair
 from rendezvous.pursuit_evasion.game import Game
 from rendezvous.pursuit_evasion.paths import ExtremalPath, extremal_paths, steered_path
 from rendezvous.pursuit_evasion.solution import Solution

@@ -10,8 +10,7 @@ from scipy.integrate import solve_ivp
 
 from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._extremal import STATES, flow_back, rate
-from rendezvous.pursuit_evasion._pair import FINE, Node
-from rendezvous.pursuit_evasion._side import Craft
+from rendezvous.pursuit_evasion._pair import FINE, Craft, Node
 from rendezvous.pursuit_evasion.solution import Solution
 from rendezvous.pursuit_evasion.units import Units, scaled_game
 

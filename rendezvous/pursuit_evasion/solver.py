@@ -12,9 +12,8 @@ import numpy as np
 from rendezvous._arrays import Floats
 from rendezvous.linear_game import LinearGameError, circular_orbit_capture
 from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow, polish
-from rendezvous.pursuit_evasion._pair import COARSE, Node
+from rendezvous.pursuit_evasion._pair import COARSE, Craft, Node, across
 from rendezvous.pursuit_evasion._scan import greater
-from rendezvous.pursuit_evasion._side import Craft, across
 from rendezvous.pursuit_evasion.game import Game, Player
 from rendezvous.pursuit_evasion.paths import orbital_axes, steered_path
 from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
@@ -86,12 +85,9 @@ def solve_near(game: Game, units: Units, guess: Node) -> Capture | None:
     Returns a local saddle, or None if Newton's method finds none whose residual is below 1e-9. Earlier captures are not
     excluded.
     """
-    node = _near(scaled_game(game, units), guess)
+    scaled = scaled_game(game, units)
+    node = _polished(scaled, guess.vector, guess.duration, scaled.radius)
     return None if node is None else _capture(game, units, node)
-
-
-def _near(scaled: ScaledGame, guess: Node) -> Node | None:
-    return _polished(scaled, guess.vector, guess.duration, scaled.radius)
 
 
 def _polished(scaled: ScaledGame, guess: Floats, duration: float, radius: float) -> Node | None:
@@ -162,7 +158,8 @@ def solve_by_homotopy(game: Game) -> Capture | None:
     done, step = 0.0, _THRUST_STEP
     while done < 1.0 and step > _LEAST_THRUST_STEP:
         to = min(1.0, done + step)
-        raised = _near(scaled_game(_with_thrust(game, to), units), node)
+        scaled = scaled_game(_with_thrust(game, to), units)
+        raised = _polished(scaled, node.vector, node.duration, scaled.radius)
         if raised is None:
             step *= 0.5
             continue

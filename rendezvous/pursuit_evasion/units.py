@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rendezvous._arrays import Floats
-from rendezvous.pursuit_evasion._pair import Pair
-from rendezvous.pursuit_evasion._side import Craft
+from rendezvous.pursuit_evasion._pair import Craft, Pair
 from rendezvous.pursuit_evasion.game import Game, Gravity, Player
 from rendezvous.two_body import semi_major_axis_m
 

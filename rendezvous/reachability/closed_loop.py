@@ -87,15 +87,11 @@ def _plan(problem: ReachabilityProblem, start: int, estimated: Floats, relative:
             return optimal_controls(wider.rest(start, estimated), relative=relative), fraction
         except InadmissibleStartError as error:
             missing = max(excess for _, excess in error.broken) / min([*problem.state_bounds, *_sizes(problem)])
-            fraction = max(2.0 * fraction, min(missing, _worst(problem, start, estimated)) * _MORE, _LEAST_RELAXATION)
+            normals, offsets = problem.further
+            beyond = ((normals @ estimated - offsets[start]) / _sizes(problem)).max(initial=-np.inf)
+            worst = max(float((np.abs(estimated) / problem.state_bounds).max()) - 1.0, float(beyond))
+            fraction = max(2.0 * fraction, min(missing, worst) * _MORE, _LEAST_RELAXATION)
         except EmptyTubeError as error:
             fraction = (fraction + error.relaxation * (1.0 + fraction)) * _MORE + _LEAST_RELAXATION
         if fraction > _MOST_RELAXATION:
             raise ArithmeticError(f"no plan from period {start}: the state is far outside the constraints")
-
-
-def _worst(problem: ReachabilityProblem, time: int, state: Floats) -> float:
-    """Return the fraction by which constraints must be relaxed to be satisfied at a state."""
-    normals, offsets = problem.further
-    beyond = (normals @ state - offsets[time]) / _sizes(problem)
-    return max(float((np.abs(state) / problem.state_bounds).max()) - 1.0, float(beyond.max(initial=-np.inf)))

@@ -206,14 +206,10 @@ class _Program:
             gains[t, s] = solution[start : start + block].reshape(self.group, self.width) * reach[:, None]
         centre = problem.run(nominal)
         # Effect of w(s) at t, directly and through the controls.
-        total = self.effect.copy()
-        for s in range(self.periods):
-            state = np.zeros((self.states, self.width))
-            for t in range(self.periods):
-                state = problem.transition[t] @ state + problem.control[t] @ gains[t, s]
-                if t == s:
-                    state = state + self.disturbance[s]
-                total[t + 1, s] = state
+        total = np.zeros_like(self.effect)
+        for t in range(self.periods):
+            total[t + 1] = problem.transition[t] @ total[t] + problem.control[t] @ gains[t]
+            total[t + 1, t] += self.disturbance[t]
         spread = np.abs(total).sum(axis=(1, 3))
         return FeedbackPlan(problem, self.disturbance, nominal, gains, centre - spread, centre + spread)
 

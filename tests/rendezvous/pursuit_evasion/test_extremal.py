@@ -14,7 +14,7 @@ from rendezvous.pursuit_evasion._extremal import (
     shoot_back,
     shoot_state_back,
 )
-from rendezvous.pursuit_evasion._side import across
+from rendezvous.pursuit_evasion._pair import across
 
 Floats = NDArray[np.float64]
 PLACE = st.floats(-1.5, 1.5)
