@@ -90,7 +90,8 @@ def capture_map(
     """
     grid = _Grid(game_at, np.asarray(columns, dtype=np.float64), np.asarray(rows, dtype=np.float64))
     for j in range(len(rows)):
-        points, wrong = _row(grid.games(j), follow_all, int(_GOLDEN * CHECKED_EVERY * j))
+        games = [grid.game(j, i) for i in range(len(columns))]
+        points, wrong = _row(games, follow_all, int(_GOLDEN * CHECKED_EVERY * j))
         for i, point in enumerate(points):
             grid.put(j, i, point)
         about_wrong = [point for i in wrong for point in grid.about(j, i)]
@@ -116,9 +117,6 @@ class _Grid:
             return self._game_at(float(self._columns[i]), float(self._rows[j]))
         except ValueError:
             return None
-
-    def games(self, j: int) -> list[Game | None]:
-        return [self.game(j, i) for i in range(len(self._columns))]
 
     def put(self, j: int, i: int, point: _Point) -> None:
         self._afresh += point.status is not PointStatus.NEIGHBOUR
@@ -197,12 +195,8 @@ def _from_nothing(game: Game | None, change_branch: bool) -> _Point:
     solution = solve(game, change_branch=change_branch)
     if solution.capture is not None and solution.verdict is Verdict.CAPTURED:
         return _Point(PointStatus.FOLLOWED, solution.units, solution.capture.extremal)
-    return _Point(
-        {
-            Verdict.ESCAPES: PointStatus.ESCAPES,
-            Verdict.PROPELLANT_EXHAUSTED: PointStatus.PROPELLANT_EXHAUSTED,
-        }.get(solution.verdict, PointStatus.NOT_CERTIFIED)
-    )
+    is_over = solution.verdict in (Verdict.ESCAPES, Verdict.PROPELLANT_EXHAUSTED)
+    return _Point(PointStatus(solution.verdict.value) if is_over else PointStatus.NOT_CERTIFIED)
 
 
 def _seeded(game: Game, points: list[_Point]) -> _Point | None:
