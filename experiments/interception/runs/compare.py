@@ -20,11 +20,11 @@ from experiments.common.screen import (
 )
 from experiments.interception.choices import chosen_strategies, scenario_with, study_scenario
 from experiments.interception.commands.compare import Compare
-from experiments.interception.comparison import QUANTILES, Comparison, flights, gather, summary
+from experiments.interception.comparison import QUANTILES, Comparison, Flight, flights, gather, summary
 from experiments.interception.figures.comparison import draw_comparison
 from experiments.interception.runs.shared import Progress, simulate_in_threads, summary_head
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
-from guidance import NoiseKind, Strategy, TieRule
+from guidance import NoiseKind, Strategy
 from sim import Scenario
 
 FIGURE = "figure-comparison"
@@ -71,18 +71,18 @@ def _simulate(
     reports: Mapping[str, Progress],
 ) -> list[Comparison]:
     wanted = flights(scenario, strategies)
-    done: dict[str, dict[TieRule | None, float]] = {name: dict.fromkeys((None, *TieRule), 0.0) for name in strategies}
+    done = dict.fromkeys(wanted, 0.0)
 
-    def progress_of(name: str, tie: TieRule | None) -> Progress:
+    def progress_of(flight: Flight) -> Progress:
         def progress(share: float) -> None:
-            done[name][tie] = share
-            reports[name](sum(done[name].values()) / len(done[name]))
+            done[flight] = share
+            shares = [each for (name, _), each in done.items() if name == flight[0]]
+            reports[flight[0]](sum(shares) / len(shares))
 
         return progress
 
-    jobs = [(flown, strategies[name], progress_of(name, tie)) for name, tie, flown in wanted]
-    results = simulate_in_threads(jobs, runs, seed)
-    return gather([(name, tie, result) for (name, tie, _), result in zip(wanted, results, strict=True)])
+    jobs = [(flown, strategies[flight[0]], progress_of(flight)) for flight, flown in wanted.items()]
+    return gather(dict(zip(wanted, simulate_in_threads(jobs, runs, seed), strict=True)))
 
 
 def _summary(comparison: Comparison) -> dict[str, object]:

@@ -10,7 +10,7 @@ from experiments.interception.figures.animation import GIF, MP4, animate, animat
 from experiments.interception.page import MOST_RECORDS, interception_page
 from experiments.interception.record_file import load_record
 from experiments.interception.runs.engagement_table import FIGURE_2, FIGURE_3, draw_engagements, show_engagements
-from experiments.interception.terminal.engagement import play
+from experiments.interception.terminal import play
 
 
 def run(options: Replay) -> None:

@@ -179,7 +179,7 @@ def test_interrupted(infoset: Infoset, monkeypatch: pytest.MonkeyPatch, tmp_path
 @pytest.fixture(scope="module")
 def compared(brief: Scenario) -> list[Comparison]:
     strategies = dict.fromkeys(["symmetric-miss", "patient"])
-    return gather([(name, tie, simulate(flown, 6)) for name, tie, flown in flights(brief, strategies)])
+    return gather({flight: simulate(flown, 6) for flight, flown in flights(brief, strategies).items()})
 
 
 def axes_of(figure: Figure) -> dict[str, Any]:

@@ -18,8 +18,7 @@ from experiments.interception.figures.animation import GIF, MP4, animate
 from experiments.interception.page import interception_page
 from experiments.interception.record_file import write_record
 from experiments.interception.scenario_file import load_scenario
-from experiments.interception.terminal.dots import Dots
-from experiments.interception.terminal.engagement import MOMENTS_IN_PRINT, frame, play
+from experiments.interception.terminal import MOMENTS_IN_PRINT, Dots, frame, play
 from sim import Record, fly_one
 
 

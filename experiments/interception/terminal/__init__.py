@@ -1,1 +1,0 @@
-"""Pictures of an engagement in a terminal."""
