@@ -17,7 +17,7 @@ from guidance import Strategy
 from infoset.limits import COUNT, WHOLE, Limits
 from sim.chunk import CampaignNoise, Chunk, chunk_size
 from sim.flights import fly_on, fly_on_threads
-from sim.requirement import Requirement
+from sim.requirement import AnyRequirement
 from sim.scenario import Scenario, strategy_name
 from sim.statistics import QuantileEstimate, estimate_quantiles
 from sim.stopping_rule import StoppingRule, Watch
@@ -123,7 +123,7 @@ class Campaign:
         Whether the guaranteed model computes the guaranteed miss Phi, which doubles the run time.
     chunk : int or None
         Engagements per shard; results do not depend on it. None chooses a value for the number of runs.
-    until : StoppingRule, Requirement or None
+    until : StoppingRule, Requirement, HitRequirement or None
         A campaign stops at the end of a shard once this rule is met; a cell of a sweep, once this requirement is
         decided.
     axes : tuple of Axis
@@ -147,7 +147,7 @@ class Campaign:
     strategy: Strategy | None = None
     guarantee: bool = True
     chunk: int | None = None
-    until: StoppingRule | Requirement | None = None
+    until: StoppingRule | AnyRequirement | None = None
     axes: tuple[Axis, ...] = ()
     cells: tuple[Scenario, ...] = ()
     most_runs: int | None = None
@@ -158,7 +158,7 @@ class Campaign:
                 limits.need(name, getattr(self, name))
         if len(self.cells) != (math.prod(len(axis.values) for axis in self.axes) if self.axes else 0):
             raise ValueError("a sweep needs at least one axis, and a scenario for each combination of their values")
-        if self.until is not None and isinstance(self.until, Requirement) != bool(self.axes):
+        if self.until is not None and isinstance(self.until, AnyRequirement) != bool(self.axes):
             raise ValueError("until must be a stopping rule of a campaign, or a requirement of a sweep")
         if self.most_runs is not None:
             Limits(least=self.runs, whole=True).need("most_runs", self.most_runs)
@@ -278,7 +278,7 @@ class Campaign:
             return
         missing = [index for index in range(manifest.chunks) if index not in folder.finished]
         cells = None
-        if isinstance(self.until, Requirement):
+        if isinstance(self.until, AnyRequirement):
             cells = UndecidedCells(folder, self.until, [kind.value for kind in self._noise.kinds], self.runs)
         done = self.engagements - sum(len(manifest.runs_of(index)[1]) for index in missing)
         stored = 0
@@ -362,7 +362,7 @@ class Sweep(Campaign):
         guarantee: bool = False,
         chunk: int | None = None,
         strategy: Strategy | None = None,
-        until: Requirement | None = None,
+        until: AnyRequirement | None = None,
         most_runs: int | None = None,
     ) -> None:
         if not axes:

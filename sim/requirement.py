@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
@@ -10,7 +11,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from infoset.limits import Positive, check_fields
+from infoset.limits import Fraction, Positive, check_fields
 from sim.stopping_rule import NUMBER, QuantileName, parse_quantile
 
 Floats = NDArray[np.float64]
@@ -20,6 +21,9 @@ CONFIDENCE = 0.95
 MOST_RUNS_NEEDED = 1_000_000
 """Greatest number of runs that `Verdict.runs_needed` names."""
 _TAIL = 0.5 * (1.0 - CONFIDENCE)
+_HIT = re.compile(rf"\s*hit\s*>=?{NUMBER}")
+_STEPS = 50
+"""Steps of bisection for an end of an interval."""
 
 
 class Decision(Enum):
@@ -65,8 +69,13 @@ class Requirement:
     @classmethod
     def parse(cls, text: str) -> Requirement:
         """Read `miss_m p99<10`; raise ValueError for any other text."""
-        example = 'a quantity, a quantile and a bound, for example "miss_m p99<10"'
+        example = 'a quantity, a quantile and a bound, for example "miss_m p99<10", or "hit>=0.95"'
         return cls(*parse_quantile(text, f"<{NUMBER}", example, "the bound"))
+
+    @property
+    def name(self) -> str:
+        """Name of what is bounded."""
+        return str(self.quantile)
 
     @property
     def share(self) -> float:
@@ -79,8 +88,66 @@ class Requirement:
         return self.quantile.quantity
 
     def holds(self, values: Floats) -> NDArray[np.bool_]:
-        """Return for each value whether it is below the bound."""
+        """Return for each of the quantity's `values` whether it is below the bound."""
         return np.asarray(values < self.bound)
+
+
+@dataclass(frozen=True)
+class HitRequirement:
+    """A lower bound of the probability of a hit, written `hit>=0.95`.
+
+    Parameters
+    ----------
+    share : float
+        Least share of the runs that hit, between 0 and 1.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the share is not between 0 and 1.
+    """
+
+    share: Fraction
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def __str__(self) -> str:
+        return f"hit>={self.share:g}"
+
+    @property
+    def name(self) -> str:
+        """Name of what is bounded."""
+        return self.quantity
+
+    @property
+    def quantity(self) -> str:
+        """Column of the results that it uses."""
+        return "hit"
+
+    @property
+    def bound(self) -> float:
+        """Bound of the probability."""
+        return self.share
+
+    def holds(self, values: Floats) -> NDArray[np.bool_]:
+        """Return for each of the `values` of the column, 0 or 1, whether the run hits."""
+        return np.asarray(values > 0.0)
+
+
+AnyRequirement = Requirement | HitRequirement
+
+
+def parse_requirement(text: str) -> AnyRequirement:
+    """Read `miss_m p99<10` or `hit>=0.95`, which may be written `hit>0.95`.
+
+    Raises
+    ------
+    ValueError
+        If the text has another form, or a number is out of its range.
+    """
+    match = _HIT.fullmatch(text[:100])
+    return Requirement.parse(text) if match is None else HitRequirement(float(match["number"]))
 
 
 @dataclass(frozen=True)
@@ -94,7 +161,7 @@ class Verdict:
     runs : int
         Size of the sample.
     value : float
-        The required quantile of the sample, in its unit.
+        The required quantile of the sample, in its unit, or the share of hits.
     lower, upper : float or None
         Ends of its 95 % confidence interval; None if the sample is too small to bound that side.
     runs_needed : int or None
@@ -109,7 +176,7 @@ class Verdict:
     runs_needed: int | None
 
 
-def judge(values: Floats, requirement: Requirement, *, watched: bool) -> Verdict:
+def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verdict:
     """Return whether a sample meets a requirement, with 95 % confidence.
 
     Parameters
@@ -140,34 +207,54 @@ def judge(values: Floats, requirement: Requirement, *, watched: bool) -> Verdict
     size, share = values.size, requirement.share
     holding = np.cumsum(requirement.holds(values))
     fewest_met, most_missed = critical_counts(size, share, watched=watched)
-    ends = _quantile_ends(values, int(fewest_met[-1]), int(most_missed[-1]))
+    value: float
+    lower: float | None
+    upper: float | None
+    if isinstance(requirement, Requirement):
+        value = float(np.quantile(values, share))
+        lower, upper = _quantile_interval(values, int(fewest_met[-1]), int(most_missed[-1]))
+    else:
+        value = int(holding[-1]) / size
+        lower, upper = share_interval(int(holding[-1]), size, watched=watched)
     looks = slice(None) if watched else slice(-1, None)
     met, missed = holding[looks] >= fewest_met[looks], holding[looks] <= most_missed[looks]
     decided = np.flatnonzero(met | missed)
-    decision = Decision.UNDECIDED
-    if decided.size:
-        decision = Decision.MET if met[decided[0]] else Decision.NOT_MET
-        # A decision at an earlier run stays valid, although the last interval may contain the bound again.
-        ends = _beyond(ends, requirement.bound, decision)
-    needed = size if decided.size else runs_needed(int(holding[-1]), size, share, watched=watched)
-    return Verdict(decision, size, float(np.quantile(values, share)), *ends, needed)
+    if not decided.size:
+        needed = runs_needed(int(holding[-1]), size, share, watched=watched)
+        return Verdict(Decision.UNDECIDED, size, value, lower, upper, needed)
+    decision = Decision.MET if met[decided[0]] else Decision.NOT_MET
+    # A decision at an earlier run stays valid, although the last interval may contain the bound again.
+    if (decision is Decision.MET) == isinstance(requirement, Requirement):
+        upper = requirement.bound if upper is None else min(upper, requirement.bound)
+    else:
+        lower = requirement.bound if lower is None else max(lower, requirement.bound)
+    return Verdict(decision, size, value, lower, upper, size)
 
 
-def _quantile_ends(values: Floats, fewest_met: int, most_missed: int) -> tuple[float | None, float | None]:
+def _quantile_interval(values: Floats, fewest_met: int, most_missed: int) -> tuple[float | None, float | None]:
     """Return the order statistics that enclose a quantile."""
     ordered = np.sort(values)
     lower = float(ordered[most_missed]) if most_missed >= 0 else None
     return lower, float(ordered[fewest_met - 1]) if fewest_met <= values.size else None
 
 
-def _beyond(
-    ends: tuple[float | None, float | None], bound: float, decision: Decision
-) -> tuple[float | None, float | None]:
-    """Cut an interval at the bound, on the side that a decision excludes."""
-    lower, upper = ends
-    if decision is Decision.MET:
-        return lower, bound if upper is None else min(upper, bound)
-    return bound if lower is None else max(lower, bound), upper
+def share_interval(count: int, runs: int, *, watched: bool) -> tuple[float, float]:
+    """Return the 95 % confidence interval of a share, by bisection.
+
+    It is the Clopper-Pearson interval, or if `watched` the confidence sequence of `judge`.
+    """
+
+    def end(index: int, inside: float, outside: float) -> float:
+        for _ in range(_STEPS):
+            middle = 0.5 * (inside + outside)
+            if p_values(runs, count, middle, watched=watched)[index] > _TAIL:
+                inside = middle
+            else:
+                outside = middle
+        return outside
+
+    share = count / runs
+    return end(0, share, 0.0) if count else 0.0, end(1, share, 1.0) if count < runs else 1.0
 
 
 @functools.lru_cache(maxsize=32)

@@ -168,7 +168,13 @@ def _checks(chunks: int) -> Iterator[int]:
 
 
 def parse_quantile(text: str, end: str, wanted: str, number: str = "") -> tuple[QuantileName, float]:
-    """Read a quantile and, if the pattern `end` has one, the number after it; raise ValueError for any other text."""
+    """Read a quantile and, if the pattern `end` has one, the number after it.
+
+    Raises
+    ------
+    ValueError
+        If the text has another form; `wanted` and `number` name the form and the number in the message.
+    """
     match = re.fullmatch(_QUANTILE + end, text[:100])
     if match is None:
         raise ValueError(f"must be {wanted}")

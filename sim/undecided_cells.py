@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sim.chunk import Chunk
-from sim.requirement import Requirement, critical_counts
+from sim.requirement import AnyRequirement, critical_counts
 from sim.results import Results
 from sim.storage import CampaignWriter
 
@@ -30,7 +30,7 @@ class UndecidedCells:
     ----------
     folder : CampaignWriter
         Folder of the sweep; the number of runs in its manifest is the limit of each cell.
-    requirement : Requirement
+    requirement : Requirement or HitRequirement
         Is decided with each noise, by the confidence sequence of `sim.requirement.judge`.
     noises : sequence of str
         Noises of the sweep.
@@ -44,7 +44,7 @@ class UndecidedCells:
     """
 
     def __init__(
-        self, folder: CampaignWriter, requirement: Requirement, noises: Sequence[str], least_runs: int
+        self, folder: CampaignWriter, requirement: AnyRequirement, noises: Sequence[str], least_runs: int
     ) -> None:
         self._folder = folder
         self._requirement = requirement

@@ -15,14 +15,14 @@ MOST_WORKERS = 1024
 MOST_AT_ONCE = 1_000_000
 EXECUTION = "Execution"
 
-DEFAULT_REQUIREMENT = "miss_m p99<10"
 Required = Annotated[
     str | None,
     typer.Option(
         "--require",
         metavar="RULE",
-        help="Requirement on a quantile: its upper bound, in the unit of the name. Each cell meets it, does not meet "
-        f'it, or is undecided, with 95 % confidence. Default: "{DEFAULT_REQUIREMENT}".',
+        help='Requirement: the upper bound of a quantile, "miss_m p99<10", or the least probability of a hit, '
+        '"hit>=0.95". Each cell meets it, does not meet it, or is undecided, with 95 % confidence. Default: one of '
+        "these two; the second if the body has a size.",
     ),
 ]
 Shown = Annotated[
@@ -144,11 +144,13 @@ class Sweep(Flight):
     """
 
     vary: Annotated[
-        str,
+        list[str],
         typer.Option(
             metavar="KEY=FROM:TO:COUNT,...",
-            help="Keys of the scenario file and their values, in the units of the file. KEY=log:FROM:TO:COUNT has "
-            "logarithmic spacing. If the value is a pair, vary KEY.least or KEY.greatest.",
+            help="Keys of the scenario file and their values, in the units of the file; can be repeated. "
+            "KEY=log:FROM:TO:COUNT has logarithmic spacing. KEY1=KEY2=FROM:TO:COUNT gives two keys the same values. "
+            "angle_sensor.scale is a factor of all error bounds of a sensor. If the value is a pair, vary KEY.least or "
+            "KEY.greatest. For example: angle_sensor.scale=0.5:4:8,thruster.greatest_impulse_m_s=2:20:7.",
         ),
     ]
     require: Required = None

@@ -16,20 +16,20 @@ from experiments.campaigns.campaign_figures import (
     draw_convergence,
     draw_dispersion,
 )
-from experiments.campaigns.command import DEFAULT_REQUIREMENT, Report
+from experiments.campaigns.command import Report
 from experiments.campaigns.flight import SCENARIO_FILE, campaign_errors
 from experiments.campaigns.samples import (
     START,
     Sample,
     heading,
     noise_flags,
+    noises_of,
     sample_json,
     samples,
     samples_table,
     worst_runs,
 )
-from experiments.campaigns.sweep_report import FIGURE as SWEEP_FIGURE
-from experiments.campaigns.sweep_report import TABLE, quantile_options, sweep_report
+from experiments.campaigns.sweep_report import TABLE, default_requirement, figure_names, quantile_options, sweep_report
 from experiments.common.errors import InputError
 from experiments.common.file_kinds import use_of_file
 from experiments.common.output import Output, output, to_json
@@ -48,7 +48,7 @@ def run(options: Report) -> None:
         need_arrow()
         folder = _read(options)
         swept = bool(folder.manifest.axes)
-        figures = [*figure_files(SWEEP_FIGURE), TABLE] if swept else figure_files(*FIGURES)
+        figures = [*figure_files(*figure_names(noises_of(folder))), TABLE] if swept else figure_files(*FIGURES)
         with output(
             folder=options.out,
             names=[*figures, "report.json", SCENARIO_FILE],
@@ -86,8 +86,12 @@ def _read(options: Report) -> CampaignFolder:
 
 
 def _report_sweep(folder: CampaignFolder, options: Report, written: Output, console: Console | None) -> None:
-    default = folder.manifest.until or DEFAULT_REQUIREMENT
-    report = sweep_report(folder, *quantile_options(options.require, options.show, default))
+    sized = bool(folder.numbers("hit").count())
+    default = folder.manifest.until or default_requirement(has_size=sized)
+    required, shown = quantile_options(options.require, options.show, default)
+    if required.quantity == "hit" and not sized:
+        raise InputError(f"--require {required}: the body of this sweep has no size; give a bound of the miss instead")
+    report = sweep_report(folder, required, shown)
     written.save("report.json", to_json(report.to_json()), "--json")
     if options.out is not None:
         report.save(written)

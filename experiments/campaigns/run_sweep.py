@@ -9,7 +9,7 @@ import typer
 from experiments.campaigns.command import Sweep as Options
 from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, scenario_of
 from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
-from experiments.campaigns.sweep_report import quantile_options, sweep_report
+from experiments.campaigns.sweep_report import default_requirement, quantile_options, sweep_report
 from experiments.common.errors import InputError
 from experiments.common.output import Output, output, to_json
 from experiments.common.screen import say, table_console
@@ -30,19 +30,27 @@ def run(options: Options) -> None:
         output(files={"--json": options.json}, overwrite=options.overwrite, quiet=options.quiet) as written,
     ):
         need_arrow()
-        required, shown = quantile_options(options.require, options.show)
         scenario, notes = scenario_of(options)
-        axes = sweep_axes(options.vary, scenario)
+        axes = sweep_axes(",".join(options.vary), scenario)
+        cells = sweep_cells(scenario, axes)
+        sized = cells[0].body is not None
+        required, shown = quantile_options(options.require, options.show, default_requirement(has_size=sized))
+        if required.quantity == "hit" and not sized:
+            raise InputError(
+                f"--require {required}: the scenario {scenario.name} has no [body]; set its radius, for example "
+                "--set body.radius_m=80"
+            )
+        guarantee = options.guarantee or "guaranteed_miss_m" in {quantile.quantity for quantile in shown}
         swept = Sweep(
             scenario,
             axes,
-            sweep_cells(scenario, axes),
+            cells,
             options.runs,
             options.out,
             seed=options.seed,
             noise=None if options.noise is None else CampaignNoise(options.noise),
             strategy=own_strategy(options.strategy),
-            guarantee=options.guarantee,
+            guarantee=guarantee,
             chunk=options.chunk,
             until=required if options.until else None,
             most_runs=_most_runs(options),

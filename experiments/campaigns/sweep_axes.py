@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from decimal import Context, Decimal, InvalidOperation
 from typing import Any, Literal
 
+from experiments.campaigns.axis_names import SCALE, tied_keys, unit_of
 from experiments.common.errors import InputError
 from experiments.common.settings import ENDS, similar_key
 from experiments.common.toml_values import LARGEST, SMALLEST, number_text, shown
@@ -24,7 +25,7 @@ from sim.storage import MOST_CELLS, Axis
 
 MOST_AXES = 4
 MOST_VALUES = 1000
-EXAMPLE = "--vary angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:8,thruster.greatest_impulse_m_s=2:20:7"
+EXAMPLE = "--vary angle_sensor.scale=0.5:4:8,thruster.greatest_impulse_m_s=2:20:7"
 
 _PLACES = Context(prec=12)
 """Values between the ends are rounded to 12 digits."""
@@ -39,7 +40,8 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
     ----------
     text : str
         `table.key=FROM:TO:COUNT` or `table.key=log:FROM:TO:COUNT`, separated by commas. Of a key that is a pair,
-        `table.key.least` or `table.key.greatest` is varied.
+        `table.key.least` or `table.key.greatest` is varied. `one.key=other.key=FROM:TO:COUNT` gives both keys the same
+        values. `sensor.scale` is a factor of all error bounds of a sensor.
     scenario : Scenario
         Scenario whose keys can be varied.
 
@@ -53,7 +55,8 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
     if len(pieces) > MOST_AXES:
         raise InputError(f"--vary: at most {MOST_AXES} keys can be varied at once, found {len(pieces)}; leave some out")
     axes = tuple(_axis(piece, known) for piece in pieces)
-    keys = [axis.key for axis in axes]
+    scaled = _error_bounds(scenario)
+    keys = [key for axis in axes for tied in tied_keys(axis.key) for key in scaled.get(tied, {tied: 0.0})]
     if len(set(keys)) < len(keys):
         (twice, *_) = [key for key in keys if keys.count(key) > 1]
         raise InputError(f"--vary: {twice} is named twice; name each key once")
@@ -71,14 +74,19 @@ def sweep_cells(scenario: Scenario, axes: Sequence[Axis]) -> tuple[Scenario, ...
     InputError
         If a cell is not a valid scenario; the message is that of a scenario file.
     """
-    known = _known_keys(scenario)
+    known, scaled = _known_keys(scenario), _error_bounds(scenario)
     text = scenario_to_toml(scenario)
     cells = []
     for values in itertools.product(*(axis.values for axis in axes)):
-        replaced = {
-            axis.key: str(round(value)) if known[axis.key] else number_text(value)
-            for axis, value in zip(axes, values, strict=True)
-        }
+        replaced = {}
+        for axis, value in zip(axes, values, strict=True):
+            for key in tied_keys(axis.key):
+                bounds = scaled.get(key)
+                if bounds is None:
+                    replaced[key] = str(round(value)) if known[key] else number_text(value)
+                else:
+                    products = {name: Decimal(str(bound)) * Decimal(str(value)) for name, bound in bounds.items()}
+                    replaced |= {name: number_text(float(_PLACES.plus(product))) for name, product in products.items()}
         changes = ", ".join(f"{key} = {literal}" for key, literal in replaced.items())
         cells.append(read_scenario(text, f"{scenario.name} with {changes}", replaced))
     return tuple(cells)
@@ -96,7 +104,16 @@ def _known_keys(scenario: Scenario) -> dict[str, bool]:
                 known[path] = False
             elif isinstance(value, int | float) and not isinstance(value, bool):
                 known[path] = isinstance(value, int)
-    return known
+    return {"body.radius_m": False} | known | dict.fromkeys(_error_bounds(scenario), False)
+
+
+def _error_bounds(scenario: Scenario) -> dict[str, dict[str, float]]:
+    """Return the error bounds of each sensor by key, under the name of their common factor: `angle_sensor.scale`."""
+    return {
+        f"{table}.{SCALE}": {f"{table}.{name}": value for name, value in keys.items() if "error" in name}
+        for table, keys in _tables(scenario).items()
+        if table in ("angle_sensor", *OPTIONAL_SENSORS)
+    }
 
 
 def _tables(scenario: Scenario) -> Mapping[str, Mapping[str, Any]]:
@@ -105,11 +122,17 @@ def _tables(scenario: Scenario) -> Mapping[str, Mapping[str, Any]]:
 
 
 def _axis(piece: str, known: Mapping[str, bool]) -> Axis:
-    key, equals, written = (part.strip() for part in piece.partition("="))
-    if not equals or not key:
+    *keys, written = (part.strip() for part in piece.split("="))
+    key = "=".join(keys)
+    if not key:
         raise InputError(f"--vary: {shown(piece)} is not written as KEY=FROM:TO:COUNT; for example {EXAMPLE}")
-    if key not in known:
-        raise InputError(f"--vary: {_unknown(key, known)}")
+    for single in keys:
+        if single not in known:
+            raise InputError(f"--vary: {_unknown(single, known)}")
+    if len({unit_of(single) for single in keys}) > 1:
+        units = ", ".join(f"{single} in {unit_of(single) or 'no unit'}" for single in keys)
+        raise InputError(f"--vary: keys with the same values must have the same unit, found {units}")
+    whole = any(known[single] for single in keys)
     parts = [part.strip() for part in written.split(":")]
     scale: Literal["linear", "log"] = "linear"
     if parts[0] == "log":
@@ -124,11 +147,11 @@ def _axis(piece: str, known: Mapping[str, bool]) -> Axis:
     if scale == "log" and first <= 0:
         raise InputError(f"--vary: {key}: on a logarithmic scale values must be greater than 0, found {shown(written)}")
     count = _count(parts[2], key)
-    values = _spaced(first, last, count, scale, whole=known[key])
+    values = _spaced(first, last, count, scale, whole=whole)
     if len(set(values)) < count:
         raise InputError(
             f"--vary: {key}: {count} values from {parts[0]} to {parts[1]} are not all different"
-            f"{' whole numbers' if known[key] else ''}; give fewer values"
+            f"{' whole numbers' if whole else ''}; give fewer values"
         )
     return Axis(key, values, scale)
 

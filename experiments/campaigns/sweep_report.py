@@ -12,21 +12,25 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from experiments.campaigns.command import DEFAULT_REQUIREMENT
+from experiments.campaigns.axis_names import unit_of
 from experiments.campaigns.samples import heading, sample_json
 from experiments.campaigns.sweep_figures import draw_sweep
-from experiments.campaigns.sweep_table import SHOWN, SweepTable, answers, sweep_table, unit_of
+from experiments.campaigns.sweep_table import SHOWN, SHOWN_WITH_HITS, SweepTable, answers, sweep_table
 from experiments.common.errors import InputError
-from experiments.common.output import Output
+from experiments.common.output import Output, hit_key
 from experiments.common.screen import number, number_table
 from sim import QuantileName, Requirement
-from sim.requirement import CONFIDENCE, MOST_RUNS_NEEDED, Decision, Verdict
+from sim.requirement import CONFIDENCE, MOST_RUNS_NEEDED, AnyRequirement, Decision, Verdict, parse_requirement
 from sim.storage import CampaignFolder, Manifest
 
 TABLE = "sweep.parquet"
-FIGURE = "figure-sweep"
 MOST_SHOWN = 8
 MOST_LINES = 40
+
+
+def figure_names(noises: Sequence[str]) -> list[str]:
+    """Return the name of the figure of each noise."""
+    return ["figure-sweep"] if len(noises) == 1 else [f"figure-sweep-{noise}" for noise in noises]
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,7 @@ class SweepReport:
                 {
                     "values": self.folder.manifest.values_of(cell),
                     "requirement": table.decision(cell).value,
+                    **hit_key(table.hits[cell]),
                     "samples": [
                         {**sample_json(sample), "requirement": _verdict_json(table.verdict(cell, sample.noise))}
                         for sample in samples
@@ -90,10 +95,11 @@ class SweepReport:
         }
 
     def save(self, written: Output) -> None:
-        """Write the table, and the figure of one or two axes, into the output's folder."""
+        """Write the table, and for one or two axes a figure of each noise, into the output's folder."""
         written.save(TABLE, self.folder.table_file(*self.table.columns()))
         if self.is_drawn and written.folder is not None:
-            written.figure(FIGURE, draw_sweep(self.table, self.shown))
+            for noise, name in zip(self.table.noises, figure_names(self.table.noises), strict=True):
+                written.figure(name, draw_sweep(self.table, self.shown, noise))
 
     def show(self, console: Console) -> None:
         """Print the decision of every cell, and the limits of the values that meet the requirement."""
@@ -150,7 +156,8 @@ def _undecided_notes(verdicts: Sequence[Verdict | None], manifest: Manifest) -> 
     text = f"undecided cells: {len(undecided)}, each after {rest} runs; "
     if more:
         amount = " to ".join(dict.fromkeys((_about(more[0]), _about(more[-1]))))
-        text += f"about {amount} more runs per cell would decide {'them' if len(more) == len(undecided) else len(more)}"
+        which = "them" if len(more) == len(undecided) else f"{len(more)} of them"
+        text += f"about {amount} more runs per cell would decide {which}"
     else:
         text += f"even {MOST_RUNS_NEEDED} runs per cell would not decide them"
     hint = f"a greater --most-runs than {manifest.runs}" if manifest.until else "--until decided"
@@ -171,7 +178,7 @@ def decision_tables(table: SweepTable, noise: str, width: int) -> Iterator[tuple
     """
     first, *others = table.axes
     if not others:
-        shown = number_table(first.key, "decision", "runs", *("95 % CI from", str(table.required.quantile), "to"))
+        shown = number_table(first.key, "decision", "runs", *("95 % CI from", table.required.name, "to"))
         for cell, value in enumerate(first.values):
             verdict = table.verdict(cell, noise)
             if verdict is not None:
@@ -201,22 +208,29 @@ def _entry(verdict: Verdict | None) -> str:
 
 
 def quantile_options(
-    require: str | None, show: str | None, default: str = DEFAULT_REQUIREMENT
-) -> tuple[Requirement, tuple[QuantileName, ...]]:
-    """Read the values of --require and --show; the required quantile is always among those shown."""
+    require: str | None, show: str | None, default: str
+) -> tuple[AnyRequirement, tuple[QuantileName, ...]]:
+    """Read the values of --require and --show; a required quantile is always the first of those shown."""
     try:
-        required = Requirement.parse(default if require is None else require)
+        required = parse_requirement(default if require is None else require)
     except ValueError as error:
         raise InputError(f"--require: {error}") from None
     try:
-        chosen = SHOWN if show is None else tuple(QuantileName.parse(text) for text in show.split(","))
+        default_shown = SHOWN if isinstance(required, Requirement) else SHOWN_WITH_HITS
+        chosen = default_shown if show is None else tuple(QuantileName.parse(text) for text in show.split(","))
     except ValueError as error:
         raise InputError(f"--show: {error}") from None
     if len(chosen) > MOST_SHOWN:
         raise InputError(f"--show: at most {MOST_SHOWN} quantiles can be drawn, found {len(chosen)}; leave some out")
-    return required, tuple(dict.fromkeys((required.quantile, *chosen)))
+    first = (required.quantile,) if isinstance(required, Requirement) else ()
+    return required, tuple(dict.fromkeys((*first, *chosen)))
 
 
-def sweep_report(folder: CampaignFolder, required: Requirement, shown: tuple[QuantileName, ...]) -> SweepReport:
+def default_requirement(*, has_size: bool) -> str:
+    """Return the requirement of a sweep without --require: a hit, if the body has a size."""
+    return "hit>=0.95" if has_size else "miss_m p99<10"
+
+
+def sweep_report(folder: CampaignFolder, required: AnyRequirement, shown: tuple[QuantileName, ...]) -> SweepReport:
     """Summarise a sweep, finished or not."""
     return SweepReport(folder, sweep_table(folder, required, shown), shown)

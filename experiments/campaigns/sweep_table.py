@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.campaigns.axis_names import tied_keys, unit_of
 from experiments.campaigns.samples import LEVELS, OUTCOMES, Sample, noises_of, samples
-from sim import QuantileEstimate, QuantileName, Requirement
-from sim.requirement import Decision, Verdict, judge
+from sim import HitEstimate, QuantileEstimate, QuantileName, estimate_hits
+from sim.requirement import AnyRequirement, Decision, Verdict, judge
 from sim.stopping_rule import QUANTITIES, level_name
 from sim.storage import Axis, CampaignFolder
 
@@ -21,19 +22,7 @@ Floats = NDArray[np.float64]
 
 TABLE = "sweep.parquet"
 SHOWN = tuple(QuantileName(quantity, level) for quantity in ("miss_m", "impulse_m_s") for level in (0.5, 0.99))
-UNITS = {
-    "km3_s2": "km\N{SUPERSCRIPT THREE}/s\N{SUPERSCRIPT TWO}",
-    "m_s2": "m/s\N{SUPERSCRIPT TWO}",
-    "km_s": "km/s",
-    "m_s": "m/s",
-    "rad_s": "rad/s",
-    "rad": "rad",
-    "deg": "deg",
-    "km": "km",
-    "m": "m",
-    "s": "s",
-}
-"""Units by the end of the key."""
+SHOWN_WITH_HITS = (SHOWN[0], SHOWN[1], SHOWN[3])
 
 
 @dataclass(frozen=True)
@@ -50,18 +39,24 @@ class SweepTable:
         Levels of the quantiles.
     cells : tuple of tuple of Sample
         Samples of each cell, one for each noise; empty for a cell without runs.
-    required : Requirement
+    required : Requirement or HitRequirement
         The requirement.
     verdicts : tuple of mapping of str to Verdict
         For each cell, what the runs of each noise say about the requirement.
+    hits : tuple of HitEstimate or None
+        Probability of a hit in each cell, over all runs; None if the body has no size.
+    radius_m : float or None
+        Radius of the body; None if it has no size, or different sizes.
     """
 
     axes: tuple[Axis, ...]
     noises: tuple[str, ...]
     levels: tuple[float, ...]
     cells: tuple[tuple[Sample, ...], ...]
-    required: Requirement
+    required: AnyRequirement
     verdicts: tuple[Mapping[str, Verdict], ...]
+    hits: tuple[HitEstimate | None, ...]
+    radius_m: float | None
 
     def verdict(self, cell: int, noise: str) -> Verdict | None:
         """Return the verdict of a cell and a noise; None without runs."""
@@ -101,11 +96,15 @@ class SweepTable:
             for noise in self.noises:
                 sample = self.sample(cell, noise)
                 row: dict[str, Any] = {"cell": cell}
-                row |= dict(zip((axis.key for axis in self.axes), values, strict=True))
+                row |= {
+                    key: value for axis, value in zip(self.axes, values, strict=True) for key in tied_keys(axis.key)
+                }
                 row |= {"noise": noise, "runs": 0 if sample is None else sample.runs}
                 for name in OUTCOMES:
                     row[name.replace("-", "_")] = 0 if sample is None else sample.outcomes.get(name, 0)
                 row["truth_kept"] = 0 if sample is None else sample.truth_kept
+                verdict = self.verdict(cell, noise)
+                row["requirement"] = None if verdict is None else verdict.decision.value
                 for quantity, level in itertools.product(QUANTITIES, self.levels):
                     estimate = self.estimate(cell, noise, QuantileName(quantity, level))
                     name = f"{quantity}_{level_name(level)}"
@@ -118,7 +117,7 @@ class SweepTable:
                     row[f"{quantity}_max"] = None if sample is None else sample.worst.get(quantity)
                 rows.append(row)
         columns = {name: [row[name] for row in rows] for name in rows[0]}
-        units = {axis.key: unit_of(axis.key) for axis in self.axes}
+        units = {key: unit_of(key) for axis in self.axes for key in tied_keys(axis.key)}
         units |= {
             name: unit
             for quantity, unit in zip(QUANTITIES, ("m", "m/s", "m"), strict=True)
@@ -128,7 +127,7 @@ class SweepTable:
         return columns, units
 
 
-def sweep_table(folder: CampaignFolder, required: Requirement, quantiles: Sequence[QuantileName] = ()) -> SweepTable:
+def sweep_table(folder: CampaignFolder, required: AnyRequirement, quantiles: Sequence[QuantileName] = ()) -> SweepTable:
     """Summarise a sweep, finished or not, at the levels `LEVELS` and those of some more quantiles."""
     levels = tuple(sorted({*LEVELS, *(quantile.level for quantile in quantiles)}))
     noises, numbers = tuple(noises_of(folder)), range(folder.manifest.cells)
@@ -142,7 +141,12 @@ def sweep_table(folder: CampaignFolder, required: Requirement, quantiles: Sequen
         }
         for samples in known
     )
-    return SweepTable(folder.manifest.axes, noises, levels, cells, required, verdicts)
+    flags = [folder.numbers("hit", cell).compressed() for cell in numbers]
+    hits = tuple(estimate_hits(int(values.sum()), values.size) if values.size else None for values in flags)
+    axes, body = folder.manifest.axes, folder.manifest.scenario.body
+    is_varied = any("body.radius_m" in tied_keys(axis.key) for axis in axes)
+    radius_m = None if body is None or is_varied else body.radius_m
+    return SweepTable(axes, noises, levels, cells, required, verdicts, hits, radius_m)
 
 
 @dataclass(frozen=True)
@@ -264,22 +268,3 @@ def answers(table: SweepTable, noise: str) -> list[Answer]:
         )
         for indices in np.ndindex(*shape[1:])
     ]
-
-
-def unit_of(key: str) -> str:
-    """Return the unit in the name of a key; empty if it has none."""
-    name = _named(key)
-    return next((unit for end, unit in UNITS.items() if name.endswith(f"_{end}")), "")
-
-
-def key_label(key: str) -> str:
-    """Return a key as the label of an axis: `angle sensor, error at nominal range, rad`."""
-    table, name, *end = key.split(".")
-    words = next((name.removesuffix(f"_{end}") for end in UNITS if name.endswith(f"_{end}")), name)
-    unit = unit_of(key)
-    label = f"{table}: {words} {' '.join(end)}".replace("_", " ").strip()
-    return f"{label}, {unit}" if unit else label
-
-
-def _named(key: str) -> str:
-    return key.split(".")[1] if "." in key else key

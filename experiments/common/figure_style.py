@@ -8,9 +8,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator
 
 WIDTH_MM = 180.0
 PNG_DPI = 200
@@ -132,6 +134,28 @@ def figure_grid(
     figure = new_figure(height_mm)
     grid = place_axes(figure, rows, columns, margins_mm=margins_mm, gaps_mm=gaps_mm)
     return figure, [axes for row in grid for axes in row]
+
+
+def separate_labels(axes: Axes, gap_points: float = 2.0) -> None:
+    """Keep only tick labels that do not touch, for axes whose place and limits are final; the first label is kept."""
+    figure = axes.get_figure(root=True)
+    if figure is None:
+        raise ValueError("these axes are in no figure")
+    gap = gap_points * figure.dpi / 72.0
+    for one, end in ((axes.xaxis, 0), (axes.yaxis, 1)):
+        figure.draw_without_rendering()
+        edge, kept = -np.inf, []
+        limits = sorted(one.get_view_interval())
+        for tick in one.get_major_ticks():
+            location = float(tick.get_loc())
+            label = tick.label1 if tick.label1.get_visible() else tick.label2
+            if not limits[0] <= location <= limits[1]:
+                continue
+            box = label.get_window_extent()
+            if not label.get_text() or box.min[end] >= edge + gap:
+                kept.append(location)
+                edge = box.max[end] if label.get_text() else edge
+        one.set_major_locator(FixedLocator(kept))
 
 
 def plain(text: str) -> str:

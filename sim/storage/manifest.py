@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from infoset.limits import COUNT, NUMBER, WHOLE
+from infoset.limits import ADDED_LATER, COUNT, NUMBER, WHOLE
 from sim.chunk import CampaignNoise
 from sim.scenario import Scenario
 from sim.storage.codec import from_json, scenario_hash, to_json
@@ -27,8 +27,6 @@ MOST_RUNS_A_SHARD = 1_000_000
 
 _PROGRESS = ("runs", "until", "stopped_after", "cell_runs", "made_by")
 """Keys that may differ between the sessions of a campaign."""
-_LATER: Mapping[str, object] = {"cell_runs": [], "order": "cells"}
-"""Keys that earlier versions did not write, with the values that are omitted."""
 _DERIVED = ("format", "schema", "version", "kind", "name", "scenario_hash", "sha256")
 """Keys of the file that follow from the others."""
 
@@ -104,7 +102,7 @@ class Manifest:
     runs: int
     until: str | None = None
     stopped_after: int | None = None
-    cell_runs: tuple[int, ...] = ()
+    cell_runs: tuple[int, ...] = field(default=(), metadata=ADDED_LATER)
     scenario: Scenario
     seed: int
     noise: CampaignNoise
@@ -112,7 +110,7 @@ class Manifest:
     guarantee: bool
     chunk: int
     axes: tuple[Axis, ...] = ()
-    order: Literal["cells", "rounds"] = "cells"
+    order: Literal["cells", "rounds"] = field(default="cells", metadata=ADDED_LATER)
     cells_hash: str = ""
     versions: Mapping[str, str]
     made_by: Mapping[str, str] = field(default_factory=dict)
@@ -180,11 +178,8 @@ class Manifest:
 
     def decisive(self) -> dict[str, Any]:
         """Return the values that must be equal in all sessions of a campaign, as JSON values."""
-        plain = {key: value for key, value in self._plain().items() if key not in _PROGRESS}
+        plain = {key: value for key, value in to_json(self).items() if key not in _PROGRESS}
         return {"format": FORMAT, "schema": SCHEMA, "kind": self.kind, **plain}
-
-    def _plain(self) -> dict[str, Any]:
-        return {key: value for key, value in to_json(self).items() if key not in _LATER or value != _LATER[key]}
 
     @property
     def identity(self) -> str:
@@ -200,7 +195,7 @@ class Manifest:
             "kind": self.kind,
             "name": self.scenario.name,
             "scenario_hash": scenario_hash(self.scenario),
-            **self._plain(),
+            **to_json(self),
         }
         return {**value, "sha256": checksum(value)}
 

@@ -9,8 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim import QuantileName, Requirement, estimate_quantiles
-from sim.requirement import Decision, critical_counts, judge, p_values, runs_needed
+from sim import QuantileName, Requirement, estimate_hits, estimate_quantiles
+from sim.requirement import (
+    Decision,
+    HitRequirement,
+    critical_counts,
+    judge,
+    p_values,
+    parse_requirement,
+    runs_needed,
+    share_interval,
+)
 from sim.statistics import order_statistics
 
 P99 = Requirement(QuantileName("miss_m", 0.99), 10.0)
@@ -77,6 +86,39 @@ def test_a_decision_is_final() -> None:
     assert later.upper is not None
     assert later.upper <= P99.bound
     assert judge(values, P99, watched=False).decision is Decision.NOT_MET
+
+
+@given(hits=st.integers(0, 60), more=st.integers(0, 60))
+@settings(deadline=None)
+def test_the_interval_of_a_share_is_that_of_clopper_and_pearson(hits: int, more: int) -> None:
+    runs = max(1, hits + more)
+    estimate = estimate_hits(hits, runs)
+    assert share_interval(hits, runs, watched=False) == pytest.approx((estimate.lower, estimate.upper), abs=1e-12)
+    lower, upper = share_interval(hits, runs, watched=True)
+    assert lower <= estimate.lower <= estimate.upper <= upper
+
+
+def test_hits_decide() -> None:
+    required = parse_requirement(" hit >= 0.95 ")
+    assert required == parse_requirement("hit>0.95") == HitRequirement(0.95)
+    assert str(required) == "hit>=0.95"
+    hit = np.ones(200)
+    assert judge(hit[:71], required, watched=False).decision is Decision.UNDECIDED
+    assert judge(hit[:72], required, watched=False).decision is Decision.MET
+    assert judge(hit[:104], required, watched=True).decision is Decision.UNDECIDED
+    verdict = judge(hit[:105], required, watched=True)
+    assert (verdict.decision, verdict.value, verdict.upper) == (Decision.MET, 1.0, 1.0)
+    assert verdict.lower is not None
+    assert verdict.lower >= 0.95
+    assert judge(0.0 * hit[:20], required, watched=True).decision is Decision.NOT_MET
+
+
+@pytest.mark.parametrize(
+    "text", ["hit", "hit<0.95", "hit>=1", "hit>=0", "hit>=95", "hit>=nan", "hit p50>=0.9", "hit=>0.9"]
+)
+def test_no_requirement_of_hits(text: str) -> None:
+    with pytest.raises(ValueError, match=r"must be|there is no quantity|must be less than 1|greater than 0"):
+        parse_requirement(text)
 
 
 def test_runs_needed_by_hand() -> None:

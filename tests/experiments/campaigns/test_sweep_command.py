@@ -4,7 +4,7 @@ import itertools
 import json
 import math
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,13 +14,26 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.figure import Figure
 
+from experiments.campaigns.axis_names import key_label, unit_of
+from experiments.campaigns.samples import Sample
 from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
-from experiments.campaigns.sweep_figures import between, draw_sweep
-from experiments.campaigns.sweep_table import SHOWN, Limit, answer, key_label, limits, sweep_table, unit_of
+from experiments.campaigns.sweep_figures import draw_sweep
+from experiments.campaigns.sweep_table import SHOWN, Limit, SweepTable, answer, limits, sweep_table
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
-from sim import CampaignNoise, QuantileName, Requirement, Scenario, Sweep, quantiles, simulate
-from sim.requirement import Decision, Verdict
+from sim import (
+    CampaignNoise,
+    QuantileEstimate,
+    QuantileName,
+    Requirement,
+    Scenario,
+    Sweep,
+    estimate_hits,
+    quantiles,
+    simulate,
+)
+from sim.requirement import Decision, HitRequirement, Verdict
 from sim.storage import Axis, CampaignFolder
 
 Infoset = Callable[..., tuple[int, str, str]]
@@ -104,7 +117,8 @@ def test_a_sweep_of_one_key_mixed_and_resumed(infoset: Infoset, file: Path, tmp_
     before = (tmp_path / "a" / "sweep.parquet").read_bytes()
     for victim in list((tmp_path / "a" / "shards").glob("*.parquet"))[1:3]:
         victim.unlink()
-    assert infoset(*asked, "--out", tmp_path / "a", "--resume", "-q") == (0, "", "")
+    again = infoset(*asked, "--out", tmp_path / "a", "--require", "miss_m p90<3", "--resume", "-q")
+    assert again == (0, "", "")
     assert (tmp_path / "a" / "sweep.parquet").read_bytes() == before
     code, _, err = infoset(*asked[:3], "thruster.greatest_impulse_m_s=2:9:4", *asked[4:], "--out", "a", "--resume")
     assert code == 2
@@ -291,6 +305,63 @@ def test_runs_are_added_until_each_cell_is_decided(infoset: Infoset, file: Path,
     assert report["cells"] == summary["cells"]
 
 
+def test_a_required_probability_of_a_hit(infoset: Infoset, file: Path, tmp_path: Path) -> None:
+    asked = ("sweep", file, "--set", "body.radius_m=8", "--vary", "angle_sensor.scale=0.5:3:3", "--runs", 40)
+    code, out, _ = infoset(*asked, "--out", tmp_path / "sweep")
+    assert code == 0
+    assert "random noise: hit>=0.95 is met in" in out
+    summary = json.loads((tmp_path / "sweep" / "summary.json").read_text())
+    flown = CampaignFolder.read(tmp_path / "sweep")
+    for number, cell in enumerate(summary["cells"]):
+        hits = int((flown.numbers("miss_m", number) <= 8.0).sum())
+        estimate = estimate_hits(hits, 40)
+        assert cell["hit"] == vars(estimate)
+        expected = "met" if estimate.lower >= 0.95 else "not-met" if estimate.upper < 0.95 else "undecided"
+        assert cell["requirement"] == cell["samples"][0]["requirement"]["decision"] == expected
+        assert cell["samples"][0]["requirement"]["lower"] == pytest.approx(estimate.lower, abs=1e-12)
+        assert cell["samples"][0]["requirement"]["upper"] == pytest.approx(estimate.upper, abs=1e-12)
+    code, out, _ = infoset("report", tmp_path / "sweep", "--require", "hit > 0.5", "--json", "-")
+    assert json.loads(out)["require"] == "hit>=0.5"
+
+
+@pytest.mark.parametrize("requirement", ["hit>=0.95", "hit>0.5"])
+def test_a_hit_needs_a_size(requirement: str, infoset: Infoset, file: Path, swept: Path, tmp_path: Path) -> None:
+    asked = ("--vary", "angle_sensor.scale=1:2:2", "--runs", 2, "--out", "sweep", "--require", requirement)
+    code, _, err = infoset("sweep", file, *asked)
+    assert code == 2
+    assert "has no [body]; set its radius, for example --set body.radius_m=80" in err
+    code, _, err = infoset("report", swept, "--require", requirement)
+    assert code == 2
+    assert "the body of this sweep has no size" in err
+
+
+def test_the_radius_can_be_varied(infoset: Infoset, file: Path, tmp_path: Path) -> None:
+    asked = ("sweep", file, "--vary", "body.radius_m=log:1:1000:4", "--runs", 30, "--json", "-", "--out", "sweep")
+    code, out, _ = infoset(*asked)
+    assert code == 0
+    cells = json.loads(out)["cells"]
+    probabilities = [cell["hit"]["probability"] for cell in cells]
+    assert probabilities == sorted(probabilities)
+    assert probabilities[0] < probabilities[-1] == 1.0
+
+
+def test_keys_with_the_same_values_and_factors_in_tables(infoset: Infoset, file: Path, tmp_path: Path) -> None:
+    one, other = "angle_sensor.error_at_zero_range_rad", "angle_sensor.error_at_nominal_range_rad"
+    asked = ("--vary", f"{one}={other}=1e-4:3e-4:2", "--vary", "thruster.greatest_impulse_m_s=2:8:2")
+    code, out, _ = infoset("sweep", file, *asked, "--runs", 5, "--out", "sweep", "--json", "-")
+    assert code == 0
+    summary = json.loads(out)
+    assert [(axis["key"], axis["unit"]) for axis in summary["axes"]] == [
+        (f"{one}={other}", "rad"),
+        ("thruster.greatest_impulse_m_s", "m/s"),
+    ]
+    table = pq.read_table(tmp_path / "sweep" / "sweep.parquet")
+    assert table.column(one).to_pylist() == table.column(other).to_pylist() == [1e-4, 1e-4, 3e-4, 3e-4]
+    assert table.schema.field(other).metadata[b"unit"] == b"rad"
+    assert key_label(f"{one}={other}") == "angle sensor: error at zero range = error at nominal range, rad"
+    assert key_label("range_sensor.scale") == "range sensor: factor of the error bounds"
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -316,25 +387,95 @@ def test_keys_as_labels() -> None:
     assert {key: unit_of(key) for key in units} == units
 
 
-def test_figures_of_sweeps(brief: Scenario, swept: Path, tmp_path: Path) -> None:
-    table = sweep_table(CampaignFolder.read(swept), REQUIRED)
-    middle = float(np.median(table.grid("random", SHOWN[1]).compressed()))
-    table = sweep_table(CampaignFolder.read(swept), Requirement(SHOWN[1], middle))
-    figure = draw_sweep(table, SHOWN)
-    panels = [each for each in figure.axes if each.get_xlabel()]
-    assert [each.get_xlabel() for each in panels] == ["angle sensor: error at zero range, $10^{-4}$ rad"] * 4
-    assert {each.get_ylabel() for each in panels} == {"thruster: greatest impulse, m/s"}
-    assert all(len(each.texts) == 6 for each in panels)
+def need_room(figure: Figure) -> None:
+    """Check that no labels of an axis touch, and that no titles, labels and legends of the figure overlap."""
+    figure.draw_without_rendering()
+    texts = []
+    for axes in figure.axes:
+        for one in (axes.xaxis, axes.yaxis):
+            low, high = sorted(one.get_view_interval())
+            ticks = [tick for tick in one.get_major_ticks() if low <= tick.get_loc() <= high]
+            labels = [label for tick in ticks for label in (tick.label1, tick.label2) if label.get_visible()]
+            boxes = [label.get_window_extent() for label in labels if label.get_text()]
+            assert len(boxes) >= 2 or one.get_label_text() == ""
+            for first, second in itertools.combinations(boxes, 2):
+                assert not first.overlaps(second)
+        texts += [
+            text.get_window_extent() for text in (axes.title, axes.xaxis.label, axes.yaxis.label) if text.get_text()
+        ]
+    texts += [legend.get_window_extent() for legend in figure.legends]
+    for first, second in itertools.combinations(texts, 2):
+        assert not first.overlaps(second)
+    for box in texts:
+        assert figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1
+        assert figure.bbox.y0 <= box.y0 <= box.y1 <= figure.bbox.y1
+
+
+def test_figures_of_sweeps_with_two_keys(swept: Path) -> None:
+    folder = CampaignFolder.read(swept)
+    middle = float(np.median(sweep_table(folder, REQUIRED).grid("random", SHOWN[1]).compressed()))
+    figure = draw_sweep(sweep_table(folder, Requirement(SHOWN[1], middle)), SHOWN, "random")
+    need_room(figure)
+    panels = [axes for axes in figure.axes if axes.get_xlabel()]
+    assert panels[0].get_title() == f"(a) miss p99 under {middle:g} m; random noise"
+    assert [axes.get_xlabel() for axes in panels] == ["angle sensor: error at zero range, $10^{-4}$ rad"] * 4
+    assert {axes.get_ylabel() for axes in panels} == {"thruster: greatest impulse, m/s"}
+    assert all(len(axes.texts) == 6 for axes in panels)
+
+
+def test_figures_of_sweeps_with_one_key(brief: Scenario, tmp_path: Path) -> None:
     axes = sweep_axes("thruster.greatest_impulse_m_s=2:8:3", brief)
     Sweep(brief, axes, sweep_cells(brief, axes), 30, tmp_path / "one", noise=CampaignNoise.MIXED).run()
     table = sweep_table(CampaignFolder.read(tmp_path / "one"), REQUIRED)
-    figure = draw_sweep(table, SHOWN)
-    assert [each.get_title() for each in figure.axes] == [
-        *("(a) random noise", "(b) random noise", "(c) game noise", "(d) game noise"),
-    ]
-    assert [each.get_ylabel() for each in figure.axes] == ["miss, m", "impulse spent, m/s"] * 2
+    for noise in ("random", "game"):
+        figure = draw_sweep(table, SHOWN, noise)
+        need_room(figure)
+        assert [axes.get_title() for axes in figure.axes] == [f"(a) {noise} noise", f"(b) {noise} noise"]
+        assert [axes.get_ylabel() for axes in figure.axes] == ["miss, m", "impulse spent, m/s"]
     with pytest.raises(ValueError, match="one or two axes"):
-        draw_sweep(table, [])
+        draw_sweep(table, [], "game")
+
+
+def made_table(axes: Sequence[Axis], required: Requirement | HitRequirement, value: Callable[..., float]) -> SweepTable:
+    """Return a table whose estimates are a function of the values of the axes."""
+    samples, verdicts = [], []
+    for values in itertools.product(*(axis.values for axis in axes)):
+        middle = value(*values)
+        estimates = {
+            quantity: [QuantileEstimate(level, level * middle, 0.8 * level * middle, None) for level in (0.5, 0.99)]
+            for quantity in ("miss_m", "impulse_m_s", "guaranteed_miss_m")
+        }
+        samples.append((Sample("game", 20, estimates, {}, {}, 20, 0, 0),))
+        share = 1.0 / (1.0 + middle)
+        shown = middle if isinstance(required, Requirement) else share
+        distance = math.log(shown / required.bound) * (-1.0 if isinstance(required, HitRequirement) else 1.0)
+        decision = OPEN if abs(distance) < 0.2 else MET if distance < 0.0 else NOT_MET
+        verdicts.append({"game": Verdict(decision, 20, shown, 0.9 * shown, 1.1 * shown, 40)})
+    nothing = (None,) * len(samples)
+    return SweepTable(tuple(axes), ("game",), (0.5, 0.99), tuple(samples), required, tuple(verdicts), nothing, 80.0)
+
+
+@pytest.mark.parametrize("required", [REQUIRED, HitRequirement(0.95)])
+@pytest.mark.parametrize(
+    "axes",
+    [
+        (Axis("angle_sensor.scale", tuple(np.geomspace(0.01, 1000.0, 21)), "log"),),
+        (Axis("angle_sensor.error_at_zero_range_rad", tuple(np.geomspace(1e-6, 1e-3, 8)), "log"),),
+        (Axis("angle_sensor.error_at_zero_range_rad=angle_sensor.error_at_nominal_range_rad", (1e-6, 1.1e-6, 1e-3)),),
+        (
+            Axis("angle_sensor.error_at_zero_range_rad", tuple(np.linspace(1.23456e-4, 9.87654e-4, 8))),
+            Axis("thruster.greatest_impulse_m_s", tuple(np.geomspace(0.1, 100.0, 15)), "log"),
+        ),
+        (
+            Axis("nominal.range_km", tuple(np.linspace(5701.31, 5901.39, 8))),
+            Axis("thruster.budget_m_s", (1.0, 1.01, 2.0, 2000.0)),
+        ),
+    ],
+)
+def test_labels_never_touch(axes: tuple[Axis, ...], required: Requirement | HitRequirement) -> None:
+    greatest = math.prod(axis.values[-1] for axis in axes)
+    table = made_table(axes, required, lambda *values: 1000.0 * (math.prod(values) / greatest) ** 0.5)
+    need_room(draw_sweep(table, SHOWN, "game"))
 
 
 def test_an_unfinished_sweep_is_reported_as_far_as_it_is(infoset: Infoset, swept: Path, tmp_path: Path) -> None:
@@ -349,10 +490,3 @@ def test_an_unfinished_sweep_is_reported_as_far_as_it_is(infoset: Infoset, swept
     assert pq.read_table(tmp_path / "report" / "sweep.parquet").column("miss_m_p50").null_count == 4
     assert math.isfinite(found["cells"][0]["samples"][0]["miss_m"]["p50"]["value"])
     assert QuantileName("miss_m", 0.5) == SHOWN[0]
-
-
-def test_the_limit_runs_along_edges_of_cells_and_not_beside_unknown_ones() -> None:
-    met = np.ma.masked_array(
-        [[True, True, False], [True, False, False]], mask=[[False, False, False], [False, True, False]]
-    )
-    assert between(np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 1.0, 2.0]), met) == [[(2.0, 0.0), (2.0, 1.0)]]
