@@ -108,6 +108,8 @@ class Flown:
         Miss, m; -inf if the engagement does not count.
     errors : ndarray, shape (n, rows, steps)
         Errors made, in units of their bounds.
+    set_emptied : ndarray of bool, shape (n,)
+        Whether the set became empty.
     truth_kept : ndarray of bool, shape (n,)
         Whether the true state was inside its section at every step.
     """
@@ -116,6 +118,7 @@ class Flown:
     value: Floats
     errors: Floats
     outcomes: NDArray[np.object_]
+    set_emptied: Flags
     truth_kept: Flags
 
     def take(self, which: Counts | slice) -> Flown:

@@ -78,9 +78,13 @@ def test_measurements_of_the_worst_lie_within_the_bounds_of_the_truth(worst: Wor
 def test_with_all_sensors_in_the_guaranteed_model(name: str, request: pytest.FixtureRequest) -> None:
     given = guaranteed(request.getfixturevalue(name))
     scenario = replace(
-        given, rate_sensor=RateSensor(1.2, 1e-5), set_model=replace(given.set_model, sections=9, fewest_sections=3)
+        given,
+        rate_sensor=RateSensor(3.0 * given.set_model.step_s, 1e-5),
+        set_model=replace(given.set_model, sections=9, fewest_sections=3),
     )
     found = find_worst(scenario, budget=24, seed=2)
+    assert found.sets_emptied == 0
+    assert found.miss_m == find_worst(scenario, budget=24, seed=2, keep_set=True).miss_m
     assert_possible(found, scenario)
     assert_flies_again(found)
     assert found.errors["range"].any()
@@ -96,6 +100,7 @@ def test_the_search_keeps_its_account(worst: WorstEngagement) -> None:
     assert evaluations[-1] <= BUDGET
     assert misses[-1] == worst.miss_m
     assert worst.strategy == "symmetric-miss"
+    assert 0 < worst.sets_emptied < BUDGET
 
 
 def test_the_same_seed_finds_the_same_whatever_the_threads(worst: WorstEngagement, coarse: Scenario) -> None:
@@ -111,8 +116,9 @@ def test_engagements_that_lose_their_set_can_be_left_out(coarse: Scenario) -> No
     """A set that believes in 58 km/s, and truths that come at 110: it is always lost."""
     fast = replace(coarse.set_model.bounds, vx_m_s=(-110.1e3, -110e3))
     wrong = replace(coarse, set_model=replace(coarse.set_model, bounds=fast))
-    assert find_worst(wrong, budget=10).outcome is Outcome.SET_EMPTY
-    with pytest.raises(NothingCountsError, match="in every simulated engagement the set was lost"):
+    found = find_worst(wrong, budget=10)
+    assert (found.outcome, found.sets_emptied) == (Outcome.SET_EMPTY, 10)
+    with pytest.raises(NothingCountsError, match="in every simulated engagement the set became empty"):
         find_worst(wrong, budget=10, keep_set=True)
 
 

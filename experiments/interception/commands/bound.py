@@ -17,7 +17,7 @@ class Bound(FileOptions):
 
     Two true states whose measurements are equal until some step receive equal impulses until that step, so at least
     one of them misses. The bound is the greatest miss that such pairs prove. Each strategy is simulated with these
-    pairs. Without --out or --json no file is written.
+    pairs, and in the searches of infoset adversary. Without --out or --json no file is written.
     """
 
     scenario: ScenarioName = "asteroid-1997"

@@ -65,7 +65,7 @@ def run(options: Engage) -> None:
         summary = {**head, **summaries} if both else summaries[noises[0].value]
         written.save("scenario.toml", scenario_to_toml(scenario if both else records[0].scenario))
         written.save("results.json", to_json(summary), "--json")
-        written.save("steps.csv", to_csv(COLUMNS, _rows(records)), "--csv")
+        written.save("steps.csv", to_csv(COLUMNS, step_rows(records)), "--csv")
         for record, name in zip(records, folder_records, strict=True):
             targets = [record_files.get(record.scenario.noise), None if options.out is None else options.out / name]
             for file in filter(None, targets):
@@ -111,10 +111,11 @@ def _where(record: Record, contradiction: Inconsistency) -> dict[str, object]:
     return {"step": step, "time_s": record.steps[step].time_s, "label_m": contradiction.label_m}
 
 
-def _rows(records: Sequence[Record]) -> list[list[Cell]]:
+def step_rows(records: Sequence[Record]) -> list[list[Cell]]:
+    """Return a row for each step of engagements, with `COLUMNS`."""
     return [
         [
-            record.scenario.noise.value,
+            record.noise_name,
             number,
             step.time_s,
             *(step.measured.get(kind.name) for kind in SENSORS),

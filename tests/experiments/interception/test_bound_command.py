@@ -77,11 +77,14 @@ def test_bound_into_a_folder(infoset: Infoset, short: Scenario, short_file: Path
         assert each["guaranteed_m"] is not None
         assert each["guaranteed_m"] >= each["worst_found_m"]
         pairs = max(miss for flight in each["flights"] for miss in flight["miss_m"])
+        assert each["worst_of_pairs_m"] == pairs
+        assert each["worst_found_set_kept_m"] == each["worst_found_m"]
+        assert each["worst_of_search_set_kept_m"] == each["worst_of_search_m"]
         assert each["worst_found_m"] == max(pairs, each["worst_of_search_m"])
         assert all(all(flight["truth_kept"]) for flight in each["flights"])
         assert each["name"] in out
     assert f"no strategy can guarantee a miss below {found['lower_bound_m']:.3g} m" in out
-    for title in ("worst miss", "closing speed", "equal measurements until", "guaranteed", "outcome"):
+    for title in ("pairs", "set never", "at all", "closing speed", "equal measurements until", "guaran-"):
         assert title in out
 
 
