@@ -54,7 +54,7 @@ class WorstOfStrategy:
     @property
     def pairs_m(self) -> float:
         """Greatest miss of the pairs, m."""
-        return max(flight.worst_miss_m for _, flight in self.flights)
+        return max(float(flight.results.miss_m.max()) for _, flight in self.flights)
 
     @property
     def miss_m(self) -> float:

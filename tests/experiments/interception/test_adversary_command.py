@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from experiments.cli import main
-from experiments.interception.choices import with_model
 from experiments.common.screen import number
+from experiments.interception.choices import with_model
 from experiments.interception.record_file import load_record
 from experiments.interception.scenario_file import load_scenario, scenario_hash
 from infoset import Model
