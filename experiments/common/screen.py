@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 BeginProgress = Callable[[str], Callable[[float], None]]
+_GAP = 2
+"""Width of the space between the columns of a table."""
 NOT_FINITE = (
     "the numbers of the scenario are so large or so small that the results are not finite; "
     "check its units with: infoset scenarios check FILE"
@@ -63,6 +65,39 @@ def number_table(*titles: str, left: int = 1) -> Table:
     for title in titles[left:]:
         table.add_column(title, justify="right")
     return table
+
+
+def print_table(console: Console, table: Table) -> None:
+    """Print a table of `number_table`; if the screen is too narrow, print it in parts, each with the columns of text.
+
+    No number is cut: a part has as many columns of numbers as fit, and at least one.
+    """
+    from rich.cells import cell_len
+    from rich.table import Table
+
+    cells = [[str(cell) for cell in (column.header, *column.cells)] for column in table.columns]
+    widths = [max(cell_len(line) for cell in column for line in cell.splitlines() or [""]) + _GAP for column in cells]
+    left = [index for index, column in enumerate(table.columns) if column.justify != "right"]
+    parts: list[list[int]] = []
+    used = room = console.width + _GAP - sum(widths[index] for index in left)
+    for index in sorted(set(range(len(widths))) - set(left)):
+        used += widths[index]
+        if used > room:
+            parts.append([])
+            used = widths[index]
+        parts[-1].append(index)
+    if len(parts) <= 1:
+        console.print(table)
+        return
+    for number, numbers in enumerate(parts):
+        part = Table(box=None, pad_edge=False)
+        chosen = sorted([*left, *numbers])
+        for index in chosen:
+            column = table.columns[index]
+            part.add_column(column.header, justify=column.justify, no_wrap=index not in left)
+        for row in zip(*(table.columns[index].cells for index in chosen), strict=True):
+            part.add_row(*row)
+        console.print(*([""] if number else []), part, sep="\n")
 
 
 @contextlib.contextmanager

@@ -29,7 +29,6 @@ from experiments.multipoint.scene import CostCurve, Scene
 
 Floats = NDArray[np.float64]
 
-_POINTS = 1601
 _TRACK_POINTS = 241
 _COMPONENTS = tuple({**look, "marker": "none"} for look in LINE_LOOKS[:3])
 _MOST_NAMED = 12
@@ -49,17 +48,10 @@ _NODE: dict[str, Any] = {"color": "white", "markeredgecolor": INK, "markersize":
 _DOTTED: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (2, 2))}
 
 
-def _times(scene: Scene) -> Floats:
-    """Return equally spaced times, and the times on both sides of each visit."""
-    nodes = scene.path.nodes
-    even = np.linspace(scene.tour.start_s, scene.end_s, _POINTS)
-    return np.unique(np.concatenate([even, nodes.arrive_s, np.nextafter(nodes.arrive_s, -np.inf), nodes.leave_s[:-1]]))
-
-
 @style()
 def draw_path(scene: Scene) -> Figure:
     """Draw the path and the motion of the targets, in two planes."""
-    positions = scene.path.state(_times(scene))[:, :3]
+    positions = scene.path.state(scene.times)[:, :3]
     name, per_m = length_unit(float(np.abs(positions).max()))
     positions = positions * per_m
     hill = scene.axes is FrameAxes.HILL
@@ -162,7 +154,7 @@ def _count_inside(box: Any, points: Floats) -> int:
 @style()
 def draw_control(scene: Scene, bound_m_s2: float | None = None) -> Figure:
     """Draw the components and the magnitude of the control against time, with the bound if there is one."""
-    times = _times(scene)
+    times = scene.times
     control = scene.path.control(times) * 1e3
     figure, (above, below) = figure_grid(100.0, 2, 1, (17.0, 8.0, 12.0, 9.0), (0.0, 8.0))
     for axis, letter in enumerate("xyz"):
@@ -181,7 +173,7 @@ def draw_control(scene: Scene, bound_m_s2: float | None = None) -> Figure:
 @style()
 def draw_costates(scene: Scene) -> Figure:
     """Draw the costates against time; the costate of the position jumps at each visit."""
-    times = _times(scene)
+    times = scene.times
     costate = scene.path.costate(times)
     figure, (above, below) = figure_grid(100.0, 2, 1, (17.0, 8.0, 12.0, 9.0), (0.0, 8.0))
     for axis, letter in enumerate("xyz"):

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.options import Csv, FileOptions, Html, ProblemName, Seed, Settings
+from experiments.common.options import Csv, FileOptions, Html, ProblemName, Seed, Settings, TrajectoryCsv
 
 ROWS = "thrust_ratio=0:0.8:17"
 
@@ -17,7 +17,7 @@ class Pursuit(FileOptions):
     """Solve the game of two spacecraft in which the pursuer minimizes the time of capture and the evader maximizes it.
 
     Each capture has a certificate (a list of checks). The result is called a saddle point only if all checks hold.
-    Without --out, --json or --html no file is written.
+    Without --out, --json, --csv or --html no file is written.
     """
 
     problem: ProblemName = "geo-pursuit"
@@ -56,6 +56,7 @@ class Pursuit(FileOptions):
     ] = 0.0
     runs: Annotated[int, typer.Option(metavar="N", min=1, max=10_000, help="Number of simulations with feedback.")] = 1
     seed: Seed = 0
+    csv: TrajectoryCsv = None
     html: Html = None
 
 

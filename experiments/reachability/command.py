@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.options import FileOptions, Html, ProblemName, Seed, Settings
+from experiments.common.options import FileOptions, Html, ProblemName, Seed, Settings, TrajectoryCsv
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class Reach(FileOptions):
 
     The results are the least terminal norm, the forward sets, the tube of all optimal trajectories, and the set of
     all optimal controls. Selected optimal controls are simulated on the linear and on the nonlinear model. Without
-    --out, --json or --html no file is written.
+    --out, --json, --csv or --html no file is written.
     """
 
     problem: ProblemName = "rendezvous-2021"
@@ -50,4 +50,5 @@ class Reach(FileOptions):
         ),
     ] = 10
     seed: Seed = 0
+    csv: TrajectoryCsv = None
     html: Html = None

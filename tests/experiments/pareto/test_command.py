@@ -72,7 +72,9 @@ def test_the_published_example_into_a_folder(infoset: Infoset, tmp_path: Path) -
     code, out, _ = infoset("--out", "results", "--prefer", "y_m=0,z_m=50", "--samples", 4)
     assert code == 0
     files = [f"{name}.{kind}" for name in FIGURES for kind in ("pdf", "png")]
-    assert sorted(each.name for each in (tmp_path / "results").iterdir()) == sorted([*files, "results.json"])
+    assert sorted(each.name for each in (tmp_path / "results").iterdir()) == sorted(
+        [*files, "results.json", "trajectories.csv"]
+    )
     found = strict((tmp_path / "results" / "results.json").read_text())
     assert list(found) == KEYS
     assert (found["version"], found["problem"], found["meet"]) == (version("infoset"), "pareto-2008", "rendezvous")

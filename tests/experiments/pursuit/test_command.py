@@ -144,7 +144,8 @@ def test_a_folder_has_the_problem_the_results_and_the_figures(infoset: Infoset, 
     assert "saddle point: all checks hold" in out
     assert "feedback, a plan every 60 s, evader coast: captured" in out
     files = sorted(each.name for each in (tmp_path / "found").iterdir())
-    assert files == sorted(["problem.toml", "results.json", *(f"{f}.{e}" for f in FIGURES for e in ("pdf", "png"))])
+    figures = [f"{name}.{kind}" for name in FIGURES for kind in ("pdf", "png")]
+    assert files == sorted(["problem.toml", "results.json", "trajectories.csv", *figures])
     again, _, _ = infoset("pursuit", "found/problem.toml", "--json", "again.json", "-q")
     assert again == 0
     one, other = (json.loads((tmp_path / each).read_text()) for each in ("again.json", "found/results.json"))

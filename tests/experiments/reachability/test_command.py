@@ -58,7 +58,9 @@ def test_reach_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
     code, out, _ = infoset("--select", "energy,l1,vertices,samples:3", "--replan", "--out", folder)
     assert code == 0
     files = [f"{name}.{kind}" for name in FIGURES for kind in ("pdf", "png")]
-    assert sorted(each.name for each in folder.iterdir()) == sorted([*files, "published-tables.csv", "results.json"])
+    assert sorted(each.name for each in folder.iterdir()) == sorted(
+        [*files, "published-tables.csv", "results.json", "trajectories.csv"]
+    )
     found = json.loads((folder / "results.json").read_text())
     assert list(found) == KEYS
     assert found["version"] == version("infoset")
