@@ -306,14 +306,7 @@ class MultipointProblem:
 
 
 def load_multipoint(name_or_path: str, settings: Sequence[str] | None = None) -> MultipointProblem:
-    """Read a built-in problem or a file.
-
-    Parameters
-    ----------
-    name_or_path : str or path
-        A built-in name, or the path of a TOML file.
-    settings : sequence of str or None, optional
-        KEY=VALUE: values in place of those of the file.
+    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
 
     Raises
     ------

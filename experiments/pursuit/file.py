@@ -17,7 +17,7 @@ from pydantic import PlainValidator
 
 from experiments.common.errors import InputError
 from experiments.common.problem_file import ProblemTables, problem_form, problem_hash
-from experiments.common.toml_file import Known, Problem, load_tables, read_tables
+from experiments.common.toml_file import Known, Problem, load_tables
 from experiments.common.toml_values import (
     KILO,
     NUMBER,
@@ -274,14 +274,7 @@ FORM = problem_form(KIND, PursuitTables, _checks, [f"{player}.{element}" for pla
 
 
 def load_pursuit(name_or_path: str, settings: Sequence[str] | None = None) -> PursuitProblem:
-    """Read a built-in problem or a file.
-
-    Parameters
-    ----------
-    name_or_path : str or path
-        A built-in name, or the path of a TOML file.
-    settings : sequence of str or None, optional
-        KEY=VALUE: values in place of those of the file, for example ``["evader.thrust_N=5"]``.
+    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
 
     Raises
     ------
@@ -289,17 +282,6 @@ def load_pursuit(name_or_path: str, settings: Sequence[str] | None = None) -> Pu
         If there is no such problem, or it is not sound.
     """
     return PursuitProblem(load_tables(FORM, name_or_path, settings), name_or_path)
-
-
-def read_problem(text: str, source: str) -> PursuitProblem:
-    """Read a problem from TOML; ``source`` is its name in messages.
-
-    Raises
-    ------
-    InputError
-        If it is not sound.
-    """
-    return PursuitProblem(read_tables(FORM, text, source), source)
 
 
 def parameter_names() -> list[str]:

@@ -3,10 +3,15 @@ from __future__ import annotations
 import pytest
 
 from experiments.common.errors import InputError
-from experiments.pursuit.file import PursuitProblem, load_pursuit, parameter_names, read_problem
+from experiments.common.toml_file import read_tables
+from experiments.pursuit.file import FORM, PursuitProblem, load_pursuit, parameter_names
 from rendezvous.pursuit_evasion import Game
 
 BUILT_IN = ["geo-pursuit", "leo-pursuit"]
+
+
+def read_problem(text: str, source: str) -> PursuitProblem:
+    return PursuitProblem(read_tables(FORM, text, source), source)
 
 
 @pytest.fixture(scope="module")
