@@ -15,13 +15,8 @@ from typer.core import TyperGroup
 from experiments.campaigns.command import Campaign, Report, Sweep
 from experiments.common.command import command
 from experiments.common.errors import INTERRUPTED, InputError, on_a_screen
-from experiments.interception.commands.adversary import Adversary
-from experiments.interception.commands.bound import Bound
-from experiments.interception.commands.compare import Compare
-from experiments.interception.commands.engage import Engage
-from experiments.interception.commands.experiment import Experiment
-from experiments.interception.commands.replay import Replay
-from experiments.interception.commands.scenarios import app as scenarios
+from experiments.interception.command import Adversary, Bound, Compare, Engage, Experiment, Replay
+from experiments.interception.scenarios_command import app as scenarios
 from experiments.multipoint.command import Multipoint
 from experiments.pareto.command import Pareto
 from experiments.problem_list import app as problems

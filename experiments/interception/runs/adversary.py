@@ -13,7 +13,7 @@ from experiments.common.errors import InputError
 from experiments.common.output import output_of, to_csv, to_json
 from experiments.common.screen import figure_files, number, print_lines, progress_bar, say_warnings, table_console
 from experiments.interception.choices import own_strategy, scenario_with, study_scenario
-from experiments.interception.commands.adversary import Adversary
+from experiments.interception.command import Adversary
 from experiments.interception.record_file import record_path, write_record
 from experiments.interception.runs.engage import COLUMNS, step_rows
 from experiments.interception.runs.engagement_table import FIGURE_2, FIGURE_3, draw_engagements

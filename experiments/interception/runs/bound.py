@@ -23,7 +23,7 @@ from experiments.common.screen import (
     table_console,
 )
 from experiments.interception.choices import chosen_strategies, scenario_with, study_scenario
-from experiments.interception.commands.bound import Bound
+from experiments.interception.command import Bound
 from experiments.interception.figures.bound import draw_bound
 from experiments.interception.runs.shared import need_finite, summary_head
 from experiments.interception.runs.worst_misses import WorstMisses, find_worst_misses

@@ -19,7 +19,7 @@ from experiments.common.screen import (
     table_console,
 )
 from experiments.interception.choices import chosen_strategies, scenario_with, study_scenario
-from experiments.interception.commands.compare import Compare
+from experiments.interception.command import Compare
 from experiments.interception.comparison import QUANTILES, Comparison, Flight, flights, gather, summary
 from experiments.interception.figures.comparison import draw_comparison
 from experiments.interception.runs.shared import Progress, simulate_in_threads, summary_head

@@ -9,7 +9,7 @@ from time import perf_counter
 from experiments.common.output import Cell, library_version, outcome_columns, output_of, to_csv, to_json
 from experiments.common.screen import figure_files, progress_bar, say_warnings, table_console
 from experiments.interception.choices import own_strategy, scenario_with
-from experiments.interception.commands.engage import Engage
+from experiments.interception.command import Engage
 from experiments.interception.record_file import record_path, write_record
 from experiments.interception.runs.engagement_table import FIGURE_2, FIGURE_3, draw_engagements, show_engagements
 from experiments.interception.runs.shared import need_finite, summary_head

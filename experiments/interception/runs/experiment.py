@@ -20,7 +20,7 @@ from experiments.common.screen import (
     table_console,
 )
 from experiments.interception.choices import own_strategy, scenario_with
-from experiments.interception.commands.experiment import Experiment
+from experiments.interception.command import Experiment
 from experiments.interception.curves import Curve, curve_scenarios
 from experiments.interception.figures.distributions import draw_distributions
 from experiments.interception.published import MANY, PRINTED_SINGLE_RUN, SINGLE

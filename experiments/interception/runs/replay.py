@@ -5,7 +5,7 @@ from __future__ import annotations
 from experiments.common.errors import InputError
 from experiments.common.output import output
 from experiments.common.screen import figure_files, progress_bar, say, table_console
-from experiments.interception.commands.replay import Replay
+from experiments.interception.command import Replay
 from experiments.interception.figures.animation import GIF, MP4, animate, animation_path
 from experiments.interception.page import MOST_RECORDS, interception_page
 from experiments.interception.record_file import load_record

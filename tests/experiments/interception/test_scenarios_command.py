@@ -11,7 +11,6 @@ import typer
 from typer.testing import CliRunner
 
 from experiments.common.errors import InputError
-from experiments.interception.commands.scenarios import app
 from experiments.interception.scenario_file import (
     load_scenario,
     scenario_hash,
@@ -19,6 +18,7 @@ from experiments.interception.scenario_file import (
     scenario_template,
     scenario_text,
 )
+from experiments.interception.scenarios_command import app
 
 NAMES = list(scenario_names())
 
@@ -217,7 +217,7 @@ def test_help_has_an_example(command: list[str]) -> None:
 
 def test_importing_the_command_imports_nothing_heavy() -> None:
     heavy = ["numpy", "pydantic", "rich", "numba", "matplotlib", "experiments.interception.scenario_file"]
-    module = "experiments.interception.commands.scenarios"
+    module = "experiments.interception.scenarios_command"
     code = f"import {module}, sys; print([each for each in {heavy} if each in sys.modules])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
