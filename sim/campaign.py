@@ -132,6 +132,8 @@ class Campaign:
         Scenarios of a sweep, one for each combination of the values; the last axis varies fastest.
     most_runs : int or None
         Greatest number of runs of a cell with a requirement in `until`; `runs` is then the least. None is `runs`.
+    require : Requirement, HitRequirement or None
+        Requirement of a sweep for its reports; stored as a description. None is that of `until`.
 
     Raises
     ------
@@ -151,6 +153,7 @@ class Campaign:
     axes: tuple[Axis, ...] = ()
     cells: tuple[Scenario, ...] = ()
     most_runs: int | None = None
+    require: AnyRequirement | None = None
 
     def __post_init__(self) -> None:
         for name, limits in (("runs", COUNT), ("seed", WHOLE), ("chunk", COUNT)):
@@ -212,6 +215,7 @@ class Campaign:
     def manifest(self) -> Manifest:
         """Return the manifest of the campaign; a resumed campaign keeps the size of its chunks."""
         noise, stored = self._noise, self._stored()
+        required = self.until if self.require is None and isinstance(self.until, AnyRequirement) else self.require
         hashes = ",".join(scenario_hash(noise.applied_to(cell)) for cell in self.cells)
         return Manifest(
             scenario=noise.applied_to(self.scenario),
@@ -226,6 +230,7 @@ class Campaign:
             order=stored.order if stored is not None and stored.axes else "rounds" if self.axes else "cells",
             cells_hash=hashlib.sha256(hashes.encode()).hexdigest()[:32] if self.cells else "",
             until=None if self.until is None else str(self.until),
+            require=None if required is None else str(required),
         )
 
     def chunk_at(self, index: int, manifest: Manifest) -> Chunk:
@@ -341,7 +346,7 @@ class Sweep(Campaign):
         As for `Campaign`.
     runs : int
         Engagements per cell.
-    folder, seed, noise, guarantee, chunk, strategy, until, most_runs
+    folder, seed, noise, guarantee, chunk, strategy, until, most_runs, require
         As for `Campaign`; the guaranteed miss is not computed by default.
 
     Raises
@@ -364,7 +369,10 @@ class Sweep(Campaign):
         strategy: Strategy | None = None,
         until: AnyRequirement | None = None,
         most_runs: int | None = None,
+        require: AnyRequirement | None = None,
     ) -> None:
         if not axes:
             raise ValueError("a sweep needs at least one axis, and a scenario for each combination of their values")
-        super().__init__(scenario, runs, folder, seed, noise, strategy, guarantee, chunk, until, axes, cells, most_runs)
+        super().__init__(
+            scenario, runs, folder, seed, noise, strategy, guarantee, chunk, until, axes, cells, most_runs, require
+        )

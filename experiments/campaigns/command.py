@@ -22,7 +22,7 @@ Required = Annotated[
         metavar="RULE",
         help='Requirement: the upper bound of a quantile, "miss_m p99<10", or the least probability of a hit, '
         '"hit>=0.95". Each cell meets it, does not meet it, or is undecided, with 95 % confidence. Default: one of '
-        "these two; the second if the body has a size.",
+        "these two, the second if the body has a size; in a report, that of the sweep.",
     ),
 ]
 Shown = Annotated[

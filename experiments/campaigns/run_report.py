@@ -87,7 +87,7 @@ def _read(options: Report) -> CampaignFolder:
 
 def _report_sweep(folder: CampaignFolder, options: Report, written: Output, console: Console | None) -> None:
     sized = bool(folder.numbers("hit").count())
-    default = folder.manifest.until or default_requirement(has_size=sized)
+    default = folder.manifest.require or default_requirement(has_size=sized)
     required, shown = quantile_options(options.require, options.show, default)
     if required.quantity == "hit" and not sized:
         raise InputError(f"--require {required}: the body of this sweep has no size; give a bound of the miss instead")

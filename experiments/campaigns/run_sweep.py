@@ -54,6 +54,7 @@ def run(options: Options) -> None:
             chunk=options.chunk,
             until=required if options.until else None,
             most_runs=_most_runs(options),
+            require=required,
         )
         need_free(options.out, resume=options.resume)
         if not options.yes:

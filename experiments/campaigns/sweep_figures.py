@@ -122,8 +122,8 @@ def _lines(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figu
     levels = sorted({quantile.level for quantile in shown}, reverse=True)
     rows = -(-len(quantities) // 2)
     columns = min(2, len(quantities))
-    figure = new_figure(height_mm=rows * _PANEL_MM + (rows - 1) * 26.0 + 49.0, width_mm=_COLUMN_MM * columns)
-    grid = place_axes(figure, rows, columns, margins_mm=(17.0, 4.0, 38.0, 11.0), gaps_mm=(18.0, 26.0))
+    figure = new_figure(height_mm=rows * _PANEL_MM + (rows - 1) * 24.0 + 45.0, width_mm=_COLUMN_MM * columns)
+    grid = place_axes(figure, rows, columns, margins_mm=(17.0, 4.0, 34.0, 11.0), gaps_mm=(18.0, 24.0))
     panels = [axes for row in grid for axes in row]
     for axes, quantity, letter in zip(panels, quantities, _LETTERS, strict=False):
         quantiles = [quantile for quantile in shown if quantile.quantity == quantity]
@@ -386,7 +386,7 @@ def _scale(axes: Axes, axis: Axis, which: str) -> None:
         one.set_major_locator(FixedLocator(axis.values))
         one.set_minor_locator(NullLocator())
     power = _power(axis)
-    one.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick / 10.0**power:.3g}"))
+    one.set_major_formatter(FuncFormatter(lambda tick, _: f"{float(f'{tick / 10.0**power:.3g}'):g}"))
     one.set_minor_formatter(NullFormatter())
     one.set_tick_params(length=2.0)
     unit = unit_of(axis.key)

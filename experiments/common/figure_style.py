@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import io
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -137,25 +137,39 @@ def figure_grid(
 
 
 def separate_labels(axes: Axes, gap_points: float = 2.0) -> None:
-    """Keep only tick labels that do not touch, for axes whose place and limits are final; the first label is kept."""
+    """Remove tick labels that touch, for axes whose place and limits are final.
+
+    If labels of a logarithmic axis touch, those at powers of ten are kept first.
+    """
     figure = axes.get_figure(root=True)
     if figure is None:
         raise ValueError("these axes are in no figure")
     gap = gap_points * figure.dpi / 72.0
     for one, end in ((axes.xaxis, 0), (axes.yaxis, 1)):
         figure.draw_without_rendering()
-        edge, kept = -np.inf, []
-        limits = sorted(one.get_view_interval())
+        low, high = sorted(one.get_view_interval())
+        boxes = {}
         for tick in one.get_major_ticks():
-            location = float(tick.get_loc())
             label = tick.label1 if tick.label1.get_visible() else tick.label2
-            if not limits[0] <= location <= limits[1]:
-                continue
-            box = label.get_window_extent()
-            if not label.get_text() or box.min[end] >= edge + gap:
-                kept.append(location)
-                edge = box.max[end] if label.get_text() else edge
-        one.set_major_locator(FixedLocator(kept))
+            if low <= tick.get_loc() <= high and label.get_text():
+                boxes[float(tick.get_loc())] = label.get_window_extent()
+        kept = _apart(list(boxes), boxes, end, gap)
+        if len(kept) < len(boxes) and one.get_scale() == "log":
+            decades = [at for at in boxes if math.log10(at).is_integer()]
+            if len(decades) > 1:
+                kept = _apart(decades, boxes, end, gap)
+        if boxes:
+            one.set_major_locator(FixedLocator(kept))
+
+
+def _apart(ticks: Sequence[float], boxes: Mapping[float, Any], end: int, gap: float) -> list[float]:
+    """Return ticks whose labels have a gap along an axis of the page, the first tick included."""
+    edge, kept = -math.inf, []
+    for at in ticks:
+        if boxes[at].min[end] >= edge + gap:
+            kept.append(at)
+            edge = boxes[at].max[end]
+    return kept
 
 
 def plain(text: str) -> str:

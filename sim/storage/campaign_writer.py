@@ -146,6 +146,7 @@ def need_free(path: Path, *, resume: bool) -> None:
 def _continued(stored: Manifest, wanted: Manifest, path: Path) -> Manifest:
     """Return the manifest of a campaign that is resumed, perhaps with more runs or another rule."""
     need_same(stored, wanted, path)
+    stored = replace(stored, require=wanted.require)
     if wanted.runs == stored.runs and wanted.until == stored.until:
         return stored
     if wanted.runs < stored.runs:

@@ -25,7 +25,7 @@ MOST_DIFFERENCES = 20
 MOST_CELLS = 10_000
 MOST_RUNS_A_SHARD = 1_000_000
 
-_PROGRESS = ("runs", "until", "stopped_after", "cell_runs", "made_by")
+_PROGRESS = ("runs", "until", "stopped_after", "cell_runs", "require", "made_by")
 """Keys that may differ between the sessions of a campaign."""
 _DERIVED = ("format", "schema", "version", "kind", "name", "scenario_hash", "sha256")
 """Keys of the file that follow from the others."""
@@ -75,6 +75,8 @@ class Manifest:
         Runs after which the rule stopped the campaign.
     cell_runs : tuple of int
         Engagements of each cell of a finished sweep whose cells were stopped by a requirement; otherwise empty.
+    require : str or None
+        The requirement of a sweep, as asked for last; it does not change any result.
     scenario : Scenario
         Scenario; for a sweep the one that is varied.
     strategy : str
@@ -103,6 +105,7 @@ class Manifest:
     until: str | None = None
     stopped_after: int | None = None
     cell_runs: tuple[int, ...] = field(default=(), metadata=ADDED_LATER)
+    require: str | None = field(default=None, metadata=ADDED_LATER)
     scenario: Scenario
     seed: int
     noise: CampaignNoise

@@ -117,6 +117,8 @@ def test_a_sweep_of_one_key_mixed_and_resumed(infoset: Infoset, file: Path, tmp_
     before = (tmp_path / "a" / "sweep.parquet").read_bytes()
     for victim in list((tmp_path / "a" / "shards").glob("*.parquet"))[1:3]:
         victim.unlink()
+    code, out, _ = infoset("report", tmp_path / "a")
+    assert out.count("noise: miss_m p90<3 is met in") == 2
     again = infoset(*asked, "--out", tmp_path / "a", "--require", "miss_m p90<3", "--resume", "-q")
     assert again == (0, "", "")
     assert (tmp_path / "a" / "sweep.parquet").read_bytes() == before
