@@ -9,8 +9,12 @@ from decimal import Decimal
 from enum import Enum
 
 from experiments.common.file_kinds import PROBLEM_COMMANDS, built_in
-from experiments.common.toml_file import Form, Known, Problem, Tables, no_checks
+from experiments.common.toml_file import Form, KeyPath, Known, Problem, Tables, no_checks
 from experiments.common.toml_values import Constant, Description, Name, Table, key
+
+MOST_RADIANS = Decimal(1000)
+LEAST_RADIANS = Decimal("1e-9")
+"""Angles of the orbit during a problem, within which linear motion is meaningful."""
 
 
 class ProblemTables(Table):
@@ -70,6 +74,19 @@ def duplicate_names(known: Known, table: str, count: int) -> Iterator[Problem]:
         first = numbers.setdefault(name, index + 1)
         if isinstance(name, str) and first <= index:
             yield Problem((table, str(index), "name"), f'"{name}" is also the name of {table} #{first}', "rename one")
+
+
+def angle_problems(path: KeyPath, duration_s: Decimal | None, rate_rad_s: Decimal | None) -> Iterator[Problem]:
+    """Yield a problem if the orbit turns by an unlikely angle in a time; wrong or missing values yield none."""
+    if duration_s is None or rate_rad_s is None or duration_s <= 0 or rate_rad_s <= 0:
+        return
+    angle = duration_s * rate_rad_s
+    if not LEAST_RADIANS <= angle <= MOST_RADIANS:
+        yield Problem(
+            path,
+            f"is {float(angle):.3g} radians of the orbit; {LEAST_RADIANS:g} to {MOST_RADIANS} make sense",
+            f"check the units of orbit_rate_rad_s and {path[-1]}",
+        )
 
 
 def _plain(value: object) -> str:

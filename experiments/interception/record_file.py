@@ -201,8 +201,6 @@ def _to_arrays(record: Record) -> Arrays:
     steps = record.steps
     sections = [section for step in steps for section in step.sections]
     polygons = [section.polygon.vertices[: int(section.polygon.counts)] for section in sections]
-    if any(section.closing_speed_m_s != record.scenario.set_model.closing_speed_m_s for section in sections):
-        raise ValueError("the sections of a record must have the closing speed of its scenario")
     arrays: Arrays = {name: _floats(getattr(step, name) for step in steps) for name in _NUMBERS}
     for sensor in SENSORS:
         values = [step.measured.get(sensor.name) for step in steps]
@@ -234,8 +232,6 @@ def _offsets(counts: list[int]) -> NDArray[np.int64]:
 
 
 def _result_to_json(result: Results) -> dict[str, object]:
-    if len(result) != 1:
-        raise ValueError(f"the result of a record is a batch of one: got {len(result)}")
     values = {key: [values_of(result, column)[0] for column in columns] for key, columns in _RESULT.items()}
     return {key: value[0] if len(value) == 1 else value for key, value in values.items()}
 

@@ -60,7 +60,7 @@ def frame(records: Sequence[Record], step: int, console: Console) -> Group:
     shown = [
         Panel(
             Group(
-                *(Text(line) for line in _plane(record, _step_of(record, step), columns, braille)),
+                *(Text(line) for line in _plane(_step_of(record, step), columns, braille)),
                 Text(),
                 Text(_bar(record, _step_of(record, step), columns)),
                 _numbers(record, min(step, len(record.steps) - 1)),
@@ -77,7 +77,7 @@ def _step_of(record: Record, step: int) -> StepRecord:
     return record.steps[min(step, len(record.steps) - 1)]
 
 
-def _plane(record: Record, step: StepRecord, columns: int, braille: bool) -> list[str]:
+def _plane(step: StepRecord, columns: int, braille: bool) -> list[str]:
     """Sections in the (omega, alpha) plane, with X for the true state."""
     last = len(step.sections) - 1
     places = {round(each) for each in np.linspace(0, last, _SECTIONS).tolist()} if step.sections else set()

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
 from experiments.common.errors import InputError
-from experiments.common.orbit_angle import angle_problems
-from experiments.common.problem_file import ProblemTables, duplicate_names, problem_form, problem_hash
+from experiments.common.problem_file import ProblemTables, angle_problems, duplicate_names, problem_form, problem_hash
 from experiments.common.toml_file import KeyPath, Known, Problem, load_tables
 from experiments.common.toml_values import (
     KILO,
