@@ -44,18 +44,12 @@ class CampaignColumns:
 
     Parameters
     ----------
-    noise : str
-        Name of the noise.
-    range_meter : bool
-        Whether the scenario has a range meter.
     miss_m, impulse_m_s : ndarray, shape (n,)
         Miss and impulse spent, in the order of the runs.
     guaranteed_miss_m : ndarray, shape (m,)
         Known values of the guaranteed miss.
     start : mapping of str to ndarray, shape (n,)
         Components of the initial state, by column.
-    guarantees : bool
-        Whether the guaranteed misses are guarantees.
     """
 
     noise: str

@@ -177,10 +177,7 @@ def _workers(options: Flight, note: Callable[[str], None]) -> Iterator[_Workers]
 def _estimate(campaign: Campaign, cores: int) -> str:
     """Return a line with the time and the disk space of a campaign, measured on a few of its engagements.
 
-    Raises
-    ------
-    InputError
-        If the disk has too little space.
+    `InputError` if the disk has too little space.
     """
     manifest, folder = campaign.manifest(), Path(campaign.folder)
     chunk = campaign.chunk_at(manifest.chunks // 2, manifest)

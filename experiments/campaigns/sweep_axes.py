@@ -42,8 +42,6 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
         `table.key=FROM:TO:COUNT` or `table.key=log:FROM:TO:COUNT`, separated by commas. Of a key that is a pair,
         `table.key.least` or `table.key.greatest` is varied. `one.key=other.key=FROM:TO:COUNT` gives both keys the same
         values. `sensor.scale` is a factor of all error bounds of a sensor.
-    scenario : Scenario
-        Scenario whose keys can be varied.
 
     Raises
     ------

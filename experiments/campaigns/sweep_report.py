@@ -39,8 +39,6 @@ class SweepReport:
 
     Parameters
     ----------
-    folder : CampaignFolder
-        The sweep, finished or not.
     table : SweepTable
         The quantiles of its cells, and the decisions about the requirement.
     shown : sequence of QuantileName

@@ -33,14 +33,8 @@ class SweepTable:
     ----------
     axes : tuple of Axis
         Keys that vary; the last varies fastest over the cells.
-    noises : tuple of str
-        Noises of the sweep.
-    levels : tuple of float
-        Levels of the quantiles.
     cells : tuple of tuple of Sample
         Samples of each cell, one for each noise; empty for a cell without runs.
-    required : Requirement or HitRequirement
-        The requirement.
     verdicts : tuple of mapping of str to Verdict
         For each cell, what the runs of each noise say about the requirement.
     hits : tuple of HitEstimate or None

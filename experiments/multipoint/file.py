@@ -270,12 +270,8 @@ class MultipointProblem:
     ----------
     source : str
         Name of the file, for messages.
-    hash : str
-        Fingerprint of the values.
     times_s : ndarray, shape (n,), or None
         Times of the visits, by target as listed; None if one is missing.
-    optimise : bool
-        Whether times are optimised.
     """
 
     name: str

@@ -13,15 +13,7 @@ MOMENTS = 401
 
 
 def multipoint_page(name: str, scene: Scene, bound_m_s2: float | None = None) -> str:
-    """Return the page of a path that visits targets as HTML.
-
-    Parameters
-    ----------
-    name : str
-        Name of the problem.
-    bound_m_s2 : float or None
-        Bound on the control.
-    """
+    """Return the page of a path that visits targets as HTML."""
     path, nodes = scene.path, scene.path.nodes
     time_s = np.unique(np.concatenate([np.linspace(scene.tour.start_s, scene.end_s, MOMENTS), nodes.arrive_s]))
     positions, control = path.state(time_s)[:, :3], path.control(time_s)

@@ -19,15 +19,7 @@ _SET_POINTS = 600
 
 
 def pareto_page(name: str, solution: EncounterSolution, selections: Mapping[str, Floats]) -> str:
-    """Return the page of an encounter as HTML.
-
-    Parameters
-    ----------
-    name : str
-        Name of the problem.
-    selections : mapping of str to ndarray, shape (f,)
-        Pareto-optimal meetings by the rule of their choice.
-    """
+    """Return the page of an encounter as HTML, with Pareto-optimal meetings by the rule of their choice."""
     encounter = solution.encounter
     free = [component.name.lower() for component in encounter.free]
     time_s = np.linspace(min(craft.start_s for craft in encounter.craft), encounter.meeting_s, MOMENTS)

@@ -56,8 +56,6 @@ def draw_map(solved: CaptureMap, column: str, row: str) -> Figure:
 
     Parameters
     ----------
-    solved : CaptureMap
-        The capture times of a grid of games, s.
     column, row : str
         Names of the parameters, with their units.
     """

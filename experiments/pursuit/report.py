@@ -37,8 +37,6 @@ class Feedback:
     ----------
     policy : str
         The policy of the evader, or the file of its script.
-    replan_s : float
-        Time between plans.
     """
 
     policy: str

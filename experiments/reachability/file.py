@@ -174,8 +174,6 @@ class Rendezvous:
 
     Parameters
     ----------
-    hash : str
-        Fingerprint of the values.
     motion : ConstantMotion or TschaunerHempel
         Linear model of the motion.
     disturbance : ndarray, shape (T, 6, 3), or None

@@ -70,12 +70,8 @@ class Request:
     ----------
     selection : sequence of str
         Names of `SINGLE`, "vertices" or "samples".
-    samples : int
-        Number of samples.
     route : Route or None
         Representation of the sets; None chooses one.
-    closed_loop : bool
-        Whether to simulate with a new plan every period.
     noisy_flights : int
         Number of these simulations with navigation errors, if the problem has them.
     """
@@ -94,8 +90,6 @@ class Member:
 
     Parameters
     ----------
-    controls : ndarray, shape (T, 3)
-        Controls of all periods.
     linear, nonlinear : ndarray, shape (T + 1, 6)
         States of the linear and of the nonlinear model.
     between : float

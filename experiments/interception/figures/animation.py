@@ -32,8 +32,6 @@ def animation_path(option: str, path: Path | None, ending: str) -> None:
 
     Parameters
     ----------
-    option : str
-        Option in the message.
     ending : str
         ``.gif`` or ``.mp4``.
 
@@ -60,13 +58,6 @@ def animate(records: Sequence[Record], ending: str, progress: Callable[[float], 
     ----------
     ending : str
         ``.gif`` (by Pillow) or ``.mp4`` (by ffmpeg).
-    progress : callable
-        Receives the fraction done.
-
-    Returns
-    -------
-    bytes
-        The file.
 
     Notes
     -----
