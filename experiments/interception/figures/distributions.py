@@ -34,18 +34,13 @@ _LEAST_SHOWN = 0.01
 def draw_distributions(curves: Sequence[Curve], confidence: float = 0.95) -> Figure:
     """Draw the distribution functions of (a) the miss and (b) the impulse spent, with their confidence bands.
 
+    Where a few values are far beyond the others, the axis ends before them and says how many; where the curves lie
+    decades apart, the axis of the miss is logarithmic.
+
     Parameters
     ----------
-    curves : sequence of Curve
-        At least one; numbered as in the paper.
     confidence : float
         Of the Dvoretzky-Kiefer-Wolfowitz bands, in (0, 1).
-
-    Returns
-    -------
-    Figure
-        Two axes. Where a few values are far beyond the others, the axis ends before them and says how many; where the
-        curves lie decades apart, the axis of the miss is logarithmic.
     """
     if not curves:
         raise ValueError("at least one curve is needed")
@@ -78,16 +73,8 @@ def draw_distributions(curves: Sequence[Curve], confidence: float = 0.95) -> Fig
 def axis_limit(samples: Sequence[Floats]) -> float:
     """Return the end of an axis: beyond all values, or of all but a few very large ones.
 
-    Parameters
-    ----------
-    samples : sequence of ndarray
-        One a curve.
-
-    Returns
-    -------
-    float
-        The greatest value if it is at most twice the farthest upper fence (upper quartile and three times the
-        distance between the quartiles) of the samples, else the greatest value within half as much again as that fence.
+    It is the greatest value if that is at most twice the farthest upper fence (upper quartile and three times the
+    distance between the quartiles) of the samples, else the greatest value within half as much again as that fence.
     """
     quartiles = [np.quantile(sample, (0.25, 0.75)) for sample in samples]
     fence = max(float(upper + 3.0 * (upper - lower)) for lower, upper in quartiles)
@@ -100,35 +87,20 @@ def axis_limit(samples: Sequence[Floats]) -> float:
 def decades_apart(samples: Sequence[Floats]) -> bool:
     """Whether samples differ so much that a linear axis would show some of them only at its end.
 
-    Parameters
-    ----------
-    samples : sequence of ndarray
-        One a curve.
-
-    Returns
-    -------
-    bool
-        Whether the greatest median is more than thirty times the least, and the least is not zero.
+    The greatest median is then more than thirty times the least, and the least is not zero.
     """
     medians = [float(np.median(sample)) for sample in samples]
     return min(medians) > 0.0 and max(medians) > _LOGARITHMIC_FROM * min(medians)
 
 
 def scale_axis(axes: Axes, samples: Sequence[Floats], *, from_zero: bool) -> tuple[float, float]:
-    """Scale the axis of the values so that every sample is visible.
+    """Scale the axis of the values so that every sample is visible, and return its limits.
 
     Parameters
     ----------
-    samples : sequence of ndarray
-        One a curve.
     from_zero : bool
         Whether a linear axis starts at zero; only such an axis becomes logarithmic, where the samples are decades
         apart.
-
-    Returns
-    -------
-    tuple of float
-        The limits.
     """
     if from_zero and decades_apart(samples):
         greatest = max(float(sample.max()) for sample in samples)
@@ -153,8 +125,6 @@ def draw_band(axes: Axes, values: Floats, lower: Floats, upper: Floats, colour: 
     ----------
     values, lower, upper : ndarray, shape (n,)
         The samples in rising order, and the band at and after each.
-    label : str
-        Of both lines.
     """
     for edge, empty in ((lower, 0.0), (upper, 1.0)):
         axes.plot(

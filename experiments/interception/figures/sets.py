@@ -35,19 +35,14 @@ _LABEL_MM, _LABEL_ROOM_MM = 14.0, 19.0
 def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8.0), sections: int = 5) -> Figure:
     """Draw sections of the sets after the measurement: one row per time, one column per record.
 
+    The axes of a row have the same limits.
+
     Parameters
     ----------
-    records : sequence of Record
-        At least one.
     times_s : sequence of float
         The nearest step is shown, and the title says which it is.
     sections : int
         Most sections to show, evenly chosen over the range, the first and the last included.
-
-    Returns
-    -------
-    Figure
-        The axes of a row have the same limits.
     """
     if not records or not times_s:
         raise ValueError("at least one record and one time are needed")
@@ -92,13 +87,7 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
 
 
 def choose_sections(sections: Sequence[Section], most: int) -> list[Section]:
-    """Return at most `count` sections, evenly distributed over the range, with the first and the last.
-
-    Parameters
-    ----------
-    sections : sequence of Section
-        In rising order of range.
-    """
+    """Return at most `most` sections in their order, evenly distributed over the range, with the first and the last."""
     if len(sections) <= most:
         return list(sections)
     if most == 1:
@@ -218,13 +207,7 @@ def _spread(wanted: Sequence[float], spacing: float, low: float, high: float) ->
 
 
 def level_planes(row: Sequence[Axes], points: Sequence[Floats]) -> None:
-    """Give planes of sets the same limits, with space for the labels.
-
-    Parameters
-    ----------
-    points : sequence of ndarray, shape (n, 2)
-        What must be seen, as `extent_of` returns it.
-    """
+    """Give planes of sets the same limits, with space for the labels; `extent_of` returns what must be seen."""
     everything = np.concatenate(points)
     least, greatest = everything.min(axis=0), everything.max(axis=0)
     margin = 0.07 * (greatest - least)
