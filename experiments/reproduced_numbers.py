@@ -76,11 +76,11 @@ def _number(number: PublishedNumber) -> dict[str, object]:
 
 
 TITLES = {
-    Origin.PRINTED: ("printed in the paper", "tolerance"),
-    Origin.OTHER: ("other implementation", "tolerance"),
+    Origin.PRINTED: ("paper prints", "tolerance"),
+    Origin.OTHER: ("other program", "tolerance"),
     Origin.EXACT: ("exact", "tolerance"),
 }
-ONE_RUN = ("printed, one run", "5 to 95 % of our runs")
+ONE_RUN = ("paper, one run", "5 to 95 % of ours")
 
 
 def _show(console: Console, reproductions: Sequence[Reproduction]) -> None:
