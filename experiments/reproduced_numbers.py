@@ -115,7 +115,7 @@ def _block(numbers: Sequence[PublishedNumber], notes: Sequence[str], width: int)
             yield f"{source}:"
         if above and name:
             yield f"  {name}"
-        first = "    " if above else f"  {name:<{sizes[0]}}"
+        first = "  " if above else f"  {name:<{sizes[0]}}"
         yield "  ".join([first, *(f"{cell:>{size}}" for cell, size in zip(cells, sizes[1:], strict=False)), verdict])
 
 
