@@ -13,7 +13,7 @@ from infoset.limits import WHOLE
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.pictures import course_html
-from sim.results import Results
+from sim.results import Results, ending
 from sim.scenario import Scenario, strategy_name, with_strategy
 
 
@@ -92,12 +92,17 @@ class Record:
         """Name of the measurement noise."""
         return self.scenario.noise.value if self.noise is None else self.noise
 
+    @property
+    def ending(self) -> str:
+        """The outcome, and `hit` or `missed` if the body has a size."""
+        return ending(self.result.outcomes[0].value, self.result.hit.tolist()[0])
+
     def __repr__(self) -> str:
         result = self.result
         inside = "inside" if result.truth_kept[0] else "not inside"
         return (
             f"<engagement of {self.scenario.name}, seed {self.seed}, run {self.run}: {self.strategy}, "
-            f"{self.noise_name} noise, {len(self.steps)} steps\n {result.outcomes[0].value}, "
+            f"{self.noise_name} noise, {len(self.steps)} steps\n {self.ending}, "
             f"miss {result.miss_m[0]:.4g} m for {result.impulse_m_s[0]:.4g} m/s, "
             f"true state {inside} its section at every step>"
         )
@@ -106,7 +111,7 @@ class Record:
         result, thruster = self.result, self.scenario.thruster
         known = [(step.time_s, step.predicted_miss_m) for step in self.steps if step.predicted_miss_m is not None]
         return course_html(
-            f"{result.outcomes[0].value}: {len(self.steps)} steps, seed {self.seed}, run {self.run}",
+            f"{self.ending}: {len(self.steps)} steps, seed {self.seed}, run {self.run}",
             {
                 "scenario": self.scenario.name,
                 "noise, strategy": f"{self.noise_name}, {self.strategy}",

@@ -155,13 +155,18 @@ class Results:
             "impulse, m/s": self.impulse_m_s,
             guaranteed: self.guaranteed_miss_m.compressed(),
         }
-        outcomes = [outcome.value for outcome in self.outcomes]
+        outcomes = [ending(outcome.value, hit) for outcome, hit in zip(self.outcomes, self.hit.tolist(), strict=True)]
         return results_html(samples, outcomes, int(self.truth_kept.sum()))
 
     def __repr__(self) -> str:
         miss, fuel = np.median(self.miss_m), np.median(self.impulse_m_s)
         hits = "" if self.hits is None else f", {self.hits.hits} hit"
         return f"<{len(self)} engagements{hits}: median miss {miss:.3g} m for {fuel:.4g} m/s>"
+
+
+def ending(outcome: str, hit: bool | None) -> str:
+    """Return how an engagement ended as text: the outcome, and `hit` or `missed` if the body has a size."""
+    return outcome if hit is None else f"{outcome}, {'hit' if hit else 'missed'}"
 
 
 _INPUTS = [declared.name for declared in fields(Results) if declared.init]

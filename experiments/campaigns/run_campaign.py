@@ -52,7 +52,7 @@ def run(options: Options) -> None:
                 "samples": [sample_json(sample) for sample in by_noise],
             }
         )
-        tables = samples_table(by_noise, stored.manifest.scenario.set_model.kind.value)
+        tables = samples_table(by_noise, stored.manifest.scenario)
         folder = Output(options.out, {}, overwrite=True)
         folder.save(SUMMARY, summary)
         written.written += [options.out / "shards", options.out / SCENARIO_FILE, *folder.written]

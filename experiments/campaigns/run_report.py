@@ -35,6 +35,7 @@ from experiments.common.file_kinds import use_of_file
 from experiments.common.output import Output, output, to_json
 from experiments.common.screen import figure_files, number, say, table_console
 from experiments.interception.scenario_file import scenario_to_toml
+from sim.results import ending
 from sim.storage import CampaignFolder, need_arrow
 
 FIGURES = ("figure-distributions", "figure-convergence", "figure-dispersion")
@@ -156,7 +157,7 @@ def _show(
     manifest = folder.manifest
     stopped = "" if manifest.stopped_after is None else f", stopped by the rule {manifest.until}"
     line(f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}; quantiles with 95 % confidence limits")
-    table, notes = samples_table(by_noise, manifest.scenario.set_model.kind.value)
+    table, notes = samples_table(by_noise, manifest.scenario)
     console.print(table)
     for note in notes:
         line(note)
@@ -173,6 +174,6 @@ def _show(
     line("the worst runs, each with the command that simulates it again:")
     for row in worst:
         miss, impulse = number(row["miss_m"]), number(row["impulse_m_s"])
-        line(f"  miss {miss} m, impulse {impulse} m/s, {row['outcome']}: {row['replay']}")
+        line(f"  miss {miss} m, impulse {impulse} m/s, {ending(row['outcome'], row['hit'])}: {row['replay']}")
     if not (folder.path / SCENARIO_FILE).is_file():
         line(f"(the folder has no {SCENARIO_FILE}, which these commands need; --out writes one)")

@@ -19,6 +19,7 @@ from experiments.campaigns.sweep_table import SHOWN, SHOWN_WITH_HITS, SweepTable
 from experiments.common.errors import InputError
 from experiments.common.output import Output, hit_key
 from experiments.common.screen import number, number_table
+from experiments.interception.study import SetCounts, set_warnings
 from sim import QuantileName, Requirement
 from sim.requirement import CONFIDENCE, MOST_RUNS_NEEDED, AnyRequirement, Decision, Verdict, parse_requirement
 from sim.storage import CampaignFolder, Manifest
@@ -121,6 +122,9 @@ class SweepReport:
                 console.print(part)
             for note in _undecided_notes(verdicts, folder.manifest):
                 line(note)
+        sets = sum((sample.sets for samples in table.cells for sample in samples), SetCounts())
+        for text in (f"all cells: {sets}", *set_warnings(folder.manifest.scenario.set_model.kind, sets)):
+            line(text)
 
     def _show_answers(self, line: Callable[[str], None], noise: str) -> None:
         lines = answers(self.table, noise)

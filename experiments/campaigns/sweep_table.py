@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from experiments.campaigns.axis_names import tied_keys, unit_of
 from experiments.campaigns.samples import LEVELS, OUTCOMES, Sample, noises_of, samples
+from experiments.interception.study import SetCounts
 from sim import HitEstimate, QuantileEstimate, QuantileName, estimate_hits
 from sim.requirement import AnyRequirement, Decision, Verdict, judge
 from sim.stopping_rule import QUANTITIES, level_name
@@ -96,7 +97,8 @@ class SweepTable:
                 row |= {"noise": noise, "runs": 0 if sample is None else sample.runs}
                 for name in OUTCOMES:
                     row[name.replace("-", "_")] = 0 if sample is None else sample.outcomes.get(name, 0)
-                row["truth_kept"] = 0 if sample is None else sample.truth_kept
+                sets = SetCounts() if sample is None else sample.sets
+                row |= {"truth_kept": sets.truth_kept, "set_emptied": sets.set_emptied}
                 verdict = self.verdict(cell, noise)
                 row["requirement"] = None if verdict is None else verdict.decision.value
                 for quantity, level in itertools.product(QUANTITIES, self.levels):

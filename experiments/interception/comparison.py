@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance import NoiseKind, Strategy, TieRule
-from sim import Results, Scenario, quantiles
+from sim import HitEstimate, Results, Scenario, estimate_hits, quantiles
 
 Floats = NDArray[np.float64]
 Flight = tuple[str, TieRule | None]
@@ -45,6 +45,18 @@ class Comparison:
     def truth_kept(self) -> NDArray[np.bool_]:
         """Whether the true state stayed in its section with every tie rule, shape (N,)."""
         return np.asarray(np.all([each.truth_kept for each in self.results.values()], axis=0), dtype=np.bool_)
+
+    @property
+    def set_emptied(self) -> NDArray[np.bool_]:
+        """Whether the set became empty with a tie rule, shape (N,)."""
+        return np.asarray(np.any([each.set_emptied for each in self.results.values()], axis=0), dtype=np.bool_)
+
+    @property
+    def hits(self) -> HitEstimate | None:
+        """Runs that hit with every tie rule; None if the body has no size."""
+        hit = [results.hit for results in self.results.values()]
+        every = np.all([flags.data for flags in hit], axis=0)
+        return estimate_hits(int(every.sum()), len(every)) if hit[0].count() else None
 
     @property
     def phi_held(self) -> np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]:

@@ -14,6 +14,7 @@ from experiments.interception.figures.sets import draw_sets
 from experiments.interception.published import PRINTED_SINGLE_RUN, SINGLE
 from experiments.interception.runs.shared import allowance, bound_name
 from sim import Record
+from sim.results import ending
 
 FIGURE_2 = "figure-2-process"
 FIGURE_3 = "figure-3-sets"
@@ -67,9 +68,10 @@ def _yes(value: bool | None) -> str:
 
 def _outcome(record: Record) -> str:
     outcome, contradiction = record.result.outcomes[0].value, record.inconsistency
-    if contradiction is None:
-        return outcome
-    return f"{outcome} at {record.steps[contradiction.step].time_s:g} s, section {contradiction.label_m / 1e3:.0f} km"
+    if contradiction is not None:
+        time_s, label_km = record.steps[contradiction.step].time_s, contradiction.label_m / 1e3
+        outcome = f"{outcome} at {time_s:g} s, section {label_km:.0f} km"
+    return ending(outcome, record.result.hit.tolist()[0])
 
 
 def draw_engagements(records: Sequence[Record], written: Output) -> None:

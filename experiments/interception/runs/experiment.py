@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from time import perf_counter
 
@@ -32,6 +31,7 @@ from experiments.interception.runs.shared import (
     summary_head,
 )
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
+from experiments.interception.study import SetCounts, hit_text, set_counts, set_warnings
 from infoset import Recovery
 from sim import Outcome, Scenario, quantiles
 
@@ -109,7 +109,6 @@ def _show(console: Console, scenario: Scenario, curves: Sequence[Curve]) -> None
         table.add_column(f"{level:.0%}", justify="right")
     enlarged = scenario.set_model.recovery is Recovery.WIDENED
     endings = {
-        Outcome.SET_EMPTY: f"the set became empty{'; it was enlarged and guidance continued' if enlarged else ''}",
         Outcome.BUDGET_SPENT: "too little of the impulse budget was left",
         Outcome.DIVERGED: "the closest approach was farther than the nominal range",
     }
@@ -125,12 +124,17 @@ def _show(console: Console, scenario: Scenario, curves: Sequence[Curve]) -> None
             table.add_row(title, quantity, *(number(float(value)) for value in quantiles(values, LEVELS)))
         median = number(float(quantiles(bounds, 0.5))) if len(bounds) else "-"
         table.add_row("", bound_name(scenario), "", median)
-        counts = Counter(outcome for outcome in results.outcomes if outcome is not Outcome.ARRIVED)
         lines = [
-            f"in {count} run{'s' if count > 1 else ''} {endings[outcome]} ({outcome.value})"
-            for outcome, count in counts.items()
+            f"in {count} run{'s' if count > 1 else ''} {text} ({outcome.value})"
+            for outcome, text in endings.items()
+            if (count := results.outcomes.count(outcome))
         ]
-        notes.append(f"curve {curve.number}: " + "; ".join([certificate(results), *lines]))
+        hits = hit_text(results.hits, scenario)
+        notes.append(f"curve {curve.number}: " + "; ".join([*([hits] if hits else []), certificate(results), *lines]))
+    counts = sum((set_counts(curve.results.truth_kept, curve.results.set_emptied) for curve in curves), SetCounts())
+    if counts.set_emptied:
+        notes.append(f"an empty set {'was enlarged, and guidance continued' if enlarged else 'ended guidance'}")
+    notes += set_warnings(scenario.set_model.kind, counts)
     if allowed := allowance(scenario):
         notes.append(allowed)
     if scenario.name in (MANY, SINGLE):

@@ -22,6 +22,7 @@ from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
 from experiments.campaigns.sweep_figures import draw_sweep
 from experiments.campaigns.sweep_table import SHOWN, Limit, SweepTable, answer, limits, sweep_table
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
+from experiments.interception.study import SetCounts
 from sim import (
     CampaignNoise,
     QuantileEstimate,
@@ -97,6 +98,7 @@ def test_a_sweep_of_two_keys(infoset: Infoset, brief: Scenario, file: Path, tmp_
         assert row["miss_m_p99_upper"] is None
         assert row["miss_m_p50_lower"] in flown.miss_m
         assert row["truth_kept"] == int(flown.truth_kept.sum())
+        assert row["set_emptied"] == int(flown.set_emptied.sum())
         assert row["arrived"] + row["set_empty"] + row["budget_spent"] + row["diverged"] == 30
     found = json.loads((folder / "summary.json").read_text())
     assert (found["kind"], found["scenario_hash"], found["runs"]) == ("sweep", scenario_hash(brief), 180)
@@ -447,7 +449,7 @@ def made_table(axes: Sequence[Axis], required: Requirement | HitRequirement, val
             quantity: [QuantileEstimate(level, level * middle, 0.8 * level * middle, None) for level in (0.5, 0.99)]
             for quantity in ("miss_m", "impulse_m_s", "guaranteed_miss_m")
         }
-        samples.append((Sample("game", 20, estimates, {}, {}, 20, 0, 0),))
+        samples.append((Sample("game", 20, estimates, {}, {}, SetCounts(20, 20), None, 0, 0),))
         share = 1.0 / (1.0 + middle)
         shown = middle if isinstance(required, Requirement) else share
         distance = math.log(shown / required.bound) * (-1.0 if isinstance(required, HitRequirement) else 1.0)
