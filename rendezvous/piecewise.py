@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -46,28 +45,17 @@ _FIT_SQUARES, _HALVES = chebyshev_fit(_DEGREE + 1), chebyshev_halves(_DEGREE + 1
 _AT_SAMPLES = chebyshev.chebvander(chebyshev_points(_SAMPLES), _DEGREE)
 
 
-@dataclass(frozen=True, eq=False)
-class Piecewise:
-    """Functions of time, each a polynomial of degree 11 on each of P panels, which are in no order.
-
-    The `coefficients`, shape (P, 12, m), are those of Chebyshev polynomials of the position in the panel, -1 to 1.
-    """
-
-    starts_s: Floats
-    ends_s: Floats
-    coefficients: Floats
-
-
-def resolve(function: Callable[[Floats], Floats], breaks_s: Floats) -> Piecewise:
-    """Represent m functions of time, of similar magnitude, by polynomials on panels.
+def resolve(function: Callable[[Floats], Floats], breaks_s: Floats) -> tuple[Floats, Floats]:
+    """Represent m functions of time, of similar magnitude, by polynomials of degree 11 on P panels, in no order.
 
     `function` returns values, shape (k, m), at k times, s. `breaks_s`, not decreasing, are the ends of the initial
-    panels; the functions may jump there and are not evaluated there.
+    panels; the functions may jump there and are not evaluated there. Returns half the lengths of the panels, s, and the
+    coefficients, shape (P, 12, m), of Chebyshev polynomials of the position in the panel, -1 to 1.
 
-    A panel is halved until the last two Chebyshev coefficients are below 1e-11 of the greatest value on all panels, or
-    below 1e-7 of it and no longer decreasing (rounding), or below the effect of the rounding of times. Sinusoids on
-    panels of one radian have an error below 1e-13 at once: the remainder of the interpolation is at most (1/2)^12 /
-    (2^11 12!) = 2.5e-16 of their amplitude.
+    A panel is halved until the last two coefficients are below 1e-11 of the greatest value on all panels, or below 1e-7
+    of it and no longer decreasing (rounding), or below the effect of the rounding of times. Sinusoids on panels of one
+    radian have an error below 1e-13 at once: the remainder of the interpolation is at most (1/2)^12 / (2^11 12!) =
+    2.5e-16 of their amplitude.
 
     Raises
     ------
@@ -78,7 +66,7 @@ def resolve(function: Callable[[Floats], Floats], breaks_s: Floats) -> Piecewise
     starts, ends = starts[ends > starts], ends[ends > starts]
     latest = float(np.abs(breaks_s).max())
     before, scale = np.full(len(starts), np.inf), 0.0
-    pieces: list[tuple[Floats, Floats, Floats]] = []
+    pieces: list[tuple[Floats, Floats]] = []
     if not len(starts):
         raise ValueError("no break is later than another")
     while len(starts):
@@ -90,12 +78,13 @@ def resolve(function: Callable[[Floats], Floats], breaks_s: Floats) -> Piecewise
         resolved = (tails <= scale * np.maximum(RESOLVED, rounding)) | (
             (tails <= ROUNDING * scale) & (tails > 0.2 * before)
         )
-        pieces.append((starts[resolved], ends[resolved], coefficients[resolved]))
+        pieces.append((0.5 * (ends - starts)[resolved], coefficients[resolved]))
         starts, ends, before = starts[~resolved], ends[~resolved], tails[~resolved]
         middles = 0.5 * (starts + ends)
         starts, ends = np.concatenate([starts, middles]), np.concatenate([middles, ends])
         before = np.tile(before, 2)
-    return Piecewise(*(np.concatenate(part) for part in zip(*pieces, strict=True)))
+    half_s, parts = zip(*pieces, strict=True)
+    return np.concatenate(half_s), np.concatenate(parts)
 
 
 def _fitted(function: Callable[[Floats], Floats], starts: Floats, ends: Floats) -> Floats:
@@ -131,8 +120,7 @@ def greatest_control(control: Callable[[Floats], Floats], breaks_s: Floats) -> f
     each panel from above; panels that may contain the greatest are halved until bound and sample agree to 1e-11. No
     peak between samples is missed.
     """
-    pieces = resolve(control, breaks_s)
-    squares = (_FIT_SQUARES @ ((_AT_SQUARES @ pieces.coefficients) ** 2).sum(axis=2)[..., None])[..., 0]
+    squares = (_FIT_SQUARES @ ((_AT_SQUARES @ resolve(control, breaks_s)[1]) ** 2).sum(axis=2)[..., None])[..., 0]
     greatest = 0.0
     for _ in range(_MOST_HALVINGS):
         values = squares @ _AT_SAMPLES.T

@@ -162,7 +162,7 @@ class Shot:
     def along(self, time_s: Floats) -> tuple[Floats, Floats]:
         """Return states and costates in SI, shapes (k, 6), at k increasing times; after the jump at a node."""
         block, duration = self.block, self.block.units[1]
-        z, now, node = self._begin(), block.start_s, 0
+        z, now, node = _initial(block, self.unknowns[:6]), block.start_s, 0
         rows = np.empty((len(time_s), 12))
         for row, time in enumerate(time_s):
             while node < len(block.time_s) - 1 and block.time_s[node] <= time:
@@ -178,7 +178,7 @@ class Shot:
     def ends(self) -> tuple[Floats, Floats, Floats, float]:
         """States and costates at the end of each segment, costates at its start, and the energy spent, in SI."""
         block, count = self.block, len(self.block.time_s)
-        z, starts, ends = self._begin(), np.empty((count, 12)), np.empty((count, 12))
+        z, starts, ends = _initial(block, self.unknowns[:6]), np.empty((count, 12)), np.empty((count, 12))
         for node in range(count):
             starts[node] = z[:12, 0]
             _advance(z, block.durations[node])
@@ -188,9 +188,6 @@ class Shot:
         (length, duration), costate = block.units, block.costate_units
         energy = float(z[12, 0]) * length**2 / duration**3
         return ends[:, :6] * block.state_units, ends[:, 6:] * costate, starts[:, 6:] * costate, energy
-
-    def _begin(self) -> Floats:
-        return _initial(self.block, self.unknowns[:6])
 
     def _jump(self, z: Floats, node: int) -> None:
         z[6:9, 0] -= self.unknowns[6 + 3 * node : 9 + 3 * node]

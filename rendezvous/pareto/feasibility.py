@@ -60,8 +60,8 @@ def peak_control(plan: Plan) -> float:
 
 def total_impulse(plan: Plan) -> float:
     """Return int |u| dt of a `plan`, m/s, to 1e-9, relative."""
-    control = resolve(plan.control, plan.breaks())
-    return integrate_size(control.coefficients, 0.5 * (control.ends_s - control.starts_s), _IMPULSE).value
+    half_s, coefficients = resolve(plan.control, plan.breaks())
+    return integrate_size(coefficients, half_s, _IMPULSE).value
 
 
 def check_bound(plan: Plan, greatest_m_s2: float, common: int = 6) -> BoundCheck:
@@ -165,9 +165,8 @@ class _Effect:
         def effect(times: Floats) -> Floats:
             return np.asarray((whiten @ plan.effects(times)[:, :common]).reshape(len(times), -1))
 
-        pieces = resolve(effect, plan.breaks())
-        half = 0.5 * (pieces.ends_s - pieces.starts_s)
-        coefficients = pieces.coefficients.reshape(len(half), NODES, common, 3)
+        half, flat = resolve(effect, plan.breaks())
+        coefficients = flat.reshape(len(half), NODES, common, 3)
         # Whitened again as represented: the rounding of the Gramian grows with its condition number.
         at_nodes = np.einsum("kj,pjai->pkai", _AT_POINTS, coefficients)
         square = np.einsum("p,k,pkai,pkbi->ab", half, _WEIGHTS, at_nodes, at_nodes)

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -50,26 +49,9 @@ class Response:
     residual: float
 
 
-class Side(Protocol):
-    """One side of a game: a craft that chooses its thrust, or one on a known path."""
-
-    def respond(
-        self, end_state: Floats, nu: Floats, plane: Floats, duration: float, tolerance: float
-    ) -> Response | None:
-        """Linearise at a guess of the end state; None if it cannot be propagated."""
-
-    def correct(
-        self, response: Response, end_state: Floats, nu: Floats, duration: float, tolerance: float
-    ) -> Floats | None:
-        """Newton's correction of another guess, with the derivatives of an earlier one near by; shape (6,)."""
-
-    def ballistic(self, duration: float, nu: Floats) -> Floats:
-        """A guess of the end state after a short time, shape (6,)."""
-
-
 @dataclass(frozen=True)
 class Craft:
-    """A side that chooses its direction of thrust; all nondimensional, `start` of shape (6,)."""
+    """One side of a game, which chooses its direction of thrust; all nondimensional, `start` of shape (6,)."""
 
     start: Floats
     thrust: float
@@ -85,7 +67,7 @@ class Craft:
     def respond(
         self, end_state: Floats, nu: Floats, plane: Floats, duration: float, tolerance: float
     ) -> Response | None:
-        """Shoot back from the guess and linearise there."""
+        """Linearise at a guess of the end state; None if it cannot be propagated."""
         shot = shoot_back(end_state, nu, plane, self.kernel_craft(duration), duration, tolerance)
         if shot is None:
             return None
@@ -113,12 +95,12 @@ class Craft:
     def correct(
         self, response: Response, end_state: Floats, nu: Floats, duration: float, tolerance: float
     ) -> Floats | None:
-        """Shoot back from the guess without its variations."""
+        """Newton's correction of another guess, shape (6,), with the derivatives of an earlier one near by."""
         start = shoot_state_back(end_state, nu, self.kernel_craft(duration), duration, tolerance)
         return None if start is None else response.inverse @ (self.start - start[:6])
 
     def ballistic(self, duration: float, nu: Floats) -> Floats:
-        """Hold gravity and thrust as they are at the start."""
+        """Return a guess of the end state after a short time, shape (6,): gravity and thrust are those at the start."""
         gravity = np.empty(3)
         acceleration(self.start[:3], self.mu, self.oblateness, gravity)
         rate = gravity + self.thrust / self.mass * nu
@@ -151,6 +133,9 @@ class KnownPath:
     def ballistic(self, duration: float, nu: Floats) -> Floats:
         """Return the state on the path."""
         return self.state_at(duration)[0]
+
+
+Side = Craft | KnownPath
 
 
 def across(nu: Floats) -> Floats:

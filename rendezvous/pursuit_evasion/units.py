@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._pair import Craft, Pair
 from rendezvous.pursuit_evasion.game import Game, Gravity, Player
 from rendezvous.two_body import semi_major_axis_m
@@ -29,11 +28,6 @@ class Units:
     def speed_m_s(self) -> float:
         """Return the unit of speed."""
         return self.length_m / self.time_s
-
-    def scaled(self, position_m: object, velocity_m_s: object) -> Floats:
-        """Return a state in these units, shape (6,), from `position_m` and `velocity_m_s`, shape (3,)."""
-        position, velocity = np.asarray(position_m, dtype=np.float64), np.asarray(velocity_m_s, dtype=np.float64)
-        return np.concatenate([position / self.length_m, velocity / self.speed_m_s])
 
 
 @dataclass(frozen=True)
@@ -63,7 +57,7 @@ def scaled_craft(player: Player, gravity: Gravity, units: Units) -> Craft:
     """Return a player as a nondimensional craft."""
     force = units.mass_kg * units.length_m / units.time_s**2
     return Craft(
-        start=units.scaled(player.position_m, player.velocity_m_s),
+        start=np.array([*player.position_m, *player.velocity_m_s]) / np.repeat([units.length_m, units.speed_m_s], 3),
         thrust=player.thrust_n / force,
         mass=player.mass_kg / units.mass_kg,
         flow=player.flow_kg_s * units.time_s / units.mass_kg,

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from time import perf_counter
-from typing import Protocol
 
 import numpy as np
 
@@ -43,22 +42,6 @@ class Budget:
     seconds: float = 5.0
     megabytes: float = 500.0
     dimension: int = 6
-
-
-class BlockSets(Protocol):
-    """Sets of states of a block, at t = 0..T, scaled."""
-
-    def support(self, kind: SetKind, time: int, directions: Floats) -> Floats:
-        """Return the support function along directions, shape (k, n), as an array of shape (k,)."""
-
-    def bounds(self, kind: SetKind) -> Floats:
-        """Return the least and greatest value of each state at each time, shape (T + 1, n, 2)."""
-
-    def shadow(self, kind: SetKind, time: int, rows: Floats, tolerance: float = 1e-9) -> Polytope:
-        """Return the image of a set under a matrix, shape (d, n), of few rows."""
-
-    def polytope(self, kind: SetKind, time: int) -> Polytope | None:
-        """Return the set as a polytope; None if its vertices are not known."""
 
 
 @dataclass(frozen=True)
@@ -325,6 +308,10 @@ class LiftedSets:
                 lifted = lift(block) if few else lift_with_states(block)
             self._known[key] = lifted, Maximiser(lifted)
         return self._known[key]
+
+
+BlockSets = ExactSets | LiftedSets
+"""Sets of states of a block, at t = 0..T, scaled."""
 
 
 def optimal_set(optimum: BlockOptimum) -> Lifted:
