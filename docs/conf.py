@@ -67,7 +67,7 @@ nitpick_ignore = [
         "infoset.set_state": ("SetState",),
         "rendezvous.pursuit_evasion._pair": ("Node",),
         "rendezvous.pursuit_evasion.paths": ("SteeredPath",),
-        "rendezvous.reachability.sets": ("BlockSets",),
+        "rendezvous.reachability.sets": ("ExactSets", "LiftedSets"),
         "rendezvous.reachability.problem": ("Block",),
         "rendezvous.reachability.admissible": ("Lifted",),
         "rendezvous.reachability.optimum": ("BlockOptimum",),
