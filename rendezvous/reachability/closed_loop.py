@@ -56,17 +56,15 @@ def replan(
     the least sufficient fraction.
     """
     state = problem.initial
-    states, controls, misses, relaxations = [state], [], [], []
+    steps = []
     for t in range(problem.periods):
         estimated = state if observe is None else observe(t, state)
         optimal, relaxation = _plan(problem, t, estimated, relative)
         control = minimum_energy(optimal)[0]
         state = truth(t, state, control)
-        states.append(state)
-        controls.append(control)
-        misses.append(optimal.miss)
-        relaxations.append(relaxation)
-    return Flight(np.array(states), np.array(controls), np.array(misses), np.array(relaxations))
+        steps.append((state, control, optimal.miss, relaxation))
+    states, controls, misses, relaxations = (np.array(column) for column in zip(*steps, strict=True))
+    return Flight(np.vstack([problem.initial, states]), controls, misses, relaxations)
 
 
 def relaxed(problem: ReachabilityProblem, fraction: float) -> ReachabilityProblem:
