@@ -16,10 +16,10 @@ from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
 from rendezvous.pursuit_evasion._pair import MOST_RESIDUAL, Craft, KnownPath, Node, Pair, Side
 from rendezvous.pursuit_evasion._scan import greater, scan
+from rendezvous.pursuit_evasion.game import scaled_game
 from rendezvous.pursuit_evasion.paths import ExtremalPath, PathError, extremal_paths, steered_path
 from rendezvous.pursuit_evasion.solution import Solution
 from rendezvous.pursuit_evasion.steering import Policy
-from rendezvous.pursuit_evasion.units import scaled_game
 
 MOST_HAMILTONIAN_DRIFT = 1e-8
 MOST_INTEGRATOR_GAP = 1e-7

@@ -12,12 +12,11 @@ from scipy.optimize import brentq, minimize_scalar
 from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
 from rendezvous.pursuit_evasion._pair import FINE, Craft, Node, Pair
-from rendezvous.pursuit_evasion.game import Game
+from rendezvous.pursuit_evasion.game import Game, Units, scaled_game
 from rendezvous.pursuit_evasion.paths import ExtremalPath, extremal_paths, steered_path
 from rendezvous.pursuit_evasion.solution import Solution
 from rendezvous.pursuit_evasion.solver import solve
 from rendezvous.pursuit_evasion.steering import Steering
-from rendezvous.pursuit_evasion.units import Units, scaled_game
 
 PathNow = Callable[[float], Floats]
 

@@ -10,10 +10,9 @@ import numpy as np
 
 from rendezvous._arrays import Floats, Places
 from rendezvous.pursuit_evasion._pair import Node
-from rendezvous.pursuit_evasion.game import Game
+from rendezvous.pursuit_evasion.game import Game, Units, scaled_game
 from rendezvous.pursuit_evasion.solution import Verdict
 from rendezvous.pursuit_evasion.solver import solve
-from rendezvous.pursuit_evasion.units import Units, scaled_game
 
 CHECKED_EVERY = 50
 """Distance between points of a row that are solved from scratch; shifted from row to row."""

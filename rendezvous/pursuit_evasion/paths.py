@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._extremal import STATES, flow_back, rate
 from rendezvous.pursuit_evasion._pair import FINE, Craft, Node
+from rendezvous.pursuit_evasion.game import Units, scaled_game
 from rendezvous.pursuit_evasion.solution import Solution
-from rendezvous.pursuit_evasion.units import Units, scaled_game
 
 Direction = Callable[[float, Floats], Floats]
 """Direction of thrust, shape (3,), of a time and a state: any length, zero to coast."""

@@ -7,8 +7,7 @@ from enum import Enum
 
 from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._pair import Node
-from rendezvous.pursuit_evasion.game import Game
-from rendezvous.pursuit_evasion.units import Units
+from rendezvous.pursuit_evasion.game import Game, Units
 
 
 class Verdict(Enum):

@@ -14,11 +14,10 @@ from rendezvous.linear_game import LinearGameError, circular_orbit_capture
 from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow, polish
 from rendezvous.pursuit_evasion._pair import COARSE, Craft, Node, across
 from rendezvous.pursuit_evasion._scan import greater
-from rendezvous.pursuit_evasion.game import Game, Player
+from rendezvous.pursuit_evasion.game import Game, Player, ScaledGame, Units, horizon_s, scaled_game, units_of
 from rendezvous.pursuit_evasion.paths import orbital_axes, steered_path
 from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
 from rendezvous.pursuit_evasion.steering import Policy
-from rendezvous.pursuit_evasion.units import ScaledGame, Units, horizon_s, scaled_game, units_of
 
 _MOST_BRANCHES = 6
 _REACH_STEP, _MOST_REACH_STEPS, _REACHED = 0.1, 400, 1e-6

@@ -26,7 +26,7 @@ from rendezvous.pursuit_evasion import (
 )
 from rendezvous.pursuit_evasion._branch import Ending, follow, polish
 from rendezvous.pursuit_evasion._pair import Node, Pair
-from rendezvous.pursuit_evasion.units import scaled_game, units_of
+from rendezvous.pursuit_evasion.game import scaled_game, units_of
 
 from .conftest import EARTH_M, MU_M3_S2, MakeGame
 from .published import CASES, Case
