@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -13,7 +13,6 @@ from experiments.interception.options import MOST_RUNS, RangeMeter, ScenarioName
 
 MOST_WORKERS = 1024
 MOST_AT_ONCE = 1_000_000
-EXECUTION = "Execution"
 
 Required = Annotated[
     str | None,
@@ -33,6 +32,14 @@ Shown = Annotated[
         "Default: p50 and p99 of the miss and of the impulse.",
     ),
 ]
+
+
+_WORKERS: dict[str, Any] = {"metavar": "W", "min": 1, "max": MOST_WORKERS}
+
+
+def _execution(text: str, *names: str, **options: Any) -> Any:
+    """Return an option in the panel of the execution."""
+    return typer.Option(*names, rich_help_panel="Execution", help=text, **options)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,49 +67,28 @@ class Flight:
     overwrite: Overwrite = False
     quiet: Quiet = False
     resume: Annotated[
-        bool,
-        typer.Option(
-            "--resume",
-            rich_help_panel=EXECUTION,
-            help="Continue the campaign in DIR; if DIR is empty, start a new one.",
-        ),
+        bool, _execution("Continue the campaign in DIR; if DIR is empty, start a new one.", "--resume")
     ] = False
     chunk: Annotated[
         int | None,
-        typer.Option(
+        _execution(
+            "Number of runs in a shard; it does not change the results. Default: depends on the number of runs.",
             metavar="N",
             min=1,
             max=MOST_AT_ONCE,
-            rich_help_panel=EXECUTION,
-            help="Number of runs in a shard; it does not change the results. Default: depends on the number of runs.",
         ),
     ] = None
     workers: Annotated[
-        int | None,
-        typer.Option(
-            metavar="W",
-            min=1,
-            max=MOST_WORKERS,
-            rich_help_panel=EXECUTION,
-            help="Number of threads on this machine. Default: one per core.",
-        ),
+        int | None, _execution("Number of threads on this machine. Default: one per core.", **_WORKERS)
     ] = None
     processes: Annotated[
         int | None,
-        typer.Option(
-            metavar="W",
-            min=1,
-            max=MOST_WORKERS,
-            rich_help_panel=EXECUTION,
-            help="Number of processes on this machine, instead of threads; faster for long campaigns.",
-        ),
+        _execution("Number of processes on this machine, instead of threads; faster for long campaigns.", **_WORKERS),
     ] = None
     dask: Annotated[
         str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            rich_help_panel=EXECUTION,
-            help="Simulate on a Dask cluster: address of its scheduler, for example tcp://host:8786.",
+        _execution(
+            "Simulate on a Dask cluster: address of its scheduler, for example tcp://host:8786.", metavar="ADDRESS"
         ),
     ] = None
 
