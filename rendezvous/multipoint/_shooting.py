@@ -159,11 +159,11 @@ class Shot:
     block: Block
     unknowns: Floats
 
-    def along(self, time_s: Floats) -> tuple[Floats, Floats]:
-        """Return states and costates in SI, shapes (k, 6), at k increasing times; after the jump at a node."""
+    def states(self, time_s: Floats) -> Floats:
+        """Return states in SI, shape (k, 6), at k increasing times."""
         block, duration = self.block, self.block.units[1]
         z, now, node = _initial(block, self.unknowns[:6]), block.start_s, 0
-        rows = np.empty((len(time_s), 12))
+        states = np.empty((len(time_s), 6))
         for row, time in enumerate(time_s):
             while node < len(block.time_s) - 1 and block.time_s[node] <= time:
                 _advance(z, (block.time_s[node] - now) / duration)
@@ -171,8 +171,8 @@ class Shot:
                 now, node = block.time_s[node], node + 1
             _advance(z, (time - now) / duration)
             now = time
-            rows[row] = z[:12, 0]
-        return rows[:, :6] * block.state_units, rows[:, 6:] * block.costate_units
+            states[row] = z[:6, 0]
+        return states * block.state_units
 
     @cached_property
     def ends(self) -> tuple[Floats, Floats, Floats, float]:
@@ -229,7 +229,7 @@ class ShotPath:
         for index, shot in enumerate(self.shots):
             rows, end = np.flatnonzero(which == index), float(shot.block.time_s[-1])
             rows = rows[np.argsort(time_s[rows], kind="stable")]
-            states[rows] = shot.along(np.minimum(time_s[rows], end))[0]
+            states[rows] = shot.states(np.minimum(time_s[rows], end))
             stays = rows[time_s[rows] > end]
             met = np.broadcast_to(shot.block.goal[-1], (len(stays), 6))
             states[stays] = coast(met, time_s[stays] - end, shot.block.gravitational_parameter_m3_s2)
