@@ -260,7 +260,7 @@ class Engagements:
             payoff, known = self._information.guaranteed_miss()
         # Without a closest approach within the greatest number of steps, the miss is the present range.
         miss = np.where(np.isfinite(self._miss), self._miss, self._truth.sight().range_m)
-        body = self.scenario.body
+        radius_m = self.scenario.radius_m
         return Results(
             runs=runs,
             miss_m=miss,
@@ -270,7 +270,7 @@ class Engagements:
                 _outcome(*flags) for flags in zip(miss > self.scenario.nominal_range_m, lost, self._spent, strict=True)
             ),
             set_emptied=lost,
-            hit=np.ma.MaskedArray(miss <= (0.0 if body is None else body.radius_m), mask=body is None),
+            hit=np.ma.MaskedArray(miss <= (radius_m or 0.0), mask=radius_m is None),
             truth_margin_m=margin,
             position_m=self._draws.position_m,
             velocity_m_s=self._draws.velocity_m_s,

@@ -167,6 +167,11 @@ class Scenario:
             )
 
     @property
+    def radius_m(self) -> float | None:
+        """Radius of the body, m; None if it has no size."""
+        return None if self.body is None else self.body.radius_m
+
+    @property
     def sensors(self) -> dict[str, Sensor]:
         """Sensors on board by name, in the order in which a step applies their measurements."""
         fitted = (self.range_sensor, self.set_model.angle_sensor, self.rate_sensor)

@@ -16,7 +16,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
 from experiments.common.figure_style import CURVE_LOOKS, INK, LIMIT, new_figure, place_axes, style
-from experiments.interception.figures.distributions import axis_limit, draw_band, scale_axis
+from experiments.interception.figures.distributions import axis_limit, draw_band, draw_radius, scale_axis
 from sim import band_half_width, estimate_quantiles
 from sim.stopping_rule import level_name
 
@@ -50,6 +50,8 @@ class CampaignColumns:
         Known values of the guaranteed miss.
     start : mapping of str to ndarray, shape (n,)
         Components of the initial state, by column.
+    radius_m : float or None
+        Radius of the body, m; None if it has no size.
     """
 
     noise: str
@@ -59,6 +61,7 @@ class CampaignColumns:
     guaranteed_miss_m: Floats
     start: Mapping[str, Floats]
     guarantees: bool
+    radius_m: float | None = None
 
     @property
     def look(self) -> dict[str, Any]:
@@ -79,9 +82,10 @@ def draw_campaign_distributions(columns: Sequence[CampaignColumns]) -> Figure:
         row[0].set_ylabel("distribution function (share of runs)")
         row[1].tick_params(labelleft=False)
         handles, labels = _handles(columns)
+        radius = draw_radius(row[0], columns[0].radius_m)
         figure.legend(
-            handles,
-            labels,
+            [*handles, *radius],
+            [*labels, *(str(line.get_label()) for line in radius)],
             loc="lower center",
             ncols=2,
             columnspacing=2.5,

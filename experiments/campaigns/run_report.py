@@ -138,6 +138,7 @@ def _columns(folder: CampaignFolder) -> list[CampaignColumns]:
             guaranteed[rows].compressed(),
             {name: values[rows] for name, values in start.items()},
             scenario.set_model.is_guaranteed,
+            scenario.radius_m,
         )
         for noise, rows in noise_flags(folder).items()
     ]

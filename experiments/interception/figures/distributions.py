@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
-from experiments.common.figure_style import CURVE_LOOKS, new_figure, place_axes, style, width_mm
+from experiments.common.figure_style import CURVE_LOOKS, INK, new_figure, place_axes, style, width_mm
 from experiments.interception.curves import Curve
 from sim import empirical_distribution
 
@@ -31,7 +31,7 @@ _LEAST_SHOWN = 0.01
 """Quantile at which a logarithmic axis starts: misses can be arbitrarily small."""
 
 
-def draw_distributions(curves: Sequence[Curve], confidence: float = 0.95) -> Figure:
+def draw_distributions(curves: Sequence[Curve], confidence: float = 0.95, radius_m: float | None = None) -> Figure:
     """Draw the distribution functions of (a) the miss and (b) the impulse spent, with their confidence bands.
 
     Where a few values are far beyond the others, the axis ends before them and says how many; where the curves lie
@@ -41,6 +41,8 @@ def draw_distributions(curves: Sequence[Curve], confidence: float = 0.95) -> Fig
     ----------
     confidence : float
         Of the Dvoretzky-Kiefer-Wolfowitz bands, in (0, 1).
+    radius_m : float or None
+        Radius of the body, m, which is a line in (a); None draws none.
     """
     if not curves:
         raise ValueError("at least one curve is needed")
@@ -58,16 +60,30 @@ def draw_distributions(curves: Sequence[Curve], confidence: float = 0.95) -> Fig
             axes.set_ylabel("distribution function (share of runs)")
         row[1].yaxis.label.set_visible(False)
         row[1].tick_params(labelleft=False)
-        handles, labels_told = _handles(curves, confidence)
+        handles, names = _handles(curves, confidence)
+        radius = draw_radius(row[0], radius_m)
         figure.legend(
-            handles,
-            labels_told,
+            [*handles, *radius],
+            [*names, *(str(line.get_label()) for line in radius)],
             loc="lower center",
             ncols=2,
             columnspacing=2.5,
             handler_map={tuple: HandlerTuple(ndivide=None, pad=0.15)},
         )
     return figure
+
+
+def draw_radius(axes: Axes, radius_m: float | None) -> list[Line2D]:
+    """Draw the radius of the body as a line on an axis of misses, and return its entry in the legend."""
+    if radius_m is None:
+        return []
+    low, high = axes.get_xlim()
+    inside = low <= radius_m <= high
+    look: dict[str, Any] = {"color": INK, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 0.9}
+    if inside:
+        axes.axvline(radius_m, zorder=2.5, label="_radius", **look)
+    where = "a smaller miss is a hit" if inside else "beyond the axis"
+    return [Line2D([], [], label=f"body radius, {radius_m:g} m: {where}", **look)]
 
 
 def axis_limit(samples: Sequence[Floats]) -> float:

@@ -59,7 +59,7 @@ def run(options: Compare) -> None:
         if written.wants("--csv"):
             written.save("results.csv", to_csv(COLUMNS, _rows(compared)), "--csv")
         if options.out is not None:
-            written.figure(FIGURE, draw_comparison(compared))
+            written.figure(FIGURE, draw_comparison(compared, scenario.radius_m))
     if not options.quiet:
         _show(table_console(written.stdout_taken), scenario, compared)
 

@@ -84,7 +84,7 @@ def run(options: Experiment) -> None:
         if written.wants("--csv"):
             written.save("results.csv", _csv(curves), "--csv")
         if options.out is not None:
-            written.figure(FIGURE, draw_distributions(curves))
+            written.figure(FIGURE, draw_distributions(curves, radius_m=scenario.radius_m))
     if not options.quiet:
         _show(table_console(written.stdout_taken), scenario, curves)
 

@@ -219,3 +219,11 @@ def test_misses_of_zero_can_be_drawn(compared: list[Comparison]) -> None:
 def test_a_comparison_of_nothing_cannot_be_drawn() -> None:
     with pytest.raises(ValueError, match="at least one strategy"):
         draw_comparison([])
+
+
+def test_the_radius_of_the_body_is_a_line_with_a_label(compared: list[Comparison]) -> None:
+    figure = draw_comparison(compared, 1.0)
+    radii = [sum(line.get_label() == "_radius" for line in axes.lines) for axes in figure.axes]
+    (legend,) = figure.legends
+    assert radii == [1, 1, 0, 0]
+    assert legend.get_texts()[-1].get_text() == "body radius, 1 m: a smaller miss is a hit"

@@ -186,6 +186,20 @@ def test_distributions_draw_the_band_of_the_half_width(curves: list[Curve]) -> N
     assert "90 % confidence band" in " ".join(text.get_text() for text in legend.get_texts())
 
 
+def test_the_radius_of_the_body_is_a_line_with_a_label(curves: list[Curve]) -> None:
+    inside = float(np.median(curves[0].results.miss_m))
+    for radius, drawn, where in ((inside, 1, "a smaller miss is a hit"), (1e6, 0, "beyond the axis")):
+        figure = draw_distributions(curves, radius_m=radius)
+        miss, impulse = figure.axes
+        lines = [each for each in miss.lines if each.get_label() == "_radius"]
+        assert [float(np.asarray(each.get_xdata())[0]) for each in lines] == [radius] * drawn
+        assert not [each for each in impulse.lines if each.get_label() == "_radius"]
+        (legend,) = figure.legends
+        assert legend.get_texts()[-1].get_text() == f"body radius, {radius:g} m: {where}"
+    figure = draw_distributions(curves)
+    assert "radius" not in " ".join(text.get_text() for legend in figure.legends for text in legend.get_texts())
+
+
 def test_a_few_huge_misses_leave_the_axis_legible(curves: list[Curve]) -> None:
     miss = curves[1].results.miss_m.copy()
     miss[0] = 8e4
