@@ -153,15 +153,16 @@ def _undecided_notes(verdicts: Sequence[Verdict | None], manifest: Manifest) -> 
     if not undecided:
         return []
     runs = sorted({verdict.runs for verdict in undecided})
-    rest = f"{runs[0]}" if len(runs) == 1 else f"{runs[0]} to {runs[-1]}"
+    after = " to ".join(dict.fromkeys((str(runs[0]), str(runs[-1]))))
+    text = "1 cell is undecided" if len(undecided) == 1 else f"{len(undecided)} cells are undecided"
     more = sorted(verdict.runs_needed - verdict.runs for verdict in undecided if verdict.runs_needed is not None)
-    text = f"undecided cells: {len(undecided)}, each after {rest} runs; "
     if more:
         amount = " to ".join(dict.fromkeys((_about(more[0]), _about(more[-1]))))
-        which = "them" if len(more) == len(undecided) else f"{len(more)} of them"
-        text += f"about {amount} more runs per cell would decide {which}"
+        which = "" if len(more) == len(undecided) else f" in {len(more)} of them"
+        needed = f"about {amount} more runs per cell would decide{which}"
     else:
-        text += f"even {MOST_RUNS_NEEDED} runs per cell would not decide them"
+        needed = f"even {MOST_RUNS_NEEDED} runs per cell would not decide"
+    text += f" after {after} runs; {needed}"
     hint = f"a greater --most-runs than {manifest.runs}" if manifest.until else "--until decided"
     return [text, f"to add runs to these cells: repeat infoset sweep with --resume and {hint}"]
 

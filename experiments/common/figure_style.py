@@ -70,6 +70,8 @@ _STYLE: dict[Any, Any] = {
     "path.simplify": True,
 }
 _MM_PER_INCH = 25.4
+_CORNER_PAD = 7.0
+"""Distance of the labels of a horizontal axis, in points, if they touch one of the vertical axis."""
 
 
 @contextlib.contextmanager
@@ -145,8 +147,9 @@ def separate_labels(axes: Axes, gap_points: float = 2.0) -> None:
     if figure is None:
         raise ValueError("these axes are in no figure")
     gap = gap_points * figure.dpi / 72.0
+    shown = []
     for one, end in ((axes.xaxis, 0), (axes.yaxis, 1)):
-        figure.draw_without_rendering()
+        one.get_ticklabels()  # places the labels
         low, high = sorted(one.get_view_interval())
         boxes = {}
         for tick in one.get_major_ticks():
@@ -160,6 +163,9 @@ def separate_labels(axes: Axes, gap_points: float = 2.0) -> None:
                 kept = _apart(decades, boxes, end, gap)
         if boxes:
             one.set_major_locator(FixedLocator(kept))
+        shown.append([boxes[at] for at in kept])
+    if any(below.overlaps(left) for below in shown[0] for left in shown[1]):  # in the corner of the axes
+        axes.tick_params(axis="x", pad=_CORNER_PAD)
 
 
 def _apart(ticks: Sequence[float], boxes: Mapping[float, Any], end: int, gap: float) -> list[float]:

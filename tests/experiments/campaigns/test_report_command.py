@@ -21,6 +21,7 @@ from experiments.campaigns.campaign_figures import (
 )
 from experiments.interception.scenario_file import load_scenario
 from sim import Campaign, CampaignNoise, Scenario
+from tests.experiments.campaigns.figure_room import need_room
 
 Infoset = Callable[..., tuple[int, str, str]]
 FIGURES = [
@@ -148,6 +149,16 @@ def test_figures_of_few_runs_and_of_many(size: int) -> None:
         *("initial z, km", "initial x, km", "initial V$_z$, km/s", "initial V$_x$, km/s"),
     ]
     assert max(len(np.asarray(line.get_xdata())) for line in clouds[0].get_lines()) <= MOST_POINTS
+
+
+def test_texts_of_figures_never_touch() -> None:
+    both = [columns("random", 400), columns("game", 400)]
+    far = replace(both[1], miss_m=np.append(both[1].miss_m[:-1], 1e5))
+    for drawn in (both, [both[0], far]):
+        for draw in (draw_campaign_distributions, draw_convergence, draw_dispersion):
+            need_room(draw(drawn))
+    row = draw_dispersion([far]).axes[0]
+    assert row.get_ylabel() == "miss, m\nruns beyond the axis: 1 of 400"
 
 
 def test_correlations_by_hand() -> None:

@@ -14,7 +14,6 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from matplotlib.figure import Figure
 
 from experiments.campaigns.axis_names import key_label, unit_of
 from experiments.campaigns.samples import Sample
@@ -36,6 +35,7 @@ from sim import (
 )
 from sim.requirement import Decision, HitRequirement, Verdict
 from sim.storage import Axis, CampaignFolder
+from tests.experiments.campaigns.figure_room import need_room
 
 Infoset = Callable[..., tuple[int, str, str]]
 FILES = [
@@ -276,7 +276,7 @@ def test_twenty_runs_decide_no_99_percent_quantile(infoset: Infoset, file: Path,
     assert code == 0
     assert "miss_m p99<10 is met in 0, not met in 0, undecided in 2 of 2 cells" in out
     assert "  undecided at all 2 values" in out
-    assert "undecided cells: 2, each after 20 runs; about 350 more runs per cell would decide them" in out
+    assert "2 cells are undecided after 20 runs; about 350 more runs per cell would decide" in out
     summary = json.loads((tmp_path / "sweep" / "summary.json").read_text())
     assert [cell["requirement"] for cell in summary["cells"]] == ["undecided"] * 2
     for cell in summary["cells"]:
@@ -389,30 +389,6 @@ def test_keys_as_labels() -> None:
     assert key_label("information_set.sections") == "information set: sections"
     units = {"sun.gravitational_parameter_km3_s2": "km³/s²", "a.b_m_s2": "m/s²", "a.error_rad_s": "rad/s", "a.b_s": "s"}
     assert {key: unit_of(key) for key in units} == units
-
-
-def need_room(figure: Figure) -> None:
-    """Check that no labels of an axis touch, and that no titles, labels and legends of the figure overlap."""
-    figure.draw_without_rendering()
-    texts = []
-    for axes in figure.axes:
-        for one in (axes.xaxis, axes.yaxis):
-            low, high = sorted(one.get_view_interval())
-            ticks = [tick for tick in one.get_major_ticks() if low <= tick.get_loc() <= high]
-            labels = [label for tick in ticks for label in (tick.label1, tick.label2) if label.get_visible()]
-            boxes = [label.get_window_extent() for label in labels if label.get_text()]
-            assert len(boxes) >= 2 or one.get_label_text() == ""
-            for first, second in itertools.combinations(boxes, 2):
-                assert not first.overlaps(second)
-        texts += [
-            text.get_window_extent() for text in (axes.title, axes.xaxis.label, axes.yaxis.label) if text.get_text()
-        ]
-    texts += [legend.get_window_extent() for legend in figure.legends]
-    for first, second in itertools.combinations(texts, 2):
-        assert not first.overlaps(second)
-    for box in texts:
-        assert figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1
-        assert figure.bbox.y0 <= box.y0 <= box.y1 <= figure.bbox.y1
 
 
 def test_figures_of_sweeps_with_two_keys(swept: Path) -> None:
