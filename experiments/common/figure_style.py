@@ -6,13 +6,19 @@ import contextlib
 import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import FixedLocator
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
 
 WIDTH_MM = 180.0
 PNG_DPI = 200
@@ -72,6 +78,14 @@ _STYLE: dict[Any, Any] = {
 _MM_PER_INCH = 25.4
 _CORNER_PAD = 7.0
 """Distance of the labels of a horizontal axis, in points, if they touch one of the vertical axis."""
+_POSITIONS = tuple(
+    (right, up, distance)
+    for distance in (5.0, 9.0, 15.0)
+    for right, up in ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
+)
+"""Positions of a label relative to its point: the side across and up, and the distance in points; better ones first."""
+_HALO = [Stroke(linewidth=2.0, foreground="white"), Normal()]
+_GROUND = {"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.9}
 
 
 @contextlib.contextmanager
@@ -176,6 +190,58 @@ def _apart(ticks: Sequence[float], boxes: Mapping[float, Any], end: int, gap: fl
             kept.append(at)
             edge = boxes[at].max[end]
     return kept
+
+
+def place_labels(
+    axes: Axes, labels: Sequence[tuple[str, Floats, Floats]], marks: Floats, *, centred: bool = False, **look: Any
+) -> None:
+    """Write labels where they cover no other label, no mark and as little of the lines as possible.
+
+    The limits of the axes become fixed.
+
+    Parameters
+    ----------
+    labels : sequence of tuple
+        Text; the points at which it can stand, shape (k, 2), the better ones first; and points of lines that it should
+        not cover, shape (n, 2), each of which weighs 3 % of another label.
+    marks : ndarray, shape (m, 2)
+        Points that weigh as much as another label.
+    centred : bool
+        Whether a label stands preferably on its point, as on a contour, and not next to it.
+    look : dict
+        Further arguments of `matplotlib.axes.Axes.annotate`.
+    """
+    figure: Any = axes.figure
+    positions = ((0, 0, 0.0), *_POSITIONS) if centred else _POSITIONS
+    renderer, per_point = figure.canvas.get_renderer(), figure.dpi / 72.0
+    axes.set(xlim=axes.get_xlim(), ylim=axes.get_ylim())
+    marks = axes.transData.transform(marks)
+    frame = axes.get_window_extent(renderer).extents
+    taken: list[Floats] = []
+    for text, anchors, line in labels:
+        label = axes.annotate(text, (0.0, 0.0), xytext=(0, 0), textcoords="offset points", **look)
+        label.set(**({"bbox": _GROUND} if centred else {"path_effects": _HALO}))
+        avoided = axes.transData.transform(line)
+        size = np.array(label.get_window_extent(renderer).size)
+        choices: list[tuple[float, Floats, Floats, int, int, Floats]] = []
+        for rank, ((right, up, distance), anchor) in enumerate(product(positions, anchors)):
+            offset = np.array([right * distance, up * distance * (1.0 if right == 0 else 0.7)])
+            low = axes.transData.transform(anchor) + per_point * offset + size * (np.array([right, up]) - 1.0) / 2.0
+            box = np.concatenate([low, low + size])
+            clashes = sum(bool((box[:2] < other[2:]).all() and (other[:2] < box[2:]).all()) for other in taken)
+            clashes += _count_inside(box + 3.0 * per_point * np.array([-1.0, -1.0, 1.0, 1.0]), marks)
+            outside = bool((box[:2] < frame[:2]).any() or (box[2:] > frame[2:]).any())
+            penalty = 1000.0 * outside + 100.0 * clashes + 3.0 * _count_inside(box, avoided) + rank
+            choices.append((penalty, box, offset, right, up, anchor))
+        _, box, offset, right, up, anchor = min(choices, key=lambda choice: choice[0])
+        taken.append(box)
+        label.xy = tuple(anchor)
+        label.set_position(tuple(offset))
+        label.set(ha=("center", "left", "right")[right], va=("center", "bottom", "top")[up])
+
+
+def _count_inside(box: Floats, points: Floats) -> int:
+    return int(np.count_nonzero(((points > box[:2]) & (points < box[2:])).all(axis=1)))
 
 
 def plain(text: str) -> str:

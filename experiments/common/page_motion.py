@@ -40,7 +40,7 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Mark:
-    """A point in SI; an empty name is left out of the legend, ``kind`` is cross, square or diamond."""
+    """A fixed point in SI: cross, plus or diamond, as no moving point; an empty name is left out of the legend."""
 
     name: str
     point: Floats

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.common.figure_style import figure_bytes
 from experiments.common.file_kinds import built_in_files
 from experiments.common.problem_file import problem_text
 from experiments.multipoint.figures import draw_control, draw_costates, draw_path, draw_times
@@ -416,3 +417,11 @@ def test_figures_say_what_they_show() -> None:
     pieces = [line for line in costates.get_lines() if len(line.get_xydata()) > 2]  # type: ignore[arg-type]
     assert len(pieces) == 9  # three components, broken where they jump
     assert draw_times(scene, curves).axes[0].get_xlabel() == "time of T1, s"
+
+
+def test_matplotlib_warns_of_nothing_in_the_path_of_a_tour(caplog: pytest.LogCaptureFixture) -> None:
+    problem = load_multipoint("asteroid-tour")
+    assert problem.times_s is not None
+    scene = Scene(problem.axes, problem.tour, (0, 1, 2), problem.tour.fly((0, 1, 2), problem.times_s))
+    assert [kind for kind, _ in figure_bytes(draw_path(scene))] == ["pdf", "png"]
+    assert caplog.messages == []
