@@ -165,7 +165,13 @@ class SetModel:
         self.check_start("bounds", self.bounds)
 
     def check_period(self, name: str, sensor: Sensor) -> None:
-        """Raise `ValueError` if the period of a sensor is not a whole number of steps; `name` is for the message."""
+        """Refuse a sensor whose period is not a whole number of steps; `name` is its name in the message.
+
+        Raises
+        ------
+        ValueError
+            If the period is another number.
+        """
         steps = sensor.period_s / self.step_s
         whole = self.steps_in(sensor.period_s)
         if abs(steps - whole) > WHOLE_STEPS_TOLERANCE * whole:
