@@ -53,14 +53,12 @@ def radians(degrees: Decimal) -> float:
     return float(_EXACT.multiply(degrees, _RADIANS_PER_DEGREE))
 
 
-UNITS = {"_km3_s2": ("_m3_s2", 3 * KILO), "_km_s": ("_m_s", KILO), "_km": ("_m", KILO)}
-"""SI unit and power of ten of the units that end keys; ``_deg`` is radians, any other key is in SI."""
+UNITS = {"_km3_s2": ("_m3_s2", 3 * KILO), "_km_s": ("_m_s", KILO), "_km": ("_m", KILO), "_deg": ("_rad", 0)}
+"""SI unit and power of ten of the units that end keys; a degree has no power of ten. Any other key is in SI."""
 
 
 def si_name(name: str) -> str:
     """Return the name of a key in SI: ``distance_m`` of ``distance_km``."""
-    if name.endswith("_deg"):
-        return f"{name.removesuffix('_deg')}_rad"
     return next((name.removesuffix(unit) + of_si for unit, (of_si, _) in UNITS.items() if name.endswith(unit)), name)
 
 
