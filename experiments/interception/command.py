@@ -15,6 +15,7 @@ from experiments.interception.options import (
     RangeMeter,
     RecordFile,
     ScenarioName,
+    SetTimes,
     Strategies,
     StrategyName,
     StudyModel,
@@ -68,6 +69,7 @@ class Engage(FileOptions):
             metavar="FILE.npz", help="Write the record; with --noise both, FILE-random.npz and FILE-game.npz."
         ),
     ] = None
+    times: SetTimes = None
     csv: Csv = None
 
 
@@ -142,6 +144,7 @@ class Adversary(FileOptions):
     ] = False
     seed: Seed = 0
     record: RecordFile = None
+    times: SetTimes = None
 
 
 @dataclass(frozen=True)
@@ -156,6 +159,15 @@ class Replay:
     mp4: Annotated[
         Path | None, typer.Option(metavar="FILE.mp4", help="Write the animation as a video; needs the program ffmpeg.")
     ] = None
+    frames: Annotated[
+        int, typer.Option(metavar="N", min=2, max=1000, help="Most frames of an animation; fewer make a smaller file.")
+    ] = 40
+    width: Annotated[
+        int | None,
+        typer.Option(
+            metavar="PIXELS", min=200, max=4000, help="Width of an animation. Default: 425, or 640 for two records."
+        ),
+    ] = None
     terminal: Annotated[
         bool,
         typer.Option(
@@ -166,5 +178,6 @@ class Replay:
         float, typer.Option(metavar="STEPS_PER_S", min=0.1, max=1000.0, help="Speed of --terminal in steps per second.")
     ] = 10.0
     out: Out = None
+    times: SetTimes = None
     overwrite: Overwrite = False
     quiet: Quiet = False

@@ -55,6 +55,14 @@ RangeMeter = Annotated[
     bool | None,
     typer.Option("--range-meter/--no-range-meter", help="Simulate with or without the scenario's range meter."),
 ]
+SetTimes = Annotated[
+    str | None,
+    typer.Option(
+        "--times",
+        metavar="T1,T2,...",
+        help="Times of the sets in figure 3, s, separated by commas; the nearest step is drawn. Default: 0.5,4,8.",
+    ),
+]
 RecordFile = Annotated[
     Path | None, typer.Option("--record", metavar="FILE.npz", help="Write the record of the engagement.")
 ]

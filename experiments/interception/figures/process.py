@@ -35,6 +35,9 @@ Floats = NDArray[np.float64]
 ANGLE_RANGE_SHARE = 0.01
 RATE_RANGE_SHARE = 0.1
 """Share of the first range below which values do not set the limits: angle and rate grow as 1/x and 1/x^2."""
+FAR_SHARE = 0.3
+MOST_GROWTH = 1.0
+"""Nearer values extend the limits by at most this multiple of the extent at ranges above `FAR_SHARE` of the first."""
 
 _ROWS = 4
 _LETTER_MM, _LINE_MM = 1.8, 4.0
@@ -166,13 +169,25 @@ def _note_exit(axes: Axes, values: Floats, record: Record, scale: float, unit: s
     if abs(value) >= 1e3:
         value, unit = 1e-3 * value, unit.removeprefix("m")
     text = f"reaches {_signed(value)} {unit} at {record.steps[worst].time_s:g} s"
-    down = values[worst] < low
+    # The four corners of the part before the curve leaves the axes: the one with the fewest values.
+    across = np.interp(_times(record), axes.get_xlim(), (0.0, 1.0))
+    up = (values - low) / (high - low)
+    last = float(across[max(int((beyond > 0.0).argmax()) - 1, 0)])
+    note_width = 1.7 * len(text) / width_mm(axes)
+    corners = [(right, top) for right in (0.985, last - 0.015) for top in (values[worst] < low, values[worst] >= low)]
+
+    def hidden(corner: tuple[float, bool]) -> int:
+        right, top = corner
+        inside = (across <= right) & (across >= right - note_width) & ((up > 0.8) if top else (up < 0.2))
+        return int(inside.sum())
+
+    right, top = min(corners, key=hidden)
     axes.annotate(
         text,
-        (0.985, 0.94 if down else 0.06),
+        (right, 0.94 if top else 0.06),
         xycoords="axes fraction",
         ha="right",
-        va="top" if down else "bottom",
+        va="top" if top else "bottom",
         bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
     )
 
@@ -218,13 +233,17 @@ def _predicted_miss(record: Record) -> tuple[Floats, Floats, Floats]:
 
 
 def _extent(record: Record, sensor: str, field: str, range_share: float) -> tuple[float, float]:
-    """Return the least and the greatest value, true or measured, of the steps at large ranges."""
+    """Return the least and the greatest value, true or measured, without the last part of the way."""
     ranges = _course(record, "true_range_m")
-    far = ranges >= range_share * ranges.max()
-    steps = [step for step, use in zip(record.steps, far, strict=True) if use]
-    seen = [getattr(step, field) for step in steps]
-    seen += [step.measured[sensor] for step in steps if sensor in step.measured]
-    return min(seen), max(seen)
+    ends = []
+    for share in (FAR_SHARE, range_share):
+        steps = [step for step, far in zip(record.steps, ranges >= share * ranges.max(), strict=True) if far]
+        seen = [getattr(step, field) for step in steps]
+        seen += [step.measured[sensor] for step in steps if sensor in step.measured]
+        ends.append((min(seen), max(seen)))
+    (low, high), (lower, higher) = ends
+    most = MOST_GROWTH * (high - low)
+    return max(lower, low - most), min(higher, high + most)
 
 
 def _marker(record: Record) -> str:

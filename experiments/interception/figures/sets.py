@@ -64,8 +64,10 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
             ]
         count = len(times_s) * len(records)
         letters = iter([f"({each}) " for each in ascii_lowercase[:count]] if 1 < count <= 26 else [""] * count)
+        measured = False
         for time, row in zip(times_s, grid, strict=True):
             steps = [min(record.steps, key=lambda step: abs(step.time_s - time)) for record in records]
+            measured = measured or any("angle" in step.measured for step in steps)
             shown = [choose_sections(step.sections, sections) for step in steps]
             level_planes(row, [extent_of(step, chosen) for step, chosen in zip(steps, shown, strict=True)])
             for axes, record, step, chosen, title in zip(row, records, steps, shown, titles, strict=True):
@@ -78,10 +80,12 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
                 axes.tick_params(labelleft=axes is row[0])
         handles: list[Line2D | Patch] = [
             Line2D([], [], label=TRUTH_MARK, **_TRUTH_LOOK),
-            Line2D([], [], label=MEASUREMENT_MARK, **_MEASUREMENT_LOOK),
             Line2D([], [], color=_colour(0, 2), label="section of the set, with its range in km"),
-            Patch(facecolor=MEASURED, alpha=0.22, label="angles allowed by the measurement at these ranges"),
         ]
+        if measured:
+            allowed = "angles allowed by the measurement at these ranges"
+            handles.insert(1, Line2D([], [], label=MEASUREMENT_MARK, **_MEASUREMENT_LOOK))
+            handles.append(Patch(facecolor=MEASURED, alpha=0.22, label=allowed))
         figure.legend(handles=handles, loc="lower center", ncols=2, columnspacing=2.5)
     return figure
 

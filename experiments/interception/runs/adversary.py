@@ -16,7 +16,7 @@ from experiments.interception.choices import own_strategy, scenario_with, study_
 from experiments.interception.command import Adversary
 from experiments.interception.record_file import record_path, write_record
 from experiments.interception.runs.engage import COLUMNS, step_rows
-from experiments.interception.runs.engagement_table import FIGURE_2, FIGURE_3, draw_engagements
+from experiments.interception.runs.engagement_table import FIGURE_2, FIGURE_3, draw_engagements, read_times
 from experiments.interception.runs.shared import summary_head
 from experiments.interception.runs.worst_misses import WorstMisses, find_worst_misses
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
@@ -39,6 +39,7 @@ def run(options: Adversary) -> None:
     )
     scenario, notes = study_scenario(scenario, options.model, options.settings)
     own = own_strategy(options.strategy)
+    times_s = read_times(options.times)
     names = ("scenario.toml", "results.json", "steps.csv", RECORD, *figure_files(FIGURE_2, FIGURE_3))
     with (
         output_of(options, names, {"--record": options.record}) as written,
@@ -65,7 +66,7 @@ def run(options: Adversary) -> None:
             for file in filter(None, files):
                 write_record(record, file, overwrite=options.overwrite)
                 written.add(file)
-            draw_engagements([record], written)
+            draw_engagements([record], times_s, written, begin)
     if not options.quiet:
         _show(table_console(written.stdout_taken), scenario, worst, options, elapsed_s)
 

@@ -11,7 +11,13 @@ from experiments.common.screen import figure_files, progress_bar, say_warnings, 
 from experiments.interception.choices import own_strategy, scenario_with
 from experiments.interception.command import Engage
 from experiments.interception.record_file import record_path, write_record
-from experiments.interception.runs.engagement_table import FIGURE_2, FIGURE_3, draw_engagements, show_engagements
+from experiments.interception.runs.engagement_table import (
+    FIGURE_2,
+    FIGURE_3,
+    draw_engagements,
+    read_times,
+    show_engagements,
+)
 from experiments.interception.runs.shared import need_finite, summary_head
 from experiments.interception.scenario_file import scenario_hash, scenario_to_toml, scenario_warnings
 from guidance import NoiseKind
@@ -36,6 +42,7 @@ def run(options: Engage) -> None:
         range_meter=options.range_meter,
     )
     own = own_strategy(options.strategy)
+    times_s = read_times(options.times)
     both = options.noise == "both"
     noises = [*NoiseKind] if both else [NoiseKind(options.noise or scenario.noise)]
     record_files = {}
@@ -71,7 +78,7 @@ def run(options: Engage) -> None:
             for file in filter(None, targets):
                 write_record(record, file, overwrite=options.overwrite)
                 written.add(file)
-        draw_engagements(records, written)
+        draw_engagements(records, times_s, written, begin)
     if not options.quiet:
         show_engagements(records, table_console(written.stdout_taken))
 
