@@ -108,14 +108,8 @@ def _few_colours(file: Path) -> bytes:
         frames = [frame.convert("RGB") for frame in ImageSequence.Iterator(animation)]
     flat = [frame.quantize(COLOURS, dither=Image.Dither.NONE) for frame in frames]
     content = BytesIO()
-    options = {
-        "save_all": True,
-        "append_images": flat[1:],
-        "duration": round(1000 * DURATION_S / len(flat)),
-        "loop": 0,
-        "optimize": True,
-    }
-    flat[0].save(content, GIF.removeprefix("."), **options)
+    frame_ms = round(1000 * DURATION_S / len(flat))
+    flat[0].save(content, "gif", save_all=True, append_images=flat[1:], duration=frame_ms, loop=0, optimize=True)
     return content.getvalue()
 
 

@@ -170,7 +170,7 @@ def _note_exit(axes: Axes, values: Floats, record: Record, scale: float, unit: s
         value, unit = 1e-3 * value, unit.removeprefix("m")
     text = f"reaches {_signed(value)} {unit} at {record.steps[worst].time_s:g} s"
     # The four corners of the part before the curve leaves the axes: the one with the fewest values.
-    across = np.interp(_times(record), axes.get_xlim(), (0.0, 1.0))
+    across = np.interp(_course(record, "time_s"), axes.get_xlim(), (0.0, 1.0))
     up = (values - low) / (high - low)
     last = float(across[max(int((beyond > 0.0).argmax()) - 1, 0)])
     note_width = 1.7 * len(text) / width_mm(axes)
