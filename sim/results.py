@@ -155,8 +155,9 @@ class Results:
             "impulse, m/s": self.impulse_m_s,
             guaranteed: self.guaranteed_miss_m.compressed(),
         }
-        outcomes = [ending(outcome.value, hit) for outcome, hit in zip(self.outcomes, self.hit.tolist(), strict=True)]
-        return results_html(samples, outcomes, int(self.truth_kept.sum()))
+        outcomes = [outcome.value for outcome in self.outcomes]
+        hits = None if self.hits is None else self.hits.hits
+        return results_html(samples, outcomes, int(self.truth_kept.sum()), hits)
 
     def __repr__(self) -> str:
         miss, fuel = np.median(self.miss_m), np.median(self.impulse_m_s)
