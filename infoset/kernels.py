@@ -18,14 +18,17 @@ import time
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, ClassVar, TypeVar, cast
 
-from numba import config, njit
+from numba import config, njit, types
 from numba.core import event
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import AnalysisPass, register_pass
+from numba.core.targetconfig import ConfigStack
 from numba.core.typed_passes import IRLegalization
+from numba.core.typing.context import Context
+from numba.extending import lower_builtin
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -82,7 +85,7 @@ class Kernels:
         before = CONFIG.CACHE_DIR
         try:
             CONFIG.CACHE_DIR = "" if folder is None else str(folder)
-            stored = JIT(cache=folder is not None, **self._options, **options)
+            stored = JIT(cache=folder is not None, pipeline_class=_Compiler, **self._options, **options)
             return cast(F, stored(function))
         finally:
             CONFIG.CACHE_DIR = before
@@ -105,6 +108,57 @@ class Kernels:
 def _callable_from_python(kernel: Any) -> Any:
     """Return a compiled function that calls a linked kernel, which has no code that Python could call."""
     return JIT(lambda *arguments: kernel(*arguments))  # noqa: PLW0108 - the kernel has no Python interface
+
+
+class _Typing(Context):
+    """Numba's typing, except that a built-in function is looked up once for each type of its arguments.
+
+    Notes
+    -----
+    Numba tries all definitions of an operator at each use, also those for texts, lists and sets: a tenth of the time.
+    Definitions that Numba compiles inherit the fast-math options of the kernel.
+    """
+
+    _signatures: ClassVar[dict[tuple[Any, ...], Any]] = {}
+
+    def __init__(self, context: Any) -> None:
+        self.__dict__ = context.__dict__
+
+    def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
+        """Return the signature of a function for some types of arguments; None if there is none."""
+        if type(func) is not types.Function or kws:
+            return super().resolve_function_type(func, args, kws)
+        key = frozenset(ConfigStack().top().fastmath.flags), func, tuple(args)
+        if key not in self._signatures:
+            signature = super().resolve_function_type(func, args, kws)
+            if signature is None:
+                return None
+            self._signatures[key] = signature
+        return self._signatures[key]
+
+
+@cache
+def _typing_of(context: Any) -> _Typing:
+    return _Typing(context)
+
+
+class _Compiler(CompilerBase):
+    """Numba's compiler with faster typing."""
+
+    def __init__(self, typing: Any, *arguments: Any) -> None:
+        super().__init__(_typing_of(typing), *arguments)
+
+    def define_pipelines(self) -> list[Any]:
+        """Return Numba's passes, without its checks of itself between them."""
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes._ENFORCING = False
+        return [passes]
+
+
+@lower_builtin("__array__", types.Array)  # type: ignore[untyped-decorator]
+def _same_array(_context: Any, _builder: Any, _signature: Any, arguments: Any) -> Any:
+    """Return an array as it is. Without this, Numba looks for conversions whenever an array is indexed."""
+    return arguments[0]
 
 
 class _LinkedLibrary(JITCodeLibrary):
@@ -143,12 +197,12 @@ class _UseLinkedLibrary(AnalysisPass):
         return True
 
 
-class _LinkedCompiler(CompilerBase):
-    """Numba's compiler, except that the code goes into a `_LinkedLibrary`."""
+class _LinkedCompiler(_Compiler):
+    """A compiler whose code goes into a `_LinkedLibrary`."""
 
     def define_pipelines(self) -> list[Any]:
         """Return Numba's passes with one more."""
-        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        (passes,) = super().define_pipelines()
         passes.add_pass_after(_UseLinkedLibrary, IRLegalization)
         passes.finalize()
         return [passes]
