@@ -21,7 +21,7 @@ import numpy as np
 
 from experiments import load_scenario
 from guidance import NoiseKind
-from infoset import information_set, section_passes
+from infoset import information_set, replays, section_passes
 from sim import Scenario
 from sim.draws import draw
 from sim.engagement import Engagements
@@ -66,8 +66,6 @@ class Clock:
 
         def part(behind: Any, measured: Any, _stale: Any, _heights: Any, *others: Any) -> str:
             sections = others[3]
-            if sections.labels.shape[1] == 1:
-                return TRUTH_SECTION
             self.section_steps += int((sections.living & (measured | behind)[:, None]).sum())
             return SECTION_STEPS
 
@@ -78,7 +76,7 @@ class Clock:
         section_passes.step_all = self.measured(section_passes.step_all)
         for owner, names, part in (
             (section_passes, ("widest_all",), SECTION_STEPS),
-            (section_passes, ("margins_all",), TRUTH_SECTION),
+            (replays, ("margins_all",), TRUTH_SECTION),
             (section_passes, ("make_room_all", "start_all"), REGRIDS),
             (information_set, ("refine_all",), REGRIDS),
             (section_passes, ("shift_all",), IMPULSES),

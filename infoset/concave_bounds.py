@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from infoset._compile import ZERO, allocation_free
-from infoset.section_life import Floats, Integers
+from infoset.replays import Records
+from infoset.section_life import Floats
 
 CERTAIN = 1e-13
 """Labels count as dead if their overlap is certainly less than minus this number times the label."""
@@ -60,32 +61,30 @@ def bound_between(
 
 
 @allocation_free
-def is_dead_between(labels: Floats, died: Integers, overlaps: Floats, number: int, latest: Floats) -> bool:
+def is_dead_between(dead: Records, latest: Floats) -> bool:
     """Return whether all labels from the first to the last of some dead labels, in increasing order, are dead.
 
-    `latest`, shape (2, number), is a working array.
+    `latest`, shape (2, len(dead)), is a working array.
 
     Notes
     -----
     The overlap at the latest event at which one of them became empty is a concave function of the label.
     """
-    last_event = died[0]
-    for i in range(1, number):
-        last_event = max(last_event, died[i])
+    last_event = dead[0].died
+    for i in range(1, len(dead)):
+        last_event = max(last_event, dead[i].died)
     known, values = latest[0], latest[1]
     count = ZERO
-    for i in range(number):
-        if died[i] == last_event and (count == 0 or labels[i] > known[count - 1]):
-            known[count], values[count] = labels[i], overlaps[i]
+    for i in range(len(dead)):
+        if dead[i].died == last_event and (count == 0 or dead[i].label > known[count - 1]):
+            known[count], values[count] = dead[i].label, dead[i].overlap
             count += 1
-    rounding = -CERTAIN * labels[number - 1]
-    if labels[0] < known[0] and bound_between(known, values, count, ZERO, labels[0], known[0], 0.0, 0.0) >= rounding:
+    least, greatest = dead[0].label, dead[len(dead) - 1].label
+    rounding = -CERTAIN * greatest
+    if least < known[0] and bound_between(known, values, count, ZERO, least, known[0], 0.0, 0.0) >= rounding:
         return False
     for i in range(count - 1):
         if bound_between(known, values, count, i + 1, known[i], known[i + 1], 0.0, 0.0) >= rounding:
             return False
     last = known[count - 1]
-    return bool(
-        last == labels[number - 1]
-        or bound_between(known, values, count, count, last, labels[number - 1], 0.0, 0.0) < rounding
-    )
+    return bool(last == greatest or bound_between(known, values, count, count, last, greatest, 0.0, 0.0) < rounding)

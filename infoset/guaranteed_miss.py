@@ -7,14 +7,16 @@ docs/guarantee.md contains the theorem and its proof.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from infoset import chains, whole_chains
-from infoset._compile import ZERO, allocation_free, entry
+from infoset._compile import ZERO, allocation_free, by_reference, entry
 from infoset.concave_bounds import bound_between
 from infoset.history import History, Tapes
 from infoset.location import LABEL_RESOLUTION, locate_end, search_window
-from infoset.replays import LOWER, PROBE, UPPER, Workspace, keep_section, run, workspace
+from infoset.replays import LOWER, PROBE, UPPER, ReplayRoom, Workspace, keep_section, probe, run, workspace
 from infoset.section_law import SectionLaw
 from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape
 from infoset.section_passes import Sections, tape_of
@@ -45,18 +47,31 @@ def extremes_along(points: Floats, count: int, tau: float) -> tuple[float, float
     return least, greatest
 
 
+@by_reference
+class Outlines(NamedTuple):
+    """Working arrays for the labels replayed for one step.
+
+    Parameters
+    ----------
+    labels : ndarray, shape (MOST_LABELS,)
+        The labels, m.
+    points : ndarray, shape (MOST_LABELS, CAPACITY, 2)
+        Vertices (V, z) of their sections.
+    counts : ndarray of int, shape (MOST_LABELS,)
+        Numbers of vertices.
+    supports : ndarray, shape (4, MOST_LABELS)
+        Supports of the sections in four directions.
+    """
+
+    labels: Floats
+    points: Floats
+    counts: Integers
+    supports: Floats
+
+
 @allocation_free
 def bound_piece(
-    labels: Floats,
-    outlines: Floats,
-    counts: Integers,
-    number: int,
-    first: int,
-    p: float,
-    q: float,
-    travelled: float,
-    law: SectionLaw,
-    values: Floats,
+    outlines: Outlines, number: int, first: int, p: float, q: float, travelled: float, law: SectionLaw
 ) -> tuple[float, float]:
     """Return bounds of z + V x/e over all sections with labels from p to q.
 
@@ -66,16 +81,17 @@ def bound_piece(
     turns with the label. With the middle c of the piece, z + V x/e = (z + V x_c/e) + V (x - x_c)/e: the first term has
     a fixed direction, and the V of the second lies within its extrapolated bounds V_c +- r.
     """
+    labels, points, counts, values = outlines.labels, outlines.points, outlines.counts, outlines.supports
     e = law.closing_speed
     centre = 0.5 * (p + q)
     tau = (centre - travelled) / e
     for k in range(number):
         least, greatest = np.inf, -np.inf
         for i in range(counts[k]):
-            least = min(least, outlines[k, i, 0])
-            greatest = max(greatest, outlines[k, i, 0])
+            least = min(least, points[k, i, 0])
+            greatest = max(greatest, points[k, i, 0])
         values[0, k], values[1, k] = -least, greatest
-        least, greatest = extremes_along(outlines[k], counts[k], tau)
+        least, greatest = extremes_along(points[k], counts[k], tau)
         values[2, k], values[3, k] = -least, greatest
     v_least = -bound_between(labels, values[0], number, first, p, q, 0.0, centre)
     v_greatest = bound_between(labels, values[1], number, first, p, q, 0.0, centre)
@@ -97,10 +113,7 @@ def bound_leaving(
     errors: Floats | None,
     law: SectionLaw,
     room: Workspace,
-    labels: Floats,
-    outlines: Floats,
-    counts: Integers,
-    values: Floats,
+    outlines: Outlines,
     pieces: Floats,
 ) -> int:
     """Bound the predicted miss of all living labels between two limits; return the number of pieces written.
@@ -113,29 +126,27 @@ def bound_leaving(
         The limits, m.
     known : float
         A label between them that lives; less than `lower` if none is known.
-    room : Workspace
-        Working arrays of replays.
-    labels, outlines, counts, values : ndarray
-        Working arrays for the replayed labels, their outlines and supports.
+    room, outlines : Workspace, Outlines
+        Working arrays.
     pieces : ndarray, shape (>= PIECES, 4)
         Receives the pieces.
     """
-    living = known
+    living, limits, replays = known, room.known, room.replays
     if errors is not None:
         # The living labels need not form an interval, so that the window must be searched.
-        probe = known if known >= lower else 0.5 * (lower + upper)
-        if not search_window(lower, upper, probe, LABEL_RESOLUTION * upper, tape, errors, law, room):
+        first_label = known if known >= lower else 0.5 * (lower + upper)
+        if not search_window(lower, upper, first_label, LABEL_RESOLUTION * upper, tape, errors, law, room):
             return 0
-        living = room.labels[1]
-    lower_died, lower_overlap = run(lower, tape, errors, law, room)
-    if lower_died == ALIVE:
-        keep_section(room, LOWER)
-    upper_died, upper_overlap = run(upper, tape, errors, law, room)
-    if upper_died == ALIVE:
-        keep_section(room, UPPER)
-    if lower_died == ALIVE:
+        living = limits[1].label
+    lower_lives = probe(limits, 0, lower, tape, errors, law, replays)
+    if lower_lives:
+        keep_section(replays, LOWER)
+    upper_lives = probe(limits, 2, upper, tape, errors, law, replays)
+    if upper_lives:
+        keep_section(replays, UPPER)
+    if lower_lives:
         living = lower
-    elif upper_died == ALIVE:
+    elif upper_lives:
         living = upper
     if living < lower:
         # The living labels form an interval, and both limits are dead: no label between them lives.
@@ -143,14 +154,10 @@ def bound_leaving(
     resolution = RESOLUTION * upper
     first_dead, last_dead = lower, upper
     first, last = lower, upper
-    if lower_died != ALIVE:
-        first_dead, first = locate_end(
-            lower, lower_died, lower_overlap, living, resolution, tape, errors, law, room, LOWER
-        )
-    if upper_died != ALIVE:
-        last_dead, last = locate_end(
-            upper, upper_died, upper_overlap, living, resolution, tape, errors, law, room, UPPER
-        )
+    if not lower_lives:
+        first_dead, first = locate_end(limits[0], living, resolution, tape, errors, law, room, LOWER)
+    if not upper_lives:
+        last_dead, last = locate_end(limits[2], living, resolution, tape, errors, law, room, UPPER)
     spacing = (last - first) / (LABELS - 1)
     travelled = law.closing_speed * (law.step * elapsed)
     number = inner = outer = ZERO
@@ -158,7 +165,7 @@ def bound_leaving(
         spacing = 0.0
     for k in range(-1, LABELS + 1):
         outside = k < 0 or k == LABELS
-        if (spacing == 0.0 and k != 0) or (k < 0 and lower_died != ALIVE) or (k == LABELS and upper_died != ALIVE):
+        if (spacing == 0.0 and k != 0) or (k < 0 and not lower_lives) or (k == LABELS and not upper_lives):
             continue
         if outside and errors is not None:
             # The bands are convex only on the window.
@@ -169,21 +176,23 @@ def bound_leaving(
             row = LOWER
         elif k == LABELS - 1:
             row = UPPER
-        elif run(label, tape, errors, law, room)[0] != ALIVE:
+        elif run(label, tape, errors, law, replays)[0] != ALIVE:
             continue
         if outside and k < 0:
             inner = 1
         elif outside:
             outer = 1
-        labels[number] = label
+        outlines.labels[number] = label
         tau = (label - travelled) / law.closing_speed
-        counts[number] = whole_chains.outline(room.origins, room.rings, room.marks, row, tau, outlines[number])
+        outlines.counts[number] = whole_chains.outline(
+            replays.origins, replays.rings, replays.marks, row, tau, outlines.points[number]
+        )
         number += 1
     if spacing == 0.0 or number < 3:
         # The living labels are equal to within the resolution: one outline and a small margin bound them all.
         width = last_dead - first_dead
         tau = (first - travelled) / law.closing_speed
-        least, greatest = extremes_along(outlines[0], counts[0], tau)
+        least, greatest = extremes_along(outlines.points[0], outlines.counts[0], tau)
         magnitude = abs(least) + abs(greatest)
         margin = SLACK * magnitude + width * magnitude / max(first - travelled, 1.0)
         drift = 0.5 * law.disturbance * tau * tau
@@ -195,17 +204,13 @@ def bound_leaving(
     for piece in range(inside + 1):
         # The first piece ends at the first living label, the last one begins at the last living label.
         at = inner + piece
-        p = first_dead if piece == 0 else labels[at - 1]
-        q = last_dead if piece == inside else labels[at]
+        p = first_dead if piece == 0 else outlines.labels[at - 1]
+        q = last_dead if piece == inside else outlines.labels[at]
         if q <= p:
             continue
-        least, greatest = bound_piece(labels, outlines, counts, number, at, p, q, travelled, law, values)
-        pieces[made, LEAST], pieces[made, GREATEST], pieces[made, NEAREST], pieces[made, FARTHEST] = (
-            least,
-            greatest,
-            p,
-            q,
-        )
+        least, greatest = bound_piece(outlines, number, at, p, q, travelled, law)
+        pieces[made, LEAST], pieces[made, GREATEST] = least, greatest
+        pieces[made, NEAREST], pieces[made, FARTHEST] = p, q
         made += 1
     return made
 
@@ -222,10 +227,7 @@ def bound_leaving_all(
     sections: Sections,
     law: SectionLaw,
     room: Workspace,
-    labels: Floats,
-    outlines: Floats,
-    counts: Integers,
-    supports: Floats,
+    outlines: Outlines,
     pieces: Floats,
     made: Integers,
 ) -> None:
@@ -236,18 +238,18 @@ def bound_leaving_all(
     With rates, a window of labels is halved while its bound is loose, since the bands that are convex on a window are
     wider on a wider window. `floor` is the bound of the labels that have arrived: Phi is no less.
     """
-    stored, used, living = sections.labels, sections.used, sections.living
+    stored, used, living, windows = sections.labels, sections.used, sections.living, room.windows
     for b in range(active.shape[0]):
         made[b] = 0
         if not active[b] or lower[b] >= upper[b]:
             continue
-        tape = tape_of(tapes, b, room.values, room.applies)
+        tape = tape_of(tapes, b, room.replays.values, room.replays.applies)
         reached = 0.5 * floor[b]
-        room.windows[0, 0], room.windows[0, 1] = lower[b], upper[b]
+        windows[0].near, windows[0].far = lower[b], upper[b]
         count = 1
         while count > 0:
             count -= 1
-            near, far = room.windows[count, 0], room.windows[count, 1]
+            near, far = windows[count].near, windows[count].far
             known = near - 1.0
             for s in range(used[b]):
                 if living[b, s] and near <= stored[b, s] <= far:
@@ -258,23 +260,23 @@ def bound_leaving_all(
                 window = Tape(tape.kinds, tape.values, tape.applies, tape.events, near, far)
             spread = 0.0
             if may_halve:
-                spread = spread_at(middle, elapsed, window, errors, law, room, outlines[0])
+                spread = spread_at(middle, elapsed, window, errors, law, room.replays, outlines.points[0])
                 if spread > LOOSE * reached:
-                    reached = max(reached, spread_at(middle, elapsed, tape, errors, law, room, outlines[0]))
+                    reached = max(
+                        reached, spread_at(middle, elapsed, tape, errors, law, room.replays, outlines.points[0])
+                    )
             number = ZERO
             new_pieces = pieces[b, made[b] :]
             if spread <= LOOSE * reached:
-                number = bound_leaving(
-                    near, far, known, elapsed, window, errors, law, room, labels, outlines, counts, supports, new_pieces
-                )
+                number = bound_leaving(near, far, known, elapsed, window, errors, law, room, outlines, new_pieces)
                 least, greatest = np.inf, -np.inf
                 for piece in range(number):
                     least, greatest = min(least, new_pieces[piece, LEAST]), max(greatest, new_pieces[piece, GREATEST])
                 spread = 0.5 * (greatest - least) if number > 0 else 0.0
             # Later impulses may centre the interval, so that its width determines Phi.
             if may_halve and spread > LOOSE * reached:
-                room.windows[count, 0], room.windows[count, 1] = near, middle
-                room.windows[count + 1, 0], room.windows[count + 1, 1] = middle, far
+                windows[count].near, windows[count].far = near, middle
+                windows[count + 1].near, windows[count + 1].far = middle, far
                 count += 2
                 continue
             made[b] += number
@@ -282,7 +284,7 @@ def bound_leaving_all(
 
 @allocation_free
 def spread_at(
-    label: float, elapsed: int, tape: Tape, errors: Floats | None, law: SectionLaw, room: Workspace, outline: Floats
+    label: float, elapsed: int, tape: Tape, errors: Floats | None, law: SectionLaw, room: ReplayRoom, outline: Floats
 ) -> float:
     """Return half the width of the predicted-miss interval at one label, m; zero if the label is dead."""
     if run(label, tape, errors, law, room)[0] != ALIVE:
@@ -361,10 +363,12 @@ class GuaranteedMiss:
             stack.sections,
             self._law,
             workspace(history.events, 1),
-            np.empty(MOST_LABELS),
-            np.empty((MOST_LABELS, chains.CAPACITY, 2)),
-            np.empty(MOST_LABELS, dtype=np.int64),
-            np.empty((4, MOST_LABELS)),
+            Outlines(
+                np.empty(MOST_LABELS),
+                np.empty((MOST_LABELS, chains.CAPACITY, 2)),
+                np.empty(MOST_LABELS, dtype=np.int64),
+                np.empty((4, MOST_LABELS)),
+            ),
             pieces,
             made,
         )

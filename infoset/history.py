@@ -6,11 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from infoset._compile import by_reference
 from infoset.section_life import IMPULSE, NO_WINDOW, PREDICTION, RATE, Flags, Floats, Integers, Tape
 
 ROOM_AT_START = 64
 
 
+@by_reference
 class Tapes(NamedTuple):
     """Histories of a batch for the kernels: the fields of `Tape`, with values and applies of shape (events, B)."""
 

@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from infoset._compile import allocation_free, constants
+from infoset import chains, polygon
+from infoset._compile import allocation_free, by_reference, constants, entry
 from infoset.chains import copy_section, empty_sections, working_room
+from infoset.history import History, Tapes
 from infoset.section_law import SectionLaw
-from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape, replay
+from infoset.section_life import (
+    ALIVE,
+    AT_START,
+    Flags,
+    Floats,
+    Integers,
+    Tape,
+    continue_replay,
+    replay,
+    start_section,
+    time_to_go,
+)
+from infoset.section_passes import tape_of
 
 MOST_HALVED_WINDOWS = 1000
 """Greatest number of windows of labels that a search halves. If more are needed, the set counts as empty."""
@@ -18,27 +33,32 @@ PROBE, LOWER, UPPER = constants(3)
 """Rows of the workspace: the section of the last replay, and the sections at the ends of the living labels."""
 
 
-class Workspace(NamedTuple):
-    """Working arrays for replays of E events and a search over K labels.
+Records = np.recarray[tuple[int], np.dtype[np.record]]
+Record = Any
+"""One of the records: a label that was replayed, or a window."""
+
+OUTCOME = [("died", np.int64), ("overlap", np.float64)]
+"""Event at which a label became empty, or ALIVE, and its overlap with the band there, m."""
+PROBED = np.dtype([("label", np.float64), *OUTCOME])
+"""A replayed label, m."""
+WINDOW = np.dtype([("near", np.float64), ("far", np.float64), *OUTCOME])
+"""A window of labels, m, with the latest outcome that a label of it reached."""
+
+
+@by_reference
+class ReplayRoom(NamedTuple):
+    """Working arrays for replays of E events.
 
     Parameters
     ----------
     values, applies : ndarray, shape (E,)
         History of one engagement in contiguous arrays: angles, rates and impulses, SI, and the events that apply.
     origins, rings, marks : ndarray
-        The sections `PROBE`, `LOWER` and `UPPER`, stored as in `chains`.
-    overlaps, living_overlaps : ndarray, shape (E,)
-        Overlap of section and band at each measurement, m, in the last replay and at the last living label.
+        Sections, stored as in `chains`; the last replay is `PROBE`.
+    overlaps : ndarray, shape (E,)
+        Overlap of section and band at each measurement, m, in the last replay.
     points : ndarray, shape (n, 2)
         Vertices of a section.
-    labels, died, label_overlaps : ndarray, shape (K,)
-        Replayed labels, m; the event at which each became empty, or `ALIVE`; its overlap there, m.
-    four_labels, four_died, four_overlaps : ndarray, shape (4,)
-        The same for a bracket of three labels and the label probed in it.
-    latest : ndarray, shape (2, 4)
-        Labels and overlaps of those that became empty at the latest event.
-    windows, windows_died, windows_overlaps : ndarray, shape (MOST_HALVED_WINDOWS + 2, 2) and (MOST_HALVED_WINDOWS + 2,)
-        Windows of labels to be searched, with the latest event and overlap that a label of each reached.
     """
 
     values: Floats
@@ -47,52 +67,79 @@ class Workspace(NamedTuple):
     rings: Floats
     marks: Integers
     overlaps: Floats
-    living_overlaps: Floats
     points: Floats
-    labels: Floats
-    died: Integers
-    label_overlaps: Floats
-    four_labels: Floats
-    four_died: Integers
-    four_overlaps: Floats
+
+
+@by_reference
+class Workspace(NamedTuple):
+    """Working arrays for replays and for a search over K labels.
+
+    Parameters
+    ----------
+    replays : ReplayRoom
+        Arrays of the replays, with the sections `PROBE`, `LOWER` and `UPPER`.
+    living_overlaps : ndarray, shape (E,)
+        Overlaps of the last replay of a living label, m.
+    known : recarray of PROBED, shape (K,)
+        Replayed labels.
+    four : recarray of PROBED, shape (4,)
+        A bracket of three labels and the label probed in it.
+    latest : ndarray, shape (2, 4)
+        Labels and overlaps of those that became empty at the latest event.
+    windows : recarray of WINDOW, shape (MOST_HALVED_WINDOWS + 2,)
+        Windows of labels to be searched.
+    """
+
+    replays: ReplayRoom
+    living_overlaps: Floats
+    known: Records
+    four: Records
     latest: Floats
-    windows: Floats
-    windows_died: Integers
-    windows_overlaps: Floats
+    windows: Records
+
+
+def replay_room(events: int, sections: int) -> ReplayRoom:
+    """Allocate the arrays for replays of `events` events, with room for some sections."""
+    return ReplayRoom(
+        np.empty(events),
+        np.empty(events, dtype=bool),
+        *empty_sections(sections),
+        overlaps=np.empty(events),
+        points=working_room(),
+    )
 
 
 def workspace(events: int, slots: int) -> Workspace:
     """Allocate the arrays for replays of `events` events and a search over `slots` stored labels."""
-    known = slots + 2
     return Workspace(
-        np.empty(events),
-        np.empty(events, dtype=bool),
-        *empty_sections(3),
-        overlaps=np.empty(events),
+        replay_room(events, 3),
         living_overlaps=np.empty(events),
-        points=working_room(),
-        labels=np.empty(known),
-        died=np.empty(known, dtype=np.int64),
-        label_overlaps=np.empty(known),
-        four_labels=np.empty(4),
-        four_died=np.empty(4, dtype=np.int64),
-        four_overlaps=np.empty(4),
+        known=np.recarray(slots + 2, PROBED),
+        four=np.recarray(4, PROBED),
         latest=np.empty((2, 4)),
-        windows=np.empty((MOST_HALVED_WINDOWS + 2, 2)),
-        windows_died=np.empty(MOST_HALVED_WINDOWS + 2, dtype=np.int64),
-        windows_overlaps=np.empty(MOST_HALVED_WINDOWS + 2),
+        windows=np.recarray(MOST_HALVED_WINDOWS + 2, WINDOW),
     )
 
 
 @allocation_free
-def run(label: float, tape: Tape, errors: Floats | None, law: SectionLaw, room: Workspace) -> tuple[int, float]:
+def run(label: float, tape: Tape, errors: Floats | None, law: SectionLaw, room: ReplayRoom) -> tuple[int, float]:
     """Replay a label; return the event at which it became empty, or ALIVE, and the overlap there, or zero."""
     died = replay(label, tape, errors, law, room.origins, room.rings, room.marks, PROBE, room.overlaps, room.points)
     return died, room.overlaps[died] if died != ALIVE else 0.0
 
 
 @allocation_free
-def keep_section(room: Workspace, row: int) -> None:
+def probe(
+    known: Records, i: int, label: float, tape: Tape, errors: Floats | None, law: SectionLaw, room: ReplayRoom
+) -> bool:
+    """Replay a label and write it to record `i`; return whether it lives."""
+    died, overlap = run(label, tape, errors, law, room)
+    known[i].label, known[i].died, known[i].overlap = label, died, overlap
+    return died == ALIVE
+
+
+@allocation_free
+def keep_section(room: ReplayRoom, row: int) -> None:
     """Copy the section of the last replay to a row of the workspace."""
     copy_section(room.origins, room.rings, room.marks, PROBE, room.origins, room.rings, room.marks, row)
 
@@ -100,12 +147,101 @@ def keep_section(room: Workspace, row: int) -> None:
 @allocation_free
 def keep_living(room: Workspace, events: int, row: int) -> None:
     """Copy section and overlaps of the last replay to those of the living label."""
-    keep_section(room, row)
+    keep_section(room.replays, row)
     for event in range(events):
-        room.living_overlaps[event] = room.overlaps[event]
+        room.living_overlaps[event] = room.replays.overlaps[event]
 
 
 @allocation_free
-def outlives(died: int, overlap: float, other_died: int, other_overlap: float) -> bool:
+def outlives(one: Record, other: Record) -> bool:
     """Whether a label became empty later than another one, or at the same event with a greater overlap."""
-    return died > other_died or (died == other_died and overlap > other_overlap)
+    return bool(one.died > other.died or (one.died == other.died and one.overlap > other.overlap))
+
+
+def margins_along(labels: Floats, looks: Integers, v: Floats, z: Floats, history: History, law: SectionLaw) -> Floats:
+    """Return the signed distances, m, of states (V, z) to the boundaries of sections during an engagement, (L, B).
+
+    Parameters
+    ----------
+    labels : ndarray, shape (B,)
+        Label of each engagement, m.
+    looks : ndarray of int, shape (L,)
+        Number of events before each state.
+    v, z : ndarray, shape (L, B)
+        The states, m/s and m.
+
+    Returns
+    -------
+    ndarray, shape (L, B)
+        Positive inside; for an empty section its overlap with the band that made it empty.
+    """
+    margins = np.empty(v.shape)
+    room = replay_room(history.events, 1)
+    margins_all(labels, looks, v, z, history.tapes, history.errors_if_any, law, room, margins)
+    return margins
+
+
+@entry
+def margins_all(
+    labels: Floats,
+    looks: Integers,
+    v: Floats,
+    z: Floats,
+    tapes: Tapes,
+    errors: Floats | None,
+    law: SectionLaw,
+    room: ReplayRoom,
+    margins: Floats,
+) -> None:
+    """Write the results of `margins_along`."""
+    origins, rings, marks = room.origins, room.rings, room.marks
+    for b in range(labels.shape[0]):
+        label, tape = labels[b], tape_of(tapes, b, room.values, room.applies)
+        start_section(origins, rings, marks, PROBE, label, law)
+        died, done = ALIVE, AT_START
+        for look in range(looks.shape[0]):
+            if died == ALIVE:
+                part = Tape(tape.kinds, tape.values, tape.applies, looks[look], tape.nearest, tape.farthest)
+                died, done = continue_replay(
+                    done, label, part, errors, law, origins, rings, marks, PROBE, room.overlaps, room.points
+                )
+            if died == ALIVE:
+                tau = time_to_go(label, done.elapsed, law)
+                margins[look, b] = margin_in(origins, rings, marks, PROBE, tau, v[look, b], z[look, b])
+            else:
+                margins[look, b] = room.overlaps[died]
+
+
+@allocation_free
+def margin_in(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, v: float, z: float) -> float:
+    """Signed distance of a state to the boundary of a section in the plane of V x/e and z, m; positive inside."""
+    nearest, inside = np.inf, False
+    last_v, last_m = chains.vertex(origins, rings, marks, n, chains.LEFT, chains.end_of(marks, n, chains.LEFT) - 1)
+    last = (tau * (last_v - v), (last_m - tau * last_v) - z)
+    for side in (chains.RIGHT, chains.LEFT):
+        # Origin of the chain relative to the state, in the plane of the distance.
+        offset_v = tau * (origins[n, side, chains.V_ORIGIN] - v + origins[n, side, chains.V_REST])
+        offset_z = chains.origin_height(origins, n, side, tau) - z
+        for i in range(chains.begin_of(marks, n, side), chains.end_of(marks, n, side)):
+            chain_v, chain_m = chains.read(rings, chains.offset_of(marks, n, side, i))
+            vertex = (tau * chain_v + offset_v, (chain_m - tau * chain_v) + offset_z)
+            nearest, inside = polygon.pass_edge(nearest, inside, last, vertex, 0.0, 0.0)
+            last = vertex
+    return math.sqrt(nearest) if inside else -math.sqrt(nearest)
+
+
+@entry
+def replay_section(
+    label: float,
+    tape: Tape,
+    errors: Floats | None,
+    law: SectionLaw,
+    origins: Floats,
+    rings: Floats,
+    marks: Integers,
+    n: int,
+    overlaps: Floats,
+    points: Floats,
+) -> int:
+    """Call `replay` from Python."""
+    return replay(label, tape, errors, law, origins, rings, marks, n, overlaps, points)

@@ -207,6 +207,25 @@ def measure_section(
 NO_SIGHT = LastSight(False, 0.0, 0, 0.0, 0.0, 0.0)
 
 
+class Replayed(NamedTuple):
+    """Part of a history that is replayed.
+
+    Parameters
+    ----------
+    events, elapsed : int
+        Number of events, and of the predictions among them.
+    sight : LastSight
+        The last sight after them.
+    """
+
+    events: int
+    elapsed: int
+    sight: LastSight
+
+
+AT_START = Replayed(ZERO, ZERO, NO_SIGHT)
+
+
 @inlined
 def sight_after(sight: LastSight, kind: int, value: float, applies: bool, law: SectionLaw) -> LastSight:
     """Return the last sight after one more event of the history."""
@@ -436,12 +455,29 @@ def replay(
     -----
     About 30 ns per event.
     """
+    start_section(origins, rings, marks, n, label, law)
+    return continue_replay(AT_START, label, tape, errors, law, origins, rings, marks, n, overlaps, points)[0]
+
+
+@allocation_free
+def continue_replay(
+    done: Replayed,
+    label: float,
+    tape: Tape,
+    errors: Floats | None,
+    law: SectionLaw,
+    origins: Floats,
+    rings: Floats,
+    marks: Integers,
+    n: int,
+    overlaps: Floats,
+    points: Floats,
+) -> tuple[int, Replayed]:
+    """Apply the events of a tape that are not done yet; return what `replay` does, and the events done."""
     kinds, values, applies, events, nearest, farthest = tape
     window = nearest, farthest
-    start_section(origins, rings, marks, n, label, law)
-    elapsed = ZERO
-    sight = NO_SIGHT
-    for event in range(events):
+    first, elapsed, sight = done
+    for event in range(first, events):
         if kinds[event] == PREDICTION:
             if whole_chains.is_crowded(marks, n):
                 whole_chains.reduce_outward(origins, rings, marks, n, time_to_go(label, elapsed, law), points)
@@ -452,7 +488,7 @@ def replay(
         elif kinds[event] == ANGLE:
             living, overlaps[event] = measure_section(origins, rings, marks, n, label, elapsed, values[event], law)
             if not living:
-                return event
+                return event, done
         elif kinds[event] == IMPULSE:
             shift_section(origins, n, label, elapsed, values[event], law)
         elif kinds[event] == WIDENING:
@@ -463,7 +499,7 @@ def replay(
                 origins, rings, marks, n, label, elapsed, values[event], errors[event], sight, window, law, points
             )
             if not living:
-                return event
+                return event, done
         if errors is not None:
             sight = sight_after(sight, kinds[event], values[event], applies[event], law)
-    return ALIVE
+    return ALIVE, Replayed(events, elapsed, sight)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
-from infoset import chain_steps, chains, polygon, whole_chains
-from infoset._compile import ZERO, allocation_free, entry
+from infoset import chain_steps, chains, whole_chains
+from infoset._compile import ZERO, allocation_free, by_reference, entry
 from infoset.history import Tapes
 from infoset.section_law import SectionLaw
 from infoset.section_life import (
@@ -28,7 +27,6 @@ from infoset.section_life import (
     measure_section,
     predict_section,
     range_of,
-    replay,
     shift_section,
     start_section,
     summarise_section,
@@ -38,6 +36,7 @@ from infoset.section_life import (
 TIE_TOLERANCE = 1e-9
 
 
+@by_reference
 class Sections(NamedTuple):
     """B engagements x S slots for one section each.
 
@@ -333,53 +332,6 @@ def widest_all(elapsed: int, sections: Sections, law: SectionLaw, exists: Flags,
             ends[b, end, 1] = alpha
             ends[b, end, 2] = (v + law.closing_speed * alpha) / x
             ends[b, end, 3] = x
-
-
-@entry
-def margins_all(v: Floats, z: Floats, elapsed: int, sections: Sections, law: SectionLaw, margins: Floats) -> None:
-    """Write the signed distance, m, of a state to the boundary of each first section; -inf if that is empty."""
-    labels, living = sections.labels, sections.living
-    origins, rings, marks = sections.origins, sections.rings, sections.marks
-    for b in range(v.shape[0]):
-        margins[b] = -np.inf
-        if living[b, 0]:
-            tau = time_to_go(labels[b, 0], elapsed, law)
-            margins[b] = margin_in(origins, rings, marks, b * labels.shape[1], tau, v[b], z[b])
-
-
-@allocation_free
-def margin_in(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, v: float, z: float) -> float:
-    """Signed distance of a state to the boundary of a section in the plane of V x/e and z, m; positive inside."""
-    nearest, inside = np.inf, False
-    last_v, last_m = chains.vertex(origins, rings, marks, n, chains.LEFT, chains.end_of(marks, n, chains.LEFT) - 1)
-    last = (tau * (last_v - v), (last_m - tau * last_v) - z)
-    for side in (chains.RIGHT, chains.LEFT):
-        # Origin of the chain relative to the state, in the plane of the distance.
-        offset_v = tau * (origins[n, side, chains.V_ORIGIN] - v + origins[n, side, chains.V_REST])
-        offset_z = chains.origin_height(origins, n, side, tau) - z
-        for i in range(chains.begin_of(marks, n, side), chains.end_of(marks, n, side)):
-            chain_v, chain_m = chains.read(rings, chains.offset_of(marks, n, side, i))
-            vertex = (tau * chain_v + offset_v, (chain_m - tau * chain_v) + offset_z)
-            nearest, inside = polygon.pass_edge(nearest, inside, last, vertex, 0.0, 0.0)
-            last = vertex
-    return math.sqrt(nearest) if inside else -math.sqrt(nearest)
-
-
-@entry
-def replay_section(
-    label: float,
-    tape: Tape,
-    errors: Floats | None,
-    law: SectionLaw,
-    origins: Floats,
-    rings: Floats,
-    marks: Integers,
-    n: int,
-    overlaps: Floats,
-    points: Floats,
-) -> int:
-    """Call `section_life.replay` from Python."""
-    return replay(label, tape, errors, law, origins, rings, marks, n, overlaps, points)
 
 
 @entry

@@ -198,13 +198,6 @@ class SectionStack:
         sections.living[removed] = False
         return removed, int(np.count_nonzero(removed))
 
-    def margins(self, v: Floats, z: Floats, elapsed: int) -> Floats:
-        """Return the signed distance of states (V, z) to the boundary of the first slot's section, m, shape (B,)."""
-        self._catch_up()
-        margins = np.empty(self.batch)
-        section_passes.margins_all(v, z, elapsed, self.sections, self.law, margins)
-        return margins
-
     def widest(self, elapsed: int) -> tuple[Flags, Floats]:
         """Return the predicted-miss interval of each engagement in the format of `section_passes.widest_all`."""
         self._summarise(Freshness.SUMMARISED)

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset import section_life, section_passes
+from infoset import section_life
 from infoset.chains import empty_sections, working_room
 from infoset.convex_polygons import ConvexPolygons
 from infoset.limits import NUMBER, POSITIVE, WHOLE
 from infoset.pictures import sections_svg
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
+from infoset.replays import replay_section
 from infoset.section_stack import outline
 from infoset.set_state import Flags, Floats, SetState, SetStatus
 
@@ -246,7 +247,7 @@ class SetQueries:
         self._need_engagement(engagement)
         tape, law, label = self._state.history, self._state.stack.law, float(label_m)
         section = empty_sections(1)
-        died = section_passes.replay_section(
+        died = replay_section(
             label, tape.tape(engagement), tape.errors_if_any, law, *section, 0, np.empty(tape.events), working_room()
         )
         vertices = outline(section, 0, label, tape.elapsed, law) if died == section_life.ALIVE else np.empty((0, 2))

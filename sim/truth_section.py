@@ -6,16 +6,16 @@ Therefore measurements and impulses are stored during the flight and evaluated a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from infoset import SetModel
 from infoset.history import History
+from infoset.replays import margins_along
 from infoset.section_law import BOUND_SLACK, section_law
-from infoset.section_life import ANGLE, IMPULSE, PREDICTION
-from infoset.section_stack import SectionStack
+from infoset.section_life import ANGLE, IMPULSE, PREDICTION, RATE
 from infoset.set_queries import MaskedFloats
 from sim.kepler import Sight
 
@@ -25,16 +25,14 @@ Flags = NDArray[np.bool_]
 LABEL_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
 
 
-@dataclass
-class _Step:
-    """Measurements and impulse of one step, and the true state at its measurements; None without one."""
+@dataclass(frozen=True)
+class _Look:
+    """True states of the flights that measure in a step."""
 
-    where: Flags | None = None
-    slope: Floats | None = None
-    slope_rate_per_s: Floats | None = None
-    alpha_rad: Floats | None = None
-    rates: list[tuple[Floats, float]] = field(default_factory=list)
-    impulse_m_s: Floats | None = None
+    step: int
+    where: Flags
+    slope: Floats
+    slope_rate_per_s: Floats
 
 
 class TruthSection:
@@ -46,22 +44,23 @@ class TruthSection:
     range x / (1 + eta), so its label is e T, with T the time at which x = 0.
     """
 
-    def __init__(self, model: SetModel) -> None:
+    def __init__(self, model: SetModel, batch: int) -> None:
         self._law = section_law(model)
         self._exact_angles = model.is_guaranteed
         self._least_range_m = model.least_range_m
-        self._steps = [_Step()]
+        self._history = History(batch)
+        self._looks: list[_Look] = []
 
     def look(self, where: Flags, sight: Sight) -> None:
         """Store which flights measure in this step, and the true states."""
         slope, rate = sight.alpha_rad, sight.omega_rad_s
         if self._exact_angles:
             slope, rate = sight.slope, sight.slope_rate_per_s
-        self._steps[-1] = _Step(where.copy(), slope, rate)
+        self._looks.append(_Look(self._history.elapsed, where, slope, rate))
 
     def measure_angle(self, alpha_rad: Floats, where: Flags) -> None:
         """Store a measured angle."""
-        self._steps[-1].alpha_rad = alpha_rad.copy()
+        self._history.record(ANGLE, alpha_rad, where)
 
     def measure_range(
         self, range_m: Floats, relative_error: float, where: Flags, *, alpha_rad: ArrayLike | None
@@ -70,15 +69,15 @@ class TruthSection:
 
     def measure_rate(self, omega_rad_s: Floats, error_rad_s: float, where: Flags) -> None:
         """Store a measured rate."""
-        self._steps[-1].rates.append((omega_rad_s.copy(), error_rad_s * (1.0 + BOUND_SLACK)))
+        self._history.record(RATE, omega_rad_s, where, error_rad_s * (1.0 + BOUND_SLACK))
 
     def shift(self, impulse_m_s: Floats) -> None:
-        """Store an impulse."""
-        self._steps[-1].impulse_m_s = impulse_m_s
+        """Store the impulse of this step."""
+        self._history.record(IMPULSE, impulse_m_s, impulse_m_s != 0.0)
 
     def predict(self) -> None:
         """End the step."""
-        self._steps.append(_Step())
+        self._history.record(PREDICTION)
 
     def margins_m(self, arrival_s: Floats) -> list[MaskedFloats]:
         """Return the signed margins (m) of the true states in their sections, one array of shape (B,) per step.
@@ -86,41 +85,33 @@ class TruthSection:
         A margin is that of the last measurement; it is masked before the first one. `arrival_s` are the times from the
         start to x = 0.
         """
-        labels = self._law.closing_speed * arrival_s
-        stack = SectionStack(self._law, labels[:, None], np.ones(len(labels), dtype=np.int64))
-        history, everywhere = History(len(labels)), np.ones(len(labels), dtype=bool)
-        margin = np.full(len(labels), np.inf)
-        margins = []
-        for elapsed, step in enumerate(self._steps):
-            if elapsed:
-                history.record(PREDICTION)
-                stack.predict(everywhere, elapsed)
-            if step.where is not None and step.slope is not None and step.slope_rate_per_s is not None:
-                ranges = stack.ranges(elapsed)[:, 0]
-                where = step.where & (ranges >= self._least_range_m)
-                if step.alpha_rad is not None:
-                    history.record(ANGLE, step.alpha_rad, where)
-                    stack.measure_angle(where, step.alpha_rad, elapsed, elapsed)
-                for omega, error in step.rates:
-                    stack.measure_rate(where, omega, error, elapsed, elapsed, history)
-                z = step.slope * ranges
-                v = step.slope_rate_per_s * ranges - self._law.closing_speed * step.slope
-                now = stack.margins(v, z, elapsed)
-                now = np.where(stack.living[:, 0], now, stack.sections.overlaps[:, 0])
-                # The label of the true state has an error of half an ulp, and so have its z and V.
-                now += LABEL_ROUNDING * labels * np.abs(step.slope)
-                margin = np.where(where, now, margin)
-            margins.append(_if_measured(margin))
-            if step.impulse_m_s is not None:
-                history.record(IMPULSE, step.impulse_m_s, step.impulse_m_s != 0.0)
-                stack.shift(everywhere, step.impulse_m_s, elapsed)
-        return margins
+        margins = np.full((self._history.elapsed + 1, len(arrival_s)), np.inf)
+        for look, margin in zip(self._looks, self._margins(arrival_s), strict=True):
+            margins[look.step :] = np.where(np.isinf(margin), margins[look.step], margin)
+        return [_if_measured(margin) for margin in margins]
 
     def least_margin_m(self, arrival_s: Floats) -> MaskedFloats:
         """Return the least signed margin of each true state, m; masked where nothing was measured."""
-        margins = self.margins_m(arrival_s)
-        least = np.min([margin.filled(np.inf) for margin in margins], axis=0)
-        return _if_measured(least)
+        return _if_measured(self._margins(arrival_s).min(axis=0, initial=np.inf))
+
+    def _margins(self, arrival_s: Floats) -> Floats:
+        """Return the margin of each flight at each look, m, shape (L, B); infinite where it does not measure."""
+        law, history, looks = self._law, self._history.copy(), self._looks
+        labels = law.closing_speed * arrival_s
+        ranges = labels - law.closing_speed * (law.step * np.arange(history.elapsed + 1))[:, None]
+        kinds = history.kinds[: history.events]
+        measured, steps = np.isin(kinds, (ANGLE, RATE)), np.cumsum(kinds == PREDICTION)
+        history.applies[: history.events][measured] &= (ranges >= self._least_range_m)[steps[measured]]
+        at = [look.step for look in looks]
+        ranges = ranges[at]
+        where = np.reshape([look.where for look in looks], ranges.shape) & (ranges >= self._least_range_m)
+        slope = np.reshape([look.slope for look in looks], ranges.shape)
+        rate = np.reshape([look.slope_rate_per_s for look in looks], ranges.shape)
+        # A look is after the measurements of its step and before the impulse.
+        ends = np.append(np.flatnonzero(kinds == IMPULSE), history.events)[at]
+        margins = margins_along(labels, ends, rate * ranges - law.closing_speed * slope, slope * ranges, history, law)
+        # The label of the true state has an error of half an ulp, and so have its z and V.
+        return np.where(where, margins + LABEL_ROUNDING * labels * np.abs(slope), np.inf)
 
 
 def _if_measured(margin: Floats) -> MaskedFloats:
