@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.options import FileOptions, Html, ProblemName, Seed, Settings, TrajectoryCsv
+from experiments.common.options import FileOptions, Html, ProblemName, Seed
 
 
 @dataclass(frozen=True)
@@ -16,11 +16,10 @@ class Reach(FileOptions):
 
     The results are the least terminal norm, the forward sets, the tube of all optimal trajectories, and the set of
     all optimal controls. Selected optimal controls are simulated on the linear and on the nonlinear model. Without
-    --out, --json, --csv or --html no file is written.
+    --out, --json or --html no file is written.
     """
 
     problem: ProblemName = "rendezvous-2021"
-    settings: Settings = None
     select: Annotated[
         str,
         typer.Option(
@@ -50,5 +49,4 @@ class Reach(FileOptions):
         ),
     ] = 10
     seed: Seed = 0
-    csv: TrajectoryCsv = None
     html: Html = None

@@ -7,8 +7,9 @@ from enum import Enum
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rendezvous._arrays import Floats
+Floats = NDArray[np.float64]
 
 
 class Axis(Enum):
@@ -31,7 +32,16 @@ class StateOrder(Enum):
 
 @dataclass(frozen=True)
 class Frame:
-    """A right-handed rotating frame with its origin on the reference orbit; x, y and z are the directions of its axes.
+    """A right-handed rotating frame with its origin on the reference orbit.
+
+    Parameters
+    ----------
+    name : str
+        Name of the frame in messages.
+    x, y, z : Axis
+        Directions of the axes.
+    order : StateOrder
+        (x, y, z, vx, vy, vz), or (x, vx, y, vy, z, vz).
 
     Raises
     ------
