@@ -128,7 +128,7 @@ def fly(scenario: Scenario, first: int, batch: int, seed: int) -> Count:
     return Count(
         batch,
         int((results.truth_margin_m < 0.0).sum()),
-        results.outcomes.count(Outcome.SET_LOST),
+        results.outcomes.count(Outcome.SET_EMPTY),
         int((results.miss_m > phi.filled(np.inf)).sum()),
         int(np.ma.getmaskarray(phi).sum()),
     )

@@ -16,9 +16,10 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 from experiments.multipoint.file import load_multipoint
 from experiments.pareto.file import load_pareto
-from rendezvous.multipoint import Nodes, best_order, best_times, solve_dense, solve_segments
+from rendezvous.multipoint import Nodes, best_order, best_times, solve_segments
 from rendezvous.pareto import analyse_coalitions, solve_encounter
 from rendezvous.relative_motion import ClohessyWiltshire
+from tests.rendezvous.multipoint.dense import solve_dense
 
 Floats = NDArray[np.float64]
 Check = Callable[[str, float, float, str], None]

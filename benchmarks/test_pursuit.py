@@ -18,9 +18,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 from experiments.pursuit.file import load_pursuit
-from rendezvous.orbital_elements import OrbitalElements
 from rendezvous.pursuit_evasion import Game, Player, PointStatus, Solution, capture_map, solve, solve_near
-from rendezvous.pursuit_evasion.units import scaled_craft, units_of
+from rendezvous.pursuit_evasion.game import scaled_craft, units_of
+from rendezvous.two_body import OrbitalElements
 
 Floats = NDArray[np.float64]
 Check = Callable[[str, float, float, str], None]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.metadata import version as installed_version
 from typing import Annotated, Any
@@ -15,13 +15,8 @@ from typer.core import TyperGroup
 from experiments.campaigns.command import Campaign, Report, Sweep
 from experiments.common.command import command
 from experiments.common.errors import INTERRUPTED, InputError, on_a_screen
-from experiments.interception.commands.adversary import Adversary
-from experiments.interception.commands.bound import Bound
-from experiments.interception.commands.compare import Compare
-from experiments.interception.commands.engage import Engage
-from experiments.interception.commands.experiment import Experiment
-from experiments.interception.commands.replay import Replay
-from experiments.interception.commands.scenarios import app as scenarios
+from experiments.interception.command import Adversary, Bound, Compare, Engage, Experiment, Replay
+from experiments.interception.scenarios_command import app as scenarios
 from experiments.multipoint.command import Multipoint
 from experiments.pareto.command import Pareto
 from experiments.problem_list import app as problems
@@ -31,76 +26,46 @@ from experiments.reproduce import Reproduce
 
 INPUT_ERROR = 2
 
-INTERCEPTION, CAMPAIGNS, RENDEZVOUS, TOOLS = "Interception", "Campaigns of interceptions", "Rendezvous", "Tools"
-COMMANDS = (
-    (
-        INTERCEPTION,
-        Experiment,
-        "experiments.interception.runs.experiment",
-        "experiment asteroid-1997 --runs 50 --out results",
-    ),
-    (
-        INTERCEPTION,
-        Engage,
-        "experiments.interception.runs.engage",
-        "engage asteroid-1997-single --noise both --out figures",
-    ),
-    (
-        INTERCEPTION,
-        Compare,
-        "experiments.interception.runs.compare",
-        "compare --strategies patient,symmetric-miss --out results",
-    ),
-    (
-        INTERCEPTION,
-        Bound,
-        "experiments.interception.runs.bound",
-        "bound asteroid-1997 --strategies patient --out results",
-    ),
-    (
-        INTERCEPTION,
-        Adversary,
-        "experiments.interception.runs.adversary",
-        "adversary --strategy symmetric-miss --budget 2000 --record worst.npz",
-    ),
-    (
-        INTERCEPTION,
-        Replay,
-        "experiments.interception.runs.replay",
-        "replay flight-random.npz flight-game.npz --html flights.html",
-    ),
-    (CAMPAIGNS, Campaign, "experiments.campaigns.run_campaign", "campaign --noise mixed --runs 100000 --out runs"),
-    (
-        CAMPAIGNS,
-        Sweep,
-        "experiments.campaigns.run_sweep",
-        "sweep --vary angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:8,thruster.greatest_impulse_m_s=2:20:7 "
-        "--runs 200 --out sensors",
-    ),
-    (CAMPAIGNS, Report, "experiments.campaigns.run_report", "report runs --out figures"),
-    (RENDEZVOUS, Pursuit, "experiments.pursuit.run", "pursuit geo-pursuit --certify --feedback coast --out results"),
-    (
-        RENDEZVOUS,
-        PursuitMap,
-        "experiments.pursuit.map",
-        "pursuit-map geo-pursuit --x phase_deg=-60:60:61 --y thrust_ratio=0:0.9:19 --out map",
-    ),
-    (
-        RENDEZVOUS,
-        Reach,
-        "experiments.reachability.run",
-        "reach rendezvous-2021 --select energy,vertices --replan --out reach",
-    ),
-    (RENDEZVOUS, Pareto, "experiments.pareto.run", "pareto pareto-2008 --prefer y_m=0,z_m=50 --out figures"),
-    (
-        RENDEZVOUS,
-        Multipoint,
-        "experiments.multipoint.run",
-        "multipoint service-3 --order best --times best --out figures",
-    ),
-    (TOOLS, Reproduce, "experiments.reproduced_numbers", "reproduce --paper pareto --json numbers.json"),
-)
-"""Panel of the help, options, module of the run, and example; the first word of the example is the command's name."""
+TOOLS = "Tools"
+COMMANDS: Mapping[str, Sequence[tuple[type, str, str]]] = {
+    "Interception": [
+        (Experiment, "interception.runs.experiment", "experiment asteroid-1997 --runs 50 --out results"),
+        (Engage, "interception.runs.engage", "engage asteroid-1997-single --noise both --out figures"),
+        (Compare, "interception.runs.compare", "compare --strategies patient,symmetric-miss --out results"),
+        (Bound, "interception.runs.bound", "bound asteroid-1997 --strategies patient --out results"),
+        (
+            Adversary,
+            "interception.runs.adversary",
+            "adversary --strategy symmetric-miss --budget 2000 --record worst.npz",
+        ),
+        (Replay, "interception.runs.replay", "replay flight-random.npz flight-game.npz --html flights.html"),
+    ],
+    "Campaigns of interceptions": [
+        (Campaign, "campaigns.run_campaign", "campaign --noise mixed --runs 100000 --out runs"),
+        (
+            Sweep,
+            "campaigns.run_sweep",
+            "sweep --vary angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:8,thruster.greatest_impulse_m_s=2:20:7 "
+            "--runs 200 --out sensors",
+        ),
+        (Report, "campaigns.run_report", "report runs --out figures"),
+    ],
+    "Rendezvous": [
+        (Pursuit, "pursuit.run", "pursuit geo-pursuit --certify --feedback coast --out results"),
+        (
+            PursuitMap,
+            "pursuit.map",
+            "pursuit-map geo-pursuit --x phase_deg=-60:60:61 --y thrust_ratio=0:0.9:19 --out map",
+        ),
+        (Reach, "reachability.run", "reach rendezvous-2021 --select energy,vertices --replan --out reach"),
+        (Pareto, "pareto.run", "pareto pareto-2008 --prefer y_m=0,z_m=50 --out figures"),
+        (Multipoint, "multipoint.run", "multipoint service-3 --order best --times best --out figures"),
+    ],
+    TOOLS: [
+        (Reproduce, "reproduced_numbers", "reproduce --paper pareto --json numbers.json"),
+    ],
+}
+"""By panel of the help: options, module of the run in `experiments`, and example, whose first word is the name."""
 
 
 class _Root(TyperGroup):
@@ -136,9 +101,10 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for panel, options, run, example in COMMANDS:
-    register = app.command(example.split()[0], rich_help_panel=panel, epilog=f"Example: infoset {example}")
-    register(command(options, run))
+for panel, rows in COMMANDS.items():
+    for options, run, example in rows:
+        register = app.command(example.split()[0], rich_help_panel=panel, epilog=f"Example: infoset {example}")
+        register(command(options, f"experiments.{run}"))
 app.add_typer(scenarios, rich_help_panel=TOOLS)
 app.add_typer(problems, rich_help_panel=TOOLS)
 

@@ -16,8 +16,9 @@ class Reproduce:
 
     Each number is printed with its table or equation, the tolerance of its printed digits, and a verdict: agreed,
     misprint (with the correct number and the reason), or not explained (with the attempted explanations). The exit
-    code is 1 if a number that should agree does not. If a paper prints no results, its numbers are compared with
-    reference values. Without --json no file is written.
+    code is 1 if a number that should agree does not. Numbers that a paper prints, numbers of another implementation,
+    exact values of closed forms, and one printed run among many of ours are in separate tables. Without --json no file
+    is written.
     """
 
     paper: Annotated[

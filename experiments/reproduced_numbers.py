@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from decimal import Decimal
 from itertools import groupby
 
 import typer
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from experiments.common.output import library_version, output, to_json
-from experiments.common.published_number import PublishedNumber, Reproduction, Verdict
+from experiments.common.published_number import Origin, PublishedNumber, Reproduction, Verdict
 from experiments.common.screen import (
     print_lines,
     progress_bar,
@@ -40,7 +39,8 @@ def run(options: Reproduce) -> None:
     disagreed = [number for each in reproductions for number in each.numbers if number.verdict is Verdict.DISAGREED]
     for number in disagreed:
         typer.echo(
-            f"disagreed: {number.paper}, {number.source}, {number.name}: printed {number.printed}, ours {number.ours}",
+            f"disagreed: {number.paper}, {number.source}, {number.name}: {TITLES[number.origin][0]}: {number.printed}, "
+            f"ours {number.ours}",
             err=True,
         )
     if disagreed:
@@ -63,6 +63,7 @@ def _number(number: PublishedNumber) -> dict[str, object]:
     return {
         "source": number.source,
         "name": number.name,
+        "origin": number.origin.value,
         "printed": number.printed,
         "corrected": number.corrected,
         "ours": number.ours if finite else None,
@@ -74,11 +75,20 @@ def _number(number: PublishedNumber) -> dict[str, object]:
     }
 
 
+TITLES = {
+    Origin.PRINTED: ("paper prints", "tolerance"),
+    Origin.OTHER: ("other program", "tolerance"),
+    Origin.EXACT: ("exact", "tolerance"),
+}
+ONE_RUN = ("paper, one run", "5 to 95 % of ours")
+
+
 def _show(console: Console, reproductions: Sequence[Reproduction]) -> None:
     for reproduction in reproductions:
         notes = list(dict.fromkeys(number.note for number in reproduction.numbers if number.note))
         console.print(Text(reproduction.title, style="bold"), soft_wrap=True)
-        console.print(_table(reproduction, notes))
+        for _, numbers in groupby(reproduction.numbers, lambda number: (number.origin, number.spread is None)):
+            print_lines(console, [*_block([*numbers], notes, console.width), ""])
         print_lines(console, [f"({i}) {note}." for i, note in enumerate(notes, start=1)])
         print_lines(console, [*(f"* {remark}" for remark in reproduction.remarks), ""])
     for reproduction in reproductions:
@@ -87,25 +97,26 @@ def _show(console: Console, reproductions: Sequence[Reproduction]) -> None:
         print_lines(console, [f"{reproduction.paper}: {len(reproduction.numbers)} numbers: {listed}"])
 
 
-def _table(reproduction: Reproduction, notes: Sequence[str]) -> Table:
-    table = Table(box=None, pad_edge=False)
-    table.add_column("number", min_width=16, overflow="fold")
-    for title in ("printed", "ours", "tolerance"):
-        table.add_column(title, justify="right", no_wrap=True)
-    table.add_column("verdict", min_width=13)
-    for source, numbers in groupby(reproduction.numbers, lambda number: number.source):
-        table.add_row(Text(source, style="bold"))
-        for number in numbers:
-            note = f" ({notes.index(number.note) + 1})" if number.note else ""
-            corrected = f"\n({number.corrected})" if number.corrected not in {None, number.printed} else ""
-            table.add_row(
-                number.name,
-                f"{number.printed}{corrected}",
-                _digits(number),
-                _tolerance(number),
-                f"{number.verdict.value}{note}",
-            )
-    return table
+def _block(numbers: Sequence[PublishedNumber], notes: Sequence[str], width: int) -> Iterator[str]:
+    """Yield the lines of numbers of one origin; if `width` is too small for a line, the name stands above the rest."""
+    theirs, tolerance = TITLES[numbers[0].origin] if numbers[0].spread is None else ONE_RUN
+    ours = "ours" if numbers[0].spread is None else "our median"
+    rows = [("", theirs, ours, tolerance, "verdict")]
+    for number in numbers:
+        note = f" ({notes.index(number.note) + 1})" if number.note else ""
+        right = f", right: {number.corrected}" if number.corrected not in {None, number.printed} else ""
+        verdict = f"{number.verdict.value}{right}{note}"
+        rows.append((number.name, number.printed, _digits(number), _tolerance(number), verdict))
+    sizes = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    above = sum(sizes) + 2 * len(sizes) > width
+    sources = ["", *(number.source for number in numbers)]
+    for before, source, (name, *cells, verdict) in zip(["", *sources], sources, rows, strict=False):
+        if source != before:
+            yield f"{source}:"
+        if above and name:
+            yield f"  {name}"
+        first = "  " if above else f"  {name:<{sizes[0]}}"
+        yield "  ".join([first, *(f"{cell:>{size}}" for cell, size in zip(cells, sizes[1:], strict=False)), verdict])
 
 
 def _digits(number: PublishedNumber) -> str:

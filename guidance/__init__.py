@@ -6,9 +6,8 @@ from guidance.least_squares import LeastSquares
 from guidance.noise import LineOfSight, MeasurementNoise, NoiseKind, TieRule
 from guidance.patient import Patient
 from guidance.predicted_miss import symmetric_impulse, zero_effort_miss
-from guidance.random_noise import RandomNoise
 from guidance.registry import make_strategy, strategy_names
-from guidance.scripted_noise import ScriptedNoise
+from guidance.scripted_noise import RandomNoise, ScriptedNoise
 from guidance.situation import Situation
 from guidance.strategy import Strategy
 from guidance.symmetric_miss import SymmetricMiss

@@ -74,6 +74,20 @@ class GameNoise:
         return np.where(tie, chosen, upper > lower)
 
 
+@dataclass(frozen=True)
+class SwitchingNoise(GameNoise):
+    """Game noise with the extreme to keep prescribed for every step, not only for ties.
+
+    Parameters
+    ----------
+    tie_draws : ndarray, shape (B, steps)
+        The upper extreme is kept where the value is not negative, the lower one elsewhere.
+    """
+
+    def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
+        return np.asarray(self.tie_draws[:, step] >= 0.0)
+
+
 def _angle(
     sensor: AngleSensor, sight: LineOfSight, predicted: InformationSetView, miss: PredictedMiss, upper_is_worse: Flags
 ) -> Floats:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.estimated_miss import impulse_beyond_dead_zone
+from guidance.predicted_miss import impulse_beyond_dead_zone
 from guidance.situation import Situation
 from infoset import RangeSensor
-from infoset.limits import COUNT, NOT_NEGATIVE
+from infoset.limits import COUNT, NotNegative, check_fields
 
 Floats = NDArray[np.float64]
 
@@ -37,6 +38,7 @@ class KalmanState:
     log_weight: Floats
 
 
+@dataclass(frozen=True)
 class Kalman:
     """Estimate as if errors were Gaussian, and correct the part of the expected miss outside a dead zone.
 
@@ -76,18 +78,15 @@ class Kalman:
     Kalman (1960); Peach (1995), Bearings-only tracking using a set of range-parameterised extended Kalman filters.
     """
 
-    name = "kalman"
+    dead_zone: NotNegative = 1.0
+    last_s: NotNegative = 3.0
+    members: Annotated[int, COUNT] = 9
+    process_noise: NotNegative = 1.0
 
-    def __init__(
-        self, dead_zone: float = 1.0, last_s: float = 3.0, members: int = 9, process_noise: float = 1.0
-    ) -> None:
-        for name, value in (("dead_zone", dead_zone), ("last_s", last_s), ("process_noise", process_noise)):
-            NOT_NEGATIVE.need(name, value)
-        COUNT.need("members", members)
-        self.dead_zone = dead_zone
-        self.last_s = last_s
-        self.members = members
-        self.process_noise = process_noise
+    name: ClassVar[str] = "kalman"
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
     def start(self, batch: int) -> KalmanState:
         """Start with empty filters; the first step sets their prior."""

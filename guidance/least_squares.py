@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.estimated_miss import impulse_beyond_dead_zone
+from guidance.predicted_miss import impulse_beyond_dead_zone
 from guidance.situation import Situation
 from infoset import RangeSensor
-from infoset.limits import COUNT, NOT_NEGATIVE
+from infoset.limits import COUNT, NotNegative, check_fields
 
 Floats = NDArray[np.float64]
 
@@ -17,36 +20,19 @@ Z, VZ, X, SPEED = range(4)
 
 
 class Measurements:
-    """All measurements of one sensor so far, in arrays that grow."""
+    """All measurements of one sensor so far: times, s, shape (n,); values, rad or m, shape (B, n)."""
 
     def __init__(self, batch: int) -> None:
-        self.count = 0
-        self._times = np.empty(16)
-        self._values = np.empty((2, batch, 16))
-
-    @property
-    def times_s(self) -> Floats:
-        """Times, s, shape (n,)."""
-        return self._times[: self.count]
-
-    @property
-    def values(self) -> Floats:
-        """Measured values, rad or m, shape (B, n)."""
-        return self._values[0, :, : self.count]
-
-    @property
-    def offsets_m(self) -> Floats:
+        self.times_s = np.empty(0)
+        self.values = np.empty((batch, 0))
+        self.offsets_m = np.empty((batch, 0))
         """Change of z by the impulses until then, m, shape (B, n)."""
-        return self._values[1, :, : self.count]
 
     def add(self, time_s: float, value: Floats, offset_m: Floats) -> None:
         """Append a measurement."""
-        if self.count == self._times.size:
-            self._times = np.concatenate([self._times, np.empty_like(self._times)])
-            self._values = np.concatenate([self._values, np.empty_like(self._values)], axis=2)
-        self._times[self.count] = time_s
-        self._values[:, :, self.count] = value, offset_m
-        self.count += 1
+        self.times_s = np.append(self.times_s, time_s)
+        self.values = np.column_stack([self.values, value])
+        self.offsets_m = np.column_stack([self.offsets_m, offset_m])
 
 
 class LeastSquaresState:
@@ -63,6 +49,7 @@ class LeastSquaresState:
         """Change of z by the impulses, sum k_j (t - t_j)."""
 
 
+@dataclass(frozen=True)
 class LeastSquares:
     """Fit one motion to all measurements, and correct the part of its miss outside a dead zone.
 
@@ -98,15 +85,14 @@ class LeastSquares:
     Gauss (1809); Björck (1996), Numerical methods for least squares problems, chapter 9.
     """
 
-    name = "least-squares"
+    dead_zone: NotNegative = 1.0
+    last_s: NotNegative = 3.0
+    iterations: Annotated[int, COUNT] = 3
 
-    def __init__(self, dead_zone: float = 1.0, last_s: float = 3.0, iterations: int = 3) -> None:
-        for name, value in (("dead_zone", dead_zone), ("last_s", last_s)):
-            NOT_NEGATIVE.need(name, value)
-        COUNT.need("iterations", iterations)
-        self.dead_zone = dead_zone
-        self.last_s = last_s
-        self.iterations = iterations
+    name: ClassVar[str] = "least-squares"
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
     def start(self, batch: int) -> LeastSquaresState:
         """Start without measurements."""
@@ -155,7 +141,7 @@ def _improve(situation: Situation, state: LeastSquaresState, centre: Floats, var
     right = (centre - start) / variance
     nearest = 0.1 * situation.step_s * situation.closing_speed_m_s
     for measurements, are_angles in ((state.angles, True), (state.ranges, False)):
-        if measurements.count == 0:
+        if not len(measurements.times_s):
             continue
         times, measured = measurements.times_s, measurements.values
         z = start[:, Z, None] + start[:, VZ, None] * times - measurements.offsets_m

@@ -39,8 +39,6 @@ class LineOfSight:
 
     Parameters
     ----------
-    step : int
-        Number of the step.
     alpha_rad, omega_rad_s, range_m : ndarray, shape (B,)
         True line-of-sight angle (rad), its rate (rad/s) and range (m).
     sensors : mapping of str to Sensor
@@ -56,15 +54,6 @@ class LineOfSight:
 
 def checked_measurements(measured: Measurements, sight: LineOfSight, noise: object) -> dict[str, Floats]:
     """Return the measurements of a noise as arrays of shape (B,), if they are finite and of sensors that measure.
-
-    Parameters
-    ----------
-    measured : mapping of str to ndarray
-        Values that the noise returned, by sensor.
-    sight : LineOfSight
-        Argument of the noise.
-    noise : object
-        The noise, for the message.
 
     Raises
     ------
@@ -93,8 +82,6 @@ def need_draws(name: str, draws: Floats) -> None:
 
     Parameters
     ----------
-    name : str
-        Name of the parameter, for the message.
     draws : ndarray, shape (B, steps)
         Errors, or choices between ties.
 
@@ -119,8 +106,6 @@ class MeasurementNoise(Protocol):
         ----------
         sight : LineOfSight
             True line of sight, and the sensors that measure.
-        predicted : InformationSetView
-            The set before the measurement.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""Measurement noise whose errors are given in advance."""
+"""Measurement noise whose errors are given in advance: prescribed, or drawn at random."""
 
 from __future__ import annotations
 
@@ -62,6 +62,23 @@ class ScriptedNoise:
                     f"errors[{name!r}] has {errors.shape[1]} steps, none for step {sight.step}: give one for each step"
                 )
         return measure_with_errors(sight, {name: errors[:, sight.step] for name, errors in self.errors.items()})
+
+
+@dataclass(frozen=True)
+class RandomNoise(ScriptedNoise):
+    """Measurements with errors drawn in advance, uniform within their bounds.
+
+    Parameters
+    ----------
+    errors : mapping of str to ndarray, shape (B, steps)
+        Draws by sensor, uniform in [-1, 1]; the error is the draw times the bound.
+
+    References
+    ----------
+    Kumkov and Patsko (1997), section 7.
+    """
+
+    name: ClassVar[str] = "random"
 
 
 def measure_with_errors(sight: LineOfSight, errors: Mapping[str, Floats]) -> dict[str, Floats]:

@@ -21,12 +21,8 @@ class Situation:
 
     Parameters
     ----------
-    time_s : float
-        Time now, s.
     step : int
         Number of this step; the first is 0.
-    step_s : float
-        Time between steps, s.
     predicted_miss : PredictedMiss
         Interval of the miss without further impulses, with the points of the set that reach its ends.
     budget_left_m_s : ndarray, shape (B,)

@@ -16,14 +16,8 @@ def checked_impulses(wanted: object, tracking: NDArray[np.bool_], strategy: obje
 
     Parameters
     ----------
-    wanted : object
-        Return value of the strategy.
     tracking : ndarray of bool, shape (B,)
         Engagements that have a set; elsewhere an impulse need not be finite.
-    strategy : object
-        The strategy, for the message.
-    step : int
-        Number of the step, for the message.
 
     Raises
     ------
@@ -53,10 +47,5 @@ class Strategy(Protocol):
     def decide(self, situation: Situation, state: Any) -> NDArray[np.float64]:
         """Return the impulses of a step along z, m/s, shape (B,).
 
-        Parameters
-        ----------
-        situation : Situation
-            What is known on board.
-        state : object
-            Return value of `start`; it may be changed.
+        The state is the return value of `start`; it may be changed.
         """

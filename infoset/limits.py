@@ -75,9 +75,11 @@ POSITIVE = Limits(above=0.0)
 NOT_NEGATIVE = Limits(least=0.0)
 FRACTION = Limits(above=0.0, below=1.0)
 PART = Limits(least=0.0, below=1.0)
-INTEGER = Limits(whole=True)
 WHOLE = Limits(least=0, whole=True)
 COUNT = Limits(least=1, whole=True)
+
+ADDED_LATER = {"added_later": True}
+"""Metadata of an optional field that the first version of the files lacks: they omit it if it has its default."""
 
 Number = Annotated[float, NUMBER]
 Positive = Annotated[float, POSITIVE]

@@ -8,7 +8,7 @@ from enum import Enum
 from typing import Annotated
 
 from infoset.limits import NUMBER, POSITIVE, Limits, NotNegative, Part, Positive, check_fields
-from infoset.sensors import AngleSensor
+from infoset.sensors import AngleSensor, Sensor
 
 Interval = tuple[float, float]
 
@@ -18,6 +18,8 @@ _APPROACH = Limits(below=0.0)
 _SECTIONS = Limits(least=1, most=MOST_SECTIONS, whole=True)
 
 
+WHOLE_STEPS_TOLERANCE = 1e-9
+"""Relative error of the number of steps between two measurements, for periods that are rounded decimals."""
 LEAST_RANGE = 1e-9
 """Least range as a share of the greatest label; at a range of zero there is no angle."""
 
@@ -159,7 +161,23 @@ class SetModel:
             raise ValueError(
                 f"SetModel: sections must be at least fewest_sections, {self.fewest_sections}: got {self.sections}"
             )
+        self.check_period("angle_sensor", self.angle_sensor)
         self.check_start("bounds", self.bounds)
+
+    def check_period(self, name: str, sensor: Sensor) -> None:
+        """Refuse a sensor whose period is not a whole number of steps; `name` is its name in the message.
+
+        Raises
+        ------
+        ValueError
+            If the period is another number.
+        """
+        steps = sensor.period_s / self.step_s
+        whole = self.steps_in(sensor.period_s)
+        if abs(steps - whole) > WHOLE_STEPS_TOLERANCE * whole:
+            raise ValueError(
+                f"{name}.period_s must be a whole number of steps of {self.step_s!r} s: got {sensor.period_s!r} s"
+            )
 
     def check_start(self, name: str, box: StateBox) -> None:
         """Refuse starts below the range threshold, and starts where the error bound of the angle is not positive.

@@ -6,12 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
+from rendezvous._arrays import Floats
 from rendezvous._compile import allocation_free
-
-Floats = NDArray[np.float64]
 
 STAGES = 12
 _NODES = np.ascontiguousarray(DOP853.C[:STAGES])
@@ -21,23 +19,12 @@ _THIRD, _FIFTH = np.ascontiguousarray(DOP853.E3[:STAGES]), np.ascontiguousarray(
 
 
 def step_of(rates: Callable[[float, Floats, Floats, Any, Floats, Floats], None]) -> Callable[..., None]:
-    """Compile one step for a right-hand side.
+    """Compile one step for a compiled right-hand side `rates(t, y, z, parameters, dy, dz)` that fills dy and dz.
 
-    Parameters
-    ----------
-    rates : callable
-        A compiled `rates(t, y, z, parameters, dy, dz)` that fills dy and dz.
-
-    Returns
-    -------
-    callable
-        A compiled `step(t, h, first, y, z, parameters, ky, kz, y_next, z_next)`. It fills the stages from `first` on,
-        ky (12, n) and kz (12, rows, columns), and the state at t + h, which shares no memory with y, (n,), and
-        z, (rows, columns). `first` is 1 where t and y are those of the call before.
-
-    Notes
-    -----
-    y + h sum_k b_k k_k for y, whose error `error_of_step` estimates; z + (h b_1) k_1 + (h b_2) k_2 ... for z.
+    The result is a compiled `step(t, h, first, y, z, parameters, ky, kz, y_next, z_next)`. It fills the stages from
+    `first` on, ky (12, n) and kz (12, rows, columns), and the state at t + h, which shares no memory with y, (n,), and
+    z, (rows, columns). `first` is 1 where t and y are those of the call before. The state is y + h sum_k b_k k_k, whose
+    error `error_of_step` estimates, and z + (h b_1) k_1 + (h b_2) k_2 ...
     """
 
     @allocation_free

@@ -13,12 +13,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from rendezvous._arrays import Floats
 from rendezvous.relative_motion import ClohessyWiltshire
-
-Floats = NDArray[np.float64]
 
 CONTACT = 1e-12
 """A gap is contact if it is at most this share of the lengths that it is the difference of."""
@@ -39,14 +37,9 @@ class LinearGameError(RuntimeError):
 
 @dataclass(frozen=True)
 class Thruster:
-    """Constant thrust of a craft in free space.
+    """Constant thrust of a craft in free space; mass is that at the start of the game.
 
-    Parameters
-    ----------
-    thrust_n, mass_kg : float
-        Thrust, and mass at the start of the game.
-    exhaust_speed_m_s : float
-        Specific impulse times standard gravity.
+    `exhaust_speed_m_s` is the specific impulse times standard gravity.
 
     Raises
     ------
@@ -66,8 +59,6 @@ class Thruster:
     def travel_m(self, time_s: float) -> float:
         """Return the distance covered from rest by full thrust along a line.
 
-        Notes
-        -----
         c [t - (tau - t) ln(tau / (tau - t))], tau = m c / T; a series where t / tau is small, as the difference cancels
         there.
         """
@@ -103,14 +94,8 @@ class Thruster:
 class LinearCapture:
     """Capture in a linear game.
 
-    Parameters
-    ----------
-    time_s : float
-        First zero of the gap.
-    direction : ndarray, shape (3,)
-        nu, in the axes of the positions.
-    is_grazing : bool
-        Whether the gap comes within the tolerance of zero, but not clearly below it (see Notes).
+    `time_s` is that of the first zero of the gap, and `direction`, shape (3,), is nu, in the axes of the positions.
+    `is_grazing` says that the gap comes within the tolerance of zero, but not clearly below it.
 
     Notes
     -----
@@ -146,14 +131,12 @@ def free_space_capture(
     Position and velocity, shapes (3,), are the evader's, relative to the pursuer; the accelerations are the greatest
     values. The evader escapes if its acceleration is not the smaller one and the players are not on a collision course.
 
+    The first root of |r + v t| = (a_P - a_E) t^2 / 2; nu is along r + v t.
+
     Raises
     ------
     ValueError
         If position or velocity are not three finite numbers, or the position is zero.
-
-    Notes
-    -----
-    The first root of |r + v t| = (a_P - a_E) t^2 / 2; nu is along r + v t.
     """
     position, velocity = _relative(position_m, velocity_m_s)
     advantage = pursuer_m_s2 - evader_m_s2
@@ -179,15 +162,13 @@ def mass_loss_capture(
 
     Position and velocity, shapes (3,), are the evader's, relative to the pursuer; the thrusters are as at t = 0.
 
+    The first root of |r + v t| = S_P(t) - S_E(t), S the travel of full thrust. The distance is convex; the second
+    derivative of the rest is bounded by S_P'' at the end of a step minus S_E'' at its start.
+
     Raises
     ------
     ValueError
         If position or velocity are not three finite numbers, or the position is zero.
-
-    Notes
-    -----
-    The first root of |r + v t| = S_P(t) - S_E(t), S the travel of full thrust. The distance is convex; the second
-    derivative of the rest is bounded by S_P'' at the end of a step minus S_E'' at its start.
     """
     position, velocity = _relative(position_m, velocity_m_s)
     last = min(pursuer.lasts_s, evader.lasts_s)
@@ -222,18 +203,16 @@ def circular_orbit_capture(
     accelerations are the greatest ones, the rate is the mean motion. The search ends at `longest_s`, by default after
     50 revolutions; there is no capture if the evader's acceleration is not the smaller one.
 
+    The first root of l(T) = max over |nu| <= 1 of nu . (Phi x)_r - (a_P - a_E) int |Phi_rv(T - t)^T nu| dt, a concave
+    function of nu with one maximum: the evader's greatest distance at T, as both reachable sets have the same shape.
+    With nu fixed it is a lower bound at other times, whose second derivative is at least -|x''| - (a_P - a_E) |Phi_vv|.
+
     Raises
     ------
     ValueError
         If position or velocity are not three finite numbers, the position is zero, or the mean motion is not positive.
     LinearGameError
         If the greatest distance is not computed to its tolerance.
-
-    Notes
-    -----
-    The first root of l(T) = max over |nu| <= 1 of nu . (Phi x)_r - (a_P - a_E) int |Phi_rv(T - t)^T nu| dt, a concave
-    function of nu with one maximum: the evader's greatest distance at T, as both reachable sets have the same shape.
-    With nu fixed it is a lower bound at other times, whose second derivative is at least -|x''| - (a_P - a_E) |Phi_vv|.
     """
     position, velocity = _relative(position_m, velocity_m_s)
     if not rate_rad_s > 0.0:

@@ -1,20 +1,20 @@
-"""Smooth functions of time as polynomials on panels that are refined until the functions are resolved."""
+"""Smooth functions of time as polynomials on panels, refined until they are resolved; the greatest control."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rendezvous._arrays import Floats
 
 NODES = 12
 RESOLVED = 1e-11
 ROUNDING = 1e-7
 _AT_ONCE = 2048
+TOLERANCE = 1e-11
+_MOST_HALVINGS = 40
 
 
 def chebyshev_points(count: int) -> Floats:
@@ -36,43 +36,37 @@ def chebyshev_halves(count: int) -> list[Floats]:
 
 
 _POINTS, _FIT = chebyshev_points(NODES), chebyshev_fit(NODES)
+# The square of a control, a polynomial of twice the degree, at samples that bound it.
+_DEGREE = 2 * (NODES - 1)
+_SAMPLES = 4 * _DEGREE
+_FACTOR = 1.0 / np.cos(0.5 * np.pi * _DEGREE / _SAMPLES)
+_AT_SQUARES = chebyshev.chebvander(chebyshev_points(_DEGREE + 1), NODES - 1)
+_FIT_SQUARES, _HALVES = chebyshev_fit(_DEGREE + 1), chebyshev_halves(_DEGREE + 1)
+_AT_SAMPLES = chebyshev.chebvander(chebyshev_points(_SAMPLES), _DEGREE)
 
 
-@dataclass(frozen=True, eq=False)
-class Piecewise:
-    """Functions of time, each a polynomial of degree 11 on each of P panels, which are in no order.
-
-    The `coefficients`, shape (P, 12, m), are those of Chebyshev polynomials of the position in the panel, -1 to 1.
-    """
-
-    starts_s: Floats
-    ends_s: Floats
-    coefficients: Floats
-
-
-def resolve(function: Callable[[Floats], Floats], breaks_s: Floats) -> Piecewise:
-    """Represent m functions of time, of similar magnitude, by polynomials on panels.
+def resolve(function: Callable[[Floats], Floats], breaks_s: Floats) -> tuple[Floats, Floats]:
+    """Represent m functions of time, of similar magnitude, by polynomials of degree 11 on P panels, in no order.
 
     `function` returns values, shape (k, m), at k times, s. `breaks_s`, not decreasing, are the ends of the initial
-    panels; the functions may jump there and are not evaluated there.
+    panels; the functions may jump there and are not evaluated there. Returns half the lengths of the panels, s, and the
+    coefficients, shape (P, 12, m), of Chebyshev polynomials of the position in the panel, -1 to 1.
+
+    A panel is halved until the last two coefficients are below 1e-11 of the greatest value on all panels, or below 1e-7
+    of it and no longer decreasing (rounding), or below the effect of the rounding of times. Sinusoids on panels of one
+    radian have an error below 1e-13 at once: the remainder of the interpolation is at most (1/2)^12 / (2^11 12!) =
+    2.5e-16 of their amplitude.
 
     Raises
     ------
     ValueError
         If a value is not finite, or no break is later than another.
-
-    Notes
-    -----
-    A panel is halved until the last two Chebyshev coefficients are below 1e-11 of the greatest value on all panels, or
-    below 1e-7 of it and no longer decreasing (rounding), or below the effect of the rounding of times. Sinusoids on
-    panels of one radian have an error below 1e-13 at once: the remainder of the interpolation is at most (1/2)^12 /
-    (2^11 12!) = 2.5e-16 of their amplitude.
     """
     starts, ends = breaks_s[:-1], breaks_s[1:]
     starts, ends = starts[ends > starts], ends[ends > starts]
     latest = float(np.abs(breaks_s).max())
     before, scale = np.full(len(starts), np.inf), 0.0
-    pieces: list[tuple[Floats, Floats, Floats]] = []
+    pieces: list[tuple[Floats, Floats]] = []
     if not len(starts):
         raise ValueError("no break is later than another")
     while len(starts):
@@ -84,12 +78,13 @@ def resolve(function: Callable[[Floats], Floats], breaks_s: Floats) -> Piecewise
         resolved = (tails <= scale * np.maximum(RESOLVED, rounding)) | (
             (tails <= ROUNDING * scale) & (tails > 0.2 * before)
         )
-        pieces.append((starts[resolved], ends[resolved], coefficients[resolved]))
+        pieces.append((0.5 * (ends - starts)[resolved], coefficients[resolved]))
         starts, ends, before = starts[~resolved], ends[~resolved], tails[~resolved]
         middles = 0.5 * (starts + ends)
         starts, ends = np.concatenate([starts, middles]), np.concatenate([middles, ends])
         before = np.tile(before, 2)
-    return Piecewise(*(np.concatenate(part) for part in zip(*pieces, strict=True)))
+    half_s, parts = zip(*pieces, strict=True)
+    return np.concatenate(half_s), np.concatenate(parts)
 
 
 def _fitted(function: Callable[[Floats], Floats], starts: Floats, ends: Floats) -> Floats:
@@ -103,3 +98,37 @@ def _fitted(function: Callable[[Floats], Floats], starts: Floats, ends: Floats) 
             raise ValueError("a value is not finite; check the units")
         parts.append(_FIT @ values.reshape(len(low), NODES, -1))
     return np.concatenate(parts)
+
+
+def greatest_control(control: Callable[[Floats], Floats], breaks_s: Floats) -> float:
+    """Return the greatest |u| of a control, m/s^2, to 1e-9, relative.
+
+    `control` returns u, shape (k, 3), m/s^2, at k times, s. It is smooth between `breaks_s`, which do not decrease, and
+    its motion turns by about a radian at most between two of them (`LinearMotion.breaks`). Between short panels at late
+    times the error is the effect of the rounding of times.
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite, or no break is later than another.
+
+    Notes
+    -----
+    On panels u is a polynomial of degree 11 to 1e-11 (`resolve`), |u|^2 one of degree 22. A polynomial p
+    of degree d is bounded by its values at the zeros of the Chebyshev polynomial of degree M > d (Ehlich and Zeller,
+    1964): max |p| <= max_j |p(x_j)| / cos(pi d / (2 M)). Applied to |u|^2 minus the middle of its samples, this bounds
+    each panel from above; panels that may contain the greatest are halved until bound and sample agree to 1e-11. No
+    peak between samples is missed.
+    """
+    squares = (_FIT_SQUARES @ ((_AT_SQUARES @ resolve(control, breaks_s)[1]) ** 2).sum(axis=2)[..., None])[..., 0]
+    greatest = 0.0
+    for _ in range(_MOST_HALVINGS):
+        values = squares @ _AT_SAMPLES.T
+        top, bottom = values.max(axis=1), values.min(axis=1)
+        bounds = 0.5 * (top + bottom) + 0.5 * _FACTOR * (top - bottom)
+        greatest = max(greatest, float(top.max()))
+        open_ = bounds > greatest * (1.0 + 2.0 * TOLERANCE)
+        if not open_.any():
+            break
+        squares = np.concatenate([squares[open_] @ half.T for half in _HALVES])
+    return float(np.sqrt(greatest))

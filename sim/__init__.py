@@ -5,27 +5,32 @@ from sim.bound import BoundError, LowerBound, lower_bound
 from sim.campaign import Campaign, CampaignResult, Sweep
 from sim.chunk import CampaignNoise
 from sim.record import Inconsistency, Record, StepRecord, fly_one
+from sim.requirement import Requirement
 from sim.results import Outcome, Results
-from sim.scenario import Manoeuvre, Scenario, Sun, Target
+from sim.scenario import Body, Manoeuvre, Scenario, Sun, Target
 from sim.simulate import simulate
 from sim.statistics import (
     Distribution,
+    HitEstimate,
     QuantileEstimate,
     band_half_width,
     empirical_distribution,
+    estimate_hits,
     estimate_quantiles,
     quantiles,
 )
-from sim.stopping_rule import QuantileName, Requirement, StoppingRule
+from sim.stopping_rule import QuantileName, StoppingRule
 from sim.storage import Axis
 
 __all__ = [
     "Axis",
+    "Body",
     "BoundError",
     "Campaign",
     "CampaignNoise",
     "CampaignResult",
     "Distribution",
+    "HitEstimate",
     "Inconsistency",
     "LowerBound",
     "Manoeuvre",
@@ -45,6 +50,7 @@ __all__ = [
     "WorstEngagement",
     "band_half_width",
     "empirical_distribution",
+    "estimate_hits",
     "estimate_quantiles",
     "find_worst",
     "fly_one",

@@ -14,7 +14,7 @@ import numpy as np
 from guidance import Strategy, TieRule, make_strategy
 from guidance.scripted_noise import ScriptedNoise
 from infoset import StateBox
-from infoset.limits import INTEGER
+from infoset.limits import COUNT, WHOLE
 from sim.draws import Draws, corners, draw
 from sim.engagement import Engagements
 from sim.planned_flights import ANGLE, ROWS, Floats, Flown, PlannedNoise, Plans
@@ -43,7 +43,7 @@ UPPER, LOWER = 1.0, -1.0
 
 
 class NothingCountsError(ValueError):
-    """In every engagement of a search the set was lost, or the miss was not finite."""
+    """In every engagement of a search the set became empty, or the miss was not finite."""
 
 
 @dataclass(frozen=True)
@@ -54,14 +54,8 @@ class WorstEngagement:
     ----------
     scenario : Scenario
         Scenario of the search, with the start of this engagement as its dispersion.
-    seed : int
-        The seed of the search.
-    strategy : str
-        Name of the strategy.
     miss_m : float
         True miss, m.
-    outcome : Outcome
-        How the engagement ended.
     truth_kept : bool
         Whether the true state was inside its section after every measurement.
     position_m, velocity_m_s : ndarray, shape (2,)
@@ -71,10 +65,9 @@ class WorstEngagement:
         these errors repeats the engagement, bit for bit.
     construction : str
         Kind of the first plan from which the engagement was derived.
-    changes : int
-        Number of changes from the first plan.
-    evaluations : int
-        Number of simulated engagements.
+    sets_emptied : int
+        Number of simulated engagements whose set became empty. If it is zero, the search with `keep_set` and the
+        search without it are the same.
     history : tuple of (int, float)
         Evaluations and greatest miss so far, m, at each increase.
     """
@@ -91,6 +84,7 @@ class WorstEngagement:
     construction: str
     changes: int
     evaluations: int
+    sets_emptied: int
     history: tuple[tuple[int, float], ...]
 
     def noise(self) -> ScriptedNoise:
@@ -126,24 +120,20 @@ def find_worst(
         The search covers all starts in `set_model.bounds` (B x D), not only its dispersion.
     strategy : Strategy, str or None
         A strategy of your own, the name of a registered one, or None for the scenario's.
-    budget : int
-        Number of engagements to simulate.
     seed : int
         Root seed. The same seed and budget give the same engagement for any number of threads.
     keep_set : bool
-        Count only engagements whose set was never lost. In the model `paper` a set can be lost at the start; then
-        nothing is corrected, and the miss says nothing about the strategy.
-    threads : int
-        Number of threads.
+        Count only engagements whose set never became empty. In the model `paper` a set can become empty at the start;
+        then nothing is corrected, and the miss says nothing about the strategy.
     progress : callable or None
         Called with the fraction done, from 0 to 1.
 
     Raises
     ------
-    ValueError
-        If the budget or the number of threads is not positive, or the seed is negative.
+    TypeError, ValueError
+        If the budget or the number of threads is not an integer from 1, or the seed not one from 0.
     NothingCountsError
-        If in every simulated engagement the set was lost, or the miss was not finite.
+        If in every simulated engagement the set became empty, or the miss was not finite.
 
     Notes
     -----
@@ -157,13 +147,9 @@ def find_worst(
     ----------
     Kumkov and Patsko (1997), section 7, for the rule of the game noise.
     """
-    for name, count in (("budget", budget), ("threads", threads), ("seed", seed)):
-        INTEGER.need(name, count)
-    if budget < 1 or threads < 1 or seed < 0:
-        raise ValueError(
-            f"need a positive budget and number of threads, and a seed not negative: got budget={budget}, "
-            f"threads={threads}, seed={seed}"
-        )
+    COUNT.need("budget", budget)
+    COUNT.need("threads", threads)
+    WHOLE.need("seed", seed)
     search = _Search(*with_strategy(scenario, strategy), seed, keep_set)
     with ThreadPoolExecutor(threads) as pool:
         try:
@@ -179,7 +165,7 @@ class _Search:
 
     def __init__(self, scenario: Scenario, strategy: Strategy | None, seed: int, keep_set: bool) -> None:
         self.scenario = replace(scenario, dispersion=scenario.set_model.bounds)
-        self.evaluations = 0
+        self.evaluations = self.sets_emptied = 0
         self.history: list[tuple[int, float]] = []
         self._seed, self._keep_set = seed, keep_set
         self._strategy = strategy or make_strategy(scenario.strategy)
@@ -206,7 +192,7 @@ class _Search:
     def worst(self) -> WorstEngagement:
         elite = self._elite
         if elite is None or not np.isfinite(elite.value[0]):
-            raise NothingCountsError("in every simulated engagement the set was lost, or the miss was not finite")
+            raise NothingCountsError("in every simulated engagement the set became empty, or the miss was not finite")
         start = elite.plans.start[0]
         z, x, vz, vx = ((value, value) for value in start.tolist())
         return WorstEngagement(
@@ -222,6 +208,7 @@ class _Search:
             construction=self._constructions[int(elite.plans.lineage[0])],
             changes=int(elite.plans.changes[0]),
             evaluations=self.evaluations,
+            sets_emptied=self.sets_emptied,
             history=tuple(self.history),
         )
 
@@ -241,15 +228,16 @@ class _Search:
         outcomes = np.array(results.outcomes, dtype=object)
         counts = np.isfinite(results.miss_m)
         if self._keep_set:
-            counts &= outcomes != Outcome.SET_LOST
+            counts &= ~results.set_emptied
         if tie is not None:  # the errors of the game become the plan
             plans.sequence[:], plans.prescribed[:] = noise.errors, True
         value = np.where(counts, results.miss_m, -np.inf)
-        return Flown(plans, value, noise.errors, outcomes, results.truth_kept)
+        return Flown(plans, value, noise.errors, outcomes, results.set_emptied, results.truth_kept)
 
     def _select(self, outcomes: Flown, young: bool) -> None:
         """Update the elite and the history with new flights."""
         self.evaluations += len(outcomes.value)
+        self.sets_emptied += int(outcomes.set_emptied.sum())
         rivals = outcomes if self._elite is None else self._elite.join(outcomes)
         order = np.argsort(-rivals.value, kind="stable")
         kept: list[int] = []

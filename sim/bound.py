@@ -80,26 +80,6 @@ class TruthPair:
 
 
 @dataclass(frozen=True)
-class LabelBound:
-    """The bound at one label and one closing speed.
-
-    Parameters
-    ----------
-    label_m, vx_m_s : float
-        Range at t = 0 and velocity along x.
-    last_common_step : int
-        Last common step of the best pair.
-    bound_m : float
-        The bound.
-    """
-
-    label_m: float
-    vx_m_s: float
-    last_common_step: int
-    bound_m: float
-
-
-@dataclass(frozen=True)
 class LowerBound:
     """A miss below which no strategy can guarantee to stay.
 
@@ -107,14 +87,14 @@ class LowerBound:
     ----------
     pairs : tuple of TruthPair
         Best pair at both ends of the interval of V_x and at the nominal closing speed, the best one first.
-    by_label : tuple of LabelBound
-        Bounds of all examined labels, in ascending order, for each velocity along x.
+    by_label : tuple of TruthPair
+        Best pairs of all examined labels, in ascending order, for each velocity along x.
     disturbance_m_s2 : float
         Greatest acceleration of the true motion along z, m/s^2.
     """
 
     pairs: tuple[TruthPair, ...]
-    by_label: tuple[LabelBound, ...]
+    by_label: tuple[TruthPair, ...]
     disturbance_m_s2: float
 
     def __repr__(self) -> str:
@@ -135,19 +115,15 @@ class LowerBound:
     @property
     def speeds_m_s(self) -> tuple[float, ...]:
         """Examined velocities along x, in ascending order, m/s."""
-        return tuple(sorted({bound.vx_m_s for bound in self.by_label}))
+        return tuple(sorted({pair.vx_m_s for pair in self.by_label}))
 
     def curve(self, vx_m_s: float) -> tuple[Floats, Floats]:
         """Return labels and bounds of one velocity along x, m."""
-        bounds = [bound for bound in self.by_label if bound.vx_m_s == vx_m_s]
-        return np.array([bound.label_m for bound in bounds]), np.array([bound.bound_m for bound in bounds])
+        pairs = [pair for pair in self.by_label if pair.vx_m_s == vx_m_s]
+        return np.array([pair.label_m for pair in pairs]), np.array([pair.bound_m for pair in pairs])
 
 
-def lower_bound(
-    scenario: Scenario,
-    *,
-    progress: Callable[[float], None] | None = None,
-) -> LowerBound:
+def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None = None) -> LowerBound:
     """Find the greatest miss below which no strategy can guarantee to stay.
 
     Parameters
@@ -183,32 +159,36 @@ def lower_bound(
     grids = [label_grid(scenario, speed) for speed in speeds]
     refinements = [2 * REFINEMENTS if len(grid) > 1 else 0 for grid in grids]
     total, done = sum(len(grid) for grid in grids) + sum(refinements), 0
-    bounds: list[LabelBound] = []
-    pairs: list[TruthPair] = []
+    by_label: dict[tuple[float, float], TruthPair] = {}
+    best: list[TruthPair] = []
     for speed, grid, extra in zip(speeds, grids, refinements, strict=True):
-        best: TruthPair | None = None
+        tried: list[TruthPair] = []
         before_s: float | None = None
         width = float(np.diff(grid).min(initial=np.inf))
         labels = grid.tolist()
         for index in range(len(grid) + extra):
-            if index >= len(grid) and best is not None:
+            if index >= len(grid):
                 # Refine around the best label: half a width to each side, repeatedly.
                 width *= 0.5 if (index - len(grid)) % 2 == 0 else 1.0
                 side = 1.0 if (index - len(grid)) % 2 else -1.0
-                labels.append(min(max(best.label_m + side * width, model.bounds.x_m[0]), model.bounds.x_m[1]))
+                label_m = max(tried, key=_bound_m).label_m + side * width
+                labels.append(min(max(label_m, model.bounds.x_m[0]), model.bounds.x_m[1]))
             pair = pair_at(scenario, labels[index], speed, allowed, try_first_before_s=before_s)
             before_s = pair.arrival_s - pair.last_common_step * model.step_s
-            bounds.append(LabelBound(pair.label_m, speed, pair.last_common_step, pair.bound_m))
-            if best is None or pair.bound_m > best.bound_m:
-                best = pair
+            tried.append(pair)
+            by_label[speed, pair.label_m] = pair
             done += 1
             if progress is not None:
                 progress(done / total)
-        if best is not None:
-            pairs.append(best)
-    pairs.sort(key=lambda pair: -pair.bound_m)
-    by_label = {(bound.vx_m_s, bound.label_m): bound for bound in bounds}
-    return LowerBound(tuple(pairs), tuple(bound for _, bound in sorted(by_label.items())), allowed)
+        best.append(max(tried, key=_bound_m))
+    best.sort(key=_bound_m, reverse=True)
+    return LowerBound(
+        tuple(best), tuple(pair for _, pair in sorted(by_label.items(), key=lambda item: item[0])), allowed
+    )
+
+
+def _bound_m(pair: TruthPair) -> float:
+    return pair.bound_m
 
 
 def label_grid(scenario: Scenario, vx_m_s: float) -> Floats:
@@ -236,8 +216,6 @@ def pair_at(
 
     Parameters
     ----------
-    scenario : Scenario
-        Bounds, sensors and engine.
     label_m, vx_m_s : float
         Range at t = 0 and velocity along x; the range is x(t) = label + vx t.
     disturbance_m_s2 : float

@@ -14,9 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from guidance import Strategy
-from infoset.limits import COUNT, WHOLE
+from infoset.limits import COUNT, WHOLE, Limits
 from sim.chunk import CampaignNoise, Chunk, chunk_size
 from sim.flights import fly_on, fly_on_threads
+from sim.requirement import AnyRequirement
 from sim.scenario import Scenario, strategy_name
 from sim.statistics import QuantileEstimate, estimate_quantiles
 from sim.stopping_rule import StoppingRule, Watch
@@ -30,7 +31,11 @@ from sim.storage import (
     read_manifest,
     scenario_hash,
 )
+from sim.undecided_cells import UndecidedCells
 from sim.versions import calculating_versions
+
+FEWEST_A_SHARD = 50
+"""Least number of engagements per shard of a sweep."""
 
 
 @dataclass(frozen=True)
@@ -84,12 +89,15 @@ class Progress:
         Engagements stored in this session.
     elapsed_s : float
         Time since the start of this session.
+    undecided : int or None
+        Cells that need more runs to decide a requirement; None without one. `total` is then an upper bound.
     """
 
     done: int
     total: int
     flown: int
     elapsed_s: float
+    undecided: int | None = None
 
 
 @dataclass(frozen=True)
@@ -115,17 +123,22 @@ class Campaign:
         Whether the guaranteed model computes the guaranteed miss Phi, which doubles the run time.
     chunk : int or None
         Engagements per shard; results do not depend on it. None chooses a value for the number of runs.
-    until : StoppingRule or None
-        Stop at the end of a shard once this rule is met.
+    until : StoppingRule, Requirement, HitRequirement or None
+        A campaign stops at the end of a shard once this rule is met; a cell of a sweep, once this requirement is
+        decided.
     axes : tuple of Axis
         Keys and values that a sweep varies, as in a scenario file; stored as a description.
     cells : tuple of Scenario
         Scenarios of a sweep, one for each combination of the values; the last axis varies fastest.
+    most_runs : int or None
+        Greatest number of runs of a cell with a requirement in `until`; `runs` is then the least. None is `runs`.
+    require : Requirement, HitRequirement or None
+        Requirement of a sweep for its reports; stored as a description. None is that of `until`.
 
     Raises
     ------
     TypeError, ValueError
-        If a number is out of its range, the axes and the cells do not fit together, or a sweep has a stopping rule.
+        If a number is out of its range, the axes and the cells do not fit together, or `until` does not fit.
     """
 
     scenario: Scenario
@@ -136,9 +149,11 @@ class Campaign:
     strategy: Strategy | None = None
     guarantee: bool = True
     chunk: int | None = None
-    until: StoppingRule | None = None
+    until: StoppingRule | AnyRequirement | None = None
     axes: tuple[Axis, ...] = ()
     cells: tuple[Scenario, ...] = ()
+    most_runs: int | None = None
+    require: AnyRequirement | None = None
 
     def __post_init__(self) -> None:
         for name, limits in (("runs", COUNT), ("seed", WHOLE), ("chunk", COUNT)):
@@ -146,8 +161,10 @@ class Campaign:
                 limits.need(name, getattr(self, name))
         if len(self.cells) != (math.prod(len(axis.values) for axis in self.axes) if self.axes else 0):
             raise ValueError("a sweep needs at least one axis, and a scenario for each combination of their values")
-        if self.axes and self.until is not None:
-            raise ValueError("a sweep has no stopping rule: use until with a campaign only")
+        if self.until is not None and isinstance(self.until, AnyRequirement) != bool(self.axes):
+            raise ValueError("until must be a stopping rule of a campaign, or a requirement of a sweep")
+        if self.most_runs is not None:
+            Limits(least=self.runs, whole=True).need("most_runs", self.most_runs)
 
     def run(
         self,
@@ -197,20 +214,23 @@ class Campaign:
 
     def manifest(self) -> Manifest:
         """Return the manifest of the campaign; a resumed campaign keeps the size of its chunks."""
-        noise = self._noise
+        noise, stored = self._noise, self._stored()
+        required = self.until if self.require is None and isinstance(self.until, AnyRequirement) else self.require
         hashes = ",".join(scenario_hash(noise.applied_to(cell)) for cell in self.cells)
         return Manifest(
             scenario=noise.applied_to(self.scenario),
-            runs=self.runs,
-            chunk=self._chunk_size(),
+            runs=self.greatest_runs,
+            chunk=self.chunk or (self._default_chunk() if stored is None else stored.chunk),
             seed=self.seed,
             noise=noise,
             strategy=getattr(self.strategy, "version", None) or strategy_name(self.scenario, self.strategy),
             guarantee=self.guarantee,
             versions=dict(calculating_versions()),
             axes=self.axes,
+            order=stored.order if stored is not None and stored.axes else "rounds" if self.axes else "cells",
             cells_hash=hashlib.sha256(hashes.encode()).hexdigest()[:32] if self.cells else "",
             until=None if self.until is None else str(self.until),
+            require=None if required is None else str(required),
         )
 
     def chunk_at(self, index: int, manifest: Manifest) -> Chunk:
@@ -226,21 +246,29 @@ class Campaign:
 
     @property
     def engagements(self) -> int:
-        """Engagements of all cells."""
-        return self.runs * max(1, len(self.cells))
+        """Engagements of all cells, at most."""
+        return self.greatest_runs * max(1, len(self.cells))
+
+    @property
+    def greatest_runs(self) -> int:
+        """Greatest number of runs of a cell."""
+        return self.runs if self.most_runs is None else self.most_runs
 
     @property
     def _noise(self) -> CampaignNoise:
         return CampaignNoise(self.scenario.noise.value) if self.noise is None else self.noise
 
-    def _chunk_size(self) -> int:
-        """Return the engagements per shard: `chunk`, or that of the campaign in the folder, or the default."""
-        if self.chunk is not None:
-            return self.chunk
+    def _stored(self) -> Manifest | None:
+        """Return the manifest in the folder, if there is one."""
         try:
-            return read_manifest(Path(self.folder)).chunk
+            return read_manifest(Path(self.folder))
         except StorageError:
-            return chunk_size(self.runs)
+            return None
+
+    def _default_chunk(self) -> int:
+        """Return the engagements per shard; small for cells with few runs, because they may be extended later."""
+        size = chunk_size(self.greatest_runs)
+        return min(size, max(self.runs, FEWEST_A_SHARD)) if self.axes else size
 
     def _fly_missing(
         self,
@@ -254,15 +282,19 @@ class Campaign:
         if stopped():
             return
         missing = [index for index in range(manifest.chunks) if index not in folder.finished]
+        cells = None
+        if isinstance(self.until, AnyRequirement):
+            cells = UndecidedCells(folder, self.until, [kind.value for kind in self._noise.kinds], self.runs)
         done = self.engagements - sum(len(manifest.runs_of(index)[1]) for index in missing)
         stored = 0
 
         def report() -> None:
             if progress is not None:
-                progress(Progress(done, self.engagements, stored, time.perf_counter() - began_s))
+                undecided = None if cells is None else cells.undecided
+                progress(Progress(done, self.engagements, stored, time.perf_counter() - began_s, undecided))
 
         report()
-        chunks = (self.chunk_at(index, manifest) for index in missing)
+        chunks = (self.chunk_at(index, manifest) for index in (missing if cells is None else cells.missing()))
         cores = os.cpu_count() or 1
         flights = (
             fly_on_threads(min(workers or cores, max(1, len(missing))), chunks)
@@ -271,16 +303,18 @@ class Campaign:
         )
         with contextlib.closing(flights):
             for chunk, results in flights:
-                folder.write(chunk, results)
+                (folder.write if cells is None else cells.store)(chunk, results)
                 done, stored = done + len(chunk.runs), stored + len(chunk.runs)
                 report()
                 if stopped():
                     return
+        if cells is not None:
+            folder.stop_cells(cells.runs)
 
     def _stop_check(self, folder: CampaignWriter) -> Callable[[], bool]:
         """Return a function that stops the campaign in its folder, and returns True, once the rule is met."""
         rule, manifest = self.until, folder.manifest
-        if rule is None:
+        if not isinstance(rule, StoppingRule):
             return lambda: False
         noises = [kind.value for kind in self._noise.kinds]
         watch = Watch(
@@ -312,7 +346,7 @@ class Sweep(Campaign):
         As for `Campaign`.
     runs : int
         Engagements per cell.
-    folder, seed, noise, guarantee, chunk, strategy, until
+    folder, seed, noise, guarantee, chunk, strategy, until, most_runs, require
         As for `Campaign`; the guaranteed miss is not computed by default.
 
     Raises
@@ -333,8 +367,12 @@ class Sweep(Campaign):
         guarantee: bool = False,
         chunk: int | None = None,
         strategy: Strategy | None = None,
-        until: StoppingRule | None = None,
+        until: AnyRequirement | None = None,
+        most_runs: int | None = None,
+        require: AnyRequirement | None = None,
     ) -> None:
         if not axes:
             raise ValueError("a sweep needs at least one axis, and a scenario for each combination of their values")
-        super().__init__(scenario, runs, folder, seed, noise, strategy, guarantee, chunk, until, axes, cells)
+        super().__init__(
+            scenario, runs, folder, seed, noise, strategy, guarantee, chunk, until, axes, cells, most_runs, require
+        )

@@ -48,12 +48,6 @@ class Chunk:
         Number of the scenario in a sweep; 0 in a campaign.
     scenario : Scenario
         Scenario; its noise is not used.
-    runs : range
-        Numbers of the runs.
-    seed : int
-        Root seed.
-    noise : CampaignNoise
-        Measurement noise of the runs.
     guarantee : bool
         Whether the guaranteed model computes the guaranteed miss.
     strategy : Strategy or None
@@ -85,8 +79,6 @@ def fly_chunk(chunk: Chunk, check: Callable[[], None] | None = None) -> Results:
 
     Parameters
     ----------
-    chunk : Chunk
-        Runs to simulate.
     check : callable or None
         Called after every step; an exception that it raises stops the simulation.
 

@@ -25,7 +25,7 @@ from infoset.sensors import Measurements
 from infoset.set_queries import MaskedFloats, MaskedIntegers
 from sim.draws import Draws
 from sim.gravity import on_board_model
-from sim.kepler import KeplerMotion, Sight, TrueMotion
+from sim.kepler import KeplerMotion, Sight
 from sim.results import Outcome, Results
 from sim.scenario import Scenario
 from sim.target import acceleration_m_s2
@@ -41,16 +41,10 @@ class Step:
 
     Parameters
     ----------
-    step : int
-        Number of the step.
-    time_s : float
-        Time since the start, s.
     tracking : ndarray of bool, shape (B,)
         Engagements that still measure and decide.
     flying : ndarray of bool, shape (B,)
         Engagements before their closest approach.
-    sight : Sight
-        True geometry.
     measured : mapping of str to ndarray, shape (B,)
         Values measured in this step, by sensor.
     predicted_miss : PredictedMiss
@@ -77,13 +71,9 @@ class Engagements:
 
     Parameters
     ----------
-    scenario : Scenario
-        Scenario to simulate.
-    draws : Draws
-        Starts and random numbers of the batch.
     strategy : Strategy or None
         Guidance strategy; None is the scenario's.
-    truth : TrueMotion or None
+    truth : KeplerMotion or None
         True motion; None is Kepler motion with the Sun of the scenario.
     noise : MeasurementNoise or None
         Measurement noise; None is the scenario's.
@@ -101,7 +91,7 @@ class Engagements:
         scenario: Scenario,
         draws: Draws,
         strategy: Strategy | None = None,
-        truth: TrueMotion | None = None,
+        truth: KeplerMotion | None = None,
         noise: MeasurementNoise | None = None,
         *,
         guarantee: bool = True,
@@ -270,6 +260,7 @@ class Engagements:
             payoff, known = self._information.guaranteed_miss()
         # Without a closest approach within the greatest number of steps, the miss is the present range.
         miss = np.where(np.isfinite(self._miss), self._miss, self._truth.sight().range_m)
+        radius_m = self.scenario.radius_m
         return Results(
             runs=runs,
             miss_m=miss,
@@ -278,6 +269,8 @@ class Engagements:
             outcomes=tuple(
                 _outcome(*flags) for flags in zip(miss > self.scenario.nominal_range_m, lost, self._spent, strict=True)
             ),
+            set_emptied=lost,
+            hit=np.ma.MaskedArray(miss <= (radius_m or 0.0), mask=radius_m is None),
             truth_margin_m=margin,
             position_m=self._draws.position_m,
             velocity_m_s=self._draws.velocity_m_s,
@@ -289,8 +282,8 @@ def _outcome(diverged: bool, lost: bool, spent: bool) -> Outcome:
     if diverged:
         return Outcome.DIVERGED
     if lost:
-        return Outcome.SET_LOST
-    return Outcome.BUDGET_SPENT if spent else Outcome.INTERCEPTED
+        return Outcome.SET_EMPTY
+    return Outcome.BUDGET_SPENT if spent else Outcome.ARRIVED
 
 
 def _make_noise(scenario: Scenario, draws: Draws) -> MeasurementNoise:

@@ -31,8 +31,6 @@ def fly_on(
     ----------
     executor : Executor
         Executor of threads, processes or a cluster.
-    chunks : iterable of Chunk
-        Chunks to simulate.
     at_once : int
         Greatest number of chunks that are submitted at a time; it limits the memory.
     check : callable or None

@@ -45,8 +45,6 @@ def with_gravity(model: SetModel, sun: Sun | None, impulses_m_s: float) -> SetMo
 
     Parameters
     ----------
-    model : SetModel
-        Model without the bounds of gravity.
     sun : Sun or None
         None is free space.
     impulses_m_s : float

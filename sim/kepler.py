@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,22 +60,6 @@ class Passage:
     passed: NDArray[np.bool_]
     least_distance_m: Floats
     arrival_s: Floats
-
-
-class TrueMotion(Protocol):
-    """The true motion of a batch."""
-
-    def sight(self) -> Sight:
-        """Return the present geometry."""
-
-    def fire(self, impulse_m_s: Floats) -> None:
-        """Change the spacecraft's velocity along z: V_z becomes V_z - k."""
-
-    def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
-        """Advance by one step, with accelerations of the object along z, shape (B,), if it manoeuvres."""
-
-    def arrival_s(self) -> Floats:
-        """Return the times from now to x = 0, shape (B,)."""
 
 
 class KeplerMotion:

@@ -54,8 +54,6 @@ class PairFlight:
 
     Parameters
     ----------
-    results : Results
-        Results of the two flights.
     impulse_m_s : ndarray, shape (steps, 2)
         Impulses at each step.
     greatest_error_share : float
@@ -65,11 +63,6 @@ class PairFlight:
     results: Results
     impulse_m_s: Floats
     greatest_error_share: float
-
-    @property
-    def worst_miss_m(self) -> float:
-        """Greater one of the two misses, m."""
-        return float(self.results.miss_m.max())
 
 
 def fly_pair(

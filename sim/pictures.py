@@ -17,21 +17,24 @@ LEVELS = (0.1, 0.5, 0.9)
 _DECADES = 10.0
 
 
-def results_html(samples: Mapping[str, Floats], outcomes: Sequence[str], truths_kept: int) -> str:
+def results_html(
+    samples: Mapping[str, Floats], outcomes: Sequence[str], truths_kept: int, hits: int | None = None
+) -> str:
     """Return a table of the results of a batch as HTML.
 
     Parameters
     ----------
     samples : mapping of str to ndarray
         Known values by title, unit included; each is a row with its quantiles.
-    outcomes : sequence of str
-        Outcome of each engagement.
     truths_kept : int
         Number of engagements whose true state was inside its section at every step.
+    hits : int or None
+        Number of engagements that hit; None if the body has no size.
     """
     counts = ", ".join(f"{count} {outcome}" for outcome, count in Counter(outcomes).items())
     kept = f"true state inside the set at every step: {truths_kept} of {len(outcomes)}"
-    caption = f"{len(outcomes)} engagements: {counts}; {kept}"
+    hit = "" if hits is None else f"; {hits} hit"
+    caption = f"{len(outcomes)} engagements: {counts}{hit}; {kept}"
     rows = [(title, _quantiles(values)) for title, values in samples.items()]
     return _table(caption, ("", *(f"{level:.0%}" for level in LEVELS), "greatest"), rows)
 
@@ -49,14 +52,8 @@ def course_html(
 
     Parameters
     ----------
-    caption : str
-        Caption of the table of facts.
-    facts : mapping of str to str
-        Rows of that table.
     time_s, impulse_m_s : ndarray, shape (steps,)
         Impulse of each step.
-    greatest_impulse_m_s : float
-        Greatest impulse of the thruster, m/s.
     miss_time_s : ndarray, shape (n,)
         Times at which a predicted miss exists, s.
     miss_m : ndarray, shape (n, 2)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance import GameNoise, LineOfSight, TieRule
+from guidance.game_noise import SwitchingNoise
 from guidance.scripted_noise import errors_made, measure_with_errors
-from guidance.switching_noise import SwitchingNoise
 from infoset import InformationSetView
 from infoset.sensors import Measurements
 
@@ -63,8 +63,6 @@ class PlannedNoise:
 
     Parameters
     ----------
-    plans : Plans
-        Plans of the batch.
     names : sequence of str
         Sensors of the rows of a sequence.
     tie : TieRule or None
@@ -106,14 +104,12 @@ class Flown:
 
     Parameters
     ----------
-    plans : Plans
-        Plans of n engagements.
     value : ndarray, shape (n,)
         Miss, m; -inf if the engagement does not count.
     errors : ndarray, shape (n, rows, steps)
         Errors made, in units of their bounds.
-    outcomes : ndarray of Outcome, shape (n,)
-        How the engagements ended.
+    set_emptied : ndarray of bool, shape (n,)
+        Whether the set became empty.
     truth_kept : ndarray of bool, shape (n,)
         Whether the true state was inside its section at every step.
     """
@@ -122,6 +118,7 @@ class Flown:
     value: Floats
     errors: Floats
     outcomes: NDArray[np.object_]
+    set_emptied: Flags
     truth_kept: Flags
 
     def take(self, which: Counts | slice) -> Flown:

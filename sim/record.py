@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from infoset.limits import WHOLE
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.pictures import course_html
-from sim.results import Results
+from sim.results import Results, ending
 from sim.scenario import Scenario, strategy_name, with_strategy
 
 
@@ -23,14 +23,10 @@ class StepRecord:
 
     Parameters
     ----------
-    time_s : float
-        Time since the start, s.
     measured : mapping of str to float
         Values measured in this step by sensor: "angle" (rad), "range" (m), "rate" (rad/s).
     true_angle_rad, true_rate_rad_s, true_range_m : float
         True line of sight.
-    impulse_m_s : float
-        Impulse k of this step.
     predicted_miss_m : tuple of float, or None
         (pi_*, pi^*) after the measurement and before the impulse; None without a set.
     truth_margin_m : float or None
@@ -56,8 +52,6 @@ class Inconsistency:
 
     Parameters
     ----------
-    step : int
-        Number of the step.
     label_m : float
         Label nearest to consistency: its range at t = 0.
     """
@@ -76,12 +70,8 @@ class Record:
         Simulated scenario, with the noise, tie rule and range meter of this engagement.
     seed, run : int
         Root seed and run number; the same values give the same engagement.
-    strategy : str
-        Name of the strategy.
     result : Results
         Results, as a batch of one.
-    steps : tuple of StepRecord
-        All steps, in order.
     noise : str or None
         Name of the noise that replaced that of the scenario; None if none did.
     inconsistency : Inconsistency or None
@@ -102,12 +92,17 @@ class Record:
         """Name of the measurement noise."""
         return self.scenario.noise.value if self.noise is None else self.noise
 
+    @property
+    def ending(self) -> str:
+        """The outcome, and `hit` or `missed` if the body has a size."""
+        return ending(self.result.outcomes[0].value, self.result.hit.tolist()[0])
+
     def __repr__(self) -> str:
         result = self.result
         inside = "inside" if result.truth_kept[0] else "not inside"
         return (
             f"<engagement of {self.scenario.name}, seed {self.seed}, run {self.run}: {self.strategy}, "
-            f"{self.noise_name} noise, {len(self.steps)} steps\n {result.outcomes[0].value}, "
+            f"{self.noise_name} noise, {len(self.steps)} steps\n {self.ending}, "
             f"miss {result.miss_m[0]:.4g} m for {result.impulse_m_s[0]:.4g} m/s, "
             f"true state {inside} its section at every step>"
         )
@@ -116,7 +111,7 @@ class Record:
         result, thruster = self.result, self.scenario.thruster
         known = [(step.time_s, step.predicted_miss_m) for step in self.steps if step.predicted_miss_m is not None]
         return course_html(
-            f"{result.outcomes[0].value}: {len(self.steps)} steps, seed {self.seed}, run {self.run}",
+            f"{self.ending}: {len(self.steps)} steps, seed {self.seed}, run {self.run}",
             {
                 "scenario": self.scenario.name,
                 "noise, strategy": f"{self.noise_name}, {self.strategy}",
@@ -129,27 +124,6 @@ class Record:
             thruster.greatest_impulse_m_s,
             np.array([time for time, _ in known]),
             np.array([miss for _, miss in known]),
-        )
-
-
-@dataclass
-class _Recorder:
-    steps: list[StepRecord] = field(default_factory=list)
-
-    def __call__(self, step: Step) -> None:
-        miss = step.predicted_miss
-        self.steps.append(
-            StepRecord(
-                time_s=step.time_s,
-                measured={name: float(values[0]) for name, values in step.measured.items()},
-                true_angle_rad=float(step.sight.alpha_rad[0]),
-                true_rate_rad_s=float(step.sight.omega_rad_s[0]),
-                true_range_m=float(step.sight.range_m[0]),
-                impulse_m_s=float(step.impulse_m_s[0]),
-                predicted_miss_m=(float(miss.lower_m[0]), float(miss.upper_m[0])) if miss.exists[0] else None,
-                truth_margin_m=None,
-                sections=tuple(step.information.sections()),
-            )
         )
 
 
@@ -188,9 +162,26 @@ def fly_one(
     scenario, own_strategy = with_strategy(scenario, strategy)
     draws = draw(scenario, [run], seed)
     flight = Engagements(scenario, draws, own_strategy, noise=noise)
-    recorder = _Recorder()
+    recorded: list[StepRecord] = []
+
+    def record(step: Step) -> None:
+        miss = step.predicted_miss
+        recorded.append(
+            StepRecord(
+                time_s=step.time_s,
+                measured={name: float(values[0]) for name, values in step.measured.items()},
+                true_angle_rad=float(step.sight.alpha_rad[0]),
+                true_rate_rad_s=float(step.sight.omega_rad_s[0]),
+                true_range_m=float(step.sight.range_m[0]),
+                impulse_m_s=float(step.impulse_m_s[0]),
+                predicted_miss_m=(float(miss.lower_m[0]), float(miss.upper_m[0])) if miss.exists[0] else None,
+                truth_margin_m=None,
+                sections=tuple(step.information.sections()),
+            )
+        )
+
     while flight.flying:
-        flight.advance(recorder)
+        flight.advance(record)
         if progress is not None:
             progress(min(1.0, flight.step / draws.steps))
     name = strategy_name(scenario, own_strategy)
@@ -199,6 +190,6 @@ def fly_one(
     inconsistency = Inconsistency(int(at_step[0]), float(label[0])) if at_step.count() else None
     margins = flight.truth_margins_m()
     steps = tuple(
-        replace(step, truth_margin_m=margin.tolist()[0]) for step, margin in zip(recorder.steps, margins, strict=True)
+        replace(step, truth_margin_m=margin.tolist()[0]) for step, margin in zip(recorded, margins, strict=True)
     )
     return Record(scenario, seed, run, name, flight.results(np.array([run])), steps, own, inconsistency)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from enum import Enum
 from typing import Any
@@ -14,17 +14,18 @@ from infoset.limits import NOT_NEGATIVE
 from infoset.set_queries import MaskedFloats
 from sim.columns import Column, columns, columns_of, documented, values_of
 from sim.pictures import results_html
+from sim.statistics import HitEstimate, estimate_hits
 
 Floats = NDArray[np.float64]
 MaskedFlags = np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]
 
 
 class Outcome(Enum):
-    """How an engagement ended."""
+    """How an engagement ended. Whether it hit is a separate column."""
 
-    INTERCEPTED = "intercepted"
-    """The spacecraft flew to the closest approach, and no other outcome applies."""
-    SET_LOST = "set-lost"
+    ARRIVED = "arrived"
+    """The spacecraft flew to the closest approach, near or far, and no other outcome applies."""
+    SET_EMPTY = "set-empty"
     """A measurement left the set empty although no label was below the threshold: measurements and model disagree.
 
     With recovery the last consistent set is enlarged and guidance continues; without it no more impulses are given.
@@ -33,6 +34,14 @@ class Outcome(Enum):
     """The budget fell below the least impulse while the strategy still commanded one."""
     DIVERGED = "diverged"
     """The miss is greater than the nominal range."""
+
+    @classmethod
+    def _missing_(cls, value: object) -> Outcome | None:
+        return OLD_OUTCOMES.get(value) if isinstance(value, str) else None
+
+
+OLD_OUTCOMES: Mapping[str, Outcome] = {"intercepted": Outcome.ARRIVED, "set-lost": Outcome.SET_EMPTY}
+"""Names of outcomes in files of version 0.1.0."""
 
 
 _PHI = (
@@ -44,6 +53,8 @@ _MARGIN = (
     "measured"
 )
 _HELD = "Miss at most the guaranteed miss; unknown without a guarantee"
+_EMPTY = "A measurement left the set empty, whatever the outcome is; old files lack it, and the outcome says so"
+_HIT = "Miss at most the radius of the body; unknown if the body has no size"
 
 
 @documented
@@ -70,6 +81,8 @@ class Results:
         metadata=columns(Column("guaranteed_miss_m", "m", _PHI, nullable=True, limits=NOT_NEGATIVE))
     )
     outcomes: tuple[Outcome, ...] = field(metadata=columns(Column("outcome", "", "How the engagement ended", Outcome)))
+    set_emptied: NDArray[np.bool_] = field(metadata=columns(Column("set_emptied", "", _EMPTY, bool, nullable=True)))
+    hit: MaskedFlags = field(metadata=columns(Column("hit", "", _HIT, bool, nullable=True)))
     truth_kept: NDArray[np.bool_] = field(
         init=False, metadata=columns(Column("truth_kept", "", "True state inside its section at every step", bool))
     )
@@ -87,12 +100,21 @@ class Results:
 
     def __post_init__(self) -> None:
         unknown = np.ma.getmaskarray(self.guaranteed_miss_m) | (not self.guarantees)
+        if isinstance(self.set_emptied, np.ma.MaskedArray):
+            emptied = [outcome is Outcome.SET_EMPTY for outcome in self.outcomes]
+            object.__setattr__(self, "set_emptied", np.where(self.set_emptied.mask, emptied, self.set_emptied.data))
         within = self.miss_m <= self.guaranteed_miss_m.filled(np.inf)
         object.__setattr__(self, "truth_kept", self.truth_margin_m.filled(0.0) >= 0.0)
         object.__setattr__(self, "phi_held", np.ma.MaskedArray(within, mask=unknown))
 
     def __len__(self) -> int:
         return len(self.runs)
+
+    @property
+    def hits(self) -> HitEstimate | None:
+        """Probability of a hit with its confidence interval; None if the body has no size."""
+        runs = int(self.hit.count())
+        return estimate_hits(int(self.hit.sum()), runs) if runs else None
 
     def to_dict(self) -> dict[str, list[Any]]:
         """Return the columns by name as plain values, one per run: texts for outcomes, None if unknown."""
@@ -134,11 +156,18 @@ class Results:
             guaranteed: self.guaranteed_miss_m.compressed(),
         }
         outcomes = [outcome.value for outcome in self.outcomes]
-        return results_html(samples, outcomes, int(self.truth_kept.sum()))
+        hits = None if self.hits is None else self.hits.hits
+        return results_html(samples, outcomes, int(self.truth_kept.sum()), hits)
 
     def __repr__(self) -> str:
         miss, fuel = np.median(self.miss_m), np.median(self.impulse_m_s)
-        return f"<{len(self)} engagements: median miss {miss:.3g} m for {fuel:.4g} m/s>"
+        hits = "" if self.hits is None else f", {self.hits.hits} hit"
+        return f"<{len(self)} engagements{hits}: median miss {miss:.3g} m for {fuel:.4g} m/s>"
+
+
+def ending(outcome: str, hit: bool | None) -> str:
+    """Return how an engagement ended as text: the outcome, and `hit` or `missed` if the body has a size."""
+    return outcome if hit is None else f"{outcome}, {'hit' if hit else 'missed'}"
 
 
 _INPUTS = [declared.name for declared in fields(Results) if declared.init]

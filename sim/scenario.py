@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Annotated
 
 from guidance.noise import NoiseKind, TieRule
 from guidance.strategy import Strategy
 from guidance.thruster import Thruster
-from infoset.limits import Limits, NotNegative, Positive, check_fields
+from infoset.limits import ADDED_LATER, Limits, NotNegative, Positive, check_fields
 from infoset.model import SetModel, StateBox
 from infoset.sensors import RangeSensor, RateSensor, Sensor
 
@@ -64,8 +64,6 @@ class Target:
 
     Parameters
     ----------
-    manoeuvre : Manoeuvre
-        Kind of the manoeuvre.
     acceleration_m_s2 : float
         Acceleration along z, m/s^2.
     switching_period_s : float
@@ -86,13 +84,32 @@ class Target:
 
 
 @dataclass(frozen=True)
+class Body:
+    """The size of the object.
+
+    Parameters
+    ----------
+    radius_m : float
+        Radius of a sphere, m: an engagement hits if its miss is at most this radius.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the radius is not a positive number.
+    """
+
+    radius_m: Positive
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True)
 class Scenario:
     """An interception: true motion, sensors, engine, guidance and noise.
 
     Parameters
     ----------
-    name, description : str
-        Name, and a description of one line.
     sun : Sun or None
         None is free space.
     nominal_range_m : float
@@ -101,20 +118,14 @@ class Scenario:
         True starts (B0 x D0), uniform, unknown on board. A fixed value has equal ends.
     set_model : SetModel
         Knowledge and assumptions on board, with the closing speed, the step and the angle sensor.
-    range_sensor : RangeSensor or None
-        The range meter, if there is one.
-    thruster : Thruster
-        Limits of the engine.
-    strategy : str
-        Name of the guidance strategy.
     noise : NoiseKind
         How measurement errors are chosen.
     tie : TieRule
         How game noise breaks ties.
-    rate_sensor : RateSensor or None
-        The sensor of the line-of-sight rate, if there is one.
     target : Target or None
         A target that manoeuvres; None does not.
+    body : Body or None
+        The size of the object; None is a point, and no engagement has a hit or a miss.
 
     Raises
     ------
@@ -135,9 +146,13 @@ class Scenario:
     tie: TieRule = TieRule.UPPER
     rate_sensor: RateSensor | None = None
     target: Target | None = None
+    body: Body | None = field(default=None, metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         check_fields(self)
+        for name, sensor in (("range_sensor", self.range_sensor), ("rate_sensor", self.rate_sensor)):
+            if sensor is not None:
+                self.set_model.check_period(name, sensor)
         self.set_model.check_start("dispersion", self.dispersion)
         greatest = max(self.dispersion.x_m[1], self.set_model.bounds.x_m[1])
         if self.sun is not None and self.sun.distance_m <= greatest:
@@ -145,6 +160,16 @@ class Scenario:
                 f"sun.distance_m must be greater than the greatest possible range, {greatest:g} m: "
                 f"got {self.sun.distance_m!r}"
             )
+        least = min(self.dispersion.x_m[0], self.set_model.bounds.x_m[0])
+        if self.body is not None and self.body.radius_m >= least:
+            raise ValueError(
+                f"body.radius_m must be less than the least possible range, {least:g} m: got {self.body.radius_m!r}"
+            )
+
+    @property
+    def radius_m(self) -> float | None:
+        """Radius of the body, m; None if it has no size."""
+        return None if self.body is None else self.body.radius_m
 
     @property
     def sensors(self) -> dict[str, Sensor]:

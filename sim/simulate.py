@@ -34,8 +34,6 @@ def simulate(
         Scenario to simulate. `experiments.simulate` also accepts the name of a built-in scenario.
     runs : int or sequence of int
         Number of runs, or the run numbers. Run k of a seed is the same engagement in every call.
-    seed : int
-        Root seed.
     strategy : Strategy, str or None
         A strategy of your own, the name of a registered one, or None for the scenario's.
     guarantee : bool

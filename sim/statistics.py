@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from infoset.limits import COUNT, real_values
+from infoset.limits import COUNT, FRACTION, Limits, real_values
 
 Floats = NDArray[np.float64]
 
@@ -162,6 +162,53 @@ def estimate_quantiles(sample: ArrayLike, levels: Sequence[float], confidence: f
     return [
         QuantileEstimate(level, float(value), *ends) for level, value, ends in zip(levels, wanted, bounds, strict=True)
     ]
+
+
+@dataclass(frozen=True)
+class HitEstimate:
+    """The probability of a hit, estimated from a number of runs.
+
+    Parameters
+    ----------
+    runs, hits : int
+        Number of runs, and of those that hit.
+    probability : float
+        Share of the runs that hit.
+    lower, upper : float
+        Ends of the Clopper-Pearson interval, in [0, 1].
+    """
+
+    runs: int
+    hits: int
+    probability: float
+    lower: float
+    upper: float
+
+
+def estimate_hits(hits: int, runs: int, confidence: float = 0.95) -> HitEstimate:
+    """Return the share of hits with its Clopper-Pearson interval.
+
+    The interval contains the true probability with at least this confidence, for any number of runs: below `lower`, so
+    many hits or more are less probable than (1 - confidence) / 2; above `upper`, so many or fewer are.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `runs` is not at least 1, `hits` is not in [0, runs], or the confidence is not between 0 and 1.
+
+    References
+    ----------
+    Clopper, Pearson (1934), The use of confidence or fiducial limits illustrated in the case of the binomial.
+    """
+    from scipy.special import betaincinv  # slow to load, and few commands need it
+
+    COUNT.need("runs", runs)
+    Limits(least=0, most=runs, whole=True).need("hits", hits)
+    FRACTION.need("confidence", confidence)
+    tail = 0.5 * (1.0 - confidence)
+    lower = float(betaincinv(hits, runs - hits + 1, tail)) if hits else 0.0
+    upper = float(betaincinv(hits + 1, runs - hits, 1.0 - tail)) if hits < runs else 1.0
+    return HitEstimate(runs, hits, hits / runs, lower, upper)
 
 
 def order_statistics(size: int, level: float, confidence: float) -> tuple[int, int]:

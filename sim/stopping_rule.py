@@ -20,7 +20,7 @@ GROWTH = 1.05
 """The sample grows by at least this factor between two checks: a check after every chunk would cost O(N^2)."""
 
 _QUANTILE = r"\s*(?P<quantity>\w+)\s+p(?P<level>\d{1,2}(?:\.\d{1,6})?)\s*"
-_NUMBER = r"\s*(?P<number>\d{1,15}(?:\.\d{1,15})?(?:[eE][+-]?\d{1,3})?)\s*"
+NUMBER = r"\s*(?P<number>\d{1,15}(?:\.\d{1,15})?(?:[eE][+-]?\d{1,3})?)\s*"
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class QuantileName:
     @classmethod
     def parse(cls, text: str) -> QuantileName:
         """Read `miss_m p99`; raise ValueError for any other text."""
-        return _parse(text, "", 'a quantity and a quantile, for example "miss_m p99"')[0]
+        return parse_quantile(text, "", 'a quantity and a quantile, for example "miss_m p99"')[0]
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class StoppingRule:
     def parse(cls, text: str) -> StoppingRule:
         """Read `miss_m p99 ci<0.5`; raise ValueError for any other text."""
         example = 'a quantity, a quantile and a width, for example "miss_m p99 ci<0.5"'
-        return cls(*_parse(text, rf"\s+ci\s*<{_NUMBER}", example, "the width of the confidence interval"))
+        return cls(*parse_quantile(text, rf"\s+ci\s*<{NUMBER}", example, "the width of the confidence interval"))
 
     def met_by(self, sample: Floats) -> bool:
         """Whether a sample is large enough."""
@@ -98,39 +98,6 @@ class StoppingRule:
             return False
         (estimate,) = estimate_quantiles(sample, [self.quantile.level], self.confidence)
         return estimate.width is not None and estimate.width < self.width
-
-
-@dataclass(frozen=True)
-class Requirement:
-    """An upper bound of a quantile, written `miss_m p99<10`.
-
-    Parameters
-    ----------
-    quantile : QuantileName
-        What is bounded.
-    bound : float
-        In the unit of the quantity.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the bound is not positive.
-    """
-
-    quantile: QuantileName
-    bound: Positive
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-
-    def __str__(self) -> str:
-        return f"{self.quantile}<{self.bound:g}"
-
-    @classmethod
-    def parse(cls, text: str) -> Requirement:
-        """Read `miss_m p99<10`; raise ValueError for any other text."""
-        example = 'a quantity, a quantile and a bound, for example "miss_m p99<10"'
-        return cls(*_parse(text, f"<{_NUMBER}", example, "the bound"))
 
 
 class Watch:
@@ -200,8 +167,14 @@ def _checks(chunks: int) -> Iterator[int]:
         yield min(count, chunks)
 
 
-def _parse(text: str, end: str, wanted: str, number: str = "") -> tuple[QuantileName, float]:
-    """Read a quantile and, if the pattern `end` has one, the number after it."""
+def parse_quantile(text: str, end: str, wanted: str, number: str = "") -> tuple[QuantileName, float]:
+    """Read a quantile and, if the pattern `end` has one, the number after it.
+
+    Raises
+    ------
+    ValueError
+        If the text has another form; `wanted` and `number` name the form and the number in the message.
+    """
     match = re.fullmatch(_QUANTILE + end, text[:100])
     if match is None:
         raise ValueError(f"must be {wanted}")

@@ -19,14 +19,8 @@ def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, p
 
     Parameters
     ----------
-    target : Target
-        Kind, size and period of the manoeuvre.
     draws : ndarray, shape (B, steps)
         Random numbers, uniform in [-1, 1].
-    step : int
-        Number of the step.
-    step_s : float
-        Length of a step.
     predicted_miss_m : ndarray, shape (B,)
         Predicted miss z + V_z (time to go) of the true state, signed.
     """

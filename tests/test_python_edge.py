@@ -51,6 +51,7 @@ from rendezvous.multipoint import DriftingTargets, Tour
 from rendezvous.multipoint import Target as Visited
 from rendezvous.relative_motion import ClohessyWiltshire
 from sim import (
+    Body,
     Campaign,
     Manoeuvre,
     QuantileName,
@@ -61,6 +62,7 @@ from sim import (
     Target,
     band_half_width,
     empirical_distribution,
+    estimate_hits,
     estimate_quantiles,
     fly_one,
     quantiles,
@@ -127,6 +129,7 @@ SCENARIO: dict[str, Any] = {
     "tie": TieRule.UPPER,
     "rate_sensor": None,
     "target": None,
+    "body": None,
 }
 SOUND: Mapping[Any, Mapping[str, Any]] = {
     AngleSensor: SENSOR,
@@ -137,6 +140,7 @@ SOUND: Mapping[Any, Mapping[str, Any]] = {
     Thruster: THRUSTER,
     Sun: {"gravitational_parameter_m3_s2": 1.3e20, "distance_m": 1.5e11, "direction_rad": 1.0},
     Target: {"manoeuvre": Manoeuvre.BANG_BANG, "acceleration_m_s2": 0.1, "switching_period_s": 10.0},
+    Body: {"radius_m": 80.0},
     Scenario: SCENARIO,
     QuantileName: {"quantity": "miss_m", "level": 0.9},
     StoppingRule: {"quantile": QuantileName("miss_m", 0.9), "width": 1.0, "confidence": 0.95},
@@ -212,6 +216,9 @@ def test_what_is_no_value_of_a_field(kind: Any, field: str) -> None:
         (lambda: InformationSet(SetModel(**{**MODEL, "gravity_speed_change": 1.0})), "gravity_speed_change"),
         (lambda: StateBox(**{**BOX, "vx_m_s": (-1.0, 1.0)}), "vx_m_s"),
         (lambda: StateBox(**{**BOX, "x_m": (0.0, 1.0)}), "x_m"),
+        (lambda: SetModel(**{**MODEL, "step_s": 0.7}), "angle_sensor.period_s"),
+        (lambda: Scenario(**{**SCENARIO, "range_sensor": RangeSensor(0.7, 0.05)}), "range_sensor.period_s"),
+        (lambda: Scenario(**{**SCENARIO, "rate_sensor": RateSensor(0.2, 1e-6)}), "rate_sensor.period_s"),
         (lambda: Scenario(**{**SCENARIO, "sun": Sun(1.3e20, 6e6, 0.0)}), "sun.distance_m"),
         (lambda: Scenario(**{**SCENARIO, "dispersion": StateBox(**{**BOX, "x_m": (1.0, 2.0)})}), "dispersion"),
         (lambda: Scenario(**{**SCENARIO, "dispersion": StateBox(**{**BOX, "z_m": (0.0, 1e8)})}), "dispersion"),
@@ -482,6 +489,14 @@ def test_what_is_no_level(level: float) -> None:
     refused(lambda: estimate_quantiles([1.0, 2.0], [level]), "levels")
 
 
+@pytest.mark.parametrize(
+    ("hits", "runs", "confidence", "name"),
+    [(0, 0, 0.95, "runs"), (3, 2, 0.95, "hits"), (-1, 2, 0.95, "hits"), (1.0, 2, 0.95, "hits"), (1, 2, 1.0, "confid")],
+)
+def test_hits_are_a_part_of_the_runs(hits: Any, runs: int, confidence: float, name: str) -> None:
+    refused(lambda: estimate_hits(hits, runs, confidence), name)
+
+
 @pytest.mark.parametrize("order", [(-1, 0), (0, 2), (0, 5), (0.5, 1.0), (0, 10**30)])
 def test_what_is_no_order_of_targets(order: Any) -> None:
     motion = ClohessyWiltshire(1e-3)
@@ -496,7 +511,7 @@ NOT_CALLED = {
     "guidance": {"LineOfSight", "MeasurementNoise", "NoiseKind", "Situation", "Strategy", "ZeroEffortMiss"},
     "sim": {
         *("BoundError", "CampaignResult", "Distribution", "Inconsistency", "LowerBound", "NothingCountsError"),
-        *("Outcome", "QuantileEstimate", "Record", "Results", "WorstEngagement"),
+        *("HitEstimate", "Outcome", "QuantileEstimate", "Record", "Results", "WorstEngagement"),
     },
 }
 """What is exported to be read, not to be given numbers."""
@@ -521,7 +536,7 @@ FILE_ONLY = (
     "must be short enough for more than one step",
     "in size",
     "range_threshold_km: must be greater than 0",
-    "must be a whole number of steps of guidance.step_s",
+    "; write it in km",
     "must be long enough for at most",
     "the true state is integrated in steps",
     "in the guaranteed model",
@@ -543,6 +558,7 @@ NESTED: list[tuple[tuple[str, ...], type]] = [
     (("rate_sensor",), RateSensor),
     (("thruster",), Thruster),
     (("target",), Target),
+    (("body",), Body),
 ]
 NUMBERS = [
     (path, field)
@@ -563,7 +579,8 @@ def changed(owner: Any, path: tuple[str, ...], field: str, value: Any) -> Any:
 def agree(place: tuple[tuple[str, ...], str], first: float, second: float) -> bool:
     """Give a field a value; whatever Python takes, a file takes. Return whether it was taken."""
     scenario = load_scenario("asteroid-1997")
-    whole = replace(scenario, rate_sensor=RateSensor(1.0, 1e-6), target=Target(Manoeuvre.CONSTANT, 0.001))
+    target = Target(Manoeuvre.CONSTANT, 0.001)
+    whole = replace(scenario, rate_sensor=RateSensor(1.0, 1e-6), target=target, body=Body(80.0))
     path, field = place
     if place in (((), "nominal_range_m"), (("set_model", "angle_sensor"), "nominal_range_m")):
         return False  # a file has one for both
@@ -577,7 +594,7 @@ def agree(place: tuple[tuple[str, ...], str], first: float, second: float) -> bo
     except REFUSALS as error:
         refusal = str(error)
     if refusal:
-        assert any(each in refusal for each in (field, *path, "error bound", "step_s", "x_m")), refusal
+        assert any(each in refusal for each in (field, *path, "error bound", "period_s", "x_m")), refusal
         return False
     lines: list[str] = []
     try:

@@ -15,8 +15,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
-from experiments.common.figure_style import CURVE_LOOKS, INK, LIMIT, new_figure, place_axes, style
-from experiments.interception.figures.distributions import axis_limit, draw_band, scale_axis
+from experiments.common.figure_style import CURVE_LOOKS, INK, LIMIT, new_figure, place_axes, separate_labels, style
+from experiments.interception.figures.distributions import axis_limit, draw_band, draw_radius, scale_axis
 from sim import band_half_width, estimate_quantiles
 from sim.stopping_rule import level_name
 
@@ -44,18 +44,14 @@ class CampaignColumns:
 
     Parameters
     ----------
-    noise : str
-        Name of the noise.
-    range_meter : bool
-        Whether the scenario has a range meter.
     miss_m, impulse_m_s : ndarray, shape (n,)
         Miss and impulse spent, in the order of the runs.
     guaranteed_miss_m : ndarray, shape (m,)
         Known values of the guaranteed miss.
     start : mapping of str to ndarray, shape (n,)
         Components of the initial state, by column.
-    guarantees : bool
-        Whether the guaranteed misses are guarantees.
+    radius_m : float or None
+        Radius of the body, m; None if it has no size.
     """
 
     noise: str
@@ -65,6 +61,7 @@ class CampaignColumns:
     guaranteed_miss_m: Floats
     start: Mapping[str, Floats]
     guarantees: bool
+    radius_m: float | None = None
 
     @property
     def look(self) -> dict[str, Any]:
@@ -84,10 +81,13 @@ def draw_campaign_distributions(columns: Sequence[CampaignColumns]) -> Figure:
         _draw_impulse(row[1], columns)
         row[0].set_ylabel("distribution function (share of runs)")
         row[1].tick_params(labelleft=False)
+        for axes in row:
+            separate_labels(axes)
         handles, labels = _handles(columns)
+        radius = draw_radius(row[0], columns[0].radius_m)
         figure.legend(
-            handles,
-            labels,
+            [*handles, *radius],
+            [*labels, *(str(line.get_label()) for line in radius)],
             loc="lower center",
             ncols=2,
             columnspacing=2.5,
@@ -113,6 +113,7 @@ def draw_convergence(columns: Sequence[CampaignColumns]) -> Figure:
                 axes.set_title(f"({next(letter)}) {label.split(',')[0]}, {column.noise} noise")
                 axes.set_xlabel("runs")
                 axes.set_ylabel(label)
+                separate_labels(axes)
         handles: list[Line2D | Patch] = [
             Line2D([], [], color=INK, linewidth=1.2, linestyle=_line(index), label=level_name(level))
             for index, level in enumerate(CONVERGING)
@@ -129,7 +130,7 @@ def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
     """
     with style():
         figure = new_figure(height_mm=44.0 * len(columns) + 15.0 * len(columns) + 6.0)
-        rows = place_axes(figure, len(columns), 4, margins_mm=(14.0, 6.0, 20.0, 7.0), gaps_mm=(9.0, 15.0))
+        rows = place_axes(figure, len(columns), 4, margins_mm=(17.0, 6.0, 20.0, 7.0), gaps_mm=(9.0, 15.0))
         letter = iter("abcdefghijkl")
         for row, column in zip(rows, columns, strict=True):
             limit = axis_limit([column.miss_m])
@@ -140,7 +141,8 @@ def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
                 axes.locator_params(axis="x", nbins=3)
                 axes.tick_params(labelleft=axes is row[0])
                 axes.set_title(f"({next(letter)}) {column.noise} noise")
-            row[0].set_ylabel("miss, m")
+                separate_labels(axes)
+            row[0].set_ylabel("\n".join(["miss, m", *filter(None, [_beyond("runs", [column.miss_m], 1.04 * limit)])]))
         handles = [
             Line2D([], [], linestyle="", marker=".", color=LIMIT, label=f"runs (at most {MOST_POINTS} drawn)"),
             Line2D([], [], color=INK, label="median"),

@@ -28,17 +28,7 @@ _ADDRESS = re.compile(r"(?P<protocol>tcp|tls)://(?P<host>\[[0-9a-fA-F:]+\]|[^\s/
 
 @dataclass(frozen=True)
 class Cluster:
-    """A connected cluster.
-
-    Parameters
-    ----------
-    executor : Executor
-        Runs functions on its workers.
-    threads : int
-        Threads of all workers.
-    workers : int
-        Number of workers.
-    """
+    """A connected cluster."""
 
     executor: Executor
     threads: int

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
-from experiments.common.options import Json, Out, Overwrite, Quiet, Seed
-from experiments.interception.options import MOST_RUNS, ModelName, RangeMeter, ScenarioName, StrategyName, TieName
+from experiments.common.options import Json, Out, Overwrite, Quiet, Seed, Settings
+from experiments.interception.options import MOST_RUNS, RangeMeter, ScenarioName, StrategyName, StudyModel, TieName
 
 MOST_WORKERS = 1024
 MOST_AT_ONCE = 1_000_000
-EXECUTION = "Execution"
 
 Required = Annotated[
-    str,
+    str | None,
     typer.Option(
         "--require",
         metavar="RULE",
-        help="Requirement on a quantile: its upper bound, in the unit of the name. The figure shows it as a contour.",
+        help='Requirement: the upper bound of a quantile, "miss_m p99<10", or the least probability of a hit, '
+        '"hit>=0.95". Each cell meets it, does not meet it, or is undecided, with 95 % confidence. Default: one of '
+        "these two, the second if the body has a size; in a report, that of the sweep.",
     ),
 ]
 Shown = Annotated[
@@ -33,11 +34,20 @@ Shown = Annotated[
 ]
 
 
+_WORKERS: dict[str, Any] = {"metavar": "W", "min": 1, "max": MOST_WORKERS}
+
+
+def _execution(text: str, *names: str, **options: Any) -> Any:
+    """Return an option in the panel of the execution."""
+    return typer.Option(*names, rich_help_panel="Execution", help=text, **options)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Flight:
     """Options of a campaign and of a sweep."""
 
     scenario: ScenarioName = "asteroid-1997"
+    settings: Settings = None
     runs: Annotated[
         int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs; in a sweep, of each cell.")
     ]
@@ -50,56 +60,35 @@ class Flight:
     ] = None
     seed: Seed = 0
     strategy: StrategyName = None
-    model: ModelName = None
+    model: StudyModel = None
     tie: TieName = None
     range_meter: RangeMeter = None
     json: Json = None
     overwrite: Overwrite = False
     quiet: Quiet = False
     resume: Annotated[
-        bool,
-        typer.Option(
-            "--resume",
-            rich_help_panel=EXECUTION,
-            help="Continue the campaign in DIR; if DIR is empty, start a new one.",
-        ),
+        bool, _execution("Continue the campaign in DIR; if DIR is empty, start a new one.", "--resume")
     ] = False
     chunk: Annotated[
         int | None,
-        typer.Option(
+        _execution(
+            "Number of runs in a shard; it does not change the results. Default: depends on the number of runs.",
             metavar="N",
             min=1,
             max=MOST_AT_ONCE,
-            rich_help_panel=EXECUTION,
-            help="Number of runs in a shard; it does not change the results. Default: depends on the number of runs.",
         ),
     ] = None
     workers: Annotated[
-        int | None,
-        typer.Option(
-            metavar="W",
-            min=1,
-            max=MOST_WORKERS,
-            rich_help_panel=EXECUTION,
-            help="Number of threads on this machine. Default: one per core.",
-        ),
+        int | None, _execution("Number of threads on this machine. Default: one per core.", **_WORKERS)
     ] = None
     processes: Annotated[
         int | None,
-        typer.Option(
-            metavar="W",
-            min=1,
-            max=MOST_WORKERS,
-            rich_help_panel=EXECUTION,
-            help="Number of processes on this machine, instead of threads; faster for long campaigns.",
-        ),
+        _execution("Number of processes on this machine, instead of threads; faster for long campaigns.", **_WORKERS),
     ] = None
     dask: Annotated[
         str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            rich_help_panel=EXECUTION,
-            help="Simulate on a Dask cluster: address of its scheduler, for example tcp://host:8786.",
+        _execution(
+            "Simulate on a Dask cluster: address of its scheduler, for example tcp://host:8786.", metavar="ADDRESS"
         ),
     ] = None
 
@@ -111,7 +100,7 @@ class Campaign(Flight):
     A shard is written as soon as its runs are complete. After any interruption, the same command with --resume
     continues the campaign; with a greater --runs it extends the campaign. The numbers depend only on the scenario, the
     seed and the run, not on workers, shards or interruptions. Run K with a noise is the same engagement as in:
-    infoset engage --noise NOISE --run K. To see the results: infoset report DIR.
+    infoset engage DIR/scenario.toml --noise NOISE --run K. To see the results: infoset report DIR.
     """
 
     until: Annotated[
@@ -141,14 +130,29 @@ class Sweep(Flight):
     """
 
     vary: Annotated[
-        str,
+        list[str],
         typer.Option(
             metavar="KEY=FROM:TO:COUNT,...",
-            help="Keys of the scenario file and their values, in the units of the file. KEY=log:FROM:TO:COUNT has "
-            "logarithmic spacing. If the value is a pair, vary KEY.least or KEY.greatest.",
+            help="Keys of the scenario file and their values, in the units of the file; can be repeated. "
+            "KEY=log:FROM:TO:COUNT has logarithmic spacing. KEY1=KEY2=FROM:TO:COUNT gives two keys the same values. "
+            "angle_sensor.scale is a factor of all error bounds of a sensor. If the value is a pair, vary KEY.least or "
+            "KEY.greatest. For example: angle_sensor.scale=0.5:4:8,thruster.greatest_impulse_m_s=2:20:7.",
         ),
     ]
-    require: Required = "miss_m p99<10"
+    require: Required = None
+    until: Annotated[
+        Literal["decided"] | None,
+        typer.Option(
+            help="decided: add runs to each cell until the requirement is met or not met there, at most --most-runs. "
+            "The decisions allow for the repeated tests."
+        ),
+    ] = None
+    most_runs: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", min=1, max=MOST_RUNS, help="Greatest number of runs of a cell with --until. Default: 2000."
+        ),
+    ] = None
     show: Shown = None
     guarantee: Annotated[
         bool,
@@ -169,7 +173,7 @@ class Report:
     """
 
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder written by infoset campaign or infoset sweep.")]
-    require: Required = "miss_m p99<10"
+    require: Required = None
     show: Shown = None
     out: Out = None
     json: Json = None

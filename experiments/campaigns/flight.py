@@ -7,7 +7,7 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -22,13 +22,13 @@ from experiments.campaigns.cluster import connected, is_open
 from experiments.campaigns.command import Flight
 from experiments.common.errors import InputError
 from experiments.common.screen import NOT_FINITE, number, say
-from experiments.interception.choices import scenario_with
+from experiments.interception.choices import scenario_with, study_scenario
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from sim import Campaign, CampaignNoise, CampaignResult, Scenario
 from sim.campaign import Progress
 from sim.flights import fly_on_threads, worker_processes
 from sim.simulate import ENGAGEMENTS_AT_ONCE
-from sim.storage import StorageError, need_free
+from sim.storage import MANIFEST, StorageError, need_free, read_manifest
 from sim.versions import VersionError
 
 SCENARIO_FILE = "scenario.toml"
@@ -44,16 +44,24 @@ _LINE_EVERY_S = 60.0
 _WARM_UP = 8
 
 
-def scenario_of(options: Flight) -> Scenario:
-    """Return the scenario that the options describe, with the campaign's noise."""
+def scenario_of(options: Flight) -> tuple[Scenario, list[str]]:
+    """Return the scenario that the options describe, with the campaign's noise, and lines about it for the screen.
+
+    A resumed folder keeps its model.
+    """
     scenario = scenario_with(
         options.scenario,
+        options.settings,
         strategy=options.strategy,
         model=options.model,
         tie=options.tie,
         range_meter=options.range_meter,
     )
-    return scenario if options.noise is None else CampaignNoise(options.noise).applied_to(scenario)
+    resumed = None
+    if options.resume and (options.out / MANIFEST).is_file():
+        resumed = read_manifest(options.out).scenario.set_model.kind
+    scenario, notes = study_scenario(scenario, options.model, options.settings, resumed)
+    return (scenario if options.noise is None else CampaignNoise(options.noise).applied_to(scenario)), notes
 
 
 @dataclass(frozen=True)
@@ -65,13 +73,21 @@ class Flown:
     elapsed_s: float
 
 
-def fly(campaign: Campaign, options: Flight) -> Flown:
-    """Simulate the engagements that the folder of a campaign does not contain yet, with messages on stderr."""
+def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> Flown:
+    """Simulate the engagements that the folder of a campaign does not contain yet, with messages on stderr.
+
+    Parameters
+    ----------
+    notes : sequence of str
+        Lines that are printed first.
+    """
     need_free(options.out, resume=options.resume)
     note = partial(say, quiet=options.quiet)
     files = {SCENARIO_FILE: scenario_to_toml(campaign.scenario)}
     scenarios = campaign.cells or (campaign.scenario,)
     warnings = list(dict.fromkeys(line for scenario in scenarios for line in scenario_warnings(scenario)))
+    for line in notes:
+        note(line)
     for warning in warnings[: MOST_WARNINGS if campaign.cells else None]:
         note(f"warning: {warning}")
     with _workers(options, note) as workers:
@@ -161,10 +177,7 @@ def _workers(options: Flight, note: Callable[[str], None]) -> Iterator[_Workers]
 def _estimate(campaign: Campaign, cores: int) -> str:
     """Return a line with the time and the disk space of a campaign, measured on a few of its engagements.
 
-    Raises
-    ------
-    InputError
-        If the disk has too little space.
+    `InputError` if the disk has too little space.
     """
     manifest, folder = campaign.manifest(), Path(campaign.folder)
     chunk = campaign.chunk_at(manifest.chunks // 2, manifest)
@@ -197,7 +210,8 @@ def campaign_progress(name: str, quiet: bool) -> Iterator[Callable[[Progress], N
             nonlocal last_s
             if time.monotonic() - last_s >= _LINE_EVERY_S:
                 last_s = time.monotonic()
-                typer.echo(f"{name}: {progress.done} of {progress.total}, {_pace(progress)}", err=True)
+                of = "" if progress.undecided is not None else f" of {progress.total}"
+                typer.echo(f"{name}: {progress.done}{of}, {_pace(progress)}", err=True)
 
         yield line
     else:
@@ -219,6 +233,8 @@ def _pace(progress: Progress) -> str:
     if not progress.flown:
         return "- runs/s"
     rate = progress.flown / max(progress.elapsed_s, 1e-9)
+    if progress.undecided is not None:
+        return f"{number(rate)} runs/s, {progress.undecided} cells undecided"
     return f"{number(rate)} runs/s, {duration((progress.total - progress.done) / rate)} left"
 
 

@@ -28,7 +28,7 @@ def run(options: Options) -> None:
         output(files={"--json": options.json}, overwrite=options.overwrite, quiet=options.quiet) as written,
     ):
         need_arrow()
-        scenario = scenario_of(options)
+        scenario, notes = scenario_of(options)
         campaign = Campaign(
             scenario,
             options.runs,
@@ -40,7 +40,7 @@ def run(options: Options) -> None:
             chunk=options.chunk,
             until=_rule(options.until),
         )
-        flown = fly(campaign, options)
+        flown = fly(campaign, options, notes)
         stored = flown.result.folder
         by_noise = samples(stored)
         summary = to_json(
@@ -52,7 +52,7 @@ def run(options: Options) -> None:
                 "samples": [sample_json(sample) for sample in by_noise],
             }
         )
-        tables = samples_table(by_noise, stored.manifest.scenario.set_model.kind.value)
+        tables = samples_table(by_noise, stored.manifest.scenario)
         folder = Output(options.out, {}, overwrite=True)
         folder.save(SUMMARY, summary)
         written.written += [options.out / "shards", options.out / SCENARIO_FILE, *folder.written]

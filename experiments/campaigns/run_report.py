@@ -23,17 +23,19 @@ from experiments.campaigns.samples import (
     Sample,
     heading,
     noise_flags,
+    noises_of,
     sample_json,
     samples,
     samples_table,
     worst_runs,
 )
-from experiments.campaigns.sweep_report import FIGURE as SWEEP_FIGURE
-from experiments.campaigns.sweep_report import TABLE, quantile_options, sweep_report
+from experiments.campaigns.sweep_report import TABLE, default_requirement, figure_names, quantile_options, sweep_report
 from experiments.common.errors import InputError
+from experiments.common.file_kinds import use_of_file
 from experiments.common.output import Output, output, to_json
 from experiments.common.screen import figure_files, number, say, table_console
 from experiments.interception.scenario_file import scenario_to_toml
+from sim.results import ending
 from sim.storage import CampaignFolder, need_arrow
 
 FIGURES = ("figure-distributions", "figure-convergence", "figure-dispersion")
@@ -47,7 +49,7 @@ def run(options: Report) -> None:
         need_arrow()
         folder = _read(options)
         swept = bool(folder.manifest.axes)
-        figures = [*figure_files(SWEEP_FIGURE), TABLE] if swept else figure_files(*FIGURES)
+        figures = [*figure_files(*figure_names(noises_of(folder))), TABLE] if swept else figure_files(*FIGURES)
         with output(
             folder=options.out,
             names=[*figures, "report.json", SCENARIO_FILE],
@@ -62,6 +64,8 @@ def run(options: Report) -> None:
 
 def _read(options: Report) -> CampaignFolder:
     path = options.folder
+    if path.is_file():
+        raise InputError(f"{path}: {use_of_file(path) or 'is a file; name the folder of a campaign or of a sweep'}")
     if not path.is_dir():
         raise InputError(f"{path}: there is no such folder; name the folder of infoset campaign or infoset sweep")
     folder = CampaignFolder.read(path)
@@ -73,15 +77,22 @@ def _read(options: Report) -> CampaignFolder:
     if not folder.finished_runs:
         raise InputError(f"{path}: contains no runs yet; continue with: infoset {folder.manifest.kind} --resume")
     if not folder.complete:
+        stopped = folder.manifest.axes and folder.manifest.until
         say(
-            f"warning: {folder.finished_runs} of {folder.wanted_runs} runs are stored; the others are missing",
+            f"warning: {folder.finished_runs} of {'at most ' if stopped else ''}{folder.wanted_runs} runs are stored; "
+            f"{'--resume adds runs to the undecided cells' if stopped else 'the others are missing'}",
             options.quiet,
         )
     return folder
 
 
 def _report_sweep(folder: CampaignFolder, options: Report, written: Output, console: Console | None) -> None:
-    report = sweep_report(folder, quantile_options(options.require, options.show))
+    sized = bool(folder.numbers("hit").count())
+    default = folder.manifest.require or default_requirement(has_size=sized)
+    required, shown = quantile_options(options.require, options.show, default)
+    if required.quantity == "hit" and not sized:
+        raise InputError(f"--require {required}: the body of this sweep has no size; give a bound of the miss instead")
+    report = sweep_report(folder, required, shown)
     written.save("report.json", to_json(report.to_json()), "--json")
     if options.out is not None:
         report.save(written)
@@ -127,6 +138,7 @@ def _columns(folder: CampaignFolder) -> list[CampaignColumns]:
             guaranteed[rows].compressed(),
             {name: values[rows] for name, values in start.items()},
             scenario.set_model.is_guaranteed,
+            scenario.radius_m,
         )
         for noise, rows in noise_flags(folder).items()
     ]
@@ -146,7 +158,7 @@ def _show(
     manifest = folder.manifest
     stopped = "" if manifest.stopped_after is None else f", stopped by the rule {manifest.until}"
     line(f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}; quantiles with 95 % confidence limits")
-    table, notes = samples_table(by_noise, manifest.scenario.set_model.kind.value)
+    table, notes = samples_table(by_noise, manifest.scenario)
     console.print(table)
     for note in notes:
         line(note)
@@ -163,6 +175,6 @@ def _show(
     line("the worst runs, each with the command that simulates it again:")
     for row in worst:
         miss, impulse = number(row["miss_m"]), number(row["impulse_m_s"])
-        line(f"  miss {miss} m, impulse {impulse} m/s, {row['outcome']}: {row['replay']}")
+        line(f"  miss {miss} m, impulse {impulse} m/s, {ending(row['outcome'], row['hit'])}: {row['replay']}")
     if not (folder.path / SCENARIO_FILE).is_file():
         line(f"(the folder has no {SCENARIO_FILE}, which these commands need; --out writes one)")

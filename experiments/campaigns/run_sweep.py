@@ -9,7 +9,7 @@ import typer
 from experiments.campaigns.command import Sweep as Options
 from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, campaign_errors, fly, scenario_of
 from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
-from experiments.campaigns.sweep_report import quantile_options, sweep_report
+from experiments.campaigns.sweep_report import default_requirement, quantile_options, sweep_report
 from experiments.common.errors import InputError
 from experiments.common.output import Output, output, to_json
 from experiments.common.screen import say, table_console
@@ -19,6 +19,8 @@ from sim.storage import need_arrow, need_free
 
 ASK_FROM = 1_000_000
 """Number of engagements above which the command asks before it starts a sweep."""
+MOST_RUNS_A_CELL = 2000
+"""Default limit of the runs of a cell that is undecided."""
 
 
 def run(options: Options) -> None:
@@ -28,26 +30,37 @@ def run(options: Options) -> None:
         output(files={"--json": options.json}, overwrite=options.overwrite, quiet=options.quiet) as written,
     ):
         need_arrow()
-        quantiles = quantile_options(options.require, options.show)
-        scenario = scenario_of(options)
-        axes = sweep_axes(options.vary, scenario)
+        scenario, notes = scenario_of(options)
+        axes = sweep_axes(",".join(options.vary), scenario)
+        cells = sweep_cells(scenario, axes)
+        sized = cells[0].body is not None
+        required, shown = quantile_options(options.require, options.show, default_requirement(has_size=sized))
+        if required.quantity == "hit" and not sized:
+            raise InputError(
+                f"--require {required}: the scenario {scenario.name} has no [body]; set its radius, for example "
+                "--set body.radius_m=80"
+            )
+        guarantee = options.guarantee or "guaranteed_miss_m" in {quantile.quantity for quantile in shown}
         swept = Sweep(
             scenario,
             axes,
-            sweep_cells(scenario, axes),
+            cells,
             options.runs,
             options.out,
             seed=options.seed,
             noise=None if options.noise is None else CampaignNoise(options.noise),
             strategy=own_strategy(options.strategy),
-            guarantee=options.guarantee,
+            guarantee=guarantee,
             chunk=options.chunk,
+            until=required if options.until else None,
+            most_runs=_most_runs(options),
+            require=required,
         )
         need_free(options.out, resume=options.resume)
         if not options.yes:
             _ask(swept)
-        flown = fly(swept, options)
-        report = sweep_report(flown.result.folder, quantiles)
+        flown = fly(swept, options, notes)
+        report = sweep_report(flown.result.folder, required, shown)
         summary = to_json(report.to_json(flown.elapsed_s))
         folder = Output(options.out, {}, overwrite=True)
         report.save(folder)
@@ -60,11 +73,25 @@ def run(options: Options) -> None:
             say("no figure: a figure can show one or two keys only", options.quiet)
 
 
+def _most_runs(options: Options) -> int | None:
+    """Return the greatest number of runs of a cell; None without --until."""
+    if options.until is None:
+        if options.most_runs is not None:
+            raise InputError("--most-runs is the limit of --until; add --until decided, or omit it")
+        return None
+    if options.most_runs is not None and options.most_runs < options.runs:
+        raise InputError(
+            f"--most-runs: must be at least --runs, {options.runs}, found {options.most_runs}; give a greater number"
+        )
+    return max(MOST_RUNS_A_CELL, options.runs) if options.most_runs is None else options.most_runs
+
+
 def _ask(swept: Sweep) -> None:
     """Ask the user to confirm a long sweep; without a terminal, refuse it."""
     if swept.engagements <= ASK_FROM:
         return
-    question = f"{len(swept.cells)} cells of {swept.runs} runs are {swept.engagements} engagements, more than a million"
+    cells = f"{len(swept.cells)} cells of {swept.greatest_runs} runs"
+    question = f"{cells} are {swept.engagements} engagements, more than a million"
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         raise InputError(f"{question}; give --yes to start the sweep, or fewer --runs or values")
     if not typer.confirm(f"{question}. Continue?", err=True):

@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.table import Table
 
-from experiments.common.output import library_version
+from experiments.common.output import hit_key, library_version
 from experiments.common.screen import number
-from sim import Outcome, QuantileEstimate, estimate_quantiles
+from experiments.interception.runs.shared import bound_name
+from experiments.interception.study import SetCounts, hit_text, set_counts, set_warnings
+from sim import HitEstimate, Outcome, QuantileEstimate, Scenario, estimate_hits, estimate_quantiles
 from sim.stopping_rule import QUANTITIES, level_name
 from sim.storage import CampaignFolder, scenario_hash
 
@@ -42,8 +44,10 @@ class Sample:
         Largest value of each quantity.
     outcomes : mapping of str to int
         Number of runs with each outcome.
-    truth_kept : int
-        Runs whose true state stayed inside the set.
+    sets : SetCounts
+        Runs by what happened to their sets.
+    hits : HitEstimate or None
+        Probability of a hit; None if the body has no size.
     phi_held, phi_known : int
         Runs whose miss is at most Phi, and runs with a Phi; 0 in a model without a guarantee.
     """
@@ -53,7 +57,8 @@ class Sample:
     quantiles: Mapping[str, Sequence[QuantileEstimate]]
     worst: Mapping[str, float]
     outcomes: Mapping[str, int]
-    truth_kept: int
+    sets: SetCounts
+    hits: HitEstimate | None
     phi_held: int
     phi_known: int
 
@@ -89,12 +94,15 @@ def samples(folder: CampaignFolder, cell: int | None = None, levels: Sequence[fl
     noises = noises_of(folder)
     counts = {noise: _Counts() for noise in noises}
     guarantees = folder.manifest.guarantee and folder.manifest.scenario.set_model.is_guaranteed
-    columns = ["truth_margin_m", *(("miss_m", "guaranteed_miss_m") if guarantees else ())]
+    columns = ["truth_margin_m", "set_emptied", "hit", *(("miss_m", "guaranteed_miss_m") if guarantees else ())]
     for numbers, codes in folder.shards(columns, {"noise": noises, "outcome": OUTCOMES}, cell):
         for code, count in enumerate(counts.values()):
             rows = codes["noise"] == code
             count.outcomes += np.bincount(codes["outcome"][rows], minlength=len(OUTCOMES))
-            count.truth_kept += int((numbers["truth_margin_m"][rows].filled(0.0) >= 0.0).sum())
+            kept, emptied = numbers["truth_margin_m"][rows].filled(0.0) >= 0.0, numbers["set_emptied"][rows].data > 0.0
+            count.sets += set_counts(kept, emptied)
+            count.hits += int(numbers["hit"][rows].sum() or 0)
+            count.sized += int(numbers["hit"][rows].count())
             if guarantees:
                 guaranteed = numbers["guaranteed_miss_m"][rows]
                 count.phi_known += int(guaranteed.count())
@@ -115,7 +123,8 @@ def samples(folder: CampaignFolder, cell: int | None = None, levels: Sequence[fl
             quantiles[noise],
             worst[noise],
             {name: int(runs) for name, runs in zip(OUTCOMES, count.outcomes, strict=True) if runs},
-            count.truth_kept,
+            count.sets,
+            estimate_hits(count.hits, count.sized) if count.sized else None,
             count.phi_held,
             count.phi_known,
         )
@@ -129,7 +138,9 @@ class _Counts:
     """Counts over the rows of a noise."""
 
     outcomes: NDArray[np.int64] = field(default_factory=lambda: np.zeros(len(OUTCOMES), dtype=np.int64))
-    truth_kept: int = 0
+    sets: SetCounts = field(default_factory=SetCounts)
+    hits: int = 0
+    sized: int = 0
     phi_held: int = 0
     phi_known: int = 0
 
@@ -165,7 +176,7 @@ def worst_runs(folder: CampaignFolder, scenario_file: Path) -> list[dict[str, An
     indices = np.argpartition(-miss, count - 1)[:count] if count else np.zeros(0, dtype=np.int64)
     indices = indices[np.lexsort((indices, -miss[indices]))]
     return [
-        {key: row[key] for key in ("run", "noise", "outcome", "miss_m", "impulse_m_s")}
+        {key: row[key] for key in ("run", "noise", "outcome", "hit", "miss_m", "impulse_m_s")}
         | {"replay": replay_line(scenario_file, row["run"], folder.manifest.seed, row["noise"]) + own}
         for row in folder.at(indices.tolist())
     ]
@@ -182,7 +193,9 @@ def sample_json(sample: Sample) -> dict[str, Any]:
         "noise": sample.noise,
         "runs": sample.runs,
         "outcomes": dict(sample.outcomes),
-        "truth_kept": sample.truth_kept,
+        **hit_key(sample.hits),
+        "truth_kept": sample.sets.truth_kept,
+        "set_emptied": sample.sets.set_emptied,
         "phi_held": sample.phi_held if sample.phi_known else None,
         "phi_known": sample.phi_known,
         **{
@@ -202,17 +215,12 @@ def sample_json(sample: Sample) -> dict[str, Any]:
     }
 
 
-def samples_table(by_noise: Sequence[Sample], model: str) -> tuple[Table, list[str]]:
-    """Return the quantiles with their intervals, a block for each noise, and a line with the outcomes of each noise.
+def samples_table(by_noise: Sequence[Sample], scenario: Scenario) -> tuple[Table, list[str]]:
+    """Return the quantiles with their intervals, a block for each noise, and lines about hits, sets and outcomes.
 
-    Parameters
-    ----------
-    by_noise : sequence of Sample
-        At least one sample.
-    model : str
-        Name of the set model; the model `paper` has no guarantee.
+    There must be at least one sample.
     """
-    phi = "the paper's Phi (not a bound here), m" if model == "paper" else "guaranteed miss, m"
+    phi = bound_name(scenario)
     names = {"miss_m": "miss, m", "impulse_m_s": "impulse, m/s", "guaranteed_miss_m": phi}
     table = Table("noise", box=None, pad_edge=False)
     table.add_column("quantity", no_wrap=True)
@@ -227,10 +235,10 @@ def samples_table(by_noise: Sequence[Sample], model: str) -> tuple[Table, list[s
             table.add_row(first, names[quantity], *values, number(sample.worst[quantity]))
             table.add_row("", "  lower limit", *(number(estimate.lower) for estimate in estimates), "", style="dim")
             table.add_row("", "  upper limit", *(number(estimate.upper) for estimate in estimates), "", style="dim")
-        others = [f"{count} {name}" for name, count in sample.outcomes.items() if name != Outcome.INTERCEPTED.value]
+        outcomes = ", ".join(f"{count} {name}" for name, count in sample.outcomes.items())
         held = f"; miss within the bound Phi: {sample.phi_held} of {sample.phi_known} runs" if sample.phi_known else ""
-        notes.append(
-            f"{sample.noise} noise: true state inside the set at every step: {sample.truth_kept} of {sample.runs} "
-            f"runs{held}; other outcomes than intercepted: {', '.join(others) or 'none'}"
-        )
-    return table, notes
+        hits = hit_text(sample.hits, scenario)
+        notes += [
+            f"{sample.noise} noise: {text}" for text in (hits, f"{sample.sets}{held}; outcomes: {outcomes}") if text
+        ]
+    return table, notes + set_warnings(scenario.set_model.kind, sum((sample.sets for sample in by_noise), SetCounts()))

@@ -1,7 +1,7 @@
 """The keys of a scenario file that a sweep varies, each over a range of values in the unit of the file.
 
-A cell is made by the reader of scenario files: the scenario is written as a file, values are replaced in its text, and
-the text is read. A cell is therefore valid exactly when a file with its values is, and has the same error messages.
+A cell is made by the reader of scenario files: the scenario is written as a file, which is read with other values. A
+cell is therefore valid exactly when a file with its values is, and has the same error messages.
 """
 
 from __future__ import annotations
@@ -11,12 +11,13 @@ import math
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from decimal import Context, Decimal, InvalidOperation
 from typing import Any, Literal
 
+from experiments.campaigns.axis_names import SCALE, tied_keys, unit_of
 from experiments.common.errors import InputError
-from experiments.common.toml_values import LARGEST, SMALLEST, nearest, number_text, shown
+from experiments.common.settings import ENDS, similar_key
+from experiments.common.toml_values import LARGEST, SMALLEST, number_text, shown
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
 from experiments.interception.scenario_tables import OPTIONAL_SENSORS
 from sim.scenario import Scenario
@@ -24,23 +25,12 @@ from sim.storage import MOST_CELLS, Axis
 
 MOST_AXES = 4
 MOST_VALUES = 1000
-EXAMPLE = "--vary angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:8,thruster.greatest_impulse_m_s=2:20:7"
+EXAMPLE = "--vary angle_sensor.scale=0.5:4:8,thruster.greatest_impulse_m_s=2:20:7"
 
 _PLACES = Context(prec=12)
 """Values between the ends are rounded to 12 digits."""
 
-_OPTIONAL = ("sun", *OPTIONAL_SENSORS, "target")
-_ENDS = ("least", "greatest")
-
-
-@dataclass(frozen=True)
-class _Key:
-    """A key that can be varied: its table, the end of a pair, and whether it must be a whole number."""
-
-    table: str
-    name: str
-    end: str | None = None
-    whole: bool = False
+_OPTIONAL = ("sun", *OPTIONAL_SENSORS, "target", "body")
 
 
 def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
@@ -50,9 +40,8 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
     ----------
     text : str
         `table.key=FROM:TO:COUNT` or `table.key=log:FROM:TO:COUNT`, separated by commas. Of a key that is a pair,
-        `table.key.least` or `table.key.greatest` is varied.
-    scenario : Scenario
-        Scenario whose keys can be varied.
+        `table.key.least` or `table.key.greatest` is varied. `one.key=other.key=FROM:TO:COUNT` gives both keys the same
+        values. `sensor.scale` is a factor of all error bounds of a sensor.
 
     Raises
     ------
@@ -64,7 +53,8 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
     if len(pieces) > MOST_AXES:
         raise InputError(f"--vary: at most {MOST_AXES} keys can be varied at once, found {len(pieces)}; leave some out")
     axes = tuple(_axis(piece, known) for piece in pieces)
-    keys = [axis.key for axis in axes]
+    scaled = _error_bounds(scenario)
+    keys = [key for axis in axes for tied in tied_keys(axis.key) for key in scaled.get(tied, {tied: 0.0})]
     if len(set(keys)) < len(keys):
         (twice, *_) = [key for key in keys if keys.count(key) > 1]
         raise InputError(f"--vary: {twice} is named twice; name each key once")
@@ -82,33 +72,46 @@ def sweep_cells(scenario: Scenario, axes: Sequence[Axis]) -> tuple[Scenario, ...
     InputError
         If a cell is not a valid scenario; the message is that of a scenario file.
     """
-    known = _known_keys(scenario)
+    known, scaled = _known_keys(scenario), _error_bounds(scenario)
     text = scenario_to_toml(scenario)
     cells = []
     for values in itertools.product(*(axis.values for axis in axes)):
-        changed, replaced = text, []
+        replaced = {}
         for axis, value in zip(axes, values, strict=True):
-            key = known[axis.key]
-            literal = str(round(value)) if key.whole else number_text(value)
-            changed = _with_value(changed, key, literal)
-            replaced.append(f"{axis.key} = {literal}")
-        cells.append(read_scenario(changed, f"{scenario.name} with {', '.join(replaced)}"))
+            for key in tied_keys(axis.key):
+                bounds = scaled.get(key)
+                if bounds is None:
+                    replaced[key] = str(round(value)) if known[key] else number_text(value)
+                else:
+                    products = {name: Decimal(str(bound)) * Decimal(str(value)) for name, bound in bounds.items()}
+                    replaced |= {name: number_text(float(_PLACES.plus(product))) for name, product in products.items()}
+        changes = ", ".join(f"{key} = {literal}" for key, literal in replaced.items())
+        cells.append(read_scenario(text, f"{scenario.name} with {changes}", replaced))
     return tuple(cells)
 
 
-def _known_keys(scenario: Scenario) -> dict[str, _Key]:
-    """Return the keys of a scenario whose values are numbers."""
-    known: dict[str, _Key] = {}
+def _known_keys(scenario: Scenario) -> dict[str, bool]:
+    """Return the keys of a scenario whose values are numbers, and whether a value must be a whole number."""
+    known: dict[str, bool] = {}
     for table, keys in _tables(scenario).items():
         for name, value in keys.items():
             path = f"{table}.{name}"
             if isinstance(value, list) or table == "dispersion":
-                known |= {f"{path}.{end}": _Key(table, name, end) for end in _ENDS}
+                known |= {f"{path}.{end}": False for end in ENDS}
             if table == "dispersion":  # a start that is fixed
-                known[path] = _Key(table, name)
+                known[path] = False
             elif isinstance(value, int | float) and not isinstance(value, bool):
-                known[path] = _Key(table, name, whole=isinstance(value, int))
-    return known
+                known[path] = isinstance(value, int)
+    return {"body.radius_m": False} | known | dict.fromkeys(_error_bounds(scenario), False)
+
+
+def _error_bounds(scenario: Scenario) -> dict[str, dict[str, float]]:
+    """Return the error bounds of each sensor by key, under the name of their common factor: `angle_sensor.scale`."""
+    return {
+        f"{table}.{SCALE}": {f"{table}.{name}": value for name, value in keys.items() if "error" in name}
+        for table, keys in _tables(scenario).items()
+        if table in ("angle_sensor", *OPTIONAL_SENSORS)
+    }
 
 
 def _tables(scenario: Scenario) -> Mapping[str, Mapping[str, Any]]:
@@ -116,12 +119,18 @@ def _tables(scenario: Scenario) -> Mapping[str, Mapping[str, Any]]:
     return {table: keys for table, keys in values.items() if isinstance(keys, dict)}
 
 
-def _axis(piece: str, known: Mapping[str, _Key]) -> Axis:
-    key, equals, written = (part.strip() for part in piece.partition("="))
-    if not equals or not key:
+def _axis(piece: str, known: Mapping[str, bool]) -> Axis:
+    *keys, written = (part.strip() for part in piece.split("="))
+    key = "=".join(keys)
+    if not key:
         raise InputError(f"--vary: {shown(piece)} is not written as KEY=FROM:TO:COUNT; for example {EXAMPLE}")
-    if key not in known:
-        raise InputError(f"--vary: {_unknown(key, known)}")
+    for single in keys:
+        if single not in known:
+            raise InputError(f"--vary: {_unknown(single, known)}")
+    if len({unit_of(single) for single in keys}) > 1:
+        units = ", ".join(f"{single} in {unit_of(single) or 'no unit'}" for single in keys)
+        raise InputError(f"--vary: keys with the same values must have the same unit, found {units}")
+    whole = any(known[single] for single in keys)
     parts = [part.strip() for part in written.split(":")]
     scale: Literal["linear", "log"] = "linear"
     if parts[0] == "log":
@@ -136,26 +145,23 @@ def _axis(piece: str, known: Mapping[str, _Key]) -> Axis:
     if scale == "log" and first <= 0:
         raise InputError(f"--vary: {key}: on a logarithmic scale values must be greater than 0, found {shown(written)}")
     count = _count(parts[2], key)
-    values = _spaced(first, last, count, scale, whole=known[key].whole)
+    values = _spaced(first, last, count, scale, whole=whole)
     if len(set(values)) < count:
         raise InputError(
             f"--vary: {key}: {count} values from {parts[0]} to {parts[1]} are not all different"
-            f"{' whole numbers' if known[key].whole else ''}; give fewer values"
+            f"{' whole numbers' if whole else ''}; give fewer values"
         )
     return Axis(key, values, scale)
 
 
-def _unknown(key: str, known: Mapping[str, _Key]) -> str:
+def _unknown(key: str, known: Mapping[str, bool]) -> str:
     names = list(known)
     table = key.partition(".")[0]
-    if table in _OPTIONAL and table not in {other.table for other in known.values()}:
+    if table in _OPTIONAL and table not in {other.partition(".")[0] for other in known}:
         return f"the scenario has no [{table}]; add that table to its file, or vary something else"
     if f"{key}.least" in known:
         return f"{key} is a pair; vary {key}.least or {key}.greatest"
-    guess = nearest(key, names)
-    if guess is None:  # the text may be the last part of a key only
-        alike = [name for name in names if key.rsplit(".", 1)[-1] in name.split(".")]
-        guess = " or ".join(alike[:3]) or None
+    guess = similar_key(key, names)
     hint = f"did you mean {guess}?" if guess else f"its numeric keys are: {', '.join(names)}"
     return f"the scenario has no numeric key {shown(key)}; {hint}"
 
@@ -189,17 +195,3 @@ def _spaced(first: Decimal, last: Decimal, count: int, scale: str, *, whole: boo
         between = [first + (last - first) * index / (count - 1) for index in range(1, count - 1)]
     values = [first, *(_PLACES.plus(value) for value in between), last]
     return tuple(float(round(value)) if whole else float(value) for value in values)
-
-
-def _with_value(text: str, key: _Key, literal: str) -> str:
-    """Replace a value in the text of `scenario_to_toml`, which has one key on a line."""
-    lines = text.split("\n")
-    table = lines.index(f"[{key.table}]")
-    row = next(index for index in range(table, len(lines)) if lines[index].startswith(f"{key.name} = "))
-    if key.end is not None:
-        pair = lines[row].partition(" = ")[2].strip("[]").split(", ")
-        ends = [pair[0], pair[-1]]
-        ends[_ENDS.index(key.end)] = literal
-        literal = f"[{ends[0]}, {ends[1]}]"
-    lines[row] = f"{key.name} = {literal}"
-    return "\n".join(lines)

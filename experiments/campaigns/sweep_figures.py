@@ -1,25 +1,39 @@
-"""Figures of a sweep: quantiles as lines (one key) or heat maps (two keys), with the bound of a requirement."""
+"""Figures of a sweep: the decisions about the requirement, and quantiles as lines (one key) or heat maps (two keys)."""
 
 from __future__ import annotations
 
+import itertools
 import math
+import textwrap
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
-from matplotlib.colors import Colormap, LinearSegmentedColormap, LogNorm, Normalize
+from matplotlib.colors import Colormap, LinearSegmentedColormap, ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.markers import CARETUPBASE
-from matplotlib.patheffects import Stroke
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
+from matplotlib.patches import Patch, Rectangle
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
-from experiments.campaigns.sweep_table import SweepTable, crossings, key_label, unit_of
-from experiments.common.figure_style import CURVE_LOOKS, IMPULSE, INK, new_figure, place_axes, style
+from experiments.campaigns.axis_names import key_label, unit_of
+from experiments.campaigns.sweep_table import Limit, SweepTable, answers, limits
+from experiments.common.figure_style import (
+    CURVE_LOOKS,
+    IMPULSE,
+    INK,
+    LIMIT,
+    new_figure,
+    place_axes,
+    separate_labels,
+    style,
+    width_mm,
+)
 from sim import QuantileName, Requirement
+from sim.requirement import AnyRequirement, Decision
 from sim.stopping_rule import level_name
 from sim.storage import Axis
 
@@ -29,8 +43,16 @@ Grid = np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]
 MOST_NUMBERS = 120
 """Greatest number of cells for which numbers are drawn in the cells."""
 
-QUANTITY_NAMES = {"miss_m": "miss, m", "impulse_m_s": "impulse spent, m/s", "guaranteed_miss_m": "guaranteed miss, m"}
+QUANTITY_NAMES = {
+    "miss_m": "miss, m",
+    "impulse_m_s": "impulse spent, m/s",
+    "guaranteed_miss_m": "guaranteed miss, m",
+    "hit": "probability of a hit",
+}
+DECISION_COLOURS = {Decision.MET: "#3f7fb5", Decision.UNDECIDED: "#ececec", Decision.NOT_MET: "#f2a65a"}
+"""Colours that differ in grey too, and for colour-blind readers."""
 _PANEL_MM = 56.0
+_COLUMN_MM = 90.0
 _COLOURS: Colormap = LinearSegmentedColormap.from_list(
     "infoset", ["#f7fbff", "#c6d9ec", "#7fb0d6", "#3f7fb5", "#1b4f8a", "#08306b"]
 )
@@ -42,16 +64,24 @@ _DASHES: tuple[tuple[float, Sequence[float]] | None, ...] = (
 )
 """Line styles from the largest quantile down; None is a solid line."""
 
+_LETTERS = "abcdefghijklmnopqrstuvwxyz"
 _MOST_TICKS = 8
 _HEAD_ROOM = 1.06
 """Factor of the axis, for the arrow of the topmost point."""
+_LOG_FROM = 30.0
+"""Ratio of the greatest to the least value from which the values have a logarithmic axis."""
+_STRIP = 0.045
+"""Height of the strip of decisions above a panel, as a fraction of the panel."""
+_BAR_AT, _NUMBER_AT = 0.2, 0.6
+"""Heights of the limit and of the number in the cells of a map, as fractions of a row."""
+_MM_PER_POINT = 25.4 / 72.0
 
 
-def draw_sweep(table: SweepTable, shown: Sequence[QuantileName], requirement: Requirement | None) -> Figure:
-    """Draw quantiles of a sweep over its one or two axes.
+def draw_sweep(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figure:
+    """Draw the decisions and the quantiles of a sweep with one or two axes, for one noise.
 
-    With one axis there is a panel for each quantity and noise, with the quantiles as lines; with two axes there is a
-    heat map for each quantile and noise. The bound of the requirement is drawn in panels with its quantile.
+    With one axis there is a panel for each quantity, with the quantiles as lines; with two axes there is a map of the
+    decisions, and a heat map for each other quantile. The panel of the requirement is the first.
 
     Raises
     ------
@@ -61,30 +91,57 @@ def draw_sweep(table: SweepTable, shown: Sequence[QuantileName], requirement: Re
     if len(table.axes) not in (1, 2) or not shown:
         raise ValueError("only a sweep with one or two axes can be drawn, with at least one quantile")
     with style():
-        return _lines(table, shown, requirement) if len(table.axes) == 1 else _maps(table, shown, requirement)
+        return _lines(table, shown, noise) if len(table.axes) == 1 else _maps(table, shown, noise)
 
 
-def _lines(table: SweepTable, shown: Sequence[QuantileName], requirement: Requirement | None) -> Figure:
-    quantities = list(dict.fromkeys(quantile.quantity for quantile in shown))
-    rows = len(table.noises)
+@dataclass(frozen=True)
+class _Point:
+    """A value of a sweep's axis, an estimate there, and the ends of its interval."""
+
+    at: float
+    value: float
+    lower: float | None
+    upper: float | None
+
+
+def _points(table: SweepTable, noise: str, quantile: QuantileName | None) -> list[_Point]:
+    """Return the known estimates of a quantile along the axis; None is the probability of a hit."""
+    (axis,), required = table.axes, table.required
+    is_required = quantile is None or (isinstance(required, Requirement) and quantile == required.quantile)
+    points = []
+    for cell, at in enumerate(axis.values):
+        verdict = table.verdict(cell, noise) if is_required else None
+        estimate = verdict if verdict is not None or quantile is None else table.estimate(cell, noise, quantile)
+        if estimate is not None:
+            points.append(_Point(at, estimate.value, estimate.lower, estimate.upper))
+    return points
+
+
+def _lines(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figure:
+    quantities = list(dict.fromkeys([table.required.quantity, *(quantile.quantity for quantile in shown)]))
     levels = sorted({quantile.level for quantile in shown}, reverse=True)
-    figure = new_figure(height_mm=rows * (_PANEL_MM + 16.0) + 12.0, width_mm=90.0 * len(quantities))
-    grid = place_axes(figure, rows, len(quantities), margins_mm=(16.0, 4.0, 22.0, 7.0), gaps_mm=(16.0, 18.0))
-    letter = iter("abcdefghijklmnopqrstuvwxyz")
-    for row, noise in zip(grid, table.noises, strict=True):
-        for axes, quantity in zip(row, quantities, strict=True):
-            quantiles = [quantile for quantile in shown if quantile.quantity == quantity]
-            _line_panel(axes, table, noise, quantiles, levels, requirement)
-            axes.set_title(f"({next(letter)}) {noise} noise")
-            axes.set_ylabel(QUANTITY_NAMES[quantity])
-    handles = [
+    rows = -(-len(quantities) // 2)
+    columns = min(2, len(quantities))
+    figure = new_figure(height_mm=rows * _PANEL_MM + (rows - 1) * 24.0 + 45.0, width_mm=_COLUMN_MM * columns)
+    grid = place_axes(figure, rows, columns, margins_mm=(17.0, 4.0, 34.0, 11.0), gaps_mm=(18.0, 24.0))
+    panels = [axes for row in grid for axes in row]
+    for axes, quantity, letter in zip(panels, quantities, _LETTERS, strict=False):
+        quantiles = [quantile for quantile in shown if quantile.quantity == quantity]
+        _line_panel(axes, table, noise, quantity, quantiles, levels)
+        axes.set_title(f"({letter}) {noise} noise", pad=6.0 + (4.0 if quantity == table.required.quantity else 0.0))
+        axes.set_ylabel(QUANTITY_NAMES[quantity])
+    for unused in panels[len(quantities) :]:
+        unused.remove()
+    handles: list[Any] = [
         Line2D([], [], color=INK, linestyle=_look(levels, level), marker="o", markersize=3, label=level_name(level))
         for level in levels
     ]
-    if requirement is not None:
-        handles.append(Line2D([], [], color=IMPULSE, linewidth=0.9, label=f"required: {_words(requirement)}"))
-    note = "bars: 95 % confidence intervals; arrow: too few runs for an upper end"
-    figure.legend(handles=handles, loc="lower center", ncols=len(handles), title=note, title_fontsize=7.0)
+    handles.append(Line2D([], [], color=IMPULSE, linewidth=0.9, label=f"required: {requirement_words(table.required)}"))
+    handles += [Patch(facecolor=colour, label=str(decision)) for decision, colour in DECISION_COLOURS.items()]
+    if table.radius_m is not None:
+        handles.append(Line2D([], [], color=LIMIT, linestyle="--", linewidth=0.9, label="radius of the body"))
+    note = "bars: 95 % confidence intervals; arrow: too few runs for an upper end; shaded: limit with 95 % confidence"
+    figure.legend(handles=handles, loc="lower center", ncols=4, title=note, title_fontsize=7.0)
     return figure
 
 
@@ -92,88 +149,145 @@ def _line_panel(
     axes: Axes,
     table: SweepTable,
     noise: str,
+    quantity: str,
     quantiles: Sequence[QuantileName],
     levels: Sequence[float],
-    requirement: Requirement | None,
 ) -> None:
-    (axis,) = table.axes
+    (axis,), required = table.axes, table.required
     colour = CURVE_LOOKS[1 if noise == "random" else 3]["color"]
-    for quantile in quantiles:
-        estimates = [table.estimate(cell, noise, quantile) for cell in range(len(axis.values))]
-        known = [
-            (value, estimate) for value, estimate in zip(axis.values, estimates, strict=True) if estimate is not None
-        ]
-        if not known:
-            continue
-        keys, values = [value for value, _ in known], [estimate.value for _, estimate in known]
+    lines = [(_points(table, noise, quantile), _look(levels, quantile.level)) for quantile in quantiles]
+    if quantity == "hit":
+        lines = [(_points(table, noise, None), "-")]
+    for points, look in lines:
         axes.plot(
-            keys,
-            values,
+            [point.at for point in points],
+            [point.value for point in points],
             color=colour,
-            linestyle=_look(levels, quantile.level),
+            linestyle=look,
             marker="o",
             markersize=3.0,
             zorder=3.0,
         )
-        ends = [(estimate.lower, estimate.upper) for _, estimate in known]
-        for key, value, (lower, upper) in zip(keys, values, ends, strict=True):
-            axes.plot(
-                [key, key],
-                [value if lower is None else lower, value if upper is None else upper],
-                color=colour,
-                linewidth=0.8,
-                zorder=2.0,
-            )
-            if upper is None:
-                axes.plot([key], [value], marker=CARETUPBASE, markersize=6.0, color=colour, zorder=2.0)
-        if requirement is not None and requirement.quantile == quantile:
-            axes.axhline(requirement.bound, color=IMPULSE, linewidth=0.9, zorder=2.5)
-            for crossing in crossings(keys, values, requirement.bound, axis.scale):
-                axes.plot([crossing], [requirement.bound], marker="D", markersize=4.5, color=IMPULSE, zorder=5.0)
-                axes.vlines(crossing, 0.0, requirement.bound, color=IMPULSE, linewidth=0.7, linestyle=":", zorder=2.5)
-                axes.annotate(
-                    f"{crossing / 10.0 ** _power(axis):.3g}",
-                    (crossing, 0.0),
-                    xycoords=axes.get_xaxis_transform(),
-                    xytext=(0.0, 3.0),
-                    textcoords="offset points",
-                    ha="center",
-                    color=IMPULSE,
-                    bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8},
-                    zorder=6.0,
-                )
-    axes.set_ylim(0.0, _HEAD_ROOM * axes.get_ylim()[1])
+        for point in points:
+            lower = point.value if point.lower is None else point.lower
+            upper = point.value if point.upper is None else point.upper
+            axes.plot([point.at, point.at], [lower, upper], color=colour, linewidth=0.8, zorder=2.0)
+            if point.upper is None:
+                axes.plot([point.at], [point.value], marker=CARETUPBASE, markersize=6.0, color=colour, zorder=2.0)
+    if quantity == "miss_m" and table.radius_m is not None:
+        axes.axhline(table.radius_m, color=LIMIT, linestyle="--", linewidth=0.9, zorder=2.5)
+    if quantity == required.quantity:
+        axes.axhline(required.bound, color=IMPULSE, linewidth=0.9, zorder=2.5)
+    _scale_values(axes, quantity, [point.value for points, _ in lines for point in points])
     _scale(axes, axis, "x")
+    if quantity == required.quantity:
+        _mark_decisions(axes, table, noise)
+    separate_labels(axes)
 
 
-def _maps(table: SweepTable, shown: Sequence[QuantileName], requirement: Requirement | None) -> Figure:
-    panels = [(noise, quantile) for noise in table.noises for quantile in shown]
-    columns = min(2, len(panels))
-    rows = -(-len(panels) // columns)
-    figure = new_figure(height_mm=rows * (_PANEL_MM + 20.0) + 10.0, width_mm=90.0 * columns)
-    grid = place_axes(figure, rows, columns, margins_mm=(16.0, 16.0, 20.0, 8.0), gaps_mm=(33.0, 20.0))
-    for (noise, quantile), axes, letter in zip(
-        panels, (axes for row in grid for axes in row), "abcdefghijklmnopqrstuvwxyz", strict=False
-    ):
-        _map_panel(figure, axes, table, noise, quantile, requirement)
+def _mark_decisions(axes: Axes, table: SweepTable, noise: str) -> None:
+    """Draw a strip with the decision at each value above a panel, and the limits with their intervals."""
+    (axis,) = table.axes
+    edges = _edges(axis)
+    for cell, (left, right) in enumerate(itertools.pairwise(edges.tolist())):
+        verdict = table.verdict(cell, noise)
+        if verdict is not None:
+            axes.add_patch(
+                Rectangle(
+                    (left, 1.0),
+                    right - left,
+                    _STRIP,
+                    transform=axes.get_xaxis_transform(),
+                    facecolor=DECISION_COLOURS[verdict.decision],
+                    edgecolor="white",
+                    linewidth=0.5,
+                    clip_on=False,
+                )
+            )
+    axes.set_xlim(edges[0], edges[-1])
+    (answer,) = answers(table, noise)
+    for limit in answer.limits:
+        axes.axvspan(limit.lower, limit.upper, color=IMPULSE, alpha=0.15, linewidth=0.0, zorder=0.5)
+        if limit.value is not None:
+            axes.axvline(limit.value, color=IMPULSE, linewidth=0.9, linestyle=":", zorder=2.5)
+    if answer.limits:
+        words = "; ".join(_limit_words(axis, limit) for limit in answer.limits[:2])
+        axes.set_xlabel(f"{axes.get_xlabel()}\nlimit: {words}")
+
+
+def _limit_words(axis: Axis, limit: Limit) -> str:
+    unit = unit_of(axis.key)
+    value = "" if limit.value is None else f"{limit.value:.3g}, "
+    return f"{value}between {limit.lower:.3g} and {limit.upper:.3g} {unit}".rstrip()
+
+
+def _maps(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figure:
+    required = table.required
+    quantiles = [
+        quantile for quantile in shown if not (isinstance(required, Requirement) and quantile == required.quantile)
+    ]
+    columns = min(2, 1 + len(quantiles))
+    rows = -(-(1 + len(quantiles)) // columns)
+    figure = new_figure(height_mm=rows * _PANEL_MM + (rows - 1) * 21.0 + 35.0, width_mm=_COLUMN_MM * columns)
+    grid = place_axes(figure, rows, columns, margins_mm=(17.0, 17.0, 27.0, 8.0), gaps_mm=(36.0, 21.0))
+    first, *others = (axes for row in grid for axes in row)
+    _decision_panel(first, table, noise)
+    first.set_title(f"(a) {requirement_words(required)}; {noise} noise")
+    for quantile, axes, letter in zip(quantiles, others, _LETTERS[1:], strict=False):
+        _map_panel(figure, axes, table, noise, quantile)
         name, unit = QUANTITY_NAMES[quantile.quantity].split(", ")
         axes.set_title(f"({letter}) {name}, {level_name(quantile.level)}, {unit}; {noise} noise")
-    for unused in [axes for row in grid for axes in row][len(panels) :]:
+    for unused in others[len(quantiles) :]:
         unused.remove()
-    if requirement is not None and requirement.quantile in shown:
-        line = Line2D([], [], color=IMPULSE, linewidth=1.5, label=f"required: {_words(requirement)}")
-        figure.legend(handles=[line], loc="lower center")
+    handles: list[Any] = [Patch(facecolor=colour, label=str(decision)) for decision, colour in DECISION_COLOURS.items()]
+    handles.append(
+        Line2D([], [], color=IMPULSE, marker="D", markersize=4.0, linewidth=1.5, label="limit, with 95 % confidence")
+    )
+    numbers = f"numbers in (a): {QUANTITY_NAMES[required.quantity]}"
+    if isinstance(required, Requirement):
+        numbers += f", {level_name(required.quantile.level)}"
+    figure.legend(handles=handles, loc="lower center", ncols=len(handles), title=numbers, title_fontsize=7.0)
     return figure
 
 
-def _map_panel(
-    figure: Figure,
-    axes: Axes,
-    table: SweepTable,
-    noise: str,
-    quantile: QuantileName,
-    requirement: Requirement | None,
-) -> None:
+def _decision_panel(axes: Axes, table: SweepTable, noise: str) -> None:
+    """Draw the decision and the estimate of each cell, and the limit of each row with its interval."""
+    across, up = table.axes
+    shape = len(across.values), len(up.values)
+    verdicts = [table.verdict(cell, noise) for cell in range(len(table.cells))]
+    decisions = list(DECISION_COLOURS)
+    codes = [0 if verdict is None else decisions.index(verdict.decision) for verdict in verdicts]
+    shown = np.ma.MaskedArray(codes, mask=[verdict is None for verdict in verdicts]).reshape(shape)
+    axes.pcolormesh(
+        _edges(across),
+        _edges(up),
+        shown.T,
+        cmap=ListedColormap([*DECISION_COLOURS.values()]),
+        vmin=-0.5,
+        vmax=2.5,
+        edgecolors="white",
+        linewidth=0.3,
+        zorder=1.0,
+    )
+    _scale(axes, across, "x")
+    _scale(axes, up, "y")
+    axes.grid(visible=False)
+    values = np.ma.MaskedArray(
+        [0.0 if verdict is None else verdict.value for verdict in verdicts], mask=np.ma.getmaskarray(shown).ravel()
+    ).reshape(shape)
+    _write_numbers(axes, across, up, values.T, lambda row, column: shown[column, row] == 0, _NUMBER_AT)
+    for row, height in enumerate(_heights(up, _BAR_AT)):
+        cells = [verdicts[column * shape[1] + row] for column in range(shape[0])]
+        for limit in limits(across, cells, table.required.bound):
+            ends = [limit.lower, limit.upper]
+            axes.plot(ends, [height, height], color="white", linewidth=3.2, solid_capstyle="butt", zorder=4.0)
+            axes.plot(ends, [height, height], color=IMPULSE, linewidth=1.5, solid_capstyle="butt", zorder=4.5)
+            if limit.value is not None:
+                axes.plot([limit.value], [height], "D", markersize=4.0, color=IMPULSE, mec="white", mew=0.6, zorder=5.0)
+    separate_labels(axes)
+
+
+def _map_panel(figure: Figure, axes: Axes, table: SweepTable, noise: str, quantile: QuantileName) -> None:
     across, up = table.axes
     values = table.grid(noise, quantile).T
     norm = _norm(values)
@@ -181,72 +295,46 @@ def _map_panel(
         _edges(across), _edges(up), values, cmap=_COLOURS, norm=norm, edgecolors="white", linewidth=0.3, zorder=1.0
     )
     bar = figure.colorbar(image, ax=axes, cax=_colour_axes(figure, axes))
+    bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)) if isinstance(norm, LogNorm) else MaxNLocator(6))
     bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
     bar.ax.yaxis.set_minor_formatter(NullFormatter())
     _scale(axes, across, "x")
     _scale(axes, up, "y")
     axes.grid(visible=False)
-    if values.size <= MOST_NUMBERS:
-        _write_numbers(axes, across, up, values, norm)
-    if requirement is None or requirement.quantile != quantile:
+    _write_numbers(axes, across, up, values, lambda row, column: float(norm(float(values[row, column]))) > 0.48)
+    separate_labels(axes)
+    separate_labels(bar.ax)
+
+
+def _write_numbers(axes: Axes, across: Axis, up: Axis, values: Grid, is_dark: Any, part: float = 0.5) -> None:
+    """Write the known values into the cells of a map, unless there are too many."""
+    if values.size > MOST_NUMBERS:
         return
-    met = values < requirement.bound
-    if met.any() and not met.all():
-        limit = LineCollection(
-            between(_edges(across), _edges(up), met), colors=IMPULSE, capstyle="projecting", zorder=4.0
-        )
-        limit.set_path_effects([Stroke(linewidth=3.2, foreground="white"), Stroke(linewidth=1.5, foreground=IMPULSE)])
-        axes.add_collection(limit, autolim=False)
-    else:
-        extent = "everywhere" if met.all() else "nowhere"
-        axes.set_xlabel(f"{axes.get_xlabel()}\n{_words(requirement)}: {extent}")
-
-
-def between(across: Floats, up: Floats, met: np.ma.MaskedArray[Any, Any]) -> list[list[tuple[float, float]]]:
-    """Return the edges between a cell that meets the requirement and a neighbour that does not.
-
-    Parameters
-    ----------
-    across, up : ndarray, shape (n + 1,) and (m + 1,)
-        Edges of the columns and of the rows.
-    met : masked array of bool, shape (m, n)
-        Whether each cell meets the requirement; a masked cell has no edges.
-    """
-    rows, columns = met.shape
-    right = np.ma.filled(met[:, 1:] != met[:, :-1], fill_value=False)
-    above = np.ma.filled(met[1:, :] != met[:-1, :], fill_value=False)
-    upright = [
-        [(float(across[column + 1]), float(up[row])), (float(across[column + 1]), float(up[row + 1]))]
-        for row in range(rows)
-        for column in range(columns - 1)
-        if right[row, column]
-    ]
-    level = [
-        [(float(across[column]), float(up[row + 1])), (float(across[column + 1]), float(up[row + 1]))]
-        for row in range(rows - 1)
-        for column in range(columns)
-        if above[row, column]
-    ]
-    return upright + level
-
-
-def _write_numbers(axes: Axes, across: Axis, up: Axis, values: Grid, norm: Normalize) -> None:
-    size = 6.5 if max(len(across.values), len(up.values)) <= 8 else 5.0
-    for row, y in enumerate(up.values):
+    room_mm = width_mm(axes) / len(across.values)
+    size = min(6.5, room_mm / _MM_PER_POINT / 2.6)
+    for row, height in enumerate(_heights(up, part)):
         for column, x in enumerate(across.values):
             if np.ma.getmaskarray(values)[row, column]:
                 continue
             value = float(values[row, column])
             axes.text(
                 x,
-                y,
+                height,
                 f"{value:.3g}" if value < 100.0 else f"{value:.0f}",
                 ha="center",
                 va="center",
                 fontsize=size,
-                color="white" if float(norm(value)) > 0.48 else INK,
-                zorder=5.0,
+                color="white" if is_dark(row, column) else INK,
+                zorder=6.0,
             )
+
+
+def _heights(up: Axis, part: float) -> Floats:
+    """Return a height within each row of a map, as a fraction of the row on the scale of the axis."""
+    edges = _edges(up)
+    if up.scale == "log":
+        return np.asarray(edges[:-1] ** (1.0 - part) * edges[1:] ** part)
+    return np.asarray(edges[:-1] + part * (edges[1:] - edges[:-1]))
 
 
 def _norm(values: Grid) -> Normalize:
@@ -273,6 +361,21 @@ def _edges(axis: Axis) -> Floats:
     return np.exp(edges) if axis.scale == "log" else edges
 
 
+def _scale_values(axes: Axes, quantity: str, values: Sequence[float]) -> None:
+    """Set the scale of the estimates: logarithmic if they differ by decades, otherwise from zero."""
+    if quantity == "hit":
+        axes.set_ylim(0.0, 1.0)
+        return
+    positive = [value for value in values if value > 0.0]
+    if positive and len(positive) == len(values) and max(positive) > _LOG_FROM * min(positive):
+        axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
+        axes.yaxis.set_minor_formatter(NullFormatter())
+    else:
+        axes.set_ylim(0.0, _HEAD_ROOM * axes.get_ylim()[1])
+
+
 def _scale(axes: Axes, axis: Axis, which: str) -> None:
     """Set scale and label of an axis; the ticks are at its values if they are few."""
     one = axes.xaxis if which == "x" else axes.yaxis
@@ -283,13 +386,13 @@ def _scale(axes: Axes, axis: Axis, which: str) -> None:
         one.set_major_locator(FixedLocator(axis.values))
         one.set_minor_locator(NullLocator())
     power = _power(axis)
-    one.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick / 10.0**power:.3g}"))
+    one.set_major_formatter(FuncFormatter(lambda tick, _: f"{float(f'{tick / 10.0**power:.3g}'):g}"))
     one.set_minor_formatter(NullFormatter())
     one.set_tick_params(length=2.0)
     unit = unit_of(axis.key)
     scaled = f"$10^{{{power}}}$ {unit}".strip() if power else unit
     name = key_label(axis.key).removesuffix(f", {unit}") if unit else key_label(axis.key)
-    one.set_label_text(f"{name}, {scaled}" if scaled else name)
+    one.set_label_text("\n".join(textwrap.wrap(f"{name}, {scaled}" if scaled else name, 52)))
 
 
 def _power(axis: Axis) -> int:
@@ -303,6 +406,9 @@ def _look(levels: Sequence[float], level: float) -> Any:
     return _DASHES[min(levels.index(level), len(_DASHES) - 1)] or "-"
 
 
-def _words(requirement: Requirement) -> str:
-    name, unit = QUANTITY_NAMES[requirement.quantile.quantity].split(", ")
-    return f"{name} {level_name(requirement.quantile.level)} under {requirement.bound:g} {unit}"
+def requirement_words(required: AnyRequirement) -> str:
+    """Return a requirement in words: `miss p99 under 10 m`."""
+    if not isinstance(required, Requirement):
+        return f"probability of a hit at least {required.share:g}"
+    name, unit = QUANTITY_NAMES[required.quantity].split(", ")
+    return f"{name} {level_name(required.quantile.level)} under {required.bound:g} {unit}"

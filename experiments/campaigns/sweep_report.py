@@ -2,26 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from experiments.campaigns.axis_names import unit_of
 from experiments.campaigns.samples import heading, sample_json
 from experiments.campaigns.sweep_figures import draw_sweep
-from experiments.campaigns.sweep_table import SHOWN, SweepTable, answers, sweep_table, unit_of
+from experiments.campaigns.sweep_table import SHOWN, SHOWN_WITH_HITS, SweepTable, answers, sweep_table
 from experiments.common.errors import InputError
-from experiments.common.output import Output
-from experiments.common.screen import number
+from experiments.common.output import Output, hit_key
+from experiments.common.screen import number, number_table
+from experiments.interception.study import SetCounts, set_warnings
 from sim import QuantileName, Requirement
-from sim.storage import CampaignFolder
+from sim.requirement import CONFIDENCE, MOST_RUNS_NEEDED, AnyRequirement, Decision, Verdict, parse_requirement
+from sim.storage import CampaignFolder, Manifest
 
 TABLE = "sweep.parquet"
-FIGURE = "figure-sweep"
 MOST_SHOWN = 8
 MOST_LINES = 40
+
+
+def figure_names(noises: Sequence[str]) -> list[str]:
+    """Return the name of the figure of each noise."""
+    return ["figure-sweep"] if len(noises) == 1 else [f"figure-sweep-{noise}" for noise in noises]
 
 
 @dataclass(frozen=True)
@@ -30,19 +40,14 @@ class SweepReport:
 
     Parameters
     ----------
-    folder : CampaignFolder
-        The sweep, finished or not.
     table : SweepTable
-        The quantiles of its cells.
-    required : Requirement
-        Bound of a quantile.
+        The quantiles of its cells, and the decisions about the requirement.
     shown : sequence of QuantileName
         Quantiles that the figure shows.
     """
 
     folder: CampaignFolder
     table: SweepTable
-    required: Requirement
     shown: Sequence[QuantileName]
 
     @property
@@ -60,75 +65,175 @@ class SweepReport:
                 {"key": axis.key, "unit": unit_of(axis.key), "scale": axis.scale, "values": list(axis.values)}
                 for axis in table.axes
             ],
-            "require": str(self.required),
+            "require": str(table.required),
+            "confidence": CONFIDENCE,
             "answers": [
-                {"noise": noise, "at": at, "met": met}
+                {
+                    "noise": noise,
+                    "at": answer.at,
+                    "met": answer.met,
+                    "limits": [
+                        {"value": limit.value, "lower": limit.lower, "upper": limit.upper} for limit in answer.limits
+                    ],
+                }
                 for noise in table.noises
-                for at, met in answers(table, noise, self.required)
+                for answer in answers(table, noise)
             ],
             "cells": [
                 {
                     "values": self.folder.manifest.values_of(cell),
-                    "samples": [sample_json(sample) for sample in samples],
+                    "requirement": table.decision(cell).value,
+                    **hit_key(table.hits[cell]),
+                    "samples": [
+                        {**sample_json(sample), "requirement": _verdict_json(table.verdict(cell, sample.noise))}
+                        for sample in samples
+                    ],
                 }
                 for cell, samples in enumerate(table.cells)
             ],
         }
 
     def save(self, written: Output) -> None:
-        """Write the table, and the figure of one or two axes, into the output's folder."""
+        """Write the table, and for one or two axes a figure of each noise, into the output's folder."""
         written.save(TABLE, self.folder.table_file(*self.table.columns()))
         if self.is_drawn and written.folder is not None:
-            written.figure(FIGURE, draw_sweep(self.table, self.shown, self.required))
+            for noise, name in zip(self.table.noises, figure_names(self.table.noises), strict=True):
+                written.figure(name, draw_sweep(self.table, self.shown, noise))
 
     def show(self, console: Console) -> None:
-        """Print where the requirement is met and, for a sweep with one axis, the required quantile of every cell."""
+        """Print the decision of every cell, and the limits of the values that meet the requirement."""
 
         def line(text: str) -> None:
             console.print(Text(text), soft_wrap=True)
 
-        folder, table, required = self.folder, self.table, self.required
-        first = table.axes[0]
-        line(
-            f"{folder.manifest.scenario.name}, {len(table.cells)} cells, {folder.finished_runs} of "
-            f"{folder.wanted_runs} runs"
-        )
+        folder, table = self.folder, self.table
+        watched = " although runs are added until it is made" if folder.manifest.until else ""
+        line(f"{folder.manifest.scenario.name}, {len(table.cells)} cells, {folder.finished_runs} runs")
+        line(f"the decision in each cell has a confidence of at least 95 %{watched}")
         for noise in table.noises:
-            lines = answers(table, noise, required)
-            line(f"{noise} noise: {required} is met for these values of {first.key}:")
-            for at, met in lines[:MOST_LINES]:
-                line(f"  {met}{f' (at {at})' if at else ''}")
-            if len(lines) > MOST_LINES:
-                line(f"  {len(lines) - MOST_LINES} more lines are in the JSON report (--json)")
-        if len(table.axes) != 1:
-            return
-        shown = Table(first.key, "noise", box=None, pad_edge=False)
-        for title in ("lower limit", str(required.quantile), "upper limit"):
-            shown.add_column(title, justify="right")
-        for noise in table.noises:
-            for cell, value in enumerate(first.values):
-                estimate = table.estimate(cell, noise, required.quantile)
-                ends = (None,) * 3 if estimate is None else (estimate.lower, estimate.value, estimate.upper)
-                shown.add_row(f"{value:g}", noise, *map(number, ends))
-        console.print(shown)
+            verdicts = [table.verdict(cell, noise) for cell in range(len(table.cells))]
+            counts = Counter(verdict.decision for verdict in verdicts if verdict is not None)
+            decisions = ", ".join(f"{decision} in {counts[decision]}" for decision in Decision)
+            line(f"{noise} noise: {table.required} is {decisions} of {len(verdicts)} cells")
+            self._show_answers(line, noise)
+            for title, part in decision_tables(table, noise, console.width):
+                if title:
+                    line(title)
+                console.print(part)
+            for note in _undecided_notes(verdicts, folder.manifest):
+                line(note)
+        sets = sum((sample.sets for samples in table.cells for sample in samples), SetCounts())
+        for text in (f"all cells: {sets}", *set_warnings(folder.manifest.scenario.set_model.kind, sets)):
+            line(text)
+
+    def _show_answers(self, line: Callable[[str], None], noise: str) -> None:
+        lines = answers(self.table, noise)
+        line(f"along {self.table.axes[0].key}:")
+        for answer in lines[:MOST_LINES]:
+            line(f"  {answer.met}{f' (at {answer.at})' if answer.at else ''}")
+        if len(lines) > MOST_LINES:
+            line(f"  {len(lines) - MOST_LINES} more lines are in the JSON report (--json)")
 
 
-def quantile_options(require: str, show: str | None) -> tuple[Requirement, tuple[QuantileName, ...]]:
-    """Read the values of --require and --show; the required quantile is always among those shown."""
+def _verdict_json(verdict: Verdict | None) -> dict[str, object] | None:
+    if verdict is None:
+        return None
+    return {
+        "decision": verdict.decision.value,
+        "value": verdict.value,
+        "lower": verdict.lower,
+        "upper": verdict.upper,
+        "runs_needed": verdict.runs_needed,
+    }
+
+
+def _undecided_notes(verdicts: Sequence[Verdict | None], manifest: Manifest) -> list[str]:
+    """Return a line about the runs of the undecided cells, and how many more may decide them."""
+    undecided = [verdict for verdict in verdicts if verdict is not None and verdict.decision is Decision.UNDECIDED]
+    if not undecided:
+        return []
+    runs = sorted({verdict.runs for verdict in undecided})
+    after = " to ".join(dict.fromkeys((str(runs[0]), str(runs[-1]))))
+    text = "1 cell is undecided" if len(undecided) == 1 else f"{len(undecided)} cells are undecided"
+    more = sorted(verdict.runs_needed - verdict.runs for verdict in undecided if verdict.runs_needed is not None)
+    if more:
+        amount = " to ".join(dict.fromkeys((_about(more[0]), _about(more[-1]))))
+        which = "" if len(more) == len(undecided) else f" in {len(more)} of them"
+        needed = f"about {amount} more runs per cell would decide{which}"
+    else:
+        needed = f"even {MOST_RUNS_NEEDED} runs per cell would not decide"
+    text += f" after {after} runs; {needed}"
+    hint = f"a greater --most-runs than {manifest.runs}" if manifest.until else "--until decided"
+    return [text, f"to add runs to these cells: repeat infoset sweep with --resume and {hint}"]
+
+
+def _about(count: int) -> str:
+    """Return a number of runs with two digits, rounded up."""
+    step = 10 ** max(0, len(str(count)) - 2)
+    return str(-(-count // step) * step)
+
+
+def decision_tables(table: SweepTable, noise: str, width: int) -> Iterator[tuple[str, Table]]:
+    """Yield decisions and estimates as tables with titles: a row for each value of an axis, or a grid of two axes.
+
+    With more axes there is a grid for each combination of the other values. A grid wider than `width` characters is
+    divided. At most `MOST_LINES` grids are returned.
+    """
+    first, *others = table.axes
+    if not others:
+        shown = number_table(first.key, "decision", "runs", *("95 % CI from", table.required.name, "to"))
+        for cell, value in enumerate(first.values):
+            verdict = table.verdict(cell, noise)
+            if verdict is not None:
+                ends = (verdict.lower, verdict.value, verdict.upper)
+                shown.add_row(f"{value:g}", str(verdict.decision), str(verdict.runs), *map(number, ends))
+        yield "", shown
+        return
+    second, *rest = others
+    shape = [len(axis.values) for axis in table.axes]
+    cells = np.arange(len(table.cells)).reshape(shape)
+    columns = max(1, (width - 14) // 12)
+    for indices in itertools.islice(np.ndindex(*shape[2:]), MOST_LINES):
+        grid = cells[(slice(None), slice(None), *indices)]
+        at = ", ".join(f"{axis.key} = {axis.values[index]:g}" for axis, index in zip(rest, indices, strict=True))
+        for begin in range(0, len(second.values), columns):
+            block = second.values[begin : begin + columns]
+            title = f"{first.key} (rows) and {second.key} (columns){f', at {at}' if at else ''}"
+            shown = number_table("", *(f"{value:g}" for value in block))
+            for row, value in enumerate(first.values):
+                entries = grid[row, begin : begin + columns].tolist()
+                shown.add_row(f"{value:g}", *(_entry(table.verdict(cell, noise)) for cell in entries))
+            yield title, shown
+
+
+def _entry(verdict: Verdict | None) -> str:
+    return "-" if verdict is None else f"{verdict.decision}\n{number(verdict.value)}"
+
+
+def quantile_options(
+    require: str | None, show: str | None, default: str
+) -> tuple[AnyRequirement, tuple[QuantileName, ...]]:
+    """Read the values of --require and --show; a required quantile is always the first of those shown."""
     try:
-        required = Requirement.parse(require)
+        required = parse_requirement(default if require is None else require)
     except ValueError as error:
         raise InputError(f"--require: {error}") from None
     try:
-        chosen = SHOWN if show is None else tuple(QuantileName.parse(text) for text in show.split(","))
+        default_shown = SHOWN if isinstance(required, Requirement) else SHOWN_WITH_HITS
+        chosen = default_shown if show is None else tuple(QuantileName.parse(text) for text in show.split(","))
     except ValueError as error:
         raise InputError(f"--show: {error}") from None
     if len(chosen) > MOST_SHOWN:
         raise InputError(f"--show: at most {MOST_SHOWN} quantiles can be drawn, found {len(chosen)}; leave some out")
-    return required, tuple(dict.fromkeys((*chosen, required.quantile)))
+    first = (required.quantile,) if isinstance(required, Requirement) else ()
+    return required, tuple(dict.fromkeys((*first, *chosen)))
 
 
-def sweep_report(folder: CampaignFolder, quantiles: tuple[Requirement, tuple[QuantileName, ...]]) -> SweepReport:
-    """Summarise a sweep, finished or not, for the quantiles of `quantile_options`."""
-    required, shown = quantiles
-    return SweepReport(folder, sweep_table(folder, shown), required, shown)
+def default_requirement(*, has_size: bool) -> str:
+    """Return the requirement of a sweep without --require: a hit, if the body has a size."""
+    return "hit>=0.95" if has_size else "miss_m p99<10"
+
+
+def sweep_report(folder: CampaignFolder, required: AnyRequirement, shown: tuple[QuantileName, ...]) -> SweepReport:
+    """Summarise a sweep, finished or not."""
+    return SweepReport(folder, sweep_table(folder, required, shown), shown)

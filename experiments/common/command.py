@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
-from typing import Any, get_type_hints
+from types import NoneType
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+
+from experiments.common.options import choice, read_number
+
+EXAMPLE = 50
+"""Number in a message about an option without a default."""
 
 
 def command(options: type, module: str) -> Callable[..., None]:
@@ -21,8 +29,9 @@ def command(options: type, module: str) -> Callable[..., None]:
     module : str
         Name of the module whose function ``run`` takes the options.
     """
-    hints = get_type_hints(options, include_extras=True)
     parameters = inspect.signature(options).parameters.values()
+    hints = get_type_hints(options, include_extras=True)
+    hints = {parameter.name: _checked(parameter, hints[parameter.name]) for parameter in parameters}
 
     def registered(**values: Any) -> None:
         import_module(module).run(options(**values))
@@ -35,3 +44,18 @@ def command(options: type, module: str) -> Callable[..., None]:
     )
     registered.__annotations__ = hints
     return registered
+
+
+def _checked(parameter: inspect.Parameter, hint: Any) -> Any:
+    """Return the annotation of an option with a parser for its numbers or names, whose messages have an example."""
+    kind, info = get_args(hint)
+    kinds = [part for part in (get_args(kind) if NoneType in get_args(kind) else [kind]) if part is not NoneType]
+    option = info.default if isinstance(info.default, str) else f"--{parameter.name.replace('_', '-')}"
+    info = copy.copy(info)
+    if get_origin(kinds[0]) is Literal:
+        info.parser = partial(choice, option, valid=get_args(kinds[0]))
+    elif kinds[0] in (int, float):
+        number = parameter.default if isinstance(parameter.default, kinds[0]) else max(info.min or 0, EXAMPLE)
+        limits = {"least": info.min, "greatest": info.max, "example": f"{option} {number}"}
+        info.parser = partial(read_number, option, kinds[0], **limits)
+    return Annotated[kind, info]

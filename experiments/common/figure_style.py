@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import contextlib
 import io
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patheffects import Normal, Stroke
+from matplotlib.ticker import FixedLocator
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
 
 WIDTH_MM = 180.0
 PNG_DPI = 200
@@ -68,6 +76,16 @@ _STYLE: dict[Any, Any] = {
     "path.simplify": True,
 }
 _MM_PER_INCH = 25.4
+_CORNER_PAD = 7.0
+"""Distance of the labels of a horizontal axis, in points, if they touch one of the vertical axis."""
+_POSITIONS = tuple(
+    (right, up, distance)
+    for distance in (5.0, 9.0, 15.0)
+    for right, up in ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
+)
+"""Positions of a label relative to its point: the side across and up, and the distance in points; better ones first."""
+_HALO = [Stroke(linewidth=2.0, foreground="white"), Normal()]
+_GROUND = {"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.9}
 
 
 @contextlib.contextmanager
@@ -92,7 +110,7 @@ def place_axes(
     margins_mm: tuple[float, float, float, float],
     gaps_mm: tuple[float, float],
 ) -> list[list[Axes]]:
-    """Return a grid of axes at fixed positions, without the cost of an automatic layout.
+    """Return a grid of axes at fixed positions by row, the top one first, without the cost of an automatic layout.
 
     Parameters
     ----------
@@ -100,11 +118,6 @@ def place_axes(
         Left, right, bottom, top.
     gaps_mm : tuple of float
         Between columns and between rows.
-
-    Returns
-    -------
-    list of list of Axes
-        By row, the top one first.
     """
     width, height = (float(size) * _MM_PER_INCH for size in figure.get_size_inches())
     left, right, bottom, top = margins_mm
@@ -137,6 +150,98 @@ def figure_grid(
     figure = new_figure(height_mm)
     grid = place_axes(figure, rows, columns, margins_mm=margins_mm, gaps_mm=gaps_mm)
     return figure, [axes for row in grid for axes in row]
+
+
+def separate_labels(axes: Axes, gap_points: float = 2.0) -> None:
+    """Remove tick labels that touch, for axes whose place and limits are final.
+
+    If labels of a logarithmic axis touch, those at powers of ten are kept first.
+    """
+    figure = axes.get_figure(root=True)
+    if figure is None:
+        raise ValueError("these axes are in no figure")
+    gap = gap_points * figure.dpi / 72.0
+    shown = []
+    for one, end in ((axes.xaxis, 0), (axes.yaxis, 1)):
+        one.get_ticklabels()  # places the labels
+        low, high = sorted(one.get_view_interval())
+        boxes = {}
+        for tick in one.get_major_ticks():
+            label = tick.label1 if tick.label1.get_visible() else tick.label2
+            if low <= tick.get_loc() <= high and label.get_text():
+                boxes[float(tick.get_loc())] = label.get_window_extent()
+        kept = _apart(list(boxes), boxes, end, gap)
+        if len(kept) < len(boxes) and one.get_scale() == "log":
+            decades = [at for at in boxes if math.log10(at).is_integer()]
+            if len(decades) > 1:
+                kept = _apart(decades, boxes, end, gap)
+        if boxes:
+            one.set_major_locator(FixedLocator(kept))
+        shown.append([boxes[at] for at in kept])
+    if any(below.overlaps(left) for below in shown[0] for left in shown[1]):  # in the corner of the axes
+        axes.tick_params(axis="x", pad=_CORNER_PAD)
+
+
+def _apart(ticks: Sequence[float], boxes: Mapping[float, Any], end: int, gap: float) -> list[float]:
+    """Return ticks whose labels have a gap along an axis of the page, the first tick included."""
+    edge, kept = -math.inf, []
+    for at in ticks:
+        if boxes[at].min[end] >= edge + gap:
+            kept.append(at)
+            edge = boxes[at].max[end]
+    return kept
+
+
+def place_labels(
+    axes: Axes, labels: Sequence[tuple[str, Floats, Floats]], marks: Floats, *, centred: bool = False, **look: Any
+) -> None:
+    """Write labels where they cover no other label, no mark and as little of the lines as possible.
+
+    The limits of the axes become fixed.
+
+    Parameters
+    ----------
+    labels : sequence of tuple
+        Text; the points at which it can stand, shape (k, 2), the better ones first; and points of lines that it should
+        not cover, shape (n, 2), each of which weighs 3 % of another label.
+    marks : ndarray, shape (m, 2)
+        Points that weigh as much as another label.
+    centred : bool
+        Whether a label stands preferably on its point, as on a contour, and not next to it.
+    look : dict
+        Further arguments of `matplotlib.axes.Axes.annotate`.
+    """
+    figure: Any = axes.figure
+    positions = ((0, 0, 0.0), *_POSITIONS) if centred else _POSITIONS
+    renderer, per_point = figure.canvas.get_renderer(), figure.dpi / 72.0
+    axes.set(xlim=axes.get_xlim(), ylim=axes.get_ylim())
+    marks = axes.transData.transform(marks)
+    frame = axes.get_window_extent(renderer).extents
+    taken: list[Floats] = []
+    for text, anchors, line in labels:
+        label = axes.annotate(text, (0.0, 0.0), xytext=(0, 0), textcoords="offset points", **look)
+        label.set(**({"bbox": _GROUND} if centred else {"path_effects": _HALO}))
+        avoided = axes.transData.transform(line)
+        size = np.array(label.get_window_extent(renderer).size)
+        choices: list[tuple[float, Floats, Floats, int, int, Floats]] = []
+        for rank, ((right, up, distance), anchor) in enumerate(product(positions, anchors)):
+            offset = np.array([right * distance, up * distance * (1.0 if right == 0 else 0.7)])
+            low = axes.transData.transform(anchor) + per_point * offset + size * (np.array([right, up]) - 1.0) / 2.0
+            box = np.concatenate([low, low + size])
+            clashes = sum(bool((box[:2] < other[2:]).all() and (other[:2] < box[2:]).all()) for other in taken)
+            clashes += _count_inside(box + 3.0 * per_point * np.array([-1.0, -1.0, 1.0, 1.0]), marks)
+            outside = bool((box[:2] < frame[:2]).any() or (box[2:] > frame[2:]).any())
+            penalty = 1000.0 * outside + 100.0 * clashes + 3.0 * _count_inside(box, avoided) + rank
+            choices.append((penalty, box, offset, right, up, anchor))
+        _, box, offset, right, up, anchor = min(choices, key=lambda choice: choice[0])
+        taken.append(box)
+        label.xy = tuple(anchor)
+        label.set_position(tuple(offset))
+        label.set(ha=("center", "left", "right")[right], va=("center", "bottom", "top")[up])
+
+
+def _count_inside(box: Floats, points: Floats) -> int:
+    return int(np.count_nonzero(((points > box[:2]) & (points < box[2:])).all(axis=1)))
 
 
 def plain(text: str) -> str:

@@ -7,11 +7,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from experiments.common.errors import InputError
+
+LONGEST_SHOWN = 60
+"""Greatest length of a number in a message."""
 
 
 def _page_path(path: Path | None) -> Path | None:
@@ -25,15 +28,17 @@ def _silence_the_compile_notice(quiet: bool) -> bool:
     return quiet
 
 
-def finite(value: float | None) -> float | None:
-    """Refuse infinity and NaN, which ``min`` and ``max`` of an option accept."""
-    if value is not None and not math.isfinite(value):
-        raise typer.BadParameter("must be a finite number")
-    return value
-
-
 ProblemName = Annotated[
     str, typer.Argument(metavar="[PROBLEM]", help="A built-in problem (see: infoset problems list), or a problem file.")
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Replace a value of the file, in the unit of the file; a key of a table is written TABLE.KEY. May be "
+        "given several times.",
+    ),
 ]
 Seed = Annotated[
     int, typer.Option("--seed", metavar="N", min=0, help="Root seed. The same seed gives the same random numbers.")
@@ -44,6 +49,12 @@ Out = Annotated[
 Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write results as JSON; - prints JSON only.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Csv = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write a table as CSV; - prints CSV only.")]
+TrajectoryCsv = Annotated[
+    Path | None,
+    typer.Option(
+        "--csv", metavar="FILE", help="Write the trajectories as CSV, units in the headings; - prints CSV only."
+    ),
+]
 Html = Annotated[
     Path | None,
     typer.Option(
@@ -83,10 +94,27 @@ def choice(option: str, name: str, valid: Sequence[str]) -> str:
     raise InputError(f"{option}: there is no {shown(name)}; {hint}choose one of: {', '.join(valid)}")
 
 
-def whole_number(option: str, value: int, least: int, greatest: int | None, example: int) -> int:
-    """Return a number within limits; raise `InputError`, with a valid example, for any other."""
-    if value >= least and (greatest is None or value <= greatest):
+def read_number(
+    option: str, kind: type[int] | type[float], text: Any, *, least: float | None, greatest: float | None, example: str
+) -> Any:
+    """Return the number in a text; raise `InputError`, with an example, if it is none or outside the limits.
+
+    Parameters
+    ----------
+    text : Any
+        The text of the command line; a value of `kind`, which is the default of the option, is returned unchanged.
+    """
+    if not isinstance(text, str):
+        return text
+    quoted = text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 3]}..."
+    try:
+        value = kind(text)
+    except ValueError:
+        value, quoted = math.nan, f'"{quoted}"'
+    if not math.isfinite(value):
+        problem = "a whole number" if kind is int else "a finite number"
+    elif (least is None or value >= least) and (greatest is None or value <= greatest):
         return value
-    limits = f"at least {least}" if greatest is None else f"from {least} to {greatest}"
-    digits = str(value) if abs(value) < 10**20 else "a number of more than 20 digits"
-    raise InputError(f"{option}: must be {limits}, found {digits}; for example {option} {example}")
+    else:
+        problem = f"at least {least:g}" if greatest is None else f"from {least:g} to {greatest:.10g}"
+    raise InputError(f"{option}: must be {problem}, found {quoted}; for example {example}")

@@ -6,8 +6,9 @@ import contextlib
 import csv
 import io
 import json
+import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 from enum import Enum
 from importlib.metadata import version
@@ -20,10 +21,12 @@ from experiments.common.errors import InputError, on_a_screen
 from sim.storage.files import replace_file, temporary_beside
 
 if TYPE_CHECKING:
+    import numpy as np
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from experiments.common.options import FileOptions
-    from sim import Results
+    from sim import HitEstimate, Results
 
 STDOUT = "-"
 
@@ -39,8 +42,6 @@ class Output:
         The folder of ``--out``.
     files : mapping of str to Path
         Single files, by the option that names them; the path ``-`` is stdout.
-    overwrite : bool
-        Whether existing files are replaced.
     """
 
     def __init__(self, folder: Path | None, files: Mapping[str, Path], overwrite: bool) -> None:
@@ -131,24 +132,24 @@ def output(
     printed = [option for option, path in single.items() if str(path) == STDOUT]
     if len(printed) > 1:
         raise InputError(f"{' and '.join(printed)} cannot both be printed on stdout; name a file for one of them")
+    wanted = [("", folder / name) for name in names] if folder is not None else []
+    wanted += [(option, path) for option, path in single.items() if option not in printed]
     created: list[Path] = []
+    owners: dict[Path, str] = {}
     try:
-        owners: dict[Path, str] = {}
         if folder is not None:
-            created = _check_folder(folder, overwrite)
-            for name in names:
-                check_file(folder / name, overwrite=overwrite)
-            owners = {_resolved(folder / name): "a file of --out" for name in names}
-        for option, path in single.items():
-            if option in printed:
-                continue
-            check_file(path, overwrite=overwrite)
-            if (other := owners.setdefault(_resolved(path), f"the file of {option}")) != f"the file of {option}":
+            _make_folder(folder, overwrite, created)
+        for option, path in wanted:
+            _check_file(path, overwrite)
+            owner = f"the file of {option}" if option else "a file of --out"
+            if (other := owners.setdefault(path.resolve(), owner)) != owner:
                 raise InputError(f"{option}: {path} is also {other}; choose another name")
         opened = Output(folder, single, overwrite)
         yield opened
     finally:
-        _remove_empty(created)
+        for path in reversed(created):
+            with contextlib.suppress(OSError):
+                path.rmdir()
     if opened.written and not quiet:
         typer.echo(on_a_screen("\n".join(_listed(opened.written))), err=True)
 
@@ -168,14 +169,8 @@ def _listed(files: Sequence[Path]) -> Iterator[str]:
         yield f"wrote {names}" + (f" in {folder}" if folder != Path() else "")
 
 
-def check_file(file: Path, *, overwrite: bool = False) -> None:
-    """Check that a file can be written, by creating a temporary file in its folder.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written, is a link, or exists and `overwrite` is false.
-    """
+def _check_file(file: Path, overwrite: bool) -> None:
+    """Check that a file can be written, by creating a temporary file in its folder."""
     with _reporting(file):
         _check_name(file, overwrite)
         probe = temporary_beside(file)
@@ -187,10 +182,7 @@ def check_file(file: Path, *, overwrite: bool = False) -> None:
 def write_file(file: Path, content: str | bytes, *, overwrite: bool = False) -> None:
     """Write a file completely or not at all; text is written as UTF-8.
 
-    Raises
-    ------
-    InputError
-        If it cannot be written, is a link, or exists and `overwrite` is false.
+    `InputError` if it cannot be written, is a link, or exists and `overwrite` is false.
     """
     with _reporting(file):
         _check_name(file, overwrite)
@@ -203,8 +195,13 @@ def library_version() -> str:
 
 
 def outcome_columns(results: Results) -> dict[str, list[Cell]]:
-    """Return the columns of results by name, without run numbers and starts."""
-    return {name: values for name, values in results.to_dict().items() if not name.startswith(("run", "start_"))}
+    """Return the columns of results by name, without run numbers, starts and hits."""
+    return {name: values for name, values in results.to_dict().items() if not name.startswith(("run", "start_", "hit"))}
+
+
+def hit_key(hits: HitEstimate | None) -> dict[str, object]:
+    """Return the key `hit` of a curve, a sample or a cell in JSON; nothing if the body has no size."""
+    return {} if hits is None else {"hit": vars(hits)}
 
 
 def to_json(value: object) -> str:
@@ -242,6 +239,35 @@ def to_csv(columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
     return text.getvalue()
 
 
+TRAJECTORIES = "trajectories.csv"
+"""Name of the file of trajectories in the folder of ``--out``."""
+STATE_COLUMNS = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")
+CONTROL_COLUMNS = ("ux_m_s2", "uy_m_s2", "uz_m_s2")
+
+
+def trajectories_csv(
+    names: Sequence[str], columns: Sequence[str], tracks: Iterable[tuple[Sequence[Cell], NDArray[np.float64]]]
+) -> str:
+    """Return trajectories as CSV, one line for each craft and time.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the columns that identify a trajectory: ``craft``.
+    columns : sequence of str
+        Names of the columns of the arrays, with their units.
+    tracks : iterable of tuple
+        Values of the first columns of a trajectory, and an array of shape (times, columns) in which a value that does
+        not exist is NaN.
+    """
+    rows = [
+        [*track, *(None if math.isnan(value) else value for value in row)]
+        for track, values in tracks
+        for row in values.tolist()
+    ]
+    return to_csv([*names, *columns], rows)
+
+
 def _cell(value: Cell) -> str:
     if value is None:
         return ""
@@ -267,40 +293,18 @@ def _check_name(file: Path, overwrite: bool) -> None:
         file.lstat()  # raises OSError if the name is too long
 
 
-def _check_folder(folder: Path, overwrite: bool) -> list[Path]:
-    """Create a folder if needed, try to write in it, and return the created folders, the outermost first."""
-    created: list[Path] = []
-    try:
-        with _reporting(folder):
-            if os.path.lexists(folder) and not folder.is_dir():
-                raise InputError(f"{folder}: is a file, not a folder; choose another name for the output folder")
-            missing = [parent for parent in (folder, *folder.parents) if not parent.exists()]
-            for parent in reversed(missing):
-                parent.mkdir()
-                created.append(parent)
-            if not overwrite and next(folder.iterdir(), None) is not None:
-                raise InputError(
-                    f"{folder}: is not empty; choose another folder, or give --overwrite to replace files in it"
-                )
-            probe = temporary_beside(folder / "probe")
-            with probe.open("x"):
-                pass
-            probe.unlink()
-    except InputError:
-        _remove_empty(created)
-        raise
-    return created
-
-
-def _remove_empty(folders: Sequence[Path]) -> None:
-    for folder in reversed(folders):
-        with contextlib.suppress(OSError):
-            folder.rmdir()
-
-
-def _resolved(path: Path) -> Path:
-    with _reporting(path):
-        return path.resolve()
+def _make_folder(folder: Path, overwrite: bool, created: list[Path]) -> None:
+    """Create a folder if needed, and append the created folders to a list, the outermost first."""
+    with _reporting(folder):
+        if os.path.lexists(folder) and not folder.is_dir():
+            raise InputError(f"{folder}: is a file, not a folder; choose another name for the output folder")
+        for parent in reversed([parent for parent in (folder, *folder.parents) if not parent.exists()]):
+            parent.mkdir()
+            created.append(parent)
+        if not overwrite and next(folder.iterdir(), None) is not None:
+            raise InputError(
+                f"{folder}: is not empty; choose another folder, or give --overwrite to replace files in it"
+            )
 
 
 @contextlib.contextmanager

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,7 +40,7 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Mark:
-    """A point in SI; an empty name is left out of the legend, ``kind`` is cross, square or diamond."""
+    """A fixed point in SI: cross, plus or diamond, as no moving point; an empty name is left out of the legend."""
 
     name: str
     point: Floats
@@ -70,12 +70,8 @@ class View:
 
     Parameters
     ----------
-    axes : tuple of str
-        Names of the three axes, without units.
     plane : tuple of int, or None
         The horizontal and the vertical axis; None is space.
-    equal : bool
-        Whether all axes have the same scale.
     """
 
     caption: str
@@ -104,10 +100,6 @@ class Graph:
 
     Parameters
     ----------
-    caption : str
-        Text above the graph.
-    title : str
-        Name of the vertical axis.
     levels : sequence of float
         Values at which horizontal lines are drawn, SI.
     band : ndarray, shape (n, 2), or None
@@ -130,35 +122,24 @@ def motion_page(
     about: Sequence[str],
     time_s: Floats,
     views: Sequence[View],
-    graphs: Sequence[Graph],
+    graphs: Sequence[Graph] = (),
     choices: Sequence[str] = (),
+    own_script: str | None = None,
+    own_data: Mapping[str, object] | None = None,
 ) -> str:
-    """Return a page of moving craft as HTML; the parameters are those of `motion_data`."""
-    data = motion_data(heading, about, time_s, views, graphs, choices)
-    return page(heading, ["motion.js", "start-motion.js"], data)
-
-
-def motion_data(
-    heading: str,
-    about: Sequence[str],
-    time_s: Floats,
-    views: Sequence[View],
-    graphs: Sequence[Graph],
-    choices: Sequence[str] = (),
-) -> dict[str, object]:
-    """Return the data that the scripts of a page of moving craft draw.
+    """Return a page of moving craft as HTML.
 
     Parameters
     ----------
-    about : sequence of str
-        Lines below the heading.
-    time_s : ndarray, shape (n,)
-        The times that the page shows.
     choices : sequence of str
         Names of alternative controls, to show one of them.
+    own_script : str or None
+        Text of the script that starts the page, if it is not the common one.
+    own_data : mapping of str to object, or None
+        Further data for that script.
     """
     name, factor = time_unit(float(np.ptp(time_s)))
-    return {
+    data = {
         "heading": heading,
         "about": list(about),
         "time_s": time_s,
@@ -168,7 +149,9 @@ def motion_data(
         "views": views,
         "graphs": graphs,
         "choices": choices,
+        **(own_data or {}),
     }
+    return page(heading, ["motion.js"] if own_script else ["motion.js", "start-motion.js"], data, own_script)
 
 
 def faces_of(points: Floats) -> list[Floats]:

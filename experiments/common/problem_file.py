@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 from decimal import Decimal
 from enum import Enum
-from importlib import resources
 
-from experiments.common.errors import InputError
-from experiments.common.toml_file import Form, Known, Problem, Tables, no_checks
-from experiments.common.toml_values import Constant, Description, Name, Table, key, nearest, shown
+from experiments.common.file_kinds import PROBLEM_COMMANDS, built_in
+from experiments.common.toml_file import Form, KeyPath, Known, Problem, Tables, no_checks
+from experiments.common.toml_values import Constant, Description, Name, Table, key
+
+MOST_RADIANS = Decimal(1000)
+LEAST_RADIANS = Decimal("1e-9")
+"""Angles of the orbit during a problem, within which linear motion is meaningful."""
 
 
 class ProblemTables(Table):
@@ -22,86 +23,44 @@ class ProblemTables(Table):
     schema_number: Constant = key("version of this file format", "1", alias="schema", default=1)
     kind: Constant = key("kind of problem", '"pareto-encounter"')
     name: Name = key("name of the results", '"my-problem"')
-    description: Description = key("one line for `infoset problems list`", '"Who meets whom"', default="")
-
-
-@dataclass(frozen=True)
-class BuiltInProblem:
-    """A built-in problem."""
-
-    name: str
-    kind: str
-    description: str
-    text: str
-
-
-def built_in_problems() -> list[BuiltInProblem]:
-    """Return the built-in problems of every kind, in alphabetical order."""
-    folder = resources.files("experiments").joinpath("problems")
-    files = sorted((each for each in folder.iterdir() if each.name.endswith(".toml")), key=lambda each: each.name)
-    problems = []
-    for file in files:
-        text = file.read_text(encoding="utf-8")
-        values = tomllib.loads(text)
-        name = file.name.removesuffix(".toml")
-        problems.append(BuiltInProblem(name, values["kind"], values.get("description", ""), text))
-    return problems
+    description: Description = key("one line for results and pages", '""', default="")
 
 
 def problem_text(name: str) -> str:
-    """Return the file of a built-in problem, with its comments.
-
-    Returns
-    -------
-    str
-        TOML.
-
-    Raises
-    ------
-    InputError
-        If there is no such problem.
-    """
-    problems = {each.name: each.text for each in built_in_problems()}
-    if name not in problems:
-        guess = nearest(name, [*problems])
-        hint = f'did you mean "{guess}"? ' if guess else ""
-        raise InputError(
-            f"no built-in problem is called {shown(name)}; {hint}the built-in ones are {', '.join(problems)}"
-        )
-    return problems[name]
+    """Return the file of a built-in problem, with its comments; `InputError` if there is no such problem."""
+    return built_in(name, PROBLEM_COMMANDS, "no built-in problem").text
 
 
 def problem_form(
     kind: str,
     tables: type[Tables],
     checks: Callable[[Known], Iterator[Problem]] = no_checks,
+    written: Sequence[str] = (),
 ) -> Form[Tables]:
     """Return the form of the problem files of a kind.
 
     Parameters
     ----------
-    kind : str
-        Value of ``kind`` in the file.
     tables : type
         The pydantic model of the whole file; it has `schema`, `kind` and `name` among its keys.
-    checks : callable, optional
-        Checks of relations between values.
-
-    Returns
-    -------
-    Form
-        To be given to `experiments.common.toml_file.load_tables`.
+    checks, written
+        As in `Form`.
     """
-    return Form("problem", "problems", "infoset problems list", "infoset problems show NAME", tables, checks, kind)
+    return Form(
+        "problem",
+        "infoset problems list",
+        f"infoset problems new {kind} FILE",
+        tables,
+        checks,
+        ("name", *written),
+        kind,
+    )
 
 
 def problem_hash(tables: Tables) -> str:
     """Return a short hash of all values of a problem except its name and description.
 
-    Returns
-    -------
-    str
-        16 hexadecimal digits, the same for equal values on every machine.
+    It has 16 hexadecimal digits, the same for equal values on every machine.
     """
     values = tables.model_dump(exclude={"name", "description"})
     return hashlib.sha256(json.dumps(values, sort_keys=True, default=_plain).encode()).hexdigest()[:16]
@@ -115,6 +74,19 @@ def duplicate_names(known: Known, table: str, count: int) -> Iterator[Problem]:
         first = numbers.setdefault(name, index + 1)
         if isinstance(name, str) and first <= index:
             yield Problem((table, str(index), "name"), f'"{name}" is also the name of {table} #{first}', "rename one")
+
+
+def angle_problems(path: KeyPath, duration_s: Decimal | None, rate_rad_s: Decimal | None) -> Iterator[Problem]:
+    """Yield a problem if the orbit turns by an unlikely angle in a time; wrong or missing values yield none."""
+    if duration_s is None or rate_rad_s is None or duration_s <= 0 or rate_rad_s <= 0:
+        return
+    angle = duration_s * rate_rad_s
+    if not LEAST_RADIANS <= angle <= MOST_RADIANS:
+        yield Problem(
+            path,
+            f"is {float(angle):.3g} radians of the orbit; {LEAST_RADIANS:g} to {MOST_RADIANS} make sense",
+            f"check the units of orbit_rate_rad_s and {path[-1]}",
+        )
 
 
 def _plain(value: object) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from enum import Enum
 
@@ -16,6 +16,17 @@ CUT_OR_ROUNDED = 1.0
 
 COMPUTED = 1.0
 """The same for a reference value of ten or more digits, whose last digit has the error of another computation."""
+
+
+class Origin(Enum):
+    """Where the number comes from that ours is compared with."""
+
+    PRINTED = "paper"
+    """The paper prints it."""
+    OTHER = "other implementation"
+    """Another implementation computed it; the paper prints no such number."""
+    EXACT = "closed form"
+    """It is the exact value of a closed form."""
 
 
 class Verdict(Enum):
@@ -71,7 +82,7 @@ class PublishedNumber:
     name : str
         Quantity, with its unit.
     printed : str
-        Digits as printed.
+        Digits as printed, or of the number of another `origin`.
     ours : float or None
         None if the computation has no result.
     band : Band
@@ -100,6 +111,7 @@ class PublishedNumber:
     unexplained: bool = False
     note: str = ""
     spread: Band | None = None
+    origin: Origin = Origin.PRINTED
 
     @property
     def verdict(self) -> Verdict:
@@ -141,10 +153,11 @@ class Reproduction:
 
 @dataclass(frozen=True)
 class Reference:
-    """A paper and the rounding of its numbers, in units of the last printed digit."""
+    """A paper, the rounding of its numbers in units of the last printed digit, and their origin."""
 
     paper: str
     units: float = ROUNDED
+    origin: Origin = Origin.PRINTED
 
     def number(
         self,
@@ -172,7 +185,8 @@ class Reference:
         band = Band.of_digits(printed, self.units, beyond)
         right = None if corrected is None else Band.of_digits(corrected, self.units, beyond)
         found = None if ours is None else float(ours)
-        return PublishedNumber(self.paper, source, name, printed, found, band, right, corrected, unexplained, note)
+        number = PublishedNumber(self.paper, source, name, printed, found, band, right, corrected, unexplained, note)
+        return replace(number, origin=self.origin)
 
     def numbers(self, source: str, printed: Mapping[str, str], ours: Iterable[float | None]) -> list[PublishedNumber]:
         """Return the numbers of a table, printed ones by name."""

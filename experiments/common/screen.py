@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 BeginProgress = Callable[[str], Callable[[float], None]]
+_GAP = 2
+"""Width of the space between the columns of a table."""
 NOT_FINITE = (
     "the numbers of the scenario are so large or so small that the results are not finite; "
     "check its units with: infoset scenarios check FILE"
@@ -34,8 +36,10 @@ def say(message: str, quiet: bool) -> None:
         typer.echo(on_a_screen(message), err=True)
 
 
-def say_warnings(warnings: Iterable[str], quiet: bool) -> None:
-    """Print warnings on stderr, one line each."""
+def say_warnings(warnings: Iterable[str], quiet: bool, notes: Iterable[str] = ()) -> None:
+    """Print notes and warnings on stderr, one line each."""
+    for note in notes:
+        say(note, quiet)
     for warning in warnings:
         say(f"warning: {warning}", quiet)
 
@@ -63,14 +67,44 @@ def number_table(*titles: str, left: int = 1) -> Table:
     return table
 
 
+def print_table(console: Console, table: Table) -> None:
+    """Print a table of `number_table`; if the screen is too narrow, print it in parts, each with the columns of text.
+
+    No number is cut: a part has as many columns of numbers as fit, and at least one.
+    """
+    from rich.cells import cell_len
+    from rich.table import Table
+
+    cells = [[str(cell) for cell in (column.header, *column.cells)] for column in table.columns]
+    widths = [max(cell_len(line) for cell in column for line in cell.splitlines() or [""]) + _GAP for column in cells]
+    left = [index for index, column in enumerate(table.columns) if column.justify != "right"]
+    parts: list[list[int]] = []
+    used = room = console.width + _GAP - sum(widths[index] for index in left)
+    for index in sorted(set(range(len(widths))) - set(left)):
+        used += widths[index]
+        if used > room:
+            parts.append([])
+            used = widths[index]
+        parts[-1].append(index)
+    if len(parts) <= 1:
+        console.print(table)
+        return
+    for number, numbers in enumerate(parts):
+        part = Table(box=None, pad_edge=False)
+        chosen = sorted([*left, *numbers])
+        for index in chosen:
+            column = table.columns[index]
+            part.add_column(column.header, justify=column.justify, no_wrap=index not in left)
+        for row in zip(*(table.columns[index].cells for index in chosen), strict=True):
+            part.add_row(*row)
+        console.print(*([""] if number else []), part, sep="\n")
+
+
 @contextlib.contextmanager
 def progress_bar(quiet: bool) -> Iterator[BeginProgress]:
     """Show progress bars on stderr if that is a terminal.
 
-    Yields
-    ------
-    callable
-        Starts a bar with a title and returns a function that sets the fraction done.
+    The context is a function that starts a bar with a title, and returns a function that sets the fraction done.
     """
     if quiet or not sys.stderr.isatty():
         yield lambda _name: lambda _done: None
@@ -109,3 +143,17 @@ def show_built_in(rows: Sequence[Mapping[str, str]], json: bool, quiet: bool) ->
         for row in rows:
             table.add_row(*row.values())
         table_console(False).print(table)
+
+
+def show_checked(summary: Mapping[str, Any], fingerprint: str, json: bool, quiet: bool) -> None:
+    """Print that a file is valid, with its name, its fingerprint and its warnings, or the summary as JSON."""
+    if json:
+        typer.echo(to_json(summary), nl=False)
+    elif not quiet:
+        from rich.console import Console
+        from rich.text import Text
+
+        console = Console(soft_wrap=True)
+        console.print(Text.assemble(("ok", "bold green"), f"  {summary['name']}  {fingerprint}"))
+        for warning in summary["warnings"]:
+            console.print(Text.assemble(("warning: ", "yellow"), warning))

@@ -5,21 +5,34 @@ from __future__ import annotations
 import os
 import tomllib
 import typing
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from decimal import Decimal, InvalidOperation
-from importlib import resources
+from decimal import Decimal
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from experiments.common.errors import InputError
-from experiments.common.toml_values import WRONG, DecimalPair, nearest, shown
+from experiments.common.file_kinds import (
+    LARGEST_FILE_BYTES,
+    LONGEST_LINE,
+    PROBLEM_COMMANDS,
+    SCENARIO,
+    ZIP,
+    built_in,
+    built_in_names,
+    kind_of,
+    taken_by,
+    use_of_file,
+    use_of_folder,
+)
+from experiments.common.settings import read_settings, replace_values
+from experiments.common.toml_values import LONGEST_DESCRIPTION, WRONG, DecimalPair, decimal_of, nearest, shown
 
-LARGEST_FILE_BYTES = 100_000
-LONGEST_LINE = 1000
 MOST_PROBLEMS = 100
+MISSING = "is missing"
+DID_YOU_MEAN = "did you mean {}?"
 
 KeyPath = tuple[str, ...]
 Tables = TypeVar("Tables", bound=BaseModel)
@@ -98,8 +111,6 @@ class Form(Generic[Tables]):
     ----------
     noun : str
         Name of such a file in messages: ``scenario``.
-    folder : str
-        Folder of the built-in files in the package `experiments`.
     listed_by : str
         Command that lists the built-in files.
     begun_by : str
@@ -108,86 +119,78 @@ class Form(Generic[Tables]):
         The pydantic model of the whole file, made of `experiments.common.toml_values.Table`.
     checks : callable, optional
         Checks of relations between values.
-    kind : str or None, optional
-        Required value of ``kind``, if a folder contains files of several kinds.
+    written : sequence of str, optional
+        Optional tables and keys that the template contains, not as comments: ``chaser.position_m``.
+    kind : str, optional
+        Required value of ``kind``; `SCENARIO` for scenario files, which do not have this key.
     schema : int, optional
         Version of the file format.
     """
 
     noun: str
-    folder: str
     listed_by: str
     begun_by: str
     tables: type[Tables]
     checks: Callable[[Known], Iterator[Problem]] = no_checks
-    kind: str | None = None
+    written: Sequence[str] = ()
+    kind: str = SCENARIO
     schema: int = 1
 
 
-def built_in_names(form: Form[Tables]) -> tuple[str, ...]:
-    """Return the names of the built-in files of a form, in alphabetical order."""
-    files = {
-        file.name.removesuffix(".toml"): file
-        for file in resources.files("experiments").joinpath(form.folder).iterdir()
-        if file.name.endswith(".toml")
-    }
-    return tuple(
-        name
-        for name, file in sorted(files.items())
-        if form.kind is None or tomllib.loads(file.read_text(encoding="utf-8")).get("kind") == form.kind
-    )
-
-
-def built_in_text(form: Form[Tables], name: str) -> str:
-    """Return the text of a built-in file, with its comments; `InputError` if there is no such file."""
-    if name not in built_in_names(form):
-        raise _no_such_name(form, name, f"no built-in {form.noun}")
-    return resources.files("experiments").joinpath(form.folder, f"{name}.toml").read_text(encoding="utf-8")
-
-
-def load_tables(form: Form[Tables], name_or_path: str | os.PathLike[str]) -> Tables:
-    """Read a built-in file or a file of the user.
+def load_tables(
+    form: Form[Tables], name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None
+) -> Tables:
+    """Read a built-in file or a file of the user; the numbers stay as written.
 
     Parameters
     ----------
     name_or_path : str or path
         A built-in name, or the path of a TOML file. A name wins over a file of that name, unless the argument has a
         path separator or ends in ``.toml``.
-
-    Returns
-    -------
-    pydantic model
-        ``form.tables``, numbers as written.
+    settings : sequence of str or None, optional
+        KEY=VALUE: values in place of those of the file, in its units; see `experiments.common.settings`. They are
+        added to the description.
 
     Raises
     ------
     InputError
         If there is no such file, or it is invalid; the message lists all its problems.
     """
+    text, source = _text_of(form, name_or_path)
+    values = read_settings(settings or ())
+    if not values:
+        return read_tables(form, text, source)
+    tables = read_tables(form, text, f"{source} with --set", values)
+    changes = ", ".join(f"{key} = {' '.join(value.split())}" for key, value in values.items() if key != "description")
+    lines = [line for line in (getattr(tables, "description", ""), changes and f"with {changes}") if line]
+    return tables.model_copy(update={"description": "; ".join(lines)[:LONGEST_DESCRIPTION]})
+
+
+def document_of(form: Form[Tables], name_or_path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the content of a built-in file of any kind or a file of the user as parsed, without checks of its keys."""
+    return _parse(form, *_text_of(form, name_or_path))
+
+
+def _text_of(form: Form[Tables], name_or_path: str | os.PathLike[str]) -> tuple[str, str]:
+    """Return the text of a file, and its name for messages."""
     given = os.fspath(name_or_path)
     marks = [mark for mark in (os.sep, os.altsep) if mark]
     is_name = isinstance(name_or_path, str) and not given.endswith(".toml") and not any(mark in given for mark in marks)
-    if is_name and given in built_in_names(form):
-        return read_tables(form, built_in_text(form, given), f"{given} (built in)")
-    if is_name and not _exists(given):
-        raise _no_such_name(form, given, f"no file and no built-in {form.noun}")
-    return read_tables(form, _text_of_file(form, given), given)
+    kinds = [form.kind] if form.kind else PROBLEM_COMMANDS
+    if is_name and (given in built_in_names(kinds) or not _exists(given)):
+        return built_in(given, kinds, f"no file and no built-in {form.noun}").text, f"{given} (built in)"
+    return _text_of_file(form, given), given
 
 
-def read_tables(form: Form[Tables], text: str, source: str) -> Tables:
-    """Check the text of a file, and return its values.
+def read_tables(form: Form[Tables], text: str, source: str, values: Mapping[str, str] | None = None) -> Tables:
+    """Check the text of a file, and return its values, numbers as written.
 
     Parameters
     ----------
-    text : str
-        TOML.
     source : str
         Name of the file in messages.
-
-    Returns
-    -------
-    pydantic model
-        ``form.tables``, numbers as written.
+    values : mapping of str to str or None, optional
+        TOML values that replace those of the text, by key; see `experiments.common.settings.replace_values`.
 
     Raises
     ------
@@ -195,17 +198,21 @@ def read_tables(form: Form[Tables], text: str, source: str) -> Tables:
         With all problems of the text: place, value and what to do.
     """
     document = _parse(form, text, source)
+    kind = kind_of(document)
+    if kind is not None and kind != form.kind:
+        raise InputError(f"{source}: {taken_by(kind)}")
+    if values:
+        replace_values(document, values, settable_keys(form.tables), form.noun, form.begun_by)
     schema = document.get("schema", form.schema)
     if isinstance(schema, bool) or not isinstance(schema, int) or schema != form.schema:
         raise InputError(
             f"{source}: schema: must be {form.schema}, the only file format that this version reads, found "
             f"{shown(schema)}; write schema = {form.schema} and the keys of `{form.begun_by}`, or update infoset"
         )
-    if form.kind is not None and document.get("kind") != form.kind:
+    if form.kind != SCENARIO and document.get("kind") != form.kind:
         found = f"found {shown(document['kind'])}" if "kind" in document else "which is missing"
         raise InputError(
-            f'{source}: kind: must be "{form.kind}", {found}; write kind = "{form.kind}" above the first table, or '
-            f"use the command for that kind"
+            f'{source}: kind: must be "{form.kind}", {found}; write kind = "{form.kind}" above the first table'
         )
     tables = None
     problems: list[Problem] = []
@@ -214,6 +221,13 @@ def read_tables(form: Form[Tables], text: str, source: str) -> Tables:
     except ValidationError as error:
         found_wrong = error.errors(include_url=False)
         problems = [_problem(form, details) for details in found_wrong[: MOST_PROBLEMS + 1]]
+        # A key with a misspelt name is not missing too.
+        misspelt = {(*each.path[:-1], each.remedy) for each in problems}
+        problems = [
+            each
+            for each in problems
+            if each.text != MISSING or (*each.path[:-1], DID_YOU_MEAN.format(each.path[-1])) not in misspelt
+        ]
         known = Known(document, frozenset(tuple(str(part) for part in each["loc"]) for each in found_wrong))
     else:
         known = Known(document, frozenset())
@@ -249,6 +263,17 @@ def tables_of(tables: type[BaseModel]) -> tuple[str, ...]:
     return tuple(name for name, field in _fields(tables).items() if _table_in(field.annotation) is not None)
 
 
+def settable_keys(tables: type[BaseModel]) -> list[str]:
+    """Return the keys of a file that ``--set`` replaces, with their tables; ``craft.1.weight`` in an array."""
+    inner = tables_of(tables)
+    top = [name for name in keys_of(tables) if name not in (*inner, "schema", "kind")]
+    return top + [
+        f"{table}.1.{name}" if is_array(tables, table) else f"{table}.{name}"
+        for table in inner
+        for name in keys_of(tables, (table,))
+    ]
+
+
 def _fields(model: type[BaseModel]) -> dict[str, Any]:
     return {field.alias or name: field for name, field in model.model_fields.items()}
 
@@ -261,7 +286,8 @@ def _table_in(annotation: Any) -> type[BaseModel] | None:
     return next((each for each in inner if each is not None), None)
 
 
-def _is_array(tables: type[BaseModel], name: str) -> bool:
+def is_array(tables: type[BaseModel], name: str) -> bool:
+    """Whether a table is an array of tables."""
     return any(typing.get_origin(each) in (list, tuple) for each in _options(_fields(tables)[name].annotation))
 
 
@@ -269,15 +295,9 @@ def _options(annotation: Any) -> tuple[Any, ...]:
     return (annotation, *typing.get_args(annotation))
 
 
-def _heading(tables: type[BaseModel], name: str) -> str:
-    return f"[[{name}]]" if _is_array(tables, name) else f"[{name}]"
-
-
-def _no_such_name(form: Form[Tables], name: str, what: str) -> InputError:
-    names = built_in_names(form)
-    guess = nearest(name, list(names))
-    hint = f'did you mean "{guess}"? ' if guess else ""
-    return InputError(f"{what} is called {shown(name)}; {hint}the built-in ones are {', '.join(names)}")
+def heading(tables: type[BaseModel], name: str) -> str:
+    """Return the heading of a table: ``[orbit]``, ``[[craft]]``."""
+    return f"[[{name}]]" if is_array(tables, name) else f"[{name}]"
 
 
 def _exists(path: str) -> bool:
@@ -297,7 +317,7 @@ def _text_of_file(form: Form[Tables], path: str) -> str:
             f"{path}: there is no such file; check the path, or see `{form.listed_by}` for the built-in names"
         ) from None
     except IsADirectoryError:
-        raise InputError(f"{path}: is a folder; name a {form.noun} file in it") from None
+        raise InputError(f"{path}: {use_of_folder(Path(path), f'{form.noun} file')}") from None
     except PermissionError:
         raise InputError(f"{path}: cannot be read, permission denied; check who may read it") from None
     except (OSError, ValueError) as error:
@@ -308,19 +328,13 @@ def _text_of_file(form: Form[Tables], path: str) -> str:
             f"{path}: is over {LARGEST_FILE_BYTES // 1000} kB, far more than a {form.noun} needs; name a {form.noun} "
             f"file"
         )
+    if content.startswith(ZIP):
+        raise InputError(f"{path}: {use_of_file(Path(path))}")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise InputError(f"{path}: is not UTF-8 text (line {line}); save it as UTF-8") from None
-
-
-def _decimal(literal: str) -> Decimal:
-    """Read a TOML float as written."""
-    try:
-        return Decimal(literal)
-    except InvalidOperation:  # an exponent beyond what a Decimal holds: zero or infinity, as for a float
-        return Decimal(repr(float(literal)))
 
 
 def _parse(form: Form[Tables], text: str, source: str) -> dict[str, Any]:
@@ -329,10 +343,10 @@ def _parse(form: Form[Tables], text: str, source: str) -> dict[str, Any]:
         raise InputError(f"{source}: is over {LARGEST_FILE_BYTES // 1000} kB, far more than a {form.noun} needs")
     lines = text.split("\n")
     for number, line in enumerate(lines, start=1):
-        if len(line) > LONGEST_LINE:  # the parser's time grows as the square of a dotted key's length
+        if len(line) > LONGEST_LINE:
             raise InputError(f"{source}: line {number} is over {LONGEST_LINE} characters; no line of a {form.noun} is")
     try:
-        return tomllib.loads(text, parse_float=_decimal)
+        return tomllib.loads(text, parse_float=decimal_of)
     except tomllib.TOMLDecodeError as error:
         column = len(lines[-1]) + 1
         reason = str(error).replace("(at end of document)", f"(at line {len(lines)}, column {column}: the end)")
@@ -369,7 +383,7 @@ def _problem(form: Form[Tables], details: Any) -> Problem:
     """Return the problem of an error of pydantic."""
     path = tuple(str(part) for part in details["loc"])
     if details["type"] == "missing":
-        return Problem(path, "is missing", _remedy_of_missing(form.tables, path))
+        return Problem(path, MISSING, _remedy_of_missing(form.tables, path))
     if details["type"] == "extra_forbidden":
         return Problem(path, *_unknown(form, path, details["input"]))
     found = shown(details["input"])
@@ -381,9 +395,9 @@ def _problem(form: Form[Tables], details: Any) -> Problem:
         least, most = details["ctx"].get("min_length"), details["ctx"].get("max_length")
         limit = f"at least {least}" if least is not None else f"at most {most}"
         return Problem(path, f"must have {limit} of them, found {len(details['input'])}", "add or remove some")
-    heading = _heading(form.tables, path[0])
-    problem = "must be tables" if heading.startswith("[[") and len(path) == 1 else "must be a table"
-    return Problem(path, f"{problem}, found {found}", f"write {heading} on a separate line, its keys below it")
+    written = heading(form.tables, path[0])
+    problem = "must be tables" if written.startswith("[[") and len(path) == 1 else "must be a table"
+    return Problem(path, f"{problem}, found {found}", f"write {written} on a separate line, its keys below it")
 
 
 def _example(tables: type[BaseModel], path: KeyPath) -> str:
@@ -392,9 +406,9 @@ def _example(tables: type[BaseModel], path: KeyPath) -> str:
 
 def _remedy_of_missing(tables: type[BaseModel], path: KeyPath) -> str:
     if len(path) > 1:
-        return f"add it under {_heading(tables, path[0])}, {_example(tables, path)}"
+        return f"add it under {heading(tables, path[0])}, {_example(tables, path)}"
     if path[0] in tables_of(tables):
-        return f"add the table {_heading(tables, path[0])} with its keys {', '.join(keys_of(tables, path))}"
+        return f"add the table {heading(tables, path[0])} with its keys {', '.join(keys_of(tables, path))}"
     return f"add it above the first table, {_example(tables, path)}"
 
 
@@ -402,19 +416,19 @@ def _unknown(form: Form[Tables], path: KeyPath, value: object) -> tuple[str, str
     """Return the text and the remedy for an unknown key or table."""
     name, home = path[-1], path[:-1]
     known_tables = tables_of(form.tables)
-    homes = [_heading(form.tables, other) for other in known_tables if name in keys_of(form.tables, (other,))]
-    heading = _heading(form.tables, home[0]) if home else None
-    if heading is not None and name in keys_of(form.tables):
-        what = f"is not a key of {heading}"
+    homes = [heading(form.tables, other) for other in known_tables if name in keys_of(form.tables, (other,))]
+    here = heading(form.tables, home[0]) if home else None
+    if here is not None and name in keys_of(form.tables):
+        what = f"is not a key of {here}"
         if name in known_tables:
-            return what, f"write {_heading(form.tables, name)} as a separate table"
+            return what, f"write {heading(form.tables, name)} as a separate table"
         return what, f"move {name} above the first table"
     if homes and not isinstance(value, dict):
-        return f"is not a key of {heading or 'the top level'}", f"move {name} to {' or '.join(homes)}"
+        return f"is not a key of {here or 'the top level'}", f"move {name} to {' or '.join(homes)}"
     valid = [*keys_of(form.tables, home)]
     guess = nearest(name, valid)
-    if heading is not None:
-        what = f"is not a key of {heading}"
+    if here is not None:
+        what = f"is not a key of {here}"
     else:
         what = f"is not a {'table' if isinstance(value, dict) else 'key'} of a {form.noun}"
-    return what, f"did you mean {guess}?" if guess else f"remove it; valid here: {', '.join(valid)}"
+    return what, DID_YOU_MEAN.format(guess) if guess else f"remove it; valid here: {', '.join(valid)}"

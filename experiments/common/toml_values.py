@@ -6,12 +6,15 @@ Numbers stay decimal, as written; the change to SI units rounds them once.
 from __future__ import annotations
 
 import difflib
+import types
+import typing
 from dataclasses import dataclass
-from decimal import Context, Decimal
-from enum import Enum
-from typing import Annotated, Any, Generic, TypeVar
+from decimal import Context, Decimal, InvalidOperation
+from enum import Enum, EnumMeta
+from numbers import Integral
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from experiments.common.errors import InputError
@@ -25,12 +28,19 @@ LONGEST_SHOWN = 60
 KILO = 3
 
 DecimalPair = tuple[Decimal, Decimal]
-Choice = TypeVar("Choice", bound=Enum)
 
 _EXACT = Context(prec=60)
 _RADIANS_PER_DEGREE = _EXACT.divide(
     Decimal("3.14159265358979323846264338327950288419716939937510582097494459"), Decimal(180)
 )
+
+
+def decimal_of(literal: str) -> Decimal:
+    """Read a TOML float as written."""
+    try:
+        return Decimal(literal)
+    except InvalidOperation:  # an exponent beyond what a Decimal holds: zero or infinity, as for a float
+        return Decimal(repr(float(literal)))
 
 
 def si(value: Decimal, power_of_ten: int = 0) -> float:
@@ -43,14 +53,12 @@ def radians(degrees: Decimal) -> float:
     return float(_EXACT.multiply(degrees, _RADIANS_PER_DEGREE))
 
 
-UNITS = {"_km3_s2": ("_m3_s2", 3 * KILO), "_km_s": ("_m_s", KILO), "_km": ("_m", KILO)}
-"""SI unit and power of ten of the units that end keys; ``_deg`` is radians, any other key is in SI."""
+UNITS = {"_km3_s2": ("_m3_s2", 3 * KILO), "_km_s": ("_m_s", KILO), "_km": ("_m", KILO), "_deg": ("_rad", 0)}
+"""SI unit and power of ten of the units that end keys; a degree has no power of ten. Any other key is in SI."""
 
 
 def si_name(name: str) -> str:
     """Return the name of a key in SI: ``distance_m`` of ``distance_km``."""
-    if name.endswith("_deg"):
-        return f"{name.removesuffix('_deg')}_rad"
     return next((name.removesuffix(unit) + of_si for unit, (of_si, _) in UNITS.items() if name.endswith(unit)), name)
 
 
@@ -79,7 +87,7 @@ def value_text(name: str, value: Any) -> str:
         return quoted_text(value.value if isinstance(value, Enum) else value)
     if isinstance(value, tuple):
         return f"[{', '.join(value_text(name, item) for item in value)}]"
-    if isinstance(value, int):
+    if isinstance(value, Integral):
         return str(value)
     return degrees_text(value) if name.endswith("_deg") else number_text(value, power_of_ten(name))
 
@@ -187,7 +195,8 @@ class Number:
         """Check and return it."""
         problem = self.problem(value)
         if problem is not None or not isinstance(value, int | Decimal):
-            raise wrong(problem or "must be a number", "write it without quotes" if isinstance(value, str) else "")
+            quoted = isinstance(value, str) and value.strip()[:1] in tuple("+-.0123456789")
+            raise wrong(problem or "must be a number", "write it without quotes" if quoted else "")
         return Decimal(value)
 
 
@@ -257,17 +266,6 @@ class Whole:
 
 
 @dataclass(frozen=True)
-class OneOf(Generic[Choice]):
-    """One of the names of an enumeration."""
-
-    choices: type[Choice]
-
-    def __call__(self, value: object) -> Choice:
-        """Check and return it."""
-        return self.choices(known_name(value, tuple(choice.value for choice in self.choices)))
-
-
-@dataclass(frozen=True)
 class Line:
     """A line of printable text."""
 
@@ -303,9 +301,13 @@ def known_name(value: object, names: tuple[str, ...]) -> str:
     raise wrong(problem, f'did you mean "{guess}"?' if guess else "")
 
 
-def key(meaning: str, example: str, **options: Any) -> Any:
-    """Describe a key: its meaning for the template, and an example as TOML."""
-    return Field(description=meaning, examples=[example], **options)
+def key(meaning: str, *examples: str, **options: Any) -> Any:
+    """Describe a key: its meaning for the template, and examples as TOML.
+
+    The example of an optional key is its default. Several examples are for the first tables that have the key, such as
+    the first two craft.
+    """
+    return Field(description=meaning, examples=list(examples), **options)
 
 
 def limited_by(owner: type, field: str | None = None) -> PlainValidator:
@@ -337,9 +339,17 @@ Constant = Annotated[Any, PlainValidator(lambda value: value)]
 
 
 class Table(BaseModel):
-    """A table of a file; unknown keys are errors."""
+    """A table of a file; unknown keys are errors, members of enumerations are written by value."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _member(cls, value: object, info: ValidationInfo) -> object:
+        hint = cls.model_fields[str(info.field_name)].annotation
+        kinds = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
+        kind = next((kind for kind in kinds if isinstance(kind, EnumMeta)), None)
+        return value if kind is None else kind(known_name(value, tuple(member.value for member in kind)))
 
     def si(self, name: str) -> Any:
         """Return the value of a key in SI, or None if the file does not have it."""

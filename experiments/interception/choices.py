@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from experiments.common.errors import InputError
 from experiments.common.options import choice
 from experiments.interception.own_strategy import is_own_strategy, load_strategy
-from experiments.interception.scenario_file import default_initial_set, load_scenario
+from experiments.interception.scenario_file import (
+    default_initial_set,
+    load_scenario,
+    read_scenario,
+    scenario_to_toml,
+)
 from guidance import Strategy, TieRule, strategy_names
 from infoset import Model
 from infoset.model import MOST_SECTIONS
 from sim import Scenario
 from sim.scenario import strategy_name
 
+MODEL_KEY = "information_set.model"
+
 
 def scenario_with(
     name: str,
+    settings: Sequence[str] | None = None,
     *,
     strategy: str | None = None,
     model: str | None = None,
@@ -29,19 +37,17 @@ def scenario_with(
 
     Parameters
     ----------
-    name : str
-        A built-in name or a path.
+    settings : sequence of str or None
+        Values of ``--set``; the other options have precedence.
     strategy : str or None
         A built-in name. ``FILE.py:CLASS`` leaves the strategy of the scenario; `own_strategy` returns it.
-    sections : int or None
-        Number of sections at the start.
 
     Raises
     ------
     InputError
         If the scenario is unsound, or an option does not fit it.
     """
-    scenario = load_scenario(name)
+    scenario = load_scenario(name, settings)
     if strategy is not None and not is_own_strategy(strategy):
         scenario = replace(scenario, strategy=choice("--strategy", strategy, strategy_names()))
     if tie is not None:
@@ -53,9 +59,9 @@ def scenario_with(
         )
     if range_meter is False:
         scenario = replace(scenario, range_sensor=None)
+    if model is not None:
+        scenario = with_model(scenario, Model(model))
     set_model = scenario.set_model
-    if model is not None and Model(model) is not set_model.kind:
-        set_model = replace(set_model, kind=Model(model), initial_set=default_initial_set(Model(model)))
     if sections is not None:
         fewest = set_model.fewest_sections
         if not fewest <= sections <= MOST_SECTIONS:
@@ -67,13 +73,58 @@ def scenario_with(
     return replace(scenario, set_model=set_model)
 
 
-def own_strategy(text: str | None) -> Strategy | None:
-    """Return the strategy that ``--strategy FILE.py:CLASS`` names; None for a built-in name.
+def with_model(scenario: Scenario, model: Model) -> Scenario:
+    """Return a scenario with a set model; a model other than the scenario's starts from its default initial set.
 
     Raises
     ------
     InputError
-        If the file has no such strategy, or its code raises an exception.
+        If the scenario does not meet the conditions of the model.
+    """
+    set_model = scenario.set_model
+    if model is set_model.kind:
+        return scenario
+    changed = replace(scenario, set_model=replace(set_model, kind=model, initial_set=default_initial_set(model)))
+    read_scenario(scenario_to_toml(changed), f"{scenario.name} with --model {model.value}")
+    return changed
+
+
+def study_scenario(
+    scenario: Scenario, model: str | None, settings: Sequence[str] | None, resumed: Model | None = None
+) -> tuple[Scenario, list[str]]:
+    """Return the scenario of a study, whose default model is the guaranteed one, whatever the scenario file says.
+
+    Quantiles of the model `paper` can be those of sets that lost the true state. The list has a line for the screen if
+    the model differs from the file's by default.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        From `scenario_with`, with the option ``--model``.
+    model : str or None
+        Value of ``--model``.
+    settings : sequence of str or None
+        Values of ``--set``; one of them may choose the model.
+    resumed : Model or None
+        Model of the folder that is resumed, which is then the default.
+    """
+    chosen = model is not None or any(text.partition("=")[0].strip() == MODEL_KEY for text in settings or ())
+    of_file, default = scenario.set_model.kind.value, resumed or Model.GUARANTEED
+    if chosen or default.value == of_file:
+        return scenario, []
+    try:
+        changed = with_model(scenario, default)
+    except InputError as error:
+        raise InputError(f"{error}; or choose the model of the file with --model {of_file}") from None
+    reason = "the model of the resumed folder" if resumed else "the model of studies"
+    remedy = "" if resumed else f": --model {of_file}"
+    return changed, [f"model: {default.value}, {reason}; the scenario file says {of_file}{remedy}"]
+
+
+def own_strategy(text: str | None) -> Strategy | None:
+    """Return the strategy that ``--strategy FILE.py:CLASS`` names; None for a built-in name.
+
+    `InputError` if the file has no such strategy, or its code raises an exception.
     """
     return load_strategy(text) if text is not None and is_own_strategy(text) else None
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from guidance import NoiseKind, Strategy, TieRule
-from sim import Results, Scenario, quantiles
+from sim import HitEstimate, Results, Scenario, estimate_hits, quantiles
 
 Floats = NDArray[np.float64]
+Flight = tuple[str, TieRule | None]
 
 QUANTILES: Mapping[str, float] = {"p10": 0.1, "p50": 0.5, "p90": 0.9, "p99": 0.99, "max": 1.0}
 
@@ -46,6 +47,18 @@ class Comparison:
         return np.asarray(np.all([each.truth_kept for each in self.results.values()], axis=0), dtype=np.bool_)
 
     @property
+    def set_emptied(self) -> NDArray[np.bool_]:
+        """Whether the set became empty with a tie rule, shape (N,)."""
+        return np.asarray(np.any([each.set_emptied for each in self.results.values()], axis=0), dtype=np.bool_)
+
+    @property
+    def hits(self) -> HitEstimate | None:
+        """Runs that hit with every tie rule; None if the body has no size."""
+        hit = [results.hit for results in self.results.values()]
+        every = np.all([flags.data for flags in hit], axis=0)
+        return estimate_hits(int(every.sum()), len(every)) if hit[0].count() else None
+
+    @property
     def phi_held(self) -> np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]:
         """Whether the miss was within the guaranteed miss with every tie rule, shape (N,).
 
@@ -55,38 +68,24 @@ class Comparison:
         return np.ma.MaskedArray(held.filled(True).all(axis=0), mask=np.ma.getmaskarray(held).all(axis=0))
 
 
-def flights(
-    scenario: Scenario, strategies: Mapping[str, Strategy | None]
-) -> list[tuple[str, TieRule | None, Scenario]]:
-    """Return the simulations of a comparison: strategy, tie rule (None is random noise) and scenario."""
-    return [
-        (
-            name,
-            tie,
-            replace(flown, noise=NoiseKind.RANDOM) if tie is None else replace(flown, noise=NoiseKind.GAME, tie=tie),
-        )
-        for name, own in strategies.items()
-        for flown in (scenario if own is not None else replace(scenario, strategy=name),)
-        for tie in (None, *TieRule)
-    ]
+def flights(scenario: Scenario, strategies: Mapping[str, Strategy | None]) -> dict[Flight, Scenario]:
+    """Return the scenarios of a comparison by strategy and tie rule; None is random noise."""
+    flown: dict[Flight, Scenario] = {}
+    for name, own in strategies.items():
+        guided = scenario if own is not None else replace(scenario, strategy=name)
+        flown[name, None] = replace(guided, noise=NoiseKind.RANDOM)
+        flown |= {(name, tie): replace(guided, noise=NoiseKind.GAME, tie=tie) for tie in TieRule}
+    return flown
 
 
-def gather(flown: Sequence[tuple[str, TieRule | None, Results]]) -> list[Comparison]:
+def gather(flown: Mapping[Flight, Results]) -> list[Comparison]:
     """Return results by strategy and noise, in the order of the strategies, random noise first."""
-    names = list(dict.fromkeys(name for name, _, _ in flown))
-    return [
-        Comparison(
-            name,
-            noise,
-            {
-                tie: results
-                for each, tie, results in flown
-                if each == name and (tie is None) == (noise is NoiseKind.RANDOM)
-            },
-        )
-        for name in names
-        for noise in (NoiseKind.RANDOM, NoiseKind.GAME)
-    ]
+    compared = []
+    for name in dict.fromkeys(name for name, _ in flown):
+        games: dict[TieRule | None, Results] = {tie: flown[name, tie] for tie in TieRule}
+        compared.append(Comparison(name, NoiseKind.RANDOM, {None: flown[name, None]}))
+        compared.append(Comparison(name, NoiseKind.GAME, games))
+    return compared
 
 
 def summary(sample: Floats) -> dict[str, float]:

@@ -38,6 +38,15 @@ ModelName = Annotated[
         "from its default initial set.",
     ),
 ]
+StudyModel = Annotated[
+    Literal["paper", "guaranteed"] | None,
+    typer.Option(
+        "--model",
+        help="Model of the information set, whatever the scenario file says. A model other than the file's starts from "
+        "its default initial set.",
+        show_default="guaranteed",
+    ),
+]
 TieName = Annotated[
     Literal["upper", "lower", "alternate", "random"] | None,
     typer.Option("--tie", help="How game noise breaks ties."),
@@ -45,6 +54,14 @@ TieName = Annotated[
 RangeMeter = Annotated[
     bool | None,
     typer.Option("--range-meter/--no-range-meter", help="Simulate with or without the scenario's range meter."),
+]
+SetTimes = Annotated[
+    str | None,
+    typer.Option(
+        "--times",
+        metavar="T1,T2,...",
+        help="Times of the sets in figure 3, s, separated by commas; the nearest step is drawn. Default: 0.5,4,8.",
+    ),
 ]
 RecordFile = Annotated[
     Path | None, typer.Option("--record", metavar="FILE.npz", help="Write the record of the engagement.")

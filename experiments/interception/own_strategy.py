@@ -29,17 +29,10 @@ def is_own_strategy(text: str) -> bool:
 
 
 def load_strategy(text: str, option: str = "--strategy") -> Strategy:
-    """Import a file and create a strategy of one of its classes.
+    """Import a file and create a strategy of one of its classes, from a text ``FILE.py:CLASS``.
 
     The strategy can be pickled: another process imports the file again. Its module is named after the file, and the
     folder of the file is searched for the modules that it imports, as by ``python FILE.py``.
-
-    Parameters
-    ----------
-    text : str
-        ``FILE.py:CLASS``.
-    option : str, optional
-        The option to name in messages.
 
     Raises
     ------

@@ -2,37 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import base64
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from experiments.common.errors import InputError
 from experiments.common.page_document import page
-from experiments.common.page_packing import packed_counts, packed_floats, packed_outlines
+from experiments.common.toml_values import shown
 from experiments.interception.record_titles import outcome_title, record_titles
-from experiments.interception.replayed_sets import replayed
-from infoset import Section
+from infoset import InformationSet, Section
 from infoset.sensors import SENSORS
 from sim import Record
+from sim.gravity import on_board_model
+
+Floats = NDArray[np.float64]
 
 MOST_RECORDS = 2
+STEPS_OF_A_BOX = 65535
+"""Steps of the vertex grid across the box of a polygon: about 0.01 pixels on a screen."""
 
 
 def interception_page(records: Sequence[Record]) -> str:
-    """Return the replay page of one engagement, or of two side by side.
+    """Return the replay page of one engagement, or of two side by side, as HTML.
 
     Parameters
     ----------
     records : sequence of Record
         One or two.
-
-    Returns
-    -------
-    str
-        HTML.
     """
-    if not 1 <= len(records) <= MOST_RECORDS:
-        raise ValueError(f"a page shows one record or two: got {len(records)}")
     names = list(dict.fromkeys(record.scenario.name for record in records))
     titles = record_titles(records)
     return page(
@@ -87,16 +87,99 @@ def _sets(record: Record) -> dict[str, str]:
         misses += stages.miss_m
     sections = [section for state in states for section in state]
     return {
-        "starts": packed_counts(np.concatenate([[0], np.cumsum([len(state) for state in states])])),
-        "labels_m": packed_floats([section.label_m for section in sections]),
-        "ranges_m": packed_floats([section.range_m for section in sections]),
-        "predicted_miss_m": packed_floats(misses),
+        "starts": _packed(np.concatenate([[0], np.cumsum([len(state) for state in states])]), "<u4"),
+        "labels_m": _packed([section.label_m for section in sections], "<f8"),
+        "ranges_m": _packed([section.range_m for section in sections], "<f8"),
+        "predicted_miss_m": _packed(misses, "<f8"),
         **packed_outlines([_omega_alpha(section) for section in sections]),
     }
 
 
-def _omega_alpha(section: Section) -> NDArray[np.float64]:
+def _omega_alpha(section: Section) -> Floats:
     """Vertices of a section in (omega, alpha), as `Section.omega_alpha` but without its checks."""
     v, z = section.polygon.vertices[: int(section.polygon.counts)].T
     alpha = z / section.range_m
     return np.stack([(v + section.closing_speed_m_s * alpha) / section.range_m, alpha], axis=1)
+
+
+@dataclass(frozen=True)
+class Stages:
+    """The sections of one step before and after its measurement.
+
+    Parameters
+    ----------
+    before : tuple of Section
+        Predicted from the previous step.
+    measured : tuple of Section
+        After the measurement: equal to the recorded sections.
+    miss_m : tuple of tuple of float
+        Predicted-miss interval of each measured section, m.
+    """
+
+    before: tuple[Section, ...]
+    measured: tuple[Section, ...]
+    miss_m: tuple[tuple[float, float], ...]
+
+
+def replayed(record: Record) -> Iterator[Stages]:
+    """Yield the stages of each step of a record, computed again from its measurements.
+
+    The last stages have an empty `measured`: the set predicted from the last step.
+
+    Raises
+    ------
+    InputError
+        If the sets differ from the recorded ones: another version of the library wrote the record.
+
+    Notes
+    -----
+    After the impulse k a section is the measured one with V reduced by k; after the prediction it is `before` of the
+    next step. Two of the four stages are therefore enough. The cost is that of the steps of the set, a few ms.
+    """
+    scenario = record.scenario
+    information = InformationSet(on_board_model(scenario))
+    for number, step in enumerate(record.steps):
+        before = tuple(information.sections())
+        values = {name: np.array([value]) for name, value in step.measured.items()}
+        for name, sensor in scenario.sensors.items():
+            if name in values:
+                sensor.cut(information, values, np.array([True]))
+        measured = tuple(information.sections())
+        if [section.label_m for section in measured] != [section.label_m for section in step.sections]:
+            raise InputError(
+                f"the record of {shown(scenario.name)}: replaying it gives different sets at step {number}; "
+                "another version of infoset wrote it: create it again with `infoset engage --record FILE.npz`"
+            )
+        lower, upper = information.predicted_miss_by_section_m()
+        living = information.living[0]
+        ends = zip(lower[0][living].tolist(), upper[0][living].tolist(), strict=True)
+        yield Stages(before, measured, tuple(ends))
+        information.shift(step.impulse_m_s)
+        information.drop_below_threshold()
+        information.predict()
+    yield Stages(tuple(information.sections()), (), ())
+
+
+def packed_outlines(outlines: Sequence[Floats]) -> dict[str, str]:
+    """Return outlines with their boxes exactly and their vertices on a grid of `STEPS_OF_A_BOX` across the box.
+
+    An outline has at least one vertex. A box is the least of each coordinate, then the greatest.
+    """
+    counts = np.array([len(outline) for outline in outlines], dtype=np.int64)
+    if not len(counts):
+        return {"boxes": "", "counts": "", "vertices": ""}
+    points = np.concatenate(outlines)
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    least, greatest = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
+    width = np.where(greatest > least, greatest - least, 1.0)
+    share = (points - np.repeat(least, counts, axis=0)) / np.repeat(width, counts, axis=0)
+    return {
+        "boxes": _packed(np.concatenate([least, greatest], axis=1), "<f8"),
+        "counts": _packed(counts, "<u4"),
+        "vertices": _packed(np.rint(share * STEPS_OF_A_BOX), "<u2"),
+    }
+
+
+def _packed(values: ArrayLike, kind: str) -> str:
+    """Return numbers as base64 of a little-endian type: doubles keep all their digits."""
+    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.common.published_number import Band, Progress, PublishedNumber, Reproduction
+from experiments.common.published_number import Band, Origin, Progress, PublishedNumber, Reproduction
 from experiments.interception.curves import curve_scenarios
 from experiments.interception.scenario_file import load_scenario, scenario_hash
 from guidance import NoiseKind, TieRule
@@ -134,11 +134,12 @@ def _figure_4(scenario: Scenario, progress: Progress) -> list[PublishedNumber]:
     return [
         PublishedNumber(
             PAPER,
-            f"reference, curve {number}",
+            f"figure 4, curve {number}",
             f"{_CURVES[number]}, {quantity} at {level:.0%} ({_UNITS[quantity]})",
             text,
             float(np.quantile(_values(flown[number], quantity), level)),
             band,
+            origin=Origin.OTHER,
         )
         for number, rows in _FIGURE_4.items()
         for quantity, level, text, band in rows

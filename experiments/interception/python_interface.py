@@ -53,8 +53,6 @@ def save(results: Results | Record, path: str | os.PathLike[str], *, overwrite: 
         `load_record` reads a record again.
     path : str or path
         Its suffix selects the format: ``.csv`` or ``.json`` for results, ``.npz`` for a record.
-    overwrite : bool
-        Whether to replace an existing file.
 
     Raises
     ------
@@ -83,11 +81,6 @@ def plot(results: Results | Record | Sequence[Record]) -> Figure:
     results : Results, Record or sequence of Record
         Results give the distributions of miss and impulse, each with its 95 % confidence band. Records give angle,
         rate, predicted miss and impulses over time (`draw_process`).
-
-    Returns
-    -------
-    Figure
-        A matplotlib figure: ``figure.savefig("results.png")`` writes it.
     """
     if not isinstance(results, Results):
         return draw_process([results] if isinstance(results, Record) else results)

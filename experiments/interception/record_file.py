@@ -14,7 +14,7 @@ import struct
 import tokenize
 import warnings
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from experiments.common.errors import InputError
+from experiments.common.file_kinds import ZIP, use_of_file, use_of_folder
 from experiments.common.output import library_version, write_file
 from experiments.common.toml_values import shown
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
@@ -48,6 +49,9 @@ Arrays = dict[str, NDArray[Any]]
 
 _STEPS, _STEPS_2, _STEPS_AND_1, _SECTIONS, _SECTIONS_AND_1, _VERTICES_2, _ANY = range(7)
 _FLOAT, _FLAG, _COUNT, _BYTE = "<f8", "|b1", "<i8", "|u1"
+
+_NUMBERS = ("time_s", "true_angle_rad", "true_rate_rad_s", "true_range_m", "impulse_m_s")
+"""Numbers of each step that are always known: names of members and of fields of `StepRecord`."""
 
 _MEASURED: Mapping[str, tuple[str, int]] = {
     name: (kind, _STEPS)
@@ -107,12 +111,8 @@ def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: boo
 
     Parameters
     ----------
-    record : Record
-        From `fly_one`.
     path : str or path
         Name of the file; it ends in ``.npz``.
-    overwrite : bool
-        Whether an existing file is replaced.
 
     Raises
     ------
@@ -151,17 +151,12 @@ def write_record(record: Record, path: str | os.PathLike[str], *, overwrite: boo
 
 
 def load_record(path: str | os.PathLike[str]) -> Record:
-    """Read the record of an engagement.
+    """Read the record of an engagement: equal, bit for bit, to the record that was written.
 
     Parameters
     ----------
     path : str or path
         A file of `write_record` or ``infoset engage --record``.
-
-    Returns
-    -------
-    Record
-        Equal, bit for bit, to the record that was written.
 
     Raises
     ------
@@ -171,7 +166,7 @@ def load_record(path: str | os.PathLike[str]) -> Record:
     file = Path(path)
     try:
         if file.is_dir():
-            raise InputError(f"{file}: is a folder; name a record in it, a file ending in .npz")
+            raise InputError(f"{file}: {use_of_folder(file, 'record')}")
         if file.exists() and not file.is_file():
             raise InputError(f"{file}: is not an ordinary file; {REMEDY}")
         size = file.stat().st_size
@@ -190,7 +185,8 @@ def load_record(path: str | os.PathLike[str]) -> Record:
             raise _UnsoundError("its contents are not what was written (the checksum differs): the file is damaged")
         return _to_record(header, arrays, str(file))
     except _UnsoundError as error:
-        raise InputError(f"{file}: is not a readable record: {error}; {REMEDY}") from None
+        use = None if content.startswith(ZIP) else use_of_file(file)
+        raise InputError(f"{file}: {use or f'is not a readable record: {error}; {REMEDY}'}") from None
 
 
 def record_path(option: str, path: Path) -> Path:
@@ -205,31 +201,14 @@ def _to_arrays(record: Record) -> Arrays:
     steps = record.steps
     sections = [section for step in steps for section in step.sections]
     polygons = [section.polygon.vertices[: int(section.polygon.counts)] for section in sections]
-    if any(section.closing_speed_m_s != record.scenario.set_model.closing_speed_m_s for section in sections):
-        raise ValueError("the sections of a record must have the closing speed of its scenario")
-
-    def optional(values: list[float | None]) -> tuple[NDArray[np.bool_], Floats]:
-        return np.array([value is not None for value in values], dtype=bool), _floats(value or 0.0 for value in values)
-
-    measured: Arrays = {}
+    arrays: Arrays = {name: _floats(getattr(step, name) for step in steps) for name in _NUMBERS}
     for sensor in SENSORS:
-        values = optional([step.measured.get(sensor.name) for step in steps])
-        measured[f"{sensor.name}_measured"], measured[f"measured_{sensor.quantity}"] = values
-    miss_exists = np.array([step.predicted_miss_m is not None for step in steps], dtype=bool)
-    margin_known, margin = optional([step.truth_margin_m for step in steps])
+        values = [step.measured.get(sensor.name) for step in steps]
+        arrays |= _optional(f"{sensor.name}_measured", f"measured_{sensor.quantity}", values)
     return {
-        "time_s": _floats(step.time_s for step in steps),
-        **measured,
-        "true_angle_rad": _floats(step.true_angle_rad for step in steps),
-        "true_rate_rad_s": _floats(step.true_rate_rad_s for step in steps),
-        "true_range_m": _floats(step.true_range_m for step in steps),
-        "impulse_m_s": _floats(step.impulse_m_s for step in steps),
-        "predicted_miss_exists": miss_exists,
-        "predicted_miss_m": _floats(end for step in steps for end in (step.predicted_miss_m or (0.0, 0.0))).reshape(
-            -1, 2
-        ),
-        "truth_margin_known": margin_known,
-        "truth_margin_m": margin,
+        **arrays,
+        **_optional("predicted_miss_exists", "predicted_miss_m", [step.predicted_miss_m for step in steps], (0.0, 0.0)),
+        **_optional("truth_margin_known", "truth_margin_m", [step.truth_margin_m for step in steps]),
         "section_offsets": _offsets([len(step.sections) for step in steps]),
         "section_label_m": _floats(section.label_m for section in sections),
         "section_range_m": _floats(section.range_m for section in sections),
@@ -238,8 +217,14 @@ def _to_arrays(record: Record) -> Arrays:
     }
 
 
-def _floats(values: Any) -> Floats:
+def _floats(values: Iterable[float]) -> Floats:
     return np.fromiter(values, dtype=np.float64)
+
+
+def _optional(mask: str, name: str, values: Sequence[Any], unknown: Any = 0.0) -> Arrays:
+    """Return the arrays of values that may be unknown: whether each is known, and its value."""
+    known = np.array([value is not None for value in values], dtype=bool)
+    return {mask: known, name: np.array([value or unknown for value in values], dtype=np.float64)}
 
 
 def _offsets(counts: list[int]) -> NDArray[np.int64]:
@@ -247,8 +232,6 @@ def _offsets(counts: list[int]) -> NDArray[np.int64]:
 
 
 def _result_to_json(result: Results) -> dict[str, object]:
-    if len(result) != 1:
-        raise ValueError(f"the result of a record is a batch of one: got {len(result)}")
     values = {key: [values_of(result, column)[0] for column in columns] for key, columns in _RESULT.items()}
     return {key: value[0] if len(value) == 1 else value for key, value in values.items()}
 
@@ -435,7 +418,11 @@ def _result_from_json(found: object, run: int, guarantees: bool) -> Results:
 def _problem(column: Column, value: object) -> str | None:
     """Return what is wrong with a value of a column, or None."""
     if issubclass(column.kind, Enum):
-        return None if value in [member.value for member in column.kind] else f"is {shown(value)}"
+        try:
+            column.kind(value)
+        except ValueError:
+            return f"is {shown(value)}"
+        return None
     if value is None and column.nullable:
         return None
     if type(value) is not column.kind:
@@ -448,44 +435,36 @@ def _array(column: Column, values: list[Any]) -> Any:
     if issubclass(column.kind, Enum):
         return (column.kind(values[0]),)
     if column.nullable:
-        return np.ma.MaskedArray([values[0] or 0.0], mask=[values[0] is None])
+        return np.ma.MaskedArray([values[0] or 0], mask=[values[0] is None], dtype=column.kind)
     return np.array(values if column.component is None else [values])
 
 
 def _to_steps(arrays: Arrays, scenario: Scenario) -> tuple[StepRecord, ...]:
     speed = scenario.set_model.closing_speed_m_s
     vertices = arrays["vertex_v_m_s_z_m"]
-    bounds = arrays["vertex_offsets"].tolist()
     sections = [
         Section(label, now, speed, ConvexPolygons(vertices[first:last].copy(), np.asarray(last - first)))
-        for label, now, first, last in zip(
-            arrays["section_label_m"].tolist(), arrays["section_range_m"].tolist(), bounds[:-1], bounds[1:], strict=True
+        for label, now, (first, last) in zip(
+            arrays["section_label_m"].tolist(),
+            arrays["section_range_m"].tolist(),
+            pairwise(arrays["vertex_offsets"].tolist()),
+            strict=True,
         )
     ]
-    ends = arrays["section_offsets"].tolist()
 
     def optional(mask: str, values: str) -> list[Any]:
-        return [
-            value if known else None
-            for known, value in zip(arrays[mask].tolist(), arrays[values].tolist(), strict=True)
-        ]
+        pairs = zip(arrays[mask].tolist(), arrays[values].tolist(), strict=True)
+        return [value if known else None for known, value in pairs]
 
-    measured: list[dict[str, float]] = [{} for _ in ends[1:]]
-    for sensor in SENSORS:
-        values = optional(f"{sensor.name}_measured", f"measured_{sensor.quantity}")
-        for step, value in zip(measured, values, strict=True):
-            if value is not None:
-                step[sensor.name] = value
-    columns = zip(
-        arrays["time_s"].tolist(),
-        measured,
-        arrays["true_angle_rad"].tolist(),
-        arrays["true_rate_rad_s"].tolist(),
-        arrays["true_range_m"].tolist(),
-        arrays["impulse_m_s"].tolist(),
-        [miss and (miss[0], miss[1]) for miss in optional("predicted_miss_exists", "predicted_miss_m")],
-        optional("truth_margin_known", "truth_margin_m"),
-        [tuple(sections[first:last]) for first, last in pairwise(ends)],
-        strict=True,
-    )
-    return tuple(StepRecord(*row) for row in columns)
+    by_sensor = [optional(f"{sensor.name}_measured", f"measured_{sensor.quantity}") for sensor in SENSORS]
+    columns = {
+        **{name: arrays[name].tolist() for name in _NUMBERS},
+        "measured": [
+            {sensor.name: value for sensor, value in zip(SENSORS, values, strict=True) if value is not None}
+            for values in zip(*by_sensor, strict=True)
+        ],
+        "predicted_miss_m": [miss and tuple(miss) for miss in optional("predicted_miss_exists", "predicted_miss_m")],
+        "truth_margin_m": optional("truth_margin_known", "truth_margin_m"),
+        "sections": [tuple(sections[first:last]) for first, last in pairwise(arrays["section_offsets"].tolist())],
+    }
+    return tuple(StepRecord(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True))

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sim import Outcome, Record
+from sim.results import ending
 
-_OUTCOMES = {Outcome.SET_LOST: "set lost", Outcome.BUDGET_SPENT: "budget spent", Outcome.DIVERGED: "diverged"}
+_OUTCOMES = {Outcome.SET_EMPTY: "set empty", Outcome.BUDGET_SPENT: "budget spent", Outcome.DIVERGED: "diverged"}
 
 
 def noise_title(record: Record) -> str:
@@ -34,11 +35,11 @@ def record_titles(records: Sequence[Record]) -> list[str]:
 
 
 def outcome_title(record: Record) -> str:
-    """Return miss and impulse, and the outcome if it is not an interception."""
+    """Return miss and impulse, the outcome if it is not the arrival, and `hit` or `missed` if the body has a size."""
     result = record.result
     text = f"miss {_shown(float(result.miss_m[0]))} m, impulse spent {float(result.impulse_m_s[0]):.1f} m/s"
     outcome = _OUTCOMES.get(result.outcomes[0])
-    return text if outcome is None else f"{text}, {outcome}"
+    return ending(text if outcome is None else f"{text}, {outcome}", result.hit.tolist()[0])
 
 
 def _shown(metres: float) -> str:

@@ -10,6 +10,7 @@ from experiments.common.toml_values import KILO, DecimalPair, shown, si
 from experiments.interception.scenario_tables import OPTIONAL_SENSORS
 from guidance import Thruster
 from infoset import AngleSensor, Model, SetModel, StateBox
+from infoset.model import WHOLE_STEPS_TOLERANCE
 from sim.draws import MOST_STEPS
 from sim.gravity import greatest_impulses_m_s, with_gravity
 from sim.kepler import LONGEST_SUBSTEP_S
@@ -17,18 +18,41 @@ from sim.scenario import Sun
 
 MOST_LEAPS = 10_000_000
 """Largest number of integration steps of one engagement: some minutes of computing."""
-WHOLE_STEPS_TOLERANCE = Decimal("1e-9")
+AGREE, OTHER_UNIT = 10, 100
+"""Ratio of two values below which they are in the same unit, and from which they are in different units."""
 
 
 def cross_problems(known: Known) -> Iterator[Problem]:
     """Yield the problems between valid values."""
     yield from _impulses(known)
     yield from _periods(known)
-    yield from _ranges(known)
-    yield from _error_law(known)
     yield from _sections(known)
-    yield from _sun(known)
-    yield from _closing_speeds(known)
+    geometric = [*_ranges(known), *_error_law(known), *_sun(known), *_body(known), *_closing_speeds(known)]
+    # A range or a speed in another unit causes problems of other keys.
+    yield from [*_other_units(known)] or geometric if geometric else ()
+
+
+def _other_units(known: Known) -> Iterator[Problem]:
+    """Yield the range or speed that differs by a large factor from two others, which agree with each other."""
+    for nominal, state, unit in (("closing_speed_km_s", "vx_km_s", "km/s"), ("range_km", "x_km", "km")):
+        single = known.number("nominal", nominal)
+        if single is None:
+            continue
+        sizes = {f"nominal.{nominal}": single}
+        sizes |= {where: abs(pair[0] + pair[1]) / 2 for where, pair in _spans(known, state)}
+        for where, size in sizes.items():
+            # The nominal range sets the error bound of the angle sensor only: `scenario_warnings` reports it.
+            others = [other for name, other in sizes.items() if name != where]
+            if where == "nominal.range_km" or len(others) < 2 or not 0 < max(others) < AGREE * min(others):
+                continue
+            factor = size / max(others)
+            if not 1 / Decimal(OTHER_UNIT) < factor < OTHER_UNIT:
+                yield Problem(
+                    (*where.split("."),),
+                    f"is {float(factor):.4g} times {' and '.join(name for name in sizes if name != where)}, "
+                    f"found {shown(known.value(*where.split('.')))}",
+                    f"write it in {unit}",
+                )
 
 
 def _impulses(known: Known) -> Iterator[Problem]:
@@ -50,11 +74,11 @@ def _periods(known: Known) -> Iterator[Problem]:
             continue
         steps = period / step
         whole = max(Decimal(1), steps.to_integral_value())
-        if abs(steps - whole) > WHOLE_STEPS_TOLERANCE * whole:
+        if abs(steps - whole) > Decimal(WHOLE_STEPS_TOLERANCE) * whole:
             yield Problem(
                 (sensor, "period_s"),
                 f"must be a whole number of steps of guidance.step_s, {shown(step)} s, found {shown(period)}",
-                f"write period_s = {shown((whole * step).normalize())}, or a step that divides it",
+                f"write period_s = {(whole * step).normalize():f}, or a step that divides it",
             )
 
 
@@ -161,6 +185,20 @@ def _sun(known: Known) -> Iterator[Problem]:
             f"must be greater than the greatest possible range, {shown(greatest)} km of {where}, "
             f"found {shown(distance)}",
             "check the unit; for free space omit the table [sun]",
+        )
+
+
+def _body(known: Known) -> Iterator[Problem]:
+    radius = known.number("body", "radius_m")
+    spans = list(_spans(known, "x_km"))
+    if radius is None or not spans:
+        return
+    where, (least, _) = min(spans, key=lambda span: span[1][0])
+    if radius >= least * 1000:
+        yield Problem(
+            ("body", "radius_m"),
+            f"must be less than the least possible range, {shown(least)} km of {where}, found {shown(radius)}",
+            "check the unit; for a point omit the table [body]",
         )
 
 

@@ -7,60 +7,59 @@ written (as its shortest decimal with the point moved) and is read back bit for 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from typing import Any, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import TypeVar
 
 from pydantic import BaseModel
 
 from experiments.common.errors import InputError
+from experiments.common.file_kinds import SCENARIO, built_in, built_in_names
+from experiments.common.template import template
 from experiments.common.toml_file import (
     Form,
-    built_in_names,
-    built_in_text,
     keys_of,
     load_tables,
     read_tables,
-    tables_of,
 )
-from experiments.common.toml_values import shown, si_values, value_text
+from experiments.common.toml_values import shown, si_name, si_values, value_text
 from experiments.interception.scenario_checks import cross_problems
 from experiments.interception.scenario_tables import OPTIONAL_SENSORS, SCHEMA, ScenarioTables
 from guidance.thruster import Thruster
 from infoset.model import InitialSet, Interval, Model, SetModel, StateBox
 from infoset.sensors import AngleSensor
-from sim.scenario import Scenario, Sun, Target
+from sim.scenario import Body, Scenario, Sun, Target
 from sim.storage.codec import scenario_hash as scenario_hash  # noqa: PLC0414 (users import it from here)
 
 DEFAULT_FEWEST_SECTIONS = 5
+FAR = 10.0
+"""Ratio of the nominal range to the possible ranges from which `scenario_warnings` reports it."""
 SMALL_ANGLE_RAD = 0.01
 """Largest line-of-sight angle for the model `paper`, which replaces tangents by their angles."""
 
 FORM = Form(
     noun="scenario",
-    folder="scenarios",
     listed_by="infoset scenarios list",
     begun_by="infoset scenarios new FILE",
     tables=ScenarioTables,
     checks=cross_problems,
+    written=("sun", "range_sensor"),
     schema=SCHEMA,
 )
 
 Part = TypeVar("Part")
-UNUSUAL_TABLES = (*(table for table in OPTIONAL_SENSORS if table != "range_sensor"), "target")
-"""Tables that the template contains as comments."""
 
 
 def scenario_names() -> tuple[str, ...]:
     """Return the names of the built-in scenarios, in alphabetical order."""
-    return built_in_names(FORM)
+    return tuple(built_in_names([SCENARIO]))
 
 
 def scenario_text(name: str) -> str:
     """Return the file of a built-in scenario, with its comments; `InputError` if there is no such scenario."""
-    return built_in_text(FORM, name)
+    return built_in(name, [SCENARIO], "no built-in scenario").text
 
 
-def load_scenario(name_or_path: str | os.PathLike[str]) -> Scenario:
+def load_scenario(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Scenario:
     """Read a built-in scenario or a scenario file.
 
     Parameters
@@ -68,6 +67,8 @@ def load_scenario(name_or_path: str | os.PathLike[str]) -> Scenario:
     name_or_path : str or path
         A built-in name, or the path of a TOML file. A name wins over a file of that name, unless the argument has a
         path separator or ends in ``.toml``.
+    settings : sequence of str or None, optional
+        KEY=VALUE: values in place of those of the file, for example ``["thruster.greatest_impulse_m_s=5"]``.
 
     Returns
     -------
@@ -79,12 +80,18 @@ def load_scenario(name_or_path: str | os.PathLike[str]) -> Scenario:
     InputError
         If there is no such scenario or file, or the file is not a valid scenario; the message lists all its problems.
     """
-    return _to_scenario(load_tables(FORM, name_or_path), str(name_or_path))
+    return _to_scenario(load_tables(FORM, name_or_path, settings), str(name_or_path))
 
 
-def read_scenario(text: str, source: str) -> Scenario:
-    """Return the scenario of the text of a scenario file, as `load_scenario`; messages name `source`."""
-    return _to_scenario(read_tables(FORM, text, source), source)
+def read_scenario(text: str, source: str, values: Mapping[str, str] | None = None) -> Scenario:
+    """Return the scenario of the text of a scenario file, as `load_scenario`; messages name `source`.
+
+    Parameters
+    ----------
+    values : mapping of str to str or None, optional
+        TOML values that replace those of the text, by key, for example ``{"uncertainty.x_km.least": "5200.0"}``.
+    """
+    return _to_scenario(read_tables(FORM, text, source, values), source)
 
 
 def scenario_warnings(scenario: Scenario) -> list[str]:
@@ -109,6 +116,12 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
         lines.append(
             f"nominal.closing_speed_km_s is {outside / 1000:.6g} km/s outside uncertainty.vx_km_s: "
             "the on-board model uses a speed that is known to be wrong"
+        )
+    ranges = (uncertainty.x_m[0] / FAR, uncertainty.x_m[1] * FAR)
+    if not ranges[0] <= scenario.nominal_range_m <= ranges[1]:
+        lines.append(
+            f"nominal.range_km is {scenario.nominal_range_m / 1000:.6g} km, far outside uncertainty.x_km: "
+            "the error bound of the angle sensor is defined at this range; check its unit"
         )
     thruster = scenario.thruster
     target, model = scenario.target, scenario.set_model
@@ -143,24 +156,14 @@ def default_initial_set(model: Model) -> InitialSet:
 
 def scenario_template() -> str:
     """Return a valid scenario file with a comment on every key, as a start for other scenarios."""
-    lines = [
-        "# A scenario. Check it with: infoset scenarios check FILE",
-        "# Every key carries its unit in its name. z is across the nominal line of approach, x along it, and the",
-        "# spacecraft is the origin. A line `# key = value` is optional: the default or an example.",
-        "",
-    ]
-    for name, field in keys_of(ScenarioTables).items():
-        if name not in tables_of(ScenarioTables):
-            lines += _template_key(name, field)
-    for table in tables_of(ScenarioTables):
-        field = keys_of(ScenarioTables)[table]
-        optional = "" if field.is_required() else " (an optional table)"
-        keys = [line for name, key in keys_of(ScenarioTables, (table,)).items() for line in _template_key(name, key)]
-        if table in UNUSUAL_TABLES:
-            keys = [f"# {line.removeprefix('# ')}" for line in keys]
-        lines += ["", f"# {field.description}{optional}", f"# [{table}]" if table in UNUSUAL_TABLES else f"[{table}]"]
-        lines += keys
-    return "\n".join(lines) + "\n"
+    return template(
+        FORM,
+        [
+            "A scenario. Check it with: infoset scenarios check FILE",
+            "Every key carries its unit in its name. z is across the nominal line of approach, x along it, and the",
+            "spacecraft is the origin. A line `# key = value` is optional: the default or an example.",
+        ],
+    )
 
 
 def scenario_to_toml(scenario: Scenario) -> str:
@@ -171,46 +174,36 @@ def scenario_to_toml(scenario: Scenario) -> str:
     InputError
         If no file can contain the scenario: a number is not finite, or its angle sensor has another nominal range.
     """
-    model, sensor, sun = scenario.set_model, scenario.set_model.angle_sensor, scenario.sun
+    model, sensor = scenario.set_model, scenario.set_model.angle_sensor
     if sensor.nominal_range_m != scenario.nominal_range_m:
         raise InputError(
             f"scenario {shown(scenario.name)}: its angle sensor has the nominal range {sensor.nominal_range_m!r} m and "
             f"it has {scenario.nominal_range_m!r} m; a scenario file has one, nominal.range_km"
         )
-    tables: dict[str, dict[str, object]] = {
-        "": {"schema": SCHEMA, "name": scenario.name, "description": scenario.description}
+    start = vars(scenario.dispersion).items()
+    tables: dict[str, dict[str, object] | None] = {
+        "sun": _values(scenario.sun),
+        "nominal": {"range_m": scenario.nominal_range_m, "closing_speed_m_s": model.closing_speed_m_s},
+        "uncertainty": vars(model.bounds),
+        "dispersion": {name: pair[0] if pair[0] == pair[1] else pair for name, pair in start},
+        "angle_sensor": vars(sensor),
+        **{table: _values(getattr(scenario, table)) for table in (*OPTIONAL_SENSORS, "target", "body")},
+        "thruster": vars(scenario.thruster),
+        "guidance": {**vars(model), "strategy": scenario.strategy},
+        "information_set": {**vars(model), "model": model.kind},
+        "noise": {"kind": scenario.noise, "tie": scenario.tie},
     }
-    if sun is not None:
-        tables["sun"] = {
-            "gravitational_parameter_km3_s2": sun.gravitational_parameter_m3_s2,
-            "distance_km": sun.distance_m,
-            "direction_deg": sun.direction_rad,
-        }
-    tables["nominal"] = {"range_km": scenario.nominal_range_m, "closing_speed_km_s": model.closing_speed_m_s}
-    tables["uncertainty"] = {**_box(model.bounds)}
-    tables["dispersion"] = {
-        key: pair[0] if pair[0] == pair[1] else pair for key, pair in _box(scenario.dispersion).items()
-    }
-    tables["angle_sensor"] = {key: value for key, value in vars(sensor).items() if key != "nominal_range_m"}
-    for table in (*OPTIONAL_SENSORS, "target"):
-        if (fitted := getattr(scenario, table)) is not None:
-            tables[table] = vars(fitted)
-    tables["thruster"] = vars(scenario.thruster)
-    tables["guidance"] = {
-        "step_s": model.step_s,
-        "strategy": scenario.strategy,
-        "range_threshold_km": model.range_threshold_m,
-    }
-    tables["information_set"] = {
-        "model": model.kind,
-        "initial_set": model.initial_set,
-        "sections": int(model.sections),
-        "fewest_sections": int(model.fewest_sections),
-        "recovery": model.recovery,
-        "disturbance_m_s2": model.disturbance_m_s2,
-    }
-    tables["noise"] = {"kind": scenario.noise, "tie": scenario.tie}
-    return "\n".join(_table_lines(tables))
+    top = {"schema": SCHEMA, "name": scenario.name, "description": scenario.description}
+    lines = [f"{key} = {value_text(key, value)}" for key, value in top.items()]
+    for table, values in tables.items():
+        if values is not None:
+            lines += ["", f"[{table}]"]
+            lines += [f"{key} = {value_text(key, values[si_name(key)])}" for key in keys_of(ScenarioTables, (table,))]
+    return "\n".join(lines) + "\n"
+
+
+def _values(part: object | None) -> dict[str, object] | None:
+    return None if part is None else vars(part)
 
 
 def _to_scenario(tables: ScenarioTables, source: str) -> Scenario:
@@ -245,6 +238,7 @@ def _composed(tables: ScenarioTables) -> Scenario:
             **chosen,
         ),
         target=_fitted(Target, tables.target),
+        body=_fitted(Body, tables.body),
         thruster=Thruster(**si_values(tables.thruster)),
         strategy=tables.guidance.strategy,
         noise=tables.noise.kind,
@@ -256,20 +250,3 @@ def _composed(tables: ScenarioTables) -> Scenario:
 def _fitted(owner: type[Part], table: BaseModel | None) -> Part | None:
     """Return the dataclass of an optional table."""
     return None if table is None else owner(**si_values(table))
-
-
-def _box(box: StateBox) -> dict[str, Interval]:
-    return {"z_km": box.z_m, "x_km": box.x_m, "vz_km_s": box.vz_m_s, "vx_km_s": box.vx_m_s}
-
-
-def _table_lines(tables: dict[str, dict[str, object]]) -> Iterator[str]:
-    for table, keys in tables.items():
-        if table:
-            yield f"\n[{table}]"
-        yield from (f"{key} = {value_text(key, value)}" for key, value in keys.items())
-    yield ""
-
-
-def _template_key(name: str, field: Any) -> list[str]:
-    line = f"{name} = {field.examples[0]}"
-    return [f"{line if field.is_required() else f'# {line}':<44}  # {field.description}"]

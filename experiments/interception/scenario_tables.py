@@ -14,12 +14,12 @@ from pydantic import PlainValidator
 import guidance
 from experiments.common.toml_values import (
     KILO,
+    Constant,
     DecimalPair,
     Degrees,
     Description,
     Name,
     Number,
-    OneOf,
     Pair,
     Positive,
     Table,
@@ -33,7 +33,7 @@ from guidance.thruster import Thruster
 from infoset.limits import limits_of
 from infoset.model import MOST_SECTIONS, InitialSet, Model, Recovery, SetModel, StateBox
 from infoset.sensors import AngleSensor, RangeSensor, RateSensor
-from sim.scenario import Manoeuvre, Scenario, Sun, Target
+from sim.scenario import Body, Manoeuvre, Scenario, Sun, Target
 
 SCHEMA = 1
 SPEED_OF_LIGHT_KM_S = Decimal("299792.458")
@@ -49,6 +49,13 @@ _APPROACH = Number(below=Decimal(0), least=-SPEED_OF_LIGHT_KM_S)
 
 ClosingSpeed = Annotated[Decimal, PlainValidator(Number(above=Decimal(0), most=SPEED_OF_LIGHT_KM_S))]
 
+OfSun = Annotated[Decimal, limited_by(Sun)]
+OfAngleSensor = Annotated[Decimal, limited_by(AngleSensor)]
+OfRangeSensor = Annotated[Decimal, limited_by(RangeSensor)]
+OfRateSensor = Annotated[Decimal, limited_by(RateSensor)]
+OfThruster = Annotated[Decimal, limited_by(Thruster)]
+OfSetModel = Annotated[Decimal, limited_by(SetModel)]
+
 
 def _pair(field: str, *, fixed: bool = False) -> PlainValidator:
     return PlainValidator(Pair(Number.of(limits_of(StateBox, field), KILO), fixed))
@@ -57,10 +64,8 @@ def _pair(field: str, *, fixed: bool = False) -> PlainValidator:
 class SunTable(Table):
     """[sun]."""
 
-    gravitational_parameter_km3_s2: Annotated[Decimal, limited_by(Sun)] = key(
-        "gravitational parameter of the Sun", "1.324948e11"
-    )
-    distance_km: Annotated[Decimal, limited_by(Sun)] = key("distance of the Sun from the spacecraft at t0", "150.0e6")
+    gravitational_parameter_km3_s2: OfSun = key("gravitational parameter of the Sun", "1.324948e11")
+    distance_km: OfSun = key("distance of the Sun from the spacecraft at t0", "150.0e6")
     direction_deg: Degrees = key("direction of the Sun at t0, from the x axis toward z", "90.0")
 
 
@@ -98,35 +103,23 @@ class DispersionTable(Table):
 class AngleSensorTable(Table):
     """[angle_sensor]."""
 
-    period_s: Annotated[Decimal, limited_by(AngleSensor)] = key(
-        "time between measurements, a multiple of guidance.step_s", "0.5"
-    )
-    error_at_nominal_range_rad: Annotated[Decimal, limited_by(AngleSensor)] = key(
-        "greatest error at nominal.range_km", "0.00015"
-    )
-    error_at_zero_range_rad: Annotated[Decimal, limited_by(AngleSensor)] = key(
-        "greatest error at range zero; a straight line joins both", "0.00023"
-    )
+    period_s: OfAngleSensor = key("time between measurements, a multiple of guidance.step_s", "0.5")
+    error_at_nominal_range_rad: OfAngleSensor = key("greatest error at nominal.range_km", "0.00015")
+    error_at_zero_range_rad: OfAngleSensor = key("greatest error at range zero; a straight line joins both", "0.00023")
 
 
 class RangeSensorTable(Table):
     """[range_sensor]."""
 
-    period_s: Annotated[Decimal, limited_by(RangeSensor)] = key(
-        "time between measurements, a multiple of guidance.step_s", "2.0"
-    )
-    relative_error: Annotated[Decimal, limited_by(RangeSensor)] = key("greatest error, relative to the range", "0.05")
+    period_s: OfRangeSensor = key("time between measurements, a multiple of guidance.step_s", "2.0")
+    relative_error: OfRangeSensor = key("greatest error, relative to the range", "0.05")
 
 
 class RateSensorTable(Table):
     """[rate_sensor]."""
 
-    period_s: Annotated[Decimal, limited_by(RateSensor)] = key(
-        "time between measurements, a multiple of guidance.step_s", "1.0"
-    )
-    error_rad_s: Annotated[Decimal, limited_by(RateSensor)] = key(
-        "greatest error of the line of sight's angular rate", "1e-6"
-    )
+    period_s: OfRateSensor = key("time between measurements, a multiple of guidance.step_s", "1.0")
+    error_rad_s: OfRateSensor = key("greatest error of the line of sight's angular rate", "1e-6")
 
 
 OPTIONAL_SENSORS: Mapping[str, type[Any]] = {"range_sensor": RangeSensor, "rate_sensor": RateSensor}
@@ -136,24 +129,26 @@ OPTIONAL_SENSORS: Mapping[str, type[Any]] = {"range_sensor": RangeSensor, "rate_
 class TargetTable(Table):
     """[target]."""
 
-    manoeuvre: Annotated[Manoeuvre, PlainValidator(OneOf(Manoeuvre))] = key(
-        '"none", "constant", "bang-bang", "random-telegraph" or "worst-case"', '"bang-bang"'
-    )
+    manoeuvre: Manoeuvre = key('"none", "constant", "bang-bang", "random-telegraph" or "worst-case"', '"bang-bang"')
     acceleration_m_s2: Annotated[Decimal, limited_by(Target)] = key("its acceleration along z", "0.005")
     switching_period_s: Annotated[Decimal, limited_by(Target)] = key(
         "time between changes of sign; their mean time if random", "10.0", default=Decimal(10)
     )
 
 
+class BodyTable(Table):
+    """[body]."""
+
+    radius_m: Annotated[Decimal, limited_by(Body)] = key("a miss of at most this radius is a hit", "80.0")
+
+
 class ThrusterTable(Table):
     """[thruster]."""
 
-    budget_m_s: Annotated[Decimal, limited_by(Thruster)] = key("sum of the absolute values of all impulses", "1000.0")
-    least_impulse_m_s: Annotated[Decimal, limited_by(Thruster)] = key("smaller impulses become zero", "0.25")
-    greatest_impulse_m_s: Annotated[Decimal, limited_by(Thruster)] = key(
-        "greater impulses are reduced to this one", "7.5"
-    )
-    execution_error_relative: Annotated[Decimal, limited_by(Thruster)] = key(
+    budget_m_s: OfThruster = key("sum of the absolute values of all impulses", "1000.0")
+    least_impulse_m_s: OfThruster = key("smaller impulses become zero", "0.25")
+    greatest_impulse_m_s: OfThruster = key("greater impulses are reduced to this one", "7.5")
+    execution_error_relative: OfThruster = key(
         "greatest relative error of an executed impulse", "0.0", default=Decimal(0)
     )
 
@@ -161,7 +156,7 @@ class ThrusterTable(Table):
 class GuidanceTable(Table):
     """[guidance]."""
 
-    step_s: Annotated[Decimal, limited_by(SetModel)] = key("step of observation and control", "0.5")
+    step_s: OfSetModel = key("step of observation and control", "0.5")
     strategy: Annotated[str, PlainValidator(_strategy)] = key("name of the guidance strategy", '"symmetric-miss"')
     range_threshold_km: Positive = key("sections nearer than this are removed from the set", "5.0")
 
@@ -169,11 +164,9 @@ class GuidanceTable(Table):
 class InformationSetTable(Table):
     """[information_set]."""
 
-    model: Annotated[Model, PlainValidator(OneOf(Model))] = key(
-        '"paper", as published, or "guaranteed", which keeps the true state', '"paper"'
-    )
-    initial_set: Annotated[InitialSet | None, PlainValidator(OneOf(InitialSet))] = key(
-        'section at t0: "rectangle" in (omega, alpha) or "box" in (z, V)', '"rectangle"', default=None
+    model: Model = key('"guaranteed", which keeps the true state, or "paper", as published', '"guaranteed"')
+    initial_set: InitialSet | None = key(
+        'section at t0: "rectangle" in (omega, alpha) or "box" in (z, V)', '"box"', default=None
     )
     sections: Annotated[int, PlainValidator(Whole(MOST_SECTIONS))] = key(
         "number of sections: a uniform grid of ranges over uncertainty.x_km", "29"
@@ -181,23 +174,19 @@ class InformationSetTable(Table):
     fewest_sections: Annotated[int | None, PlainValidator(Whole(MOST_SECTIONS))] = key(
         "if fewer remain: a new grid of 2 fewest_sections + 1 sections", "5", default=None
     )
-    recovery: Annotated[Recovery, PlainValidator(OneOf(Recovery))] = key(
+    recovery: Recovery = key(
         'after a set became empty: "widened" enlarges it, "none" ends guidance',
         '"widened"',
         default=Recovery.WIDENED,
     )
-    disturbance_m_s2: Annotated[Decimal, limited_by(SetModel)] = key(
-        "bound of the unknown acceleration along z, target included", "0.005"
-    )
+    disturbance_m_s2: OfSetModel = key("bound of the unknown acceleration along z, target included", "0.005")
 
 
 class NoiseTable(Table):
     """[noise]."""
 
-    kind: Annotated[NoiseKind, PlainValidator(OneOf(NoiseKind))] = key(
-        '"random", or "game": errors chosen against the guidance', '"random"'
-    )
-    tie: Annotated[TieRule, PlainValidator(OneOf(TieRule))] = key(
+    kind: NoiseKind = key('"random", or "game": errors chosen against the guidance', '"random"')
+    tie: TieRule = key(
         'tie rule of game noise: "upper", "lower", "alternate" or "random"',
         '"upper"',
         default=TieRule.UPPER,
@@ -207,9 +196,7 @@ class NoiseTable(Table):
 class ScenarioTables(Table):
     """A whole scenario file."""
 
-    schema_number: Annotated[int, PlainValidator(lambda value: value)] = key(
-        "version of the file format", str(SCHEMA), alias="schema"
-    )
+    schema_number: Constant = key("version of the file format", str(SCHEMA), alias="schema")
     name: Name = key("name in results and files", '"my-scenario"')
     description: Description = key("a line for `infoset scenarios list`", '"What this scenario is about"', default="")
     sun: SunTable | None = key("the Sun, seen from the spacecraft; without this table: no gravity", "", default=None)
@@ -224,6 +211,7 @@ class ScenarioTables(Table):
     target: TargetTable | None = key(
         "how the object accelerates; without this table: no acceleration", "", default=None
     )
+    body: BodyTable | None = key("the size of the object; without this table: a point", "", default=None)
     thruster: ThrusterTable = key("the engine", "")
     guidance: GuidanceTable = key("how impulses are chosen", "")
     information_set: InformationSetTable = key("the information set", "")

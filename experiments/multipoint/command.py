@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.options import FileOptions, Html, ProblemName
+from experiments.common.options import FileOptions, Html, ProblemName, Settings, TrajectoryCsv
 
 GIVEN, BEST = "given", "best"
 
@@ -17,10 +17,11 @@ class Multipoint(FileOptions):
     """Visit several moving targets with minimum energy, by flybys or rendezvous.
 
     With --order best and --times given, the times of the file are kept and the targets are exchanged: the target that
-    is visited first has the earliest time. Without --out, --json or --html no file is written.
+    is visited first has the earliest time. Without --out, --json, --csv or --html no file is written.
     """
 
     problem: ProblemName = "service-3"
+    settings: Settings = None
     order: Annotated[
         Literal["given", "best"], typer.Option(help="Order of the targets: that of the file, or the best one.")
     ] = "given"
@@ -28,4 +29,5 @@ class Multipoint(FileOptions):
         Literal["given", "best"] | None,
         typer.Option(help="Times of the visits: those of the file, or the best ones. Default: as in the file."),
     ] = None
+    csv: TrajectoryCsv = None
     html: Html = None

@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
@@ -22,6 +21,7 @@ from experiments.common.figure_style import (
     SET_FILL,
     TRUTH,
     figure_grid,
+    place_labels,
     style,
 )
 from experiments.multipoint.file import Axes as FrameAxes
@@ -29,18 +29,10 @@ from experiments.multipoint.scene import CostCurve, Scene
 
 Floats = NDArray[np.float64]
 
-_POINTS = 1601
 _TRACK_POINTS = 241
 _COMPONENTS = tuple({**look, "marker": "none"} for look in LINE_LOOKS[:3])
 _MOST_NAMED = 12
-_POSITIONS = tuple(
-    (right, up, distance)
-    for distance in (5.0, 9.0, 15.0)
-    for right, up in ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
-)
-"""Positions of a name relative to its mark: the side across and up, and the distance in points; better ones first."""
 _SUN_M3_S2 = 1.32712440018e20
-_CLASH, _OUTSIDE = 100.0, 1000.0
 _TARGET: dict[str, Any] = {"color": LIMIT, "linewidth": 0.7, "linestyle": (0, (3, 2))}
 _TARGET_START: dict[str, Any] = {"color": LIMIT, "marker": "."}
 _START: dict[str, Any] = {"color": TRUTH, "marker": "s", "markersize": 4.5}
@@ -49,17 +41,10 @@ _NODE: dict[str, Any] = {"color": "white", "markeredgecolor": INK, "markersize":
 _DOTTED: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (2, 2))}
 
 
-def _times(scene: Scene) -> Floats:
-    """Return equally spaced times, and the times on both sides of each visit."""
-    nodes = scene.path.nodes
-    even = np.linspace(scene.tour.start_s, scene.end_s, _POINTS)
-    return np.unique(np.concatenate([even, nodes.arrive_s, np.nextafter(nodes.arrive_s, -np.inf), nodes.leave_s[:-1]]))
-
-
 @style()
 def draw_path(scene: Scene) -> Figure:
     """Draw the path and the motion of the targets, in two planes."""
-    positions = scene.path.state(_times(scene))[:, :3]
+    positions = scene.path.state(scene.times)[:, :3]
     name, per_m = length_unit(float(np.abs(positions).max()))
     positions = positions * per_m
     hill = scene.axes is FrameAxes.HILL
@@ -81,6 +66,8 @@ def draw_path(scene: Scene) -> Figure:
         if equal:
             panel.set_aspect("equal", adjustable="datalim")
             panel.apply_aspect()
+            panel.set_aspect("auto")  # the limits are final; matplotlib warns about fixed limits with a fixed aspect
+        panel.set(xlim=panel.get_xlim(), ylim=panel.get_ylim())
         _mark_visits(panel, scene, positions[:, [across, up]], scene.path.arrival_states[:, [across, up]] * per_m)
         panel.set(xlabel=f"{labels[across]}, {name}", ylabel=f"{labels[up]}, {name}")
         panel.set_title(f"({letter}) axes with {'equal' if equal else 'different'} scales", loc="left")
@@ -115,54 +102,17 @@ def _path_handles(scene: Scene) -> list[Line2D]:
 
 def _mark_visits(panel: Axes, scene: Scene, line: Floats, visits: Floats) -> None:
     """Mark the visits with their names in a plane, for a path and visits of shapes (n, 2)."""
-    labels: list[Any] = []
-    for name, visit, rendezvous in zip(scene.names, visits, scene.path.nodes.rendezvous, strict=True):
+    for visit, rendezvous in zip(visits, scene.path.nodes.rendezvous, strict=True):
         panel.plot(*visit, marker="D" if rendezvous else "o", zorder=5, **_NODE)
-        if len(visits) <= _MOST_NAMED:
-            label = panel.annotate(
-                name, tuple(visit), xytext=(4, 4), textcoords="offset points", fontsize=7.0, zorder=6
-            )
-            label.set_path_effects([Stroke(linewidth=2.0, foreground="white"), Normal()])
-            labels.append(label)
-    panel.set_xlim(panel.get_xlim())
-    panel.set_ylim(panel.get_ylim())
-    _place_labels(panel, labels, np.vstack([visits, line[:1]]), line)
-
-
-def _place_labels(panel: Axes, labels: list[Any], marks: Floats, line: Floats) -> None:
-    """Move each name to where it covers no other name, no mark and as little of the path as possible."""
-    figure: Any = panel.figure
-    renderer = figure.canvas.get_renderer()
-    margin = 3.0 * figure.dpi / 72.0
-    line, marks = panel.transData.transform(line), panel.transData.transform(marks)
-    frame = panel.get_window_extent(renderer)
-    taken: list[Any] = []
-
-    def moved(label: Any, right: int, up: int, distance: float) -> Any:
-        label.set(ha=("center", "left", "right")[right], va=("center", "bottom", "top")[up])
-        label.set_position((right * distance, up * distance * (1.0 if right == 0 else 0.7)))
-        return label.get_window_extent(renderer)
-
-    def penalty(box: Any) -> float:
-        clashes = sum(box.overlaps(other) for other in taken) + _count_inside(box.padded(margin), marks)
-        outside = not (frame.x0 <= box.x0 and box.x1 <= frame.x1 and frame.y0 <= box.y0 and box.y1 <= frame.y1)
-        return float(_OUTSIDE * outside + _CLASH * clashes + 3.0 * _count_inside(box, line))
-
-    for label in labels:
-        # Each position before the best one costs a point more than the one before it.
-        penalties = [penalty(moved(label, *position)) + rank for rank, position in enumerate(_POSITIONS)]
-        taken.append(moved(label, *_POSITIONS[int(np.argmin(penalties))]))
-
-
-def _count_inside(box: Any, points: Floats) -> int:
-    inside = (points > (box.x0, box.y0)).all(axis=1) & (points < (box.x1, box.y1)).all(axis=1)
-    return int(np.count_nonzero(inside))
+    if len(visits) <= _MOST_NAMED:
+        labels = [(name, visit[None], line) for name, visit in zip(scene.names, visits, strict=True)]
+        place_labels(panel, labels, np.vstack([visits, line[:1]]), fontsize=7.0, zorder=6)
 
 
 @style()
 def draw_control(scene: Scene, bound_m_s2: float | None = None) -> Figure:
     """Draw the components and the magnitude of the control against time, with the bound if there is one."""
-    times = _times(scene)
+    times = scene.times
     control = scene.path.control(times) * 1e3
     figure, (above, below) = figure_grid(100.0, 2, 1, (17.0, 8.0, 12.0, 9.0), (0.0, 8.0))
     for axis, letter in enumerate("xyz"):
@@ -181,7 +131,7 @@ def draw_control(scene: Scene, bound_m_s2: float | None = None) -> Figure:
 @style()
 def draw_costates(scene: Scene) -> Figure:
     """Draw the costates against time; the costate of the position jumps at each visit."""
-    times = _times(scene)
+    times = scene.times
     costate = scene.path.costate(times)
     figure, (above, below) = figure_grid(100.0, 2, 1, (17.0, 8.0, 12.0, 9.0), (0.0, 8.0))
     for axis, letter in enumerate("xyz"):

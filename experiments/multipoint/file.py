@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
 from experiments.common.errors import InputError
-from experiments.common.orbit_angle import angle_problems
-from experiments.common.problem_file import ProblemTables, duplicate_names, problem_form, problem_hash
+from experiments.common.problem_file import ProblemTables, angle_problems, duplicate_names, problem_form, problem_hash
 from experiments.common.toml_file import KeyPath, Known, Problem, load_tables
 from experiments.common.toml_values import (
     KILO,
@@ -25,7 +24,6 @@ from experiments.common.toml_values import (
     Name,
     NotNegative,
     Numbers,
-    OneOf,
     Positive,
     Table,
     Vector,
@@ -35,9 +33,8 @@ from experiments.common.toml_values import (
     wrong,
 )
 from rendezvous.multipoint import DriftingTargets, KeplerTargets, KeplerTour, Meet, Target, TimeLimits, Tour, Visits
-from rendezvous.orbital_elements import OrbitalElements
 from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
-from rendezvous.two_body import coast
+from rendezvous.two_body import OrbitalElements, coast
 
 Floats = NDArray[np.float64]
 
@@ -91,15 +88,27 @@ Time = Annotated[Decimal, PlainValidator(NUMBER)]
 class BodyTable(Table):
     """State of a body: at t = 0 in Hill axes, or at an epoch in inertial axes."""
 
-    position_m: Vector | None = key("at t = 0 in Hill axes", "[0.0, 2000.0, 0.0]", default=None)
-    velocity_m_s: Vector | None = key("at t = 0 in Hill axes", "[0.0, 0.0, 0.0]", default=None)
+    position_m: Vector | None = key(
+        "at t = 0: x radial, y along the motion, z along the normal of the orbit",
+        "[0.0, 0.0, 0.0]",
+        "[100.0, 2000.0, 50.0]",
+        "[-150.0, 3500.0, -80.0]",
+        default=None,
+    )
+    velocity_m_s: Vector | None = key(
+        "velocity at t = 0 in the same axes",
+        "[0.0, 0.0, 0.0]",
+        "[0.05, -0.226, 0.02]",
+        "[-0.10, 0.339, 0.05]",
+        default=None,
+    )
     elements: Elements | None = key(
-        "a km, e, then i, RAAN, argument of periapsis, true anomaly in degrees, epoch s",
+        'with axes = "inertial": a km, e, then i, RAAN, argument of periapsis, true anomaly in degrees, epoch s',
         "[1.5e8, 0.02, 0.0, 0.0, 103.0, 0.0, 0.0]",
         default=None,
     )
-    position_km: Vector | None = key("in place of elements", "[7000.0, 0.0, 0.0]", default=None)
-    velocity_km_s: Vector | None = key("in place of elements", "[0.0, 7.5, 0.0]", default=None)
+    position_km: Vector | None = key("position, in place of elements", "[7000.0, 0.0, 0.0]", default=None)
+    velocity_km_s: Vector | None = key("velocity, in place of elements", "[0.0, 7.5, 0.0]", default=None)
     epoch_s: Time = key("epoch of position_km and velocity_km_s", "0.0", default=ZERO)
 
 
@@ -110,9 +119,11 @@ class ChaserTable(BodyTable):
 class TargetTable(BodyTable):
     """[[target]]."""
 
-    name: Name = key("name of the target", '"T1"')
-    time_s: Positive | None = key("time of the visit; a first guess if times are optimised", "1500.0", default=None)
-    meet: Annotated[Meet, PlainValidator(OneOf(Meet))] = key(
+    name: Name = key("name of the target", '"T1"', '"T2"')
+    time_s: Positive | None = key(
+        "time of the visit; a first guess if times are optimised", "1500.0", "3000.0", default=None
+    )
+    meet: Meet = key(
         '"flyby" (same position) or "rendezvous" (same position and velocity)', '"flyby"', default=Meet.FLYBY
     )
     dwell_s: NotNegative = key("how long the chaser stays at a rendezvous", "0.0", default=ZERO)
@@ -122,21 +133,25 @@ class TimesTable(Table):
     """[times]."""
 
     optimise: Annotated[bool, PlainValidator(_flag)] = key("whether times are optimised", "false", default=False)
-    latest_s: Positive | None = key("latest time of the last visit", "4000.0", default=None)
+    latest_s: Positive | None = key("latest time of the last visit; without this key: none", "4000.0", default=None)
     least_gap_s: NotNegative = key("shortest travel time between two targets", "0.0", default=ZERO)
-    price_per_s: NotNegative = key("price of one second of the last time, added to the cost", "1e-6", default=ZERO)
+    price_per_s: NotNegative = key("price of one second of the last time, added to the cost", "0.0", default=ZERO)
 
 
 class MultipointTables(ProblemTables):
     """A problem file of kind `multipoint`."""
 
     name: Name = key("name of the results", '"my-tour"', default="tour")
-    axes: Annotated[Axes, PlainValidator(OneOf(Axes))] = key('"hill" or "inertial"', '"hill"')
-    orbit_rate_rad_s: Positive | None = key("mean motion of the reference orbit", "1.13e-3", default=None)
-    eccentricity: Eccentricity = key("of the reference orbit", "0.0", default=ZERO)
-    true_anomaly_deg: Degrees = key("of the reference orbit at t = 0", "0.0", default=ZERO)
-    gravitational_parameter_km3_s2: Positive | None = key("of the attracting body", "398600.4418", default=None)
-    greatest_control_m_s2: Positive | None = key("bound on the control", "0.01", default=None)
+    axes: Axes = key('"hill" or "inertial"', '"hill"')
+    orbit_rate_rad_s: Positive | None = key(
+        'mean motion of the reference orbit, with axes = "hill"', "1.13e-3", default=None
+    )
+    eccentricity: Eccentricity = key("eccentricity of the reference orbit", "0.0", default=ZERO)
+    true_anomaly_deg: Degrees = key("true anomaly of the reference orbit at t = 0", "0.0", default=ZERO)
+    gravitational_parameter_km3_s2: Positive | None = key(
+        'gravitational parameter of the attracting body, with axes = "inertial"', "398600.4418", default=None
+    )
+    greatest_control_m_s2: Positive | None = key("bound on the control; without this key: none", "0.02", default=None)
     chaser: ChaserTable = key("initial state of the chaser", "")
     target: Annotated[list[TargetTable], Field(min_length=1, max_length=MOST_TARGETS)] = key("the targets", "")
     times: TimesTable = key("choice of the times", "", default=TimesTable())
@@ -235,7 +250,16 @@ def _time_problems(known: Known, paths: Sequence[KeyPath]) -> Iterator[Problem]:
         )
 
 
-FORM = problem_form(KIND, MultipointTables, _checks)
+FORM = problem_form(
+    KIND,
+    MultipointTables,
+    _checks,
+    (
+        "orbit_rate_rad_s",
+        *(f"{body}.{name}" for body in ("chaser", "target") for name in KEYS[Axes.HILL]),
+        "target.time_s",
+    ),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,12 +270,8 @@ class MultipointProblem:
     ----------
     source : str
         Name of the file, for messages.
-    hash : str
-        Fingerprint of the values.
     times_s : ndarray, shape (n,), or None
         Times of the visits, by target as listed; None if one is missing.
-    optimise : bool
-        Whether times are optimised.
     """
 
     name: str
@@ -280,20 +300,15 @@ class MultipointProblem:
             raise InputError(f"{self.source}: {error}: latest_s or price_per_s under [times]") from None
 
 
-def load_multipoint(name_or_path: str) -> MultipointProblem:
-    """Read a built-in problem or a file.
-
-    Parameters
-    ----------
-    name_or_path : str or path
-        A built-in name, or the path of a TOML file.
+def load_multipoint(name_or_path: str, settings: Sequence[str] | None = None) -> MultipointProblem:
+    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
 
     Raises
     ------
     InputError
         If there is no such problem, or it is not sound.
     """
-    tables = load_tables(FORM, name_or_path)
+    tables = load_tables(FORM, name_or_path, settings)
     try:
         tour = _hill(tables) if tables.axes is Axes.HILL else _inertial(tables)
     except ValueError as error:

@@ -13,27 +13,19 @@ MOMENTS = 401
 
 
 def multipoint_page(name: str, scene: Scene, bound_m_s2: float | None = None) -> str:
-    """Return the page of a path that visits targets as HTML.
-
-    Parameters
-    ----------
-    name : str
-        Name of the problem.
-    bound_m_s2 : float or None
-        Bound on the control.
-    """
+    """Return the page of a path that visits targets as HTML."""
     path, nodes = scene.path, scene.path.nodes
     time_s = np.unique(np.concatenate([np.linspace(scene.tour.start_s, scene.end_s, MOMENTS), nodes.arrive_s]))
     positions, control = path.state(time_s)[:, :3], path.control(time_s)
     tracks = [Track("chaser", 0, positions)]
     for visit, target in enumerate(scene.names):
         until_s = nodes.leave_s[visit] if visit < len(scene.order) - 1 else scene.end_s
-        tracks.append(Track(target, 1 + visit % 4, scene.target_path(visit, time_s[time_s <= until_s])))
+        tracks.append(Track(target, 1 + visit, scene.target_path(visit, time_s[time_s <= until_s])))
     marks = [Mark("" if visit else "visit", state[:3], "diamond") for visit, state in enumerate(path.arrival_states)]
     hill = scene.axes is Axes.HILL
     axes = ("x (radial)", "y (along-track)", "z (normal)") if hill else ("x", "y", "z")
     if not hill:
-        marks.append(Mark("centre of attraction", np.zeros(3), "square"))
+        marks.append(Mark("centre of attraction", np.zeros(3), "plus"))
     unit = length_unit(float(np.abs(positions).max()))
     above, side = ((1, 0), (1, 2)) if hill else ((0, 1), (0, 2))
     views = [

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.common.published_number import COMPUTED, Progress, PublishedNumber, Reference, Reproduction
+from experiments.common.published_number import COMPUTED, Origin, Progress, PublishedNumber, Reference, Reproduction
 from experiments.multipoint.file import load_multipoint
 from rendezvous.multipoint import (
     DriftingTargets,
@@ -37,7 +37,8 @@ REMARKS = (
     "B_2 of the elimination for N = 2 is R43(t2, t1) alone; costates between nodes have R33, R34, R43 and R44 where "
     "R32 is printed; the line on jumps has the sign that is missing in (11).",
 )
-_REFERENCE = Reference(PAPER, COMPUTED)
+_REFERENCE = Reference(PAPER, COMPUTED, Origin.OTHER)
+_EXACT = Reference(PAPER, COMPUTED, Origin.EXACT)
 _FLYBYS = {
     2: {
         "I (m^2/s^3)": ("0.007795510261",),
@@ -107,7 +108,7 @@ def _visits(count: int) -> list[PublishedNumber]:
         "V(t1) (m/s)": path.arrival_states[0, 3:],
     }
     return [
-        _REFERENCE.number(f"reference, N = {count}", name if len(printed) == 1 else f"{name}, {i}", text, float(ours))
+        _REFERENCE.number(f"N = {count}", name if len(printed) == 1 else f"{name}, {i}", text, float(ours))
         for name, printed in _FLYBYS[count].items()
         for i, (text, ours) in enumerate(zip(printed, computed[name], strict=True), start=1)
     ]
@@ -117,7 +118,7 @@ def _priced() -> list[PublishedNumber]:
     tour, times = _tour(2)
     best = best_times(tour, (0, 1), TimeLimits(price_per_s=1e-6), [times])
     printed = {"t1 (s)": "2905.083078", "t2 (s)": "4690.157388", "I (m^2/s^3)": "0.0008170807218"}
-    source = "reference, N = 2, last time at 1e-6 a second"
+    source = "N = 2, last time at 1e-6 a second"
     return _REFERENCE.numbers(source, printed, [*best.time_s, best.path.cost])
 
 
@@ -129,7 +130,7 @@ def _orders() -> list[PublishedNumber]:
         "I of the worst order, given times (m^2/s^3)": "0.05442751",
         "I of the best order, best times (m^2/s^3)": "0.008734876263",
     }
-    return _REFERENCE.numbers("reference, N = 3", printed, [worst, best.objective])
+    return _REFERENCE.numbers("N = 3", printed, [worst, best.objective])
 
 
 def _double_integrator() -> TimeVaryingMotion:
@@ -149,14 +150,14 @@ def _splines() -> list[PublishedNumber]:
     exact |= {f"V, {i}": value / 13 for i, value in enumerate((-9, -3, 60), start=1)}
     printed = {name: f"{value:.9f}" for name, value in exact.items()}
     ours = [path.cost, *path.jumps[:, 0], *path.arrival_states[:, 3]]
-    numbers = _REFERENCE.numbers("closed form, cubic spline", printed, ours)
+    numbers = _EXACT.numbers("cubic spline", printed, ours)
     there = np.zeros((2, 6))
     there[0, 0] = 1.0
     tour = Tour(motion, DriftingTargets((Target("out"), Target("back")), motion, there), np.zeros(6))
     back = best_times(tour, (0, 1), TimeLimits(latest_s=1.0))
     printed = {"t1": f"{2.0 - 2.0**0.5:.9f}", "I": f"{1.5 * (1.0 + 2.0**0.5) ** 4:.8f}"}
-    source = "closed form, out to 1 and back by T = 1"
-    return numbers + _REFERENCE.numbers(source, printed, [back.time_s[0], back.path.cost])
+    source = "out to 1 and back by T = 1"
+    return numbers + _EXACT.numbers(source, printed, [back.time_s[0], back.path.cost])
 
 
 def _kepler() -> list[PublishedNumber]:
@@ -167,4 +168,4 @@ def _kepler() -> list[PublishedNumber]:
         states.append(np.concatenate([radius * np.array([c, s, s]) * tilt, radius**-0.5 * np.array([-s, c, c]) * tilt]))
     targets = KeplerTargets((Target("first"), Target("second")), np.array(states), np.zeros(2), 1.0)
     path = KeplerTour(targets, np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])).fly((0, 1), [2.0, 4.0])
-    return [_REFERENCE.number("reference, nonlinear", "I (mu = 1)", "4.267529653e-5", path.cost)]
+    return [_REFERENCE.number("nonlinear", "I (mu = 1)", "4.267529653e-5", path.cost)]

@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 
-from experiments.common.output import library_version
-from experiments.common.screen import number_table, print_lines
+from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, Cell, library_version, trajectories_csv
+from experiments.common.screen import number_table, print_lines, print_table
 from experiments.multipoint.command import BEST, GIVEN
 from experiments.multipoint.file import Axes, MultipointProblem
 from experiments.multipoint.scene import Scene
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -98,14 +101,27 @@ def _node_json(scene: Scene, index: int) -> dict[str, object]:
     }
 
 
+def trajectories(scene: Scene) -> str:
+    """Return the trajectories of the chaser and of the targets, as CSV; only the chaser has a control."""
+    times, count = scene.times, len(scene.tour.targets.targets)
+    chaser = np.column_stack([times, scene.path.state(times), scene.path.control(times)])
+    tracks: list[tuple[list[Cell], Floats]] = [(["chaser"], chaser)]
+    for target in range(count):
+        states = scene.tour.targets.states(np.full(len(times), target), times)
+        name = scene.tour.targets.targets[target].name
+        tracks.append(([name], np.column_stack([times, states, np.full((len(times), 3), np.nan)])))
+    return trajectories_csv(["craft"], ["time_s", *STATE_COLUMNS, *CONTROL_COLUMNS], tracks)
+
+
 def print_report(console: Console, report: Report) -> None:
     """Print the cost, the visits and the extent of the search."""
     path, nodes = report.scene.path, report.scene.path.nodes
     print_lines(
         console, [f"{report.problem.name}: cost I = {path.cost:.8g} m^2/s^3, peak |u| {report.peak_m_s2:.4g} m/s^2"]
     )
+    unit, per_s = report.scene.time_unit
     table = number_table(
-        "target", "meet", "time\ns", "relative speed\nm/s", "dI/dt\nm^2/s^4", "costate jump\nm/s^3", left=2
+        "target", "meet", f"time\n{unit}", "relative speed\nm/s", "dI/dt\nm^2/s^4", "costate jump\nm/s^3", left=2
     )
     relative = np.linalg.norm(path.arrival_states[:, 3:] - nodes.arrive[:, 3:], axis=1)
     for index, name in enumerate(report.scene.names):
@@ -113,12 +129,12 @@ def print_report(console: Console, report: Report) -> None:
         table.add_row(
             name,
             "rendezvous" if rendezvous else "flyby",
-            f"{nodes.arrive_s[index]:.10g}",
+            f"{nodes.arrive_s[index] * per_s:.10g}",
             f"{0.0 if rendezvous else relative[index]:.5g}",
             f"{path.time_gradient[index]:.4g}",
             f"{np.linalg.norm(path.jumps[index, :3]):.4g}",
         )
-    console.print(table)
+    print_table(console, table)
     if BEST not in (report.search.order, report.search.times):
         return
     text = f"{report.evaluations} paths computed"

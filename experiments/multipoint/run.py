@@ -10,16 +10,16 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from experiments.common.errors import InputError
-from experiments.common.output import output_of, to_json
+from experiments.common.output import TRAJECTORIES, output_of, to_json
 from experiments.common.screen import figure_files, progress_bar, table_console
 from experiments.multipoint.command import BEST, GIVEN, Multipoint
 from experiments.multipoint.figures import draw_control, draw_costates, draw_path, draw_times
 from experiments.multipoint.file import MultipointProblem, load_multipoint
 from experiments.multipoint.page import multipoint_page
-from experiments.multipoint.report import Report, Search, print_report, report_json
+from experiments.multipoint.report import Report, Search, print_report, report_json, trajectories
 from experiments.multipoint.scene import Scene, cost_curves
-from rendezvous.greatest_control import greatest_control
 from rendezvous.multipoint import MOST_TARGETS, best_order, best_order_of_slots, best_times
+from rendezvous.piecewise import greatest_control
 
 FIGURES = ("figure-path", "figure-control", "figure-costates", "figure-times")
 
@@ -28,15 +28,17 @@ Progress = Callable[[float], None]
 
 def run(options: Multipoint) -> None:
     """Solve the problem, write the files and print the tables."""
-    problem = load_multipoint(options.problem)
+    problem = load_multipoint(options.problem, options.settings)
     search = Search(options.order, options.times or (BEST if problem.optimise else GIVEN))
     _check(problem, search)
     with (
-        output_of(options, ("results.json", *figure_files(*FIGURES))) as written,
+        output_of(options, ("results.json", TRAJECTORIES, *figure_files(*FIGURES))) as written,
         progress_bar(options.quiet) as begin,
     ):
         report = _solve(problem, search, begin(search.title))
         written.save("results.json", to_json(report_json(report)), "--json")
+        if written.wants("--csv"):
+            written.save(TRAJECTORIES, trajectories(report.scene), "--csv")
         if options.html is not None:
             page = multipoint_page(problem.name, report.scene, problem.greatest_control_m_s2)
             written.deliver("--html", page)

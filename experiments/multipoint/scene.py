@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from rendezvous.multipoint import Path, Visits
 
 Floats = NDArray[np.float64]
 
+_POINTS = 1601
 _CURVE_POINTS = 41
 _NEAREST = 0.12
 _JUMP = 0.3
@@ -51,6 +53,14 @@ class Scene:
     def time_unit(self) -> Unit:
         """Return the unit in which times are shown."""
         return time_unit(self.end_s - self.tour.start_s)
+
+    @cached_property
+    def times(self) -> Floats:
+        """Return equally spaced times, and the times on both sides of each visit."""
+        nodes = self.path.nodes
+        even = np.linspace(self.tour.start_s, self.end_s, _POINTS)
+        before = np.nextafter(nodes.arrive_s, -np.inf)
+        return np.unique(np.concatenate([even, nodes.arrive_s, before, nodes.leave_s[:-1]]))
 
     def target_path(self, visit: int, times_s: Floats) -> Floats:
         """Return the positions of the target of a visit, shape (n, 3)."""

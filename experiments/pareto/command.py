@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.options import FileOptions, Html, ProblemName
+from experiments.common.options import FileOptions, Html, ProblemName, Settings, TrajectoryCsv
 
 
 @dataclass(frozen=True)
@@ -16,10 +16,13 @@ class Pareto(FileOptions):
 
     Each craft moves with minimum energy. The excess of a craft is its cost minus the cost of its cheapest meeting. The
     meeting minimizes the group loss, which is the weighted sum of the excesses. Other choices of the meeting, the
-    coalitions and the bound on the control are also evaluated. Without --out, --json or --html no file is written.
+    coalitions and the bound on the control are also evaluated.
+
+    Without --out, --json, --csv or --html no file is written.
     """
 
     problem: ProblemName = "pareto-2008"
+    settings: Settings = None
     prefer: Annotated[
         str | None,
         typer.Option(
@@ -28,6 +31,10 @@ class Pareto(FileOptions):
         ),
     ] = None
     samples: Annotated[
-        int, typer.Option(metavar="N", min=2, max=10_001, help="Number of times in each trajectory of the JSON file.")
+        int,
+        typer.Option(
+            metavar="N", min=2, max=10_001, help="Number of times in each trajectory of the JSON and the CSV file."
+        ),
     ] = 31
+    csv: TrajectoryCsv = None
     html: Html = None

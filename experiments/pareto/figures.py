@@ -74,13 +74,7 @@ def _names(solution: EncounterSolution) -> list[str]:
 
 @style()
 def draw_trajectories(solution: EncounterSolution) -> Figure:
-    """Draw the trajectories in space and in three planes.
-
-    Parameters
-    ----------
-    solution : EncounterSolution
-        The solution of an encounter.
-    """
+    """Draw the trajectories in space and in three planes."""
     figure, (corner, *planes) = figure_grid(150.0, 2, 2, (14.0, 4.0, 12.0, 6.0), (17.0, 15.0))
     # The labels of axes in space lie inside the drawing, which therefore gets more room.
     left, bottom, width, height = corner.get_position().bounds

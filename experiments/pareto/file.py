@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Annotated
@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
 from experiments.common.errors import InputError
-from experiments.common.orbit_angle import angle_problems
-from experiments.common.problem_file import ProblemTables, duplicate_names, problem_form, problem_hash
+from experiments.common.problem_file import ProblemTables, angle_problems, duplicate_names, problem_form, problem_hash
 from experiments.common.toml_file import Known, Problem, load_tables
 from experiments.common.toml_values import (
     NUMBER,
     ZERO,
     Name,
     NotNegative,
-    OneOf,
     Positive,
     Table,
     Vector,
@@ -66,9 +64,11 @@ class TerminalTable(Table):
 class CraftTable(Table):
     """[[craft]]."""
 
-    name: Name = key("name of the craft", '"first"')
-    position_m: Vector = key("x against the motion, y outward, z along the normal", "[0.0, 60.0, 80.0]")
-    velocity_m_s: Vector = key("velocity in the same axes", "[-1.2, -4.1, 0.04]")
+    name: Name = key("name of the craft", '"first"', '"second"')
+    position_m: Vector = key(
+        "x against the motion, y outward, z along the normal", "[0.0, 60.0, 80.0]", "[40.0, -50.0, 60.0]"
+    )
+    velocity_m_s: Vector = key("velocity in the same axes", "[-1.2, -4.1, 0.04]", "[-9.0, 7.6, 0.07]")
     weight: NotNegative = key("weight of its excess in the group loss", "1.0", default=Decimal(1))
     start_s: NotNegative = key("start time", "0.0", default=ZERO)
 
@@ -82,12 +82,14 @@ class ParetoTables(ProblemTables):
     free: Annotated[tuple[Component, ...], PlainValidator(_free)] = key(
         "free components of the meeting, of x, y, z, vx, vy, vz", '["y", "z"]'
     )
-    meet: Annotated[Meeting, PlainValidator(OneOf(Meeting))] = key(
+    meet: Meeting = key(
         '"rendezvous", or "intercept" (the same position, any velocities)',
         '"rendezvous"',
         default=Meeting.RENDEZVOUS,
     )
-    greatest_control_m_s2: Positive | None = key("bound on each craft's control", "1.0", default=None)
+    greatest_control_m_s2: Positive | None = key(
+        "bound on each craft's control; without this key: none", "20.0", default=None
+    )
     terminal: TerminalTable = key("fixed components of the meeting", "", default=TerminalTable())
     craft: Annotated[list[CraftTable], Field(min_length=1, max_length=MOST_CRAFT)] = key("the craft", "")
 
@@ -131,20 +133,15 @@ class ParetoProblem:
     greatest_control_m_s2: float | None
 
 
-def load_pareto(name_or_path: str) -> ParetoProblem:
-    """Read a built-in problem or a file.
-
-    Parameters
-    ----------
-    name_or_path : str or path
-        A built-in name, or the path of a TOML file.
+def load_pareto(name_or_path: str, settings: Sequence[str] | None = None) -> ParetoProblem:
+    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
 
     Raises
     ------
     InputError
         If there is no such problem, or it is not sound.
     """
-    tables = load_tables(FORM, name_or_path)
+    tables = load_tables(FORM, name_or_path, settings)
     motion = ClohessyWiltshire(tables.si("orbit_rate_rad_s"), ORBITAL)
     craft = tuple(
         Craft(

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.common.display_units import length_unit
-from experiments.common.page_document import page
-from experiments.common.page_motion import Mark, Track, View, faces_of, motion_data
+from experiments.common.page_motion import Mark, Track, View, faces_of, motion_page
 from rendezvous.pareto import EncounterSolution, pareto_set, simplex_weights
 
 Floats = NDArray[np.float64]
@@ -20,15 +19,7 @@ _SET_POINTS = 600
 
 
 def pareto_page(name: str, solution: EncounterSolution, selections: Mapping[str, Floats]) -> str:
-    """Return the page of an encounter as HTML.
-
-    Parameters
-    ----------
-    name : str
-        Name of the problem.
-    selections : mapping of str to ndarray, shape (f,)
-        Pareto-optimal meetings by the rule of their choice.
-    """
+    """Return the page of an encounter as HTML, with Pareto-optimal meetings by the rule of their choice."""
     encounter = solution.encounter
     free = [component.name.lower() for component in encounter.free]
     time_s = np.linspace(min(craft.start_s for craft in encounter.craft), encounter.meeting_s, MOMENTS)
@@ -50,9 +41,7 @@ def pareto_page(name: str, solution: EncounterSolution, selections: Mapping[str,
         f"free components: {', '.join(free)}",
         "Drag the meeting, or type its components, to see the costs of the craft and the group loss.",
     ]
-    heading = f"Encounter {name}"
     data = {
-        **motion_data(heading, about, time_s, views, ()),
         "free": [{"name": name, "unit": "m" if len(name) == 1 else "m/s"} for name in free],
         "point": solution.point,
         "craft": [
@@ -75,7 +64,7 @@ def pareto_page(name: str, solution: EncounterSolution, selections: Mapping[str,
         "pareto_points": [] if hull else pareto_set(solution, simplex_weights(len(tracks), _SET_POINTS)).points,
     }
     script = (resources.files("experiments.pareto") / "page.js").read_text(encoding="utf-8")
-    return page(heading, ["motion.js"], data, script)
+    return motion_page(f"Encounter {name}", about, time_s, views, own_script=script, own_data=data)
 
 
 def _affine(solution: EncounterSolution, index: int, time_s: Floats) -> tuple[Floats, Floats]:

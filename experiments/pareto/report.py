@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
-from experiments.common.output import library_version
-from experiments.common.screen import number, number_table, print_lines
+from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, library_version, trajectories_csv
+from experiments.common.screen import number, number_table, print_lines, print_table
 from experiments.pareto.file import TERMINAL, ParetoProblem
 from rendezvous.pareto import BoundCheck, Coalitions, DurationSweep, EncounterSolution, Feasibility, distances
 
@@ -146,6 +146,16 @@ def _trajectory_json(solution: EncounterSolution, index: int, samples: int) -> d
     }
 
 
+def trajectories(report: Report, samples: int) -> str:
+    """Return the trajectories at ``samples`` times, as CSV."""
+    solution = report.solution
+    tracks = []
+    for index, cost in enumerate(solution.costs):
+        sampled = solution.plan(index).sample(samples)
+        tracks.append(([cost.craft.name], np.column_stack([sampled.time_s, sampled.state, sampled.control_m_s2])))
+    return trajectories_csv(["craft"], ["time_s", *STATE_COLUMNS, *CONTROL_COLUMNS], tracks)
+
+
 def print_report(console: Console, report: Report) -> None:
     """Print the meeting, the costs, the choices and the coalitions."""
     solution, encounter = report.solution, report.problem.encounter
@@ -160,7 +170,7 @@ def print_report(console: Console, report: Report) -> None:
     columns = (ideal, solution.cost_squared(), solution.excess(), report.impulses_m_s, report.peaks_m_s2)
     for name, *row in zip(names, *columns, strict=True):
         table.add_row(name, *(number(float(value)) for value in row))
-    console.print(table)
+    print_table(console, table)
     print_lines(console, [f"group loss {float(solution.group_loss()):.6g} m^2/s^3", *_exceeded(report), ""])
     free = [component.name.lower() for component in encounter.free]
     titles = [f"{name}, {'m' if len(name) == 1 else 'm/s'}" for name in free]
@@ -169,7 +179,7 @@ def print_report(console: Console, report: Report) -> None:
     for name, point in report.selections.items():
         values = (f"{value if abs(value) > _ZERO * scale else 0.0:.6g}" for value in point)
         chosen.add_row(name.replace("_", " "), *values, number(float(solution.group_loss(point))))
-    console.print(chosen)
+    print_table(console, chosen)
     if report.coalitions is None:
         print_lines(console, ["the coalitions are not computed: there are too many craft"])
         return

@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from experiments.common.errors import InputError
-from experiments.common.output import output_of, to_json
+from experiments.common.output import TRAJECTORIES, output_of, to_json
 from experiments.common.screen import figure_files, progress_bar, table_console
 from experiments.common.toml_values import LARGEST, shown
 from experiments.pareto.command import Pareto
 from experiments.pareto.figures import draw_controls, draw_costs, draw_front, draw_trajectories
 from experiments.pareto.file import TERMINAL, ParetoProblem, load_pareto
 from experiments.pareto.page import pareto_page
-from experiments.pareto.report import Report, print_report, report_json
+from experiments.pareto.report import Report, print_report, report_json, trajectories
 from rendezvous.pareto import (
     BoundCheck,
     EncounterSolution,
@@ -47,14 +47,16 @@ SWEEP = (0.5, 2.0, 31)
 
 def run(options: Pareto) -> None:
     """Solve the problem, write the files and print the tables."""
-    problem = load_pareto(options.problem)
+    problem = load_pareto(options.problem, options.settings)
     preferred = None if options.prefer is None else _preferred(options.prefer, problem)
     with (
-        output_of(options, ("results.json", *figure_files(*FIGURES))) as written,
+        output_of(options, ("results.json", TRAJECTORIES, *figure_files(*FIGURES))) as written,
         progress_bar(options.quiet) as begin,
     ):
         report = _solve(problem, preferred, begin("meetings and coalitions"))
         written.save("results.json", to_json(report_json(report, options.samples)), "--json")
+        if written.wants("--csv"):
+            written.save(TRAJECTORIES, trajectories(report, options.samples), "--csv")
         if options.html is not None:
             written.deliver("--html", pareto_page(problem.name, report.solution, report.selections))
         written.draw(_drawings(report), begin("figures"))

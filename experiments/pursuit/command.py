@@ -7,18 +7,9 @@ from typing import Annotated
 
 import typer
 
-from experiments.common.options import Csv, FileOptions, Html, ProblemName, Seed, finite
+from experiments.common.options import Csv, FileOptions, Html, ProblemName, Seed, Settings, TrajectoryCsv
 
 ROWS = "thrust_ratio=0:0.8:17"
-
-Settings = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Replace a value of the problem, for example evader.thrust_N=5. May be given several times.",
-    ),
-]
 
 
 @dataclass(frozen=True)
@@ -26,7 +17,7 @@ class Pursuit(FileOptions):
     """Solve the game of two spacecraft in which the pursuer minimizes the time of capture and the evader maximizes it.
 
     Each capture has a certificate (a list of checks). The result is called a saddle point only if all checks hold.
-    Without --out, --json or --html no file is written.
+    Without --out, --json, --csv or --html no file is written.
     """
 
     problem: ProblemName = "geo-pursuit"
@@ -51,27 +42,21 @@ class Pursuit(FileOptions):
         typer.Option(
             metavar="S",
             min=1.0,
-            callback=finite,
             help="Time between plans, s. Default: 600 s, or 1/50 of the duration of the game if that is shorter.",
         ),
     ] = None
-    delay_s: Annotated[
-        float, typer.Option(metavar="S", min=0.0, callback=finite, help="Delay of the pursuer's observation, s.")
-    ] = 0.0
+    delay_s: Annotated[float, typer.Option(metavar="S", min=0.0, help="Delay of the pursuer's observation, s.")] = 0.0
     position_noise_m: Annotated[
         float,
-        typer.Option(
-            metavar="M", min=0.0, callback=finite, help="Standard deviation of each observed position component, m."
-        ),
+        typer.Option(metavar="M", min=0.0, help="Standard deviation of each observed position component, m."),
     ] = 0.0
     velocity_noise_m_s: Annotated[
         float,
-        typer.Option(
-            metavar="M/S", min=0.0, callback=finite, help="Standard deviation of each observed velocity component, m/s."
-        ),
+        typer.Option(metavar="M/S", min=0.0, help="Standard deviation of each observed velocity component, m/s."),
     ] = 0.0
     runs: Annotated[int, typer.Option(metavar="N", min=1, max=10_000, help="Number of simulations with feedback.")] = 1
     seed: Seed = 0
+    csv: TrajectoryCsv = None
     html: Html = None
 
 

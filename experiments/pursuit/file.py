@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 from typing import Annotated, Any
 
 import numpy as np
@@ -17,10 +17,9 @@ from pydantic import PlainValidator
 
 from experiments.common.errors import InputError
 from experiments.common.problem_file import ProblemTables, problem_form, problem_hash
-from experiments.common.toml_file import Known, Problem, load_tables, read_tables
+from experiments.common.toml_file import Known, Problem, load_tables
 from experiments.common.toml_values import (
     KILO,
-    LARGEST,
     NUMBER,
     ONE,
     ZERO,
@@ -32,15 +31,13 @@ from experiments.common.toml_values import (
     Table,
     Vector,
     key,
-    nearest,
     quoted_text,
     radians,
-    shown,
     si,
     wrong,
 )
-from rendezvous.orbital_elements import OrbitalElements, perigee_m, semi_major_axis_m
 from rendezvous.pursuit_evasion import Game, Gravity, Player
+from rendezvous.two_body import OrbitalElements, perigee_m, semi_major_axis_m
 
 KIND = "pursuit-evasion"
 SUSPICIOUSLY_SMALL_KM = Decimal(100)
@@ -84,16 +81,16 @@ class PlayerTable(Table):
     """[pursuer] and [evader]."""
 
     semi_major_axis_km: Axis | None = key("semi-major axis", "42166.0", default=None)
-    eccentricity: Eccentricity | None = key("eccentricity", "0.00013", default=None)
-    inclination_deg: Inclination | None = key("inclination", "1.565", default=None)
-    raan_deg: Degrees | None = key("right ascension of the ascending node", "47.0", default=None)
+    eccentricity: Eccentricity | None = key("eccentricity", "0.00013", "0.00016", default=None)
+    inclination_deg: Inclination | None = key("inclination", "1.565", "0.828", default=None)
+    raan_deg: Degrees | None = key("right ascension of the ascending node", "47.0", "79.0", default=None)
     argument_of_perigee_deg: Degrees | None = key("argument of perigee", "0.0", default=None)
-    true_anomaly_deg: Degrees | None = key("true anomaly", "350.0", default=None)
+    true_anomaly_deg: Degrees | None = key("true anomaly", "350.0", "309.0", default=None)
     position_km: Vector | None = key("position, in place of the elements", "[42166.0, 0.0, 0.0]", default=None)
     velocity_km_s: Vector | None = key("velocity, in place of the elements", "[0.0, 3.07, 0.0]", default=None)
     mass_kg: Positive = key("initial mass, with propellant", "2000.0")
     dry_mass_kg: NotNegative = key("mass without propellant", "1000.0")
-    thrust_newton: NotNegative = key("thrust; 0 for an evader that coasts", "20.0", alias="thrust_N")
+    thrust_newton: NotNegative = key("thrust; 0 for an evader that coasts", "20.0", "10.0", alias="thrust_N")
     specific_impulse_s: Positive = key("specific impulse", "350.0")
 
 
@@ -103,12 +100,16 @@ class PursuitTables(ProblemTables):
     name: Name = key("name of the results", '"my-pursuit"', default="pursuit")
     gravitational_parameter_km3_s2: Positive = key("gravitational parameter of the planet", "398600.4418")
     planet_radius_km: NotNegative = key("the orbits stay above it", "6378.137", default=EARTH_RADIUS_KM)
-    j2: Oblateness = key("second zonal harmonic", "1.08262668e-3", default=ZERO)
-    equatorial_radius_km: Positive | None = key("radius that j2 refers to", "6378.1363", default=None)
-    capture_radius_km: NotNegative = key("distance of a capture; 0 for the same point", "1.0", default=ZERO)
-    longest_s: Positive | None = key("longest game searched; 15 revolutions by default", "200000.0", default=None)
-    pursuer: PlayerTable = key("minimizes the time of capture", "")
-    evader: PlayerTable = key("maximizes the time of capture", "")
+    j2: Oblateness = key("second zonal harmonic, for example 1.08262668e-3 for the Earth", "0.0", default=ZERO)
+    equatorial_radius_km: Positive | None = key(
+        "radius that j2 refers to; needed only if j2 is not 0", "6378.1363", default=None
+    )
+    capture_radius_km: NotNegative = key("distance of a capture; 0 for the same point", "0.0", default=ZERO)
+    longest_s: Positive | None = key(
+        "longest game searched; without this key: 15 revolutions", "200000.0", default=None
+    )
+    pursuer: PlayerTable = key("the pursuer, which minimizes the time of capture", "")
+    evader: PlayerTable = key("the evader, which maximizes the time of capture", "")
 
 
 @dataclass(frozen=True)
@@ -142,37 +143,6 @@ class PursuitProblem:
             If a value is impossible.
         """
         return _game(self.tables, changes or {})
-
-    def with_settings(self, settings: Sequence[str]) -> PursuitProblem:
-        """Return the problem with the values of ``--set``, checked like those of a file.
-
-        Parameters
-        ----------
-        settings : sequence of str
-            KEY=VALUE, for example ``evader.thrust_N=5``.
-
-        Raises
-        ------
-        InputError
-            If a setting has another form, a key is unknown, or the problem is not sound.
-        """
-        values: dict[str, str] = {}
-        document = _document(self.tables)
-        for setting in settings:
-            name, mark, text = (part.strip() for part in setting.partition("="))
-            if not mark or not name or not text:
-                raise InputError(
-                    f"--set: must be KEY=VALUE, found {shown(setting)}; for example --set evader.thrust_N=5"
-                )
-            if name in values:
-                raise InputError(f"--set: {name} is set twice; set each key once")
-            if name not in _SETTABLE:
-                guess = nearest(name, list(_SETTABLE))
-                hint = f"did you mean {guess}?" if guess else "for example evader.thrust_N=5"
-                raise InputError(f"--set: there is no key {shown(name)}; {hint}")
-            table, _, own = name.rpartition(".")
-            values[name] = (document[table] if table else document)[own] = _number_text(name, text)
-        return read_problem(_toml(document), f"{self.source} with --set") if values else self
 
     def to_toml(self) -> str:
         """Return a file that reads back as the same problem."""
@@ -300,34 +270,18 @@ def _orbit_problem(position_m: np.ndarray, velocity_m_s: np.ndarray, mu_si: floa
     return None
 
 
-FORM = problem_form(KIND, PursuitTables, _checks)
+FORM = problem_form(KIND, PursuitTables, _checks, [f"{player}.{element}" for player in PLAYERS for element in ELEMENTS])
 
 
-def load_pursuit(name_or_path: str) -> PursuitProblem:
-    """Read a built-in problem or a file.
-
-    Parameters
-    ----------
-    name_or_path : str or path
-        A built-in name, or the path of a TOML file.
+def load_pursuit(name_or_path: str, settings: Sequence[str] | None = None) -> PursuitProblem:
+    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
 
     Raises
     ------
     InputError
         If there is no such problem, or it is not sound.
     """
-    return PursuitProblem(load_tables(FORM, name_or_path), name_or_path)
-
-
-def read_problem(text: str, source: str) -> PursuitProblem:
-    """Read a problem from TOML; ``source`` is its name in messages.
-
-    Raises
-    ------
-    InputError
-        If it is not sound.
-    """
-    return PursuitProblem(read_tables(FORM, text, source), source)
+    return PursuitProblem(load_tables(FORM, name_or_path, settings), name_or_path)
 
 
 def parameter_names() -> list[str]:
@@ -391,16 +345,6 @@ def _player(table: PlayerTable, values: Mapping[str, float], mu_si: float) -> Pl
         thrust_n=values["thrust_N"],
         specific_impulse_s=values["specific_impulse_s"],
     )
-
-
-def _number_text(name: str, text: str) -> str:
-    try:
-        number = Decimal(text)
-    except InvalidOperation:
-        raise InputError(f"--set: {name} must be a number, found {shown(text)}; for example --set {name}=1.5") from None
-    if not number.is_finite() or number.copy_abs() > LARGEST:
-        raise InputError(f"--set: {name} must be a finite number of at most {LARGEST:g} in size, found {shown(text)}")
-    return str(number)
 
 
 def _document(tables: PursuitTables) -> dict[str, Any]:

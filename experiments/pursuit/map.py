@@ -17,7 +17,7 @@ from experiments.common.screen import figure_files, print_lines, progress_bar, s
 from experiments.common.toml_values import shown
 from experiments.pursuit.command import ROWS, PursuitMap
 from experiments.pursuit.file import PursuitProblem, load_pursuit, parameter_names
-from experiments.pursuit.map_figure import counted, draw_map
+from experiments.pursuit.map_figure import S_PER_HOUR, counted, draw_map
 from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus, capture_map
 
 FIGURE = "figure-map"
@@ -39,7 +39,7 @@ class Axis:
 
 def run(options: PursuitMap) -> None:
     """Solve the games of the grid, write the files and print a summary."""
-    problem = load_pursuit(options.problem).with_settings(options.settings or ())
+    problem = load_pursuit(options.problem, options.settings)
     x = read_axis("--x", _columns(problem) if options.columns is None else options.columns)
     y = read_axis("--y", options.rows)
     if x.parameter == y.parameter:
@@ -68,7 +68,8 @@ def run(options: PursuitMap) -> None:
         return
     lines = [f"{problem.name}: {points} points in {elapsed_s:.1f} s: {counted(solved)}"]
     if solved.capture_s.count():
-        lines.append(f"capture times from {solved.capture_s.min():.1f} to {solved.capture_s.max():.1f} s")
+        least, greatest = (float(time_s) / S_PER_HOUR for time_s in (solved.capture_s.min(), solved.capture_s.max()))
+        lines.append(f"capture times from {least:.4f} to {greatest:.4f} h")
     if solved.count(PointStatus.NEIGHBOUR):
         lines.append(
             "points continued from a neighbour are local saddle points: earlier captures are not excluded there; "

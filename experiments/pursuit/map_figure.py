@@ -16,7 +16,7 @@ from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus
 
 Floats = NDArray[np.float64]
 
-_S_PER_HOUR = 3600.0
+S_PER_HOUR = 3600.0
 _BOTTOM, _BOTTOM_WITH_LEGEND, _TOP = 0.18, 0.25, 0.93
 _SHADES = LinearSegmentedColormap.from_list("blues", ["#f4f8fc", "#b4d0e8", "#4f8bbf", "#0b3c74"])
 _DARK = 0.6
@@ -56,12 +56,10 @@ def draw_map(solved: CaptureMap, column: str, row: str) -> Figure:
 
     Parameters
     ----------
-    solved : CaptureMap
-        The capture times of a grid of games, s.
     column, row : str
         Names of the parameters, with their units.
     """
-    hours = solved.capture_s / _S_PER_HOUR
+    hours = solved.capture_s / S_PER_HOUR
     figure = new_figure(height_mm=95.0, width_mm=150.0)
     has_unknown = any(solved.count(status) for status in _UNKNOWN)
     bottom = _BOTTOM_WITH_LEGEND if has_unknown else _BOTTOM

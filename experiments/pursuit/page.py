@@ -29,14 +29,14 @@ def pursuit_page(name: str, description: str, solution: Solution) -> str:
     frames = orbital_axes(evader.position_m, evader.velocity_m_s)
     relative = np.einsum("nij,nj->ni", frames, offset)[:, [1, 2, 0]]
     far, near = length_unit(float(np.abs(pursuer.position_m).max())), length_unit(float(np.abs(relative).max()))
-    marks = [Mark("centre of the planet", np.zeros(3), "square"), Mark("capture", evader.position_m[-1], "diamond")]
+    marks = [Mark("centre of the planet", np.zeros(3), "plus"), Mark("capture", evader.position_m[-1], "diamond")]
     tracks = [Track(player, look, motion.position_m) for player, look, motion in players]
-    path, here = [Track("pursuer", 0, relative)], [Mark("evader", np.zeros(3))]
+    path = [Track("pursuer", 0, relative), Track("evader", 1, np.zeros_like(relative))]
     absolute_axes, relative_axes = ("x", "y", "z"), ("along-track", "normal", "radial")
     views = [
         View("Both orbits", absolute_axes, far, tracks, marks),
-        View("Pursuer relative to the evader, in the orbital plane", relative_axes, near, path, here, plane=(0, 2)),
-        View("Pursuer relative to the evader, in space", relative_axes, near, path, here),
+        View("Pursuer relative to the evader, in the orbital plane", relative_axes, near, path, plane=(0, 2)),
+        View("Pursuer relative to the evader, in space", relative_axes, near, path),
         View("Both orbits, seen along the planet's axis", absolute_axes, far, tracks, marks, plane=(0, 1)),
     ]
     distance, radius = Curve("distance", 0, np.linalg.norm(offset, axis=1)), solution.game.capture_radius_m

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from experiments.common.display_units import M_PER_KM
-from experiments.common.published_number import COMPUTED, Progress, PublishedNumber, Reference, Reproduction
+from experiments.common.published_number import COMPUTED, Origin, Progress, PublishedNumber, Reference, Reproduction
 from experiments.pursuit.file import load_pursuit
 from rendezvous.linear_game import (
     Thruster,
@@ -27,7 +27,8 @@ REMARKS = (
     "c = 350 s is the specific impulse; the exhaust speed is 350 x 9.80665 m/s.",
     "The equation of lambda_r lacks the factor (lambda_v . r), that of lambda_m lacks k.",
 )
-_REFERENCE = Reference(PAPER, COMPUTED)
+_REFERENCE = Reference(PAPER, COMPUTED, Origin.OTHER)
+_EXACT = Reference(PAPER, COMPUTED, Origin.EXACT)
 _MU_M3_S2 = 398600.4418e9
 _GEO_M = 42166e3
 _EXHAUST_M_S = 350.0 * 9.80665
@@ -60,7 +61,7 @@ def reproduce(progress: Progress) -> Reproduction:
     numbers: list[PublishedNumber] = []
     for done, (thrust_n, printed) in enumerate(_TABLE.items(), start=1):
         capture = solve(problem.game({"evader.thrust_N": thrust_n})).capture
-        source = f"reference, T_E = {thrust_n:g} N"
+        source = f"T_E = {thrust_n:g} N"
         numbers += _REFERENCE.numbers(source, dict(zip(_NAMES, printed, strict=True)), _row(capture))
         if thrust_n == 10.0:
             numbers += _REFERENCE.numbers(source, _END, _end(capture))
@@ -68,7 +69,7 @@ def reproduce(progress: Progress) -> Reproduction:
     for radius_km, text in _RADII.items():
         capture = solve(problem.game({"capture_radius_km": radius_km})).capture
         ours = None if capture is None else capture.time_s
-        numbers.append(_REFERENCE.number(f"reference, capture radius {radius_km:g} km", "t_f (s)", text, ours))
+        numbers.append(_REFERENCE.number(f"capture radius {radius_km:g} km", "t_f (s)", text, ours))
     solution = solve(problem.game())
     numbers.append(_deviation(solution))
     progress(0.5)
@@ -101,7 +102,7 @@ def _deviation(solution: Solution) -> PublishedNumber:
         deviations = {deviation.name: deviation.capture_s for deviation in certify(solution).evader_deviations}
         coast_s = deviations[Policy.COAST.value]
         ours = None if coast_s is None else coast_s - solution.capture.time_s
-    return _REFERENCE.number("reference, the evader coasts", "capture less t_f (s)", "-11055.906", ours)
+    return _REFERENCE.number("the evader coasts", "capture less t_f (s)", "-11055.906", ours)
 
 
 def _feedback(solution: Solution) -> list[PublishedNumber]:
@@ -111,7 +112,7 @@ def _feedback(solution: Solution) -> list[PublishedNumber]:
         steering = policy.direction if isinstance(policy, Policy) else None
         predicted_s = fly(solution.game, steering, replan_s=600.0, solution=solution).predicted_s
         name = policy.value if isinstance(policy, Policy) else policy
-        numbers.append(_REFERENCE.number(f"reference, replanned, E {name}", "t_f (s)", text, float(predicted_s[-1])))
+        numbers.append(_REFERENCE.number(f"replanned, E {name}", "t_f (s)", text, float(predicted_s[-1])))
     return numbers
 
 
@@ -129,7 +130,7 @@ def _analytic() -> list[PublishedNumber]:
         ("linear game about a circle", "21366.29566606", linear),
     )
     numbers = [
-        _REFERENCE.number(f"closed form, {name}", "t_f (s)", text, None if capture is None else capture.time_s)
+        _EXACT.number(name, "t_f (s)", text, None if capture is None else capture.time_s)
         for name, text, capture in cases
     ]
     for share, text in _SHARES.items():
@@ -137,7 +138,7 @@ def _analytic() -> list[PublishedNumber]:
         capture = solve(_small_game(share, share * about, share * speed, rate)).capture
         ours = None if capture is None or small is None else capture.time_s / small.time_s - 1.0
         name = "t_f over the linear game's, less 1"
-        numbers.append(_REFERENCE.number(f"reference, {share:g} of that game", name, text, ours))
+        numbers.append(_REFERENCE.number(f"{share:g} of that game", name, text, ours))
     return numbers
 
 

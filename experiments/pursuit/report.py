@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from rich.console import Console
 
 from experiments.common.display_units import M_PER_KM
-from experiments.common.output import library_version
-from experiments.common.screen import number_table, print_lines
+from experiments.common.output import STATE_COLUMNS, Cell, library_version, trajectories_csv
+from experiments.common.screen import number, number_table, print_lines, print_table
 from experiments.pursuit.file import PursuitProblem
 from rendezvous.pursuit_evasion import (
     Capture,
@@ -22,7 +22,11 @@ from rendezvous.pursuit_evasion import (
     Solution,
     Verdict,
     capture_quantiles_s,
+    history,
 )
+
+_FEWEST = 10
+"""Number of simulations from which quantiles are printed."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +37,6 @@ class Feedback:
     ----------
     policy : str
         The policy of the evader, or the file of its script.
-    replan_s : float
-        Time between plans.
     """
 
     policy: str
@@ -155,6 +157,22 @@ def _feedback_json(feedback: Feedback) -> dict[str, object]:
     }
 
 
+def trajectories(solution: Solution) -> str:
+    """Return both trajectories as CSV; the direction of the thrust is zero for a player without thrust."""
+    sampled = history(solution)
+    tracks: list[tuple[list[Cell], np.ndarray]] = [
+        (
+            [name],
+            np.column_stack(
+                [sampled.time_s, player.position_m, player.velocity_m_s, player.mass_kg, player.thrust_direction]
+            ),
+        )
+        for name, player in (("pursuer", sampled.pursuer), ("evader", sampled.evader))
+    ]
+    directions = (f"thrust_direction_{axis}" for axis in "xyz")
+    return trajectories_csv(["player"], ["time_s", *STATE_COLUMNS, "mass_kg", *directions], tracks)
+
+
 def _captured(feedback: Feedback) -> int:
     return sum(flight.ended is Ended.CAPTURED for flight in feedback.flights)
 
@@ -167,7 +185,7 @@ def print_report(console: Console, report: Report) -> None:
         table = number_table("player", "propellant\nkg", "final velocity\nkm/s")
         for name, end in (("pursuer", capture.pursuer), ("evader", capture.evader)):
             table.add_row(name, f"{end.propellant_kg:.8f}", _listed(end.velocity_m_s / M_PER_KM, 9))
-        console.print(table)
+        print_table(console, table)
         console.print(f"position of the capture, km: {_listed(capture.position_m / M_PER_KM, 6)}")
         console.print(f"direction from pursuer to evader: {_listed(capture.direction, 9)}")
         speed_km_s, curvature = capture.closing_speed_m_s / M_PER_KM, _listed(capture.curvature, 5)
@@ -175,7 +193,7 @@ def print_report(console: Console, report: Report) -> None:
     if report.certificate is not None:
         print_lines(console, (f"  {line}" for line in _certificate_lines(report.certificate)))
     if report.feedback is not None:
-        print_lines(console, [_feedback_line(report.feedback)])
+        print_lines(console, _feedback_lines(report.feedback))
 
 
 def _listed(values: np.ndarray, digits: int) -> str:
@@ -229,18 +247,26 @@ def _certificate_lines(certificate: Certificate) -> Iterator[str]:
     yield f"saddle point: {f'not claimed: {failures}' if failures else 'all checks hold'}"
 
 
-def _feedback_line(feedback: Feedback) -> str:
+def _feedback_lines(feedback: Feedback) -> Iterator[str]:
     flights = feedback.flights
     heading = f"feedback, a plan every {feedback.replan_s:g} s, evader {feedback.policy}: "
     if len(flights) == 1:
         (flight,) = flights
-        return (
+        yield (
             f"{heading}{flight.ended.value} at {flight.time_s:.1f} s, distance {flight.distance_m:.4g} m; "
             f"last predicted capture {flight.predicted_s[-1]:.1f} s"
         )
-    text = f"{heading}{_captured(feedback)} of {len(flights)} captured"
-    if quantiles := capture_quantiles_s(flights):
-        names = ("smallest", "10 %", "median", "90 %", "largest")
-        times = ", ".join(f"{name} {time_s:.1f}" for name, time_s in zip(names, quantiles, strict=True))
-        text += f"; capture time, s: {times}"
-    return text
+        return
+    yield f"{heading}{_captured(feedback)} of {len(flights)} captured"
+    if times_s := [flight.time_s for flight in flights if flight.ended is Ended.CAPTURED]:
+        yield f"  capture time, s: {_distribution(times_s)}"
+    yield f"  distance at the end, m: {_distribution([flight.distance_m for flight in flights])}"
+
+
+def _distribution(values: Sequence[float]) -> str:
+    """Return the ends and the median of values; from ten values on also two quantiles."""
+    levels = {"smallest": 0.0, "10 %": 0.1, "median": 0.5, "90 %": 0.9, "largest": 1.0}
+    if len(values) < _FEWEST:
+        levels = {name: level for name, level in levels.items() if "%" not in name}
+    numbers = np.quantile(values, list(levels.values())).tolist()
+    return ", ".join(f"{name} {number(value)}" for name, value in zip(levels, numbers, strict=True))

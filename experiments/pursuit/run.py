@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
+from pathlib import Path
 from time import perf_counter
 
 from matplotlib.figure import Figure
 
 from experiments.common.errors import InputError
-from experiments.common.output import output_of, to_json
+from experiments.common.output import TRAJECTORIES, output_of, to_json
 from experiments.common.screen import figure_files, progress_bar, say, say_warnings, table_console
 from experiments.pursuit.command import Pursuit
 from experiments.pursuit.evader import EvaderPolicy, evader_policy
 from experiments.pursuit.figures import draw_control, draw_distance, draw_feedback, draw_orbits, draw_relative
 from experiments.pursuit.file import PursuitProblem, load_pursuit
 from experiments.pursuit.page import pursuit_page
-from experiments.pursuit.report import Feedback, Report, print_report, report_json
+from experiments.pursuit.report import Feedback, Report, print_report, report_json, trajectories
 from rendezvous.pursuit_evasion import Observation, PathError, Solution, certify, fly_many, history, solve
 
 FIGURES = ("figure-orbits", "figure-relative", "figure-control", "figure-distance")
@@ -30,16 +31,21 @@ Begin = Callable[[str], Callable[[float], None]]
 def run(options: Pursuit) -> None:
     """Solve the game, simulate it with feedback, write the files and print the results."""
     _check_feedback(options)
-    problem = load_pursuit(options.problem).with_settings(options.settings or ())
+    problem = load_pursuit(options.problem, options.settings)
     evader = None if options.feedback is None else evader_policy(options.feedback, options.seed)
     names = FIGURES if evader is None else (*FIGURES, FEEDBACK_FIGURE)
-    with output_of(options, ("problem.toml", "results.json", *figure_files(*names))) as written:
+    with output_of(options, ("problem.toml", "results.json", TRAJECTORIES, *figure_files(*names))) as written:
         say_warnings(problem.warnings(), options.quiet)
         with progress_bar(options.quiet) as begin:
             report = _solve(problem, options, evader, begin)
-            page = "" if options.html is None else _page(report)
+            _need_trajectory(report.solution, {"--html": options.html, "--csv": options.csv})
+            page = (
+                "" if options.html is None else pursuit_page(problem.name, problem.tables.description, report.solution)
+            )
             written.save("results.json", to_json(report_json(report)), "--json")
             written.deliver("--html", page)
+            if written.wants("--csv") and _has_trajectory(report.solution):
+                written.save(TRAJECTORIES, trajectories(report.solution), "--csv")
             if options.out is not None:
                 written.save("problem.toml", problem.to_toml())
                 written.draw(_drawings(report), begin("figures"))
@@ -103,11 +109,18 @@ def _time_between_plans(game_s: float, asked_s: float | None) -> float:
     return asked_s
 
 
-def _page(report: Report) -> str:
-    solution = report.solution
-    if solution.capture is None and solution.fallback is None:
-        raise InputError(f"--html: there is no trajectory to show, the result is {solution.verdict.value}; omit --html")
-    return pursuit_page(report.problem.name, report.problem.tables.description, solution)
+def _has_trajectory(solution: Solution) -> bool:
+    return solution.capture is not None or solution.fallback is not None
+
+
+def _need_trajectory(solution: Solution, files: Mapping[str, Path | None]) -> None:
+    """Refuse options that need a trajectory if there is none."""
+    wanted = [option for option, file in files.items() if file is not None]
+    if wanted and not _has_trajectory(solution):
+        raise InputError(
+            f"{' and '.join(wanted)}: there is no trajectory to show, the result is {solution.verdict.value}; omit "
+            f"{' and '.join(wanted)}"
+        )
 
 
 def _drawings(report: Report) -> dict[str, Callable[[], Figure]]:

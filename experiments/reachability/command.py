@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from experiments.common.options import FileOptions, Html, ProblemName, Seed
+from experiments.common.options import FileOptions, Html, ProblemName, Seed, Settings, TrajectoryCsv
 
 
 @dataclass(frozen=True)
@@ -16,10 +16,11 @@ class Reach(FileOptions):
 
     The results are the least terminal norm, the forward sets, the tube of all optimal trajectories, and the set of
     all optimal controls. Selected optimal controls are simulated on the linear and on the nonlinear model. Without
-    --out, --json or --html no file is written.
+    --out, --json, --csv or --html no file is written.
     """
 
     problem: ProblemName = "rendezvous-2021"
+    settings: Settings = None
     select: Annotated[
         str,
         typer.Option(
@@ -49,4 +50,5 @@ class Reach(FileOptions):
         ),
     ] = 10
     seed: Seed = 0
+    csv: TrajectoryCsv = None
     html: Html = None

@@ -26,6 +26,7 @@ from experiments.common.figure_style import (
     SET_FILL,
     figure_grid,
     new_figure,
+    place_labels,
     style,
 )
 from experiments.reachability.report import Member, Report
@@ -40,6 +41,8 @@ _TOLERANCE, _TOLERANCE_IN_SPACE = 2e-3, 1e-2
 _MOST_TIMES, _MOST_TIMES_IN_SPACE = 6, 4
 _TOGETHER = 0.06
 _MANY_EDGES = 120
+_OUTLINE_POINTS, _ANCHORS = 96, 4
+"""Points of an outline that labels avoid, and the step between those at which its own label can stand."""
 _SHARP = np.cos(np.radians(4.0))
 _NAMES = {
     "energy": "least energy",
@@ -124,7 +127,7 @@ def _stacked(labels: Sequence[Shadow], bounds: Floats) -> list[tuple[str, Floats
     stacked: list[tuple[str, Floats]] = []
     for times, position in labels:
         below = sum(float(np.abs((other - position) / size).max()) < _TOGETHER for _, other in stacked)
-        stacked.append((f"t = {', '.join(str(t) for t in times)}" + "\n" * below, position))
+        stacked.append((_name(times) + "\n" * below, position))
     return stacked
 
 
@@ -198,16 +201,11 @@ def draw_planes(report: Report) -> Figure:
     figure, panels = figure_grid(162.0, 2, 2, (16.0, 3.0, 12.0, 22.0), (18.0, 16.0))
     titles, per_si = _units(report)
     for axes, plane, letter in zip(panels, map(list, _PLANES), "abcd", strict=True):
-        labels, factors = [], per_si[plane]
-        for times, points in _shadows(report, tuple(plane), _MOST_TIMES, _TOLERANCE):
+        factors, outlines = per_si[plane], []
+        shadows = _shadows(report, tuple(plane), _MOST_TIMES, _TOLERANCE)
+        for _, points in shadows:
             _draw_polygon(axes, points)
-            top = points[points[:, 1] >= points[:, 1].max() - 0.01 * np.ptp(points[:, 1])]
-            labels.append((times, np.array([top[:, 0].mean(), points[:, 1].max()])))
-        for text, position in _stacked(labels, report.tube[:, plane] * factors[:, None]):
-            axes.annotate(
-                text, (float(position[0]), float(position[1])), fontsize=6.5, color=SET_EDGE, ha="center",
-                va="bottom", zorder=8, path_effects=_HALO,
-            )  # fmt: skip
+            outlines.append(_along(_in_order(points) if len(points) > 2 else points))
         for look, member, path in _shown(report):
             axes.plot(*(path[:, plane] * factors).T, **{**look, "marker": "none"})
             marks = {**look, "linestyle": "none", "markersize": 3.2}
@@ -219,6 +217,21 @@ def draw_planes(report: Report) -> Figure:
         axes.set(xlabel=titles[plane[0]], ylabel=titles[plane[1]])
         axes.margins(0.07)
         axes.xaxis.set_major_locator(MaxNLocator(6))
+        names = [_name(times) for times, _ in shadows]
+        paths = [(path[:, plane] * factors) for _, _, path in _shown(report)]
+        anchors = [outline[np.argsort(-outline[:, 1])[::_ANCHORS]] for outline in outlines]
+        place_labels(
+            axes,
+            [
+                (name, where, np.vstack([*paths, *(other for other in outlines if other is not outline)]))
+                for name, where, outline in zip(names, anchors, outlines, strict=True)
+            ],
+            np.stack([start, end]),
+            centred=True,
+            fontsize=6.5,
+            color=SET_EDGE,
+            zorder=8,
+        )
     handles = [Line2D([], [], markersize=3.2, label=_title(member), **look) for look, member, _ in _shown(report)]
     title = "lines: nonlinear model; marks: linear model, at whole periods" if handles else None
     tube = Patch(label="tube at t", **_SET)
@@ -226,6 +239,17 @@ def draw_planes(report: Report) -> Figure:
         handles=[*handles, *panels[-1].lines[-2:], tube], loc="upper center", ncols=4, title=title, title_fontsize=7.5
     )
     return figure
+
+
+def _along(vertices: Floats) -> Floats:
+    """Return points along the outline of a polygon."""
+    after = np.roll(vertices, -1, axis=0)
+    shares = np.linspace(0.0, 1.0, _OUTLINE_POINTS // len(vertices) + 2)[:-1, None, None]
+    return np.asarray((vertices + shares * (after - vertices)).reshape(-1, 2))
+
+
+def _name(times: Sequence[int]) -> str:
+    return f"t = {', '.join(str(t) for t in times)}"
 
 
 def _draw_polygon(axes: Axes, points: Floats) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property
@@ -23,7 +23,6 @@ from experiments.common.toml_values import (
     Eccentricity,
     Number,
     Numbers,
-    OneOf,
     Positive,
     Table,
     Vector,
@@ -113,7 +112,7 @@ class ConeTable(Table):
 
     apex_m: Vector = key("apex", "[-20.0, 0.0, 0.0]")
     axis: Vector = key("direction of the axis, of any length", "[1.0, 0.0, 0.0]")
-    half_angle_deg: OpenAngle = key("angle between axis and cone", "20.0")
+    half_angle_deg: OpenAngle = key("angle between axis and cone", "60.0")
     faces: Annotated[int, PlainValidator(Whole(MOST_FACES))] = key(
         "number of faces of the pyramid, at least 3", "8", default=8
     )
@@ -123,8 +122,12 @@ class ConeTable(Table):
 class KeepInTable(Table):
     """[[keep_in]]: a bounded polytope for the position, normals . position <= offsets_m."""
 
-    normals: Annotated[Rows, PlainValidator(_rows)] = key("one array for each half-space", "[[1.0, 0.0, 0.0]]")
-    offsets_m: Annotated[tuple[Decimal, ...], PlainValidator(_row)] = key("one number for each half-space", "[2000.0]")
+    normals: Annotated[Rows, PlainValidator(_rows)] = key(
+        "one array for each half-space", "[[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]"
+    )
+    offsets_m: Annotated[tuple[Decimal, ...], PlainValidator(_row)] = key(
+        "one number for each half-space", "[2900, 2900, 2900, 2900, 2900, 2900]"
+    )
     from_period: FromPeriod = key("first t at which it holds", "0", default=0)
 
 
@@ -147,11 +150,9 @@ class ReachabilityTables(ProblemTables):
     periods: Annotated[int, PlainValidator(Whole(MOST_PERIODS))] = key("number of periods, T", "4")
     period_s: Positive = key("length of a period", "180.0")
     acceleration_m_s2: Positive = key("acceleration of a unit control", "0.15")
-    model: Annotated[MotionModel, PlainValidator(OneOf(MotionModel))] = key(
-        "frozen at t = 0, or time-varying", '"frozen"', default=MotionModel.FROZEN
-    )
-    thrust: Annotated[ThrustShape, PlainValidator(OneOf(ThrustShape))] = key(
-        "box (each component is bounded) or ball (the norm is bounded)", '"box"', default=ThrustShape.BOX
+    model: MotionModel = key('"frozen" at t = 0, or "time-varying"', '"frozen"', default=MotionModel.FROZEN)
+    thrust: ThrustShape = key(
+        '"box" (each component is bounded) or "ball" (the norm is bounded)', '"box"', default=ThrustShape.BOX
     )
     checks_between_periods: FromPeriod = key(
         "number of instants within a period at which the constraints also hold", "0", default=0
@@ -173,8 +174,6 @@ class Rendezvous:
 
     Parameters
     ----------
-    hash : str
-        Fingerprint of the values.
     motion : ConstantMotion or TschaunerHempel
         Linear model of the motion.
     disturbance : ndarray, shape (T, 6, 3), or None
@@ -212,20 +211,15 @@ class Rendezvous:
         return replace(problem, transition=transition, control=control, offsets=offsets, between=between)
 
 
-def load_rendezvous(name_or_path: str | os.PathLike[str]) -> Rendezvous:
-    """Read a built-in problem or a file.
-
-    Parameters
-    ----------
-    name_or_path : str or path
-        A built-in name, or the path of a TOML file.
+def load_rendezvous(name_or_path: str | os.PathLike[str], settings: Sequence[str] | None = None) -> Rendezvous:
+    """Read a built-in problem by its name or a file by its path, with settings KEY=VALUE in place of its values.
 
     Raises
     ------
     InputError
         If there is no such problem, or it is not sound.
     """
-    tables = load_tables(problem_form(KIND, ReachabilityTables, _checks), name_or_path)
+    tables = load_tables(FORM, name_or_path, settings)
     try:
         return _rendezvous(tables)
     except InadmissibleStartError as error:
@@ -340,6 +334,9 @@ def _keep_in_problems(known: Known) -> Iterator[Problem]:
             yield Problem(path, f"is unbounded along ({along})", "add half-spaces that bound it")
         except UncertainHullError:
             yield Problem(path, "is so flat or small that rounding errors hide it", "make it wider")
+
+
+FORM = problem_form(KIND, ReachabilityTables, _checks)
 
 
 def _rendezvous(tables: ReachabilityTables) -> Rendezvous:

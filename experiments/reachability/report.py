@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from experiments.common.display_units import Unit, length_unit
 from experiments.common.errors import InputError
-from experiments.common.output import library_version
+from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, Cell, library_version, trajectories_csv
 from experiments.reachability.file import KIND, Rendezvous
 from infoset.polytope import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
 from rendezvous.reachability import (
@@ -70,12 +70,8 @@ class Request:
     ----------
     selection : sequence of str
         Names of `SINGLE`, "vertices" or "samples".
-    samples : int
-        Number of samples.
     route : Route or None
         Representation of the sets; None chooses one.
-    closed_loop : bool
-        Whether to simulate with a new plan every period.
     noisy_flights : int
         Number of these simulations with navigation errors, if the problem has them.
     """
@@ -94,8 +90,6 @@ class Member:
 
     Parameters
     ----------
-    controls : ndarray, shape (T, 3)
-        Controls of all periods.
     linear, nonlinear : ndarray, shape (T + 1, 6)
         States of the linear and of the nonlinear model.
     between : float
@@ -318,6 +312,19 @@ def _conflict(rendezvous: Rendezvous, error: EmptyTubeError) -> str:
         f"bounds, that is bounds.position_m by {position:.6g} and bounds.velocity_m_s by {velocity:.6g}, or change the "
         "initial state"
     )
+
+
+def trajectories(report: Report) -> str:
+    """Return the trajectories of the selected controls on both models, as CSV; a control is held over its period."""
+    rendezvous = report.rendezvous
+    periods = np.arange(rendezvous.problem.periods + 1)
+    tracks: list[tuple[list[Cell], Floats]] = []
+    for member in report.members:
+        controls = np.vstack([rendezvous.acceleration_m_s2 * member.controls, np.full(3, np.nan)])
+        for model, states in (("linear", member.linear), ("nonlinear", member.nonlinear)):
+            values = np.column_stack([periods * rendezvous.period_s, states, controls])
+            tracks.append(([member.name, model], values))
+    return trajectories_csv(["control", "model"], ["time_s", *STATE_COLUMNS, *CONTROL_COLUMNS], tracks)
 
 
 def report_json(report: Report) -> dict[str, object]:

@@ -8,9 +8,17 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments.common.errors import InputError
-from experiments.common.options import choice, whole_number
-from experiments.common.output import output_of, to_csv, to_json
-from experiments.common.screen import figure_files, number, number_table, progress_bar, table_console
+from experiments.common.options import choice, read_number
+from experiments.common.output import TRAJECTORIES, output_of, to_csv, to_json
+from experiments.common.screen import (
+    figure_files,
+    number,
+    number_table,
+    print_lines,
+    print_table,
+    progress_bar,
+    table_console,
+)
 from experiments.reachability.command import Reach
 from experiments.reachability.figures import drawings
 from experiments.reachability.file import load_rendezvous
@@ -25,11 +33,15 @@ from experiments.reachability.report import (
     Request,
     make_report,
     report_json,
+    trajectories,
 )
 from rendezvous.reachability import Route, SetKind, effort
 
 FIGURES = ("figure-positions", "figure-velocities", "figure-planes", "figure-controls")
 TABLES = "published-tables.csv"
+_COUNTED = ("vertices", "facets")
+_NORM = "(m, m/s)"
+"""Unit of a norm of states."""
 
 
 def run(options: Reach) -> None:
@@ -37,9 +49,9 @@ def run(options: Reach) -> None:
     names, samples = _selection(options.select)
     route = None if options.route == "auto" else Route(options.route)
     request = Request(names, samples, options.seed, route, options.replan, options.noisy_flights)
-    rendezvous = load_rendezvous(options.problem)
+    rendezvous = load_rendezvous(options.problem, options.settings)
     published = is_published(rendezvous)
-    files = ("results.json", *((TABLES,) if published else ()), *figure_files(*FIGURES))
+    files = ("results.json", TRAJECTORIES, *((TABLES,) if published else ()), *figure_files(*FIGURES))
     with output_of(options, files) as written, progress_bar(options.quiet) as begin:
         report = make_report(rendezvous, request, begin(rendezvous.name))
         results = report_json(report)
@@ -47,6 +59,8 @@ def run(options: Reach) -> None:
         written.save("results.json", to_json(results), "--json")
         if comparisons:
             written.save(TABLES, to_csv(COLUMNS, [row for comparison in comparisons for row in comparison.rows]))
+        if written.wants("--csv"):
+            written.save(TRAJECTORIES, trajectories(report), "--csv")
         try:
             if options.html is not None:
                 written.deliver("--html", reachability_page(report))
@@ -68,9 +82,9 @@ def _selection(text: str) -> tuple[list[str], int]:
         if name in names:
             raise InputError(f"--select: {name} is named twice; name each choice once")
         if name == SAMPLES:
-            if not digits.isascii() or not digits.isdigit() or len(digits) > 6:
-                raise InputError(f"--select {SAMPLES}: needs a number, for example --select {SAMPLES}:20")
-            count = whole_number(f"--select {SAMPLES}", int(digits), 1, MOST_SAMPLES, 20)
+            count = read_number(
+                f"--select {SAMPLES}", int, digits, least=1, greatest=MOST_SAMPLES, example="--select samples:20"
+            )
         elif digits:
             raise InputError(f"--select {name}: takes no number, found {digits[:20]!r}; write --select {name}")
         names.append(name)
@@ -78,59 +92,73 @@ def _selection(text: str) -> tuple[list[str], int]:
 
 
 def _print_report(console: Console, report: Report, comparisons: Sequence[Comparison]) -> None:
-    console.print("\n".join(_summary(report)), soft_wrap=True)
-    console.print("", _sets_table(report), sep="\n")
-    if report.members:
-        console.print("", _members_table(report), sep="\n")
+    print_lines(console, _summary(report))
+    for table in _tables(report, comparisons):
+        console.print()
+        print_table(console, table)
     if comparisons:
-        console.print("", _published_table(comparisons), sep="\n")
-        console.print(
-            "the misses printed in the paper do not follow from the equations of motion; see docs/reachability.md"
-        )
-    for line in _feedback(report):
-        console.print(line, soft_wrap=True)
+        note = "the misses printed in the paper do not follow from the equations of motion; see docs/reachability.md"
+        print_lines(console, [note])
+    print_lines(console, _feedback(report))
 
 
 def _summary(report: Report) -> Iterator[str]:
     solution, least = report.solution, report.least_periods
     dimension = solution.optimal.dimension
     reached = f"norm 0 needs at least {least} periods" if least else f"norm 0 not reached in {report.searched_periods}"
-    yield f"{report.rendezvous.name}: least terminal norm {solution.optimal.miss:.9g}; {reached}"
+    yield f"{report.rendezvous.name}: least terminal norm {solution.optimal.miss:.9g} {_NORM}; {reached}"
     yield f"route: {solution.route.value} ({solution.reason})"
     yield f"optimal controls: {f'a set of dimension {dimension}' if dimension else 'one'}"
+    yield (
+        f"units: {_NORM} is the norm of a state whose components are in m and m/s; controls u are in units of "
+        f"{report.rendezvous.acceleration_m_s2:g} m/s^2"
+    )
 
 
 def _feedback(report: Report) -> Iterator[str]:
     if report.flight is not None:
-        yield f"\nreplanned every period: nonlinear miss {number(report.flight.miss)}"
+        yield f"\nreplanned every period: nonlinear miss {number(report.flight.miss)} {_NORM}"
     if report.noisy:
         misses = sorted(flight.miss for flight in report.noisy)
         relaxed = max(float(flight.relaxations.max()) for flight in report.noisy)
         yield (
             f"with navigation errors, {len(misses)} simulations: median {number(misses[len(misses) // 2])}, "
-            f"largest {number(misses[-1])}; constraints relaxed by at most {relaxed:.2%}"
+            f"largest {number(misses[-1])} {_NORM}; constraints relaxed by at most {relaxed:.2%}"
         )
     if report.robustness is not None:
         conflict, plan = report.robustness.conflict, report.robustness.plan
         yield f"\nwith disturbances, without feedback: {conflict or 'controls that keep the constraints exist'}"
-        bound = report.robustness.refusal if plan is None else f"terminal norm at most {number(plan.worst_miss)}"
+        bound = (
+            report.robustness.refusal if plan is None else f"terminal norm at most {number(plan.worst_miss)} {_NORM}"
+        )
         yield f"with disturbances, with feedback: {bound}"
 
 
-def _sets_table(report: Report) -> Table:
-    titles = ("forward\nvertices", "\nfacets", "tube\nvertices", "\nfacets", "tube\nx, m", "\ny, m", "\nz, m")
-    table = number_table("period", *titles)
-    for t in range(1, report.solution.problem.periods + 1):
-        cells = []
-        for kind in (SetKind.FORWARD, SetKind.TUBE):
-            counts = report.solution.sets.counts(kind, t)
-            cells += ["-", "-"] if counts is None else [str(counts.vertices), str(counts.facets)]
-        table.add_row(str(t), *cells, *(f"{low:.1f} .. {high:.1f}" for low, high in report.tube[t, :3] + 0.0))
-    return table
+def _tables(report: Report, comparisons: Sequence[Comparison]) -> Iterator[Table]:
+    sets, periods = report.solution.sets, range(1, report.solution.problem.periods + 1)
+    counts = [[sets.counts(kind, t) for kind in (SetKind.FORWARD, SetKind.TUBE)] for t in periods]
+    if any(count is not None for row in counts for count in row):
+        table = number_table("period", *(f"{name}\n{what}" for name in ("forward", "tube") for what in _COUNTED))
+        for t, row in zip(periods, counts, strict=True):
+            cells = (("-", "-") if count is None else (count.vertices, count.facets) for count in row)
+            table.add_row(str(t), *(str(cell) for pair in cells for cell in pair))
+        yield table
+    table = number_table("period", *(f"{axis} of the tube\nm" for axis in "xyz"))
+    for t in periods:
+        table.add_row(str(t), *(f"{low:.1f} .. {high:.1f}" for low, high in report.tube[t, :3] + 0.0))
+    yield table
+    if report.members:
+        yield _members_table(report)
+    if comparisons:
+        yield _published_table(comparisons)
 
 
 def _members_table(report: Report) -> Table:
-    titles = ("energy", "L1", "norms", "peak", "nonlinear\nmiss", "violation\nbetween periods")
+    titles = (
+        *(f"{name}\n{unit}" for name, unit in (("energy", "u^2"), ("L1", "u"), ("norms", "u"), ("peak", "u"))),
+        f"nonlinear miss\n{_NORM}",
+        "violation between\nperiods",
+    )
     table = number_table("control", *titles)
     for member in report.members:
         costs = (f"{value:.6f}" for value in vars(effort(member.controls)).values())
@@ -141,10 +169,10 @@ def _members_table(report: Report) -> Table:
 
 def _published_table(comparisons: Sequence[Comparison]) -> Table:
     titles = (
-        "largest difference\nof a control",
-        "nonlinear miss\nas printed",
-        "with the\nprinted u",
-        "with our\ncontrol",
+        "largest difference\nof a control, u",
+        f"nonlinear miss\nas printed, {_NORM}",
+        f"with the\nprinted u, {_NORM}",
+        f"with our\ncontrol, {_NORM}",
     )
     table = number_table("paper", "our control", *titles, left=2)
     for comparison in comparisons:

@@ -1,9 +1,15 @@
 """Convex polytopes in R^n with both representations, flat ones included."""
 
-from infoset.polytope._relative_interior import HIGHS, RelativeInterior, null_space_basis, relative_interior
-from infoset.polytope._shadow import shadow
-from infoset.polytope.errors import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
-from infoset.polytope.operations import cut, intersection, linear_image, minkowski_sum, product, projection
+from infoset.polytope._affine_hull import (
+    HIGHS,
+    EmptyPolytopeError,
+    RelativeInterior,
+    UnboundedPolytopeError,
+    UncertainHullError,
+    null_space_basis,
+    relative_interior,
+)
+from infoset.polytope.operations import cut, intersection, linear_image, minkowski_sum, product, projection, shadow
 from infoset.polytope.polytope import Polytope
 
 __all__ = [

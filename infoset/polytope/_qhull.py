@@ -2,26 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
-from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError, cKDTree
 
-from infoset.polytope._frame import FLAT, Frame, frame_of
-from infoset.polytope._incidence import MERGE, essential, together
-from infoset.polytope._relative_interior import chebyshev_ball, relative_interior
-from infoset.polytope.errors import UncertainHullError
+from infoset.polytope._affine_hull import FLAT, Frame, UncertainHullError, chebyshev_ball, frame_of, relative_interior
 
 Floats = NDArray[np.float64]
-
-_OPTIONS = ("Qt", "QJ Pp")
-_APART = 1e-9
-_ROUND = 30.0
-"""Ratio of length to thickness above which sets are intersected again, in coordinates in which they are round."""
-
-
+Flags = NDArray[np.bool_]
+Places = NDArray[np.int64]
 Description = tuple[Floats, Floats, Floats, Floats, Floats]
 """Vertices; facets normals x <= offsets; the affine hull across x = levels: the fields of a `Polytope`."""
+
+_OPTIONS = ("Qt", "QJ Pp")
+_ROUND = 30.0
+"""Ratio of length to thickness above which sets are intersected again, in coordinates in which they are round."""
+MERGE = 1e-10
+"""Points nearer than this are one point, in coordinates in which the width of the set is about one."""
+_APART = 1e-9
+"""Greatest distance between both representations of a set."""
+_LEAST_ON, _MOST_ON = 1e-14, 1e-7
+"""Limits of the distance, in the same coordinates, below which a point is on a plane."""
+_OTHERWISE_ON = (1e-11, 1e-10, 1e-12, 1e-13, 1e-9, 1e-8)
+_LEAST_RANK = 1e-11
+_ENTRIES = 4_000_000
 
 
 def hull_of_points(points: Floats, flat: float = FLAT) -> Description:
@@ -132,3 +141,124 @@ def _lifted(point: Floats, basis: Floats, corners: Floats, sides: Floats, ends: 
 def _single(point: Floats) -> Description:
     size = len(point)
     return point[None, :], np.zeros((0, size)), np.zeros(0), np.eye(size), point.copy()
+
+
+def essential(points: Floats, normals: Floats, offsets: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the points that are vertices and the planes that are facets of a full-dimensional polytope, d >= 2.
+
+    `points`, shape (k, d), contain all vertices, and perhaps other points of the polytope, in coordinates in which its
+    width is about one. `normals`, shape (m, d), and `offsets` contain all facets, and perhaps other half-spaces that
+    contain the polytope. Normals of the returned facets have unit length.
+
+    Raises
+    ------
+    UncertainHullError
+        If, because of rounding, a point is outside or the result is not a polytope.
+
+    Notes
+    -----
+    A plane is a facet if the points on it span d - 1 dimensions and are not a subset of the points on another plane. A
+    point is a vertex if it is the only common point of the planes through it. O(k m d^2), and O(m^2 k) for matrix
+    products. The hull of the vertices is computed again as a check: it must contain all points, and each simplex of its
+    surface must lie in a facet. Distances of points from planes are either rounding or real: the widest gap among them
+    separates the two. If the check fails, fixed tolerances are tried.
+    """
+    lengths = np.linalg.norm(normals, axis=1)
+    normals, offsets = normals / lengths[:, None], offsets / lengths
+    gaps = offsets - points @ normals.T
+    if float(gaps.min()) < -_MOST_ON:
+        raise UncertainHullError(f"a vertex is {-float(gaps.min()):.2g} outside its own facets")
+    failed = UncertainHullError("no tolerance fits")
+    labels = together(points, MERGE)
+    kept = np.unique(labels, return_index=True)[1]
+    points = points[kept]
+    for near in (_widest_gap(gaps), *_OTHERWISE_ON):
+        # A merged point is on the planes of all its points.
+        on = np.zeros((len(kept), len(normals)), dtype=bool)
+        np.logical_or.at(on, labels, gaps <= near)
+        try:
+            corners, facets = _agreeing(points, normals, on, max(near, _LEAST_RANK))
+        except UncertainHullError as error:
+            failed = error
+        else:
+            return points[corners], normals[facets], offsets[facets]
+    raise failed
+
+
+def _agreeing(points: Floats, normals: Floats, on: Flags, negligible: float) -> tuple[Places, Places]:
+    """Return which points are vertices and which planes facets, given which points are on which planes."""
+    size = points.shape[1]
+    facets = _largest(on, size)
+    members = on[:, facets].T
+    means = (members @ points) / members.sum(axis=1)[:, None]
+    spans = _ranks(
+        len(means), len(points), lambda one: (points - means[one, None, :]) * members[one, :, None], negligible
+    )
+    facets = facets[spans >= size - 1]
+    through = on[:, facets]
+    corners = np.flatnonzero(through.sum(axis=1) >= size)
+    planes, met = normals[facets], through[corners]
+    corners = corners[_ranks(len(met), len(planes), lambda one: planes * met[one, :, None], negligible) == size]
+    if len(corners) <= size or len(facets) <= size:
+        raise UncertainHullError(f"{len(corners)} vertices and {len(facets)} facets are no polytope in R^{size}")
+    if float(through[corners].sum(axis=0).min()) < size:
+        raise UncertainHullError(f"a facet of a polytope in R^{size} has fewer than {size} vertices")
+    if size == 2 and len(corners) != len(facets):
+        raise UncertainHullError(f"{len(corners)} vertices and {len(facets)} sides are no polygon")
+    _need_agreement(points, corners, on[:, facets])
+    return corners, facets
+
+
+def _need_agreement(points: Floats, corners: Places, on_facets: Flags) -> None:
+    """Check that the hull of the vertices contains all points, and that each simplex of its surface is in a facet."""
+    try:
+        hull = ConvexHull(points[corners])
+    except QhullError as error:
+        raise UncertainHullError(f"rounding decides which of {len(corners)} points are vertices") from error
+    outside = float((points @ hull.equations[:, :-1].T + hull.equations[:, -1]).max())
+    if outside > _APART:
+        raise UncertainHullError(f"a point is {outside:.2g} outside the hull of its vertices")
+    covered = np.ones((len(hull.simplices), on_facets.shape[1]), dtype=bool)
+    for corner in range(hull.simplices.shape[1]):
+        covered &= on_facets[corners[hull.simplices[:, corner]]]
+    if not covered.any(axis=1).all():
+        raise UncertainHullError("a part of the surface is in no facet")
+
+
+def _widest_gap(gaps: Floats) -> float:
+    """Return the geometric mean of the ends of the widest gap among small distances."""
+    sizes = np.abs(gaps)
+    small = np.log(np.sort(sizes[(sizes > _LEAST_ON) & (sizes < _MOST_ON)]))
+    ends = np.concatenate([[np.log(_LEAST_ON)], small, [np.log(_MOST_ON)]])
+    widest = int(np.diff(ends).argmax())
+    return float(np.exp(0.5 * (ends[widest] + ends[widest + 1])))
+
+
+def together(points: Floats, within: float) -> Places:
+    """Label points that are nearer to each other than a distance, in every coordinate, with the same number."""
+    # Scipy 1.11.0 looks for components among indices of 32 bits only.
+    pairs = cKDTree(points).query_pairs(within, p=np.inf, output_type="ndarray").astype(np.int32)
+    graph = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _largest(on: Flags, least: int) -> Places:
+    """Return the planes whose points are not all on another plane; of planes with the same points, the first."""
+    planes = np.flatnonzero(on.sum(axis=0) >= least)
+    held = on[:, planes].astype(np.float32)
+    counts = held.sum(axis=0)
+    common = held.T @ held
+    order = np.arange(len(planes))
+    within = common >= counts[:, None]
+    beaten = within & ((counts[None, :] > counts[:, None]) | (order[None, :] < order[:, None]))
+    return np.asarray(planes[~beaten.any(axis=1)])
+
+
+def _ranks(count: int, height: int, stack: Callable[[slice], Floats], negligible: float) -> Places:
+    """Return the ranks of matrices, which are built in batches."""
+    size = max(1, _ENTRIES // max(1, height))
+    ranks = [np.zeros(0, np.int64)]
+    for start in range(0, count, size):
+        values = np.linalg.svd(stack(slice(start, start + size)), compute_uv=False)
+        ranks.append((values > negligible * np.maximum(values[:, :1], 1e-300)).sum(axis=1))
+    return np.concatenate(ranks)

@@ -1,14 +1,19 @@
-"""Operations on polytopes that make new ones."""
+"""Operations on polytopes that make new ones, and polytopes in few dimensions from their support vectors alone."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
 from infoset.polytope.polytope import Polytope
+
+Floats = NDArray[np.float64]
+
+_MOST_ROUNDS = 200
+_FLAT = 1e-7
 
 
 def linear_image(polytope: Polytope, matrix: ArrayLike, shift: ArrayLike = 0.0) -> Polytope:
@@ -72,3 +77,47 @@ def product(*polytopes: Polytope) -> Polytope:
         block_diag(*[factor.across for factor in polytopes]),
         np.concatenate([factor.levels for factor in polytopes]),
     )
+
+
+def shadow(
+    furthest: Callable[[Floats], Floats], space: int, tolerance: float = 1e-9, most_facets: int = 10_000
+) -> Polytope:
+    """Return a polytope from its support vectors: a projection of a set that is known only by programs over it.
+
+    `furthest` returns a point of the set furthest along a direction, both of shape (space,). `space` is 2 or 3; more
+    works but the cost grows fast. Vertices of the result are points of the set; the set extends beyond its facets, at
+    most `most_facets`, by no more than the relative `tolerance`.
+
+    The hull of the points known is enlarged: each facet (and each direction across it, where it is flat) beyond which
+    the set extends gives a new point. It ends when none does, after a program a facet and a vertex: exact, for a
+    polytope.
+
+    Raises
+    ------
+    ArithmeticError
+        If it has too many facets.
+    """
+    unit = np.eye(space)
+    points = np.array([furthest(direction) for direction in np.vstack([unit, -unit])])
+    known: set[tuple[float, ...]] = set()
+    for _ in range(_MOST_ROUNDS):
+        hull = Polytope.from_vertices(points, _FLAT)
+        size = max(float(np.ptp(points, axis=0).max()), 1e-12 * float(np.abs(points).max()))
+        rows = np.vstack([hull.normals, hull.across, -hull.across])
+        limits = np.concatenate([hull.offsets, hull.levels, -hull.levels])
+        if len(rows) > most_facets:
+            raise ArithmeticError(f"the projection has over {most_facets} facets")
+        new = []
+        for row, limit in zip(rows, limits, strict=True):
+            key = tuple((row + 0.0).round(10))
+            if key in known:
+                continue
+            point = furthest(row)
+            if row @ point > limit + tolerance * size:
+                new.append(point)
+            else:
+                known.add(key)
+        if not new:
+            return hull
+        points = np.vstack([hull.vertices, new])
+    raise ArithmeticError("the projection did not end")

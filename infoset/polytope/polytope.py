@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 
-from infoset.polytope._frame import FLAT, frame_of
-from infoset.polytope._incidence import together
-from infoset.polytope._qhull import hull_of_points, intersection_of_halfspaces
+from infoset.polytope._affine_hull import FLAT, frame_of
+from infoset.polytope._qhull import hull_of_points, intersection_of_halfspaces, together
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -22,21 +21,10 @@ _TOGETHER = 1e-7
 class Polytope:
     """A convex polytope that is not empty; it may be flat, a segment or a point.
 
-    Construct it with `from_vertices` or `from_halfspaces`. Coordinates should be of similar size: scale them first,
-    because a set that is 1e9 times thinner than it is long counts as flat.
-
-    Parameters
-    ----------
-    vertices : ndarray, shape (v, n)
-        Vertices, without redundant points.
-    normals : ndarray, shape (f, n)
-        Outward normals of the facets, of unit length, in the directions of the affine hull.
-    offsets : ndarray, shape (f,)
-        Offsets of the facets: normals x <= offsets.
-    across : ndarray, shape (n - dimension, n)
-        Orthonormal rows, normal to the affine hull.
-    levels : ndarray, shape (n - dimension,)
-        Levels of the affine hull: across x = levels.
+    It is {x: normals x <= offsets, across x = levels}, and the hull of its `vertices`, shape (v, n), without redundant
+    points. The f normals of the facets have unit length and are in the directions of the affine hull; the n - dimension
+    rows of `across` are orthonormal. Construct it with `from_vertices` or `from_halfspaces`. Coordinates should be of
+    similar size: scale them first, because a set that is 1e9 times thinner than it is long counts as flat.
     """
 
     vertices: Floats
@@ -47,14 +35,11 @@ class Polytope:
 
     @classmethod
     def from_vertices(cls, points: ArrayLike, flat: float = FLAT) -> Polytope:
-        """Return the convex hull of points.
+        """Return the convex hull of `points`, shape (k, n), at least one.
 
-        Parameters
-        ----------
-        points : array_like, shape (k, n)
-            Points, at least one.
-        flat : float
-            Relative thickness below which a set counts as flat: greater for points that are known to fewer digits.
+        `flat` is the relative thickness below which a set counts as flat: greater for points that are known to fewer
+        digits. The affine hull first, then Qhull in coordinates of it in which the set is round, then a check that
+        facets and vertices agree. Qhull takes O(k log k) for n to 3, O(k^(n/2)) beyond at worst.
 
         Raises
         ------
@@ -62,11 +47,6 @@ class Polytope:
             If there is no point, or one is not finite.
         UncertainHullError
             If rounding decides which points are vertices.
-
-        Notes
-        -----
-        The affine hull first, then Qhull in coordinates of it in which the set is round, then a check that facets and
-        vertices agree. Qhull takes O(k log k) for n to 3, O(k^(n/2)) beyond at worst.
         """
         array = np.asarray(points, dtype=float)
         if array.ndim != 2 or not len(array) or not array.shape[1]:
@@ -85,16 +65,10 @@ class Polytope:
         *,
         bounded: bool = False,
     ) -> Polytope:
-        """Return {x: normals x <= offsets, across x = levels}.
+        """Return {x: normals x <= offsets, across x = levels}, of shapes (m, n), (m,), (k, n) and (k,).
 
-        Parameters
-        ----------
-        normals, offsets : array_like
-            Of shapes (m, n) and (m,).
-        across, levels : array_like, optional
-            Equations, of shapes (k, n) and (k,).
-        bounded : bool
-            Whether the set is known to be bounded, which saves a linear program.
+        A set that is known to be `bounded` saves a linear program. Equations hidden in the half-spaces are found first,
+        by linear programs (HiGHS); then Qhull intersects in the affine hull, around the Chebyshev centre.
 
         Raises
         ------
@@ -106,11 +80,6 @@ class Polytope:
             If the set is unbounded; it holds a direction.
         UncertainHullError
             If rounding decides which points are vertices.
-
-        Notes
-        -----
-        Equations hidden in the half-spaces are found first, by linear programs (HiGHS); then Qhull intersects in the
-        affine hull, around the Chebyshev centre.
         """
         rows, limits = np.asarray(normals, dtype=float), np.asarray(offsets, dtype=float)
         if rows.ndim != 2 or limits.shape != (len(rows),) or not rows.shape[1]:

@@ -1,18 +1,15 @@
 """Minimum-energy visits to several moving targets: flybys and rendezvous, their times and their order."""
 
-from rendezvous.multipoint.dense import DenseSolution, solve_dense
 from rendezvous.multipoint.kepler import KeplerTargets, KeplerTour
 from rendezvous.multipoint.order import MOST_TARGETS, BestOrder, best_order, best_order_of_slots, best_times
 from rendezvous.multipoint.segments import Flown, Nodes, NotSettledError, Path, solve_segments
-from rendezvous.multipoint.targets import DriftingTargets, Meet, MovingTargets, Target
 from rendezvous.multipoint.times import BestTimes, Effort, TimeLimits, optimise_times
-from rendezvous.multipoint.tour import Tour, Visits, nodes_of
+from rendezvous.multipoint.tour import DriftingTargets, Meet, MovingTargets, Target, Tour, Visits, nodes_of
 
 __all__ = [
     "MOST_TARGETS",
     "BestOrder",
     "BestTimes",
-    "DenseSolution",
     "DriftingTargets",
     "Effort",
     "Flown",
@@ -32,6 +29,5 @@ __all__ = [
     "best_times",
     "nodes_of",
     "optimise_times",
-    "solve_dense",
     "solve_segments",
 ]

@@ -8,14 +8,13 @@ from dataclasses import dataclass, field
 from math import factorial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rendezvous._arrays import Flags, Floats
 from rendezvous.multipoint.segments import Flown, NotSettledError, Path, check_times, solve_segments
-from rendezvous.multipoint.targets import Meet
 from rendezvous.multipoint.times import BestTimes, Effort, NoRoomError, TimeLimits, optimise_times, room_s
-from rendezvous.multipoint.tour import SMOOTH, Tour, Visits, nodes_of
+from rendezvous.multipoint.tour import SMOOTH, Meet, Tour, Visits, nodes_of
 
-Floats = NDArray[np.float64]
 Report = Callable[[float], None]
 
 MOST_TARGETS = 9
@@ -24,25 +23,12 @@ _MARGIN = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class BestOrder:
-    """Targets visited in their best order.
+    """Targets visited in their best `order`, first to last.
 
-    Parameters
-    ----------
-    order : tuple of int
-        Indices of the targets, first to last.
-    path : Path
-        Path in this order.
-    objective : float
-        Energy plus the price of the time, m^2/s^3.
-    nodes : int
-        Number of partial orders examined.
-    evaluations : int
-        Number of paths computed.
-    lost : tuple of tuple of int
-        Partial orders that were skipped because no path was found.
-    unfit : int
-        Number of infeasible orders: a stay ends after the time of the next visit, or stays leave no time for travel
-        before the latest time.
+    `objective` is the energy plus the price of the time, m^2/s^3. The search examined `nodes` partial orders and
+    computed `evaluations` paths; partial orders in `lost` were skipped because no path was found. `unfit` is the number
+    of infeasible orders: a stay ends after the time of the next visit, or stays leave no time for travel before the
+    latest time.
     """
 
     order: tuple[int, ...]
@@ -61,26 +47,24 @@ def best_order(
 
     `guesses` are additional initial times, s, of any order; `progress` is called with the share of orders decided.
 
+    The search is depth first and starts with the cheapest partial order. The cost of a partial order at its best times
+    is a lower bound of the cost of all orders that begin with it, and its times are their initial times. This holds for
+    global minima. The computed minima are local, so the result is the best order found: a partial order is discarded
+    only if more starts find no lower minimum, and for Kepler's motion a factor is applied (`ruggedness`).
+
     Raises
     ------
     ValueError
         If there are more than 9 targets, or they do not fit before the latest time.
     NotSettledError
         If no path is found for any order.
-
-    Notes
-    -----
-    The search is depth first and starts with the cheapest partial order. The cost of a partial order at its best times
-    is a lower bound of the cost of all orders that begin with it, and its times are their initial times. This holds for
-    global minima. The computed minima are local, so the result is the best order found: a partial order is discarded
-    only if more starts find no lower minimum, and for Kepler's motion a factor is applied (`ruggedness`).
     """
     count = _checked_count(tour)
     dwell = tour.dwell_s
     unfit = _orders_without_room(tour.start_s, dwell, limits)
     horizon = limits.latest_s
 
-    def solve(order: tuple[int, ...], warm: Sequence[Floats], careful: bool) -> tuple[float, Flown, int]:
+    def solve(order: tuple[int, ...], warm: Sequence[Floats], careful: bool) -> tuple[float, Flown]:
         complete, held, enough = len(order) == count, limits, -np.inf
         if not complete:
             if horizon is not None:
@@ -96,7 +80,8 @@ def best_order(
         times = optimise_times(
             tour.flyer(order), tour.start_s, dwell[list(order)], held, begins, effort=effort, enough=enough
         )
-        return times.objective, times.flown, times.evaluations
+        search.evaluations += times.evaluations
+        return times.objective, times.flown
 
     # A local minimum of a partial order is no bound; divided by the slack, it is used as one.
     slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0 / (1.0 - _MARGIN)
@@ -112,17 +97,15 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
 
     `progress` is called with the share of orders decided.
 
+    Dynamic programming over (visited, last) if every visit is a rendezvous, as a leg's cost then depends on its two
+    ends only; otherwise branch and bound. Orders in which a stay ends after the next visit do not fit and are left out.
+
     Raises
     ------
     ValueError
         If there are more than 9 targets, times do not increase, or no order fits them.
     NotSettledError
         If no path is found for any order that fits.
-
-    Notes
-    -----
-    Dynamic programming over (visited, last) if every visit is a rendezvous, as a leg's cost then depends on its two
-    ends only; otherwise branch and bound. Orders in which a stay ends after the next visit do not fit and are left out.
     """
     count, times = _checked_count(tour), np.asarray(time_s, dtype=np.float64)
     if times.shape != (count,):
@@ -139,9 +122,10 @@ def best_order_of_slots(tour: Visits, time_s: ArrayLike, *, progress: Report | N
     if isinstance(tour, Tour) and all(target.meet is Meet.RENDEZVOUS for target in tour.targets.targets):
         return _by_dynamic_programming(tour, times, fits, unfit)
 
-    def solve(order: tuple[int, ...], _warm: Sequence[Floats], _careful: bool) -> tuple[float, Flown, int]:
+    def solve(order: tuple[int, ...], _warm: Sequence[Floats], _careful: bool) -> tuple[float, Flown]:
         flown = tour.flyer(order)(times[: len(order)])
-        return flown.cost, flown, 1
+        search.evaluations += 1
+        return flown.cost, flown
 
     slack = tour.ruggedness if tour.ruggedness > SMOOTH else 1.0
     search = _Search(solve, count, progress, tour.start_s, None, slack, looks_twice=False, fits=fits)
@@ -166,14 +150,14 @@ def best_times(
 class _Search:
     """A depth-first search through partial orders."""
 
-    solve: Callable[[tuple[int, ...], Sequence[Floats], bool], tuple[float, Flown, int]]
+    solve: Callable[[tuple[int, ...], Sequence[Floats], bool], tuple[float, Flown]]
     count: int
     progress: Report | None
     start_s: float
     horizon_s: float | None
     slack: float
     looks_twice: bool
-    fits: NDArray[np.bool_] | None = None
+    fits: Flags | None = None
     best: tuple[int, ...] = ()
     best_path: Flown | None = None
     best_objective: float = np.inf
@@ -183,7 +167,6 @@ class _Search:
     lost: list[tuple[int, ...]] = field(default_factory=list)
 
     def run(self) -> Flown:
-        """Search all orders, and return the path of the best one."""
         self._branch((), None)
         if self.best_path is None:
             raise NotSettledError("no path was found for any order; give visits more time")
@@ -199,7 +182,7 @@ class _Search:
                 continue
             self.nodes += 1
             try:
-                objective, path = self._look(order, self._warm(before), careful=False)
+                objective, path = self.solve(order, self._warm(before), False)
             except NoRoomError:
                 self._done(order)
             except NotSettledError:
@@ -213,7 +196,7 @@ class _Search:
             if self.looks_twice and (complete or objective >= self.slack * self.best_objective):
                 # This is a local minimum: try more starts before an order is accepted, or a partial order is dropped.
                 with suppress(NotSettledError):
-                    again, other = self._look(order, [path.nodes.arrive_s], careful=True)
+                    again, other = self.solve(order, [path.nodes.arrive_s], True)
                     if again < objective:
                         lowest, best_path = again, other
             if complete:
@@ -224,11 +207,6 @@ class _Search:
                 self._branch(order, best_path)
             else:
                 self._done(order)
-
-    def _look(self, order: tuple[int, ...], warm: Sequence[Floats], careful: bool) -> tuple[float, Flown]:
-        objective, path, evaluations = self.solve(order, warm, careful)
-        self.evaluations += evaluations
-        return objective, path
 
     def _done(self, order: tuple[int, ...]) -> None:
         self.decided += factorial(self.count - len(order))
@@ -258,8 +236,7 @@ def _checked_count(tour: Visits) -> int:
 
 
 def _orders_without_room(start_s: float, dwell_s: Floats, limits: TimeLimits) -> int:
-    """Count the orders that do not fit before the latest time; this depends on the last target, whose stay may end
-    later.
+    """Count the orders that do not fit before the latest time; the stay with the last target may end later.
 
     Raises
     ------
@@ -276,7 +253,7 @@ def _orders_without_room(start_s: float, dwell_s: Floats, limits: TimeLimits) ->
     return unfit
 
 
-def _orders_that_fit(fits: NDArray[np.bool_]) -> int:
+def _orders_that_fit(fits: Flags) -> int:
     """Count the orders that use only pairs of slots and targets that fit, shape (slot, target)."""
     ways = {frozenset[int](): 1}
     for slot in fits:
@@ -288,12 +265,11 @@ def _orders_that_fit(fits: NDArray[np.bool_]) -> int:
     return sum(ways.values())
 
 
-def _unvisited(slot: NDArray[np.bool_], visited: frozenset[int]) -> list[int]:
-    """Targets that fit a slot and are not visited yet."""
+def _unvisited(slot: Flags, visited: frozenset[int]) -> list[int]:
     return [target for target in np.flatnonzero(slot).tolist() if target not in visited]
 
 
-def _by_dynamic_programming(tour: Tour, times: Floats, fits: NDArray[np.bool_], unfit: int) -> BestOrder:
+def _by_dynamic_programming(tour: Tour, times: Floats, fits: Flags, unfit: int) -> BestOrder:
     """Held and Karp's recursion over sets of visited targets."""
     count, targets, dwell = len(times), tour.targets, tour.dwell_s
     best: dict[tuple[frozenset[int], int], tuple[float, tuple[int, ...]]] = {}

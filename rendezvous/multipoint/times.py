@@ -8,14 +8,13 @@ from enum import Enum
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 from scipy.stats import qmc
 
+from rendezvous._arrays import Floats
 from rendezvous.multipoint.segments import Flown, NotSettledError, Path
 
-Floats = NDArray[np.float64]
 FlyAt = Callable[[Floats], Flown]
 
 LEAST_SHARE = 1e-6
@@ -87,14 +86,7 @@ class TimeLimits:
 class BestTimes:
     """Visits at their best times.
 
-    Parameters
-    ----------
-    flown : Flown
-        The path at these times.
-    objective : float
-        Energy plus the price of the time, m^2/s^3.
-    evaluations : int
-        Number of paths computed.
+    `objective` is the energy plus the price of the time, m^2/s^3; `evaluations` is the number of paths computed.
     """
 
     flown: Flown
@@ -192,12 +184,8 @@ def optimise_times(
         Start of the first segment.
     dwell_s : ndarray, shape (N,)
         Duration of the stay with each target.
-    limits : TimeLimits
-        Limits of the times.
     guesses : sequence of ndarray, shape (N,)
         Additional initial times, s; those outside the limits are ignored.
-    effort : Effort
-        Effort of the search; the default is that of a final result.
     enough : float
         Objective, m^2/s^3, below which a descent stops.
     progress : callable or None
@@ -207,6 +195,8 @@ def optimise_times(
     ------
     NoRoomError
         If the visits do not fit before the latest time.
+    ValueError
+        If there is no latest time and no guess.
     NotSettledError
         If the conditions of a minimum are not satisfied; with the final effort only.
 
@@ -220,7 +210,11 @@ def optimise_times(
     count = len(dwell_s)
     shifts = start_s + np.concatenate([[0.0], np.cumsum(dwell_s[:-1])])
     total = room_s(start_s, dwell_s, limits)
-    scale = total if np.isfinite(total) else _longest(guesses, start_s, count)
+    scale = total
+    if np.isinf(total):
+        scale = max((float(guess[-1]) - start_s for guess in guesses if len(guess) == count), default=0.0)
+        if scale <= 0.0:
+            raise ValueError("with the last time free, times to start from are needed")
     least = max(limits.least_gap_s, LEAST_SHARE * scale)
     trials = _Trials(fly, shifts, limits.price_per_s, least, total, scale)
     candidates = [np.diff(np.concatenate([[0.0], np.asarray(guess) - shifts])) for guess in guesses]
@@ -292,14 +286,6 @@ def room_s(start_s: float, dwell_s: Floats, limits: TimeLimits) -> float:
             "earliest"
         )
     return max(total, need)
-
-
-def _longest(guesses: Sequence[Floats], start_s: float, count: int) -> float:
-    """Return the longest duration of the guesses, s."""
-    ends = [float(guess[-1]) - start_s for guess in guesses if len(guess) == count]
-    if not ends or max(ends) <= 0.0:
-        raise ValueError("with the last time free, times to start from are needed")
-    return max(ends)
 
 
 def _spread(count: int, scale: float, least: float, bounded: bool, most: int) -> list[Floats]:

@@ -1,22 +1,108 @@
-"""A chaser that visits moving targets, and the path for given order and times."""
+"""Moving targets, a chaser that visits them, and the path for given order and times."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rendezvous._arrays import Floats, Integers
 from rendezvous.multipoint.segments import Flown, Nodes, Path, solve_segments
-from rendezvous.multipoint.targets import Meet, MovingTargets
 from rendezvous.relative_motion import LinearMotion
 
-Floats = NDArray[np.float64]
-
 SMOOTH = 4.0 / 3.0
+
+
+class Meet(Enum):
+    """Kind of a visit."""
+
+    FLYBY = "flyby"
+    """At its position, with any velocity."""
+    RENDEZVOUS = "rendezvous"
+    """At its position, with its velocity."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A target; `dwell_s` is the duration of the stay with it, coasting, for a rendezvous only.
+
+    Raises
+    ------
+    ValueError
+        If the dwell is negative or not finite, or that of a flyby is not zero.
+    """
+
+    name: str
+    meet: Meet = Meet.FLYBY
+    dwell_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.dwell_s) and self.dwell_s >= 0.0):
+            raise ValueError(
+                f"target {self.name!r}: the dwell must be finite and not negative, found {self.dwell_s!r} s"
+            )
+        if self.meet is Meet.FLYBY and self.dwell_s > 0.0:
+            raise ValueError(f"target {self.name!r}: a flyby cannot dwell; make it a rendezvous")
+
+
+class MovingTargets(ABC):
+    """Targets whose motion is known, with their states at an epoch. They coast in the same dynamics as the chaser.
+
+    Raises
+    ------
+    ValueError
+        If there is no target, two have one name, or a state is not six finite numbers.
+    """
+
+    targets: tuple[Target, ...]
+    initial: Floats
+
+    def __post_init__(self) -> None:
+        if not self.targets:
+            raise ValueError("there is no target to visit")
+        names = [target.name for target in self.targets]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"target {name!r} is listed twice; each target is visited once")
+        if np.shape(self.initial) != (len(names), 6) or not np.isfinite(self.initial).all():
+            raise ValueError("each target needs a state of six finite numbers")
+
+    @property
+    def dwell_s(self) -> Floats:
+        """Duration of the stay with each target, shape (n,)."""
+        return np.array([target.dwell_s for target in self.targets])
+
+    @abstractmethod
+    def states(self, which: Integers, time_s: Floats) -> Floats:
+        """States, m and m/s, of the k targets numbered `which` at k times, shape (k, 6)."""
+
+    @abstractmethod
+    def rates(self, time_s: Floats, states: Floats) -> Floats:
+        """Time derivatives of `states` of targets at k times, shape (k, 6)."""
+
+
+@dataclass(frozen=True, eq=False)
+class DriftingTargets(MovingTargets):
+    """Targets that coast in a linear motion; `initial`, shape (n, 6), are their states at t = 0, m and m/s."""
+
+    targets: tuple[Target, ...]
+    motion: LinearMotion
+    initial: Floats
+
+    def states(self, which: Integers, time_s: Floats) -> Floats:
+        """States, m and m/s, of the k targets numbered `which` at k times, shape (k, 6)."""
+        zero = np.zeros(time_s.shape)
+        coasted = self.motion.transition(zero, time_s) @ self.initial[which][:, :, None]
+        return np.asarray(coasted[:, :, 0] + self.motion.drift(zero, time_s))
+
+    def rates(self, time_s: Floats, states: Floats) -> Floats:
+        """Time derivatives of `states` of targets at k times, shape (k, 6)."""
+        return self.motion.rates(time_s, states)
 
 
 class Visits(ABC):
@@ -56,23 +142,9 @@ class Visits(ABC):
 
 @dataclass(frozen=True, eq=False)
 class Tour(Visits):
-    """A chaser and the targets it visits, in linear motion.
+    """A chaser and the targets it visits, in the same linear motion.
 
-    Parameters
-    ----------
-    motion : LinearMotion
-        Motion of the chaser.
-    targets : MovingTargets
-        Targets, in the same motion.
-    start_state : ndarray, shape (6,)
-        State of the chaser at the start, m and m/s.
-    start_s : float
-        Time of the start.
-
-    Raises
-    ------
-    ValueError
-        If the start is not finite.
+    `start_state`, shape (6,), is the chaser's at the start, m and m/s.
     """
 
     motion: LinearMotion
@@ -111,12 +183,9 @@ def nodes_of(targets: MovingTargets, order: Sequence[int], time_s: ArrayLike) ->
         raise ValueError("a time is not finite")
     rendezvous = np.array([targets.targets[index].meet is Meet.RENDEZVOUS for index in order])
     leave_s = times + targets.dwell_s[which]
-    if not rendezvous.any():  # rates and departures are not used
-        arrive = targets.states(which, times)
-        return Nodes(times, times, arrive, arrive, arrive, arrive, rendezvous)
     if (leave_s == times).all():
         arrive = targets.states(which, times)
-        rate = targets.rates(times, arrive)
+        rate = targets.rates(times, arrive) if rendezvous.any() else arrive  # rates at flybys are not used
         return Nodes(times, times, arrive, arrive, rate, rate, rendezvous)
     both, count = np.concatenate([times, leave_s]), len(times)
     states = targets.states(np.concatenate([which, which]), both)

@@ -14,15 +14,21 @@ from rendezvous.pareto.feasibility import (
 from rendezvous.pareto.front import (
     ParetoSet,
     distances,
-    front_of_three,
     front_of_two,
     pareto_set,
     simplex_weights,
 )
-from rendezvous.pareto.plan import Plan, PlanSamples
 from rendezvous.pareto.selections import NotOptimalError, least_greatest_excess, least_sum_of_costs, nearest_to
-from rendezvous.pareto.solution import CraftCost, EncounterSolution, solve_encounter, weighted_point
-from rendezvous.pareto.sweep import DurationSweep, sweep_meeting_time
+from rendezvous.pareto.solution import (
+    CraftCost,
+    DurationSweep,
+    EncounterSolution,
+    Plan,
+    PlanSamples,
+    solve_encounter,
+    sweep_meeting_time,
+    weighted_point,
+)
 
 __all__ = [
     "BoundCheck",
@@ -45,7 +51,6 @@ __all__ = [
     "analyse_coalitions",
     "check_bound",
     "distances",
-    "front_of_three",
     "front_of_two",
     "least_greatest_excess",
     "least_peak",

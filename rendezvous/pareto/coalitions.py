@@ -8,11 +8,9 @@ from itertools import combinations
 from math import factorial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rendezvous._arrays import Floats
 from rendezvous.pareto.solution import EncounterSolution, weighted_point
-
-Floats = NDArray[np.float64]
 
 MOST_CRAFT = 12
 _RELATIVE = 1e-12
@@ -37,16 +35,10 @@ class Core(Enum):
 
 @dataclass(frozen=True)
 class Coalition:
-    """A coalition of craft.
+    """A coalition of craft, whose `members` are indices.
 
-    Parameters
-    ----------
-    members : tuple of int
-        Indices of the craft.
-    excess : float
-        c(S): their least weighted sum of excesses at a common meeting, m^2/s^3.
-    regret : float
-        Increase of their sum at the common meeting of all, m^2/s^3.
+    `excess` is c(S), their least weighted sum of excesses at a common meeting, and `regret` its increase at the common
+    meeting of all; both in m^2/s^3.
     """
 
     members: tuple[int, ...]
@@ -56,19 +48,11 @@ class Coalition:
 
 @dataclass(frozen=True)
 class Coalitions:
-    """All coalitions of an encounter.
+    """All coalitions of an encounter, by size, from single craft to the coalition of all.
 
-    Parameters
-    ----------
-    coalitions : tuple of Coalition
-        By size, from single craft to the coalition of all.
-    shapley : ndarray, shape (n,)
-        The Shapley value of the cost game c, m^2/s^3.
-    transfers : ndarray, shape (n,)
-        Payment to each craft that leaves it with its Shapley value: its weighted excess minus that value, m^2/s^3; of
-        sum zero.
-    core : Core
-        Core of the cost game.
+    `shapley`, shape (n,), is the Shapley value of the cost game c, and `core` the core of this game. `transfers`, shape
+    (n,), are payments to each craft that leave it with its Shapley value: its weighted excess minus that value, of sum
+    zero. Both are in m^2/s^3.
     """
 
     coalitions: tuple[Coalition, ...]
@@ -80,15 +64,13 @@ class Coalitions:
 def analyse_coalitions(solution: EncounterSolution) -> Coalitions:
     """Analyse every coalition of a `solution`, whose meeting is the best one for the group.
 
+    With one M and equal weights c(S) = sum over pairs of d_ij^2 / |S|. c is superadditive with c({i}) = 0, so its core
+    is empty unless all ideals coincide. O(2^n n).
+
     Raises
     ------
     ValueError
         If there are more than 12 craft: there are 2^n coalitions.
-
-    Notes
-    -----
-    With one M and equal weights c(S) = sum over pairs of d_ij^2 / |S|. c is superadditive with c({i}) = 0, so its core
-    is empty unless all ideals coincide. O(2^n n).
     """
     count = len(solution.costs)
     if count > MOST_CRAFT:

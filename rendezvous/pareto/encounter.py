@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rendezvous._arrays import Floats
 from rendezvous.relative_motion import Frame, LinearMotion
-
-Floats = NDArray[np.float64]
 
 
 class Component(Enum):
@@ -37,18 +35,8 @@ class Meeting(Enum):
 class Craft:
     """A craft that takes part.
 
-    Parameters
-    ----------
-    name : str
-        Unique name.
-    state : ndarray, shape (6,)
-        (x, y, z, vx, vy, vz) at the start, in the frame of the motion, m and m/s.
-    motion : LinearMotion
-        Motion of the craft.
-    weight : float
-        Weight of its excess in the loss of the group; not negative.
-    start_s : float
-        Time of its start, before the meeting.
+    `state`, shape (6,), is (x, y, z, vx, vy, vz) at its start, in the frame of the motion, m and m/s. The `weight` of
+    its excess in the loss of the group is not negative.
     """
 
     name: str
@@ -60,20 +48,10 @@ class Craft:
 
 @dataclass(frozen=True, eq=False)
 class Encounter:
-    """Craft that meet.
+    """Craft, all in one frame, that meet at one time.
 
-    Parameters
-    ----------
-    craft : tuple of Craft
-        At least one craft, all in one frame.
-    meeting_s : float
-        Time of the meeting.
-    free : tuple of Component
-        Free components of the terminal state, at least one; for an intercept components of the position only.
-    fixed : ndarray, shape (6,)
-        Values of the other components, m and m/s; those of free components are ignored.
-    meeting : Meeting
-        Whether velocities must agree.
+    `free` lists the free components of the terminal state, at least one; for an intercept of the position only.
+    `fixed`, shape (6,), contains the values of the other components, m and m/s; those of free components are ignored.
 
     Raises
     ------

@@ -5,26 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
+from rendezvous._arrays import Floats
 from rendezvous.pareto.solution import EncounterSolution
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class ParetoSet:
     """Pareto-optimal meetings.
 
-    Parameters
-    ----------
-    weights : ndarray, shape (k, n)
-        Weights of the craft, of sum one, whose weighted sum of excesses each meeting minimises.
-    points : ndarray, shape (k, f)
-        Free terminal values.
-    excess : ndarray, shape (k, n)
-        J_i^2 - J_i*^2, m^2/s^3.
+    Each meeting minimises the weighted sum of excesses with its row of `weights`, shape (k, n), of sum one. `points`,
+    shape (k, f), are free terminal values, and `excess`, shape (k, n), is J_i^2 - J_i*^2, m^2/s^3.
     """
 
     weights: Floats
@@ -35,8 +28,6 @@ class ParetoSet:
 def pareto_set(solution: EncounterSolution, weights: Floats) -> ParetoSet:
     """Return the Pareto-optimal meetings of a `solution` for k rows of `weights` (k, n), not negative and not all zero.
 
-    Notes
-    -----
     (sum w_i M_i)^-1 sum w_i M_i p_i*: with one M the convex hull of the ideals, otherwise curved. All weights together
     cover the set, as the excesses are convex.
     """
@@ -93,25 +84,3 @@ def front_of_two(distance: float, excess: ArrayLike) -> Floats:
     `distance` is d_12, m/s^1.5, and `excess` is e_1, from 0 to d_12^2, m^2/s^3.
     """
     return np.asarray((distance - np.sqrt(np.asarray(excess, dtype=np.float64))) ** 2)
-
-
-def front_of_three(between: Floats, first: ArrayLike, second: ArrayLike) -> Floats:
-    """Return e_3, m^2/s^3, on the Pareto front of three craft, at e_1 (`first`) and e_2 (`second`), m^2/s^3.
-
-    In a plane triangle with the sides d_ij (`between`, shape (3, 3), m/s^1.5) the distances of a point from two corners
-    give the third.
-
-    Raises
-    ------
-    ValueError
-        If the first two ideals coincide.
-    """
-    e1, e2 = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
-    base = between[0, 1]
-    if not base > 0.0:
-        raise ValueError("the first two ideals coincide: the front of these three is that of two")
-    along = (base**2 + e1 - e2) / (2.0 * base)
-    across = np.sqrt(np.maximum(e1 - along**2, 0.0))
-    corner = (base**2 + between[0, 2] ** 2 - between[1, 2] ** 2) / (2.0 * base)
-    height = np.sqrt(max(between[0, 2] ** 2 - corner**2, 0.0))
-    return np.asarray((along - corner) ** 2 + (across - height) ** 2)

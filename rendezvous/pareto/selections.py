@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
+from rendezvous._arrays import Floats
 from rendezvous.pareto.front import simplex_weights
-from rendezvous.pareto.hull import nearest_in_hull
 from rendezvous.pareto.solution import EncounterSolution
-
-Floats = NDArray[np.float64]
 
 _MOST_STEPS = 200
 _TRIED, _FOLLOWED, _MOST_ROUNDS = 500, 4, 20
 _NEAREST = 1e-6
+_RELATIVE = 1e-13
+_MOST_CORRALS = 1000
 
 
 class NotOptimalError(ValueError):
@@ -27,13 +26,12 @@ class NotOptimalError(ValueError):
 def least_sum_of_costs(solution: EncounterSolution) -> Floats:
     """Return the free values, shape (f,), that minimise sum w_i J_i of a `solution`: costs like impulses.
 
-    Notes
-    -----
     A sum of norms of affine functions, convex: damped Newton steps. If an ideal costs nothing, its norm has a corner
     there, which is the minimum if the others' slopes do not outweigh it.
     """
     roots, centres, floors, weights = _parts(solution)
-    size = _size(roots, centres)
+    between = np.einsum("nab,nmb->nma", roots, centres[None] - centres[:, None])
+    size = float(np.sqrt((between**2).sum(axis=-1).max()))
     active = weights > 0.0
 
     def parts(point: Floats) -> tuple[Floats, Floats]:
@@ -76,10 +74,8 @@ def least_sum_of_costs(solution: EncounterSolution) -> Floats:
 def least_greatest_excess(solution: EncounterSolution) -> Floats:
     """Return the free values, shape (f,), that minimise the greatest weighted excess of a `solution`.
 
-    Notes
-    -----
-    With one M, the centre of the smallest enclosing ball. Sequential quadratic programming on (p, t), least t with
-    w_i e_i(p) <= t, then Newton's method on the conditions of the active craft.
+    With one M, the centre of the smallest enclosing ball. Sequential quadratic programming on (p, t), least t with w_i
+    e_i(p) <= t, then Newton's method on the conditions of the active craft.
     """
     roots, centres, _, weights = _parts(solution)
     matrices = np.einsum("n,nca,ncb->nab", weights, roots, roots)
@@ -122,17 +118,15 @@ def nearest_to(solution: EncounterSolution, preferred: Floats) -> Floats:
 
     The norm is that of M, or that of the weighted mean of the M if they differ.
 
+    With one M, or multiples of one, an exact projection onto the convex hull of the ideals; otherwise sequential
+    quadratic programming over the weights from the nearest of many meetings of the set, which finds a local minimum.
+
     Raises
     ------
     ValueError
         If the preferred values are not f finite numbers.
     NotOptimalError
         If the computed point does not satisfy the conditions of the nearest one.
-
-    Notes
-    -----
-    With one M, or multiples of one, an exact projection onto the convex hull of the ideals; otherwise sequential
-    quadratic programming over the weights from the nearest of many meetings of the set, which finds a local minimum.
     """
     preferred = np.asarray(preferred, dtype=np.float64)
     if preferred.shape != solution.point.shape or not np.isfinite(preferred).all():
@@ -232,12 +226,6 @@ def _parts(solution: EncounterSolution) -> tuple[Floats, Floats, Floats, Floats]
     )
 
 
-def _size(roots: Floats, centres: Floats) -> float:
-    """The greatest distance between ideals, in the norms of M."""
-    apart = np.einsum("nab,nmb->nma", roots, centres[None] - centres[:, None])
-    return float(np.sqrt((apart**2).sum(axis=-1).max()))
-
-
 def _bound_craft(
     point: Floats, excess: Callable[[Floats], Floats], slopes: Callable[[Floats], Floats], matrices: Floats
 ) -> Floats:
@@ -262,3 +250,50 @@ def _bound_craft(
         step = np.linalg.lstsq(system, -residual, rcond=None)[0]
         point, shares = point + step[:free], shares + step[free : free + count]
     return np.asarray(point if excess(point).max() <= excess(best).max() * (1.0 + 1e-9) else best)
+
+
+def nearest_in_hull(points: Floats, target: Floats) -> Floats:
+    """Return the weights of `points`, shape (n, f), that give the point of their convex hull nearest to a `target`.
+
+    The weights, shape (n,), are not negative and of sum one; distances are Euclidean.
+
+    Wolfe (1976): a set of affinely independent points (corral) is extended by the point that is farthest in the
+    direction of the target, and points with negative weights in the nearest point of its affine hull are removed. The
+    method is finite; in practice it solves a few small least-squares problems.
+    """
+    offsets = points - target
+    size = float((offsets**2).sum(axis=1).max())
+    if size == 0.0:
+        return np.asarray(np.eye(len(points))[0])
+    corral = [int((offsets**2).sum(axis=1).argmin())]
+    weights = np.ones(1)
+    for _ in range(_MOST_CORRALS):
+        nearest = weights @ offsets[corral]
+        ahead = int((offsets @ nearest).argmin())
+        if ahead in corral or nearest @ (nearest - offsets[ahead]) <= _RELATIVE * size:
+            break
+        corral.append(ahead)
+        weights = np.append(weights, 0.0)
+        while True:
+            affine = _affine_nearest(offsets[corral])
+            if (affine > 0.0).all():
+                weights = affine
+                break
+            behind = affine <= 0.0
+            # A weight that stays zero is removed at once.
+            step = float(np.min(weights[behind] / np.maximum(weights[behind] - affine[behind], np.finfo(float).tiny)))
+            weights = weights + min(step, 1.0) * (affine - weights)
+            leaving = int(np.where(behind, weights, np.inf).argmin())
+            del corral[leaving]
+            weights = np.delete(weights, leaving)
+            weights /= weights.sum()
+    all_weights = np.zeros(len(points))
+    all_weights[corral] = weights
+    return all_weights
+
+
+def _affine_nearest(offsets: Floats) -> Floats:
+    """Weights of sum one of the point of least norm in an affine hull."""
+    edges = (offsets[1:] - offsets[0]).T
+    rest = np.linalg.lstsq(edges, -offsets[0], rcond=None)[0]
+    return np.concatenate([[1.0 - rest.sum()], rest])

@@ -1,17 +1,80 @@
-"""The solution in closed form: every craft's cost as a quadratic form of the free terminal values."""
+"""The solution in closed form: every craft's cost as a quadratic form of the free terminal values, and its flight."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rendezvous._arrays import Floats
 from rendezvous.pareto.encounter import Craft, Encounter
-from rendezvous.pareto.plan import Plan
+from rendezvous.relative_motion import TimeVaryingMotion
 
-Floats = NDArray[np.float64]
+
+@dataclass(frozen=True)
+class PlanSamples:
+    """A flight sampled at k times: `state`, shape (k, 6), in m and m/s, and the control u, shape (k, 3)."""
+
+    time_s: Floats
+    state: Floats
+    control_m_s2: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The minimum-energy flight of one craft from its start to the meeting; `costate`, shape (6,), is at the
+    meeting.
+    """
+
+    craft: Craft
+    meeting_s: float
+    costate: Floats
+
+    def control(self, time_s: ArrayLike) -> Floats:
+        """Return u(t) = B' Phi(T, t)' lambda, m/s^2, shape (..., 3): (2.1) of the paper."""
+        times = np.asarray(time_s, dtype=np.float64)
+        costate = self._costate_at(times)
+        return np.asarray(np.einsum("...ai,...a->...i", self.craft.motion.input_map(times), costate))
+
+    def state(self, time_s: ArrayLike) -> Floats:
+        """Return x(t) = Phi x0 + drift + G(t, t0) Phi(T, t)' lambda, m and m/s, shape (..., 6): (2.5) of the paper."""
+        times = np.asarray(time_s, dtype=np.float64)
+        segment = self.craft.motion.segment(np.full(times.shape, self.craft.start_s), times)
+        forced = np.einsum("...ab,...b->...a", segment.gramian, self._costate_at(times))
+        return np.asarray(segment.transition @ self.craft.state + segment.drift + forced)
+
+    def sample(self, count: int) -> PlanSamples:
+        """Return the flight at `count` >= 2 equally spaced times, both ends included."""
+        times = np.linspace(self.craft.start_s, self.meeting_s, count)
+        return PlanSamples(times, self.state(times), self.control(times))
+
+    def effects(self, time_s: Floats) -> Floats:
+        """Return Phi(T, t) B(t), shape (k, 6, 3), the effect of a unit control for a second on the terminal state."""
+        return np.asarray(self._to_meeting(time_s) @ self.craft.motion.input_map(time_s))
+
+    def breaks(self) -> Floats:
+        """Return times from start to meeting between which the motion turns by about a radian at most, s."""
+        return self.craft.motion.breaks(self.craft.start_s, self.meeting_s)
+
+    def _costate_at(self, times: Floats) -> Floats:
+        return np.asarray(np.einsum("...ba,b->...a", self._to_meeting(times), self.costate))
+
+    def _to_meeting(self, times: Floats) -> Floats:
+        """Phi(T, t), shape (..., 6, 6)."""
+        motion = self.craft.motion
+        if not isinstance(motion, TimeVaryingMotion):
+            return motion.transition(times, np.full(times.shape, self.meeting_s))
+        # From each time to the next one: long intervals of a motion that varies are expensive.
+        order = np.argsort(times, axis=None, kind="stable")
+        grid = np.append(times.ravel()[order], self.meeting_s)
+        steps = motion.transition(grid[:-1], grid[1:])
+        matrices, ahead = np.empty((times.size, 6, 6)), np.eye(6)
+        for index in range(times.size - 1, -1, -1):
+            ahead = ahead @ steps[index]
+            matrices[order[index]] = ahead
+        return matrices.reshape(*times.shape, 6, 6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,8 +83,6 @@ class CraftCost:
 
     Parameters
     ----------
-    craft : Craft
-        Craft of this cost.
     ideal : ndarray, shape (f,)
         p*: the cheapest free values for this craft alone.
     ideal_cost_squared : float
@@ -56,15 +117,8 @@ class CraftCost:
 class EncounterSolution:
     """A solved encounter: the meeting of least group loss, and the costs of any other meeting.
 
-    Parameters
-    ----------
-    encounter : Encounter
-        The problem.
-    costs : tuple of CraftCost
-        Costs of the craft, in order.
-    point : ndarray, shape (f,)
-        The free values that minimise the weighted sum of excesses, the norm (1.7) of the paper. The methods use it
-        where their `point` is None.
+    `point`, shape (f,), contains the free values that minimise the weighted sum of excesses, the norm (1.7) of the
+    paper. The methods use it where their `point` is None.
     """
 
     encounter: Encounter
@@ -109,16 +163,14 @@ class EncounterSolution:
 def solve_encounter(encounter: Encounter) -> EncounterSolution:
     """Solve an `encounter`.
 
+    (2.1) to (2.7) of Barseghyan and Stepanyan (2008) for any free components. States are divided by (T, T, T, 1, 1, 1)
+    before the Cholesky factor of the Gramian is computed, and the ideal is a least-squares problem of that factor, so
+    J* loses no digits. O(n) small matrices.
+
     Raises
     ------
     ValueError
         If the numbers overflow, or a Gramian is singular: the craft's control does not reach all components.
-
-    Notes
-    -----
-    (2.1) to (2.7) of Barseghyan and Stepanyan (2008) for any free components. States are divided by (T, T, T, 1, 1, 1)
-    before the Cholesky factor of the Gramian is computed, and the ideal is a least-squares problem of that factor, so
-    J* loses no digits. O(n) small matrices.
     """
     common, opening, base = encounter.common, encounter.opening, encounter.base
     factors: dict[tuple[int, float], tuple[Floats, Floats, Floats]] = {}
@@ -136,8 +188,6 @@ def solve_encounter(encounter: Encounter) -> EncounterSolution:
 def weighted_point(costs: Sequence[CraftCost], weights: ArrayLike) -> Floats:
     """Return the free values, shape (f,), that minimise the sum of excesses with `weights`, not negative, shape (n,).
 
-    Notes
-    -----
     (sum w_i M_i)^-1 sum w_i M_i p_i*, as a least-squares problem of the roots of M_i of the `costs`.
     """
     roots = np.sqrt(np.asarray(weights, dtype=np.float64))
@@ -179,3 +229,31 @@ def _craft_cost(craft: Craft, whiten: Floats, missing: Floats, opening: Floats) 
     if not np.isfinite(ideal).all():
         raise ValueError(f"craft {craft.name!r}: the numbers overflow; check the units")
     return CraftCost(craft, ideal, float(rest @ rest), upper, base, slope, to_costate)
+
+
+@dataclass(frozen=True)
+class DurationSweep:
+    """An encounter at k meeting times.
+
+    `points`, shape (k, f), are the free values that minimise the `group_loss`, shape (k,); `cost_squared` and
+    `ideal_cost_squared`, shape (k, n), are J_i^2 and J_i*^2. Costs are in m^2/s^3.
+    """
+
+    meeting_s: Floats
+    points: Floats
+    cost_squared: Floats
+    ideal_cost_squared: Floats
+    group_loss: Floats
+
+
+def sweep_meeting_time(encounter: Encounter, meeting_s: ArrayLike) -> DurationSweep:
+    """Solve an `encounter` at k meeting times, each after every craft's start."""
+    times = np.atleast_1d(np.asarray(meeting_s, dtype=np.float64))
+    solutions = [solve_encounter(replace(encounter, meeting_s=float(time))) for time in times]
+    return DurationSweep(
+        times,
+        np.array([solution.point for solution in solutions]),
+        np.array([solution.cost_squared() for solution in solutions]),
+        np.array([[cost.ideal_cost_squared for cost in solution.costs] for solution in solutions]),
+        np.array([float(solution.group_loss()) for solution in solutions]),
+    )

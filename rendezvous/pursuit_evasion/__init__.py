@@ -7,13 +7,12 @@ not from these sources.
 
 from rendezvous.pursuit_evasion.certificate import Certificate, Deviation, certify
 from rendezvous.pursuit_evasion.feedback import Ended, Flight, Observation, capture_quantiles_s, fly, fly_many
-from rendezvous.pursuit_evasion.game import Game, Gravity, Player
+from rendezvous.pursuit_evasion.game import Game, Gravity, Player, Units
 from rendezvous.pursuit_evasion.maps import STATUSES, CaptureMap, PointStatus, capture_map
 from rendezvous.pursuit_evasion.paths import History, PathError, PlayerHistory, history, orbital_axes
 from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
 from rendezvous.pursuit_evasion.solver import solve, solve_by_homotopy, solve_by_linear_game, solve_near
 from rendezvous.pursuit_evasion.steering import Policy, RandomSteering, Script, Steering
-from rendezvous.pursuit_evasion.units import Units
 
 __all__ = [
     "STATUSES",

@@ -13,11 +13,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._pair import COARSE, FINE, MOST_RESIDUAL, ROUGH, Node, Pair
-
-Floats = NDArray[np.float64]
 
 _LONGEST_STEP, _SHORTEST_STEP = 0.3, 1e-6
 _PREDICTED_WITHIN = 3e-3
@@ -38,17 +36,7 @@ class Ending(Enum):
 
 @dataclass(frozen=True)
 class Branch:
-    """A branch of extremals.
-
-    Parameters
-    ----------
-    nodes : tuple of Node
-        Extremals in ascending order of duration.
-    ending : Ending
-        Reason for the end.
-    work : float
-        Radians of extremals propagated.
-    """
+    """A branch of extremals, `nodes` in ascending order of duration; `work` is the radians of extremals propagated."""
 
     nodes: tuple[Node, ...]
     ending: Ending
@@ -64,11 +52,8 @@ def follow(pair: Pair, first: Node, radius: float, latest: float, most_work: flo
     """Follow a branch from its first extremal, as the duration grows, to the capture, to `latest`, or to a fold.
 
     A `radius` of minus infinity follows the branch beyond the capture. `most_work` limits the radians of extremals
-    propagated: the same limit on every machine. A capture that ends the branch is computed to full precision.
-
-    Notes
-    -----
-    Some 20 steps a revolution, of two or three iterations each.
+    propagated: the same limit on every machine. A capture that ends the branch is computed to full precision. Some 20
+    steps a revolution, of two or three iterations each.
     """
     nodes, step, work = [first], first.duration, 0.0
     while work < most_work:
@@ -89,22 +74,19 @@ def follow(pair: Pair, first: Node, radius: float, latest: float, most_work: flo
         )
         # The error of a prediction of order two is as the cube of the step.
         missed = math.inf if after is None else float(np.abs(after.vector - guess).max())
-        if after is None or not pair.is_sound(after) or missed > 8.0 * _PREDICTED_WITHIN:
-            if step < _SHORTEST_STEP:
-                return Branch(tuple(nodes), Ending.FOLD, work)
-            step *= 0.4
-            continue
-        at = first_crossing(node, after, radius)
-        if at is not None:
+        if after is not None and pair.is_sound(after) and missed <= 8.0 * _PREDICTED_WITHIN:
+            at = first_crossing(node, after, radius)
+            if at is None:
+                nodes.append(after)
+                growth = 0.9 * (_PREDICTED_WITHIN / max(missed, 1e-12)) ** (1.0 / 3.0)
+                step = min(_LONGEST_STEP, step * min(2.0, growth))
+                continue
             capture = polish(pair, _predicted(nodes, at), at, radius, latest)
             if capture is not None and node.duration < capture.duration <= after.duration + _SHORTEST_STEP:
                 return Branch((*nodes, capture), Ending.CAPTURE, work)
-            if step < _SHORTEST_STEP:
-                return Branch(tuple(nodes), Ending.FOLD, work)
-            step *= 0.4
-            continue
-        nodes.append(after)
-        step = min(_LONGEST_STEP, step * min(2.0, 0.9 * (_PREDICTED_WITHIN / max(missed, 1e-12)) ** (1.0 / 3.0)))
+        if step < _SHORTEST_STEP:
+            return Branch(tuple(nodes), Ending.FOLD, work)
+        step *= 0.4
     return Branch(tuple(nodes), Ending.WORK, work)
 
 
@@ -133,8 +115,6 @@ def first_crossing(before: Node, after: Node, radius: float) -> float | None:
     rise = (after.distance - before.distance) / step
     a, b = -before.closing, -after.closing
     cubic = np.array([(a + b - 2.0 * rise) / step**2, (3.0 * rise - 2.0 * a - b) / step, a, before.distance - radius])
-    if not math.isfinite(radius):
-        return None
     turns = np.roots(np.trim_zeros(cubic[:3] * np.array([3.0, 2.0, 1.0]), "f"))
     ends = sorted(float(t.real) for t in turns if abs(t.imag) < 1e-12 and 0.0 < t.real < step)
     low = 0.0

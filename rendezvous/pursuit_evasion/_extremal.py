@@ -12,22 +12,141 @@ That of the mass, lambda_m' = k |lambda_v| T / m^2 (they omit k), is not needed:
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rendezvous._arrays import Floats
 from rendezvous._compile import allocation_free, compiled
 from rendezvous.dormand_prince import STAGES, error_of_step, step_of
-from rendezvous.pursuit_evasion._gravity import acceleration, derivatives
-
-Floats = NDArray[np.float64]
 
 STATES, COLUMNS = 12, 9
 """Position, velocity and costate; what they are differentiated by: end state (6), nu in its plane (2), end mass."""
-
 _SAFETY, _LEAST_FACTOR, _GREATEST_FACTOR = 0.9, 0.2, 6.0
 _MOST_STEPS = 20_000
 _FIRST_STEP = 0.05
 _NO_VARIATIONS = np.zeros((0, COLUMNS))
 _Parameters = tuple[Floats, Floats, Floats]
+
+
+@allocation_free
+def acceleration(r: Floats, mu: float, oblateness: float, g: Floats) -> None:
+    """Put the acceleration at `r` into `g`; `oblateness` is mu J2 R^2 / 2, the axis z.
+
+    The potential is mu/r + oblateness (1/r^3 - 3 z^2/r^5).
+    """
+    q = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
+    cube = 1.0 / (q * np.sqrt(q))
+    radial = -mu * cube
+    axial = 0.0
+    if oblateness != 0.0:
+        fifth = cube / q
+        radial += oblateness * fifth * (-3.0 + 15.0 * r[2] * r[2] / q)
+        axial = -6.0 * oblateness * fifth * r[2]
+    g[0] = radial * r[0]
+    g[1] = radial * r[1]
+    g[2] = radial * r[2] + axial
+
+
+@allocation_free
+def derivatives(
+    r: Floats, p: Floats, mu: float, oblateness: float, g: Floats, first: Floats, second: Floats, with_second: bool
+) -> None:
+    """Put the acceleration, its gradient (3, 3) and, if wanted, the gradient of gradient times `p` (3, 3) into arrays.
+
+    For a function f of q = r . r: the gradient is 2 f' r, its gradient 4 f'' r r^T + 2 f' I, and along p 8 f''' s r r^T
+    + 4 f'' (r p^T + p r^T + s I) with s = r . p. The oblate part is a power of q, less z^2 times one.
+    """
+    q = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
+    s = r[0] * p[0] + r[1] * p[1] + r[2] * p[2]
+    inverse = 1.0 / q
+    f = mu * np.sqrt(inverse)
+    f1 = -0.5 * f * inverse
+    f2 = -1.5 * f1 * inverse
+    f4 = -2.5 * f2 * inverse
+    if oblateness != 0.0:
+        f3 = oblateness * inverse * np.sqrt(inverse)
+        f1 -= 1.5 * f3 * inverse
+        f2 += 3.75 * f3 * inverse * inverse
+        f4 -= 13.125 * f3 * inverse * inverse * inverse
+    for i in range(3):
+        g[i] = 2.0 * f1 * r[i]
+        for j in range(3):
+            first[i, j] = 4.0 * f2 * r[i] * r[j]
+        first[i, i] += 2.0 * f1
+    if with_second:
+        for i in range(3):
+            for j in range(3):
+                second[i, j] = 8.0 * f4 * s * r[i] * r[j] + 4.0 * f2 * (r[i] * p[j] + p[i] * r[j])
+            second[i, i] += 4.0 * f2 * s
+    if oblateness != 0.0:
+        _subtract_axial(r, p, s, q, oblateness, g, first, second)
+
+
+@allocation_free
+def _subtract_axial(
+    r: Floats, p: Floats, s: float, q: float, oblateness: float, g: Floats, first: Floats, second: Floats
+) -> None:
+    """Subtract the derivatives of z^2 f, f = 3 oblateness q^(-5/2)."""
+    z, square = r[2], r[2] * r[2]
+    f = 3.0 * oblateness / (q * q * np.sqrt(q))
+    f1, f2, f4 = -2.5 * f / q, 8.75 * f / (q * q), -39.375 * f / (q * q * q)
+    along = 2.0 * f1 * s
+    for i in range(3):
+        g[i] -= square * 2.0 * f1 * r[i]
+        for j in range(3):
+            plain = 4.0 * f2 * r[i] * r[j]
+            turned = 8.0 * f4 * s * r[i] * r[j] + 4.0 * f2 * (r[i] * p[j] + p[i] * r[j])
+            if i == j:
+                plain += 2.0 * f1
+                turned += 4.0 * f2 * s
+            first[i, j] -= square * plain
+            second[i, j] -= square * turned + 2.0 * z * p[2] * plain
+    g[2] -= 2.0 * z * f
+    first[2, 2] -= 2.0 * f
+    second[2, 2] -= 2.0 * along
+    for i in range(3):
+        toward = 2.0 * f1 * r[i]
+        turned = 4.0 * f2 * s * r[i] + 2.0 * f1 * p[i]
+        first[2, i] -= 2.0 * z * toward
+        first[i, 2] -= 2.0 * z * toward
+        second[2, i] -= 2.0 * z * turned + 2.0 * p[2] * toward
+        second[i, 2] -= 2.0 * z * turned + 2.0 * p[2] * toward
+
+
+@allocation_free
+def eliminate(matrix: Floats, right: Floats) -> float:
+    """Solve matrix @ x = right, shapes (n, n) and (n, m), by Gauss-Jordan elimination with partial pivoting.
+
+    Both are overwritten, `right` with x. Returns the determinant; where it is zero, `right` has no meaning. A
+    microsecond for n = 6, where a call of LAPACK takes ten.
+    """
+    size, width = matrix.shape[0], right.shape[1]
+    determinant = 1.0
+    for k in range(size):
+        pivot = k
+        for i in range(k + 1, size):
+            if abs(matrix[i, k]) > abs(matrix[pivot, k]):
+                pivot = i
+        value = matrix[pivot, k]
+        determinant *= value if pivot == k else -value
+        if not abs(value) > 0.0:
+            return 0.0
+        if pivot != k:
+            for j in range(k, size):
+                matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+            for j in range(width):
+                right[k, j], right[pivot, j] = right[pivot, j], right[k, j]
+        inverse = 1.0 / value
+        for j in range(k, size):
+            matrix[k, j] *= inverse
+        for j in range(width):
+            right[k, j] *= inverse
+        for i in range(size):
+            factor = matrix[i, k]
+            if i != k and factor != 0.0:
+                for j in range(k, size):
+                    matrix[i, j] -= factor * matrix[k, j]
+                for j in range(width):
+                    right[i, j] -= factor * right[k, j]
+    return determinant
 
 
 @allocation_free
@@ -86,28 +205,12 @@ _step = step_of(_rates)
 def flow_back(y: Floats, z: Floats | None, craft: Floats, begin: float, end: float, tolerance: float) -> bool:
     """Integrate a state and its variations from time to go `begin` to `end`, in place; either may be the greater.
 
-    Parameters
-    ----------
-    y : ndarray, shape (12,)
-        Position, velocity, p_r, p_v.
-    z : ndarray, shape (12, 9), or None
-        Their derivatives; None to integrate y alone.
-    craft : ndarray, shape (5,)
-        mu, oblateness, thrust, mass at the end of the game, mass flow.
-    begin, end : float
-        Times to go.
-    tolerance : float
-        Tolerance of a step's error, relative and absolute, in y.
+    `y`, shape (12,), is (position, velocity, p_r, p_v), and `z`, shape (12, 9), contains its derivatives; None
+    integrates y alone. `craft`, shape (5,), is (mu, oblateness, thrust, mass at the end of the game, mass flow).
+    Returns False where the steps are too many or too small, or a number overflows.
 
-    Returns
-    -------
-    bool
-        False where the steps are too many or too small, or a number overflows.
-
-    Notes
-    -----
-    The Dormand-Prince method of order 8 (SciPy's coefficients); the error of y alone controls the steps. A step costs
-    12 stages of some 0.3 us, or 0.1 us for y alone.
+    The `tolerance` of a step's error, relative and absolute, applies to y alone. A step costs 12 stages of some 0.3 us,
+    or 0.1 us for y alone.
     """
     if begin == end:
         return True

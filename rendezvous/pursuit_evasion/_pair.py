@@ -1,66 +1,164 @@
-"""The extremals of both sides together, by Newton's method: at a duration T, or at a distance l. Nondimensional.
+"""The extremals of one side at a time, and of both together by Newton's method: at a duration T, or at a distance l.
 
 At each duration T both sides reach the greatest distance along nu, and r_E - r_P = l nu. At l = 0 these are the
 terminal conditions of Wang's slides ("Optimal control"): r_P = r_E, lambda_rP + lambda_rE = 0, lambda_v = 0. The last
 condition there, lambda_rP . (v_P - v_E) = 1, only determines the scale of the costates: here |nu| = 1, and the closing
-speed must be positive.
+speed must be positive. All values are nondimensional.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rendezvous.pursuit_evasion._elimination import eliminate
-from rendezvous.pursuit_evasion._side import KnownPath, Response, Side, across
-
-Floats = NDArray[np.float64]
+from rendezvous._arrays import Floats
+from rendezvous.pursuit_evasion._extremal import acceleration, eliminate, rate, shoot_back, shoot_state_back
 
 FINE, COARSE = 1e-13, 1e-9
 """Tolerances of propagation: of results, and of intermediate iterations."""
-
 MOST_RESIDUAL = 1e-9
 """Greatest error of a result in the necessary conditions: start states, and r_E - r_P = l nu."""
-
 CLOSE, ROUGH = 1e-7, 1e-4
 """Greatest last corrections of Newton's method, for the same; the remaining error is about their square."""
-
 _MOST_ITERATIONS = 12
-_IDENTITY = np.eye(3)
 _FIRST_DURATION = 0.01
 _LEAST_OF_FIRST = 1e-9
 _FARTHEST, _NEAR, _FRACTION, _NEAR_ENOUGH = 0.7, 1e-2, 0.2, 1e-3
 
 
 @dataclass(frozen=True)
-class Node:
-    """An extremal of the game of one duration.
+class Response:
+    """Linear dependence of an end state at a guess of it: rho + by_nu dnu + by_time dT leads to the true one.
 
-    Parameters
-    ----------
-    duration, distance : float
-        T and l.
-    nu : ndarray, shape (3,)
-        Unit vector from the pursuer's end to the evader's.
-    pursuer, evader : ndarray, shape (6,)
-        End states.
-    curvature : ndarray, shape (2,)
-        Eigenvalues of the Hessian of h_P - h_E across nu, ascending.
-    closing : float
-        nu . (v_P - v_E), the rate at which l falls.
-    regular : bool
-        Whether neither side's extremal has a conjugate point.
-    slope : ndarray, shape (15,)
-        d/dT of (pursuer, evader, nu) at l free; of the last guess, so to first order.
-    correction : float
-        Size of the last step of Newton's method: the remaining error is about its square.
-    costates : ndarray, shape (2, 6)
-        p at the start, pursuer's and evader's, of the last guess that was linearised.
-    residual : float
-        Error of the start states of that guess, and of r_E - r_P = l nu at the ends of this extremal.
+    `rho`, shape (6,), is Newton's correction of the guess; `by_nu`, shape (6, 2), and `by_time`, shape (6,), are the
+    derivatives along two directions across nu and by the duration. `regular` says that there is no conjugate point: the
+    map from end states near by to start states preserves orientation. `inverse`, shape (6, 6), is the inverse of the
+    derivative of the start state by the end state, `costate`, shape (6,), p_r and p_v at the start, and `residual` the
+    greatest component of the error of the start state.
+    """
+
+    rho: Floats
+    by_nu: Floats
+    by_time: Floats
+    regular: bool
+    inverse: Floats
+    costate: Floats
+    residual: float
+
+
+@dataclass(frozen=True)
+class Craft:
+    """One side of a game, which chooses its direction of thrust; all nondimensional, `start` of shape (6,)."""
+
+    start: Floats
+    thrust: float
+    mass: float
+    flow: float
+    mu: float
+    oblateness: float
+
+    def kernel_craft(self, duration: float) -> Floats:
+        """Return the parameters of `flow_back` for a game of a duration."""
+        return np.array([self.mu, self.oblateness, self.thrust, self.mass - self.flow * duration, self.flow])
+
+    def respond(
+        self, end_state: Floats, nu: Floats, plane: Floats, duration: float, tolerance: float
+    ) -> Response | None:
+        """Linearise at a guess of the end state; None if it cannot be propagated."""
+        shot = shoot_back(end_state, nu, plane, self.kernel_craft(duration), duration, tolerance)
+        if shot is None:
+            return None
+        y, z = shot
+        right = np.empty((6, 10))
+        right[:, :6] = np.eye(6)
+        right[:, 6] = self.start - y[:6]
+        right[:, 7:9] = -z[:6, 6:8]
+        # A longer game starts further back, and ends with less mass.
+        right[:, 9] = rate(y, self.mu, self.oblateness, self.thrust / self.mass) + self.flow * z[:6, 8]
+        residual = float(np.abs(right[:, 6]).max())
+        determinant = eliminate(z[:6, :6].copy(), right)
+        if determinant == 0.0:
+            return None
+        return Response(
+            rho=right[:, 6],
+            by_nu=right[:, 7:9],
+            by_time=right[:, 9],
+            regular=determinant > 0.0,
+            inverse=right[:, :6],
+            costate=y[6:],
+            residual=residual,
+        )
+
+    def correct(
+        self, response: Response, end_state: Floats, nu: Floats, duration: float, tolerance: float
+    ) -> Floats | None:
+        """Newton's correction of another guess, shape (6,), with the derivatives of an earlier one near by."""
+        start = shoot_state_back(end_state, nu, self.kernel_craft(duration), duration, tolerance)
+        return None if start is None else response.inverse @ (self.start - start[:6])
+
+    def ballistic(self, duration: float, nu: Floats) -> Floats:
+        """Return a guess of the end state after a short time, shape (6,): gravity and thrust are those at the start."""
+        gravity = np.empty(3)
+        acceleration(self.start[:3], self.mu, self.oblateness, gravity)
+        rate = gravity + self.thrust / self.mass * nu
+        velocity = self.start[3:] + duration * rate
+        return np.concatenate([self.start[:3] + 0.5 * duration * (self.start[3:] + velocity), velocity])
+
+
+@dataclass(frozen=True)
+class KnownPath:
+    """A side on a known path: `state_at` gives state, shape (6,), and acceleration, shape (3,), at a time."""
+
+    state_at: Callable[[float], tuple[Floats, Floats]]
+
+    def respond(
+        self, end_state: Floats, nu: Floats, plane: Floats, duration: float, tolerance: float
+    ) -> Response | None:
+        """Return the state on the path, whatever nu is."""
+        state, acceleration_there = self.state_at(duration)
+        by_time = np.concatenate([state[3:], acceleration_there])
+        rho = state - end_state
+        residual = float(np.abs(rho).max())
+        return Response(rho, np.zeros((6, 2)), by_time, True, np.eye(6), np.zeros(6), residual)
+
+    def correct(
+        self, response: Response, end_state: Floats, nu: Floats, duration: float, tolerance: float
+    ) -> Floats | None:
+        """Return the difference to the state on the path."""
+        return self.state_at(duration)[0] - end_state
+
+    def ballistic(self, duration: float, nu: Floats) -> Floats:
+        """Return the state on the path."""
+        return self.state_at(duration)[0]
+
+
+Side = Craft | KnownPath
+
+
+def across(nu: Floats) -> Floats:
+    """Return two unit vectors across a unit vector and each other, shape (2, 3)."""
+    x, y, z = nu
+    sign = 1.0 if z >= 0.0 else -1.0
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    return np.array([[1.0 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y]])
+
+
+@dataclass(frozen=True)
+class Node:
+    """An extremal of the game of one duration T, with the distance l.
+
+    `nu`, shape (3,), is the unit vector from the pursuer's end to the evader's; `pursuer` and `evader`, shape (6,), are
+    the end states. `curvature`, shape (2,), contains the eigenvalues of the Hessian of h_P - h_E across nu, ascending;
+    `closing` is nu . (v_P - v_E), the rate at which l falls; `regular` says that neither side's extremal has a
+    conjugate point.
+
+    `slope`, shape (15,), is d/dT of (pursuer, evader, nu) at l free, of the last guess, so to first order. `costates`,
+    shape (2, 6), are p at the start, pursuer's and evader's, of the last guess that was linearised. `residual` is the
+    error of the start states of that guess, and of r_E - r_P = l nu at the ends of this extremal.
     """
 
     duration: float
@@ -72,7 +170,6 @@ class Node:
     closing: float
     regular: bool
     slope: Floats
-    correction: float
     costates: Floats
     residual: float
 
@@ -121,7 +218,7 @@ class _Linear:
         step[15], step[16] = dt, dl
         return step
 
-    def node(self, state: Floats, correction: float) -> Node:
+    def node(self, state: Floats) -> Node:
         """Return the extremal that the last step led to."""
         p, e, drift = self.pursuer, self.evader, self.drift[:2]
         hessian = self.plane @ (p.by_nu[:3] - e.by_nu[:3])
@@ -136,7 +233,6 @@ class _Linear:
             closing=float(state[12:15] @ (state[3:6] - state[9:12])),
             regular=p.regular and e.regular,
             slope=np.concatenate([p.by_nu @ drift + p.by_time, e.by_nu @ drift + e.by_time, drift @ self.plane]),
-            correction=correction,
             costates=np.stack([p.costate, e.costate]),
             residual=max(p.residual, e.residual, float(np.abs(apart).max())),
         )
@@ -165,27 +261,13 @@ class Pair:
         close: float = CLOSE,
         latest: float = math.inf,
     ) -> Node | None:
-        """Return the extremal near a guess, or None if Newton's method does not converge.
+        """Return the extremal near a guess, shape (15,), of end states and nu, or None if Newton's method does not
+        converge.
 
-        Parameters
-        ----------
-        guess : ndarray, shape (15,)
-            End states and nu.
-        duration, distance : float
-            The known value, and a guess of the free one.
-        time_free : bool
-            Whether the duration is free; otherwise the distance is.
-        tolerance : float
-            Tolerance of the propagation.
-        linear_tolerance : float
-            Tolerance of the propagation of derivatives, if it is larger.
-        close : float
-            Greatest size of the last correction.
-        latest : float
-            Longest duration that can be propagated.
+        If `time_free`, the distance is known and the duration a guess, otherwise the reverse. The propagation has a
+        `tolerance`, that of derivatives `linear_tolerance` if it is larger; `close` is the greatest size of the last
+        correction, and `latest` the longest duration that can be propagated.
 
-        Notes
-        -----
         Both sides are propagated with their variations, then several times without, with the same derivatives, while
         each correction is a fraction of the previous one: 0.5 ms and 0.1 ms per revolution.
         """
@@ -200,10 +282,12 @@ class Pair:
             if fresh and tolerance >= linear_tolerance:
                 rho = np.concatenate([linear.pursuer.rho, linear.evader.rho])
             else:
-                corrections = self._corrections(linear, state, tolerance)
-                if corrections is None:
+                nu, length = state[12:15], float(state[15])
+                p = self.pursuer.correct(linear.pursuer, state[:6], nu, length, tolerance)
+                e = self.evader.correct(linear.evader, state[6:12], nu, length, tolerance)
+                if p is None or e is None:
                     return None
-                rho = corrections
+                rho = np.concatenate([p, e])
             step = linear.step(rho, state)
             correction = float(np.abs(step).max())
             if not correction < min(_FARTHEST, 4.0 * before):
@@ -213,20 +297,13 @@ class Pair:
             if not 0.0 < state[15] <= latest:
                 return None
             if correction < close:
-                return linear.node(state, correction)
+                return linear.node(state)
             # The first correction only restores the start states: the second may be as great.
             uses = 0 if fresh else uses + 1
             if correction > _NEAR_ENOUGH or (uses > 1 and correction > _FRACTION * before):
                 linear = None
             before = correction
         return None
-
-    def _corrections(self, linear: _Linear, state: Floats, tolerance: float) -> Floats | None:
-        """Newton's corrections of both end states, with derivatives from near by; shape (12,)."""
-        nu, duration = state[12:15], float(state[15])
-        p = self.pursuer.correct(linear.pursuer, state[:6], nu, duration, tolerance)
-        e = self.evader.correct(linear.evader, state[6:12], nu, duration, tolerance)
-        return None if p is None or e is None else np.concatenate([p, e])
 
     def _linearised(self, state: Floats, tolerance: float, time_free: bool) -> _Linear | None:
         nu, duration, distance = state[12:15], float(state[15]), float(state[16])
@@ -240,13 +317,13 @@ class Pair:
         outer[:, 2] = nu
         drift = e.by_time[:3] - p.by_time[:3]
         # The inverse of the system at this duration, and the derivative of (nu, l) by the duration.
-        at_time = np.concatenate([_IDENTITY, drift[:, None]], axis=1)
+        at_time = np.concatenate([np.eye(3), drift[:, None]], axis=1)
         if eliminate(outer.copy(), at_time) == 0.0:
             return None
         at_distance = at_time[:, :3]
         if time_free:
             outer[:, 2] = -drift
-            at_distance = _IDENTITY.copy()
+            at_distance = np.eye(3)
             if eliminate(outer, at_distance) == 0.0:
                 return None
         return _Linear(p, e, plane, time_free, at_distance, at_time[:, 3])

@@ -9,12 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rendezvous.pursuit_evasion._pair import COARSE, ROUGH, Node, Pair
-from rendezvous.pursuit_evasion._side import Response, Side, across
-
-Floats = NDArray[np.float64]
+from rendezvous._arrays import Floats
+from rendezvous.pursuit_evasion._pair import COARSE, ROUGH, Node, Pair, Response, Side, across
 
 _DIRECTIONS = 120
 _SEEDS, _MOST_PARTS = 2, 4
@@ -27,18 +24,10 @@ _CLIMBS, _MOST_CLIMBING, _APART, _LEAST_STRIDE = 4, 40, 0.9, 1e-4
 
 @dataclass(frozen=True)
 class Scan:
-    """Distances along all directions, at one duration.
+    """Distances h_E - h_P, shape (n,), along directions `nu`, shape (n, 3), at one duration.
 
-    Parameters
-    ----------
-    nu : ndarray, shape (n, 3)
-        Directions for which both sides' extremals were found.
-    distance : ndarray, shape (n,)
-        h_E - h_P along them.
-    tried : int
-        Number of directions tried.
-    maxima : tuple of Node
-        Local maxima among them, computed exactly, the greatest first.
+    Of the directions `tried`, these are the ones for which both sides' extremals were found. `maxima` are local maxima
+    among them, computed exactly, the greatest first.
     """
 
     nu: Floats
@@ -58,8 +47,6 @@ class _End:
 def scan(pair: Pair, node: Node) -> Scan:
     """Compute extremals in all directions at the duration of a known extremal, from its direction outward.
 
-    Notes
-    -----
     120 directions per side, each from a solved neighbour: at least 0.5 s per revolution. A reachable set that is not
     convex has several extremals per direction. If the end of another direction is farther along a direction, its
     extremal is not the farthest, and the direction counts as not found.

@@ -7,20 +7,17 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
+from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow
-from rendezvous.pursuit_evasion._pair import FINE, Node, Pair
-from rendezvous.pursuit_evasion._side import Craft
-from rendezvous.pursuit_evasion.game import Game
-from rendezvous.pursuit_evasion.paths import ExtremalPath, SteeredPath, extremal_paths, steered_path
+from rendezvous.pursuit_evasion._pair import FINE, Craft, Node, Pair
+from rendezvous.pursuit_evasion.game import Game, Units, scaled_game
+from rendezvous.pursuit_evasion.paths import ExtremalPath, extremal_paths, steered_path
 from rendezvous.pursuit_evasion.solution import Solution
 from rendezvous.pursuit_evasion.solver import solve
 from rendezvous.pursuit_evasion.steering import Steering
-from rendezvous.pursuit_evasion.units import Units, scaled_game
 
-Floats = NDArray[np.float64]
 PathNow = Callable[[float], Floats]
 
 HIT_M = 100.0
@@ -36,12 +33,8 @@ _QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
 class Observation:
     """The pursuer's observation of the evader when it plans.
 
-    Parameters
-    ----------
-    delay_s : float, optional
-        Age of the observation; the pursuer assumes that the evader has been optimal since.
-    position_error_m, velocity_error_m_s : float, optional
-        Standard deviations of each component.
+    `delay_s` is its age; the pursuer assumes that the evader has been optimal since. The errors are standard deviations
+    of each component.
 
     Raises
     ------
@@ -54,7 +47,6 @@ class Observation:
     velocity_error_m_s: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the values."""
         values = (self.delay_s, self.position_error_m, self.velocity_error_m_s)
         if not all(np.isfinite(value) and value >= 0.0 for value in values):
             raise ValueError("delay and errors of the observation must be finite and not negative")
@@ -80,20 +72,9 @@ class Ended(Enum):
 class Flight:
     """A pursuit with feedback.
 
-    Parameters
-    ----------
-    ended : Ended
-        How it ends.
-    time_s : float
-        Time of the capture, of the closest approach, or of the end.
-    distance_m : float
-        Distance at that time.
-    planned_s, predicted_s : ndarray, shape (n,)
-        Times of the plans, and the capture times that they predict.
-    distances_m : ndarray, shape (n,)
-        Distances at the times of the plans.
-    pursuer_m, evader_m : ndarray, shape (n, 3)
-        Positions at the times of the plans.
+    It ends at `time_s`, at the capture, at the closest approach or for another reason, at `distance_m`. At the times of
+    the n plans, `planned_s`, which predict captures at `predicted_s`, the distances are `distances_m`, shape (n,), and
+    the positions `pursuer_m` and `evader_m`, shape (n, 3).
     """
 
     ended: Ended
@@ -116,24 +97,11 @@ def fly(
     solution: Solution | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Flight:
-    """Simulate a pursuer that computes a new plan at regular times and follows each plan until the next.
+    """Simulate a pursuer that computes a new plan at regular times, `replan_s` apart, and follows each until the next.
 
-    Parameters
-    ----------
-    game : Game
-        The game at the start.
-    steering : callable or None
-        Steering of the evader; None is optimal against the true state of the pursuer.
-    replan_s : float, optional
-        Time between plans.
-    observation : Observation or None, optional
-        None observes the evader exactly.
-    seed : int or SeedSequence, optional
-        Seed of the errors of observation.
-    solution : Solution or None, optional
-        Solution of the game, if it is known.
-    progress : callable, optional
-        Called with the fraction of the predicted time that has passed.
+    `steering` is that of the evader; None is optimal against the true state of the pursuer. No `observation` observes
+    the evader exactly; otherwise `seed` is that of its errors. `solution` is that of the game, if it is known.
+    `progress` is called with the fraction of the predicted time that has passed.
 
     Raises
     ------
@@ -173,18 +141,8 @@ def fly_many(
 ) -> list[Flight]:
     """Simulate a pursuit several times; flights are in the order of the runs.
 
-    Parameters
-    ----------
-    game, replan_s, observation, solution
-        As for `fly`.
-    steering : callable
-        Function of the run number that returns the steering of the evader.
-    runs : int
-        Number of flights.
-    seed : int, optional
-        Root seed: each run has its own stream.
-    progress : callable, optional
-        Called with the fraction done.
+    `steering` returns the steering of the evader of a run number; each run has a stream of the root `seed`. `progress`
+    is called with the fraction done. The other parameters are those of `fly`.
     """
     solution = solve(game) if solution is None else solution
     flights = []
@@ -228,7 +186,6 @@ class _Pursuit:
         self._log: list[tuple[float, float, Floats, Floats]] = []
 
     def run(self, plan: Node, leg: float, progress: Callable[[float], None] | None) -> Flight:
-        """Simulate to the end."""
         own = plan
         while len(self._log) < _MOST_PLANS:
             self._log.append((self._time, self._time + plan.duration, self._pursuer.start[:3], self._evader.start[:3]))
@@ -244,8 +201,9 @@ class _Pursuit:
             if ended is not None:
                 return ended
             self._past.append((self._time, evader))
-            self._pursuer = _moved(self._pursuer, pursuer.at(spell)[:6], self._pursuer.flow * spell)
-            self._evader = _moved(self._evader, evader(spell), self._evader.mass - evader_mass)
+            mass = self._pursuer.mass - self._pursuer.flow * spell
+            self._pursuer = replace(self._pursuer, start=pursuer.at(spell)[:6], mass=mass)
+            self._evader = replace(self._evader, start=evader(spell), mass=evader_mass)
             self._time += spell
             planned, known = self._plan(plan, spell, self._seen(plan)), plan
             if planned is None:
@@ -286,18 +244,15 @@ class _Pursuit:
         if self._steering is None:
             path = ExtremalPath(self._evader, own.evader, own.nu, own.duration)
             return (lambda time: path.at(time)[:6]), self._evader.mass - self._evader.flow * spell
-        steered = self._steered(self._evader, self._steering, spell)
-        return (lambda time: np.asarray(steered.solution(time)[:6])), steered.mass_at(spell)
-
-    def _steered(self, craft: Craft, steering: Steering, spell: float) -> SteeredPath:
-        units, begin = self._units, self._time
+        units, begin, steering = self._units, self._time, self._steering
         scale = np.repeat([units.length_m, units.speed_m_s], 3)
-        spent = craft.mass <= self._dry[1] + craft.flow * spell
+        spent = self._evader.mass <= self._dry[1] + self._evader.flow * spell
 
         def direction(time: float, state: Floats) -> Floats:
             return np.zeros(3) if spent else np.asarray(steering((begin + time) * units.time_s, state * scale))
 
-        return steered_path(craft, direction, spell)
+        steered = steered_path(self._evader, direction, spell)
+        return (lambda time: np.asarray(steered.solution(time)[:6])), float(steered.solution(spell)[6])
 
     def _seen(self, plan: Node) -> Craft:
         """Return the evader as the pursuer observes it."""
@@ -327,7 +282,8 @@ class _Pursuit:
         def distance(time: float) -> float:
             return float(np.linalg.norm(pursuer.at(time)[:3] - evader(time)[:3]))
 
-        if not last and min(distance(0.0), distance(spell)) - self._radius > _WIDE * self._drift(spell):
+        drift = spell * float(np.linalg.norm(self._pursuer.start[3:] - self._evader.start[3:]))
+        if not last and min(distance(0.0), distance(spell)) - self._radius > _WIDE * drift:
             return None
         times = np.linspace(0.0, spell, _LOOKS)
         if self._radius > 0.0:
@@ -347,16 +303,11 @@ class _Pursuit:
         ended = Ended.CAPTURED if distance(at) <= self._hit else Ended.MISSED
         return self._flight(ended, self._time + at, distance(at))
 
-    def _drift(self, spell: float) -> float:
-        """Approximate relative displacement of the two in a leg."""
-        return spell * float(np.linalg.norm(self._pursuer.start[3:] - self._evader.start[3:]))
-
     def _end(self, ended: Ended) -> Flight:
         apart = float(np.linalg.norm(self._pursuer.start[:3] - self._evader.start[:3]))
         return self._flight(ended, self._time, apart)
 
     def _flight(self, ended: Ended, time: float, distance: float) -> Flight:
-        """Return the flight in SI units."""
         units = self._units
         planned, predicted, pursuer, evader = (np.array(column) for column in zip(*self._log, strict=True))
         return Flight(
@@ -375,7 +326,3 @@ def _lasts(craft: Craft, dry: float) -> float:
     """Return how long the propellant lasts; a little less for a craft without dry mass, whose acceleration diverges."""
     share = 1.0 if dry > 0.0 else 0.999
     return share * (craft.mass - dry) / craft.flow if craft.flow > 0.0 else np.inf
-
-
-def _moved(craft: Craft, state: Floats, burnt: float) -> Craft:
-    return replace(craft, start=state, mass=craft.mass - burnt)

@@ -1,7 +1,7 @@
 """The game: two craft with thrust, in a planet's gravity, and the distance that counts as capture.
 
 It is that of Wang's slides (Bauman University), after Shen and Casalino, Journal of Guidance, Control, and Dynamics
-41(8), 2018, p. 1823.
+41(8), 2018, p. 1823. Its nondimensional form has units of length, time and mass for which mu is one.
 """
 
 from __future__ import annotations
@@ -10,39 +10,29 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rendezvous.orbital_elements import perigee_m, semi_major_axis_m
+from rendezvous.pursuit_evasion._pair import Craft, Pair
+from rendezvous.two_body import perigee_m, semi_major_axis_m
 
-Floats = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 STANDARD_GRAVITY_M_S2 = 9.80665
+LONGEST_REVOLUTIONS = 15.0
+"""Default of the longest duration of a game, in revolutions of the pursuer."""
 
 
 @dataclass(frozen=True)
 class Gravity:
     """Gravity of the planet.
 
-    Parameters
-    ----------
-    parameter_m3_s2 : float
-        Gravitational parameter.
-    planet_radius_m : float
-        Least allowed distance from the centre; zero for no limit.
-    j2 : float
-        Second zonal harmonic, about the z axis; zero for a sphere.
-    equatorial_radius_m : float
-        Radius that J2 refers to.
+    `planet_radius_m` is the least allowed distance from the centre; zero for no limit. `j2` is the second zonal
+    harmonic, about the z axis, which refers to `equatorial_radius_m`; zero for a sphere. J2 is not in the slides:
+    without it gravity is that of their first equation, -mu r / |r|^3.
 
     Raises
     ------
     ValueError
         If the gravitational parameter is not positive, a radius negative, J2 not small, or without its radius.
-
-    Notes
-    -----
-    J2 is not in the slides: without it gravity is that of their first equation, -mu r / |r|^3.
     """
 
     parameter_m3_s2: float
@@ -51,7 +41,6 @@ class Gravity:
     equatorial_radius_m: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the values."""
         _need(0.0 < self.parameter_m3_s2 < math.inf, "the gravitational parameter must be positive")
         _need(0.0 <= self.planet_radius_m < math.inf, "the radius of the planet must not be negative")
         _need(math.isfinite(self.j2) and abs(self.j2) < 0.1, "J2 must be small: that of the Earth is 1.0826e-3")
@@ -68,27 +57,17 @@ class Gravity:
 class Player:
     """A craft with full thrust in any direction, until its propellant is spent.
 
-    Parameters
-    ----------
-    position_m, velocity_m_s : tuple of float
-        In an inertial frame whose z axis is the planet's.
-    mass_kg, dry_mass_kg : float
-        At the start, and without propellant.
-    thrust_n : float
-        Zero for a craft that coasts.
-    specific_impulse_s : float
-        Infinite for a craft of constant mass.
+    Its state is in an inertial frame whose z axis is the planet's. A craft with no thrust coasts; one with an infinite
+    specific impulse has a constant mass.
+
+    r' = v, v' = g + (T/m) u, m' = -T/c (Wang's slides, "Modelling of the motion"), c the specific impulse times
+    standard gravity: the slides write the former for c.
 
     Raises
     ------
     ValueError
         If position or velocity is not finite, mass or specific impulse not positive, the dry mass negative or not below
         the mass, or the thrust negative.
-
-    Notes
-    -----
-    r' = v, v' = g + (T/m) u, m' = -T/c (Wang's slides, "Modelling of the motion"), c the specific impulse times
-    standard gravity: the slides write the former for c.
     """
 
     position_m: Vector
@@ -99,7 +78,6 @@ class Player:
     specific_impulse_s: float
 
     def __post_init__(self) -> None:
-        """Check the values."""
         _need(np.isfinite((*self.position_m, *self.velocity_m_s)).all(), "position and velocity must be finite")
         _need(0.0 < self.mass_kg < math.inf, "the mass must be positive")
         _need(0.0 <= self.dry_mass_kg < self.mass_kg, "the dry mass must be at least 0 and below the mass")
@@ -126,26 +104,16 @@ class Player:
 class Game:
     """A pursuer that minimises the capture time and an evader that maximises it.
 
-    Parameters
-    ----------
-    gravity : Gravity
-        Gravity of the planet.
-    pursuer, evader : Player
-        The pursuer's thrust must be positive.
-    capture_radius_m : float
-        Distance that counts as capture; zero for a point.
-    longest_s : float
-        Longest duration considered; infinite for 15 revolutions of the pursuer.
+    `capture_radius_m` is the distance that counts as capture; zero for a point. `longest_s` is the longest duration
+    considered; infinite for 15 revolutions of the pursuer.
+
+    Wang's slides, "Modelling of the motion": the payoff is t_f, at which r_P = r_E; the capture radius is ours.
 
     Raises
     ------
     ValueError
         If the pursuer has no thrust, an orbit is not an ellipse or intersects the planet, the distance at the start is
         within the capture radius, or this radius or the longest duration is out of range.
-
-    Notes
-    -----
-    Wang's slides, "Modelling of the motion": the payoff is t_f, at which r_P = r_E; the capture radius is ours.
     """
 
     gravity: Gravity
@@ -155,7 +123,6 @@ class Game:
     longest_s: float = math.inf
 
     def __post_init__(self) -> None:
-        """Check the values."""
         _need(self.pursuer.thrust_n > 0.0, "the pursuer's thrust must be positive")
         _need(0.0 <= self.capture_radius_m < math.inf, "the capture radius must not be negative")
         _need(self.longest_s > 0.0, "the longest duration must be positive")
@@ -179,3 +146,74 @@ class Game:
 def _need(holds: bool | np.bool_, message: str) -> None:
     if not holds:
         raise ValueError(message)
+
+
+@dataclass(frozen=True)
+class Units:
+    """Units of a game: the pursuer's semi-major axis and mass at the start, and the time of a radian of a circular
+    orbit of that size.
+    """
+
+    length_m: float
+    time_s: float
+    mass_kg: float
+
+    @property
+    def speed_m_s(self) -> float:
+        """Return the unit of speed."""
+        return self.length_m / self.time_s
+
+
+@dataclass(frozen=True)
+class ScaledGame:
+    """A nondimensional game; `latest` is its longest duration."""
+
+    units: Units
+    pursuer: Craft
+    evader: Craft
+    radius: float
+    latest: float
+
+    @property
+    def pair(self) -> Pair:
+        """Both sides."""
+        return Pair(self.pursuer, self.evader)
+
+
+def units_of(game: Game) -> Units:
+    """Return the units that suit a game."""
+    mu = game.gravity.parameter_m3_s2
+    length = semi_major_axis_m(np.array(game.pursuer.position_m), np.array(game.pursuer.velocity_m_s), mu)
+    return Units(length, float(np.sqrt(length**3 / mu)), game.pursuer.mass_kg)
+
+
+def scaled_craft(player: Player, gravity: Gravity, units: Units) -> Craft:
+    """Return a player as a nondimensional craft."""
+    force = units.mass_kg * units.length_m / units.time_s**2
+    return Craft(
+        start=np.array([*player.position_m, *player.velocity_m_s]) / np.repeat([units.length_m, units.speed_m_s], 3),
+        thrust=player.thrust_n / force,
+        mass=player.mass_kg / units.mass_kg,
+        flow=player.flow_kg_s * units.time_s / units.mass_kg,
+        mu=gravity.parameter_m3_s2 * units.time_s**2 / units.length_m**3,
+        oblateness=gravity.oblateness_m5_s2 * units.time_s**2 / units.length_m**5,
+    )
+
+
+def scaled_game(game: Game, units: Units | None = None) -> ScaledGame:
+    """Return a nondimensional game; without `units` those of `units_of` are used."""
+    units = units or units_of(game)
+    pursuer, evader = (scaled_craft(player, game.gravity, units) for player in (game.pursuer, game.evader))
+    return ScaledGame(units, pursuer, evader, game.capture_radius_m / units.length_m, horizon_s(game) / units.time_s)
+
+
+def horizon_s(game: Game) -> float:
+    """Return the longest duration of a game, s: the time until a player's propellant is spent, or that of the game."""
+    longest = game.longest_s
+    if not np.isfinite(longest):
+        longest = 2.0 * np.pi * LONGEST_REVOLUTIONS * units_of(game).time_s
+    # The acceleration of a craft without dry mass is infinite at the end of its propellant.
+    burns = [
+        player.burn_time_s * (1.0 if player.dry_mass_kg > 0.0 else 0.999) for player in (game.pursuer, game.evader)
+    ]
+    return float(min(longest, *burns))

@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rendezvous._arrays import Floats, Places
 from rendezvous.pursuit_evasion._pair import Node
-from rendezvous.pursuit_evasion.game import Game
+from rendezvous.pursuit_evasion.game import Game, Units, scaled_game
 from rendezvous.pursuit_evasion.solution import Verdict
 from rendezvous.pursuit_evasion.solver import solve
-from rendezvous.pursuit_evasion.units import Units, scaled_game
-
-Floats = NDArray[np.float64]
 
 CHECKED_EVERY = 50
 """Distance between points of a row that are solved from scratch; shifted from row to row."""
@@ -45,26 +42,17 @@ STATUSES = tuple(PointStatus)
 
 @dataclass(frozen=True)
 class CaptureMap:
-    """Capture times over a grid.
+    """Capture times over a grid of `columns`, shape (nx,), and `rows`, shape (ny,), in the units of the two parameters.
 
-    Parameters
-    ----------
-    columns, rows : ndarray, shape (nx,) and (ny,)
-        Values of the two parameters, in their own units.
-    capture_s : masked array, shape (ny, nx)
-        Masked where there is no capture, or none that is certified.
-    status : ndarray of int, shape (ny, nx)
-        Indices in `STATUSES`.
-    closing_speed_m_s : masked array, shape (ny, nx)
-        Masked as the capture times.
-    solved_from_nothing : int
-        Number of points solved from scratch.
+    `capture_s` and `closing_speed_m_s`, shape (ny, nx), are masked where there is no capture, or none that is
+    certified. `status`, shape (ny, nx), contains indices in `STATUSES`. `solved_from_nothing` is the number of points
+    solved from scratch.
     """
 
     columns: Floats
     rows: Floats
     capture_s: np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]
-    status: NDArray[np.int64]
+    status: Places
     closing_speed_m_s: np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]
     solved_from_nothing: int
 
@@ -88,23 +76,12 @@ def capture_map(
     follow_all: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> CaptureMap:
-    """Solve a game at each point of a grid.
+    """Solve a game at each point of a grid of `columns`, shape (nx,), and `rows`, shape (ny,).
 
-    Parameters
-    ----------
-    game_at : callable
-        Function of a column's and a row's value that returns the game; it raises ValueError if there is no game.
-    columns : ndarray, shape (nx,)
-        Values of the first parameter, in its own units.
-    rows : ndarray, shape (ny,)
-        Values of the second parameter, in its own units.
-    follow_all : bool, optional
-        Whether to solve all points from scratch, with a change of branch at folds: 20 ms to seconds per point.
-    progress : callable, optional
-        Called with the fraction done.
+    `game_at` returns the game of a column's and a row's value, and raises ValueError if there is no game. `follow_all`
+    solves all points from scratch, with a change of branch at folds: 20 ms to seconds per point. `progress` is called
+    with the fraction done.
 
-    Notes
-    -----
     In a row a point is computed from the three previous points, in 1 to 2 ms. One point in 50 is solved from scratch,
     and also the last point before a new start of the row, and points whose time differs from the extrapolation of the
     previous rows. If a result differs from the previous one, the neighbours are also solved from scratch, and their
@@ -112,7 +89,8 @@ def capture_map(
     """
     grid = _Grid(game_at, np.asarray(columns, dtype=np.float64), np.asarray(rows, dtype=np.float64))
     for j in range(len(rows)):
-        points, wrong = _row(grid.games(j), follow_all, int(_GOLDEN * CHECKED_EVERY * j))
+        games = [grid.game(j, i) for i in range(len(columns))]
+        points, wrong = _row(games, follow_all, int(_GOLDEN * CHECKED_EVERY * j))
         for i, point in enumerate(points):
             grid.put(j, i, point)
         about_wrong = [point for i in wrong for point in grid.about(j, i)]
@@ -134,18 +112,12 @@ class _Grid:
         self._afresh = 0
 
     def game(self, j: int, i: int) -> Game | None:
-        """Return the game of a point, or None."""
         try:
             return self._game_at(float(self._columns[i]), float(self._rows[j]))
         except ValueError:
             return None
 
-    def games(self, j: int) -> list[Game | None]:
-        """Return the games of a row."""
-        return [self.game(j, i) for i in range(len(self._columns))]
-
     def put(self, j: int, i: int, point: _Point) -> None:
-        """Store a point."""
         self._afresh += point.status is not PointStatus.NEIGHBOUR
         self._status[j, i] = STATUSES.index(point.status)
         self._hidden[j, i] = point.node is None or point.units is None
@@ -182,7 +154,6 @@ class _Grid:
                 doubted += self.about(j, i)
 
     def map(self) -> CaptureMap:
-        """Return the map."""
         return CaptureMap(
             self._columns,
             self._rows,
@@ -201,8 +172,9 @@ def _row(games: list[Game | None], follow_all: bool, offset: int) -> tuple[list[
 
     def check() -> None:
         if points and points[-1].status is PointStatus.NEIGHBOUR:
-            seeded, points[-1] = points[-1], _from_nothing(games[len(points) - 1], follow_all)
-            if not _agree(points[-1], seeded):
+            seeded, points[-1] = points[-1].node, _from_nothing(games[len(points) - 1], follow_all)
+            node = points[-1].node
+            if node is None or seeded is None or not abs(node.duration - seeded.duration) < _SAME * node.duration:
                 wrong.append(len(points) - 1)
 
     for i, game in enumerate(games):
@@ -222,12 +194,8 @@ def _from_nothing(game: Game | None, change_branch: bool) -> _Point:
     solution = solve(game, change_branch=change_branch)
     if solution.capture is not None and solution.verdict is Verdict.CAPTURED:
         return _Point(PointStatus.FOLLOWED, solution.units, solution.capture.extremal)
-    return _Point(
-        {
-            Verdict.ESCAPES: PointStatus.ESCAPES,
-            Verdict.PROPELLANT_EXHAUSTED: PointStatus.PROPELLANT_EXHAUSTED,
-        }.get(solution.verdict, PointStatus.NOT_CERTIFIED)
-    )
+    is_over = solution.verdict in (Verdict.ESCAPES, Verdict.PROPELLANT_EXHAUSTED)
+    return _Point(PointStatus(solution.verdict.value) if is_over else PointStatus.NOT_CERTIFIED)
 
 
 def _seeded(game: Game, points: list[_Point]) -> _Point | None:
@@ -253,9 +221,3 @@ def _seeded(game: Game, points: list[_Point]) -> _Point | None:
     if node is None or not node.is_saddle or node.closing <= 0.0:
         return None
     return _Point(PointStatus.NEIGHBOUR, scaled.units, node)
-
-
-def _agree(first: _Point, second: _Point) -> bool:
-    if first.node is None or second.node is None:
-        return False
-    return abs(first.node.duration - second.node.duration) < _SAME * first.node.duration

@@ -6,16 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._extremal import STATES, flow_back, rate
-from rendezvous.pursuit_evasion._pair import FINE, Node
-from rendezvous.pursuit_evasion._side import Craft
+from rendezvous.pursuit_evasion._pair import FINE, Craft, Node
+from rendezvous.pursuit_evasion.game import Units, scaled_game
 from rendezvous.pursuit_evasion.solution import Solution
-from rendezvous.pursuit_evasion.units import Units, scaled_game
 
-Floats = NDArray[np.float64]
 Direction = Callable[[float, Floats], Floats]
 """Direction of thrust, shape (3,), of a time and a state: any length, zero to coast."""
 
@@ -90,22 +88,16 @@ class SteeredPath:
         state = np.asarray(self.solution(time), dtype=np.float64)
         return state[:6], _rates(time, state, self.craft, self.direction)[3:6]
 
-    def mass_at(self, time: float) -> float:
-        """Return the mass at a time."""
-        return float(self.solution(time)[6])
-
 
 def steered_path(craft: Craft, direction: Direction, duration: float) -> SteeredPath:
     """Return the path of a craft that steers by a rule: full thrust along the direction, or none where that is zero.
+
+    SciPy's DOP853 to 1e-12: some 3 ms a revolution.
 
     Raises
     ------
     PathError
         If the direction turns so fast that integration takes too long, or the path comes too near the planet's centre.
-
-    Notes
-    -----
-    SciPy's DOP853 to 1e-12: some 3 ms a revolution.
     """
     calls = 0
 
@@ -141,19 +133,11 @@ def _rates(time: float, state: Floats, craft: Craft, direction: Direction) -> Fl
 
 @dataclass(frozen=True)
 class PlayerHistory:
-    """One player at times.
+    """One player at n times, in the inertial frame; vectors have shape (n, 3).
 
-    Parameters
-    ----------
-    position_m, velocity_m_s : ndarray, shape (n, 3)
-        In the inertial frame.
-    mass_kg : ndarray, shape (n,)
-        Mass with propellant.
-    thrust_direction : ndarray, shape (n, 3)
-        Unit vectors; zero for a craft without thrust.
-    switching : ndarray, shape (n,)
-        |lambda_v| / m - k lambda_m / c over its value at the start: full thrust is optimal while it is positive. It is
-        the factor of k T in the Hamiltonian of Wang's slides, "Optimal control".
+    `thrust_direction` has unit vectors; zero for a craft without thrust. `switching`, shape (n,), is |lambda_v| / m - k
+    lambda_m / c over its value at the start: full thrust is optimal while it is positive. It is the factor of k T in
+    the Hamiltonian of Wang's slides, "Optimal control".
     """
 
     position_m: Floats
@@ -165,15 +149,7 @@ class PlayerHistory:
 
 @dataclass(frozen=True)
 class History:
-    """Both players at times.
-
-    Parameters
-    ----------
-    time_s : ndarray, shape (n,)
-        Times from the start.
-    pursuer, evader : PlayerHistory
-        At these times.
-    """
+    """Both players at times from the start, shape (n,)."""
 
     time_s: Floats
     pursuer: PlayerHistory

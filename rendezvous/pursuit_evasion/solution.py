@@ -5,14 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rendezvous._arrays import Floats
 from rendezvous.pursuit_evasion._pair import Node
-from rendezvous.pursuit_evasion.game import Game
-from rendezvous.pursuit_evasion.units import Units
-
-Floats = NDArray[np.float64]
+from rendezvous.pursuit_evasion.game import Game, Units
 
 
 class Verdict(Enum):
@@ -39,17 +34,10 @@ class Route(Enum):
 
 @dataclass(frozen=True)
 class PlayerEnd:
-    """One player at the end of the game.
+    """One player at the end of the game, in the inertial frame.
 
-    Parameters
-    ----------
-    propellant_kg : float
-        Propellant spent.
-    position_m, velocity_m_s : ndarray, shape (3,)
-        In the inertial frame.
-    costate_at_start : ndarray, shape (6,)
-        lambda_r, lambda_v at t = 0 in the units of the solution, scaled so that the Hamiltonian is one: H_f = 1 of
-        Wang's slides, "Optimal control".
+    `propellant_kg` is the propellant spent. `costate_at_start`, shape (6,), is (lambda_r, lambda_v) at t = 0 in the
+    units of the solution, scaled so that the Hamiltonian is one: H_f = 1 of Wang's slides, "Optimal control".
     """
 
     propellant_kg: float
@@ -60,14 +48,10 @@ class PlayerEnd:
 
 @dataclass(frozen=True)
 class DistanceCurve:
-    """The distance l that the evader can keep at each duration.
+    """The distance l that the evader can keep at each duration T, rising, both of shape (n,).
 
-    Parameters
-    ----------
-    duration_s, distance_m : ndarray, shape (n,)
-        T, rising, and l.
-    least_curvature : ndarray, shape (n,)
-        Lesser eigenvalue of the Hessian of h_P - h_E + l across nu, in units of length: a saddle while it is positive.
+    `least_curvature`, shape (n,), is the lesser eigenvalue of the Hessian of h_P - h_E + l across nu, in units of
+    length: a saddle while it is positive.
     """
 
     duration_s: Floats
@@ -81,28 +65,20 @@ class Capture:
 
     Parameters
     ----------
-    time_s : float
-        Capture time.
     position_m : ndarray, shape (3,)
-        Position of the evader at that time.
+        Position of the evader at the capture time.
     direction : ndarray, shape (3,)
         nu, the direction along which both players reach the greatest distance; with a capture radius, the direction
         from the pursuer to the evader. It is that of lambda_rP at the end, which equals -lambda_rE.
     closing_speed_m_s : float
         Speed at which the distance falls.
     curvature : ndarray, shape (2,)
-        Eigenvalues of the Hessian of h_P - h_E on the plane normal to nu, in units of length, ascending.
-    pursuer, evader : PlayerEnd
-        Both players.
+        Eigenvalues of the Hessian of h_P - h_E on the plane normal to nu, in units of length, ascending; not from the
+        slides.
     residual : float
         Error of the start states and of r_E - r_P = R nu, in units of length and speed: below 1e-9.
     extremal : Node
         The extremal, nondimensional; an initial guess for similar games.
-
-    Notes
-    -----
-    The conditions at the end of Wang's slides, "Optimal control", after Shen and Casalino (2018); the curvature is not
-    from there.
     """
 
     time_s: float
@@ -123,30 +99,12 @@ class Capture:
 
 @dataclass(frozen=True)
 class Solution:
-    """A game with its verdict.
+    """A game with its verdict; `units` are those of nondimensional values.
 
-    Parameters
-    ----------
-    game : Game
-        The game.
-    units : Units
-        Units of the nondimensional values.
-    verdict : Verdict
-        End of the game.
-    capture : Capture or None
-        Capture, if the verdict is `captured`.
-    route : Route
-        Continuation, with or without a change of branch.
-    curve : DistanceCurve
-        Distances along the branch.
-    looked_at_s : float
-        Longest duration that was solved.
-    exhausted : str or None
-        Player without propellant at that time: pursuer or evader.
-    fallback : Capture or None
-        Capture by another route, which is not claimed to be the first one, if the branch is not certified.
-    fallback_route : Route or None
-        Route of the fallback.
+    There is a `capture` if the verdict is `captured`. `curve` contains the distances along the branch, and
+    `looked_at_s` is the longest duration that was solved; `exhausted` is the player without propellant at that time,
+    pursuer or evader. If the branch is not certified, `fallback` is a capture by another route, which is not claimed to
+    be the first one.
     """
 
     game: Game

@@ -8,20 +8,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rendezvous._arrays import Floats
 from rendezvous.linear_game import LinearGameError, circular_orbit_capture
 from rendezvous.pursuit_evasion._branch import MOST_WORK, Ending, follow, polish
-from rendezvous.pursuit_evasion._pair import COARSE, Node
+from rendezvous.pursuit_evasion._pair import COARSE, Craft, Node, across
 from rendezvous.pursuit_evasion._scan import greater
-from rendezvous.pursuit_evasion._side import Craft, across
-from rendezvous.pursuit_evasion.game import Game, Player
+from rendezvous.pursuit_evasion.game import Game, Player, ScaledGame, Units, horizon_s, scaled_game, units_of
 from rendezvous.pursuit_evasion.paths import orbital_axes, steered_path
 from rendezvous.pursuit_evasion.solution import Capture, DistanceCurve, PlayerEnd, Route, Solution, Verdict
 from rendezvous.pursuit_evasion.steering import Policy
-from rendezvous.pursuit_evasion.units import ScaledGame, Units, horizon_s, scaled_game, units_of
-
-Floats = NDArray[np.float64]
 
 _MOST_BRANCHES = 6
 _REACH_STEP, _MOST_REACH_STEPS, _REACHED = 0.1, 400, 1e-6
@@ -34,14 +30,8 @@ _LONGEST = 40.0
 def solve(game: Game, *, change_branch: bool = True, all_directions: bool = False) -> Solution:
     """Solve a game without a guess.
 
-    Parameters
-    ----------
-    game : Game
-        The game to solve.
-    change_branch : bool, optional
-        Whether to search for another branch at a fold; each search takes seconds.
-    all_directions : bool, optional
-        Whether to search also at the capture for a branch that keeps the evader farther away.
+    `change_branch` searches for another branch at a fold; each search takes seconds. `all_directions` searches also at
+    the capture for a branch that keeps the evader farther away.
 
     Notes
     -----
@@ -94,12 +84,9 @@ def solve_near(game: Game, units: Units, guess: Node) -> Capture | None:
     Returns a local saddle, or None if Newton's method finds none whose residual is below 1e-9. Earlier captures are not
     excluded.
     """
-    node = _near(scaled_game(game, units), guess)
+    scaled = scaled_game(game, units)
+    node = _polished(scaled, guess.vector, guess.duration, scaled.radius)
     return None if node is None else _capture(game, units, node)
-
-
-def _near(scaled: ScaledGame, guess: Node) -> Node | None:
-    return _polished(scaled, guess.vector, guess.duration, scaled.radius)
 
 
 def _polished(scaled: ScaledGame, guess: Floats, duration: float, radius: float) -> Node | None:
@@ -109,7 +96,6 @@ def _polished(scaled: ScaledGame, guess: Floats, duration: float, radius: float)
 
 
 def _capture(game: Game, units: Units, node: Node) -> Capture:
-    """Return an extremal in SI units."""
     time_s = node.duration * units.time_s
 
     def end(player: Player, state: Floats, costate: Floats) -> PlayerEnd:
@@ -171,7 +157,8 @@ def solve_by_homotopy(game: Game) -> Capture | None:
     done, step = 0.0, _THRUST_STEP
     while done < 1.0 and step > _LEAST_THRUST_STEP:
         to = min(1.0, done + step)
-        raised = _near(scaled_game(_with_thrust(game, to), units), node)
+        scaled = scaled_game(_with_thrust(game, to), units)
+        raised = _polished(scaled, node.vector, node.duration, scaled.radius)
         if raised is None:
             step *= 0.5
             continue
@@ -189,13 +176,9 @@ def _with_thrust(game: Game, share: float) -> Game:
 def solve_by_linear_game(game: Game) -> Capture | None:
     """Solve a `game` from the solution of its linear game about the pursuer's circular orbit.
 
-    Returns a local saddle; earlier captures are not excluded.
-
-    Notes
-    -----
-    The relative state is curvilinear, with the arc as the coordinate along the motion, so that the linear game remains
-    close to the true one over long distances. Its duration and direction are the guess; the ends of both sides are
-    computed by continuation in the duration.
+    Returns a local saddle; earlier captures are not excluded. The relative state is curvilinear, with the arc as the
+    coordinate along the motion, so that the linear game remains close to the true one over long distances. Its duration
+    and direction are the guess; the ends of both sides are computed by continuation in the duration.
     """
     scaled = scaled_game(game)
     guess = _linear_guess(game, scaled)

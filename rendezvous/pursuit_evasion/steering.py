@@ -9,9 +9,8 @@ from enum import Enum
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rendezvous._arrays import Floats
 
 Steering = Callable[[float, Floats], Floats]
 """Direction of thrust, shape (3,), of the time (s) and the evader's state (m, m/s): any length, zero to coast."""
@@ -42,14 +41,7 @@ class Policy(Enum):
 
 @dataclass(frozen=True)
 class Script:
-    """A sequence of policies.
-
-    Parameters
-    ----------
-    begin_s : tuple of float
-        Starting times of the policies, increasing, the first zero.
-    policies : tuple of Policy
-        Policies, one for each starting time.
+    """A sequence of policies, one for each of the starting times `begin_s`, which increase from 0.
 
     Raises
     ------
@@ -61,7 +53,6 @@ class Script:
     policies: tuple[Policy, ...]
 
     def __post_init__(self) -> None:
-        """Check the values."""
         if not self.begin_s or len(self.begin_s) != len(self.policies):
             raise ValueError("a script must have one time for each policy, and at least one policy")
         if self.begin_s[0] != 0.0 or any(b <= a for a, b in zip(self.begin_s, self.begin_s[1:], strict=False)):
@@ -75,15 +66,7 @@ class Script:
 
 @dataclass(frozen=True)
 class RandomSteering:
-    """Random directions, uniform over the sphere.
-
-    Parameters
-    ----------
-    seed, run : int
-        Seed and run number; they determine the directions.
-    hold_s : float
-        Time for which a direction is constant.
-    """
+    """Random directions, uniform over the sphere, each constant for `hold_s`; seed and run number determine them."""
 
     seed: int
     run: int

@@ -7,15 +7,12 @@ from dataclasses import dataclass, replace
 
 import clarabel
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from rendezvous._arrays import Flags, Floats, Places
 from rendezvous.reachability.conic import STEADY, ConeProgram, NoSolutionError, Optimum
 from rendezvous.reachability.problem import Block
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Places = NDArray[np.int64]
 Constraints = tuple[Floats, Floats, Places, Places]
 
 _BROKEN = 3e-10
@@ -28,22 +25,11 @@ _STILL = 1e-9
 class Lifted:
     """{v: rows v <= limits, equal v = levels}, with |u(t)| <= 1 for a ball; states and controls are affine in v.
 
-    Parameters
-    ----------
-    free, response : ndarray
-        x(t) = free[t] + response[t] v, of shapes (T + 1, n) and (T + 1, n, p).
-    control_free, control_response : ndarray
-        The same for all controls, those of the first period first, of shapes (T m,) and (T m, p).
-    rows, limits : ndarray
-        Inequalities, of shapes (r, p) and (r,).
-    moments : ndarray of int, shape (r,)
-        Time that each row refers to; -1 for a bound on a control.
-    labels : ndarray of int, shape (r,)
-        Index of the block's constraint in each row; -1 for a bound on a control.
-    equal, levels : ndarray
-        Equations, of shapes (e, p) and (e,).
-    ball : int
-        Number m of controls of a period if their norm is bounded; 0 for a box, whose bounds are among the rows.
+    States are x(t) = free[t] + response[t] v, of shapes (T + 1, n) and (T + 1, n, p). `control_free` and
+    `control_response`, of shapes (T m,) and (T m, p), are the same for all controls, those of the first period first.
+    Of the r rows, `moments` are the times that they refer to, and `labels` the indices of the block's constraints; both
+    are -1 for a bound on a control. `ball` is the number m of controls of a period if their norm is bounded; 0 for a
+    box, whose bounds are among the rows.
     """
 
     free: Floats
@@ -342,8 +328,6 @@ def _polished(optimum: Optimum, matrix: Floats, vector: Floats, rows: Floats, li
 class Maximiser:
     """Maximise many linear functions over one set of controls, which is not empty.
 
-    Notes
-    -----
     An interior-point method (Clarabel) reuses the factors that depend on the constraints only; the simplex method
     (HiGHS) solves the programs on which it fails. Most constraints on states are never active. If there are many, the
     maximiser starts without them, and adds a constraint at neighbouring times once a solution violates it.

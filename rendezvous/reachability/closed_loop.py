@@ -6,14 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rendezvous._arrays import Floats
 from rendezvous.reachability.optimum import EmptyTubeError
 from rendezvous.reachability.problem import InadmissibleStartError, ReachabilityProblem
 from rendezvous.reachability.selection import minimum_energy
 from rendezvous.reachability.solve import OptimalControls, optimal_controls
-
-Floats = NDArray[np.float64]
 
 Truth = Callable[[int, Floats, Floats], Floats]
 """A function of the period, the true state and the control that returns the true state one period later."""
@@ -27,18 +25,10 @@ _MOST_RELAXATION = 1e3
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """Simulation in closed loop.
+    """Simulation in closed loop: true states, shape (T + 1, n), and the controls applied, shape (T, m).
 
-    Parameters
-    ----------
-    states : ndarray, shape (T + 1, n)
-        True states.
-    controls : ndarray, shape (T, m)
-        Controls applied.
-    expected_misses : ndarray, shape (T,)
-        The least terminal norm of each plan, in the units of the states.
-    relaxations : ndarray, shape (T,)
-        Fraction by which all constraints on states were relaxed for each plan; 0 without relaxation.
+    `expected_misses`, shape (T,), are the least terminal norms of the plans, in the units of the states. `relaxations`,
+    shape (T,), are the fractions by which all constraints on states were relaxed for each plan; 0 without relaxation.
     """
 
     states: Floats
@@ -57,35 +47,24 @@ def replan(
 ) -> Flight:
     """Simulate a problem in closed loop: in every period apply the first control of the optimal plan of least energy.
 
-    Parameters
-    ----------
-    problem : ReachabilityProblem
-        The model used for planning.
-    truth : callable
-        Function of the period, the true state and the control that returns the true state one period later.
-    observe : callable or None
-        Function of the period and the true state that returns the estimated state; None for exact estimates.
-    relative : bool
-        Norm that plans minimise if they cannot reach zero, for example in the last period: True for states divided by
-        their bounds, False for the units of the problem.
+    `truth` returns the true state one period later from the period, the true state and the control; `observe` returns
+    the estimated state from the period and the true state, and is None for exact estimates. If a plan cannot reach
+    zero, for example in the last period, it minimises the norm of the states in the units of the problem, or divided by
+    their bounds if `relative`.
 
-    Notes
-    -----
     T optima and T quadratic programs. If no control satisfies the constraints from a state, all of them are relaxed by
     the least sufficient fraction.
     """
     state = problem.initial
-    states, controls, misses, relaxations = [state], [], [], []
+    steps = []
     for t in range(problem.periods):
         estimated = state if observe is None else observe(t, state)
         optimal, relaxation = _plan(problem, t, estimated, relative)
         control = minimum_energy(optimal)[0]
         state = truth(t, state, control)
-        states.append(state)
-        controls.append(control)
-        misses.append(optimal.miss)
-        relaxations.append(relaxation)
-    return Flight(np.array(states), np.array(controls), np.array(misses), np.array(relaxations))
+        steps.append((state, control, optimal.miss, relaxation))
+    states, controls, misses, relaxations = (np.array(column) for column in zip(*steps, strict=True))
+    return Flight(np.vstack([problem.initial, states]), controls, misses, relaxations)
 
 
 def relaxed(problem: ReachabilityProblem, fraction: float) -> ReachabilityProblem:
@@ -106,15 +85,11 @@ def _plan(problem: ReachabilityProblem, start: int, estimated: Floats, relative:
             return optimal_controls(wider.rest(start, estimated), relative=relative), fraction
         except InadmissibleStartError as error:
             missing = max(excess for _, excess in error.broken) / min([*problem.state_bounds, *_sizes(problem)])
-            fraction = max(2.0 * fraction, min(missing, _worst(problem, start, estimated)) * _MORE, _LEAST_RELAXATION)
+            normals, offsets = problem.further
+            beyond = ((normals @ estimated - offsets[start]) / _sizes(problem)).max(initial=-np.inf)
+            worst = max(float((np.abs(estimated) / problem.state_bounds).max()) - 1.0, float(beyond))
+            fraction = max(2.0 * fraction, min(missing, worst) * _MORE, _LEAST_RELAXATION)
         except EmptyTubeError as error:
             fraction = (fraction + error.relaxation * (1.0 + fraction)) * _MORE + _LEAST_RELAXATION
         if fraction > _MOST_RELAXATION:
             raise ArithmeticError(f"no plan from period {start}: the state is far outside the constraints")
-
-
-def _worst(problem: ReachabilityProblem, time: int, state: Floats) -> float:
-    """Return the fraction by which constraints must be relaxed to be satisfied at a state."""
-    normals, offsets = problem.further
-    beyond = (normals @ state - offsets[time]) / _sizes(problem)
-    return max(float((np.abs(state) / problem.state_bounds).max()) - 1.0, float(beyond.max(initial=-np.inf)))

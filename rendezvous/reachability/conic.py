@@ -7,13 +7,11 @@ from dataclasses import dataclass
 
 import clarabel
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.sparse import csc_matrix, issparse, vstack
 
 from infoset.polytope import HIGHS
-
-Floats = NDArray[np.float64]
+from rendezvous._arrays import Floats
 
 _GAP = 1e-10
 _BROKEN, _APART = 1e-9, 1e-8
@@ -179,13 +177,9 @@ class ConeProgram:
         """Return the violation of the constraints at a point, and its duality gap; both relative.
 
         Multipliers, of all constraints in their order, are moved into the dual cone first. A `cost` is used in place of
-        the program's.
-
-        Notes
-        -----
-        The gap is relative to the value, or to the change of the value that the allowed violation can cause. By weak
-        duality no solution y is below - v . matrix v / 2 - multipliers . limits - |residual| . |y|; y is assumed to be
-        at most twice as large as the point.
+        the program's. The gap is relative to the value, or to the change of the value that the allowed violation can
+        cause. By weak duality no solution y is below - v . matrix v / 2 - multipliers . limits - |residual| . |y|; y is
+        assumed to be at most twice as large as the point.
         """
         linear = self.cost if cost is None else cost
         rows, ends = self._all()

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
+from rendezvous._arrays import Floats
 from rendezvous.relative_motion import ORBITAL, ConstantMotion, EllipticOrbit, TschaunerHempel
-
-Floats = NDArray[np.float64]
 
 _RELATIVE = 1e-12
 _ABSOLUTE = 1e-9
@@ -27,8 +26,6 @@ class MotionModel(Enum):
 def motion_of(orbit: EllipticOrbit, model: MotionModel) -> ConstantMotion | TschaunerHempel:
     """Return the linear motion about an `orbit` by a `model`, in axes x against the motion, y outward.
 
-    Notes
-    -----
     Equation (2) of Shorikov and Goranov (2021), who use the frozen model.
     """
     return orbit.frozen(0.0, ORBITAL) if model is MotionModel.FROZEN else TschaunerHempel(orbit, ORBITAL)
@@ -42,14 +39,12 @@ def discretised(
     A(t), shape (periods, 6, 6), is of states in m and m/s of the `motion`; B(t), shape (periods, 6, 3), is in m and m/s
     for a unit control, of acceleration `acceleration_m_s2`.
 
+    Equation (3). A block exponential for the frozen model, closed forms and quadrature for the other.
+
     Raises
     ------
     ValueError
         If `periods` is less than 1.
-
-    Notes
-    -----
-    Equation (3). A block exponential for the frozen model, closed forms and quadrature for the other.
     """
     if periods < 1:
         raise ValueError("there must be at least one period")
@@ -94,16 +89,8 @@ def _repeated(matrices: Floats, periods: int) -> Floats:
 class NonlinearMotion:
     """Relative motion in a central field, in the orbital frame: x against the motion, y outward, z completes.
 
-    Parameters
-    ----------
-    orbit : EllipticOrbit
-        Orbit of the passive craft.
-    semi_major_axis_m : float
-        Semi-major axis of that orbit.
-
-    Notes
-    -----
-    Equations (1) of Shorikov and Goranov (2021), with w^2 r^4 / p = mu; DOP853 to 1e-12.
+    Equations (1) of Shorikov and Goranov (2021), with w^2 r^4 / p = mu; DOP853 to 1e-12. The passive craft is on the
+    `orbit`.
     """
 
     orbit: EllipticOrbit

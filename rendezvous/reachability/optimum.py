@@ -5,17 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lstsq
 
 from infoset.polytope import null_space_basis, relative_interior
+from rendezvous._arrays import Flags, Floats, Places
 from rendezvous.reachability.admissible import Lifted, deep_point, least_relaxation, lift
 from rendezvous.reachability.conic import ConeProgram, NoSolutionError
 from rendezvous.reachability.problem import Block
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Places = NDArray[np.int64]
 
 _REACHED = 1e-9
 """Constraints that are broken by less than this, relative to their sizes, count as kept."""
@@ -37,14 +33,9 @@ _NEWTON_STEPS, _IDLE = 16, 5
 class EmptyTubeError(ValueError):
     """No control satisfies the constraints.
 
-    Parameters
-    ----------
-    time : int
-        The first time t such that the constraints up to t cannot all be kept.
-    relaxation : float
-        Least relaxation of all constraints on states, as a fraction of their bounds, with which all can be satisfied.
-    names : tuple of str
-        Constraints that conflict at that time.
+    `time` is the first time t such that the constraints up to t cannot all be kept, and `names` lists those that
+    conflict there. `relaxation` is the least relaxation of all constraints on states, as a fraction of their bounds,
+    with which all can be satisfied.
     """
 
     def __init__(self, time: int, relaxation: float, names: tuple[str, ...]) -> None:
@@ -59,26 +50,14 @@ class EmptyTubeError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class BlockOptimum:
-    """The least terminal norm of a block.
+    """The least terminal norm of a `block`, which is relaxed by rounding where needed.
 
-    Parameters
-    ----------
-    block : Block
-        The block, relaxed by rounding where needed.
-    lifted : Lifted
-        All admissible controls.
-    terminal : ndarray, shape (n,)
-        The terminal state of least norm, which is unique, scaled; exactly zero where that is reachable.
-    reached : bool
-        Whether it is zero.
-    optimal : Lifted
-        All optimal controls, in coordinates z of their affine hull; thrust in a ball remains a constraint.
-    centre : ndarray, shape (d,)
-        A point far from the boundary of `optimal`, in its coordinates.
+    `terminal`, shape (n,), is the terminal state of least norm, which is unique, scaled; exactly zero where that is
+    `reached`. `optimal` contains all optimal controls, in coordinates z of their affine hull; thrust in a ball remains
+    a constraint. `centre`, shape (d,), is a point far from its boundary, in its coordinates.
     """
 
     block: Block
-    lifted: Lifted
     terminal: Floats
     reached: bool
     optimal: Lifted
@@ -96,8 +75,6 @@ def block_optimum(block: Block, *, relative: bool = False) -> BlockOptimum:
     If `relative`, the norm is of states divided by their bounds; otherwise in the units of the problem.
     `EmptyTubeError` is raised if no control satisfies the constraints.
 
-    Notes
-    -----
     A cone program gives the terminal state, which is unique, and multipliers (see `least_norm`). A row with a positive
     multiplier is tight for every optimal control: with the terminal equations these give a face of the set of
     admissible controls, whose affine hull is found by linear programs through the solution.
@@ -120,10 +97,10 @@ def block_optimum(block: Block, *, relative: bool = False) -> BlockOptimum:
     if lifted.ball:
         optimal = face.within(least.point, null_space_basis(face.equal))
         optimal = optimal.only(np.flatnonzero(np.linalg.norm(optimal.rows, axis=1) > _REACHED))
-        return BlockOptimum(block, lifted, terminal, least.reached, optimal, deep_point(optimal)[0])
+        return BlockOptimum(block, terminal, least.reached, optimal, deep_point(optimal)[0])
     hull = relative_interior(face.rows, face.limits, face.equal, face.levels, bounded=True, member=least.point)
     optimal = face.within(hull.point, hull.basis).only(hull.kept)
-    return BlockOptimum(block, lifted, terminal, least.reached, optimal, hull.centre)
+    return BlockOptimum(block, terminal, least.reached, optimal, hull.centre)
 
 
 def block_reaches_zero(block: Block) -> bool:
@@ -173,30 +150,16 @@ def _relaxed(block: Block, relaxation: float) -> Block:
 class LeastNorm:
     """The controls of least terminal norm.
 
-    Parameters
-    ----------
-    point : ndarray, shape (p,)
-        The controls, divided by their bounds.
-    value : float
-        The norm; exactly zero where it is below rounding.
-    bound : float
-        A lower bound on the norm over all admissible controls.
-    multipliers : ndarray, shape (r,)
-        Of the rows, those of a box included: derivative of the norm by a limit, sign reversed.
-    pressures : ndarray, shape (p,)
-        Derivative of the norm, without its constraints' part, by each control: the bounds on controls balance it.
+    `point`, shape (p,), contains the controls, divided by their bounds; `reached` says that the norm is zero to
+    rounding. `multipliers`, shape (r,), are those of the rows, a box included: the derivative of the norm by a limit,
+    sign reversed. `pressures`, shape (p,), is the derivative of the norm, without its constraints' part, by each
+    control: the bounds on controls balance it.
     """
 
     point: Floats
-    value: float
-    bound: float
+    reached: bool
     multipliers: Floats
     pressures: Floats
-
-    @property
-    def reached(self) -> bool:
-        """Whether zero is reached."""
-        return self.value == 0.0
 
 
 def least_norm(lifted: Lifted, weights: Floats) -> LeastNorm:
@@ -301,19 +264,18 @@ class _Search:
                 f"the least terminal norm was not found: it lies between {self._bound:.6g} and {self.value:.6g} of the "
                 "largest bound on a state"
             )
-        value = 0.0 if self.at_zero else self.value
         residual = self._residual(self._direction, self._multipliers)
         if self.at_zero and self._bound < -_ZERO * self._reach:
             # Zero is inside the set reached: no constraint is active.
-            return LeastNorm(self._point, value, 0.0, np.zeros(len(self._multipliers)), np.zeros(self._size))
+            return LeastNorm(self._point, True, np.zeros(len(self._multipliers)), np.zeros(self._size))
         multipliers = self._multipliers.copy()
         if not self._lifted.ball and self._size:
             # The rows of a box, which hold a control at its bound.
             hard = np.flatnonzero(~self._soft)
             multipliers[hard] = np.maximum(-self._lifted.rows[hard] @ residual, 0.0)
-        return LeastNorm(self._point, value, min(self._bound, value), multipliers, residual)
+        return LeastNorm(self._point, self.at_zero, multipliers, residual)
 
-    def _program(self, start: Floats, scale: float) -> tuple[ConeProgram, NDArray[np.int64]]:
+    def _program(self, start: Floats, scale: float) -> tuple[ConeProgram, Places]:
         """The cone program in v = start + scale z, without the constraints that z cannot reach."""
         lifted, size = self._lifted, self._size
         slack = (lifted.limits - lifted.rows @ start) / scale

@@ -7,12 +7,11 @@ from enum import Enum
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-Floats = NDArray[np.float64]
-Places = NDArray[np.int64]
+from rendezvous._arrays import Floats, Places
 
 MOST_PERIODS = 256
 
@@ -25,13 +24,7 @@ class ThrustShape(Enum):
 
 
 class InadmissibleStartError(ValueError):
-    """The initial state violates constraints.
-
-    Parameters
-    ----------
-    broken : tuple of tuple of (str, float)
-        Names of the constraints, each with its violation.
-    """
+    """The initial state violates constraints; `broken` contains their names, each with its violation."""
 
     def __init__(self, broken: tuple[tuple[str, float], ...]) -> None:
         listed = ", ".join(f"{name} by {excess:.6g}" for name, excess in broken)
@@ -224,7 +217,7 @@ class ReachabilityProblem:
                 worst = np.maximum(worst, self._state_excess(inner[..., instant, :], np.arange(self.periods)))
         return np.asarray(worst)
 
-    def _state_excess(self, states: Floats, times: NDArray[np.int64]) -> Floats:
+    def _state_excess(self, states: Floats, times: Places) -> Floats:
         """Worst over the last two axes (time, state); a constraint holds between t and t + 1 where it does at t."""
         worst = (np.abs(states) / self.state_bounds).max(axis=(-1, -2)) - 1.0
         normals, offsets = self.further
@@ -259,20 +252,9 @@ class ReachabilityProblem:
 class Block:
     """An independent part of a problem, with states and controls divided by their bounds.
 
-    Parameters
-    ----------
-    states, controls : ndarray of int
-        Indices of the states and controls in the problem.
-    scale : ndarray, shape (n,)
-        Bounds on the states, in their own units.
-    transition, control, initial, between
-        Arrays of the problem, scaled.
-    normals, offsets : ndarray
-        All constraints on states, the bounds first, of shapes (k, n) and (T + 1, k); normals of unit length.
-    names : tuple of str
-        Names of these k constraints.
-    ball : bool
-        Whether |u(t)| <= 1 in the Euclidean norm; otherwise of each component.
+    `states` and `controls` are indices in the problem, and `scale`, shape (n,), the bounds on the states in their own
+    units. `normals`, of unit length, `offsets` and `names` are those of all constraints on states, the bounds first, of
+    shapes (k, n), (T + 1, k) and (k,). If `ball`, |u(t)| <= 1 in the Euclidean norm; otherwise for each component.
     """
 
     states: Places

@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 from scipy.sparse import coo_array
 
 from infoset.polytope import HIGHS
+from rendezvous._arrays import Floats
 from rendezvous.reachability.conic import ConeProgram, NoSolutionError
 from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
-
-Floats = NDArray[np.float64]
 
 MOST_PERIODS_WITH_FEEDBACK = 24
 _TIDY = 1e-7
@@ -25,12 +24,10 @@ class NoRobustPlanError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class FeedbackPlan:
-    """Controls u(t) = nominal(t) + sum over s < t of gains[t, s] w(s).
+    """Controls u(t) = nominal(t) + sum over s < t of gains[t, s] w(s), for a problem with a disturbance.
 
     Parameters
     ----------
-    problem : ReachabilityProblem
-        The problem without disturbance.
     disturbance : ndarray, shape (T, n, q)
         x(t + 1) = A x + B u + disturbance[t] w(t), |w_k(t)| <= 1, in the units of the states.
     nominal : ndarray, shape (T, m)
@@ -100,18 +97,16 @@ def feedback_plan(problem: ReachabilityProblem, disturbance: Floats) -> Feedback
     The `problem`, with thrust in a box, and the `disturbance` are as for `tightened`; w(t) is known from t + 1 on, by
     the state.
 
+    With affine feedback all constraints are linear in (nominal, gains) except for absolute values, each of which needs
+    an additional variable. The result is one linear program (HiGHS) with about T^2 (n + m) q / 2 additional variables,
+    whose solution is checked. It minimises the sum of the greatest terminal states, divided by their bounds.
+
     Raises
     ------
     NoRobustPlanError
         If no plan satisfies the constraints.
     ValueError
         If there are too many periods, or thrust is in a ball.
-
-    Notes
-    -----
-    With affine feedback all constraints are linear in (nominal, gains) except for absolute values, each of which needs
-    an additional variable. The result is one linear program (HiGHS) with about T^2 (n + m) q / 2 additional variables,
-    whose solution is checked. It minimises the sum of the greatest terminal states, divided by their bounds.
     """
     _check(problem, disturbance)
     if problem.thrust is ThrustShape.BALL:
@@ -211,14 +206,10 @@ class _Program:
             gains[t, s] = solution[start : start + block].reshape(self.group, self.width) * reach[:, None]
         centre = problem.run(nominal)
         # Effect of w(s) at t, directly and through the controls.
-        total = self.effect.copy()
-        for s in range(self.periods):
-            state = np.zeros((self.states, self.width))
-            for t in range(self.periods):
-                state = problem.transition[t] @ state + problem.control[t] @ gains[t, s]
-                if t == s:
-                    state = state + self.disturbance[s]
-                total[t + 1, s] = state
+        total = np.zeros_like(self.effect)
+        for t in range(self.periods):
+            total[t + 1] = problem.transition[t] @ total[t] + problem.control[t] @ gains[t]
+            total[t + 1, t] += self.disturbance[t]
         spread = np.abs(total).sum(axis=(1, 3))
         return FeedbackPlan(problem, self.disturbance, nominal, gains, centre - spread, centre + spread)
 

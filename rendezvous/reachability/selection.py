@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from infoset.polytope import EmptyPolytopeError, Polytope, UncertainHullError, relative_interior
+from rendezvous._arrays import Floats
 from rendezvous.reachability.admissible import Lifted, least_l1, least_peak, least_sum_of_norms, quadratic
 from rendezvous.reachability.conic import NoSolutionError
 from rendezvous.reachability.solve import OptimalControls
-
-Floats = NDArray[np.float64]
 
 MOST_VERTICES = 2000
 _MOST_DIMENSIONS = 8
@@ -29,18 +27,10 @@ class TooManyVerticesError(ValueError):
 
 @dataclass(frozen=True)
 class Effort:
-    """Costs of a control.
+    """Costs of a control, dimensionless.
 
-    Parameters
-    ----------
-    energy : float
-        Sum of squares of all components, dimensionless.
-    l1 : float
-        Sum of their absolute values, dimensionless.
-    norms : float
-        Sum of the Euclidean norms over the periods, dimensionless.
-    peak : float
-        Greatest absolute value, dimensionless.
+    `energy` is the sum of squares of all components, `l1` that of their absolute values, `norms` that of the Euclidean
+    norms over the periods, and `peak` the greatest absolute value.
     """
 
     energy: float
@@ -61,7 +51,7 @@ def effort(controls: Floats) -> Effort:
 
 def minimum_energy(optimal: OptimalControls) -> Floats:
     """Return the `optimal` control of least sum of squares, shape (T, m), which is unique, by a quadratic program."""
-    return optimal.at(_least_energy(optimal.space, optimal.scale))
+    return optimal.at(_nearest(optimal.space, optimal.scale))
 
 
 def minimum_l1(optimal: OptimalControls) -> Floats:
@@ -97,15 +87,12 @@ def minimum_peak(optimal: OptimalControls) -> Floats:
     limits = np.concatenate([space.limits, bound - fixed, bound + fixed])
     face = relative_interior(rows, limits, space.equal, space.levels, bounded=True, member=point)
     inner = replace(space.within(face.point, face.basis), rows=face.rows, limits=face.limits)
-    return optimal.at(face.point + face.basis @ _least_energy(inner, scale))
+    return optimal.at(face.point + face.basis @ _nearest(inner, scale))
 
 
 def nearest(optimal: OptimalControls, control: Floats) -> Floats:
     """Return the `optimal` control nearest to a `control`, both of shape (T, m), by a quadratic program."""
-    space, scale = optimal.space, optimal.scale
-    turned = scale[:, None] * space.control_response
-    away = scale * space.control_free - control.ravel()
-    return optimal.at(quadratic(space, turned.T @ turned, turned.T @ away).point)
+    return optimal.at(_nearest(optimal.space, optimal.scale, control.ravel()))
 
 
 def chebyshev_centre(optimal: OptimalControls) -> Floats:
@@ -125,16 +112,13 @@ def analytic_centre(optimal: OptimalControls) -> Floats:
 def analytic_point(space: Lifted, start: Floats) -> tuple[Floats, Floats]:
     """Return the analytic centre, shape (d,), of a set without equations, and the Hessian of its barrier there.
 
-    `start`, shape (d,), is inside.
+    `start`, shape (d,), is inside. Newton's method with halved steps on - sum log(slack) - sum log(1 - |u(t)|^2), which
+    is self-concordant.
 
     Raises
     ------
     NoSolutionError
         If Newton's method does not converge.
-
-    Notes
-    -----
-    Newton's method with halved steps on - sum log(slack) - sum log(1 - |u(t)|^2), which is self-concordant.
     """
     point = start.copy()
     if not space.size:
@@ -224,15 +208,13 @@ def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
 def samples(optimal: OptimalControls, count: int, generator: np.random.Generator) -> Floats:
     """Draw `count` random members, at least 1, of the set of `optimal` controls, shape (count, T, m).
 
+    Hit-and-run: for each sample a chain of 20 d steps from the analytic centre; the `generator` draws directions, which
+    are scaled by the Hessian of the barrier. The distribution is uniform in the limit. O(count r d) per step.
+
     Raises
     ------
     ValueError
         If the count is less than 1.
-
-    Notes
-    -----
-    Hit-and-run: for each sample a chain of 20 d steps from the analytic centre; the `generator` draws directions, which
-    are scaled by the Hessian of the barrier. The distribution is uniform in the limit. O(count r d) per step.
     """
     if count < 1:
         raise ValueError(f"at least one sample must be drawn, not {count}")
@@ -276,6 +258,6 @@ def _chord(space: Lifted, points: Floats, directions: Floats) -> tuple[Floats, F
     return np.minimum(least, 0.0), np.maximum(most, 0.0)
 
 
-def _least_energy(space: Lifted, scale: Floats) -> Floats:
+def _nearest(space: Lifted, scale: Floats, control: Floats | float = 0.0) -> Floats:
     turned = scale[:, None] * space.control_response
-    return quadratic(space, turned.T @ turned, turned.T @ (scale * space.control_free)).point
+    return quadratic(space, turned.T @ turned, turned.T @ (scale * space.control_free - control)).point

@@ -6,17 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from time import perf_counter
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from infoset.polytope import Polytope, cut, intersection, linear_image, shadow
+from rendezvous._arrays import Floats
 from rendezvous.reachability.admissible import Lifted, Maximiser, lift, lift_with_states
 from rendezvous.reachability.optimum import BlockOptimum
 from rendezvous.reachability.problem import ReachabilityProblem
-
-Floats = NDArray[np.float64]
 
 _FEW_CONTROLS = 24
 _AT_BOUND = 1.0 - 1e-10
@@ -38,14 +35,8 @@ class TooLargeError(ArithmeticError):
 class Budget:
     """Limits of the exact route.
 
-    Parameters
-    ----------
-    seconds : float
-        Computing time, s, for all blocks; a step that is expected to exceed it is not started.
-    megabytes : float
-        Memory, MB, for one step.
-    dimension : int
-        Greatest number of states of a block.
+    `seconds` is the computing time, s, for all blocks; a step that is expected to exceed it is not started. `megabytes`
+    is the memory, MB, for one step, and `dimension` the greatest number of states of a block.
     """
 
     seconds: float = 5.0
@@ -53,34 +44,11 @@ class Budget:
     dimension: int = 6
 
 
-class BlockSets(Protocol):
-    """Sets of states of a block, at t = 0..T, scaled."""
-
-    def support(self, kind: SetKind, time: int, directions: Floats) -> Floats:
-        """Return the support function along directions, shape (k, n), as an array of shape (k,)."""
-
-    def bounds(self, kind: SetKind) -> Floats:
-        """Return the least and greatest value of each state at each time, shape (T + 1, n, 2)."""
-
-    def shadow(self, kind: SetKind, time: int, rows: Floats, tolerance: float = 1e-9) -> Polytope:
-        """Return the image of a set under a matrix, shape (d, n), of few rows."""
-
-    def polytope(self, kind: SetKind, time: int) -> Polytope | None:
-        """Return the set as a polytope; None if its vertices are not known."""
-
-
 @dataclass(frozen=True)
 class SetCounts:
-    """Size and dimension of a polytope.
+    """Size and dimension of a polytope: `facets` are those of all blocks.
 
-    Parameters
-    ----------
-    vertices : int
-        Number of vertices; vertices nearer to each other than 1e-7 of the bounds count once.
-    facets : int
-        Number of facets of all blocks.
-    dimension : int
-        Dimension of the affine hull.
+    Vertices nearer to each other than 1e-7 of the bounds count once.
     """
 
     vertices: int
@@ -90,15 +58,7 @@ class SetCounts:
 
 @dataclass(frozen=True, eq=False)
 class ReachableSets:
-    """Sets of states at t = 0..T, in the units of the problem.
-
-    Parameters
-    ----------
-    problem : ReachabilityProblem
-        The problem.
-    parts : tuple of BlockSets
-        Sets of each block of the problem.
-    """
+    """Sets of states at t = 0..T, in the units of the problem; `parts` are those of each block of the problem."""
 
     problem: ReachabilityProblem
     parts: tuple[BlockSets, ...]
@@ -134,16 +94,8 @@ class ReachableSets:
     def shadow(self, kind: SetKind, time: int, axes: Sequence[int], tolerance: float = 1e-9) -> Floats:
         """Return the vertices of the projection of a set on two or three states, shape (v, len(axes)), in no order.
 
-        Parameters
-        ----------
-        kind : SetKind
-            Forward set or tube.
-        time : int
-            Time index, from 0 to T.
-        axes : sequence of int
-            Indices of the states.
-        tolerance : float
-            Relative error of the projection of a set that is represented by programs.
+        `axes` are indices of states, `time` is from 0 to T, and `tolerance` is the relative error of the projection of
+        a set that is represented by programs.
         """
         wanted = list(axes)
         order: list[int] = []
@@ -161,8 +113,6 @@ class ReachableSets:
 class Meter:
     """Measures the computing time of hulls, and raises an error before a hull that is expected to exceed the budget.
 
-    Notes
-    -----
     Qhull's time for k points in R^d grows as k^(d/2) at worst, and the memory of the check as vertices times facets.
     Both are extrapolated from the last hull of that dimension, or from values of a slow machine for the first hull.
     """
@@ -203,18 +153,16 @@ class Meter:
 class ExactSets:
     """Sets of a block with all vertices and facets, for thrust in a box and constraints at whole periods only.
 
+    Shorikov and Goranov (2021): G+(t + 1) = (A G+(t) + B U) cut by X; G-(t) = {x in X: A x in G-(t + 1) - B U}, whose
+    half-spaces need no inverse of A; the tube is the intersection of both. Where zero is not reached the tube is a face
+    of G+ that rounding would lose; it is then the image of the vertices of the optimal controls.
+
     Raises
     ------
     TooLargeError
         If the block exceeds the budget of the meter, or a hull is expected to.
     UncertainHullError
         If rounding decides which points are vertices of a set.
-
-    Notes
-    -----
-    Shorikov and Goranov (2021): G+(t + 1) = (A G+(t) + B U) cut by X; G-(t) = {x in X: A x in G-(t + 1) - B U}, whose
-    half-spaces need no inverse of A; the tube is the intersection of both. Where zero is not reached the tube is a face
-    of G+ that rounding would lose; it is then the image of the vertices of the optimal controls.
     """
 
     def __init__(self, optimum: BlockOptimum, meter: Meter) -> None:
@@ -290,8 +238,6 @@ def _finite(normals: Floats, offsets: Floats) -> tuple[Floats, Floats]:
 class LiftedSets:
     """Sets of a block, represented by programs over its admissible controls.
 
-    Notes
-    -----
     Each direction needs a linear program, or a cone program for thrust in a ball. The only error is the tolerance of
     the programs, at most 1e-8 of the bounds. The variables are the controls; if there are many, states are variables
     too, because the rows are then sparse.
@@ -362,6 +308,10 @@ class LiftedSets:
                 lifted = lift(block) if few else lift_with_states(block)
             self._known[key] = lifted, Maximiser(lifted)
         return self._known[key]
+
+
+BlockSets = ExactSets | LiftedSets
+"""Sets of states of a block, at t = 0..T, scaled."""
 
 
 def optimal_set(optimum: BlockOptimum) -> Lifted:

@@ -7,9 +7,10 @@ from enum import Enum
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from infoset.polytope import EmptyPolytopeError, UncertainHullError
+from rendezvous._arrays import Floats
 from rendezvous.reachability.admissible import Lifted, Maximiser, joined
 from rendezvous.reachability.optimum import BlockOptimum, block_optimum, block_reaches_zero
 from rendezvous.reachability.problem import ReachabilityProblem, ThrustShape
@@ -24,8 +25,6 @@ from rendezvous.reachability.sets import (
     TooLargeError,
     optimal_set,
 )
-
-Floats = NDArray[np.float64]
 
 MOST_STATES_BY_CHOICE = 4
 """Greatest number of states of a block for which the exact route is tried by default."""
@@ -43,15 +42,7 @@ class Route(Enum):
 
 @dataclass(frozen=True, eq=False)
 class OptimalControls:
-    """{u: |x(T)| is least and every constraint kept}: a polytope for thrust in a box.
-
-    Parameters
-    ----------
-    problem : ReachabilityProblem
-        The problem.
-    blocks : tuple of BlockOptimum
-        Optima of the independent parts of the problem.
-    """
+    """{u: |x(T)| is least and every constraint kept}, from the optima of the blocks: a polytope for thrust in a box."""
 
     problem: ReachabilityProblem
     blocks: tuple[BlockOptimum, ...]
@@ -123,20 +114,9 @@ class OptimalControls:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The solution of a problem.
+    """The solution of a problem: all controls of least terminal norm, and the forward sets and the tube.
 
-    Parameters
-    ----------
-    problem : ReachabilityProblem
-        The problem.
-    optimal : OptimalControls
-        All controls of least terminal norm.
-    sets : ReachableSets
-        Forward sets and the tube.
-    route : Route
-        EXACT if the vertices and facets of all blocks are known.
-    reason : str
-        Reason for the choice of the route.
+    The `route` is EXACT if the vertices and facets of all blocks are known; `reason` explains its choice.
     """
 
     problem: ReachabilityProblem
@@ -154,15 +134,8 @@ def optimal_controls(problem: ReachabilityProblem, *, relative: bool = False) ->
 def solve(problem: ReachabilityProblem, route: Route | None = None, budget: Budget | None = None) -> Solution:
     """Compute the least terminal norm, all controls that attain it, and the forward sets and tube.
 
-    Parameters
-    ----------
-    problem : ReachabilityProblem
-        Problem, in any consistent units.
-    route : Route or None
-        None selects the exact route if blocks are small, thrust is in a box, constraints apply at whole periods only
-        and the expected cost is within the budget; otherwise the lifted route.
-    budget : Budget or None
-        Limits of the exact route.
+    No `route` selects the exact route if blocks are small, thrust is in a box, constraints apply at whole periods only
+    and the expected cost is within the `budget`; otherwise the lifted route.
 
     Raises
     ------
@@ -228,8 +201,6 @@ def _refusal(problem: ReachabilityProblem, *, asked: bool) -> str | None:
 def least_periods(problem: ReachabilityProblem) -> int | None:
     """Return the least number of periods in which zero can be reached, or None if those of the `problem` are too few.
 
-    Notes
-    -----
     If the zero state satisfies all constraints, it can be held, and the least number is computed by bisection;
     otherwise all numbers are tried. Each block and number needs a linear program.
     """

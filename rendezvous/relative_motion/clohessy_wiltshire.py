@@ -2,38 +2,33 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from rendezvous.relative_motion._circular import NODES, WEIGHTS, fill_gramians, fill_held_inputs, fill_transitions
+from rendezvous._arrays import Floats
+from rendezvous._compile import compiled
 from rendezvous.relative_motion.frames import HILL, Frame
 from rendezvous.relative_motion.linear_motion import LinearMotion, checked_durations, checked_rate, even_breaks
 
-Floats = NDArray[np.float64]
+SERIES_BELOW_RAD = 1.0
+QUADRATURE_BELOW_RAD = 2.0
+NODES, WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.leggauss(12))
 
 
 @dataclass(frozen=True)
 class ClohessyWiltshire(LinearMotion):
-    """Relative motion about a circular orbit.
+    """Relative motion about a circular orbit, whose mean motion n is `rate_rad_s`.
 
-    Parameters
-    ----------
-    rate_rad_s : float
-        Mean motion n of the reference orbit.
-    frame : Frame
-        Of states and controls; position before velocity.
+    Barseghyan and Stepanyan (2008), (1.8), X[T, t] and (2.3) corrected. A transition takes about 0.1 microseconds, a
+    Gramian at most 1.
 
     Raises
     ------
     ValueError
         If the rate is not positive, or the frame interleaves positions and velocities.
-
-    Notes
-    -----
-    Barseghyan and Stepanyan (2008), (1.8), X[T, t] and (2.3) corrected. A transition takes about 0.1 microseconds, a
-    Gramian at most 1.
     """
 
     rate_rad_s: float
@@ -62,8 +57,6 @@ class ClohessyWiltshire(LinearMotion):
     def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Gramian, shape (..., 6, 6); end >= start.
 
-        Notes
-        -----
         Below two radians, where the closed forms cancel, by Gauss and Legendre's rule, beyond by the closed forms. Each
         entry is within 1e-14 of its size up to 50 radians.
         """
@@ -82,3 +75,120 @@ class ClohessyWiltshire(LinearMotion):
     def breaks(self, start_s: float, end_s: float) -> Floats:
         """Times from start to end, inclusive, a radian apart at most."""
         return even_breaks(start_s, end_s, self.rate_rad_s * (end_s - start_s))
+
+
+@compiled
+def angle_less_sine(theta: float) -> float:
+    """Return theta - sin(theta) to full relative accuracy: nine terms of the series up to one radian."""
+    if abs(theta) >= SERIES_BELOW_RAD:
+        return theta - math.sin(theta)
+    squared, tail = theta * theta, 1.0
+    for order in range(19, 3, -2):
+        tail = 1.0 - squared / (order * (order - 1)) * tail
+    return theta * squared / 6.0 * tail
+
+
+@compiled
+def fill_effect(theta: float, effect: Floats) -> None:
+    """Fill Phi B for unit rate, shape (6, 3), whose other entries are zero."""
+    sine, half = math.sin(theta), math.sin(0.5 * theta)
+    versine = 2.0 * half * half
+    effect[0, 0] = effect[2, 2] = sine
+    effect[0, 1] = 2.0 * versine
+    effect[1, 0] = -2.0 * versine
+    effect[1, 1] = 4.0 * sine - 3.0 * theta
+    effect[3, 0] = effect[5, 2] = math.cos(theta)
+    effect[3, 1] = 2.0 * sine
+    effect[4, 0] = -2.0 * sine
+    effect[4, 1] = 1.0 - 4.0 * versine
+
+
+@compiled
+def fill_transitions(rate: float, durations: Floats, matrices: Floats) -> None:
+    """Fill Phi of durations, shape (k, 6, 6), whose other entries are zero."""
+    for row in range(len(durations)):
+        theta, matrix = rate * durations[row], matrices[row]
+        fill_effect(theta, matrix[:, 3:])
+        for first in range(3):
+            for second in range(3, 6):
+                matrix[first, second] /= rate
+        sine, half = math.sin(theta), math.sin(0.5 * theta)
+        versine = 2.0 * half * half
+        matrix[0, 0] = 1.0 + 3.0 * versine
+        matrix[1, 0] = -6.0 * angle_less_sine(theta)
+        matrix[1, 1] = 1.0
+        matrix[2, 2] = math.cos(theta)
+        matrix[3, 0] = 3.0 * rate * sine
+        matrix[4, 0] = -6.0 * rate * versine
+        matrix[5, 2] = -rate * sine
+
+
+@compiled
+def fill_held_inputs(rate: float, durations: Floats, matrices: Floats) -> None:
+    """Fill int Phi B dt of durations, shape (k, 6, 3), whose other entries are zero."""
+    for row in range(len(durations)):
+        theta, matrix = rate * durations[row], matrices[row]
+        fill_effect(theta, matrix)
+        for axis in range(3):
+            # The integral of Phi_vv is Phi_rv.
+            for column in range(3):
+                matrix[3 + axis, column] = matrix[axis, column] / rate
+        half, lag = math.sin(0.5 * theta), angle_less_sine(theta)
+        versine = 2.0 * half * half
+        matrix[0, 0] = matrix[2, 2] = versine / rate**2
+        matrix[0, 1] = 2.0 * lag / rate**2
+        matrix[1, 0] = -2.0 * lag / rate**2
+        matrix[1, 1] = (4.0 * versine - 1.5 * theta * theta) / rate**2
+
+
+@compiled
+def fill_gramians(rate: float, durations: Floats, nodes: Floats, weights: Floats, matrices: Floats) -> None:
+    """Fill Gramians of durations, shape (k, 6, 6), whose other entries are zero."""
+    effect = np.zeros((6, 3))
+    for row in range(len(durations)):
+        theta, matrix = rate * durations[row], matrices[row]
+        if theta < QUADRATURE_BELOW_RAD:
+            _integrate(theta, nodes, weights, effect, matrix)
+        else:
+            _close(theta, matrix)
+        # These two entries cancel under the integral.
+        half, lag = math.sin(0.5 * theta), angle_less_sine(theta)
+        matrix[0, 1] = -3.0 * lag * lag
+        matrix[3, 4] = -12.0 * half**4
+        for first in range(6):
+            for second in range(first, 6):
+                velocities = (first >= 3) + (second >= 3)
+                matrix[first, second] /= rate ** (3 - velocities)
+                matrix[second, first] = matrix[first, second]
+
+
+@compiled
+def _integrate(theta: float, nodes: Floats, weights: Floats, effect: Floats, matrix: Floats) -> None:
+    """Fill the upper triangle for unit rate by Gauss and Legendre's rule: no entry cancels but two."""
+    half = 0.5 * theta
+    for node in range(len(nodes)):
+        fill_effect(half * (1.0 + nodes[node]), effect)
+        for first in range(6):
+            for second in range(first, 6):
+                product = 0.0
+                for column in range(3):
+                    product += effect[first, column] * effect[second, column]
+                matrix[first, second] += half * weights[node] * product
+
+
+@compiled
+def _close(theta: float, matrix: Floats) -> None:
+    """Fill the upper triangle for unit rate in closed form: (2.3) of the paper with q11 and q44 corrected."""
+    sine, cosine, sine2 = math.sin(theta), math.cos(theta), math.sin(2.0 * theta)
+    versine, climb = 1.0 - cosine, 4.0 * sine - 3.0 * theta
+    matrix[0, 0] = 6.5 * theta - 8.0 * sine + 0.75 * sine2
+    matrix[0, 3] = 0.5 * (sine * sine + 4.0 * versine * versine)
+    matrix[0, 4] = -(11.0 * theta - 14.0 * sine + 1.5 * sine2)
+    matrix[1, 1] = 14.0 * theta + 3.0 * theta**3 + 24.0 * theta * cosine - 32.0 * sine - 3.0 * sine2
+    matrix[1, 3] = -(8.0 * sine + 1.5 * sine2 - 5.0 * theta - 6.0 * theta * cosine)
+    matrix[1, 4] = 0.5 * (climb * climb + 4.0 * versine * versine)
+    matrix[3, 3] = 2.5 * theta - 0.75 * sine2
+    matrix[4, 4] = 19.0 * theta + 3.0 * sine2 - 24.0 * sine
+    matrix[2, 2] = 0.5 * theta - 0.25 * sine2
+    matrix[2, 5] = 0.5 * sine * sine
+    matrix[5, 5] = 0.5 * theta + 0.25 * sine2

@@ -5,34 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
+from rendezvous._arrays import Floats
 from rendezvous.relative_motion.frames import HILL, Frame
-from rendezvous.relative_motion.linear_motion import LinearMotion, checked_durations, even_breaks
-
-Floats = NDArray[np.float64]
+from rendezvous.relative_motion.linear_motion import LinearMotion, checked_durations, even_breaks, state_scales
 
 
 @dataclass(frozen=True, eq=False)
 class ConstantMotion(LinearMotion):
-    """x' = A x + (0, u)'.
+    """x' = A x + (0, u)' with a constant `matrix` A, shape (6, 6), in the frame.
 
-    Parameters
-    ----------
-    matrix : ndarray, shape (6, 6)
-        A, in the frame.
-    frame : Frame
-        Of states and controls; position before velocity.
+    Van Loan's block exponential, 12 x 12 for each interval, in states divided by (T, T, T, 1, 1, 1) to balance it.
 
     Raises
     ------
     ValueError
         If A has another shape or is not finite, or the frame interleaves positions and velocities.
-
-    Notes
-    -----
-    Van Loan's block exponential, 12 x 12 for each interval, in states divided by (T, T, T, 1, 1, 1) to balance it.
     """
 
     matrix: Floats
@@ -50,13 +40,13 @@ class ConstantMotion(LinearMotion):
     def transition(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Phi(end, start), shape (..., 6, 6); the end may be before the start."""
         durations = np.asarray(end_s, dtype=np.float64) - np.asarray(start_s, dtype=np.float64)
-        scale = _scales(durations)
+        scale = state_scales(durations)
         return np.asarray(expm(self._scaled(durations, scale)) * (scale[..., :, None] / scale[..., None, :]))
 
     def gramian(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Gramian, shape (..., 6, 6); end >= start."""
         durations = checked_durations(start_s, end_s)
-        scale = _scales(durations)
+        scale = state_scales(durations)
         scaled = self._scaled(durations, scale)
         block = np.zeros((*durations.shape, 12, 12))
         block[..., :6, :6] = -scaled
@@ -71,7 +61,7 @@ class ConstantMotion(LinearMotion):
     def held_input(self, start_s: ArrayLike, end_s: ArrayLike) -> Floats:
         """Effect at the end of a unit control held from the start, shape (..., 6, 3)."""
         durations = checked_durations(start_s, end_s)
-        scale = _scales(durations)
+        scale = state_scales(durations)
         block = np.zeros((*durations.shape, 9, 9))
         block[..., :6, :6] = self._scaled(durations, scale)
         block[..., (3, 4, 5), (6, 7, 8)] = 1.0
@@ -85,10 +75,3 @@ class ConstantMotion(LinearMotion):
     def _scaled(self, durations: Floats, scale: Floats) -> Floats:
         """A T in states divided by (T, T, T, 1, 1, 1)."""
         return np.asarray(self.matrix * (scale[..., None, :] / scale[..., :, None]) * durations[..., None, None])
-
-
-def _scales(durations: Floats) -> Floats:
-    """(T, T, T, 1, 1, 1) of each interval; T = 1 s for an empty one."""
-    scale = np.ones((*durations.shape, 6))
-    scale[..., :3] = np.where(durations == 0.0, 1.0, np.abs(durations))[..., None]
-    return scale

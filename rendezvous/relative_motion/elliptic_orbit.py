@@ -5,29 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rendezvous._arrays import Floats
 from rendezvous.relative_motion.constant import ConstantMotion
 from rendezvous.relative_motion.frames import HILL, Frame
 from rendezvous.relative_motion.linear_motion import checked_rate
-
-Floats = NDArray[np.float64]
 
 _MOST_STEPS = 60
 
 
 @dataclass(frozen=True)
 class EllipticOrbit:
-    """An elliptic reference orbit.
-
-    Parameters
-    ----------
-    mean_motion_rad_s : float
-        n.
-    eccentricity : float
-        0 <= e < 1.
-    true_anomaly_rad : float
-        At t = 0.
+    """An elliptic reference orbit: mean motion n, eccentricity 0 <= e < 1, and true anomaly at t = 0.
 
     Raises
     ------
@@ -91,8 +81,6 @@ class EllipticOrbit:
     def dynamics(self, time_s: ArrayLike) -> Floats:
         """Return A(t) in axes of Hill, shape (..., 6, 6), for states in m and m/s.
 
-        Notes
-        -----
         Equation (2) of Shorikov and Goranov (2021) in other axes; mu / r^3 = w^2 r / p.
         """
         anomaly, e, k2 = self.true_anomaly(time_s), self.eccentricity, self.semi_latus_rate_rad_s
@@ -106,13 +94,7 @@ class EllipticOrbit:
         return matrix
 
     def frozen(self, time_s: float, frame: Frame = HILL) -> ConstantMotion:
-        """Return the motion whose constant matrix is A at a time; `frame` has position before velocity.
-
-        Raises
-        ------
-        ValueError
-            If the frame interleaves positions and velocities.
-        """
+        """Return the motion whose constant matrix is A at a time; `frame` has position before velocity."""
         return ConstantMotion(HILL.matrices_to(frame, self.dynamics(time_s)), frame)
 
     def _eccentric_of_true(self, true_rad: float) -> float:
@@ -124,8 +106,6 @@ class EllipticOrbit:
 def eccentric_of_mean(mean_rad: ArrayLike, eccentricity: ArrayLike) -> Floats:
     """Solve Kepler's equation E - e sin E = M for E, rad; E increases with M without bound.
 
-    Notes
-    -----
     Newton's method from above, where the function is convex: it decreases to the root and cannot overshoot.
     """
     mean, e = np.asarray(mean_rad, dtype=np.float64), np.asarray(eccentricity, dtype=np.float64)

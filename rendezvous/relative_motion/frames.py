@@ -7,9 +7,8 @@ from enum import Enum
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rendezvous._arrays import Floats
 
 
 class Axis(Enum):
@@ -32,16 +31,7 @@ class StateOrder(Enum):
 
 @dataclass(frozen=True)
 class Frame:
-    """A right-handed rotating frame with its origin on the reference orbit.
-
-    Parameters
-    ----------
-    name : str
-        Name of the frame in messages.
-    x, y, z : Axis
-        Directions of the axes.
-    order : StateOrder
-        (x, y, z, vx, vy, vz), or (x, vx, y, vy, z, vz).
+    """A right-handed rotating frame with its origin on the reference orbit; x, y and z are the directions of its axes.
 
     Raises
     ------

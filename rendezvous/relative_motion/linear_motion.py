@@ -6,11 +6,10 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rendezvous._arrays import Floats
 from rendezvous.relative_motion.frames import HILL, Frame, StateOrder
-
-Floats = NDArray[np.float64]
 
 MOST_PANELS = 200_000
 
@@ -19,12 +18,7 @@ MOST_PANELS = 200_000
 class Segment:
     """Motion between two times: x(end) = transition x(start) + drift + the effect of the control.
 
-    Parameters
-    ----------
-    transition, gramian : ndarray, shape (..., 6, 6)
-        Matrices of states in m and m/s.
-    drift : ndarray, shape (..., 6)
-        Drift, m and m/s.
+    `transition` and `gramian`, shape (..., 6, 6), and `drift`, shape (..., 6), are those of states in m and m/s.
     """
 
     transition: Floats
@@ -35,7 +29,8 @@ class Segment:
 class LinearMotion(ABC):
     """x' = A(t) x + B(t) u + w(t), x = (position, velocity) in a frame; by default B = (0, 1)' and w = 0.
 
-    Times are scalars or arrays, in seconds, broadcast against each other; the results have their shape in front.
+    Times are scalars or arrays, in seconds, broadcast against each other; the results have their shape in front. The
+    `frame` is that of states and controls.
 
     Raises
     ------
@@ -106,6 +101,13 @@ def checked_durations(start_s: ArrayLike, end_s: ArrayLike) -> Floats:
     if (durations < 0.0).any():
         raise ValueError(f"the end is {-durations.min():g} s before the start; a Gramian needs start <= end")
     return durations
+
+
+def state_scales(durations: Floats) -> Floats:
+    """Return (T, T, T, 1, 1, 1) of each interval, shape (..., 6), from durations in s; T = 1 s for an empty one."""
+    scale = np.ones((*durations.shape, 6))
+    scale[..., :3] = np.where(durations == 0.0, 1.0, np.abs(durations))[..., None]
+    return scale
 
 
 def checked_rate(rate_rad_s: float) -> None:

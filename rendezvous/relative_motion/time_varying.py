@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rendezvous._arrays import Floats
 from rendezvous.relative_motion.frames import HILL, Frame
-from rendezvous.relative_motion.linear_motion import LinearMotion, Segment, checked_durations
+from rendezvous.relative_motion.linear_motion import LinearMotion, Segment, checked_durations, state_scales
 
-Floats = NDArray[np.float64]
 OfTime = Callable[[Floats], Floats]
 
 NODES = 8
@@ -37,18 +37,11 @@ class TimeVaryingMotion(LinearMotion):
     ----------
     matrix_at : callable
         A of times of shape (k,), s: shape (k, 6, 6).
-    frame : Frame
-        Of states and controls; position before velocity.
     input_at : callable or None
-        B, shape (k, 6, 3); None is an acceleration, (0, 1)'. An actuator with the cost u' R u has
-        B = (0, 1)' R^(-1/2), and controls R^(1/2) u.
+        B, shape (k, 6, 3); None is an acceleration, (0, 1)'. An actuator with the cost u' R u has B = (0, 1)' R^(-1/2),
+        and controls R^(1/2) u.
     drift_at : callable or None
         w, shape (k, 6); None is zero.
-
-    Raises
-    ------
-    ValueError
-        If the frame interleaves positions and velocities.
 
     Notes
     -----
@@ -104,8 +97,6 @@ class TimeVaryingMotion(LinearMotion):
     def breaks(self, start_s: float, end_s: float) -> Floats:
         """Times from start to end, inclusive, a radian of the fastest motion seen in between apart at most.
 
-        Notes
-        -----
         Panels are halved where A at their Gauss points turns by more than a radian over them.
 
         Raises
@@ -131,12 +122,7 @@ class TimeVaryingMotion(LinearMotion):
         if not (np.isfinite(starts).all() and np.isfinite(ends).all()):
             raise ValueError("a time is not finite")
         solution, shape = _refined(self, starts.ravel(), ends.ravel()), starts.shape
-        return _Solution(
-            *(
-                part.reshape(*shape, *part.shape[1:])
-                for part in (solution.transition, solution.gramian, solution.drift, solution.held)
-            )
-        )
+        return _Solution(*(part.reshape(*shape, *part.shape[1:]) for part in vars(solution).values()))
 
 
 def _refined(motion: TimeVaryingMotion, starts: Floats, ends: Floats) -> _Solution:
@@ -182,13 +168,7 @@ def _gauss_collocation() -> tuple[Floats, Floats, Floats]:
     """Nodes and weights on [0, 1], and the integrals of the Lagrange polynomials from 0 to each node."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     values = np.polynomial.legendre.legvander(nodes, NODES - 1)
-    integrals = np.stack(
-        [
-            np.polynomial.legendre.legval(nodes, np.polynomial.legendre.legint(np.eye(NODES)[k], lbnd=-1.0))
-            for k in range(NODES)
-        ],
-        axis=1,
-    )
+    integrals = np.polynomial.legendre.legval(nodes, np.polynomial.legendre.legint(np.eye(NODES), lbnd=-1.0)).T
     return 0.5 * (nodes + 1.0), 0.5 * weights, 0.5 * integrals @ np.linalg.inv(values)
 
 
@@ -199,8 +179,7 @@ def _collocated(motion: TimeVaryingMotion, starts: Floats, ends: Floats, panels:
     width = durations / panels
     positions = (np.arange(panels)[:, None] + nodes) / panels
     times = ends[:, None, None] - durations[:, None, None] * positions
-    scale = np.ones((len(durations), 6))
-    scale[:, :3] = np.where(durations == 0.0, 1.0, np.abs(durations))[:, None]
+    scale = state_scales(durations)
     ratio = (scale[:, None, :] / scale[:, :, None])[:, None, None]
     adjoint = np.swapaxes(motion.dynamics(times) * ratio, -1, -2) * width[:, None, None, None, None]
     # (1 - h a_jk A_k') Psi_k = 1, for the 8 nodes of each panel at once.
@@ -236,8 +215,7 @@ def _difference(first: _Solution, second: _Solution, durations: Floats) -> float
     """Greatest difference of two solutions, relative to each part, in states divided by (T, T, T, 1, 1, 1)."""
     if not len(durations):
         return 0.0
-    scale = np.ones((len(durations), 6))
-    scale[:, :3] = np.where(durations == 0.0, 1.0, np.abs(durations))[:, None]
+    scale = state_scales(durations)
     worst = 0.0
     for one, other, weight in (
         (first.transition, second.transition, scale[:, None, :] / scale[:, :, None]),

@@ -6,14 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rendezvous._arrays import Flags, Floats
 from rendezvous.relative_motion.elliptic_orbit import EllipticOrbit
 from rendezvous.relative_motion.frames import HILL, Frame
 from rendezvous.relative_motion.linear_motion import LinearMotion, checked_durations, even_breaks
 from rendezvous.relative_motion.time_varying import TimeVaryingMotion
 
-Floats = NDArray[np.float64]
 _OfIntervals = Callable[[Floats, Floats], Floats]
 
 SHORT_RAD = 0.1
@@ -22,22 +22,8 @@ _NODES, _WEIGHTS = (rule.astype(np.float64) for rule in np.polynomial.legendre.l
 
 @dataclass(frozen=True)
 class TschaunerHempel(LinearMotion):
-    """Relative motion about an elliptic orbit.
+    """Relative motion about an elliptic `orbit`.
 
-    Parameters
-    ----------
-    orbit : EllipticOrbit
-        The reference orbit.
-    frame : Frame
-        Of states and controls; position before velocity.
-
-    Raises
-    ------
-    ValueError
-        If the frame interleaves positions and velocities.
-
-    Notes
-    -----
     Yamanaka and Ankersen (2002), which holds from e = 0 on. Its two factors cancel over short times, where the
     equations are collocated instead. Gramians by Gauss and Legendre's rule in the eccentric anomaly.
     """
@@ -81,8 +67,6 @@ class TschaunerHempel(LinearMotion):
     def breaks(self, start_s: float, end_s: float) -> Floats:
         """Times from start to end, inclusive, a radian of the eccentric anomaly apart at most.
 
-        Notes
-        -----
         The motion has poles at cos E = 1 / e; panels are no longer than the distance to them.
         """
         first, last = (float(anomaly) for anomaly in self.orbit.eccentric_anomaly(np.array([start_s, end_s])))
@@ -99,7 +83,7 @@ class TschaunerHempel(LinearMotion):
     def _collocated(self) -> TimeVaryingMotion:
         return TimeVaryingMotion(self.orbit.dynamics)
 
-    def _short(self, starts: Floats, ends: Floats) -> NDArray[np.bool_]:
+    def _short(self, starts: Floats, ends: Floats) -> Flags:
         anomalies = self.orbit.true_anomaly(starts), self.orbit.true_anomaly(ends)
         return np.asarray(np.abs(anomalies[1] - anomalies[0]) < SHORT_RAD)
 
@@ -163,7 +147,7 @@ def _closed(orbit: EllipticOrbit, starts: Floats, ends: Floats) -> Floats:
     plane[:, 2, 3] = -s
     plane[:, 3, 1], plane[:, 3, 2], plane[:, 3, 3] = 3.0 * rho + e * e - 1.0, -(rho**2), e * s
     plane /= 1.0 - e * e
-    from_state = _scaled_states(rho, np.sin(at_start), e, k2)
+    from_state = _scaling(rho, -e * np.sin(at_start), 1.0 / (k2 * rho))
 
     rho = 1.0 + e * np.cos(at_end)
     s, c = rho * np.sin(at_end), rho * np.cos(at_end)
@@ -183,24 +167,12 @@ def _closed(orbit: EllipticOrbit, starts: Floats, ends: Floats) -> Floats:
     turn = at_end - at_start
     in_plane[:, 2, 2] = in_plane[:, 5, 5] = np.cos(turn)
     in_plane[:, 2, 5], in_plane[:, 5, 2] = np.sin(turn), -np.sin(turn)
-    return _states_of_scaled(rho, np.sin(at_end), e, k2) @ in_plane @ from_state
+    return _scaling(1.0 / rho, k2 * e * np.sin(at_end), k2 * rho) @ in_plane @ from_state
 
 
-def _scaled_states(rho: Floats, sine: Floats, e: float, k2: float) -> Floats:
-    """(r, v) to (rho r, -e sin(nu) r + v / (k^2 rho)), shape (n, 6, 6)."""
-    matrix = np.zeros((len(rho), 6, 6))
+def _scaling(position: Floats, mixed: Floats, velocity: Floats) -> Floats:
+    """The map from (r, v) to (position r, mixed r + velocity v), shape (n, 6, 6)."""
+    matrix = np.zeros((len(position), 6, 6))
     for axis in range(3):
-        matrix[:, axis, axis] = rho
-        matrix[:, 3 + axis, axis] = -e * sine
-        matrix[:, 3 + axis, 3 + axis] = 1.0 / (k2 * rho)
-    return matrix
-
-
-def _states_of_scaled(rho: Floats, sine: Floats, e: float, k2: float) -> Floats:
-    """The inverse of `_scaled_states`."""
-    matrix = np.zeros((len(rho), 6, 6))
-    for axis in range(3):
-        matrix[:, axis, axis] = 1.0 / rho
-        matrix[:, 3 + axis, axis] = k2 * e * sine
-        matrix[:, 3 + axis, 3 + axis] = k2 * rho
+        matrix[:, axis, axis], matrix[:, 3 + axis, axis], matrix[:, 3 + axis, 3 + axis] = position, mixed, velocity
     return matrix

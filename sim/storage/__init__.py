@@ -11,9 +11,10 @@ from sim.storage.files import (
     OccupiedError,
     StorageError,
 )
-from sim.storage.manifest import MOST_CELLS, Axis, Manifest, read_manifest
+from sim.storage.manifest import MANIFEST, MOST_CELLS, Axis, Manifest, read_manifest
 
 __all__ = [
+    "MANIFEST",
     "MOST_CELLS",
     "Axis",
     "CampaignFolder",

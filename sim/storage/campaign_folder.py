@@ -26,15 +26,7 @@ _NAME = re.compile(r"chunk-(\d{7,12})-([0-9a-f]{8})\.parquet")
 
 @dataclass(frozen=True)
 class Damage:
-    """A damaged shard, or one that belongs to another campaign.
-
-    Parameters
-    ----------
-    file : Path
-        The shard.
-    reason : str
-        What is wrong with it.
-    """
+    """A damaged shard, or one that belongs to another campaign."""
 
     file: Path
     reason: str
@@ -42,13 +34,6 @@ class Damage:
 
 class CampaignFolder:
     """The stored runs of a campaign or a sweep.
-
-    Parameters
-    ----------
-    path : Path
-        The folder.
-    manifest : Manifest
-        Read from it.
 
     Attributes
     ----------
@@ -89,7 +74,7 @@ class CampaignFolder:
     @property
     def wanted_runs(self) -> int:
         """Engagements of the result, over all cells."""
-        return self.manifest.wanted_runs * self.manifest.cells
+        return sum(map(self.manifest.wanted_runs, range(self.manifest.cells)))
 
     @property
     def complete(self) -> bool:
@@ -221,14 +206,15 @@ class CampaignFolder:
         return sum(self._size(index) for index in self._wanted(cell))
 
     def _is_wanted(self, index: int) -> bool:
-        return self.manifest.runs_of(index)[1].start < self.manifest.wanted_runs
+        cell, runs = self.manifest.runs_of(index)
+        return runs.start < self.manifest.wanted_runs(cell)
 
     def _wanted(self, cell: int | None = None) -> list[int]:
-        """Return the stored chunks of the result, in their order."""
-        chunks_a_cell = self.manifest.chunks_a_cell
-        return [
-            index for index in sorted(self._files) if self._is_wanted(index) and cell in (None, index // chunks_a_cell)
-        ]
+        """Return the stored chunks of the result, in the order of cells and runs."""
+        cells = {index: self.manifest.runs_of(index)[0] for index in self._files if self._is_wanted(index)}
+        return sorted(
+            (index for index in cells if cell in (None, cells[index])), key=lambda index: (cells[index], index)
+        )
 
     def _scan(self) -> None:
         """Find the undamaged shards, and list the others in `damaged`."""

@@ -39,8 +39,6 @@ class CampaignWriter(CampaignFolder):
 
         Parameters
         ----------
-        path : Path
-            Folder; it is created if it does not exist.
         manifest : Manifest
             Manifest of the campaign; more runs than in the folder extend the campaign.
         resume : bool
@@ -105,6 +103,12 @@ class CampaignWriter(CampaignFolder):
                 damage.file.unlink(missing_ok=True)
         self.damaged = []
 
+    def stop_cells(self, runs: tuple[int, ...]) -> None:
+        """Store the number of runs of each cell of a finished sweep whose cells a requirement stopped."""
+        if runs != self.manifest.cell_runs:
+            self.manifest = replace(self.manifest, cell_runs=runs)
+            write_manifest(self.path, self.manifest)
+
     def stop_after(self, runs: int) -> None:
         """Store the number of runs at which a rule stopped the campaign, and move later shards to the subfolder."""
         if runs != self.manifest.stopped_after:
@@ -142,19 +146,21 @@ def need_free(path: Path, *, resume: bool) -> None:
 def _continued(stored: Manifest, wanted: Manifest, path: Path) -> Manifest:
     """Return the manifest of a campaign that is resumed, perhaps with more runs or another rule."""
     need_same(stored, wanted, path)
+    stored = replace(stored, require=wanted.require)
     if wanted.runs == stored.runs and wanted.until == stored.until:
         return stored
     if wanted.runs < stored.runs:
+        option = "--most-runs" if wanted.axes and wanted.until else "--runs"
         raise ManifestError(
-            f"{path}: the campaign in this folder has {stored.runs} runs, more than --runs {wanted.runs}; give --runs "
-            f"{stored.runs} or more"
+            f"{path}: the {stored.kind} in this folder has {stored.runs} runs, more than {option} {wanted.runs}; give "
+            f"{option} {stored.runs} or more"
         )
-    if wanted.axes and wanted.runs != stored.runs:
+    if stored.axes and stored.order == "cells" and wanted.chunks_a_cell != stored.chunks_a_cell:
         raise ManifestError(
-            f"{path}: the sweep in this folder has {stored.runs} runs per cell, not {wanted.runs}; give --runs "
-            f"{stored.runs}, or choose another folder"
+            f"{path}: an earlier version wrote the sweep in this folder; its {stored.runs} runs per cell cannot be "
+            f"extended to {wanted.runs}; choose another folder"
         )
-    return replace(stored, runs=wanted.runs, until=wanted.until, stopped_after=None)
+    return replace(stored, runs=wanted.runs, until=wanted.until, stopped_after=None, cell_runs=())
 
 
 def _take_back(shards: Path) -> None:
@@ -165,10 +171,11 @@ def _take_back(shards: Path) -> None:
 
 
 def _drop_partial_shard(path: Path, stored: Manifest) -> None:
-    """Delete the last shard of a campaign if it is not full; with more runs it is written again."""
+    """Delete the last shard of each cell if it is not full; with more runs it is written again."""
     last, rows = divmod(stored.runs, stored.chunk)
     if not rows:
         return
     with reporting(path):
-        for file in (path / SHARDS).glob(f"chunk-{last:07d}-*.parquet"):
-            file.unlink()
+        for cell in range(stored.cells):
+            for file in (path / SHARDS).glob(f"chunk-{stored.index_of(cell, last):07d}-*.parquet"):
+                file.unlink()

@@ -6,11 +6,12 @@ import functools
 import hashlib
 import json
 from collections.abc import Callable, Hashable, Iterator
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
 from typing import Any, TypeVar
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
+from infoset.limits import ADDED_LATER
 from sim.scenario import Scenario
 
 Kind = TypeVar("Kind")
@@ -23,11 +24,29 @@ def _adapter(kind: Hashable) -> TypeAdapter[Any]:
 
 
 def to_json(value: Any) -> dict[str, Any]:
-    """Return a dataclass as JSON values: enumerations by value, a number as the type of its field."""
+    """Return a dataclass as JSON values: enumerations by value, a number as the type of its field.
+
+    A field marked `ADDED_LATER` is omitted if it has its default. Files and fingerprints of values that do not use the
+    field are then those of the versions before it.
+    """
     adapter = _adapter(value.__class__)
     text = adapter.dump_json((value,), fallback=lambda number: number.item())  # integers of NumPy
-    (plain,) = adapter.dump_python(adapter.validate_json(text), mode="json")
-    return dict(plain)
+    (made,) = adapter.validate_json(text)
+    (plain,) = adapter.dump_python((made,), mode="json")
+    return dict(_used(made, plain))
+
+
+def _used(value: Any, plain: Any) -> Any:
+    """Omit the fields added later that have their default, at any depth."""
+    if is_dataclass(value):
+        return {
+            field.name: _used(getattr(value, field.name), plain[field.name])
+            for field in fields(value)
+            if not (ADDED_LATER.items() <= field.metadata.items() and getattr(value, field.name) == field.default)
+        }
+    if isinstance(value, tuple):
+        return [_used(*pair) for pair in zip(value, plain, strict=True)]
+    return plain
 
 
 def from_json(kind: Callable[..., Kind], value: object) -> Kind:

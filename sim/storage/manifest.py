@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from infoset.limits import COUNT, NUMBER, WHOLE
+from infoset.limits import ADDED_LATER, COUNT, NUMBER, WHOLE
 from sim.chunk import CampaignNoise
 from sim.scenario import Scenario
 from sim.storage.codec import from_json, scenario_hash, to_json
@@ -25,7 +25,7 @@ MOST_DIFFERENCES = 20
 MOST_CELLS = 10_000
 MOST_RUNS_A_SHARD = 1_000_000
 
-_PROGRESS = ("runs", "until", "stopped_after", "made_by")
+_PROGRESS = ("runs", "until", "stopped_after", "cell_runs", "require", "made_by")
 """Keys that may differ between the sessions of a campaign."""
 _DERIVED = ("format", "schema", "version", "kind", "name", "scenario_hash", "sha256")
 """Keys of the file that follow from the others."""
@@ -41,8 +41,6 @@ class Axis:
         Key as in a scenario file, with its table and unit.
     values : tuple of float
         At least two values, in the unit of the file.
-    scale : str
-        Spacing of the values, `linear` or `log`.
 
     Raises
     ------
@@ -65,30 +63,31 @@ class Axis:
 class Manifest:
     """All that determines the numbers of a campaign or a sweep, its progress, and its division into chunks.
 
-    Chunks are numbered from 0, cell by cell; each is stored as one shard.
+    Chunks are numbered from 0; each is stored as one shard.
 
     Parameters
     ----------
     runs : int
-        Engagements of each cell, numbered from 0.
+        Engagements of each cell, numbered from 0; with `until` the greatest number.
     until : str or None
-        The rule that may stop the campaign early.
+        The rule that may stop the campaign early, or the requirement that stops the cells of a sweep.
     stopped_after : int or None
-        Runs after which the rule stopped it.
+        Runs after which the rule stopped the campaign.
+    cell_runs : tuple of int
+        Engagements of each cell of a finished sweep whose cells were stopped by a requirement; otherwise empty.
+    require : str or None
+        The requirement of a sweep, as asked for last; it does not change any result.
     scenario : Scenario
         Scenario; for a sweep the one that is varied.
-    seed : int
-        Root seed.
-    noise : CampaignNoise
-        Measurement noise of all cells.
     strategy : str
         Name; for a strategy in a Python file with the hash of the file: `mine.py:Mine sha256:0123456789abcdef`.
-    guarantee : bool
-        Whether the guaranteed miss Phi was computed.
     chunk : int
         Engagements per shard; the last shard of a cell may have fewer. Results do not depend on it.
     axes : tuple of Axis
         Keys that a sweep varies, in all combinations of values; the last varies fastest. Empty for a campaign.
+    order : str
+        How chunks are numbered: `cells`, all chunks of a cell one after the other, or `rounds`, the first chunks of all
+        cells, then the second ones, so that cells can be extended.
     cells_hash : str
         Fingerprint of the scenarios of a sweep's cells; empty for a campaign.
     versions : mapping of str to str
@@ -105,6 +104,8 @@ class Manifest:
     runs: int
     until: str | None = None
     stopped_after: int | None = None
+    cell_runs: tuple[int, ...] = field(default=(), metadata=ADDED_LATER)
+    require: str | None = field(default=None, metadata=ADDED_LATER)
     scenario: Scenario
     seed: int
     noise: CampaignNoise
@@ -112,6 +113,7 @@ class Manifest:
     guarantee: bool
     chunk: int
     axes: tuple[Axis, ...] = ()
+    order: Literal["cells", "rounds"] = field(default="cells", metadata=ADDED_LATER)
     cells_hash: str = ""
     versions: Mapping[str, str]
     made_by: Mapping[str, str] = field(default_factory=dict)
@@ -125,6 +127,10 @@ class Manifest:
             raise ValueError(f"axes make {self.cells} cells, more than the {MOST_CELLS} that a sweep may have")
         if self.stopped_after is not None and not 1 <= self.stopped_after <= self.runs:
             raise ValueError(f"stopped_after must be from 1 to {self.runs}: got {self.stopped_after}")
+        if self.cell_runs and (
+            len(self.cell_runs) != self.cells or not all(0 <= runs <= self.runs for runs in self.cell_runs)
+        ):
+            raise ValueError(f"cell_runs must contain {self.cells} numbers from 0 to {self.runs}")
 
     @property
     def kind(self) -> str:
@@ -136,9 +142,10 @@ class Manifest:
         """Number of simulated scenarios."""
         return math.prod(len(axis.values) for axis in self.axes)
 
-    @property
-    def wanted_runs(self) -> int:
-        """Engagements of each cell that belong to the result: fewer than `runs` where a rule stopped the campaign."""
+    def wanted_runs(self, cell: int) -> int:
+        """Return the engagements of a cell that belong to the result: fewer than `runs` where a rule stopped it."""
+        if self.cell_runs:
+            return self.cell_runs[cell]
         return self.runs if self.stopped_after is None else self.stopped_after
 
     @property
@@ -153,9 +160,16 @@ class Manifest:
 
     def runs_of(self, index: int) -> tuple[int, range]:
         """Return the cell and the numbers of the runs of a chunk."""
-        cell, number = divmod(index, self.chunks_a_cell)
+        if self.order == "cells":
+            cell, number = divmod(index, self.chunks_a_cell)
+        else:
+            number, cell = divmod(index, self.cells)
         first = number * self.chunk
         return cell, range(first, min(first + self.chunk, self.runs))
+
+    def index_of(self, cell: int, number: int) -> int:
+        """Return the number of the chunk that is the `number`-th of a cell, from 0."""
+        return cell * self.chunks_a_cell + number if self.order == "cells" else number * self.cells + cell
 
     def values_of(self, cell: int) -> dict[str, float]:
         """Return the varied values of a cell of a sweep, by key."""
@@ -167,9 +181,7 @@ class Manifest:
 
     def decisive(self) -> dict[str, Any]:
         """Return the values that must be equal in all sessions of a campaign, as JSON values."""
-        plain = to_json(self)
-        for key in _PROGRESS:
-            del plain[key]
+        plain = {key: value for key, value in to_json(self).items() if key not in _PROGRESS}
         return {"format": FORMAT, "schema": SCHEMA, "kind": self.kind, **plain}
 
     @property

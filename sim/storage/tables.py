@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from guidance import NoiseKind, TieRule
 from sim.chunk import Chunk
 from sim.columns import Column, columns_of, values_of
-from sim.results import Results
+from sim.results import OLD_OUTCOMES, Outcome, Results
 
 SCHEMA_VERSION = 2
 M_PER_KM = 1e3
@@ -150,14 +150,10 @@ def fault(content: bytes, wanted: Mapping[str, str], rows: int, *, with_cell: bo
 
     Parameters
     ----------
-    content : bytes
-        Content of the file.
     wanted : mapping of str to str
         Entries that the metadata of its schema must have.
     rows : int
         Number of rows that the file must have.
-    with_cell : bool
-        Whether the shard belongs to a sweep.
     """
     try:
         file = pq.ParquetFile(pa.BufferReader(content))
@@ -194,10 +190,19 @@ def read(file: Path, columns: Sequence[str] | None, *, with_cell: bool) -> Any:
     """
     wanted = _some(columns, with_cell=with_cell)
     try:
-        table = pq.ParquetFile(file).read(columns=wanted.names, use_threads=False)
+        names = {*wanted.names, *(["outcome"] if "set_emptied" in wanted.names else [])}
+        table = pq.ParquetFile(file).read(columns=list(names), use_threads=False)
         for field in wanted:
             if field.name not in table.column_names:
                 table = table.append_column(field.name, pa.nulls(len(table), field.type))
+        if "outcome" in names:
+            texts = table.column("outcome")
+            for old, outcome in OLD_OUTCOMES.items():
+                texts = pc.if_else(pc.equal(texts, old), outcome.value, texts)
+            table = table.set_column(table.column_names.index("outcome"), "outcome", texts)
+        if "set_emptied" in wanted.names:
+            emptied = pc.coalesce(table.column("set_emptied"), pc.equal(texts, Outcome.SET_EMPTY.value))
+            table = table.set_column(table.column_names.index("set_emptied"), "set_emptied", emptied)
         return table.select(wanted.names).cast(wanted).replace_schema_metadata(wanted.metadata)
     except (pa.ArrowException, KeyError) as error:
         raise ValueError(str(error)) from None
@@ -215,8 +220,10 @@ def _some(columns: Sequence[str] | None, *, with_cell: bool) -> Any:
 
 
 def numbers(table: Any, name: str) -> np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]:
-    """Return a column of numbers; masked where it is null."""
+    """Return a column of numbers, or of flags as 0 and 1; masked where it is null."""
     column = table.column(name)
+    if pa.types.is_boolean(column.type):
+        column = column.cast(pa.float64())
     if not column.null_count:
         return np.ma.MaskedArray(column.to_numpy(), mask=False)
     return np.ma.MaskedArray(pc.fill_null(column, 0).to_numpy(), mask=pc.is_null(column).to_numpy())

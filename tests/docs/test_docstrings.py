@@ -26,8 +26,10 @@ WITHOUT_UNITS = (
     *("infoset.ConvexPolygons", "infoset.polytope."),  # geometry in any unit
     *(
         "sim.Distribution",
+        "sim.HitEstimate",
         "sim.QuantileEstimate",
         "sim.empirical_distribution",
+        "sim.estimate_hits",
         "sim.estimate_quantiles",
         "sim.quantiles",
     ),

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from importlib.metadata import version
-from itertools import product
+from itertools import chain, product
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -31,11 +31,12 @@ CURVE_KEYS = [
     "impulse_m_s",
     "guaranteed_miss_m",
     "outcome",
+    "set_emptied",
     "truth_kept",
     "truth_margin_m",
     "phi_held",
 ]
-OUTCOMES = {"intercepted", "set-lost", "budget-spent", "diverged"}
+OUTCOMES = {"arrived", "set-empty", "budget-spent", "diverged"}
 
 
 @pytest.fixture(autouse=True)
@@ -225,7 +226,8 @@ def test_a_run_of_the_experiment_is_the_same_engagement(infoset: Command) -> Non
 def test_the_guaranteed_model_shows_its_certificate(infoset: Command) -> None:
     code, out, _ = infoset("experiment", "--runs", 4, "--model", "guaranteed")
     assert code == 0
-    assert out.count("inside the set at every step: 4 of 4 runs; miss within the bound Phi: 4 of 4 runs") == 4
+    sets = "true state inside the set at every step: 4 of 4 runs (100 %); set became empty: 0 of 4 runs (0 %)"
+    assert out.count(f"{sets}; miss within the bound Phi: 4 of 4 runs") == 4
     assert "acceleration along z at most 0.0050881 m/s^2" in out  # (0.005 + 3.9e-7) / (1 - 1 / 58)
     one = infoset.json("engage", "--model", "guaranteed", "--run", 3)
     assert one["phi_held"] is True
@@ -238,6 +240,7 @@ def test_engage_as_json(infoset: Command, tmp_path: Path) -> None:
     assert [key for key in found if key not in {"run", "runs"}] == [
         *("version", "scenario", "scenario_hash", "seed", "elapsed_s"),
         *CURVE_KEYS,
+        "hit",
         "inconsistency",
         "steps",
     ]
@@ -297,7 +300,7 @@ def test_engage_under_both_noises(infoset: Command, tmp_path: Path) -> None:
         "scenario.toml",
         "steps.csv",
     ]
-    for part in ("4.3", "244.7", "9.5", "521.7", "paper", "intercepted", "the paper's Phi (not a bound here), m"):
+    for part in ("4.3", "244.7", "9.5", "521.7", "paper", "arrived", "the paper's Phi (not a bound here), m"):
         assert part in out
     found = json.loads((folder / "results.json").read_text())
     assert [key for key in found if key in {"random", "game"}] == ["random", "game"]
@@ -338,19 +341,29 @@ def test_replay_of_one_record(infoset: Command, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
-        (["experiment", "--runs", "0"], ["--runs", "greater than or equal to 1"]),
-        (["experiment", "--runs", "-3"], ["--runs", "greater than or equal to 1"]),
-        (["experiment", "--runs", "10000001"], ["--runs", "less than or equal to 10000000"]),
-        (["experiment", "--runs", "9" * 100], ["--runs", "less than or equal to 10000000"]),
-        (["experiment", "--seed", "-1"], ["--seed", "Input should be greater than or equal to 0"]),
-        (["engage", "--seed", "-1"], ["--seed", "Input should be greater than or equal to 0"]),
-        (["engage", "--run", "-1"], ["--run", "greater than or equal to 0"]),
-        (["engage", "--run", "9" * 30], ["--run", "less than or equal to 9999999"]),
+        (["experiment", "--runs", "0"], ["--runs: must be from 1 to 10000000, found 0; for example --runs 50"]),
+        (["experiment", "--runs", "-3"], ["--runs: must be from 1 to 10000000, found -3; for example --runs 50"]),
+        (["experiment", "--runs", "abc"], ['--runs: must be a whole number, found "abc"; for example --runs 50']),
+        (["experiment", "--sections", "3.5"], ['--sections: must be a whole number, found "3.5"; for example']),
+        (["replay", "a.npz", "--speed", "fast"], ['--speed: must be a finite number, found "fast"; for example']),
+        (["pursuit", "--delay-s", "nan"], ["--delay-s: must be a finite number, found nan; for example --delay-s 0.0"]),
+        (["experiment", "--runs", "10000001"], ["--runs", " to 10000000, found "]),
+        (["experiment", "--runs", "9" * 100], ["--runs", " to 10000000, found "]),
+        (["experiment", "--seed", "-1"], ["--seed", "must be at least 0, found -1; for example --seed 0"]),
+        (["engage", "--seed", "-1"], ["--seed", "must be at least 0, found -1; for example --seed 0"]),
+        (["engage", "--run", "-1"], ["--run", "must be from 0 to "]),
+        (["engage", "--run", "9" * 30], ["--run", " to 9999999, found "]),
         (["experiment", "--strategy", "symetric-miss"], ["--strategy", "did you mean symmetric-miss?"]),
         (["experiment", "--strategy", "[red]"], ["--strategy", "[red]", "choose one of"]),
-        (["engage", "--model", "papr"], ["--model", "'papr' is not one of 'paper', 'guaranteed'"]),
-        (["engage", "--tie", "uper"], ["--tie", "'uper' is not one of 'upper', 'lower', 'alternate', 'random'"]),
-        (["engage", "--noise", "gmae"], ["--noise", "'gmae' is not one of 'random', 'game', 'both'"]),
+        (
+            ["engage", "--model", "papr"],
+            ["--model", 'there is no "papr"; did you mean paper? choose one of: paper, guaranteed'],
+        ),
+        (["engage", "--tie", "uper"], ["--tie", 'there is no "uper"; did you mean upper? choose one of: upper, lower']),
+        (
+            ["engage", "--noise", "gmae"],
+            ["--noise", 'there is no "gmae"; did you mean game? choose one of: random, game, both'],
+        ),
         (["experiment", "--sections", "4"], ["--sections", "from 5", "fewest_sections", "found 4"]),
         (["experiment", "--sections", "100001"], ["--sections", "found 100001"]),
         (["engage", "asteroid-1997-single", "--range-meter"], ["--range-meter", "[range_sensor]", "relative_error"]),
@@ -552,5 +565,6 @@ def test_interrupt_of_a_process(tmp_path: Path) -> None:
 
 
 def test_the_run_of_every_command_takes_its_options() -> None:
-    for _, options, module, _ in COMMANDS:
-        assert get_type_hints(importlib.import_module(module).run) == {"options": options, "return": type(None)}
+    for options, module, _ in chain.from_iterable(COMMANDS.values()):
+        run = importlib.import_module(f"experiments.{module}").run
+        assert get_type_hints(run) == {"options": options, "return": type(None)}

@@ -7,6 +7,7 @@ import hashlib
 import html
 import json
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations
 from typing import Any
@@ -18,12 +19,16 @@ from hypothesis import strategies as st
 
 from experiments.common.errors import InputError
 from experiments.common.page_document import asset, embedded_json, page
-from experiments.common.page_packing import STEPS_OF_A_BOX, packed_outlines
-from experiments.interception.page import interception_page
-from experiments.interception.replayed_sets import replayed
+from experiments.interception.page import STEPS_OF_A_BOX, interception_page, packed_outlines, replayed
 from experiments.interception.scenario_file import load_scenario
+from experiments.multipoint.file import load_multipoint
+from experiments.multipoint.page import multipoint_page
+from experiments.multipoint.scene import Scene
+from experiments.pursuit.file import load_pursuit
+from experiments.pursuit.page import pursuit_page
 from guidance import NoiseKind
 from infoset import InitialSet, Model, RateSensor, Recovery
+from rendezvous.pursuit_evasion import solve
 from sim import Outcome, Record, fly_one
 
 MOST_BYTES = 6_000_000
@@ -85,7 +90,7 @@ def flown(name: str) -> Record:
 @pytest.mark.parametrize("name", ["game", "guaranteed", "lost", "recovered"])
 def test_replaying_gives_the_recorded_sets_bit_for_bit(name: str) -> None:
     record = flown(name)
-    assert (record.result.outcomes[0] is Outcome.SET_LOST) == (name in ("lost", "recovered"))
+    assert (record.result.outcomes[0] is Outcome.SET_EMPTY) == (name in ("lost", "recovered"))
     stages = list(replayed(record))
     assert len(stages) == len(record.steps) + 1
     for each, step in zip(stages, record.steps, strict=False):
@@ -176,3 +181,27 @@ def test_colours_that_stand_together_can_be_told_apart_by_the_colour_blind(theme
     for one, other in combinations(("ink", "set", "measured"), 2):
         apart = np.abs(seen_without(colours[one], kind) - seen_without(colours[other], kind)).max()
         assert apart >= 0.1, (one, other)
+
+
+def _visits() -> str:
+    problem = load_multipoint("service-5")
+    path = problem.tour.fly((0, 2, 1, 3, 4), np.array([1800.0, 3600.0, 6000.0, 8700.0, 11000.0]))
+    return multipoint_page("visits", Scene(problem.axes, problem.tour, (0, 2, 1, 3, 4), path))
+
+
+def _pursuit() -> str:
+    return pursuit_page("pursuit", "", solve(load_pursuit("geo-pursuit").game()))
+
+
+@pytest.mark.parametrize("draw", [_visits, _pursuit])
+def test_no_two_marks_of_a_page_are_alike(draw: Callable[[], str]) -> None:
+    moving = re.findall(r'colour: "\w+", dash: .*mark: "(\w+)"', asset("motion.js"))
+    assert len(set(moving)) == len(moving) == 5
+    found = re.search(r'<script type="application/json"[^>]*>(.*?)</script>', draw(), re.DOTALL)
+    assert found is not None
+    for view in json.loads(found[1])["views"]:
+        looks = [track["look"] for track in view["tracks"]]
+        assert len(set(looks)) == len(looks)
+        named = [mark["kind"] for mark in view["marks"] if mark["name"]]
+        assert len(set(named)) == len(named)
+        assert not set(named) & set(moving)

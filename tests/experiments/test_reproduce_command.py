@@ -13,6 +13,7 @@ import pytest
 from experiments.common.published_number import (
     CUT_OR_ROUNDED,
     Band,
+    Origin,
     Progress,
     PublishedNumber,
     Reference,
@@ -160,11 +161,37 @@ def test_a_number_that_should_agree_and_does_not(
     monkeypatch.setattr("experiments.reproduced_numbers.reproduce_paper", only(right, wrong))
     code, out, err = infoset("--paper", "reachability", "--json", "-", "-q")
     assert code == 1
-    assert "table 1, y (m): printed 1.25" in err
+    assert "table 1, y (m): paper prints: 1.25, ours" in err
     assert "x (m)" not in err
     numbers = json.loads(out)["papers"][0]["numbers"]
     assert [each["verdict"] for each in numbers] == ["agreed", "disagreed"]
     assert numbers[1]["ours"] == (1.3 if ours == 1.3 else None)
+
+
+def test_printed_numbers_other_computations_and_our_spread_are_apart(
+    infoset: Infoset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each origin has its own table with its own titles, and no digit is cut on a screen of 60 columns."""
+    spread = Band(0.067, 4.98)
+    run = PublishedNumber("pareto", "one run", "random, miss (m)", "4.3", 1.5, spread, unexplained=True, spread=spread)
+    numbers = (
+        REFERENCE.number("table 1", "a rather long name of a number (m^2/s^3)", "-1.2345678901e-7", -1.2345678901e-7),
+        run,
+        Reference("pareto", origin=Origin.OTHER).number("figure 4", "miss (m)", "1.2", 1.21),
+        Reference("pareto", origin=Origin.EXACT).number("cubic spline", "I", "41.076923077", 41.0769230769),
+    )
+    monkeypatch.setattr("experiments.reproduced_numbers.reproduce_paper", only(*numbers))
+    monkeypatch.setenv("COLUMNS", "60")
+    code, out, _ = infoset("--paper", "pareto")
+    assert code == 0
+    titles = ("paper prints", "paper, one run  our median  5 to 95 % of ours", "other program")
+    for text in (*titles, "exact", "-1.2345678901e-7", "-1.23456789010e-07", "0.067 .. 4.98", "41.076923077", "5e-18"):
+        assert text in out
+    assert "…" not in out
+    assert [line for line in out.splitlines() if len(line) > 60] == []
+    code, out, _ = infoset("--paper", "pareto", "--json", "-", "-q")
+    origins = [number["origin"] for number in json.loads(out)["papers"][0]["numbers"]]
+    assert origins == ["paper", "paper", "other implementation", "closed form"]
 
 
 def test_a_wrong_rate_is_seen(infoset: Infoset, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -177,9 +204,12 @@ def test_a_wrong_rate_is_seen(infoset: Infoset, monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
-        (["--paper", "paretto"], ["--paper", "'paretto' is not one of 'interception', 'pareto', "]),
-        (["--paper", "number"], ["'number' is not one of 'interception', 'pareto'"]),
-        (["--paper", "../pareto"], ["'../pareto' is not one of"]),
+        (
+            ["--paper", "paretto"],
+            ["--paper", 'there is no "paretto"; did you mean pareto? choose one of: interception, '],
+        ),
+        (["--paper", "number"], ['there is no "number"; choose one of: interception, pareto']),
+        (["--paper", "../pareto"], ['there is no "../pareto"']),
         (["--json", "missing/numbers.json"], ["there is no folder"]),
     ],
 )

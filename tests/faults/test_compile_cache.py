@@ -206,7 +206,7 @@ def test_no_folder_can_be_written(installation: Path, tmp_path: Path, ordinary: 
     """The library alone, as in a notebook: it works, and one line says what to do."""
     code = (
         "from infoset import kernels; kernels.NOTICE_AFTER_S = 0.0; kernels._private_folder = kernels._user_folder\n"
-        "from rendezvous.relative_motion import _circular; print(_circular.angle_less_sine(1.0))"
+        "from rendezvous.relative_motion.clohessy_wiltshire import angle_less_sine; print(angle_less_sine(1.0))"
     )
     sealed = tmp_path / "home"
     sealed.mkdir(mode=0o500)

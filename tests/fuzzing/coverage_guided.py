@@ -247,12 +247,12 @@ def _expressions() -> tuple[Parse, Mutate, list[bytes]]:
     from experiments.interception.scenario_file import load_scenario
     from experiments.pursuit.file import load_pursuit
     from experiments.pursuit.map import read_axis
-    from sim.stopping_rule import QuantileName, Requirement, StoppingRule
+    from sim import QuantileName, Requirement, StoppingRule
 
     from .mutations import mutated_bytes
     from .subjects import attempted
 
-    scenario, game = load_scenario("asteroid-1997"), load_pursuit("geo-pursuit")
+    scenario = load_scenario("asteroid-1997")
 
     def parse(content: bytes) -> None:
         text = content[1:].decode(errors="surrogateescape")
@@ -269,7 +269,7 @@ def _expressions() -> tuple[Parse, Mutate, list[bytes]]:
             read_axis("--x", text)
         elif option == b"s":
             name, _, value = text.partition("=")
-            game.with_settings([f"{name}={value}"])
+            load_pursuit("geo-pursuit", [f"{name}={value}"])
 
     def _first(axis: Any) -> Any:
         return type(axis)(axis.key, axis.values[:3], axis.scale)

@@ -75,7 +75,7 @@ def scenarios(draw: st.DrawFn) -> str:
     }
     period_s, sun_km = step_s * draw(st.integers(1, 3)), range_km * draw(sizes(10.0, 1e4))
     impulse = slow * 1e3 * draw(sizes(1e-3, 10.0))
-    optional = draw(st.lists(st.sampled_from(["sun", "range_sensor", "rate_sensor", "target"]), unique=True))
+    optional = draw(st.lists(st.sampled_from(["sun", "range_sensor", "rate_sensor", "target", "body"]), unique=True))
     rare: dict[str, Values] = {
         "sun": {
             "gravitational_parameter_km3_s2": speed**2 * sun_km * draw(sizes(1e-6, 1e-2)),
@@ -89,6 +89,7 @@ def scenarios(draw: st.DrawFn) -> str:
             "acceleration_m_s2": draw(sizes(1e-9, 1.0)),
             "switching_period_s": step_s,
         },
+        "body": {"radius_m": range_km * draw(sizes(1e-9, 1e2))},
     }
     tables: dict[str, Values] = {
         "nominal": {"range_km": range_km, "closing_speed_km_s": speed},

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from guidance import Strategy, Thruster, TieRule
 from infoset import AngleSensor, InitialSet, Model, RateSensor, SetModel, StateBox
 from infoset.model import Interval
-from sim import Results, Scenario, Target
+from sim import Body, Results, Scenario, Target
 from sim.draws import Draws, corners, greatest_number_of_steps
 from sim.engagement import Engagements, Step
 
@@ -199,4 +199,5 @@ def scaled(scenario: Scenario, draws: Draws, length: float, time: float) -> tupl
         target=None
         if target is None
         else Target(target.manoeuvre, acceleration * target.acceleration_m_s2, time * target.switching_period_s),
+        body=None if scenario.body is None else Body(length * scenario.body.radius_m),
     ), replace(draws, position_m=length * draws.position_m, velocity_m_s=speed * draws.velocity_m_s)

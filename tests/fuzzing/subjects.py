@@ -14,7 +14,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from experiments.common.problem_file import built_in_problems
+from experiments.common.file_kinds import PROBLEM_COMMANDS, built_in_files
+from experiments.common.toml_file import read_tables
 from experiments.interception import record_file
 from experiments.interception.scenario_file import (
     load_scenario,
@@ -26,7 +27,8 @@ from experiments.interception.scenario_file import (
 )
 from experiments.multipoint.file import load_multipoint
 from experiments.pareto.file import load_pareto
-from experiments.pursuit.file import load_pursuit, read_problem
+from experiments.pursuit.file import FORM as PURSUIT
+from experiments.pursuit.file import load_pursuit
 from experiments.reachability.file import load_rendezvous
 from infoset import AngleSensor, StateBox
 from sim import Campaign, CampaignNoise, Record, Scenario, fly_one
@@ -62,9 +64,10 @@ class TextFile:
 def text_files() -> Mapping[str, TextFile]:
     """Return the kinds of files that people write, by name."""
     problems: dict[str, list[str]] = {}
-    for each in built_in_problems():
-        problems.setdefault(each.kind, []).append(each.text)
-    readers = {
+    for each in built_in_files().values():
+        if each.kind in PROBLEM_COMMANDS:
+            problems.setdefault(each.kind, []).append(each.text)
+    readers: dict[str, Callable[[str], object]] = {
         "pareto-encounter": load_pareto,
         "multipoint": lambda path: load_multipoint(path).tour,
         "pursuit-evasion": _read_pursuit,
@@ -84,7 +87,7 @@ def _read_scenario(path: str) -> Scenario:
 def _read_pursuit(path: str) -> object:
     problem = load_pursuit(path)
     problem.warnings()
-    assert read_problem(problem.to_toml(), "written again").tables == problem.tables
+    assert read_tables(PURSUIT, problem.to_toml(), "written again") == problem.tables
     try:
         return problem.game()
     except ValueError as error:  # what the core documents

@@ -64,7 +64,7 @@ def assert_works(scenario: Scenario, draws: Draws, steps: int | None = None) -> 
         assert np.isfinite(values).all()
     if scenario.set_model.is_guaranteed:
         assert there.results.truth_kept.all()
-        assert Outcome.SET_LOST not in there.results.outcomes
+        assert Outcome.SET_EMPTY not in there.results.outcomes
         assert not there.ended or there.results.phi_held.filled(True).all()
     back = fly(*mirrored(scenario, draws), steps=steps)
     size = TOLERANCE * np.abs(there.upper_m - there.lower_m).max()
@@ -324,7 +324,7 @@ def test_what_is_known_exactly_is_no_trouble(exact: str, model: Model, sections:
         assert there.ended
         assert np.isfinite(there.results.miss_m).all()
         if model is Model.GUARANTEED:
-            assert Outcome.SET_LOST not in there.results.outcomes
+            assert Outcome.SET_EMPTY not in there.results.outcomes
             # Two thousand substeps of half a second round the truth's own position: two thousand ulp of 2 km.
             assert there.results.truth_margin_m.min() >= -2200 * 2.0**-52 * 2e3
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from experiments.cli import main
 from experiments.common.errors import InputError
-from experiments.common.toml_file import LARGEST_FILE_BYTES
+from experiments.common.file_kinds import LARGEST_FILE_BYTES
 from experiments.common.toml_file import MOST_PROBLEMS as MOST
 
 from .documents import KINDS

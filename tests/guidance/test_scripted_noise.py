@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from guidance import GameNoise, LineOfSight
+from guidance.game_noise import SwitchingNoise
 from guidance.noise import TieRule
 from guidance.scripted_noise import ScriptedNoise, errors_made, measure_with_errors
-from guidance.switching_noise import SwitchingNoise
 from infoset import AngleSensor, InformationSet, RangeSensor, RateSensor, SetModel, StateBox
 from infoset.sensors import Sensor
 

@@ -22,10 +22,10 @@ from guidance import (
     ZeroEffortMiss,
     strategy_names,
 )
-from guidance.estimated_miss import impulse_beyond_dead_zone
 from guidance.kalman import KalmanState
 from guidance.least_squares import LeastSquaresState
 from guidance.patient import correctable_later_m
+from guidance.predicted_miss import impulse_beyond_dead_zone
 from infoset import AngleSensor, ExtremePoints, InformationSet, PredictedMiss, RangeSensor, SetModel, StateBox
 from sim import Results, Scenario, simulate
 from sim.draws import Draws, draw
@@ -251,7 +251,7 @@ def test_an_angle_that_is_not_new_tells_nothing(make: Callable[[], Strategy]) ->
         assert (state.covariance[0, :, 0, 0] >= before).all()
     else:
         strategy.decide(again, state)
-        assert state.angles.count == 1
+        assert len(state.angles.times_s) == 1
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rendezvous.greatest_control import greatest_control
+from rendezvous.piecewise import greatest_control
 
 Floats = NDArray[np.float64]
 

@@ -114,7 +114,7 @@ def fly_in_the_model(scenario: Scenario, engagements: int, seed: int) -> Results
 def test_the_truth_stays_in_its_section_in_the_models_own_dynamics(asteroid: Scenario, noise: NoiseKind) -> None:
     results = fly_in_the_model(replace(asteroid, noise=noise), 160, 5)
     assert results.truth_margin_m.min() >= 0.0
-    assert Outcome.SET_LOST not in results.outcomes
+    assert Outcome.SET_EMPTY not in results.outcomes
 
 
 @pytest.mark.slow
@@ -125,7 +125,7 @@ def test_the_truth_stays_in_its_section_in_ten_thousand_engagements(asteroid: Sc
         scenario = replace(asteroid, noise=noise, tie=rules[part % len(rules)])
         results = fly_in_the_model(scenario, 200, 100 + part)
         assert results.truth_margin_m.min() >= 0.0
-        assert Outcome.SET_LOST not in results.outcomes
+        assert Outcome.SET_EMPTY not in results.outcomes
 
 
 def test_a_run_is_the_same_in_whatever_company(ranging: Scenario) -> None:
@@ -196,7 +196,7 @@ def test_a_strategy_that_returns_nonsense_is_named(asteroid: Scenario) -> None:
 def test_a_wrong_model_of_the_start_loses_the_set(asteroid: Scenario) -> None:
     far = StateBox((60e3, 60e3), (5801.3e3, 5801.3e3), (0.0, 0.0), (-58e3, -58e3))
     results = simulate(replace(asteroid, dispersion=far), 3)
-    assert set(results.outcomes) == {Outcome.SET_LOST}
+    assert set(results.outcomes) == {Outcome.SET_EMPTY}
     assert not results.truth_kept.any()
     assert np.isfinite(results.miss_m).all()
 

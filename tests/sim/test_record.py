@@ -30,7 +30,7 @@ def test_the_measurement_that_empties_the_set_for_good_is_kept(brief: Scenario) 
     ranging = replace(brief, set_model=model, range_sensor=RangeSensor(model.step_s, 1e-3))
     record = fly_one(ranging, noise=RangeAlone())
     first, later = record.steps[0], record.steps[1]
-    assert record.result.outcomes == (Outcome.SET_LOST,)
+    assert record.result.outcomes == (Outcome.SET_EMPTY,)
     assert first.measured == {"range": 10.0 * first.true_range_m}
     assert later.measured == {}
 

@@ -1,13 +1,14 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim import band_half_width, empirical_distribution, estimate_quantiles, quantiles
+from sim import band_half_width, empirical_distribution, estimate_hits, estimate_quantiles, quantiles
 from sim.statistics import order_statistics
 
 
@@ -101,3 +102,35 @@ def test_quantiles_of_a_small_sample_have_open_ends() -> None:
 def test_no_quantiles_of_nothing(sample: list[float], levels: list[float], confidence: float) -> None:
     with pytest.raises(ValueError, match=r"quantiles need|levels must"):
         estimate_quantiles(sample, levels, confidence)
+
+
+def tail(runs: int, hits: range, probability: float) -> float:
+    """Probability of a number of hits in a range, summed exactly."""
+    p = Fraction(probability)
+    return float(sum(math.comb(runs, k) * p**k * (1 - p) ** (runs - k) for k in hits))
+
+
+@pytest.mark.parametrize(("hits", "runs"), [(1, 1), (1, 2), (19, 20), (48, 50), (50, 50), (0, 7), (3, 160), (187, 200)])
+@pytest.mark.parametrize("confidence", [0.8, 0.95, 0.999])
+def test_the_interval_of_hits_ends_where_the_binomial_tails_are_half_the_rest(
+    hits: int, runs: int, confidence: float
+) -> None:
+    found = estimate_hits(hits, runs, confidence)
+    half = 0.5 * (1.0 - confidence)
+    assert (found.runs, found.hits, found.probability) == (runs, hits, hits / runs)
+    assert 0.0 <= found.lower <= found.probability <= found.upper <= 1.0
+    if hits:
+        assert tail(runs, range(hits, runs + 1), found.lower) == pytest.approx(half, rel=1e-9)
+    else:
+        assert found.lower == 0.0
+    if hits < runs:
+        assert tail(runs, range(hits + 1), found.upper) == pytest.approx(half, rel=1e-9)
+    else:
+        assert found.upper == 1.0
+
+
+@pytest.mark.parametrize("runs", [1, 20, 59, 1000])
+def test_no_hit_and_all_hits_have_closed_forms(runs: int) -> None:
+    none, every = estimate_hits(0, runs), estimate_hits(runs, runs)
+    assert every.lower == pytest.approx(0.025 ** (1.0 / runs), rel=1e-12)
+    assert none.upper == pytest.approx(1.0 - 0.025 ** (1.0 / runs), rel=1e-9)

@@ -117,8 +117,8 @@ class Canvas {
     drawPath(this.context, points, { stroke, fill, width, dash, closed, opacity });
   }
 
-  mark(x, y, kind, colour) {
-    drawMark(this.context, x, y, kind, colour);
+  mark(x, y, kind, colour, filled = false) {
+    drawMark(this.context, x, y, kind, colour, 5, filled);
   }
 }
 
@@ -139,18 +139,28 @@ function drawPath(context, points, { stroke, fill, width = 1.5, dash = [], close
   }
 }
 
-/** A mark with a halo: cross, square, dot or diamond. */
-function drawMark(context, x, y, kind, colour, size = 5) {
+/** The outline of a regular polygon whose first corner is at an angle in degrees, clockwise from the right. */
+const polygon = (corners, from, size = 1.35) => [...Array(corners + 1).keys()].map((corner) => {
+  const angle = (from / 180 + 2 * corner / corners) * Math.PI;
+  return [size * Math.cos(angle), size * Math.sin(angle)];
+});
+
+/** A mark with a halo: cross or plus, or an outline, filled or not. */
+function drawMark(context, x, y, kind, colour, size = 5, filled = false) {
   const shapes = {
     cross: [[[-1, -1], [1, 1]], [[-1, 1], [1, -1]]],
     square: [[[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]],
     diamond: [[[0, -1.3], [1.3, 0], [0, 1.3], [-1.3, 0], [0, -1.3]]],
-    dot: [[...Array(13).keys()].map((k) => [Math.cos(k * Math.PI / 6), Math.sin(k * Math.PI / 6)])],
+    plus: [[[-1.3, 0], [1.3, 0]], [[0, -1.3], [0, 1.3]]],
+    triangle: [polygon(3, -90)],
+    nabla: [polygon(3, 90)],
+    pentagon: [polygon(5, -90)],
+    dot: [polygon(12, 0, 1)],
   };
   const lines = shapes[kind].map((line) => line.map(([u, v]) => [x + size * u, y + size * v]));
-  const closed = kind !== "cross";
+  const closed = kind !== "cross" && kind !== "plus";
   for (const line of lines) drawPath(context, line, { stroke: theme.colours.panel, width: 5 });
-  for (const line of lines) drawPath(context, line, { stroke: colour, width: 2, fill: closed && theme.colours.panel });
+  for (const line of lines) drawPath(context, line, { stroke: colour, width: 2, fill: closed && (filled ? colour : theme.colours.panel) });
 }
 
 /** A plane with axes: a drawing begins with `begin` and ends with `end`; between them all is in the axes' units. */

@@ -2,20 +2,25 @@
 "use strict";
 // Moving craft: paths in space and in planes, reachable sets, and curves over time.
 
+// Marks of moving points; those of fixed points are diamond, plus and cross.
 const LOOKS = [
   { colour: "set", dash: [], mark: "dot" },
   { colour: "impulse", dash: [6, 3], mark: "square" },
-  { colour: "extra", dash: [2, 2], mark: "diamond" },
-  { colour: "measured", dash: [8, 2, 2, 2], mark: "dot" },
-  { colour: "ink", dash: [1, 3], mark: "square" },
+  { colour: "extra", dash: [2, 2], mark: "triangle" },
+  { colour: "measured", dash: [8, 2, 2, 2], mark: "nabla" },
+  { colour: "ink", dash: [1, 3], mark: "pentagon" },
 ];
-const lookOf = (index) => LOOKS[index % LOOKS.length];
+/** The look of a track; marks of later rounds are filled, with the colours in another order. */
+const lookOf = (index) => {
+  const [round, place] = [Math.floor(index / LOOKS.length), index % LOOKS.length];
+  return { ...LOOKS[(place + round) % LOOKS.length], mark: LOOKS[place].mark, filled: round > 0 };
+};
 const colourOf = (index) => theme.colours[lookOf(index).colour];
 
 /** An entry of a legend for a look: its line and its mark. */
 const lookKey = (name, index) => [name, (context) => {
   drawPath(context, [[1, 6], [21, 6]], { stroke: colourOf(index), width: 2, dash: lookOf(index).dash });
-  drawMark(context, 11, 6, lookOf(index).mark, colourOf(index), 3);
+  drawMark(context, 11, 6, lookOf(index).mark, colourOf(index), 3, lookOf(index).filled);
 }];
 
 let chosen = null; // index of the choice shown; null shows all of them
@@ -80,7 +85,7 @@ class View {
     for (const { point, kind } of view.marks) panel.mark(...this.place(point).slice(0, 2), kind, theme.colours.ink);
     for (const track of view.tracks.filter(isShown)) {
       const at = this.place(track.points[Math.min(this.frame, track.points.length - 1)]);
-      panel.mark(at[0], at[1], lookOf(track.look).mark, colourOf(track.look));
+      panel.mark(at[0], at[1], lookOf(track.look).mark, colourOf(track.look), lookOf(track.look).filled);
     }
     if (view.plane) panel.end();
   }

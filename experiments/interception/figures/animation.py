@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Sequence
+from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.axes import Axes
+from PIL import Image, ImageSequence
 
 from experiments.common.errors import InputError
 from experiments.common.figure_style import INK, new_figure, place_axes, plain, style
@@ -19,10 +21,9 @@ from experiments.interception.record_titles import record_titles
 from sim import Record, StepRecord
 
 GIF, MP4 = ".gif", ".mp4"
-FRAMES_PER_S = 10
-DPI = 90
+DURATION_S = 8.0
+COLOURS = 16
 
-_MOST_FRAMES = 80
 _SECTIONS = 7
 _SECOND_MM = 58.0
 
@@ -32,8 +33,6 @@ def animation_path(option: str, path: Path | None, ending: str) -> None:
 
     Parameters
     ----------
-    option : str
-        Option in the message.
     ending : str
         ``.gif`` or ``.mp4``.
 
@@ -53,29 +52,31 @@ def animation_path(option: str, path: Path | None, ending: str) -> None:
         )
 
 
-def animate(records: Sequence[Record], ending: str, progress: Callable[[float], None] = lambda _done: None) -> bytes:
-    """Return an animation of engagements, side by side.
+def animate(
+    records: Sequence[Record],
+    ending: str,
+    most_frames: int = 40,
+    width_px: int | None = None,
+    progress: Callable[[float], None] = lambda _done: None,
+) -> bytes:
+    """Return an animation of engagements, side by side, of eight seconds.
 
     Parameters
     ----------
     ending : str
-        ``.gif`` (by Pillow) or ``.mp4`` (by ffmpeg).
-    progress : callable
-        Receives the fraction done.
-
-    Returns
-    -------
-    bytes
-        The file.
-
-    Notes
-    -----
-    At most 80 frames, evenly distributed over the steps; about 0.2 s each.
+        ``.gif`` (by Pillow, with 16 colours) or ``.mp4`` (by ffmpeg).
+    most_frames : int
+        Frames are evenly distributed over the steps, about 0.2 s of computing each.
+    width_px : int or None
+        Width of a frame; None is 425, or 640 for two records.
     """
-    writer: AbstractMovieWriter = PillowWriter(fps=FRAMES_PER_S) if ending == GIF else FFMpegWriter(fps=FRAMES_PER_S)
     times = np.unique([step.time_s for record in records for step in record.steps])
-    chosen = times[np.unique(np.linspace(0, len(times) - 1, min(len(times), _MOST_FRAMES)).round().astype(int))]
-    width_mm = 180.0 if len(records) > 1 else 120.0
+    count = min(len(times), most_frames)
+    chosen = times[np.unique(np.linspace(0, len(times) - 1, count).round().astype(int))]
+    fps = max(1, round(most_frames / DURATION_S))
+    writer: AbstractMovieWriter = PillowWriter(fps=fps) if ending == GIF else FFMpegWriter(fps=fps)
+    width_mm, usual_px = (180.0, 640) if len(records) > 1 else (120.0, 425)
+    width = usual_px if width_px is None else width_px
     with style(), TemporaryDirectory() as folder:
         file = Path(folder) / f"animation{ending}"
         figure = new_figure(height_mm=86.0 + _SECOND_MM, width_mm=width_mm)
@@ -90,7 +91,7 @@ def animate(records: Sequence[Record], ending: str, progress: Callable[[float], 
             axes.tick_params(labelleft=axes is below[0])
         level_predicted_miss(below, records)
         lines = [axes.axvline(float(chosen[0]), color=INK, linewidth=1.0) for axes in below]
-        with writer.saving(figure, str(file), DPI):
+        with writer.saving(figure, str(file), width / figure.get_figwidth()):
             for index, time in enumerate(chosen.tolist()):
                 steps = [min(record.steps, key=lambda step: abs(step.time_s - time)) for record in records]
                 _draw_planes(above, steps, titles)
@@ -98,7 +99,18 @@ def animate(records: Sequence[Record], ending: str, progress: Callable[[float], 
                     line.set_xdata([time, time])
                 writer.grab_frame()
                 progress((index + 1) / len(chosen))
-        return file.read_bytes()
+        return _few_colours(file) if ending == GIF else file.read_bytes()
+
+
+def _few_colours(file: Path) -> bytes:
+    """Return a GIF file with few colours, which makes it smaller."""
+    with Image.open(file) as animation:
+        frames = [frame.convert("RGB") for frame in ImageSequence.Iterator(animation)]
+    flat = [frame.quantize(COLOURS, dither=Image.Dither.NONE) for frame in frames]
+    content = BytesIO()
+    frame_ms = round(1000 * DURATION_S / len(flat))
+    flat[0].save(content, "gif", save_all=True, append_images=flat[1:], duration=frame_ms, loop=0, optimize=True)
+    return content.getvalue()
 
 
 def _draw_planes(row: Sequence[Axes], steps: Sequence[StepRecord], titles: Sequence[str]) -> None:

@@ -29,17 +29,7 @@ _SECONDS_SHOWN = 3.0
 def draw_bound(scenario: Scenario, lower: LowerBound) -> Figure:
     """Draw (a) the bound over the label, one curve per closing speed, and (b) the pair of true states that proves it.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        Sensor and step are used.
-    lower : LowerBound
-        Result of `sim.lower_bound` for this scenario.
-
-    Returns
-    -------
-    Figure
-        Two axes.
+    The bound is the result of `sim.lower_bound` for this scenario.
     """
     with style():
         figure = new_figure(height_mm=_HEIGHT_MM + 19.0)
@@ -55,12 +45,7 @@ def ripples(labels_m: Floats, bounds_m: Floats) -> list[tuple[Floats, Floats]]:
     Parameters
     ----------
     labels_m, bounds_m : ndarray, shape (n,)
-        Labels in rising order.
-
-    Returns
-    -------
-    list of tuple of ndarray
-        Stretches of labels that lie close together, with their bounds.
+        Labels in rising order, and their bounds. The stretches that are returned have labels that lie close together.
     """
     gaps = np.diff(labels_m)
     if not len(gaps):

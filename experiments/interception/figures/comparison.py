@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from experiments.common.figure_style import INK, SET_EDGE, SET_FILL, new_figure, place_axes, style
 from experiments.interception.comparison import Comparison
+from experiments.interception.figures.distributions import draw_radius
 from guidance import NoiseKind
 
 Floats = NDArray[np.float64]
@@ -29,13 +30,15 @@ _BAR = 0.17
 _NOISES = ((NoiseKind.RANDOM, "random noise"), (NoiseKind.GAME, "game noise, worst of four tie rules"))
 
 
-def draw_comparison(compared: Sequence[Comparison]) -> Figure:
+def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = None) -> Figure:
     """Draw the distributions of (a, b) the miss and (c, d) the impulse spent, one row per strategy.
 
     Parameters
     ----------
     compared : sequence of Comparison
         Of each strategy one under random and one under game noise.
+    radius_m : float or None
+        Radius of the body, m, which is a line in (a) and (b); None draws none.
 
     Returns
     -------
@@ -56,7 +59,10 @@ def draw_comparison(compared: Sequence[Comparison]) -> Figure:
                 axes.set_xlabel(label)
         for axes, letter in zip((*rows[0], *rows[1]), "abcd", strict=True):
             axes.set_title(f"({letter}) {_NOISES['abcd'.index(letter) % 2][1]}")
-        figure.legend(handles=_handles(len(compared[0].miss_m)), loc="lower center", ncols=5, columnspacing=1.6)
+        handles = _handles(len(compared[0].miss_m))
+        (radius, _) = [draw_radius(axes, radius_m) for axes in rows[0]]
+        handles += radius
+        figure.legend(handles=handles, loc="lower center", ncols=5 if radius_m is None else 3, columnspacing=1.6)
     return figure
 
 

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
-from experiments.common.figure_style import CURVE_LOOKS, new_figure, place_axes, style, width_mm
+from experiments.common.figure_style import CURVE_LOOKS, INK, new_figure, place_axes, style, width_mm
 from experiments.interception.curves import Curve
 from sim import empirical_distribution
 
@@ -31,21 +31,18 @@ _LEAST_SHOWN = 0.01
 """Quantile at which a logarithmic axis starts: misses can be arbitrarily small."""
 
 
-def draw_distributions(curves: Sequence[Curve], confidence: float = 0.95) -> Figure:
+def draw_distributions(curves: Sequence[Curve], confidence: float = 0.95, radius_m: float | None = None) -> Figure:
     """Draw the distribution functions of (a) the miss and (b) the impulse spent, with their confidence bands.
+
+    Where a few values are far beyond the others, the axis ends before them and says how many; where the curves lie
+    decades apart, the axis of the miss is logarithmic.
 
     Parameters
     ----------
-    curves : sequence of Curve
-        At least one; numbered as in the paper.
     confidence : float
         Of the Dvoretzky-Kiefer-Wolfowitz bands, in (0, 1).
-
-    Returns
-    -------
-    Figure
-        Two axes. Where a few values are far beyond the others, the axis ends before them and says how many; where the
-        curves lie decades apart, the axis of the miss is logarithmic.
+    radius_m : float or None
+        Radius of the body, m, which is a line in (a); None draws none.
     """
     if not curves:
         raise ValueError("at least one curve is needed")
@@ -63,10 +60,11 @@ def draw_distributions(curves: Sequence[Curve], confidence: float = 0.95) -> Fig
             axes.set_ylabel("distribution function (share of runs)")
         row[1].yaxis.label.set_visible(False)
         row[1].tick_params(labelleft=False)
-        handles, labels_told = _handles(curves, confidence)
+        handles, names = _handles(curves, confidence)
+        radius = draw_radius(row[0], radius_m)
         figure.legend(
-            handles,
-            labels_told,
+            [*handles, *radius],
+            [*names, *(str(line.get_label()) for line in radius)],
             loc="lower center",
             ncols=2,
             columnspacing=2.5,
@@ -75,19 +73,24 @@ def draw_distributions(curves: Sequence[Curve], confidence: float = 0.95) -> Fig
     return figure
 
 
+def draw_radius(axes: Axes, radius_m: float | None) -> list[Line2D]:
+    """Draw the radius of the body as a line on an axis of misses, and return its entry in the legend."""
+    if radius_m is None:
+        return []
+    low, high = axes.get_xlim()
+    inside = low <= radius_m <= high
+    look: dict[str, Any] = {"color": INK, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 0.9}
+    if inside:
+        axes.axvline(radius_m, zorder=2.5, label="_radius", **look)
+    where = "a smaller miss is a hit" if inside else "beyond the axis"
+    return [Line2D([], [], label=f"body radius, {radius_m:g} m: {where}", **look)]
+
+
 def axis_limit(samples: Sequence[Floats]) -> float:
     """Return the end of an axis: beyond all values, or of all but a few very large ones.
 
-    Parameters
-    ----------
-    samples : sequence of ndarray
-        One a curve.
-
-    Returns
-    -------
-    float
-        The greatest value if it is at most twice the farthest upper fence (upper quartile and three times the
-        distance between the quartiles) of the samples, else the greatest value within half as much again as that fence.
+    It is the greatest value if that is at most twice the farthest upper fence (upper quartile and three times the
+    distance between the quartiles) of the samples, else the greatest value within half as much again as that fence.
     """
     quartiles = [np.quantile(sample, (0.25, 0.75)) for sample in samples]
     fence = max(float(upper + 3.0 * (upper - lower)) for lower, upper in quartiles)
@@ -100,35 +103,20 @@ def axis_limit(samples: Sequence[Floats]) -> float:
 def decades_apart(samples: Sequence[Floats]) -> bool:
     """Whether samples differ so much that a linear axis would show some of them only at its end.
 
-    Parameters
-    ----------
-    samples : sequence of ndarray
-        One a curve.
-
-    Returns
-    -------
-    bool
-        Whether the greatest median is more than thirty times the least, and the least is not zero.
+    The greatest median is then more than thirty times the least, and the least is not zero.
     """
     medians = [float(np.median(sample)) for sample in samples]
     return min(medians) > 0.0 and max(medians) > _LOGARITHMIC_FROM * min(medians)
 
 
 def scale_axis(axes: Axes, samples: Sequence[Floats], *, from_zero: bool) -> tuple[float, float]:
-    """Scale the axis of the values so that every sample is visible.
+    """Scale the axis of the values so that every sample is visible, and return its limits.
 
     Parameters
     ----------
-    samples : sequence of ndarray
-        One a curve.
     from_zero : bool
         Whether a linear axis starts at zero; only such an axis becomes logarithmic, where the samples are decades
         apart.
-
-    Returns
-    -------
-    tuple of float
-        The limits.
     """
     if from_zero and decades_apart(samples):
         greatest = max(float(sample.max()) for sample in samples)
@@ -153,8 +141,6 @@ def draw_band(axes: Axes, values: Floats, lower: Floats, upper: Floats, colour: 
     ----------
     values, lower, upper : ndarray, shape (n,)
         The samples in rising order, and the band at and after each.
-    label : str
-        Of both lines.
     """
     for edge, empty in ((lower, 0.0), (upper, 1.0)):
         axes.plot(

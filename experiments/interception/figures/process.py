@@ -35,6 +35,9 @@ Floats = NDArray[np.float64]
 ANGLE_RANGE_SHARE = 0.01
 RATE_RANGE_SHARE = 0.1
 """Share of the first range below which values do not set the limits: angle and rate grow as 1/x and 1/x^2."""
+FAR_SHARE = 0.3
+MOST_GROWTH = 1.0
+"""Nearer values extend the limits by at most this multiple of the extent at ranges above `FAR_SHARE` of the first."""
 
 _ROWS = 4
 _LETTER_MM, _LINE_MM = 1.8, 4.0
@@ -49,15 +52,7 @@ _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 def draw_process(records: Sequence[Record]) -> Figure:
     """Draw angle, angular rate, impulse and predicted miss over time, one column per record.
 
-    Parameters
-    ----------
-    records : sequence of Record
-        At least one.
-
-    Returns
-    -------
-    Figure
-        Four rows of axes; the axes of a row have the same limits.
+    The axes of a row have the same limits. At least one record is needed.
     """
     if not records:
         raise ValueError("at least one record is needed")
@@ -72,45 +67,37 @@ def draw_process(records: Sequence[Record]) -> Figure:
         figure = new_figure(height_mm=184.0 + top)
         grid = place_axes(figure, _ROWS, len(records), margins_mm=(21.0, 4.0, 24.0, top), gaps_mm=(gap, 4.0))
         for record, title, column in zip(records, titles, zip(*grid, strict=True), strict=True):
-            _draw_angle(column[0], record)
-            _draw_rate(column[1], record)
+            _draw_sight(column[0], record, "angle", "true_angle_rad", 1e3)
+            column[1].axhline(0.0, color=LIMIT, linewidth=0.6)
+            _draw_sight(column[1], record, "rate", "true_rate_rad_s", 1e6)
             _draw_impulse(column[2], record)
             draw_predicted_miss(column[3], record)
             column[0].set_title(title, linespacing=1.3)
             column[-1].set_xlabel("time t, s")
-        _level(grid[0], [_angle_extent(record) for record in records], scale=1e3)
-        _level(grid[1], [_rate_extent(record) for record in records], scale=1e6)
+        _level(grid[0], [_extent(each, "angle", "true_angle_rad", ANGLE_RANGE_SHARE) for each in records], scale=1e3)
+        _level(grid[1], [_extent(each, "rate", "true_rate_rad_s", RATE_RANGE_SHARE) for each in records], scale=1e6)
         _level_impulse(grid[2], records)
         level_predicted_miss(grid[3], records)
         for record, column in zip(records, zip(*grid, strict=True), strict=True):
-            _note_exit(column[0], _angles(record) * 1e3, record, 1.0, "mrad")
-            _note_exit(column[1], _rates(record) * 1e6, record, 1e-3, "mrad/s")
+            _note_exit(column[0], _course(record, "true_angle_rad") * 1e3, record, 1.0, "mrad")
+            _note_exit(column[1], _course(record, "true_rate_rad_s") * 1e6, record, 1e-3, "mrad/s")
         _finish(figure, grid, records)
     return figure
 
 
-def _draw_angle(axes: Axes, record: Record) -> None:
-    measured = [(step.time_s, step.measured["angle"]) for step in record.steps if "angle" in step.measured]
+def _draw_sight(axes: Axes, record: Record, sensor: str, field: str, scale: float) -> None:
+    """Draw a quantity of the line of sight, and its measurements as dots."""
+    measured = [(step.time_s, step.measured[sensor]) for step in record.steps if sensor in step.measured]
     if measured:
-        times, angles = np.array(measured).T
-        axes.plot(
-            times, angles * 1e3, ".", color=MEASURED, markersize=6.0 if _marker(record) else 3.0, markeredgewidth=0.0
-        )
-    axes.plot(_times(record), _angles(record) * 1e3, color=TRUTH, marker=_marker(record), markersize=3.0)
-
-
-def _draw_rate(axes: Axes, record: Record) -> None:
-    axes.axhline(0.0, color=LIMIT, linewidth=0.6)
-    measured = [(step.time_s, step.measured["rate"]) for step in record.steps if "rate" in step.measured]
-    if measured:
-        times, rates = np.array(measured).T
-        axes.plot(times, rates * 1e6, ".", color=MEASURED, markersize=3.0, markeredgewidth=0.0)
-    axes.plot(_times(record), _rates(record) * 1e6, color=TRUTH, marker=_marker(record), markersize=3.0)
+        times, values = np.array(measured).T
+        size = 6.0 if _marker(record) and sensor == "angle" else 3.0
+        axes.plot(times, values * scale, ".", color=MEASURED, markersize=size, markeredgewidth=0.0)
+    times, true = _course(record, "time_s"), _course(record, field)
+    axes.plot(times, true * scale, color=TRUTH, marker=_marker(record), markersize=3.0)
 
 
 def _draw_impulse(axes: Axes, record: Record) -> None:
-    times = _times(record)
-    impulses = np.array([step.impulse_m_s for step in record.steps])
+    times, impulses = _course(record, "time_s"), _course(record, "impulse_m_s")
     greatest = record.scenario.thruster.greatest_impulse_m_s
     axes.axhline(0.0, color=LIMIT, linewidth=0.6)
     for limit in (-greatest, greatest):
@@ -182,13 +169,25 @@ def _note_exit(axes: Axes, values: Floats, record: Record, scale: float, unit: s
     if abs(value) >= 1e3:
         value, unit = 1e-3 * value, unit.removeprefix("m")
     text = f"reaches {_signed(value)} {unit} at {record.steps[worst].time_s:g} s"
-    down = values[worst] < low
+    # The four corners of the part before the curve leaves the axes: the one with the fewest values.
+    across = np.interp(_course(record, "time_s"), axes.get_xlim(), (0.0, 1.0))
+    up = (values - low) / (high - low)
+    last = float(across[max(int((beyond > 0.0).argmax()) - 1, 0)])
+    note_width = 1.7 * len(text) / width_mm(axes)
+    corners = [(right, top) for right in (0.985, last - 0.015) for top in (values[worst] < low, values[worst] >= low)]
+
+    def hidden(corner: tuple[float, bool]) -> int:
+        right, top = corner
+        inside = (across <= right) & (across >= right - note_width) & ((up > 0.8) if top else (up < 0.2))
+        return int(inside.sum())
+
+    right, top = min(corners, key=hidden)
     axes.annotate(
         text,
-        (0.985, 0.94 if down else 0.06),
+        (right, 0.94 if top else 0.06),
         xycoords="axes fraction",
         ha="right",
-        va="top" if down else "bottom",
+        va="top" if top else "bottom",
         bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
     )
 
@@ -222,16 +221,9 @@ def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], records: Sequence[Re
     figure.legend(handles=handles, loc="lower center", ncols=3, columnspacing=2.5, labelcolor=INK)
 
 
-def _times(record: Record) -> Floats:
-    return np.array([step.time_s for step in record.steps])
-
-
-def _angles(record: Record) -> Floats:
-    return np.array([step.true_angle_rad for step in record.steps])
-
-
-def _rates(record: Record) -> Floats:
-    return np.array([step.true_rate_rad_s for step in record.steps])
+def _course(record: Record, field: str) -> Floats:
+    """Return a field of all steps."""
+    return np.array([getattr(step, field) for step in record.steps])
 
 
 def _predicted_miss(record: Record) -> tuple[Floats, Floats, Floats]:
@@ -240,29 +232,18 @@ def _predicted_miss(record: Record) -> tuple[Floats, Floats, Floats]:
     return times, lower, upper
 
 
-def _far(record: Record, share: float) -> NDArray[np.bool_]:
-    ranges = np.array([step.true_range_m for step in record.steps])
-    return np.asarray(ranges >= share * ranges.max())
-
-
-def _angle_extent(record: Record) -> tuple[float, float]:
-    far = _far(record, ANGLE_RANGE_SHARE)
-    seen = [step.true_angle_rad for step, use in zip(record.steps, far, strict=True) if use]
-    seen += _measured_where(record, far, "angle")
-    return min(seen), max(seen)
-
-
-def _rate_extent(record: Record) -> tuple[float, float]:
-    far = _far(record, RATE_RANGE_SHARE)
-    seen = _rates(record)[far].tolist()
-    seen += _measured_where(record, far, "rate")
-    return min(seen), max(seen)
-
-
-def _measured_where(record: Record, chosen: NDArray[np.bool_], name: str) -> list[float]:
-    """Return the measurements of a sensor in the chosen steps."""
-    steps = zip(record.steps, chosen, strict=True)
-    return [step.measured[name] for step, use in steps if use and name in step.measured]
+def _extent(record: Record, sensor: str, field: str, range_share: float) -> tuple[float, float]:
+    """Return the least and the greatest value, true or measured, without the last part of the way."""
+    ranges = _course(record, "true_range_m")
+    ends = []
+    for share in (FAR_SHARE, range_share):
+        steps = [step for step, far in zip(record.steps, ranges >= share * ranges.max(), strict=True) if far]
+        seen = [getattr(step, field) for step in steps]
+        seen += [step.measured[sensor] for step in steps if sensor in step.measured]
+        ends.append((min(seen), max(seen)))
+    (low, high), (lower, higher) = ends
+    most = MOST_GROWTH * (high - low)
+    return max(lower, low - most), min(higher, high + most)
 
 
 def _marker(record: Record) -> str:

@@ -35,19 +35,14 @@ _LABEL_MM, _LABEL_ROOM_MM = 14.0, 19.0
 def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8.0), sections: int = 5) -> Figure:
     """Draw sections of the sets after the measurement: one row per time, one column per record.
 
+    The axes of a row have the same limits.
+
     Parameters
     ----------
-    records : sequence of Record
-        At least one.
     times_s : sequence of float
         The nearest step is shown, and the title says which it is.
     sections : int
         Most sections to show, evenly chosen over the range, the first and the last included.
-
-    Returns
-    -------
-    Figure
-        The axes of a row have the same limits.
     """
     if not records or not times_s:
         raise ValueError("at least one record and one time are needed")
@@ -69,8 +64,10 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
             ]
         count = len(times_s) * len(records)
         letters = iter([f"({each}) " for each in ascii_lowercase[:count]] if 1 < count <= 26 else [""] * count)
+        measured = False
         for time, row in zip(times_s, grid, strict=True):
             steps = [min(record.steps, key=lambda step: abs(step.time_s - time)) for record in records]
+            measured = measured or any("angle" in step.measured for step in steps)
             shown = [choose_sections(step.sections, sections) for step in steps]
             level_planes(row, [extent_of(step, chosen) for step, chosen in zip(steps, shown, strict=True)])
             for axes, record, step, chosen, title in zip(row, records, steps, shown, titles, strict=True):
@@ -83,22 +80,18 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
                 axes.tick_params(labelleft=axes is row[0])
         handles: list[Line2D | Patch] = [
             Line2D([], [], label=TRUTH_MARK, **_TRUTH_LOOK),
-            Line2D([], [], label=MEASUREMENT_MARK, **_MEASUREMENT_LOOK),
             Line2D([], [], color=_colour(0, 2), label="section of the set, with its range in km"),
-            Patch(facecolor=MEASURED, alpha=0.22, label="angles allowed by the measurement at these ranges"),
         ]
+        if measured:
+            allowed = "angles allowed by the measurement at these ranges"
+            handles.insert(1, Line2D([], [], label=MEASUREMENT_MARK, **_MEASUREMENT_LOOK))
+            handles.append(Patch(facecolor=MEASURED, alpha=0.22, label=allowed))
         figure.legend(handles=handles, loc="lower center", ncols=2, columnspacing=2.5)
     return figure
 
 
 def choose_sections(sections: Sequence[Section], most: int) -> list[Section]:
-    """Return at most `count` sections, evenly distributed over the range, with the first and the last.
-
-    Parameters
-    ----------
-    sections : sequence of Section
-        In rising order of range.
-    """
+    """Return at most `most` sections in their order, evenly distributed over the range, with the first and the last."""
     if len(sections) <= most:
         return list(sections)
     if most == 1:
@@ -218,13 +211,7 @@ def _spread(wanted: Sequence[float], spacing: float, low: float, high: float) ->
 
 
 def level_planes(row: Sequence[Axes], points: Sequence[Floats]) -> None:
-    """Give planes of sets the same limits, with space for the labels.
-
-    Parameters
-    ----------
-    points : sequence of ndarray, shape (n, 2)
-        What must be seen, as `extent_of` returns it.
-    """
+    """Give planes of sets the same limits, with space for the labels; `extent_of` returns what must be seen."""
     everything = np.concatenate(points)
     least, greatest = everything.min(axis=0), everything.max(axis=0)
     margin = 0.07 * (greatest - least)

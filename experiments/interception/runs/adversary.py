@@ -1,8 +1,8 @@
-"""`infoset adversary`: search, files and table."""
+"""`infoset adversary`: searches, files and table."""
 
 from __future__ import annotations
 
-import os
+from collections.abc import Callable
 from time import perf_counter
 
 from rich.console import Console
@@ -10,16 +10,20 @@ from rich.table import Table
 
 from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
-from experiments.common.output import output, to_json
-from experiments.common.screen import number, print_lines, progress_bar, say_warnings, table_console
-from experiments.interception.choices import own_strategy, scenario_with
-from experiments.interception.commands.adversary import Adversary
+from experiments.common.output import output_of, to_csv, to_json
+from experiments.common.screen import figure_files, number, print_lines, progress_bar, say_warnings, table_console
+from experiments.interception.choices import own_strategy, scenario_with, study_scenario
+from experiments.interception.command import Adversary
 from experiments.interception.record_file import record_path, write_record
+from experiments.interception.runs.engage import COLUMNS, step_rows
+from experiments.interception.runs.engagement_table import FIGURE_2, FIGURE_3, draw_engagements, read_times
 from experiments.interception.runs.shared import summary_head
-from experiments.interception.scenario_file import scenario_warnings
-from sim import Outcome, Scenario
-from sim.adversary import NothingCountsError, WorstEngagement, find_worst
-from sim.scenario import strategy_name
+from experiments.interception.runs.worst_misses import WorstMisses, find_worst_misses
+from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
+from sim import Scenario
+from sim.adversary import WorstEngagement
+
+RECORD = "record-worst.npz"
 
 
 def run(options: Adversary) -> None:
@@ -27,97 +31,113 @@ def run(options: Adversary) -> None:
     if options.record is not None:
         record_path("--record", options.record)
     scenario = scenario_with(
-        options.scenario, strategy=options.strategy, model=options.model, range_meter=options.range_meter
+        options.scenario,
+        options.settings,
+        strategy=options.strategy,
+        model=options.model,
+        range_meter=options.range_meter,
     )
+    scenario, notes = study_scenario(scenario, options.model, options.settings)
     own = own_strategy(options.strategy)
+    times_s = read_times(options.times)
+    names = ("scenario.toml", "results.json", "steps.csv", RECORD, *figure_files(FIGURE_2, FIGURE_3))
     with (
-        output(
-            files={"--json": options.json, "--record": options.record},
-            overwrite=options.overwrite,
-            quiet=options.quiet,
-        ) as written,
+        output_of(options, names, {"--record": options.record}) as written,
         progress_bar(options.quiet) as begin,
     ):
-        say_warnings(scenario_warnings(scenario), options.quiet)
+        say_warnings(scenario_warnings(scenario), options.quiet, notes)
         began_s = perf_counter()
-        try:
-            worst = find_worst(
-                scenario,
-                strategy=own,
-                budget=options.budget,
-                seed=options.seed,
-                keep_set=options.keep_set,
-                threads=os.cpu_count() or 1,
-                progress=begin(f"worst against {strategy_name(scenario, own)}"),
-            )
-        except NothingCountsError as error:
-            raise InputError(
-                f"{scenario.name}: {error}; {'omit --keep-set, or ' if options.keep_set else ''}check the units "
-                "of the scenario with: infoset scenarios check FILE"
-            ) from None
+        worst = find_worst_misses(scenario, own, budget=options.budget, seed=options.seed, begin=begin)
         elapsed_s = perf_counter() - began_s
-        if options.record is not None:
-            write_record(worst.record(own), options.record, overwrite=options.overwrite)
-            written.add(options.record)
-        summary = {**summary_head(scenario), **_summary(scenario, worst, options, elapsed_s)}
-        written.deliver("--json", to_json(summary))
+        chosen = worst.set_kept if options.keep_set else worst.overall
+        if chosen is None:
+            raise InputError(
+                f"{scenario.name}: in every simulated engagement the set became empty, or the miss was not finite; "
+                f"{'omit --keep-set, or ' if options.keep_set else ''}check the units of the scenario with: infoset "
+                "scenarios check FILE"
+            )
+        summary = {**summary_head(scenario), **_summary(scenario, worst, chosen, options, elapsed_s)}
+        written.save("scenario.toml", scenario_to_toml(scenario))
+        written.save("results.json", to_json(summary), "--json")
+        files = [options.record, None if options.out is None else options.out / RECORD]
+        if any(files):
+            record = chosen.record(own)
+            written.save("steps.csv", to_csv(COLUMNS, step_rows([record])))
+            for file in filter(None, files):
+                write_record(record, file, overwrite=options.overwrite)
+                written.add(file)
+            draw_engagements([record], times_s, written, begin)
     if not options.quiet:
         _show(table_console(written.stdout_taken), scenario, worst, options, elapsed_s)
 
 
-def _summary(scenario: Scenario, worst: WorstEngagement, options: Adversary, elapsed_s: float) -> dict[str, object]:
+def _summary(
+    scenario: Scenario, worst: WorstMisses, chosen: WorstEngagement, options: Adversary, elapsed_s: float
+) -> dict[str, object]:
     return {
-        "seed": worst.seed,
+        "seed": chosen.seed,
         "model": scenario.set_model.kind.value,
         "range_meter": scenario.range_sensor is not None,
         "elapsed_s": elapsed_s,
-        "strategy": worst.strategy,
+        "strategy": chosen.strategy,
+        **worst.misses(),
         "keep_set": options.keep_set,
-        "worst_miss_m": worst.miss_m,
-        "outcome": worst.outcome.value,
-        "truth_kept": worst.truth_kept,
-        "evaluations": worst.evaluations,
+        "worst_miss_m": chosen.miss_m,
+        "outcome": chosen.outcome.value,
+        "truth_kept": chosen.truth_kept,
+        "evaluations": chosen.evaluations,
         "record": None if options.record is None else str(options.record),
-        "found_from": worst.construction,
-        "changes": worst.changes,
+        "found_from": chosen.construction,
+        "changes": chosen.changes,
         "start": {
-            "z_m": float(worst.position_m[0]),
-            "x_m": float(worst.position_m[1]),
-            "vz_m_s": float(worst.velocity_m_s[0]),
-            "vx_m_s": float(worst.velocity_m_s[1]),
+            "z_m": float(chosen.position_m[0]),
+            "x_m": float(chosen.position_m[1]),
+            "vz_m_s": float(chosen.velocity_m_s[0]),
+            "vx_m_s": float(chosen.velocity_m_s[1]),
         },
-        "history": [{"evaluations": evaluations, "worst_miss_m": miss_m} for evaluations, miss_m in worst.history],
+        "history": [{"evaluations": evaluations, "worst_miss_m": miss_m} for evaluations, miss_m in chosen.history],
     }
 
 
-def _show(console: Console, scenario: Scenario, worst: WorstEngagement, options: Adversary, elapsed_s: float) -> None:
+ROWS: tuple[tuple[str, Callable[[WorstEngagement], str]], ...] = (
+    ("greatest miss found, m", lambda found: number(found.miss_m)),
+    ("outcome", lambda found: found.outcome.value),
+    ("true state always in the set", lambda found: "yes" if found.truth_kept else "no"),
+    ("initial z, x, km", lambda found: ", ".join(f"{value:.6g}" for value in found.position_m / M_PER_KM)),
+    ("initial V_z, V_x, km/s", lambda found: ", ".join(f"{value:.6g}" for value in found.velocity_m_s / M_PER_KM)),
+    ("errors of the first candidate", lambda found: found.construction),
+    ("rounds of changes to it", lambda found: str(found.changes)),
+    ("after half the budget, m", lambda found: number(_halfway_m(found))),
+)
+"""Rows of the table: title, and text of an engagement."""
+
+
+def _halfway_m(found: WorstEngagement) -> float | None:
+    return max((miss for count, miss in found.history if 2 * count <= found.evaluations), default=None)
+
+
+def _show(console: Console, scenario: Scenario, worst: WorstMisses, options: Adversary, elapsed_s: float) -> None:
     meter = "with" if scenario.range_sensor is not None else "without"
-    z, x = worst.position_m / M_PER_KM
-    vz, vx = worst.velocity_m_s / M_PER_KM
-    halfway_m = max((miss for count, miss in worst.history if 2 * count <= worst.evaluations), default=None)
-    table = Table("", "", box=None, pad_edge=False, show_header=False)
-    for row in (
-        ("strategy", worst.strategy),
-        ("worst miss, m", number(worst.miss_m)),
-        ("outcome", worst.outcome.value),
-        ("true state inside the set at every step", "yes" if worst.truth_kept else "no"),
-        ("initial z, x, km", f"{z:.4g}, {x:.6g}"),
-        ("initial V_z, V_x, km/s", f"{vz:.4g}, {vx:.6g}"),
-        ("errors of the first candidate", worst.construction),
-        ("rounds of changes to it", str(worst.changes)),
-        ("worst miss after half the budget, m", number(halfway_m)),
-        (
-            "simulated engagements",
-            f"{worst.evaluations}, {number(worst.evaluations / max(elapsed_s, 1e-9))} per second",
-        ),
-    ):
-        table.add_row(*row)
-    print_lines(console, [f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}"])
+    same = worst.set_kept is worst.overall
+    columns = [("set never empty, and at all" if same else "set never empty", worst.set_kept)]
+    columns += [] if same else [("at all", worst.overall)]
+    table = Table("", *(title for title, _ in columns), box=None, pad_edge=False)
+    for title, text in ROWS:
+        table.add_row(title, *("-" if found is None else text(found) for _, found in columns))
+    strategy = worst.engagements[0].strategy
+    count = sum(found.evaluations for found in worst.engagements)
+    lines = [
+        f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}, strategy {strategy}: "
+        f"{count} simulated engagements, {number(count / max(elapsed_s, 1e-9))} per second"
+    ]
+    print_lines(console, lines)
     console.print(table)
-    notes = ["this miss was simulated: the strategy cannot guarantee a smaller one, and greater misses may exist"]
-    if worst.outcome is Outcome.SET_LOST and not options.keep_set:
+    notes = ["each miss was simulated: the strategy cannot guarantee a smaller one, and greater misses may exist"]
+    if not same:
+        emptied = max(found.sets_emptied for found in worst.engagements)
         notes.append(
-            "set-lost: a measurement contradicted all states of the set; to exclude such engagements, use --keep-set"
+            f"the set became empty in {emptied} engagements of a search, and such a miss says little about the strategy"
+            + ("" if scenario.set_model.is_guaranteed else "; use --model guaranteed, whose set keeps the true state")
         )
     if options.record is not None:
         notes.append(f"to draw it: infoset replay {options.record} --out DIR")

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -23,70 +22,78 @@ from experiments.common.screen import (
     say_warnings,
     table_console,
 )
-from experiments.interception.choices import chosen_strategies, scenario_with
-from experiments.interception.commands.bound import Bound
+from experiments.interception.choices import chosen_strategies, scenario_with, study_scenario
+from experiments.interception.command import Bound
 from experiments.interception.figures.bound import draw_bound
 from experiments.interception.runs.shared import need_finite, summary_head
+from experiments.interception.runs.worst_misses import WorstMisses, find_worst_misses
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from guidance import Strategy
 from sim import Outcome, Record, Results, Scenario
-from sim.adversary import NothingCountsError, find_worst
 from sim.bound import BoundError, LowerBound, TruthPair, lower_bound
 from sim.pair import PairFlight, fly_pair
+from sim.results import join
 
 FIGURE = "figure-bound"
 
 
 @dataclass(frozen=True)
 class WorstOfStrategy:
-    """Simulations of one strategy against the pairs of the bound, and the worst engagement of a search."""
+    """Simulations of one strategy: the pairs of the bound, and the worst engagements of the searches."""
 
     name: str
     flights: tuple[tuple[TruthPair, PairFlight], ...]
-    searched: Record | None = None
+    searched: WorstMisses
+    records: tuple[Record, ...]
 
     @property
-    def all_results(self) -> list[Results]:
+    def results(self) -> Results:
         """Results of all simulations."""
-        searched = [] if self.searched is None else [self.searched.result]
-        return [*(flight.results for _, flight in self.flights), *searched]
+        return join([*(flight.results for _, flight in self.flights), *(record.result for record in self.records)])
 
     @property
-    def worst(self) -> Results:
-        """Results with the greatest miss."""
-        return max(self.all_results, key=lambda results: float(results.miss_m.max()))
+    def pairs_m(self) -> float:
+        """Greatest miss of the pairs, m."""
+        return max(float(flight.results.miss_m.max()) for _, flight in self.flights)
 
     @property
     def miss_m(self) -> float:
         """Greatest miss, m."""
-        return float(self.worst.miss_m.max())
+        return float(self.results.miss_m.max())
+
+    @property
+    def set_kept_m(self) -> float | None:
+        """Greatest miss of the engagements whose set never became empty, m; None if there is none."""
+        results = self.results
+        return max(results.miss_m[~results.set_emptied].tolist(), default=None)
 
     @property
     def outcome(self) -> Outcome:
         """Outcome of the engagement with the greatest miss."""
-        return self.worst.outcomes[int(self.worst.miss_m.argmax())]
+        return self.results.outcomes[int(self.results.miss_m.argmax())]
 
-    def guaranteed_m(self, scenario: Scenario) -> float | None:
-        """Return the greatest guaranteed miss of all simulations, m; None if the model has no guarantee."""
-        if not scenario.set_model.is_guaranteed:
-            return None
-        misses = [miss for results in self.all_results for miss in results.guaranteed_miss_m.tolist()]
-        return None if None in misses else max(misses)
+    @property
+    def guaranteed_m(self) -> float | None:
+        """Greatest guaranteed miss of all simulations, m; None if the model has no guarantee."""
+        guaranteed = self.results.guaranteed_miss_m
+        known = self.results.guarantees and not np.ma.getmaskarray(guaranteed).any()
+        return float(guaranteed.max()) if known else None
 
     def over(self, lower: LowerBound) -> float | None:
-        """Return the greatest miss divided by the bound; None if the bound is zero."""
-        return self.miss_m / lower.bound_m if lower.bound_m > 0.0 else None
+        """Return the greatest miss with the set never empty, divided by the bound; None if one of them is missing."""
+        return self.set_kept_m / lower.bound_m if lower.bound_m > 0.0 and self.set_kept_m is not None else None
 
 
 def run(options: Bound) -> None:
     """Compute the bound, simulate the strategies, write the files and print the tables."""
-    scenario = scenario_with(options.scenario, model=options.model)
+    scenario = scenario_with(options.scenario, options.settings, model=options.model)
+    scenario, notes = study_scenario(scenario, options.model, options.settings)
     strategies = chosen_strategies(scenario, options.strategies)
     with (
         output_of(options, ("scenario.toml", "results.json", *figure_files(FIGURE))) as written,
         progress_bar(options.quiet) as begin,
     ):
-        say_warnings(scenario_warnings(scenario), options.quiet)
+        say_warnings(scenario_warnings(scenario), options.quiet, notes)
         began_s = perf_counter()
         try:
             lower = lower_bound(scenario, progress=begin("lower bound"))
@@ -107,7 +114,7 @@ def run(options: Bound) -> None:
         if options.out is not None:
             written.figure(FIGURE, draw_bound(scenario, lower))
     if not options.quiet:
-        _show(table_console(written.stdout_taken), scenario, lower, worst)
+        _show(table_console(written.stdout_taken), scenario, lower, worst, options)
 
 
 def _simulate(
@@ -126,19 +133,11 @@ def _simulate(
             need_finite(flight.results)
             flights.append((pair, flight))
             report((i + 1) / len(lower.pairs))
-        searched = None
+        searched = WorstMisses(None, None)
         if options.budget > 0:
-            with contextlib.suppress(NothingCountsError):
-                searched = find_worst(
-                    flown,
-                    strategy=own,
-                    budget=options.budget,
-                    seed=options.seed,
-                    keep_set=not scenario.set_model.is_guaranteed,
-                    threads=os.cpu_count() or 1,
-                    progress=begin(f"worst against {name}"),
-                ).record(own)
-        worst.append(WorstOfStrategy(name, tuple(flights), searched))
+            searched = find_worst_misses(flown, own, budget=options.budget, seed=options.seed, begin=begin)
+        records = tuple(engagement.record(own) for engagement in searched.engagements)
+        worst.append(WorstOfStrategy(name, tuple(flights), searched, records))
     return worst
 
 
@@ -160,10 +159,12 @@ def _summary(scenario: Scenario, lower: LowerBound, worst: Sequence[WorstOfStrat
             {
                 "name": strategy.name,
                 "worst_found_m": strategy.miss_m,
-                "guaranteed_m": strategy.guaranteed_m(scenario),
+                "worst_found_set_kept_m": strategy.set_kept_m,
+                "guaranteed_m": strategy.guaranteed_m,
                 "worst_over_bound": strategy.over(lower),
                 "outcome": strategy.outcome.value,
-                "worst_of_search_m": None if strategy.searched is None else float(strategy.searched.result.miss_m[0]),
+                "worst_of_pairs_m": strategy.pairs_m,
+                **strategy.searched.misses(),
                 "flights": [
                     {
                         **_where(pair, scenario),
@@ -195,7 +196,9 @@ def _equal_until_s(pair: TruthPair, scenario: Scenario) -> float:
     return pair.arrival_s - pair.last_common_step * scenario.set_model.step_s
 
 
-def _show(console: Console, scenario: Scenario, lower: LowerBound, worst: Sequence[WorstOfStrategy]) -> None:
+def _show(
+    console: Console, scenario: Scenario, lower: LowerBound, worst: Sequence[WorstOfStrategy], options: Bound
+) -> None:
     bounds = Table(box=None, pad_edge=False)
     for title in (
         "closing speed\nkm/s",
@@ -212,12 +215,18 @@ def _show(console: Console, scenario: Scenario, lower: LowerBound, worst: Sequen
             f"{_equal_until_s(pair, scenario):.2f}",
         )
     strategies = Table("strategy", box=None, pad_edge=False)
-    for title in ("worst miss\nm", "worst miss\n/ bound", "guaranteed\nmiss, m"):
+    for title in (
+        "pairs\n\nm",
+        "set never\nempty\nm",
+        "at all\n\nm",
+        "miss /\nbound\n",
+        "guaran-\nteed\nm",
+    ):
         strategies.add_column(title, justify="right")
-    strategies.add_column("outcome")
     for strategy in worst:
-        values = (strategy.miss_m, strategy.over(lower), strategy.guaranteed_m(scenario))
-        strategies.add_row(strategy.name, *(number(value) for value in values), strategy.outcome.value)
+        searched = strategy.searched.misses().values()
+        values = (strategy.pairs_m, *searched, strategy.over(lower), strategy.guaranteed_m)
+        strategies.add_row(strategy.name, *(number(value) for value in values))
     print_lines(
         console,
         [
@@ -227,8 +236,16 @@ def _show(console: Console, scenario: Scenario, lower: LowerBound, worst: Sequen
         ],
     )
     console.print(bounds, "", strategies, sep="\n")
-    notes = ["worst miss: the greatest miss in simulations of these pairs and in a search (see: infoset adversary)"]
-    if any(strategy.outcome is Outcome.SET_LOST for strategy in worst):
+    model = scenario.set_model.kind.value
+    notes = [
+        "pairs: greatest miss of the states that prove the bound",
+        "set never empty, at all: greatest misses found by `infoset adversary` with "
+        f"--model {model} --budget {options.budget} --seed {options.seed}"
+        if options.budget
+        else "set never empty, at all: not searched",
+        "miss / bound: greatest miss of these engagements with the set never empty, divided by the bound",
+    ]
+    if any(strategy.results.set_emptied.any() for strategy in worst):
         hint = "" if scenario.set_model.is_guaranteed else "; try --model guaranteed"
-        notes.append(f"set-lost: a measurement contradicted all states of the set{hint}")
+        notes.append(f"in some engagements a measurement contradicted all states of the set, which became empty{hint}")
     print_lines(console, notes)

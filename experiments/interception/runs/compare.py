@@ -9,7 +9,7 @@ from time import perf_counter
 from rich.console import Console
 from rich.table import Table
 
-from experiments.common.output import Cell, output_of, to_csv, to_json
+from experiments.common.output import Cell, hit_key, output_of, to_csv, to_json
 from experiments.common.screen import (
     figure_files,
     number,
@@ -18,28 +18,30 @@ from experiments.common.screen import (
     say_warnings,
     table_console,
 )
-from experiments.interception.choices import chosen_strategies, scenario_with
-from experiments.interception.commands.compare import Compare
-from experiments.interception.comparison import QUANTILES, Comparison, flights, gather, summary
+from experiments.interception.choices import chosen_strategies, scenario_with, study_scenario
+from experiments.interception.command import Compare
+from experiments.interception.comparison import QUANTILES, Comparison, Flight, flights, gather, summary
 from experiments.interception.figures.comparison import draw_comparison
 from experiments.interception.runs.shared import Progress, simulate_in_threads, summary_head
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
-from guidance import NoiseKind, Strategy, TieRule
+from experiments.interception.study import SetCounts, percent, set_counts, set_warnings
+from guidance import NoiseKind, Strategy
 from sim import Scenario
 
 FIGURE = "figure-comparison"
-COLUMNS = ("strategy", "noise", "tie", "run", "miss_m", "impulse_m_s", "outcome", "truth_kept")
+COLUMNS = ("strategy", "noise", "tie", "run", "miss_m", "impulse_m_s", "outcome", "truth_kept", "set_emptied", "hit")
 
 
 def run(options: Compare) -> None:
     """Simulate the strategies, write the files and print the table."""
-    scenario = scenario_with(options.scenario, model=options.model, range_meter=options.range_meter)
+    scenario = scenario_with(options.scenario, options.settings, model=options.model, range_meter=options.range_meter)
+    scenario, notes = study_scenario(scenario, options.model, options.settings)
     strategies = chosen_strategies(scenario, options.strategies)
     with (
         output_of(options, ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE))) as written,
         progress_bar(options.quiet) as begin,
     ):
-        say_warnings(scenario_warnings(scenario), options.quiet)
+        say_warnings(scenario_warnings(scenario), options.quiet, notes)
         began_s = perf_counter()
         reports = {name: begin(name) for name in strategies}
         compared = _simulate(scenario, strategies, options.runs, options.seed, reports)
@@ -57,7 +59,7 @@ def run(options: Compare) -> None:
         if written.wants("--csv"):
             written.save("results.csv", to_csv(COLUMNS, _rows(compared)), "--csv")
         if options.out is not None:
-            written.figure(FIGURE, draw_comparison(compared))
+            written.figure(FIGURE, draw_comparison(compared, scenario.radius_m))
     if not options.quiet:
         _show(table_console(written.stdout_taken), scenario, compared)
 
@@ -70,18 +72,18 @@ def _simulate(
     reports: Mapping[str, Progress],
 ) -> list[Comparison]:
     wanted = flights(scenario, strategies)
-    done: dict[str, dict[TieRule | None, float]] = {name: dict.fromkeys((None, *TieRule), 0.0) for name in strategies}
+    done = dict.fromkeys(wanted, 0.0)
 
-    def progress_of(name: str, tie: TieRule | None) -> Progress:
+    def progress_of(flight: Flight) -> Progress:
         def progress(share: float) -> None:
-            done[name][tie] = share
-            reports[name](sum(done[name].values()) / len(done[name]))
+            done[flight] = share
+            shares = [each for (name, _), each in done.items() if name == flight[0]]
+            reports[flight[0]](sum(shares) / len(shares))
 
         return progress
 
-    jobs = [(flown, strategies[name], progress_of(name, tie)) for name, tie, flown in wanted]
-    results = simulate_in_threads(jobs, runs, seed)
-    return gather([(name, tie, result) for (name, tie, _), result in zip(wanted, results, strict=True)])
+    jobs = [(flown, strategies[flight[0]], progress_of(flight)) for flight, flown in wanted.items()]
+    return gather(dict(zip(wanted, simulate_in_threads(jobs, runs, seed), strict=True)))
 
 
 def _summary(comparison: Comparison) -> dict[str, object]:
@@ -92,7 +94,9 @@ def _summary(comparison: Comparison) -> dict[str, object]:
         "noise": comparison.noise.value,
         "miss_m": summary(comparison.miss_m),
         "impulse_m_s": summary(comparison.impulse_m_s),
+        **hit_key(comparison.hits),
         "truth_kept": int(comparison.truth_kept.sum()),
+        "set_emptied": int(comparison.set_emptied.sum()),
         "phi_held": None if phi_held.mask.all() else int(phi_held.filled(False).sum()),
         "outcomes": dict(outcomes),
         "ties": {
@@ -114,6 +118,8 @@ def _rows(compared: Sequence[Comparison]) -> list[list[Cell]]:
             float(results.impulse_m_s[i]),
             results.outcomes[i].value,
             bool(results.truth_kept[i]),
+            bool(results.set_emptied[i]),
+            results.hit.tolist()[i],
         ]
         for comparison in compared
         for tie, results in comparison.results.items()
@@ -122,21 +128,34 @@ def _rows(compared: Sequence[Comparison]) -> list[list[Cell]]:
 
 
 def _show(console: Console, scenario: Scenario, compared: Sequence[Comparison]) -> None:
-    table = Table("noise", box=None, pad_edge=False)
-    table.add_column("strategy", no_wrap=True)
+    table, sets = Table("noise", box=None, pad_edge=False), Table("noise", box=None, pad_edge=False)
+    for part in (table, sets):
+        part.add_column("strategy", no_wrap=True)
     table.add_column("quantity", no_wrap=True)
     for level in QUANTILES.values():
         table.add_column("worst" if level == 1.0 else f"{level:.0%}", justify="right")
-    table.add_column("runs with true\nstate in the set", justify="right")
+    body = scenario.body
+    for title in ("true state in the\nset at every step", "set became\nempty"):
+        sets.add_column(title, justify="right")
+    if body is not None:
+        for title in (f"hit: miss at\nmost {body.radius_m:g} m", "95 % CI\nof a hit"):
+            sets.add_column(title, justify="right")
+    total = SetCounts()
     for noise in (NoiseKind.RANDOM, NoiseKind.GAME):
         title = noise.value
         for comparison in compared:
             if comparison.noise is not noise:
                 continue
-            miss, impulse = summary(comparison.miss_m), summary(comparison.impulse_m_s)
-            kept = str(int(comparison.truth_kept.sum()))
-            table.add_row(title, comparison.strategy, "miss, m", *(number(value) for value in miss.values()), kept)
-            table.add_row("", "", "impulse, m/s", *(number(value) for value in impulse.values()))
+            for quantity, sample in (("miss, m", comparison.miss_m), ("impulse, m/s", comparison.impulse_m_s)):
+                heads = (title, comparison.strategy) if quantity == "miss, m" else ("", "")
+                table.add_row(*heads, quantity, *(number(value) for value in summary(sample).values()))
+            counts, hits = set_counts(comparison.truth_kept, comparison.set_emptied), comparison.hits
+            total += counts
+            shares = [f"{count} ({percent(count / counts.runs)})" for count in (counts.truth_kept, counts.set_emptied)]
+            if hits is not None:
+                shares.append(f"{hits.hits} ({percent(hits.probability)})")
+                shares.append(f"{percent(hits.lower)} to {percent(hits.upper)}")
+            sets.add_row(title, comparison.strategy, *shares)
             title = ""
     meter = "with" if scenario.range_sensor is not None else "without"
     runs = len(compared[0].miss_m)
@@ -145,4 +164,12 @@ def _show(console: Console, scenario: Scenario, compared: Sequence[Comparison]) 
         [f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}: quantiles of {runs} runs"],
     )
     console.print(table)
-    print_lines(console, ["game noise: for each run, the worst of its four tie rules"])
+    print_lines(console, ["", f"of the {runs} runs:"])
+    console.print(sets)
+    print_lines(
+        console,
+        [
+            "game noise: for each run, the worst of its four tie rules",
+            *set_warnings(scenario.set_model.kind, total),
+        ],
+    )

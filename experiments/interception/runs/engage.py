@@ -9,9 +9,15 @@ from time import perf_counter
 from experiments.common.output import Cell, library_version, outcome_columns, output_of, to_csv, to_json
 from experiments.common.screen import figure_files, progress_bar, say_warnings, table_console
 from experiments.interception.choices import own_strategy, scenario_with
-from experiments.interception.commands.engage import Engage
+from experiments.interception.command import Engage
 from experiments.interception.record_file import record_path, write_record
-from experiments.interception.runs.engagement_table import FIGURE_2, FIGURE_3, draw_engagements, show_engagements
+from experiments.interception.runs.engagement_table import (
+    FIGURE_2,
+    FIGURE_3,
+    draw_engagements,
+    read_times,
+    show_engagements,
+)
 from experiments.interception.runs.shared import need_finite, summary_head
 from experiments.interception.scenario_file import scenario_hash, scenario_to_toml, scenario_warnings
 from guidance import NoiseKind
@@ -29,12 +35,14 @@ def run(options: Engage) -> None:
     """Simulate one or two engagements, write the files and print the table."""
     scenario = scenario_with(
         options.scenario,
+        options.settings,
         strategy=options.strategy,
         model=options.model,
         tie=options.tie,
         range_meter=options.range_meter,
     )
     own = own_strategy(options.strategy)
+    times_s = read_times(options.times)
     both = options.noise == "both"
     noises = [*NoiseKind] if both else [NoiseKind(options.noise or scenario.noise)]
     record_files = {}
@@ -64,13 +72,13 @@ def run(options: Engage) -> None:
         summary = {**head, **summaries} if both else summaries[noises[0].value]
         written.save("scenario.toml", scenario_to_toml(scenario if both else records[0].scenario))
         written.save("results.json", to_json(summary), "--json")
-        written.save("steps.csv", to_csv(COLUMNS, _rows(records)), "--csv")
+        written.save("steps.csv", to_csv(COLUMNS, step_rows(records)), "--csv")
         for record, name in zip(records, folder_records, strict=True):
             targets = [record_files.get(record.scenario.noise), None if options.out is None else options.out / name]
             for file in filter(None, targets):
                 write_record(record, file, overwrite=options.overwrite)
                 written.add(file)
-        draw_engagements(records, written)
+        draw_engagements(records, times_s, written, begin)
     if not options.quiet:
         show_engagements(records, table_console(written.stdout_taken))
 
@@ -86,6 +94,7 @@ def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
         "noise": scenario.noise.value,
         "range_meter": scenario.range_sensor is not None,
         **{name: values[0] for name, values in outcome_columns(record.result).items()},
+        "hit": record.result.hit.tolist()[0],
         "inconsistency": None if contradiction is None else _where(record, contradiction),
         "steps": [
             {
@@ -109,10 +118,11 @@ def _where(record: Record, contradiction: Inconsistency) -> dict[str, object]:
     return {"step": step, "time_s": record.steps[step].time_s, "label_m": contradiction.label_m}
 
 
-def _rows(records: Sequence[Record]) -> list[list[Cell]]:
+def step_rows(records: Sequence[Record]) -> list[list[Cell]]:
+    """Return a row for each step of engagements, with `COLUMNS`."""
     return [
         [
-            record.scenario.noise.value,
+            record.noise_name,
             number,
             step.time_s,
             *(step.measured.get(kind.name) for kind in SENSORS),

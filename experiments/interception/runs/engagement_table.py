@@ -7,16 +7,21 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.table import Table
 
+from experiments.common.errors import InputError
+from experiments.common.options import read_number
 from experiments.common.output import Output
-from experiments.common.screen import number, print_lines
+from experiments.common.screen import BeginProgress, number, print_lines
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import draw_sets
 from experiments.interception.published import PRINTED_SINGLE_RUN, SINGLE
 from experiments.interception.runs.shared import allowance, bound_name
 from sim import Record
+from sim.results import ending
 
 FIGURE_2 = "figure-2-process"
 FIGURE_3 = "figure-3-sets"
+DEFAULT_TIMES = ("0.5", "4", "8")
+MOST_TIMES = 12
 
 
 def show_engagements(records: Sequence[Record], console: Console) -> None:
@@ -67,13 +72,25 @@ def _yes(value: bool | None) -> str:
 
 def _outcome(record: Record) -> str:
     outcome, contradiction = record.result.outcomes[0].value, record.inconsistency
-    if contradiction is None:
-        return outcome
-    return f"{outcome} at {record.steps[contradiction.step].time_s:g} s, section {contradiction.label_m / 1e3:.0f} km"
+    if contradiction is not None:
+        time_s, label_km = record.steps[contradiction.step].time_s, contradiction.label_m / 1e3
+        outcome = f"{outcome} at {time_s:g} s, section {label_km:.0f} km"
+    return ending(outcome, record.result.hit.tolist()[0])
 
 
-def draw_engagements(records: Sequence[Record], written: Output) -> None:
+def read_times(text: str | None) -> tuple[float, ...]:
+    """Return the times of figure 3 that ``--times`` gives, s; raise `InputError` if one is not a time."""
+    parts = DEFAULT_TIMES if text is None else text.split(",")
+    if len(parts) > MOST_TIMES:
+        raise InputError(f"--times: at most {MOST_TIMES} times fit in a figure, found {len(parts)}; omit some")
+    example = "--times 0.5,40,90"
+    return tuple(read_number("--times", float, part, least=0.0, greatest=None, example=example) for part in parts)
+
+
+def draw_engagements(
+    records: Sequence[Record], times_s: Sequence[float], written: Output, begin: BeginProgress
+) -> None:
     """Draw figures 2 and 3 of one or two engagements into the folder, if there is one."""
     if written.folder is not None:
-        written.figure(FIGURE_2, draw_process(records))
-        written.figure(FIGURE_3, draw_sets(records))
+        drawings = {FIGURE_2: lambda: draw_process(records), FIGURE_3: lambda: draw_sets(records, times_s)}
+        written.draw(drawings, begin("figures"))

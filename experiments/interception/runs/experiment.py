@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from time import perf_counter
 
 from rich.console import Console
 from rich.table import Table
 
-from experiments.common.output import outcome_columns, output_of, to_csv, to_json
+from experiments.common.output import hit_key, outcome_columns, output_of, to_csv, to_json
 from experiments.common.screen import (
     figure_files,
     number,
@@ -20,7 +19,7 @@ from experiments.common.screen import (
     table_console,
 )
 from experiments.interception.choices import own_strategy, scenario_with
-from experiments.interception.commands.experiment import Experiment
+from experiments.interception.command import Experiment
 from experiments.interception.curves import Curve, curve_scenarios
 from experiments.interception.figures.distributions import draw_distributions
 from experiments.interception.published import MANY, PRINTED_SINGLE_RUN, SINGLE
@@ -32,6 +31,7 @@ from experiments.interception.runs.shared import (
     summary_head,
 )
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
+from experiments.interception.study import SetCounts, hit_text, set_counts, set_warnings
 from infoset import Recovery
 from sim import Outcome, Scenario, quantiles
 
@@ -43,6 +43,7 @@ def run(options: Experiment) -> None:
     """Simulate the curves, write the files and print the table."""
     scenario = scenario_with(
         options.scenario,
+        options.settings,
         strategy=options.strategy,
         model=options.model,
         tie=options.tie,
@@ -74,14 +75,16 @@ def run(options: Experiment) -> None:
             "seed": options.seed,
             "runs": options.runs,
             "elapsed_s": elapsed_s,
-            "curves": [{**_key(curve), **outcome_columns(curve.results)} for curve in curves],
+            "curves": [
+                {**_key(curve), **hit_key(curve.results.hits), **outcome_columns(curve.results)} for curve in curves
+            ],
         }
         written.save("scenario.toml", scenario_to_toml(scenario))
         written.save("results.json", to_json(summary), "--json")
         if written.wants("--csv"):
             written.save("results.csv", _csv(curves), "--csv")
         if options.out is not None:
-            written.figure(FIGURE, draw_distributions(curves))
+            written.figure(FIGURE, draw_distributions(curves, radius_m=scenario.radius_m))
     if not options.quiet:
         _show(table_console(written.stdout_taken), scenario, curves)
 
@@ -106,7 +109,6 @@ def _show(console: Console, scenario: Scenario, curves: Sequence[Curve]) -> None
         table.add_column(f"{level:.0%}", justify="right")
     enlarged = scenario.set_model.recovery is Recovery.WIDENED
     endings = {
-        Outcome.SET_LOST: f"the set became empty{'; it was enlarged and guidance continued' if enlarged else ''}",
         Outcome.BUDGET_SPENT: "too little of the impulse budget was left",
         Outcome.DIVERGED: "the closest approach was farther than the nominal range",
     }
@@ -122,12 +124,17 @@ def _show(console: Console, scenario: Scenario, curves: Sequence[Curve]) -> None
             table.add_row(title, quantity, *(number(float(value)) for value in quantiles(values, LEVELS)))
         median = number(float(quantiles(bounds, 0.5))) if len(bounds) else "-"
         table.add_row("", bound_name(scenario), "", median)
-        counts = Counter(outcome for outcome in results.outcomes if outcome is not Outcome.INTERCEPTED)
         lines = [
-            f"in {count} run{'s' if count > 1 else ''} {endings[outcome]} ({outcome.value})"
-            for outcome, count in counts.items()
+            f"in {count} run{'s' if count > 1 else ''} {text} ({outcome.value})"
+            for outcome, text in endings.items()
+            if (count := results.outcomes.count(outcome))
         ]
-        notes.append(f"curve {curve.number}: " + "; ".join([certificate(results), *lines]))
+        hits = hit_text(results.hits, scenario)
+        notes.append(f"curve {curve.number}: " + "; ".join([*([hits] if hits else []), certificate(results), *lines]))
+    counts = sum((set_counts(curve.results.truth_kept, curve.results.set_emptied) for curve in curves), SetCounts())
+    if counts.set_emptied:
+        notes.append(f"an empty set {'was enlarged, and guidance continued' if enlarged else 'ended guidance'}")
+    notes += set_warnings(scenario.set_model.kind, counts)
     if allowed := allowance(scenario):
         notes.append(allowed)
     if scenario.name in (MANY, SINGLE):

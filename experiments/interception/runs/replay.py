@@ -5,18 +5,25 @@ from __future__ import annotations
 from experiments.common.errors import InputError
 from experiments.common.output import output
 from experiments.common.screen import figure_files, progress_bar, say, table_console
-from experiments.interception.commands.replay import Replay
+from experiments.interception.command import Replay
 from experiments.interception.figures.animation import GIF, MP4, animate, animation_path
 from experiments.interception.page import MOST_RECORDS, interception_page
 from experiments.interception.record_file import load_record
-from experiments.interception.runs.engagement_table import FIGURE_2, FIGURE_3, draw_engagements, show_engagements
-from experiments.interception.terminal.engagement import play
+from experiments.interception.runs.engagement_table import (
+    FIGURE_2,
+    FIGURE_3,
+    draw_engagements,
+    read_times,
+    show_engagements,
+)
+from experiments.interception.terminal import play
 
 
 def run(options: Replay) -> None:
     """Read the records, write the files and print the table or the terminal replay."""
     if len(options.records) > MOST_RECORDS:
         raise InputError(f"replay needs one record or two records, found {len(options.records)}; omit some")
+    times_s = read_times(options.times)
     animation_path("--gif", options.gif, GIF)
     animation_path("--mp4", options.mp4, MP4)
     files = {"--html": options.html, "--gif": options.gif, "--mp4": options.mp4}
@@ -35,8 +42,8 @@ def run(options: Replay) -> None:
             written.deliver("--html", interception_page(records))
         for option, file in (("--gif", options.gif), ("--mp4", options.mp4)):
             if file is not None:
-                written.deliver(option, animate(records, file.suffix, begin(file.name)))
-        draw_engagements(records, written)
+                written.deliver(option, animate(records, file.suffix, options.frames, options.width, begin(file.name)))
+        draw_engagements(records, times_s, written, begin)
     console = table_console(False)
     if options.terminal:
         play(records, console, options.speed)

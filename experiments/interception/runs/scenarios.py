@@ -5,12 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import typer
-from rich.console import Console
-from rich.text import Text
 
-from experiments.common.output import to_json, write_file
-from experiments.common.screen import show_built_in
-from experiments.interception.runs.shared import summary_head
+from experiments.common.output import library_version, write_file
+from experiments.common.screen import show_built_in, show_checked
 from experiments.interception.scenario_file import (
     load_scenario,
     scenario_hash,
@@ -29,25 +26,9 @@ def list_scenarios(json: bool, quiet: bool) -> None:
 def check(file: str, json: bool, quiet: bool) -> None:
     """Check a scenario file."""
     scenario = load_scenario(file)
-    warnings = scenario_warnings(scenario)
-    if json:
-        head = summary_head(scenario)
-        typer.echo(
-            to_json(
-                {
-                    "version": head["version"],
-                    "name": scenario.name,
-                    "scenario_hash": head["scenario_hash"],
-                    "warnings": warnings,
-                }
-            ),
-            nl=False,
-        )
-    elif not quiet:
-        console = Console(soft_wrap=True)
-        console.print(Text.assemble(("ok", "bold green"), f"  {scenario.name}  {scenario_hash(scenario)}"))
-        for warning in warnings:
-            console.print(Text.assemble(("warning: ", "yellow"), warning))
+    head = {"version": library_version(), "name": scenario.name, "scenario_hash": scenario_hash(scenario)}
+    summary = {**head, "warnings": scenario_warnings(scenario)}
+    show_checked(summary, head["scenario_hash"], json, quiet)
 
 
 def new(file: Path, overwrite: bool, quiet: bool) -> None:

@@ -13,6 +13,7 @@ from experiments.common.errors import InputError
 from experiments.common.output import library_version
 from experiments.common.screen import NOT_FINITE
 from experiments.interception.scenario_file import scenario_hash, scenario_warnings
+from experiments.interception.study import set_counts
 from guidance import Strategy
 from sim import Results, Scenario, simulate
 from sim.gravity import on_board_model
@@ -30,8 +31,6 @@ def simulate_in_threads(
     ----------
     jobs : sequence
         Scenario, own strategy and progress callback of each simulation, the slowest first.
-    runs, seed : int
-        As in `simulate`.
 
     Raises
     ------
@@ -97,11 +96,11 @@ def allowance(scenario: Scenario) -> str | None:
 
 
 def certificate(results: Results) -> str:
-    """Return a line with the numbers of runs that kept the true state, and of runs within the bound Phi."""
+    """Return a line about the sets of all runs, and the number of runs within the bound Phi."""
     runs = len(results)
-    kept = f"true state inside the set at every step: {int(results.truth_kept.sum())} of {runs} runs"
+    sets = str(set_counts(results.truth_kept, results.set_emptied))
     held = results.phi_held.compressed()
     if not len(held):
-        return kept
+        return sets
     missing = f" ({runs - len(held)} without a bound)" if len(held) < runs else ""
-    return f"{kept}; miss within the bound Phi: {int(held.sum())} of {len(held)} runs{missing}"
+    return f"{sets}; miss within the bound Phi: {int(held.sum())} of {len(held)} runs{missing}"

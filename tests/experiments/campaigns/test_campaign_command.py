@@ -21,9 +21,11 @@ import pytest
 from experiments.campaigns.flight import duration, size
 from experiments.campaigns.samples import replay_line
 from experiments.common.errors import InputError
+from experiments.interception.choices import with_model
 from experiments.interception.own_strategy import load_strategy
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
 from guidance import NoiseKind
+from infoset import Model
 from sim import Campaign, CampaignNoise, Scenario, fly_one
 from sim.chunk import chunk_size
 from sim.storage import CampaignFolder
@@ -42,7 +44,9 @@ def file(brief: Scenario, tmp_path: Path, infoset: Infoset) -> Path:
 
 def test_a_campaign_into_a_folder(infoset: Infoset, brief: Scenario, file: Path, tmp_path: Path) -> None:
     folder = tmp_path / "runs"
-    code, out, err = infoset("campaign", file, "--runs", 150, "--noise", "mixed", "--seed", 4, "--out", folder)
+    code, out, err = infoset(
+        *("campaign", file, "--runs", 150, "--noise", "mixed", "--seed", 4, "--model", "paper", "--out", folder)
+    )
     assert (code, err) == (0, f"wrote shards, scenario.toml, summary.json in {folder}\n")
     assert sorted(each.name for each in folder.iterdir()) == FILES
     stored = CampaignFolder.read(folder)
@@ -203,14 +207,14 @@ def test_damage_is_said_and_mended(infoset: Infoset, file: Path, tmp_path: Path)
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
-        (["--runs", 0], ["--runs", "greater than or equal to 1"]),
-        (["--runs", -3], ["--runs", "greater than or equal to 1"]),
-        (["--runs", 10**30], ["--runs", "less than or equal to 10000000"]),
+        (["--runs", 0], ["--runs", "must be from 1 to "]),
+        (["--runs", -3], ["--runs", "must be from 1 to "]),
+        (["--runs", 10**30], ["--runs", " to 10000000, found "]),
         (["--seed", -1], ["--seed"]),
         (["--chunk", 0], ["--chunk"]),
-        (["--workers", 0], ["--workers", "greater than or equal to 1"]),
-        (["--workers", 10**6], ["--workers", "less than or equal to 1024"]),
-        (["--noise", "gam"], ["--noise", "'random', 'game', 'mixed'"]),
+        (["--workers", 0], ["--workers", "must be from 1 to "]),
+        (["--workers", 10**6], ["--workers", " to 1024, found "]),
+        (["--noise", "gam"], ["--noise: there is no", "did you mean game? choose one of: random, game, mixed"]),
         (["--strategy", "patent"], ["did you mean patient?"]),
         (["--until", "miss p99 ci<1"], ["--until: there is no quantity miss"]),
         (
@@ -220,7 +224,7 @@ def test_damage_is_said_and_mended(infoset: Infoset, file: Path, tmp_path: Path)
         (["--dask", "localhost"], ["--dask: must be an address such as tcp://host:8786"]),
         (["--dask", "tcp://h:1", "--workers", 2], ["cannot be combined; give only one of them"]),
         (["--processes", 2, "--workers", 2], ["cannot be combined; give only one of them"]),
-        (["--processes", 0], ["--processes", "greater than or equal to 1"]),
+        (["--processes", 0], ["--processes", "must be from 1 to "]),
         (["--json", "missing/x.json"], ["there is no folder missing"]),
         (["--out", "brief.toml"], ["brief.toml: is a file, not a folder"]),
         (["--out", "."], ["is not empty, and contains no campaign"]),
@@ -400,7 +404,8 @@ def _finished(file: Path, folder: Path, runs: int) -> Any:
 def test_killed_and_resumed(brief: Scenario, file: Path, tmp_path: Path) -> None:
     stored = _killed_at_random_moments(file, tmp_path / "runs", 400, 1, seed=1)
     assert stored == sorted(stored)
-    expected = Campaign(brief, 400, tmp_path / "whole", noise=CampaignNoise.MIXED).run().table
+    study = with_model(brief, Model.GUARANTEED)  # the default model of the command
+    expected = Campaign(study, 400, tmp_path / "whole", noise=CampaignNoise.MIXED).run().table
     assert _finished(file, tmp_path / "runs", 400).equals(expected)
 
 
@@ -411,7 +416,8 @@ def test_killed_at_twenty_random_moments_and_resumed(brief: Scenario, file: Path
     assert stored == sorted(stored)  # what is stored is never lost
     assert len(set(stored)) > 10
     assert stored[-1] < 4000
-    expected = Campaign(brief, 4000, tmp_path / "whole", noise=CampaignNoise.MIXED).run().table
+    study = with_model(brief, Model.GUARANTEED)
+    expected = Campaign(study, 4000, tmp_path / "whole", noise=CampaignNoise.MIXED).run().table
     assert _finished(file, tmp_path / "runs", 4000).equals(expected)
 
 
@@ -444,7 +450,7 @@ def test_a_disk_that_fills_up(infoset: Infoset, brief: Scenario, file: Path, sma
     assert infoset(*asked, "--resume")[0] == 2  # still full
     subprocess.run(["mount", "-o", "remount,size=4m", small_disk], check=True)
     assert infoset(*asked, "--resume") == (0, "", "")
-    expected = Campaign(brief, 1600, tmp_path / "whole").run().table
+    expected = Campaign(with_model(brief, Model.GUARANTEED), 1600, tmp_path / "whole").run().table
     assert CampaignFolder.read(small_disk / "runs").table().equals(expected)
 
 
@@ -462,6 +468,7 @@ def test_a_second_campaign_in_the_folder_is_refused(infoset: Infoset, file: Path
 @pytest.mark.slow
 def test_processes_give_the_same_bits_and_die_with_their_parent(brief: Scenario, file: Path, tmp_path: Path) -> None:
     arguments = ["campaign", file, "--runs", 6000, "--chunk", 8, "--noise", "mixed", "--out", tmp_path / "runs", "-q"]
+    brief = with_model(brief, Model.GUARANTEED)
     command = [sys.executable, "-m", "experiments", *map(str, arguments), "--resume", "--processes", "2"]
     with subprocess.Popen(command) as process:
         shards = tmp_path / "runs" / "shards"

@@ -21,6 +21,7 @@ from experiments.campaigns.campaign_figures import (
 )
 from experiments.interception.scenario_file import load_scenario
 from sim import Campaign, CampaignNoise, Scenario
+from tests.experiments.campaigns.figure_room import need_room
 
 Infoset = Callable[..., tuple[int, str, str]]
 FIGURES = [
@@ -119,6 +120,16 @@ def test_the_axis_has_room_for_the_guarantee_or_says_what_is_beyond() -> None:
     assert miss.get_xlabel().split("\n")[1:] == ["dotted beyond the axis: 1 of 40"]
 
 
+def test_the_radius_of_the_body_is_a_line_with_a_label() -> None:
+    figure = draw_campaign_distributions([replace(columns("random", 40), radius_m=0.5), columns("game", 40)])
+    miss, impulse = figure.axes
+    (line,) = [each for each in miss.lines if each.get_label() == "_radius"]
+    assert float(np.asarray(line.get_xdata())[0]) == 0.5
+    assert not [each for each in impulse.lines if each.get_label() == "_radius"]
+    (legend,) = figure.legends
+    assert legend.get_texts()[-1].get_text() == "body radius, 0.5 m: a smaller miss is a hit"
+
+
 @pytest.mark.parametrize("size", [1, 2, 30, 20_000])
 def test_figures_of_few_runs_and_of_many(size: int) -> None:
     both = [columns("random", size), columns("game", size)]
@@ -138,6 +149,16 @@ def test_figures_of_few_runs_and_of_many(size: int) -> None:
         *("initial z, km", "initial x, km", "initial V$_z$, km/s", "initial V$_x$, km/s"),
     ]
     assert max(len(np.asarray(line.get_xdata())) for line in clouds[0].get_lines()) <= MOST_POINTS
+
+
+def test_texts_of_figures_never_touch() -> None:
+    both = [columns("random", 400), columns("game", 400)]
+    far = replace(both[1], miss_m=np.append(both[1].miss_m[:-1], 1e5))
+    for drawn in (both, [both[0], far]):
+        for draw in (draw_campaign_distributions, draw_convergence, draw_dispersion):
+            need_room(draw(drawn))
+    row = draw_dispersion([far]).axes[0]
+    assert row.get_ylabel() == "miss, m\nruns beyond the axis: 1 of 400"
 
 
 def test_correlations_by_hand() -> None:

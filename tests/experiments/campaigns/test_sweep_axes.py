@@ -85,9 +85,46 @@ def test_values_rise_evenly_between_the_ends_as_written(ends: tuple[int, int], c
     np.testing.assert_allclose(axis.values, spaced(least / 100.0, greatest / 100.0, count), rtol=1e-11)
 
 
+def test_keys_with_the_same_values(asteroid: Scenario) -> None:
+    tied = "angle_sensor.error_at_zero_range_rad=angle_sensor.error_at_nominal_range_rad=log:1e-4:4e-4:3"
+    (axis,) = sweep_axes(tied, asteroid)
+    assert axis == Axis(tied.rpartition("=")[0], (1e-4, 2e-4, 4e-4), "log")
+    for cell, value in zip(sweep_cells(asteroid, (axis,)), axis.values, strict=True):
+        sensor = cell.set_model.angle_sensor
+        assert (sensor.error_at_zero_range_rad, sensor.error_at_nominal_range_rad) == (value, value)
+
+
+def test_a_factor_of_all_error_bounds_of_a_sensor(asteroid: Scenario) -> None:
+    axes = sweep_axes("angle_sensor.scale=0.5:2:2,range_sensor.scale=1:3:2", asteroid)
+    assert axes[0] == Axis("angle_sensor.scale", (0.5, 2.0))
+    cells = sweep_cells(asteroid, axes)
+    bounds = [
+        (
+            cell.set_model.angle_sensor.error_at_nominal_range_rad,
+            cell.set_model.angle_sensor.error_at_zero_range_rad,
+            cell.range_sensor.relative_error if cell.range_sensor else None,
+        )
+        for cell in cells
+    ]
+    assert bounds == [
+        *((7.5e-5, 1.15e-4, 0.05), (7.5e-5, 1.15e-4, 0.15)),
+        *((3e-4, 4.6e-4, 0.05), (3e-4, 4.6e-4, 0.15)),
+    ]
+    (same,) = sweep_cells(asteroid, (Axis("angle_sensor.scale=range_sensor.scale", (1.0, 1.0)),))[:1]
+    assert same == asteroid
+
+
 @pytest.mark.parametrize(
     ("text", "parts"),
     [
+        (
+            "thruster.budget_m_s=nominal.range_km=1:2:2",
+            ["must have the same unit, found thruster.budget_m_s in m/s, nominal.range_km in km"],
+        ),
+        ("angle_sensor.scale=1:2:2,angle_sensor.error_at_zero_range_rad=1e-4:2e-4:2", ["is named twice"]),
+        ("thruster.budget_m_s=thruster.budget_m_s=1:2:2", ["is named twice"]),
+        ("rate_sensor.scale=1:2:2", ["has no [rate_sensor]; add that table"]),
+        ("thruster.scale=1:2:2", ["has no numeric key", "thruster.scale"]),
         ("", ['"" is not written as KEY=FROM:TO:COUNT']),
         ("thruster.budget_m_s", ["is not written as KEY=FROM:TO:COUNT"]),
         ("thruster.budget=1:2:2", ["did you mean thruster.budget_m_s?"]),

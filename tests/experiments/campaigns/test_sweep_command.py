@@ -4,7 +4,7 @@ import itertools
 import json
 import math
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,18 +15,34 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from experiments.campaigns.axis_names import key_label, unit_of
+from experiments.campaigns.samples import Sample
 from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
-from experiments.campaigns.sweep_figures import between, draw_sweep
-from experiments.campaigns.sweep_table import SHOWN, crossings, key_label, sweep_table, unit_of, where_met
+from experiments.campaigns.sweep_figures import draw_sweep
+from experiments.campaigns.sweep_table import SHOWN, Limit, SweepTable, answer, limits, sweep_table
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
-from sim import CampaignNoise, QuantileName, Requirement, Scenario, Sweep, quantiles, simulate
+from experiments.interception.study import SetCounts
+from sim import (
+    CampaignNoise,
+    QuantileEstimate,
+    QuantileName,
+    Requirement,
+    Scenario,
+    Sweep,
+    estimate_hits,
+    quantiles,
+    simulate,
+)
+from sim.requirement import Decision, HitRequirement, Verdict
 from sim.storage import Axis, CampaignFolder
+from tests.experiments.campaigns.figure_room import need_room
 
 Infoset = Callable[..., tuple[int, str, str]]
 FILES = [
     *(".lock", "figure-sweep.pdf", "figure-sweep.png", "manifest.json", "scenario.toml", "shards", "summary.json"),
     "sweep.parquet",
 ]
+REQUIRED = Requirement(SHOWN[1], 10.0)
 TWO = "angle_sensor.error_at_zero_range_rad=1e-4:4e-4:3,thruster.greatest_impulse_m_s=log:2:8:2"
 
 
@@ -48,7 +64,9 @@ def swept(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_sweep_of_two_keys(infoset: Infoset, brief: Scenario, file: Path, tmp_path: Path) -> None:
     folder = tmp_path / "sweep"
-    code, out, err = infoset("sweep", file, "--vary", TWO, "--runs", 30, "--out", folder, "--seed", 2)
+    code, out, err = infoset(
+        "sweep", file, "--model", "paper", "--vary", TWO, "--runs", 30, "--out", folder, "--seed", 2
+    )
     assert code == 0
     assert (
         f"wrote shards, scenario.toml, sweep.parquet, figure-sweep.pdf, figure-sweep.png, summary.json in {folder}"
@@ -80,7 +98,8 @@ def test_a_sweep_of_two_keys(infoset: Infoset, brief: Scenario, file: Path, tmp_
         assert row["miss_m_p99_upper"] is None
         assert row["miss_m_p50_lower"] in flown.miss_m
         assert row["truth_kept"] == int(flown.truth_kept.sum())
-        assert row["intercepted"] + row["set_lost"] + row["budget_spent"] + row["diverged"] == 30
+        assert row["set_emptied"] == int(flown.set_emptied.sum())
+        assert row["arrived"] + row["set_empty"] + row["budget_spent"] + row["diverged"] == 30
     found = json.loads((folder / "summary.json").read_text())
     assert (found["kind"], found["scenario_hash"], found["runs"]) == ("sweep", scenario_hash(brief), 180)
     assert [each["unit"] for each in found["axes"]] == ["rad", "m/s"]
@@ -92,14 +111,18 @@ def test_a_sweep_of_one_key_mixed_and_resumed(infoset: Infoset, file: Path, tmp_
     asked = ("sweep", file, "--vary", "thruster.greatest_impulse_m_s=2:8:4", "--runs", 20, "--noise", "mixed")
     code, out, _ = infoset(*asked, "--out", tmp_path / "a", "--require", "miss_m p90<3")
     assert code == 0
-    assert out.count("noise: miss_m p90<3 is met for these values of thruster.greatest_impulse_m_s:") == 2
+    assert out.count("noise: miss_m p90<3 is met in") == 2
+    assert out.count("along thruster.greatest_impulse_m_s:") == 2
     table = pq.read_table(tmp_path / "a" / "sweep.parquet")
     assert table.column("noise").to_pylist() == ["random", "game"] * 4
     assert set(table.column("runs").to_pylist()) == {10}
     before = (tmp_path / "a" / "sweep.parquet").read_bytes()
     for victim in list((tmp_path / "a" / "shards").glob("*.parquet"))[1:3]:
         victim.unlink()
-    assert infoset(*asked, "--out", tmp_path / "a", "--resume", "-q") == (0, "", "")
+    code, out, _ = infoset("report", tmp_path / "a")
+    assert out.count("noise: miss_m p90<3 is met in") == 2
+    again = infoset(*asked, "--out", tmp_path / "a", "--require", "miss_m p90<3", "--resume", "-q")
+    assert again == (0, "", "")
     assert (tmp_path / "a" / "sweep.parquet").read_bytes() == before
     code, _, err = infoset(*asked[:3], "thruster.greatest_impulse_m_s=2:9:4", *asked[4:], "--out", "a", "--resume")
     assert code == 2
@@ -110,7 +133,8 @@ def test_a_sweep_of_one_key_mixed_and_resumed(infoset: Infoset, file: Path, tmp_
 def test_the_report_of_a_sweep_is_from_its_files_alone(infoset: Infoset, swept: Path, tmp_path: Path) -> None:
     code, out, _ = infoset("report", swept, "--out", tmp_path / "report", "--require", "impulse_m_s p50<60")
     assert code == 0
-    assert "impulse_m_s p50<60 is met for these values of angle_sensor.error_at_zero_range_rad:" in out
+    assert "impulse_m_s p50<60 is met in" in out
+    assert "angle_sensor.error_at_zero_range_rad (rows) and thruster.greatest_impulse_m_s (columns)" in out
     names = ["figure-sweep.pdf", "figure-sweep.png", "report.json", "scenario.toml", "sweep.parquet"]
     assert sorted(each.name for each in (tmp_path / "report").iterdir()) == names
     assert pq.read_table(tmp_path / "report" / "sweep.parquet").num_rows == 6
@@ -133,7 +157,7 @@ def test_three_keys_are_a_table_only(infoset: Infoset, file: Path, tmp_path: Pat
     [
         (["--vary", "thruster.budget=1:2:2"], ["did you mean thruster.budget_m_s?"]),
         (["--vary", "thruster.greatest_impulse_m_s=0.01:5:3"], ["brief with thruster.greatest_impulse_m_s = 0.01"]),
-        (["--runs", 0], ["--runs", "greater than or equal to 1"]),
+        (["--runs", 0], ["--runs", "must be from 1 to "]),
         (["--require", "miss_m<10"], ["--require: must be a quantity, a quantile and a bound"]),
         (["--show", "miss_m p99,fuel p50"], ["--show: there is no quantity fuel"]),
         (["--show", ",".join(f"miss_m p{each}" for each in range(1, 20))], ["--show: at most 8"]),
@@ -198,29 +222,165 @@ def test_a_large_sweep_asks_on_a_terminal(
     assert questions == ["6 cells of 300000 runs are 1800000 engagements, more than a million. Continue?"]
 
 
-def test_where_a_quantile_crosses_its_bound_by_hand() -> None:
-    assert crossings((1.0, 2.0, 4.0), (5.0, 15.0, 5.0), 10.0, "linear") == [1.5, 3.0]
-    assert crossings((1.0, 100.0), (5.0, 15.0), 10.0, "log") == pytest.approx([10.0])
-    assert crossings((1.0, 2.0, 3.0), (5.0, None, 15.0), 10.0, "linear") == []
-    axis = Axis("a", (1.0, 2.0, 4.0))
-    assert where_met(axis, (5.0, 15.0, 25.0), 10.0) == "up to 1.5"
-    assert where_met(axis, (15.0, 5.0, 5.0), 10.0) == "from 1.5"
-    assert where_met(axis, (5.0, 15.0, 5.0), 10.0) == "up to 1.5, from 3"
-    assert where_met(axis, (15.0, 5.0, 15.0), 10.0) == "1.5 to 3"
-    assert where_met(axis, (5.0, 6.0, 7.0), 10.0) == "everywhere"
-    assert where_met(axis, (15.0, 16.0, 17.0), 10.0) == "nowhere"
-    assert where_met(axis, (None, None, None), 10.0) == "not simulated yet"
+MET, NOT_MET, OPEN = Decision.MET, Decision.NOT_MET, Decision.UNDECIDED
+
+
+def verdict(value: float, decision: Decision, half: float = 1.0) -> Verdict:
+    return Verdict(decision, 20, value, value - half, value + half, 20)
+
+
+def test_limits_are_interpolated_between_neighbouring_decided_cells_only() -> None:
+    axis = Axis("guidance.step_s", (1.0, 2.0, 4.0))
+    met, missed, undecided = verdict(5.0, MET), verdict(15.0, NOT_MET), verdict(10.5, OPEN)
+    assert limits(axis, (met, missed, met), 10.0) == [Limit(1.5, 1.4, 1.6), Limit(3.0, 2.8, 3.2)]
+    (limit,) = limits(Axis("a", (1.0, 100.0), "log"), (met, missed), 10.0)
+    assert (limit.value, limit.lower, limit.upper) == pytest.approx((10.0, 10.0**0.8, 10.0**1.2))
+    assert limits(axis, (met, undecided, missed), 10.0) == [Limit(None, 1.0, 4.0)]
+    assert limits(axis, (met, None, missed), 10.0) == [Limit(None, 1.0, 4.0)]
+    assert limits(axis, (undecided, missed, undecided), 10.0) == []
+    unbounded = replace(missed, upper=None)
+    assert limits(axis, (met, unbounded, missed), 10.0) == [Limit(1.5, 1.0, 1.6)]
+    assert limits(axis, (unbounded, met, met), 10.0) == [Limit(1.5, 1.4, 2.0)]
+
+
+def test_answers_in_words() -> None:
+    axis = Axis("guidance.step_s", (1.0, 2.0, 4.0))
+    met, missed, undecided = verdict(5.0, MET), verdict(15.0, NOT_MET), verdict(10.5, OPEN)
+    assert answer(axis, (met, missed, missed), 10.0).met == (
+        "met at 1 s, not met from 2 to 4 s; limit 1.5 s, with 95 % confidence between 1.4 and 1.6 s"
+    )
+    assert answer(axis, (met, undecided, missed), 10.0).met == (
+        "met at 1 s, undecided at 2 s, not met at 4 s; limit between 1 and 4 s"
+    )
+    assert answer(axis, (met, met, met), 10.0).met == "met at all 3 values"
+    assert answer(axis, (undecided, undecided, undecided), 10.0).met == "undecided at all 3 values"
+    assert answer(axis, (None, None, None), 10.0).met == "not simulated at all 3 values"
 
 
 @given(values=st.lists(st.floats(0.0, 20.0), min_size=2, max_size=12), bound=st.floats(1.0, 19.0))
-def test_crossings_lie_between_cells_on_either_side_of_the_bound(values: list[float], bound: float) -> None:
-    places = tuple(float(each) for each in range(len(values)))
-    found = crossings(places, values, bound, "linear")
+def test_limits_lie_between_cells_on_either_side_of_the_bound(values: list[float], bound: float) -> None:
+    axis = Axis("a", tuple(float(index) for index in range(len(values))))
+    verdicts = [verdict(value, MET if value < bound else NOT_MET, 0.0) for value in values]
+    found = limits(axis, verdicts, bound)
     changes = [left for left in range(len(values) - 1) if (values[left] < bound) != (values[left + 1] < bound)]
     assert len(found) == len(changes)
-    for place, left in zip(found, changes, strict=True):
-        assert left <= place <= left + 1
-        assert np.interp(place, places, values) == pytest.approx(bound, rel=1e-9)
+    for limit, left in zip(found, changes, strict=True):
+        assert limit.value is not None
+        assert left <= limit.lower <= limit.value <= limit.upper <= left + 1
+        assert np.interp(limit.value, axis.values, values) == pytest.approx(bound, rel=1e-9)
+
+
+def test_twenty_runs_decide_no_99_percent_quantile(infoset: Infoset, file: Path, tmp_path: Path) -> None:
+    key = "angle_sensor.error_at_zero_range_rad"
+    code, out, _ = infoset("sweep", file, "--vary", f"{key}=1e-5:2e-5:2", "--runs", 20, "--out", tmp_path / "sweep")
+    assert code == 0
+    assert "miss_m p99<10 is met in 0, not met in 0, undecided in 2 of 2 cells" in out
+    assert "  undecided at all 2 values" in out
+    assert "2 cells are undecided after 20 runs; about 350 more runs per cell would decide" in out
+    summary = json.loads((tmp_path / "sweep" / "summary.json").read_text())
+    assert [cell["requirement"] for cell in summary["cells"]] == ["undecided"] * 2
+    for cell in summary["cells"]:
+        required = cell["samples"][0]["requirement"]
+        assert required["value"] < 10.0
+        assert (required["upper"], required["runs_needed"]) == (None, 368)
+
+
+def test_runs_are_added_until_each_cell_is_decided(infoset: Infoset, file: Path, tmp_path: Path) -> None:
+    key = "angle_sensor.error_at_zero_range_rad"
+    asked = ("sweep", file, "--vary", f"{key}=1e-5:3e-4:4", "--require", "miss_m p80<3", "--out", tmp_path / "sweep")
+    code, out, _ = infoset(*asked, "--runs", 10)
+    assert code == 0
+    assert "to add runs to these cells: repeat infoset sweep with --resume and --until decided" in out
+    code, out, _ = infoset(*asked, "--runs", 10, "--until", "decided", "--most-runs", 300, "--resume")
+    assert code == 0
+    assert "the decision in each cell has a confidence of at least 95 % although runs are added until it is made" in out
+    summary = json.loads((tmp_path / "sweep" / "summary.json").read_text())
+    assert (summary["complete"], summary["until"], summary["require"]) == (True, "miss_m p80<3", "miss_m p80<3")
+    runs = [cell["samples"][0]["runs"] for cell in summary["cells"]]
+    assert min(runs) == 50
+    assert sum(runs) == summary["runs"] == summary["wanted_runs"]
+    for cell in summary["cells"]:
+        assert cell["requirement"] in ("met", "not-met") or cell["samples"][0]["runs"] == 300
+    assert pq.read_table(tmp_path / "sweep" / "sweep.parquet").column("runs").to_pylist() == runs
+    # The report uses the requirement of the sweep, and the test that allows for the added runs.
+    code, out, _ = infoset("report", tmp_path / "sweep", "--json", "-")
+    report = json.loads(out)
+    assert report["require"] == "miss_m p80<3"
+    assert report["cells"] == summary["cells"]
+
+
+def test_a_required_probability_of_a_hit(infoset: Infoset, file: Path, tmp_path: Path) -> None:
+    asked = ("sweep", file, "--set", "body.radius_m=8", "--vary", "angle_sensor.scale=0.5:3:3", "--runs", 40)
+    code, out, _ = infoset(*asked, "--out", tmp_path / "sweep")
+    assert code == 0
+    assert "random noise: hit>=0.95 is met in" in out
+    summary = json.loads((tmp_path / "sweep" / "summary.json").read_text())
+    flown = CampaignFolder.read(tmp_path / "sweep")
+    for number, cell in enumerate(summary["cells"]):
+        hits = int((flown.numbers("miss_m", number) <= 8.0).sum())
+        estimate = estimate_hits(hits, 40)
+        assert cell["hit"] == vars(estimate)
+        expected = "met" if estimate.lower >= 0.95 else "not-met" if estimate.upper < 0.95 else "undecided"
+        assert cell["requirement"] == cell["samples"][0]["requirement"]["decision"] == expected
+        assert cell["samples"][0]["requirement"]["lower"] == pytest.approx(estimate.lower, abs=1e-12)
+        assert cell["samples"][0]["requirement"]["upper"] == pytest.approx(estimate.upper, abs=1e-12)
+    code, out, _ = infoset("report", tmp_path / "sweep", "--require", "hit > 0.5", "--json", "-")
+    assert json.loads(out)["require"] == "hit>=0.5"
+
+
+@pytest.mark.parametrize("requirement", ["hit>=0.95", "hit>0.5"])
+def test_a_hit_needs_a_size(requirement: str, infoset: Infoset, file: Path, swept: Path, tmp_path: Path) -> None:
+    asked = ("--vary", "angle_sensor.scale=1:2:2", "--runs", 2, "--out", "sweep", "--require", requirement)
+    code, _, err = infoset("sweep", file, *asked)
+    assert code == 2
+    assert "has no [body]; set its radius, for example --set body.radius_m=80" in err
+    code, _, err = infoset("report", swept, "--require", requirement)
+    assert code == 2
+    assert "the body of this sweep has no size" in err
+
+
+def test_the_radius_can_be_varied(infoset: Infoset, file: Path, tmp_path: Path) -> None:
+    asked = ("sweep", file, "--vary", "body.radius_m=log:1:1000:4", "--runs", 30, "--json", "-", "--out", "sweep")
+    code, out, _ = infoset(*asked)
+    assert code == 0
+    cells = json.loads(out)["cells"]
+    probabilities = [cell["hit"]["probability"] for cell in cells]
+    assert probabilities == sorted(probabilities)
+    assert probabilities[0] < probabilities[-1] == 1.0
+
+
+def test_keys_with_the_same_values_and_factors_in_tables(infoset: Infoset, file: Path, tmp_path: Path) -> None:
+    one, other = "angle_sensor.error_at_zero_range_rad", "angle_sensor.error_at_nominal_range_rad"
+    asked = ("--vary", f"{one}={other}=1e-4:3e-4:2", "--vary", "thruster.greatest_impulse_m_s=2:8:2")
+    code, out, _ = infoset("sweep", file, *asked, "--runs", 5, "--out", "sweep", "--json", "-")
+    assert code == 0
+    summary = json.loads(out)
+    assert [(axis["key"], axis["unit"]) for axis in summary["axes"]] == [
+        (f"{one}={other}", "rad"),
+        ("thruster.greatest_impulse_m_s", "m/s"),
+    ]
+    table = pq.read_table(tmp_path / "sweep" / "sweep.parquet")
+    assert table.column(one).to_pylist() == table.column(other).to_pylist() == [1e-4, 1e-4, 3e-4, 3e-4]
+    assert table.schema.field(other).metadata[b"unit"] == b"rad"
+    assert key_label(f"{one}={other}") == "angle sensor: error at zero range = error at nominal range, rad"
+    assert key_label("range_sensor.scale") == "range sensor: factor of the error bounds"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--most-runs", 30), "--most-runs is the limit of --until; add --until decided"),
+        (("--until", "decided", "--most-runs", 9), "--most-runs: must be at least --runs, 10, found 9"),
+        (("--until", "never"), "--until"),
+    ],
+)
+def test_limits_of_the_runs_that_do_not_fit(
+    arguments: tuple[object, ...], message: str, infoset: Infoset, file: Path, tmp_path: Path
+) -> None:
+    code, _, err = infoset("sweep", file, "--vary", TWO, "--runs", 10, "--out", tmp_path / "sweep", *arguments)
+    assert code == 2
+    assert message in err
+    assert not (tmp_path / "sweep").exists()
 
 
 def test_keys_as_labels() -> None:
@@ -231,24 +391,71 @@ def test_keys_as_labels() -> None:
     assert {key: unit_of(key) for key in units} == units
 
 
-def test_figures_of_sweeps(brief: Scenario, swept: Path, tmp_path: Path) -> None:
-    table = sweep_table(CampaignFolder.read(swept))
-    middle = float(np.median(table.grid("random", SHOWN[1]).compressed()))
-    figure = draw_sweep(table, SHOWN, Requirement(SHOWN[1], middle))
-    panels = [each for each in figure.axes if each.get_xlabel()]
-    assert [each.get_xlabel() for each in panels] == ["angle sensor: error at zero range, $10^{-4}$ rad"] * 4
-    assert {each.get_ylabel() for each in panels} == {"thruster: greatest impulse, m/s"}
-    assert all(len(each.texts) == 6 for each in panels)
+def test_figures_of_sweeps_with_two_keys(swept: Path) -> None:
+    folder = CampaignFolder.read(swept)
+    middle = float(np.median(sweep_table(folder, REQUIRED).grid("random", SHOWN[1]).compressed()))
+    figure = draw_sweep(sweep_table(folder, Requirement(SHOWN[1], middle)), SHOWN, "random")
+    need_room(figure)
+    panels = [axes for axes in figure.axes if axes.get_xlabel()]
+    assert panels[0].get_title() == f"(a) miss p99 under {middle:g} m; random noise"
+    assert [axes.get_xlabel() for axes in panels] == ["angle sensor: error at zero range, $10^{-4}$ rad"] * 4
+    assert {axes.get_ylabel() for axes in panels} == {"thruster: greatest impulse, m/s"}
+    assert all(len(axes.texts) == 6 for axes in panels)
+
+
+def test_figures_of_sweeps_with_one_key(brief: Scenario, tmp_path: Path) -> None:
     axes = sweep_axes("thruster.greatest_impulse_m_s=2:8:3", brief)
     Sweep(brief, axes, sweep_cells(brief, axes), 30, tmp_path / "one", noise=CampaignNoise.MIXED).run()
-    table = sweep_table(CampaignFolder.read(tmp_path / "one"))
-    figure = draw_sweep(table, SHOWN, None)
-    assert [each.get_title() for each in figure.axes] == [
-        *("(a) random noise", "(b) random noise", "(c) game noise", "(d) game noise"),
-    ]
-    assert [each.get_ylabel() for each in figure.axes] == ["miss, m", "impulse spent, m/s"] * 2
+    table = sweep_table(CampaignFolder.read(tmp_path / "one"), REQUIRED)
+    for noise in ("random", "game"):
+        figure = draw_sweep(table, SHOWN, noise)
+        need_room(figure)
+        assert [axes.get_title() for axes in figure.axes] == [f"(a) {noise} noise", f"(b) {noise} noise"]
+        assert [axes.get_ylabel() for axes in figure.axes] == ["miss, m", "impulse spent, m/s"]
     with pytest.raises(ValueError, match="one or two axes"):
-        draw_sweep(table, [], None)
+        draw_sweep(table, [], "game")
+
+
+def made_table(axes: Sequence[Axis], required: Requirement | HitRequirement, value: Callable[..., float]) -> SweepTable:
+    """Return a table whose estimates are a function of the values of the axes."""
+    samples, verdicts = [], []
+    for values in itertools.product(*(axis.values for axis in axes)):
+        middle = value(*values)
+        estimates = {
+            quantity: [QuantileEstimate(level, level * middle, 0.8 * level * middle, None) for level in (0.5, 0.99)]
+            for quantity in ("miss_m", "impulse_m_s", "guaranteed_miss_m")
+        }
+        samples.append((Sample("game", 20, estimates, {}, {}, SetCounts(20, 20), None, 0, 0),))
+        share = 1.0 / (1.0 + middle)
+        shown = middle if isinstance(required, Requirement) else share
+        distance = math.log(shown / required.bound) * (-1.0 if isinstance(required, HitRequirement) else 1.0)
+        decision = OPEN if abs(distance) < 0.2 else MET if distance < 0.0 else NOT_MET
+        verdicts.append({"game": Verdict(decision, 20, shown, 0.9 * shown, 1.1 * shown, 40)})
+    nothing = (None,) * len(samples)
+    return SweepTable(tuple(axes), ("game",), (0.5, 0.99), tuple(samples), required, tuple(verdicts), nothing, 80.0)
+
+
+@pytest.mark.parametrize("required", [REQUIRED, HitRequirement(0.95)])
+@pytest.mark.parametrize(
+    "axes",
+    [
+        (Axis("angle_sensor.scale", tuple(np.geomspace(0.01, 1000.0, 21)), "log"),),
+        (Axis("angle_sensor.error_at_zero_range_rad", tuple(np.geomspace(1e-6, 1e-3, 8)), "log"),),
+        (Axis("angle_sensor.error_at_zero_range_rad=angle_sensor.error_at_nominal_range_rad", (1e-6, 1.1e-6, 1e-3)),),
+        (
+            Axis("angle_sensor.error_at_zero_range_rad", tuple(np.linspace(1.23456e-4, 9.87654e-4, 8))),
+            Axis("thruster.greatest_impulse_m_s", tuple(np.geomspace(0.1, 100.0, 15)), "log"),
+        ),
+        (
+            Axis("nominal.range_km", tuple(np.linspace(5701.31, 5901.39, 8))),
+            Axis("thruster.budget_m_s", (1.0, 1.01, 2.0, 2000.0)),
+        ),
+    ],
+)
+def test_labels_never_touch(axes: tuple[Axis, ...], required: Requirement | HitRequirement) -> None:
+    greatest = math.prod(axis.values[-1] for axis in axes)
+    table = made_table(axes, required, lambda *values: 1000.0 * (math.prod(values) / greatest) ** 0.5)
+    need_room(draw_sweep(table, SHOWN, "game"))
 
 
 def test_an_unfinished_sweep_is_reported_as_far_as_it_is(infoset: Infoset, swept: Path, tmp_path: Path) -> None:
@@ -263,10 +470,3 @@ def test_an_unfinished_sweep_is_reported_as_far_as_it_is(infoset: Infoset, swept
     assert pq.read_table(tmp_path / "report" / "sweep.parquet").column("miss_m_p50").null_count == 4
     assert math.isfinite(found["cells"][0]["samples"][0]["miss_m"]["p50"]["value"])
     assert QuantileName("miss_m", 0.5) == SHOWN[0]
-
-
-def test_the_limit_runs_along_edges_of_cells_and_not_beside_unknown_ones() -> None:
-    met = np.ma.masked_array(
-        [[True, True, False], [True, False, False]], mask=[[False, False, False], [False, True, False]]
-    )
-    assert between(np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 1.0, 2.0]), met) == [[(2.0, 0.0), (2.0, 1.0)]]

@@ -10,8 +10,11 @@ from typing import Any
 import pytest
 
 from experiments.cli import main
+from experiments.common.screen import number
+from experiments.interception.choices import with_model
 from experiments.interception.record_file import load_record
 from experiments.interception.scenario_file import load_scenario, scenario_hash
+from infoset import Model
 from sim.adversary import find_worst
 
 KEYS = [
@@ -23,6 +26,8 @@ KEYS = [
     "range_meter",
     "elapsed_s",
     "strategy",
+    "worst_of_search_set_kept_m",
+    "worst_of_search_m",
     "keep_set",
     "worst_miss_m",
     "outcome",
@@ -83,13 +88,15 @@ def test_the_worst_as_json_and_as_a_record_that_replays(infoset: Command, tmp_pa
     assert (code, err) == (0, "")
     found: dict[str, Any] = json.loads(out)
     assert list(found) == KEYS
-    scenario = load_scenario("asteroid-1997")
+    scenario = with_model(load_scenario("asteroid-1997"), Model.GUARANTEED)
     assert found["version"] == version("infoset")
     assert (found["scenario"], found["scenario_hash"]) == (scenario.name, scenario_hash(scenario))
     assert (found["seed"], found["evaluations"], found["record"]) == (5, BUDGET, "worst.npz")
-    assert (found["strategy"], found["model"], found["range_meter"]) == ("symmetric-miss", "paper", True)
+    assert (found["strategy"], found["model"], found["range_meter"]) == ("symmetric-miss", "guaranteed", True)
     worst = find_worst(scenario, budget=BUDGET, seed=5)
     assert found["worst_miss_m"] == worst.miss_m == found["history"][-1]["worst_miss_m"]
+    assert worst.miss_m == found["worst_of_search_m"] >= found["worst_of_search_set_kept_m"]
+    assert found["worst_of_search_set_kept_m"] == find_worst(scenario, budget=BUDGET, seed=5, keep_set=True).miss_m
     assert list(found["start"].values()) == [*worst.position_m.tolist(), *worst.velocity_m_s.tolist()]
 
     record = load_record(tmp_path / "worst.npz")
@@ -113,11 +120,56 @@ def test_the_table_says_what_was_found_and_how(infoset: Command, tmp_path: Path)
         "adversary", "--budget", BUDGET, "--model", "guaranteed", "--no-range-meter", "--strategy", "patient"
     )
     assert code == 0
-    assert "asteroid-1997, without range meter, model guaranteed\n" in out
-    lines = ("patient", "worst miss, m", "initial z, x, km", "rounds of changes", "per second")
+    assert "asteroid-1997, without range meter, model guaranteed, strategy patient: 12 simulated" in out
+    lines = (
+        "patient",
+        "greatest miss found, m",
+        "set never empty, and at all",
+        "initial z, x, km",
+        "rounds of changes",
+        "engagements, ",
+    )
     for part in (*lines, "greater misses may exist"):
         assert part in out
     assert list(tmp_path.iterdir()) == []
+
+
+def test_both_greatest_misses_are_those_of_bound(infoset: Command) -> None:
+    """The same strategy, seed, budget and model: bound and adversary print the same two numbers."""
+    options = ("--budget", 40, "--model", "paper", "--json", "-", "-q")
+    (of_bound,) = json.loads(infoset("bound", "--strategies", "symmetric-miss", *options)[1])["strategies"]
+    found = json.loads(infoset("adversary", "--strategy", "symmetric-miss", *options)[1])
+    misses = [found[name] for name in ("worst_of_search_set_kept_m", "worst_of_search_m")]
+    assert misses == [of_bound["worst_of_search_set_kept_m"], of_bound["worst_of_search_m"]]
+    assert misses[0] < 60.0 < misses[1]
+    assert misses[1] == of_bound["worst_found_m"]
+    table = infoset("bound", "--strategies", "symmetric-miss", *options[:4])[1]
+    shown = infoset("adversary", *options[:4])[1]
+    for miss in misses:
+        assert f" {number(miss)} " in table
+        assert f" {number(miss)} " in shown
+    assert "use --model guaranteed, whose set keeps the true state" in shown
+
+
+def test_the_worst_in_a_folder_as_engage_writes_it(infoset: Command, tmp_path: Path) -> None:
+    options = ("--budget", BUDGET, "--model", "paper", "--keep-set", "--out", "worst")
+    code, _, err = infoset("adversary", *options)
+    assert code == 0
+    files = sorted(each.name for each in (tmp_path / "worst").iterdir())
+    figures = [f"{name}.{kind}" for name in ("figure-2-process", "figure-3-sets") for kind in ("pdf", "png")]
+    assert files == [*figures, "record-worst.npz", "results.json", "scenario.toml", "steps.csv"]
+    assert all(name in err for name in files)
+    found = json.loads((tmp_path / "worst" / "results.json").read_text())
+    record = load_record(tmp_path / "worst" / "record-worst.npz")
+    assert float(record.result.miss_m[0]) == found["worst_miss_m"] == found["worst_of_search_set_kept_m"]
+    assert not record.result.set_emptied[0]
+    rows = (tmp_path / "worst" / "steps.csv").read_text().splitlines()
+    assert len(rows) == 1 + len(record.steps)
+    assert rows[1].startswith("scripted,0,")
+    assert scenario_hash(load_scenario(tmp_path / "worst" / "scenario.toml")) == found["scenario_hash"]
+    code, _, err = infoset("adversary", *options)
+    assert code == 2
+    assert "worst: is not empty" in err
 
 
 def test_quiet_prints_nothing(infoset: Command) -> None:
@@ -129,15 +181,15 @@ def test_quiet_prints_nothing(infoset: Command) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--budget", "0"], "greater than or equal to 1"),
-        (["--budget", "-5"], "greater than or equal to 1"),
-        (["--seed", "-1"], "Input should be greater than or equal to 0"),
+        (["--budget", "0"], "must be from 1 to "),
+        (["--budget", "-5"], "must be from 1 to "),
+        (["--seed", "-1"], "must be at least 0, found -1; for example --seed 0"),
         (["--record", "worst.txt"], "--record: worst.txt must end in .npz"),
         (["--record", "there.npz"], "there.npz: exists already; choose another name, or give --overwrite"),
         (["--json", "there.npz"], "there.npz: exists already"),
         (["--json", "nowhere/out.json"], "there is no folder nowhere"),
         (["--strategy", "symetric-miss"], '--strategy: there is no "symetric-miss"; did you mean symmetric-miss?'),
-        (["--model", "papers"], "'papers' is not one of 'paper', 'guaranteed'"),
+        (["--model", "papers"], 'there is no "papers"; did you mean paper? choose one of: paper, guaranteed'),
         (["asteroid-1998"], "asteroid-1998"),
         (["asteroid-1997-single", "--range-meter"], "has no [range_sensor]"),
     ],
@@ -161,7 +213,7 @@ def test_where_no_engagement_counts_it_is_said(infoset: Command, tmp_path: Path)
     text = text.replace("vx_km_s = [-58.1, -57.9]", "vx_km_s = [-110.05, -110.0]")
     file = tmp_path / "fast.toml"
     file.write_text(text)
-    message = infoset("adversary", file, "--keep-set", "--budget", 2, "-q")
+    message = infoset("adversary", file, "--model", "paper", "--keep-set", "--budget", 2, "-q")
     assert message[0] == 2
-    assert "in every simulated engagement the set was lost" in message[2]
+    assert "in every simulated engagement the set became empty" in message[2]
     assert "omit --keep-set" in message[2]

@@ -17,7 +17,7 @@ from experiments.interception.scenario_file import load_scenario, scenario_hash,
 from guidance import strategy_names
 from infoset import StateBox
 from sim import Scenario
-from sim.bound import LabelBound, LowerBound, lower_bound, pair_at
+from sim.bound import LowerBound, lower_bound, pair_at
 
 FILES = ["figure-bound.pdf", "figure-bound.png", "results.json", "scenario.toml"]
 KEYS = [
@@ -77,16 +77,21 @@ def test_bound_into_a_folder(infoset: Infoset, short: Scenario, short_file: Path
         assert each["guaranteed_m"] is not None
         assert each["guaranteed_m"] >= each["worst_found_m"]
         pairs = max(miss for flight in each["flights"] for miss in flight["miss_m"])
+        assert each["worst_of_pairs_m"] == pairs
+        assert each["worst_found_set_kept_m"] == each["worst_found_m"]
+        assert each["worst_of_search_set_kept_m"] == each["worst_of_search_m"]
         assert each["worst_found_m"] == max(pairs, each["worst_of_search_m"])
         assert all(all(flight["truth_kept"]) for flight in each["flights"])
         assert each["name"] in out
     assert f"no strategy can guarantee a miss below {found['lower_bound_m']:.3g} m" in out
-    for title in ("worst miss", "closing speed", "equal measurements until", "guaranteed", "outcome"):
+    for title in ("pairs", "set never", "at all", "closing speed", "equal measurements until", "guaran-"):
         assert title in out
 
 
 def test_bound_as_json_alone(infoset: Infoset, short_file: Path, tmp_path: Path) -> None:
-    code, out, err = infoset(short_file, "--strategies", "symmetric-miss", "--json", "-", "--budget", 0)
+    code, out, err = infoset(
+        short_file, "--strategies", "symmetric-miss", "--model", "paper", "--json", "-", "--budget", 0
+    )
     assert code == 0
     found: Any = json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
     (only,) = found["strategies"]
@@ -110,8 +115,8 @@ def test_help_has_an_example(infoset: Infoset) -> None:
         (["asteroid-1996"], ["asteroid-1996", "did you mean"]),
         (["--strategies", "patent"], ["--strategies", "did you mean patient?"]),
         (["--strategies", "patient,patient"], ["named twice"]),
-        (["--budget", -1], ["--budget", "greater than or equal to 0"]),
-        (["--model", "papr"], ["--model", "'papr' is not one of 'paper', 'guaranteed'"]),
+        (["--budget", -1], ["--budget", "must be from 0 to "]),
+        (["--model", "papr"], ["--model", 'there is no "papr"; did you mean paper? choose one of: paper, guaranteed']),
         (["--json", "missing/x.json"], ["there is no folder missing"]),
         (["--out", "/dev/null"], ["is a file"]),
         (["--json", "out/results.json", "--out", "out"], ["also a file of --out"]),
@@ -154,7 +159,7 @@ def test_a_program_without_a_solution_is_one_message(
         raise BoundError("label 1 m")
 
     monkeypatch.setattr("experiments.interception.runs.bound.lower_bound", fail)
-    code, out, err = infoset(short_file)
+    code, out, err = infoset(short_file, "-q")
     assert (code, out) == (2, "")
     assert err.startswith("error: short: a linear program of the bound has no solution (label 1 m)")
 
@@ -167,9 +172,10 @@ def test_figure_of_few_labels_and_of_many(short: Scenario) -> None:
     assert "s" in right.get_xlabel()
     assert not left.collections
     places = np.concatenate([first + np.linspace(0.0, 29e3, 9) for first in (5.3e6, 5.8e6, 6.2e6)])
+    pair = pair_at(short, 1745e3, -58e3, 0.005)
     many = LowerBound(
-        (pair_at(short, 1745e3, -58e3, 0.005),),
-        tuple(LabelBound(label, -58e3, 1, 20.0 + math.sin(label)) for label in places),
+        (pair,),
+        tuple(replace(pair, label_m=at, apart_m=40.0 + 2.0 * math.sin(at), correction_m=0.0) for at in places),
         0.005,
     )
     (left, _) = draw_bound(short, many).axes

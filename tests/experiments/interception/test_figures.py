@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
-from experiments.common.figure_style import figure_bytes
+from experiments.common.figure_style import figure_bytes, width_mm
 from experiments.interception.curves import Curve, curve_scenarios
 from experiments.interception.figures.distributions import axis_limit, draw_distributions
 from experiments.interception.figures.process import draw_process
@@ -134,6 +134,43 @@ def test_sets_show_truth_measurement_and_labelled_sections(records: list[Record]
         assert first.get_ylim() == second.get_ylim()
 
 
+def test_a_figure_has_no_legend_of_what_it_does_not_show(records: list[Record]) -> None:
+    """Without an angle at the drawn times there is neither a square nor a shaded band, and the legend has none."""
+
+    def legend(record: Record) -> list[str]:
+        return [text.get_text() for text in draw_sets([record]).legends[0].get_texts()]
+
+    blind = replace(records[0], steps=tuple(replace(step, measured={}) for step in records[0].steps))
+    assert legend(blind) == [TRUTH_MARK, "section of the set, with its range in km"]
+    assert len(legend(records[0])) == 4
+
+
+def test_a_miss_of_kilometres_leaves_the_whole_flight_readable(records: list[Record]) -> None:
+    """A line of sight that turns by 80 mrad at the end does not set the limits, and no note hides the curve."""
+    steps = records[0].steps
+    angles = 1.6e-3 + 2e-4 * np.sin(np.arange(len(steps)) / 20.0)
+    far = np.array([step.true_range_m for step in steps])
+    angles += 4e3 / np.maximum(far, 1e3) * (far < 0.2 * far[0])
+    record = replace(
+        records[0],
+        steps=tuple(
+            replace(step, true_angle_rad=angle, measured={"angle": angle + 1e-4})
+            for step, angle in zip(steps, angles.tolist(), strict=True)
+        ),
+    )
+    axes = draw_process([record]).axes[0]
+    low, high = axes.get_ylim()
+    assert high - low < 4.0 * 0.5
+    (note,) = axes.texts
+    assert note.get_text().startswith("reaches ")
+    right, up = note.get_position()
+    left = right - 1.7 * len(note.get_text()) / width_mm(axes)
+    across = np.interp([step.time_s for step in steps], axes.get_xlim(), (0.0, 1.0))
+    heights = (angles * 1e3 - low) / (high - low)
+    under = (across > left) & (across < right) & (np.abs(heights - up) < 0.1)
+    assert not under.any()
+
+
 def test_sets_beyond_the_flight_show_the_last_step(records: list[Record]) -> None:
     (axes,) = draw_sets(records[1:], times_s=(500.0,)).axes
     assert axes.get_title() == f"game noise, t = {records[1].steps[-1].time_s:g} s"
@@ -184,6 +221,20 @@ def test_distributions_draw_the_band_of_the_half_width(curves: list[Curve]) -> N
         assert {text.get_text() for text in axes.texts} == {"1", "2", "3", "4"}
     (legend,) = figure.legends
     assert "90 % confidence band" in " ".join(text.get_text() for text in legend.get_texts())
+
+
+def test_the_radius_of_the_body_is_a_line_with_a_label(curves: list[Curve]) -> None:
+    inside = float(np.median(curves[0].results.miss_m))
+    for radius, drawn, where in ((inside, 1, "a smaller miss is a hit"), (1e6, 0, "beyond the axis")):
+        figure = draw_distributions(curves, radius_m=radius)
+        miss, impulse = figure.axes
+        lines = [each for each in miss.lines if each.get_label() == "_radius"]
+        assert [float(np.asarray(each.get_xdata())[0]) for each in lines] == [radius] * drawn
+        assert not [each for each in impulse.lines if each.get_label() == "_radius"]
+        (legend,) = figure.legends
+        assert legend.get_texts()[-1].get_text() == f"body radius, {radius:g} m: {where}"
+    figure = draw_distributions(curves)
+    assert "radius" not in " ".join(text.get_text() for legend in figure.legends for text in legend.get_texts())
 
 
 def test_a_few_huge_misses_leave_the_axis_legible(curves: list[Curve]) -> None:

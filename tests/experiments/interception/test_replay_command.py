@@ -6,6 +6,7 @@ import io
 import re
 import shutil
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,7 @@ from experiments.interception.figures.animation import GIF, MP4, animate
 from experiments.interception.page import interception_page
 from experiments.interception.record_file import write_record
 from experiments.interception.scenario_file import load_scenario
-from experiments.interception.terminal.dots import Dots
-from experiments.interception.terminal.engagement import MOMENTS_IN_PRINT, frame, play
+from experiments.interception.terminal import MOMENTS_IN_PRINT, Dots, frame, play
 from sim import Record, fly_one
 
 
@@ -72,7 +72,7 @@ def test_an_animation_has_a_picture_a_moment(record: Record, tmp_path: Path) -> 
     short = shortened(record, 3)
     told: list[float] = []
     file = tmp_path / "a.gif"
-    file.write_bytes(animate([short, short], GIF, told.append))
+    file.write_bytes(animate([short, short], GIF, progress=told.append))
     with Image.open(file) as found:
         assert found.n_frames == 3  # type: ignore[attr-defined]
         pictures = []
@@ -82,6 +82,26 @@ def test_an_animation_has_a_picture_a_moment(record: Record, tmp_path: Path) -> 
     assert told == pytest.approx([1 / 3, 2 / 3, 1.0])
     assert pictures[0].shape[1] > pictures[0].shape[0]
     assert (pictures[0] != pictures[2]).any()
+
+
+def test_frames_and_width_of_an_animation_make_it_small(record: Record, tmp_path: Path) -> None:
+    sizes = []
+    for frames, width in ((6, 425), (3, 250)):
+        content = animate([record], GIF, frames, width)
+        with Image.open(BytesIO(content)) as found:
+            assert (found.n_frames, found.size[0]) == (frames, width)  # type: ignore[attr-defined]
+            assert sum(1 for _ in found.getcolors() or ()) <= 16
+        sizes.append(len(content))
+    assert sizes[0] < 6 * 17_000
+    assert sizes[1] < 0.4 * sizes[0]
+
+
+def test_figure_3_at_other_times(file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert replay(file, "--out", "sets", "--times", "2, 40,60,90", "-q") == 0
+    assert (tmp_path / "sets" / "figure-3-sets.png").is_file()
+    for times, part in (("1,x", 'found "x"'), ("-1", "must be at least 0, found -1"), ("1," * 12 + "1", "at most 12")):
+        assert replay(file, "--out", "no", "--times", times) == 2
+        assert f"--times: {part}" in capsys.readouterr().err.replace("must be a finite number, ", "")
 
 
 def test_a_film_needs_ffmpeg_and_says_so(

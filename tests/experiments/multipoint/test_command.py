@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.common.problem_file import built_in_problems, problem_text
+from experiments.common.figure_style import figure_bytes
+from experiments.common.file_kinds import built_in_files
+from experiments.common.problem_file import problem_text
 from experiments.multipoint.figures import draw_control, draw_costates, draw_path, draw_times
 from experiments.multipoint.file import KIND, Axes, load_multipoint
 from experiments.multipoint.scene import Scene, cost_curves
@@ -82,7 +84,9 @@ def test_three_targets_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
     code, out, _ = infoset("--out", "results")
     assert code == 0
     files = [f"{name}.{kind}" for name in FIGURES for kind in ("pdf", "png")]
-    assert sorted(each.name for each in (tmp_path / "results").iterdir()) == sorted([*files, "results.json"])
+    assert sorted(each.name for each in (tmp_path / "results").iterdir()) == sorted(
+        [*files, "results.json", "trajectories.csv"]
+    )
     found = strict((tmp_path / "results" / "results.json").read_text())
     assert list(found) == KEYS
     assert (found["version"], found["problem"]) == (version("infoset"), "service-3")
@@ -212,7 +216,7 @@ def test_help_has_an_example(infoset: Infoset) -> None:
 
 
 def test_every_built_in_problem_is_sound() -> None:
-    mine = [each for each in built_in_problems() if each.kind == KIND]
+    mine = [each for each in built_in_files().values() if each.kind == KIND]
     assert {each.name for each in mine} == {"asteroid-tour", "service-2", "service-3", "service-5"}
     for each in mine:
         loaded = load_multipoint(each.name)
@@ -225,11 +229,11 @@ def test_every_built_in_problem_is_sound() -> None:
     ("arguments", "parts"),
     [
         (["service-4"], ["service-4", "did you mean"]),
-        (["pareto-2008"], ["pareto-2008", "service-3"]),
+        (["pareto-2008"], ["pareto-2008: this is a problem of kind pareto-encounter; use infoset pareto pareto-2008"]),
         (["missing.toml"], ["missing.toml: there is no such file"]),
         (["bad\x1b[31mname"], ["bad?[31mname"]),
-        (["--order", "bets"], ["Invalid value for '--order'", "'best'"]),
-        (["--times", ""], ["Invalid value for '--times'", "'given'"]),
+        (["--order", "bets"], ['--order: there is no "bets"; did you mean best?']),
+        (["--times", ""], ['--times: there is no ""; choose one of: given']),
         (["--json", "missing/x.json"], ["there is no folder missing"]),
         (["--json", "out/results.json", "--out", "out"], ["also a file of --out"]),
         (["--out", "/dev/null"], ["is a file"]),
@@ -413,3 +417,11 @@ def test_figures_say_what_they_show() -> None:
     pieces = [line for line in costates.get_lines() if len(line.get_xydata()) > 2]  # type: ignore[arg-type]
     assert len(pieces) == 9  # three components, broken where they jump
     assert draw_times(scene, curves).axes[0].get_xlabel() == "time of T1, s"
+
+
+def test_matplotlib_warns_of_nothing_in_the_path_of_a_tour(caplog: pytest.LogCaptureFixture) -> None:
+    problem = load_multipoint("asteroid-tour")
+    assert problem.times_s is not None
+    scene = Scene(problem.axes, problem.tour, (0, 1, 2), problem.tour.fly((0, 1, 2), problem.times_s))
+    assert [kind for kind, _ in figure_bytes(draw_path(scene))] == ["pdf", "png"]
+    assert [each.message for each in caplog.records if each.name.startswith("matplotlib")] == []

@@ -119,7 +119,7 @@ def test_what_is_no_game_is_told_in_a_line_with_a_remedy(settings: list[str], in
     options = [part for setting in settings for part in ("--set", setting)]
     code, out, err = infoset("pursuit", *options, "--out", "found")
     assert (code, out) == (2, "")
-    assert err.startswith("error: geo-pursuit with --set: ")
+    assert err.startswith("error: geo-pursuit (built in) with --set")
     assert settings[-1].split("=")[0] in err
     assert ";" in err
     assert list(tmp_path.iterdir()) == []
@@ -144,7 +144,8 @@ def test_a_folder_has_the_problem_the_results_and_the_figures(infoset: Infoset, 
     assert "saddle point: all checks hold" in out
     assert "feedback, a plan every 60 s, evader coast: captured" in out
     files = sorted(each.name for each in (tmp_path / "found").iterdir())
-    assert files == sorted(["problem.toml", "results.json", *(f"{f}.{e}" for f in FIGURES for e in ("pdf", "png"))])
+    figures = [f"{name}.{kind}" for name in FIGURES for kind in ("pdf", "png")]
+    assert files == sorted(["problem.toml", "results.json", "trajectories.csv", *figures])
     again, _, _ = infoset("pursuit", "found/problem.toml", "--json", "again.json", "-q")
     assert again == 0
     one, other = (json.loads((tmp_path / each).read_text()) for each in ("again.json", "found/results.json"))
@@ -205,12 +206,12 @@ def test_a_scripted_evader(infoset: Infoset, tmp_path: Path) -> None:
         (["--set", "evader.eccentricity=1.5"], ["evader.eccentricity", "hyperbola"]),
         (["--feedback", "costa"], ["--feedback", "did you mean coast"]),
         (["--feedback", "gone.csv"], ["gone.csv cannot be read"]),
-        (["--feedback", "coast", "--replan-s", "0"], ["Invalid value for '--replan-s'"]),
-        (["--feedback", "coast", "--delay-s", "nan"], ["Invalid value for '--delay-s'"]),
-        (["--feedback", "coast", "--delay-s", "inf"], ["'--delay-s': must be a finite number"]),
+        (["--feedback", "coast", "--replan-s", "0"], ["--replan-s: must be at least 1, found 0;"]),
+        (["--feedback", "coast", "--delay-s", "nan"], ["--delay-s: must be a finite number, found nan;"]),
+        (["--feedback", "coast", "--delay-s", "inf"], ["--delay-s: must be a finite number"]),
         (["--runs", "5"], ["--feedback"]),
         (["--replan-s", "60"], ["--feedback"]),
-        (["--runs", "0"], ["Invalid value for '--runs'"]),
+        (["--runs", "0"], ["--runs: must be from 1 to 10000, found 0;"]),
         (["--json", "missing/x.json"], ["there is no folder missing"]),
         (["--out", "/dev/null"], ["is a file"]),
     ],

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.common.problem_file import built_in_problems, problem_text
+from experiments.common.file_kinds import built_in_files
+from experiments.common.problem_file import problem_text
 from experiments.reachability.figures import drawings, shown_times
 from experiments.reachability.file import KIND, load_rendezvous
 from experiments.reachability.printed_tables import TABLES, compare_published, corrected, is_published
@@ -57,7 +58,9 @@ def test_reach_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
     code, out, _ = infoset("--select", "energy,l1,vertices,samples:3", "--replan", "--out", folder)
     assert code == 0
     files = [f"{name}.{kind}" for name in FIGURES for kind in ("pdf", "png")]
-    assert sorted(each.name for each in folder.iterdir()) == sorted([*files, "published-tables.csv", "results.json"])
+    assert sorted(each.name for each in folder.iterdir()) == sorted(
+        [*files, "published-tables.csv", "results.json", "trajectories.csv"]
+    )
     found = json.loads((folder / "results.json").read_text())
     assert list(found) == KEYS
     assert found["version"] == version("infoset")
@@ -126,7 +129,7 @@ def test_help_has_an_example(infoset: Infoset) -> None:
 
 
 def test_every_built_in_problem_is_sound() -> None:
-    mine = [each for each in built_in_problems() if each.kind == KIND]
+    mine = [each for each in built_in_files().values() if each.kind == KIND]
     assert {each.name for each in mine} == {"approach-cone", "rendezvous-16-periods", "rendezvous-2021"}
     for each in mine:
         loaded = load_rendezvous(each.name)
@@ -208,12 +211,12 @@ def test_zero_out_of_reach_is_looked_for_further_on(infoset: Infoset, tmp_path: 
         (["--select", "enrgy"], ["--select", "did you mean energy?"]),
         (["--select", "energy,energy"], ["named twice"]),
         (["--select", ""], ["--select", "choose one of"]),
-        (["--select", "samples"], ["needs a number"]),
+        (["--select", "samples"], ['must be a whole number, found ""', "--select samples:20"]),
         (["--select", "samples:0"], ["must be from 1 to 1000"]),
-        (["--select", "samples:-5"], ["needs a number"]),
+        (["--select", "samples:-5"], ["must be from 1 to 1000, found -5"]),
         (["--select", "energy:4"], ["takes no number"]),
-        (["--route", "exakt"], ["Invalid value for '--route'", "'exact'"]),
-        (["--noisy-flights", "-1"], ["Invalid value for '--noisy-flights'"]),
+        (["--route", "exakt"], ['--route: there is no "exakt"; did you mean exact?']),
+        (["--noisy-flights", "-1"], ["--noisy-flights: must be from 0 to 1000, found -1;"]),
         (["--json", "missing/x.json"], ["there is no folder missing"]),
         (["--json", "out/results.json", "--out", "out"], ["also a file of --out"]),
     ],

@@ -19,10 +19,10 @@ from rendezvous.multipoint import (
     best_order,
     best_order_of_slots,
     best_times,
-    solve_dense,
     solve_segments,
 )
 from rendezvous.relative_motion import TimeVaryingMotion
+from tests.rendezvous.multipoint.dense import solve_dense
 
 Floats = NDArray[np.float64]
 Make = Callable[..., Tour]

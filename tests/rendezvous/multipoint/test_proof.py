@@ -15,8 +15,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.sparse import csc_matrix
 
-from rendezvous.greatest_control import greatest_control
-from rendezvous.multipoint import DriftingTargets, Meet, Nodes, Target, Tour, solve_dense, solve_segments
+from rendezvous.multipoint import DriftingTargets, Meet, Nodes, Target, Tour, solve_segments
+from rendezvous.piecewise import greatest_control
 from rendezvous.relative_motion import (
     ClohessyWiltshire,
     EllipticOrbit,
@@ -24,6 +24,7 @@ from rendezvous.relative_motion import (
     TimeVaryingMotion,
     TschaunerHempel,
 )
+from tests.rendezvous.multipoint.dense import solve_dense
 
 Floats = NDArray[np.float64]
 

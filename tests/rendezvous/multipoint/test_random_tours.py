@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize, minimize_scalar
 
-from rendezvous.greatest_control import greatest_control
 from rendezvous.multipoint import (
     DriftingTargets,
     Meet,
@@ -24,6 +23,7 @@ from rendezvous.multipoint import (
     best_order_of_slots,
     best_times,
 )
+from rendezvous.piecewise import greatest_control
 from rendezvous.relative_motion import ClohessyWiltshire, EllipticOrbit, LinearMotion, TschaunerHempel
 
 Floats = NDArray[np.float64]

@@ -26,7 +26,6 @@ from rendezvous.pareto import (
     analyse_coalitions,
     check_bound,
     distances,
-    front_of_three,
     front_of_two,
     least_greatest_excess,
     least_peak,
@@ -39,7 +38,7 @@ from rendezvous.pareto import (
     sweep_meeting_time,
     total_impulse,
 )
-from rendezvous.pareto.hull import nearest_in_hull
+from rendezvous.pareto.selections import nearest_in_hull
 from rendezvous.relative_motion import ORBITAL, ClohessyWiltshire
 
 Floats = NDArray[np.float64]
@@ -91,11 +90,14 @@ def test_the_front_of_three_in_closed_form() -> None:
     solution = some(2, 3)
     inside = np.random.default_rng(3).dirichlet([2.0, 2.0, 2.0], size=200)
     found = pareto_set(solution, inside)
-    third = front_of_three(distances(solution), found.excess[:, 0], found.excess[:, 1])
-    # Near the edge between the first two the third's distance hangs on a square root of what cancels.
-    np.testing.assert_allclose(third, found.excess[:, 2], rtol=1e-7)
-    with pytest.raises(ValueError, match="coincide"):
-        front_of_three(np.zeros((3, 3)), 0.0, 0.0)
+    (_, base, left), (_, _, right) = distances(solution)[:2]
+    first, second, third = found.excess.T
+    # In the plane triangle of the ideals the distances of a point from two corners give the third.
+    along = (base**2 + first - second) / (2.0 * base)
+    corner = (base**2 + left**2 - right**2) / (2.0 * base)
+    across, height = np.sqrt(np.maximum(first - along**2, 0.0)), np.sqrt(left**2 - corner**2)
+    # Near the edge between the first two ideals the square root amplifies rounding.
+    np.testing.assert_allclose((along - corner) ** 2 + (across - height) ** 2, third, rtol=1e-7)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 6])

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from rendezvous.pursuit_evasion import PathError, Policy, Solution, certify, solve
+from rendezvous.pursuit_evasion.game import scaled_craft
 from rendezvous.pursuit_evasion.paths import steered_path
-from rendezvous.pursuit_evasion.units import scaled_craft
 
 from .conftest import MakeGame
 from .published import CASES, Case

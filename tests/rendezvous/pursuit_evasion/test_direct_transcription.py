@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from rendezvous.pursuit_evasion import Solution
+from rendezvous.pursuit_evasion.game import scaled_craft
 from rendezvous.pursuit_evasion.paths import extremal_paths
-from rendezvous.pursuit_evasion.units import scaled_craft
 
 Floats = NDArray[np.float64]
 NODES, STEPS = 16, 400

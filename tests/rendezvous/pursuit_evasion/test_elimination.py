@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rendezvous.pursuit_evasion._elimination import eliminate
+from rendezvous.pursuit_evasion._extremal import eliminate
 
 
 @given(st.integers(1, 7), st.integers(1, 4), st.integers(0, 10_000))

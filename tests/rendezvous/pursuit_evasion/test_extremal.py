@@ -6,9 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rendezvous.pursuit_evasion._extremal import flow_back, rate, shoot_back, shoot_state_back
-from rendezvous.pursuit_evasion._gravity import acceleration, derivatives
-from rendezvous.pursuit_evasion._side import across
+from rendezvous.pursuit_evasion._extremal import (
+    acceleration,
+    derivatives,
+    flow_back,
+    rate,
+    shoot_back,
+    shoot_state_back,
+)
+from rendezvous.pursuit_evasion._pair import across
 
 Floats = NDArray[np.float64]
 PLACE = st.floats(-1.5, 1.5)

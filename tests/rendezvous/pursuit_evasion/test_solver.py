@@ -26,7 +26,7 @@ from rendezvous.pursuit_evasion import (
 )
 from rendezvous.pursuit_evasion._branch import Ending, follow, polish
 from rendezvous.pursuit_evasion._pair import Node, Pair
-from rendezvous.pursuit_evasion.units import scaled_game, units_of
+from rendezvous.pursuit_evasion.game import scaled_game, units_of
 
 from .conftest import EARTH_M, MU_M3_S2, MakeGame
 from .published import CASES, Case
@@ -189,7 +189,7 @@ def independent_capture(game: Game, capture: Capture) -> float:
     def miss(unknown: Floats) -> Floats:
         ends = []
         for k, craft in enumerate(crafts):
-            begin = np.concatenate([craft.start, unknown[6 * k : 6 * k + 6]])  # type: ignore[attr-defined]
+            begin = np.concatenate([craft.start, unknown[6 * k : 6 * k + 6]])  # type: ignore[union-attr]
             found = solve_ivp(
                 rates,
                 (0.0, unknown[12]),
@@ -197,7 +197,7 @@ def independent_capture(game: Game, capture: Capture) -> float:
                 method="DOP853",
                 rtol=1e-10,
                 atol=1e-12,
-                args=(craft.thrust, craft.mass, craft.flow),  # type: ignore[attr-defined]
+                args=(craft.thrust, craft.mass, craft.flow),  # type: ignore[union-attr]
             )
             ends.append(found.y[:, -1])
         p, e = ends

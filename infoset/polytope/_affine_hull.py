@@ -1,4 +1,4 @@
-"""The affine hull of a set defined by half-spaces and equations, and the centre of a largest ball inside."""
+"""Affine hulls of points and of sets of half-spaces and equations, and the centre of a largest ball inside."""
 
 from __future__ import annotations
 
@@ -9,35 +9,97 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.optimize import linprog
 
-from infoset.polytope._frame import FLAT, ROUNDING
-from infoset.polytope.errors import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
-
 Floats = NDArray[np.float64]
 Places = NDArray[np.int64]
 
+FLAT = 1e-9
+"""Relative thickness below which a set is flat."""
+ROUNDING = 1e-13
+"""Rounding of zero, relative to the size of the coordinates."""
 HIGHS = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
+
+
+class EmptyPolytopeError(ValueError):
+    """No point satisfies the constraints.
+
+    `relaxation` is the least relaxation of every constraint, its normal of unit length, with which a point satisfies
+    all.
+    """
+
+    def __init__(self, relaxation: float) -> None:
+        super().__init__(f"the polytope is empty; it is not if its constraints are relaxed by {relaxation:.3g}")
+        self.relaxation = relaxation
+
+
+class UnboundedPolytopeError(ValueError):
+    """The constraints do not bound a set; `direction`, shape (n,), of unit length, is one in which it is unbounded."""
+
+    def __init__(self, direction: Floats) -> None:
+        shown = ", ".join(f"{component:.3g}" for component in direction)
+        super().__init__(f"the polytope is unbounded along ({shown})")
+        self.direction = direction
+
+
+class UncertainHullError(ArithmeticError):
+    """Facets and vertices do not agree because of rounding."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Coordinates y = (x - centre) basis / extents of an affine subspace of dimension d in R^n.
+
+    `centre` is the mean of the points, `basis`, shape (n, d), has orthonormal columns, and `extents`, shape (d,), are
+    the greatest distances of a point from the centre along them. `across`, shape (n, n - d), completes the basis.
+    """
+
+    centre: Floats
+    basis: Floats
+    extents: Floats
+    across: Floats
+
+    @property
+    def dimension(self) -> int:
+        """Dimension d of the subspace."""
+        return int(self.basis.shape[1])
+
+    def inward(self, points: Floats) -> Floats:
+        """Return points, shape (k, n), in coordinates of the frame, shape (k, d)."""
+        return np.asarray((points - self.centre) @ self.basis / self.extents)
+
+    def outward(self, inner: Floats) -> Floats:
+        """Return points in coordinates of the frame, shape (k, d), in R^n."""
+        return np.asarray(self.centre + (inner * self.extents) @ self.basis.T)
+
+    def rows_outward(self, normals: Floats, offsets: Floats) -> tuple[Floats, Floats]:
+        """Return half-spaces of the frame, normals (m, d) and offsets (m,), in R^n with normals of unit length."""
+        turned = (normals / self.extents) @ self.basis.T
+        lengths = np.linalg.norm(turned, axis=1)
+        return turned / lengths[:, None], (offsets + (normals / self.extents) @ (self.basis.T @ self.centre)) / lengths
+
+
+def frame_of(points: Floats, flat: float = FLAT) -> Frame:
+    """Return the frame of the affine hull of points, shape (k, n), at least one.
+
+    A singular-value decomposition, O(k n^2). A direction counts where the points are wider along it than `flat` times
+    their greatest width, and wider than the rounding of their coordinates.
+    """
+    centre = points.mean(axis=0)
+    centred = points - centre
+    # With fewer points than coordinates all right singular vectors are needed, and the left ones are few.
+    directions = np.linalg.svd(centred, full_matrices=len(points) < points.shape[1])[2]
+    extents = np.abs(centred @ directions.T).max(axis=0)
+    least = max(flat * float(extents.max()), ROUNDING * float(np.abs(points).max(initial=0.0)))
+    wide = extents > least
+    return Frame(centre, directions[wide].T, extents[wide], directions[~wide].T)
 
 
 @dataclass(frozen=True, eq=False)
 class RelativeInterior:
-    """The set {point + basis z: rows z <= limits}, with the centre of a largest ball inside.
+    """The set {point + basis z: rows z <= limits}, with the centre and radius of a largest ball inside.
 
-    Parameters
-    ----------
-    point : ndarray, shape (n,)
-        Origin of the coordinates z.
-    basis : ndarray, shape (n, d)
-        Orthonormal columns.
-    rows : ndarray, shape (k, d)
-        Rows of unit length.
-    limits : ndarray, shape (k,)
-        Limits of the rows.
-    kept : ndarray of int, shape (k,)
-        Index of each row's half-space; the others are always tight, or do not depend on z.
-    centre : ndarray, shape (d,)
-        The Chebyshev centre.
-    radius : float
-        Radius of a largest ball inside.
+    `point`, shape (n,), is the origin of the coordinates z, `basis`, shape (n, d), has orthonormal columns, and `rows`,
+    shape (k, d), have unit length. `kept`, shape (k,), is the index of each row's half-space; the others are always
+    tight, or do not depend on z. `centre`, shape (d,), is the Chebyshev centre.
     """
 
     point: Floats
@@ -63,16 +125,12 @@ def relative_interior(
     bounded: bool = False,
     member: Floats | None = None,
 ) -> RelativeInterior:
-    """Return the affine hull of {x: normals x <= offsets, across x = levels}.
+    """Return the affine hull of {x: normals x <= offsets, across x = levels}, of shapes (m, n), (m,), (e, n) and (e,).
 
-    Parameters
-    ----------
-    normals, offsets, across, levels : ndarray
-        Arrays of shapes (m, n), (m,), (e, n) and (e,).
-    bounded : bool
-        Whether the set is known to be bounded, which saves a linear program.
-    member : ndarray, shape (n,), optional
-        A point that is known to be in the set: the rows are relaxed by its rounding.
+    A set that is known to be `bounded` saves a linear program. `member`, shape (n,), is a point that is known to be in
+    the set: the rows are relaxed by its rounding. If the radius of a largest ball is zero, some half-spaces imply
+    equations; linear programs (HiGHS) find the rows that are always tight. A set is flat in a direction in which it is
+    thinner than 1e-9 of its width.
 
     Raises
     ------
@@ -82,11 +140,6 @@ def relative_interior(
         If the set is unbounded.
     UncertainHullError
         If a linear program was not solved.
-
-    Notes
-    -----
-    If the radius of a largest ball is zero, some half-spaces imply equations; linear programs (HiGHS) find the rows
-    that are always tight. A set is flat in a direction in which it is thinner than 1e-9 of its width.
     """
     lengths = np.linalg.norm(normals, axis=1)
     long = lengths > ROUNDING * float(lengths.max(initial=0.0))
@@ -97,7 +150,7 @@ def relative_interior(
     # A row whose length is rounding has no direction.
     void = np.flatnonzero(~long & (offsets < -ROUNDING * size))
     if len(void):
-        raise EmptyPolytopeError(float(-offsets[void].min()), void)
+        raise EmptyPolytopeError(float(-offsets[void].min()))
     used = np.flatnonzero(long)
     normals, offsets = normals[used] / lengths[used, None], offsets[used] / lengths[used]
     for _ in range(len(normals) + 1):
@@ -108,7 +161,7 @@ def relative_interior(
         kept = np.flatnonzero(lengths > FLAT)
         worst = float(np.delete(limits, kept).min(initial=np.inf))
         if worst < -slack:
-            raise EmptyPolytopeError(-worst, used[np.flatnonzero((lengths <= FLAT) & (limits < -slack))])
+            raise EmptyPolytopeError(-worst)
         if not basis.shape[1]:
             return RelativeInterior(point, basis, rows[:0], limits[:0], used[:0], np.zeros(0), 0.0)
         rows, limits = rows[kept] / lengths[kept, None], limits[kept] / lengths[kept]

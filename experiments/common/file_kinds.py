@@ -1,0 +1,120 @@
+"""Kinds of files that commands take, recognized by their content, and the command that takes each of them."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from experiments.common.errors import InputError
+from experiments.common.toml_values import nearest, shown
+
+SCENARIO = "scenario"
+PROBLEM_COMMANDS = {
+    "pareto-encounter": "pareto",
+    "multipoint": "multipoint",
+    "reachable-rendezvous": "reach",
+    "pursuit-evasion": "pursuit",
+}
+"""Command of each kind of problem."""
+LARGEST_FILE_BYTES = 100_000
+"""Size of the largest TOML file that is read."""
+LONGEST_LINE = 1000
+"""Longest line of a TOML file: the parser's time grows as the square of the length of a dotted key."""
+ZIP = b"PK"
+"""First bytes of a record."""
+_SCENARIO_TABLES = {"nominal", "uncertainty", "dispersion", "angle_sensor", "thruster", "information_set"}
+_FEWEST_TABLES = 2
+"""Number of tables of a scenario from which a file without a kind is taken for a scenario."""
+
+
+@dataclass(frozen=True)
+class BuiltIn:
+    """A built-in scenario or problem."""
+
+    name: str
+    kind: str
+    description: str
+    text: str
+
+
+@cache
+def built_in_files() -> Mapping[str, BuiltIn]:
+    """Return the built-in files of all kinds by name, in alphabetical order."""
+    package = resources.files("experiments")
+    files = [file for folder in ("scenarios", "problems") for file in package.joinpath(folder).iterdir()]
+    found = {}
+    for file in sorted(files, key=lambda file: file.name.removesuffix(".toml")):
+        name, dot, _ = file.name.rpartition(".toml")
+        if dot:
+            text = file.read_text(encoding="utf-8")
+            values = tomllib.loads(text)
+            found[name] = BuiltIn(name, values.get("kind", SCENARIO), values.get("description", ""), text)
+    return found
+
+
+def built_in_names(kinds: Collection[str]) -> list[str]:
+    """Return the names of the built-in files of these kinds, in alphabetical order."""
+    return [file.name for file in built_in_files().values() if file.kind in kinds]
+
+
+def built_in(name: str, kinds: Collection[str], missing: str) -> BuiltIn:
+    """Return the built-in file of a name; `InputError` if there is none, or it has another kind.
+
+    Parameters
+    ----------
+    kinds : collection of str
+        Kinds that fit.
+    missing : str
+        What does not exist otherwise, for the message: ``no built-in problem``.
+    """
+    file = built_in_files().get(name)
+    if file is not None and file.kind in kinds:
+        return file
+    if file is not None:
+        raise InputError(f"{name}: {taken_by(file.kind, name)}")
+    names = built_in_names(kinds)
+    guess = nearest(name, names)
+    hint = f'did you mean "{guess}"? ' if guess else ""
+    raise InputError(f"{missing} is called {shown(name)}; {hint}the built-in ones are {', '.join(names)}")
+
+
+def kind_of(document: Mapping[str, Any]) -> str | None:
+    """Return the kind of a parsed file: `SCENARIO`, a kind of problem, or None."""
+    kind = document.get("kind")
+    if isinstance(kind, str) and kind in PROBLEM_COMMANDS:
+        return kind
+    return SCENARIO if kind is None and len(_SCENARIO_TABLES & document.keys()) >= _FEWEST_TABLES else None
+
+
+def taken_by(kind: str, file: str = "FILE") -> str:
+    """Return what a file of a kind is, and the command that takes it."""
+    if kind == SCENARIO:
+        return f"this is a scenario; use infoset engage {file}"
+    return f"this is a problem of kind {kind}; use infoset {PROBLEM_COMMANDS[kind]} {file}"
+
+
+def use_of_file(path: Path) -> str | None:
+    """Return what a file is, and the command that takes it; None if it is not recognized."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_FILE_BYTES + 1)
+        if content.startswith(ZIP):
+            return "this may be a record; use infoset replay FILE"
+        if len(content) > LARGEST_FILE_BYTES or max(map(len, content.split(b"\n"))) > LONGEST_LINE:
+            return None
+        kind = kind_of(tomllib.loads(content.decode("utf-8-sig")))
+    except (OSError, ValueError, RecursionError):
+        return None
+    return None if kind is None else taken_by(kind)
+
+
+def use_of_folder(path: Path, wanted: str) -> str:
+    """Return what a folder is, and what to name in place of it."""
+    if (path / "manifest.json").is_file():
+        return "this is the folder of a campaign or a sweep; use infoset report DIR"
+    return f"is a folder; name a {wanted} in it"

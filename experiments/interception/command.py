@@ -1,0 +1,183 @@
+"""Options of `infoset experiment`, `engage`, `compare`, `bound`, `adversary` and `replay`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from experiments.common.options import Csv, FileOptions, Html, Out, Overwrite, Quiet, Seed, Settings
+from experiments.interception.options import (
+    MOST_RUNS,
+    ModelName,
+    RangeMeter,
+    RecordFile,
+    ScenarioName,
+    SetTimes,
+    Strategies,
+    StrategyName,
+    StudyModel,
+    TieName,
+)
+
+
+@dataclass(frozen=True)
+class Experiment(FileOptions):
+    """Simulate many runs of four cases (curves): random or game noise, without or with the range meter.
+
+    Game noise is measurement errors chosen against the guidance. Run K starts from the same state in all four cases,
+    and is the same engagement as in: infoset engage --run K. Without --out, --json or --csv no file is written.
+    """
+
+    scenario: ScenarioName = "asteroid-1997"
+    settings: Settings = None
+    runs: Annotated[int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs of each case.")] = 50
+    seed: Seed = 0
+    strategy: StrategyName = None
+    model: ModelName = None
+    tie: TieName = None
+    sections: Annotated[
+        int | None, typer.Option(metavar="N", help="Number of sections at t = 0. Default: that of the scenario.")
+    ] = None
+    csv: Csv = None
+
+
+@dataclass(frozen=True)
+class Engage(FileOptions):
+    """Simulate one engagement and show its result; with --noise both, one with each kind of noise.
+
+    Run K has exactly the same numbers as run K of infoset experiment with the same seed.
+    Without --out, --json, --csv or --record no file is written.
+    """
+
+    scenario: ScenarioName = "asteroid-1997"
+    settings: Settings = None
+    noise: Annotated[
+        Literal["random", "game", "both"] | None, typer.Option(help="Measurement noise. Default: that of the scenario.")
+    ] = None
+    range_meter: RangeMeter = None
+    strategy: StrategyName = None
+    model: ModelName = None
+    tie: TieName = None
+    seed: Seed = 0
+    run: Annotated[int, typer.Option(metavar="K", min=0, max=MOST_RUNS - 1, help="Number of the run, from 0.")] = 0
+    record: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.npz", help="Write the record; with --noise both, FILE-random.npz and FILE-game.npz."
+        ),
+    ] = None
+    times: SetTimes = None
+    csv: Csv = None
+
+
+@dataclass(frozen=True)
+class Compare(FileOptions):
+    """Compare strategies by miss and spent impulse, with random noise and with game noise.
+
+    Run K has the same initial state and the same random errors for all strategies. Game noise is simulated with each
+    of its four tie rules, and a run is represented by the worst of the four. Run K is the same engagement as in:
+    infoset engage --model guaranteed --run K.
+    Without --out, --json or --csv no file is written.
+    """
+
+    scenario: ScenarioName = "asteroid-1997"
+    settings: Settings = None
+    strategies: Strategies = None
+    runs: Annotated[
+        int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs for each strategy and noise.")
+    ] = 50
+    seed: Seed = 0
+    model: StudyModel = None
+    range_meter: RangeMeter = None
+    csv: Csv = None
+
+
+@dataclass(frozen=True)
+class Bound(FileOptions):
+    """Compute a lower bound of the guaranteed miss of all strategies, and simulate the pairs of states that prove it.
+
+    Two true states whose measurements are equal until some step receive equal impulses until that step, so at least
+    one of them misses. The bound is the greatest miss that such pairs prove. Each strategy is simulated with these
+    pairs, and in the searches of infoset adversary. Without --out or --json no file is written.
+    """
+
+    scenario: ScenarioName = "asteroid-1997"
+    settings: Settings = None
+    strategies: Strategies = None
+    model: StudyModel = None
+    budget: Annotated[
+        int,
+        typer.Option(
+            metavar="N",
+            min=0,
+            max=MOST_RUNS,
+            help="Number of engagements in the search for the worst one, for each strategy; 0 skips the search.",
+        ),
+    ] = 500
+    seed: Seed = 0
+
+
+@dataclass(frozen=True)
+class Adversary(FileOptions):
+    """Search for the initial state and the measurement errors that give the greatest miss of a strategy.
+
+    The search covers all initial states that the scenario allows, and all errors within their bounds. The result is a
+    simulated miss: the strategy cannot guarantee a smaller one, and greater misses may exist. If the set became empty
+    in some engagements, a second search includes them, and both greatest misses are printed. The same seed and budget
+    give the same result, also in infoset bound. Without --out, --json or --record no file is written.
+    """
+
+    scenario: ScenarioName = "asteroid-1997"
+    settings: Settings = None
+    strategy: StrategyName = None
+    model: StudyModel = None
+    range_meter: RangeMeter = None
+    budget: Annotated[
+        int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of engagements in a search.")
+    ] = 2000
+    keep_set: Annotated[
+        bool,
+        typer.Option("--keep-set", help="Record and draw the worst engagement in which the set never became empty."),
+    ] = False
+    seed: Seed = 0
+    record: RecordFile = None
+    times: SetTimes = None
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Show records of `infoset engage --record` without simulating again: page, animations, figures 2 and 3."""
+
+    records: Annotated[
+        list[Path], typer.Argument(metavar="A.npz [B.npz]", help="One record, or two records to show side by side.")
+    ]
+    html: Html = None
+    gif: Annotated[Path | None, typer.Option(metavar="FILE.gif", help="Write an animation of the sets.")] = None
+    mp4: Annotated[
+        Path | None, typer.Option(metavar="FILE.mp4", help="Write the animation as a video; needs the program ffmpeg.")
+    ] = None
+    frames: Annotated[
+        int, typer.Option(metavar="N", min=2, max=1000, help="Most frames of an animation; fewer make a smaller file.")
+    ] = 40
+    width: Annotated[
+        int | None,
+        typer.Option(
+            metavar="PIXELS", min=200, max=4000, help="Width of an animation. Default: 425, or 640 for two records."
+        ),
+    ] = None
+    terminal: Annotated[
+        bool,
+        typer.Option(
+            "--terminal", help="Play as text in the terminal. If the output is not a terminal, print a few steps."
+        ),
+    ] = False
+    speed: Annotated[
+        float, typer.Option(metavar="STEPS_PER_S", min=0.1, max=1000.0, help="Speed of --terminal in steps per second.")
+    ] = 10.0
+    out: Out = None
+    times: SetTimes = None
+    overwrite: Overwrite = False
+    quiet: Quiet = False

@@ -1,0 +1,83 @@
+"""What a study reports about the sets and the hits of its runs, next to its quantiles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infoset import Model
+from sim import HitEstimate, Scenario
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class SetCounts:
+    """Numbers of runs by what happened to their information sets.
+
+    Parameters
+    ----------
+    runs : int
+        All runs.
+    truth_kept : int
+        Runs whose true state was inside the set at every step.
+    set_emptied : int
+        Runs whose set became empty.
+    failed : int
+        Runs whose set became empty or lost the true state.
+    """
+
+    runs: int = 0
+    truth_kept: int = 0
+    set_emptied: int = 0
+    failed: int = 0
+
+    def __add__(self, other: SetCounts) -> SetCounts:
+        return SetCounts(*(mine + more for mine, more in zip(vars(self).values(), vars(other).values(), strict=True)))
+
+    def __str__(self) -> str:
+        kept, emptied = (f"{count} of {self.runs} runs" for count in (self.truth_kept, self.set_emptied))
+        return (
+            f"true state inside the set at every step: {kept} ({percent(self.truth_kept / self.runs)}); "
+            f"set became empty: {emptied} ({percent(self.set_emptied / self.runs)})"
+        )
+
+
+def set_counts(truth_kept: Flags, set_emptied: Flags) -> SetCounts:
+    """Return the counts of some runs, from arrays of shape (N,)."""
+    failed = ~truth_kept | set_emptied
+    return SetCounts(len(truth_kept), int(truth_kept.sum()), int(set_emptied.sum()), int(failed.sum()))
+
+
+def set_warnings(model: Model, counts: SetCounts) -> list[str]:
+    """Return a warning if sets failed in some runs: the quantiles then describe the failures of the model too."""
+    if not counts.failed:
+        return []
+    failures = f"in {counts.failed} of {counts.runs} runs the set lost the true state or became empty"
+    if model is Model.PAPER:
+        return [
+            f"warning: model paper: {failures}; the quantiles describe these failures of the model too; to see those "
+            "of the guidance and the sensors, use --model guaranteed"
+        ]
+    return [
+        f"warning: model guaranteed: {failures}, so the scenario exceeds an assumption of the model; to find it, use "
+        "infoset scenarios check FILE"
+    ]
+
+
+def hit_text(hits: HitEstimate | None, scenario: Scenario) -> str:
+    """Return the share of hits with its interval; an empty text if the body has no size."""
+    if hits is None or scenario.body is None:
+        return ""
+    return (
+        f"hit (miss at most {scenario.body.radius_m:g} m): {hits.hits} of {hits.runs} runs ({percent(hits.probability)}"
+        f"), 95 % CI {percent(hits.lower)} to {percent(hits.upper)}"
+    )
+
+
+def percent(share: float) -> str:
+    """Return a share with four digits, rounded away from 0 % and 100 %, which only 0 and 1 are."""
+    text = f"{100.0 * share:.4g}"
+    return f"{f'{100.0 * share:.12g}' if text == '100' and share < 1.0 else text} %"

@@ -1,0 +1,326 @@
+"""Requirements of a study, and whether a sample meets them: met, not met, or undecided."""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from infoset.limits import Fraction, Positive, check_fields
+from sim.stopping_rule import NUMBER, QuantileName, parse_quantile
+
+Floats = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+CONFIDENCE = 0.95
+MOST_RUNS_NEEDED = 1_000_000
+"""Greatest number of runs that `Verdict.runs_needed` names."""
+_TAIL = 0.5 * (1.0 - CONFIDENCE)
+_HIT = re.compile(rf"\s*hit\s*>=?{NUMBER}")
+_STEPS = 50
+"""Steps of bisection for an end of an interval."""
+
+
+class Decision(Enum):
+    """Whether a requirement is met."""
+
+    MET = "met"
+    NOT_MET = "not-met"
+    UNDECIDED = "undecided"
+    """The confidence interval contains the bound, or is open on its side: more runs may decide."""
+
+    def __str__(self) -> str:
+        return self.value.replace("-", " ")
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """An upper bound of a quantile, written `miss_m p99<10`.
+
+    It is a requirement on a share of the runs: at least 99 % of the misses are less than 10 m.
+
+    Parameters
+    ----------
+    quantile : QuantileName
+        What is bounded.
+    bound : float
+        In the unit of the quantity.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the bound is not positive.
+    """
+
+    quantile: QuantileName
+    bound: Positive
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def __str__(self) -> str:
+        return f"{self.quantile}<{self.bound:g}"
+
+    @classmethod
+    def parse(cls, text: str) -> Requirement:
+        """Read `miss_m p99<10`; raise ValueError for any other text."""
+        example = 'a quantity, a quantile and a bound, for example "miss_m p99<10", or "hit>=0.95"'
+        return cls(*parse_quantile(text, f"<{NUMBER}", example, "the bound"))
+
+    @property
+    def name(self) -> str:
+        """Name of what is bounded."""
+        return str(self.quantile)
+
+    @property
+    def share(self) -> float:
+        """Share of the runs that must be below the bound."""
+        return self.quantile.level
+
+    @property
+    def quantity(self) -> str:
+        """Column of the results that it uses."""
+        return self.quantile.quantity
+
+    def holds(self, values: Floats) -> NDArray[np.bool_]:
+        """Return for each of the quantity's `values` whether it is below the bound."""
+        return np.asarray(values < self.bound)
+
+
+@dataclass(frozen=True)
+class HitRequirement:
+    """A lower bound of the probability of a hit, written `hit>=0.95`.
+
+    Parameters
+    ----------
+    share : float
+        Least share of the runs that hit, between 0 and 1.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the share is not between 0 and 1.
+    """
+
+    share: Fraction
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def __str__(self) -> str:
+        return f"hit>={self.share:g}"
+
+    @property
+    def name(self) -> str:
+        """Name of what is bounded."""
+        return self.quantity
+
+    @property
+    def quantity(self) -> str:
+        """Column of the results that it uses."""
+        return "hit"
+
+    @property
+    def bound(self) -> float:
+        """Bound of the probability."""
+        return self.share
+
+    def holds(self, values: Floats) -> NDArray[np.bool_]:
+        """Return for each of the `values` of the column, 0 or 1, whether the run hits."""
+        return np.asarray(values > 0.0)
+
+
+AnyRequirement = Requirement | HitRequirement
+
+
+def parse_requirement(text: str) -> AnyRequirement:
+    """Read `miss_m p99<10` or `hit>=0.95`, which may be written `hit>0.95`.
+
+    Raises
+    ------
+    ValueError
+        If the text has another form, or a number is out of its range.
+    """
+    match = _HIT.fullmatch(text[:100])
+    return Requirement.parse(text) if match is None else HitRequirement(float(match["number"]))
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a sample says about a requirement.
+
+    Parameters
+    ----------
+    decision : Decision
+        Met if the interval is on the right side of the bound, not met if it is on the wrong side.
+    runs : int
+        Size of the sample.
+    value : float
+        The required quantile of the sample, in its unit, or the share of hits.
+    lower, upper : float or None
+        Ends of its 95 % confidence interval; None if the sample is too small to bound that side.
+    runs_needed : int or None
+        About how many runs decide if further runs are like these; None: more than `MOST_RUNS_NEEDED`.
+    """
+
+    decision: Decision
+    runs: int
+    value: float
+    lower: float | None
+    upper: float | None
+    runs_needed: int | None
+
+
+def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verdict:
+    """Return whether a sample meets a requirement, with 95 % confidence.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        The required quantity, in the order of the runs; at least one.
+    watched : bool
+        Whether the number of runs may depend on the values, because runs are added until the requirement is decided.
+        False: the number of runs was fixed before.
+
+    Notes
+    -----
+    Let K of n runs satisfy the bound, and q be the required share. The requirement is met if the hypothesis that the
+    true share is at most q is rejected, and not met if the hypothesis that it is at least q is rejected, each at the
+    level 2.5 %. With a fixed n the tests are the exact binomial ones. They are equivalent to a comparison of the bound
+    with the interval of order statistics of `estimate_quantiles`, or with the Clopper-Pearson interval.
+
+    Repeated looks at such an interval until it decides would make errors more frequent than 5 %. If `watched`, the
+    tests are those of a confidence sequence, which holds for all n at once: the likelihood ratio of a uniform mixture
+    of all shares above (below) q to the share q exceeds 40 at any n with a probability of at most 2.5 % if the true
+    share is at most (at least) q. The first n that decides is final: more runs never change a decision.
+
+    References
+    ----------
+    Robbins (1970), Statistical methods related to the law of the iterated logarithm. Howard, Ramdas, McAuliffe, Sekhon
+    (2021), Time-uniform, nonparametric, nonasymptotic confidence sequences, Annals of Statistics 49(2).
+    """
+    size, share = values.size, requirement.share
+    holding = np.cumsum(requirement.holds(values))
+    fewest_met, most_missed = critical_counts(size, share, watched=watched)
+    value: float
+    lower: float | None
+    upper: float | None
+    if isinstance(requirement, Requirement):
+        value = float(np.quantile(values, share))
+        lower, upper = _quantile_interval(values, int(fewest_met[-1]), int(most_missed[-1]))
+    else:
+        value = int(holding[-1]) / size
+        lower, upper = share_interval(int(holding[-1]), size, watched=watched)
+    looks = slice(None) if watched else slice(-1, None)
+    met, missed = holding[looks] >= fewest_met[looks], holding[looks] <= most_missed[looks]
+    decided = np.flatnonzero(met | missed)
+    if not decided.size:
+        needed = runs_needed(int(holding[-1]), size, share, watched=watched)
+        return Verdict(Decision.UNDECIDED, size, value, lower, upper, needed)
+    decision = Decision.MET if met[decided[0]] else Decision.NOT_MET
+    # A decision at an earlier run stays valid, although the last interval may contain the bound again.
+    if (decision is Decision.MET) == isinstance(requirement, Requirement):
+        upper = requirement.bound if upper is None else min(upper, requirement.bound)
+    else:
+        lower = requirement.bound if lower is None else max(lower, requirement.bound)
+    return Verdict(decision, size, value, lower, upper, size)
+
+
+def _quantile_interval(values: Floats, fewest_met: int, most_missed: int) -> tuple[float | None, float | None]:
+    """Return the order statistics that enclose a quantile."""
+    ordered = np.sort(values)
+    lower = float(ordered[most_missed]) if most_missed >= 0 else None
+    return lower, float(ordered[fewest_met - 1]) if fewest_met <= values.size else None
+
+
+def share_interval(count: int, runs: int, *, watched: bool) -> tuple[float, float]:
+    """Return the 95 % confidence interval of a share, by bisection.
+
+    It is the Clopper-Pearson interval, or if `watched` the confidence sequence of `judge`.
+    """
+
+    def end(index: int, inside: float, outside: float) -> float:
+        for _ in range(_STEPS):
+            middle = 0.5 * (inside + outside)
+            if p_values(runs, count, middle, watched=watched)[index] > _TAIL:
+                inside = middle
+            else:
+                outside = middle
+        return outside
+
+    share = count / runs
+    return end(0, share, 0.0) if count else 0.0, end(1, share, 1.0) if count < runs else 1.0
+
+
+@functools.lru_cache(maxsize=32)
+def critical_counts(size: int, share: float, *, watched: bool) -> tuple[Counts, Counts]:
+    """Return the numbers of runs that satisfy a bound at which a requirement is decided, for 1, ..., `size` runs.
+
+    Returns
+    -------
+    fewest_met : ndarray of int, shape (size,)
+        The requirement is met from this number on; one more than the number of runs if no number decides.
+    most_missed : ndarray of int, shape (size,)
+        It is not met up to this number; -1 if no number decides. Both arrays are read-only.
+    """
+    runs = np.arange(1, size + 1)
+    fewest_met = _least(runs, lambda count: p_values(runs, count, share, watched=watched)[0] <= _TAIL)
+    most_missed = _least(runs, lambda count: p_values(runs, count, share, watched=watched)[1] > _TAIL) - 1
+    for counts in (fewest_met, most_missed):
+        counts.setflags(write=False)
+    return fewest_met, most_missed
+
+
+def _least(most: Counts, is_enough: Callable[[Counts], NDArray[np.bool_]]) -> Counts:
+    """Return the least count from 0 to `most` that is enough, or `most` + 1; greater counts are enough too."""
+    low, high = np.zeros_like(most), most + 1
+    while (low < high).any():
+        middle = np.minimum((low + high) // 2, most)
+        enough = is_enough(middle)
+        low, high = np.where(enough | (low >= high), low, middle + 1), np.where(enough, np.minimum(middle, high), high)
+    return low
+
+
+def p_values(runs: ArrayLike, count: ArrayLike, share: ArrayLike, *, watched: bool) -> tuple[Floats, Floats]:
+    """Return the p-values of the hypotheses that the true share is at most, and at least, a given share.
+
+    Parameters
+    ----------
+    runs, count : array_like
+        Number of runs, and of those that satisfy the bound; `count` may be fractional.
+    share : array_like
+        Between 0 and 1.
+    watched : bool
+        Whether they hold for all numbers of runs at once; then they are inverse likelihood ratios: see `judge`.
+    """
+    from scipy.special import betainc, betaln  # slow to load, and few commands need it
+
+    n, k, q = (np.asarray(values, dtype=np.float64) for values in (runs, count, share))
+    if not watched:
+        # Where no run (every run) satisfies the bound, k or more (k or fewer) are certain.
+        with np.errstate(invalid="ignore"):
+            at_least = np.where(k > 0, betainc(np.maximum(k, 1e-300), n - k + 1.0, q), 1.0)
+            at_most = np.where(k < n, betainc(np.maximum(n - k, 1e-300), k + 1.0, 1.0 - q), 1.0)
+        return at_least, at_most
+    # The integral of the likelihood over the shares above q is an incomplete beta function; likewise below q.
+    likelihood = k * np.log(q) + (n - k) * np.log1p(-q) - betaln(k + 1.0, n - k + 1.0)
+    with np.errstate(divide="ignore", over="ignore"):
+        above = np.log1p(-q) + likelihood - np.log(betainc(n - k + 1.0, k + 1.0, 1.0 - q))
+        below = np.log(q) + likelihood - np.log(betainc(k + 1.0, n - k + 1.0, q))
+        return np.exp(np.minimum(above, 0.0)), np.exp(np.minimum(below, 0.0))
+
+
+def runs_needed(count: int, runs: int, share: float, *, watched: bool) -> int | None:
+    """Return about how many runs decide a requirement if the same share of them satisfies the bound.
+
+    None is more than `MOST_RUNS_NEEDED`. If all runs satisfy the bound so far, it is the least number that can decide.
+    """
+    sizes = np.unique(np.geomspace(1, MOST_RUNS_NEEDED, 2000).astype(np.int64))
+    values = p_values(sizes, count / runs * sizes, share, watched=watched)
+    enough = sizes[(np.minimum(*values) <= _TAIL) & (sizes > runs)]
+    return int(enough[0]) if enough.size else None

@@ -1,0 +1,118 @@
+"""Runs are added to the cells of a sweep until a requirement is decided in each cell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sim.chunk import Chunk
+from sim.requirement import AnyRequirement, critical_counts
+from sim.results import Results
+from sim.storage import CampaignWriter
+
+
+@dataclass
+class _Cell:
+    """Progress of a cell: chunks that are judged, and for each noise the known values, those that hold, a decision."""
+
+    chunks: int = 0
+    known: list[int] = field(default_factory=list)
+    holding: list[int] = field(default_factory=list)
+    decided: list[bool] = field(default_factory=list)
+
+
+class UndecidedCells:
+    """The chunks of a sweep that are still to be simulated, and those that are simulated out of order.
+
+    Parameters
+    ----------
+    folder : CampaignWriter
+        Folder of the sweep; the number of runs in its manifest is the limit of each cell.
+    requirement : Requirement or HitRequirement
+        Is decided with each noise, by the confidence sequence of `sim.requirement.judge`.
+    noises : sequence of str
+        Noises of the sweep.
+    least_runs : int
+        Runs of each cell before it may stop.
+
+    Notes
+    -----
+    A chunk is stored only if the chunks before it in its cell are stored and have not decided. The stored runs are
+    therefore the same for any number of workers and after any interruption.
+    """
+
+    def __init__(
+        self, folder: CampaignWriter, requirement: AnyRequirement, noises: Sequence[str], least_runs: int
+    ) -> None:
+        self._folder = folder
+        self._requirement = requirement
+        self._noises = noises
+        self._least_runs = least_runs
+        self._critical = critical_counts(folder.manifest.runs, requirement.share, watched=True)
+        self._waiting: dict[int, tuple[Chunk, Results]] = {}
+        zeros, none = [0] * len(noises), [False] * len(noises)
+        self._cells = [_Cell(0, [*zeros], [*zeros], [*none]) for _ in range(folder.manifest.cells)]
+        for cell in range(len(self._cells)):
+            self._advance(cell)
+
+    @property
+    def undecided(self) -> int:
+        """Number of cells that need more runs."""
+        return sum(not self._is_done(cell) for cell in range(len(self._cells)))
+
+    @property
+    def runs(self) -> tuple[int, ...]:
+        """Engagements stored without a gap from run 0 on, for each cell."""
+        manifest, finished = self._folder.manifest, self._folder.finished
+        counts = []
+        for cell in range(manifest.cells):
+            number = 0
+            while number < manifest.chunks_a_cell and manifest.index_of(cell, number) in finished:
+                number += 1
+            counts.append(min(number * manifest.chunk, manifest.runs))
+        return tuple(counts)
+
+    def missing(self) -> Iterator[int]:
+        """Yield the chunks to simulate: the next one of each cell that is undecided at that time, in rounds."""
+        manifest = self._folder.manifest
+        for number in range(manifest.chunks_a_cell):
+            for cell in range(manifest.cells):
+                index = manifest.index_of(cell, number)
+                if not self._is_done(cell) and index not in self._folder.finished:
+                    yield index
+
+    def store(self, chunk: Chunk, results: Results) -> None:
+        """Write a simulated chunk, at the latest when the chunks before it are written, unless its cell is decided."""
+        self._waiting[chunk.index] = chunk, results
+        self._advance(chunk.cell)
+
+    def _is_done(self, cell: int) -> bool:
+        manifest, state = self._folder.manifest, self._cells[cell]
+        runs = min(state.chunks * manifest.chunk, manifest.runs)
+        return runs == manifest.runs or (runs >= self._least_runs and all(state.decided))
+
+    def _advance(self, cell: int) -> None:
+        """Judge the chunks of a cell in their order, as far as they are known and the cell needs them."""
+        while not self._is_done(cell):
+            index = self._folder.manifest.index_of(cell, self._cells[cell].chunks)
+            if index in self._waiting:
+                self._folder.write(*self._waiting.pop(index))
+            elif index not in self._folder.finished:
+                return
+            self._judge(cell, index)
+        for index in [index for index, (chunk, _) in self._waiting.items() if chunk.cell == cell]:
+            del self._waiting[index]
+
+    def _judge(self, cell: int, index: int) -> None:
+        state, (fewest_met, most_missed) = self._cells[cell], self._critical
+        samples = self._folder.chunk_samples(index, self._requirement.quantity, self._noises)
+        for noise, values in enumerate(samples):
+            counts = state.holding[noise] + np.cumsum(self._requirement.holds(values))
+            looks = slice(state.known[noise], state.known[noise] + values.size)
+            decided = (counts >= fewest_met[looks]) | (counts <= most_missed[looks])
+            state.decided[noise] |= bool(decided.any())
+            state.known[noise] += values.size
+            state.holding[noise] = int(counts[-1]) if values.size else state.holding[noise]
+        state.chunks += 1

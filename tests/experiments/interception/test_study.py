@@ -1,0 +1,174 @@
+"""What studies say about sets and hits next to their quantiles."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from experiments import load_scenario
+from experiments.interception.choices import with_model
+from experiments.interception.scenario_file import scenario_to_toml
+from experiments.interception.study import SetCounts, hit_text, percent, set_counts, set_warnings
+from infoset import Model
+from sim import Body, Scenario, estimate_hits, quantiles, simulate
+
+Infoset = Callable[..., tuple[int, str, str]]
+KEYS = ["runs", "hits", "probability", "lower", "upper"]
+WARNING = "the quantiles describe these failures of the model too; to see those of the guidance and the sensors, use"
+EMPTY = "set became empty: 0 of 3 runs (0 %)"
+
+
+@pytest.fixture
+def sized(brief: Scenario, tmp_path: Path) -> Path:
+    file = tmp_path / "sized.toml"
+    file.write_text(scenario_to_toml(replace(brief, body=Body(10.0))))
+    return file
+
+
+def test_a_better_range_meter_looks_worse_in_the_paper_and_the_study_says_why(infoset: Infoset) -> None:
+    """On commit 652bf7c nothing tells the two apart: the quantiles of the better meter are those of emptied sets."""
+    published = load_scenario("asteroid-1997")
+
+    def p99(model: Model, error: float) -> tuple[float, int]:
+        meter = replace(published.range_sensor, relative_error=error) if published.range_sensor is not None else None
+        flown = simulate(with_model(replace(published, range_sensor=meter), model), 20, guarantee=False)
+        return float(quantiles(flown.miss_m, 0.99)), int(flown.set_emptied.sum())
+
+    good, poor = p99(Model.PAPER, 0.01), p99(Model.PAPER, 0.1)
+    assert good[0] > 3.0 * poor[0]
+    assert good[1] == 15
+    assert p99(Model.GUARANTEED, 0.01)[0] < 1.1 * p99(Model.GUARANTEED, 0.1)[0]
+
+    asked = ("campaign", "--runs", 20, "--set", "range_sensor.relative_error=0.01", "--out")
+    code, out, _ = infoset(*asked, "paper", "--model", "paper")
+    assert code == 0
+    assert "set became empty: 15 of 20 runs (75 %)" in out
+    assert "warning: model paper: in " in out
+    assert WARNING in out
+    code, out, _ = infoset(*asked, "default")
+    assert code == 0
+    assert "true state inside the set at every step: 20 of 20 runs (100 %); set became empty: 0 of 20 runs (0 %)" in out
+    assert "warning" not in out
+
+
+def test_a_sweep_has_the_shares_of_its_sets(infoset: Infoset) -> None:
+    vary = ("--vary", "range_sensor.relative_error=0.01:0.1:2", "--runs", 20, "--out")
+    code, out, _ = infoset("sweep", *vary, "paper", "--model", "paper")
+    assert code == 0
+    assert "all cells: true state inside the set at every step: " in out
+    assert "set became empty: 16 of 40 runs (40 %)" in out
+    assert "warning: model paper: in " in out
+    code, out, _ = infoset("sweep", *vary, "default")
+    assert "set became empty: 0 of 40 runs (0 %)" in out
+    assert "warning" not in out
+
+
+@pytest.mark.parametrize("command", ["experiment", "compare", "campaign", "report"])
+def test_every_study_has_the_shares_of_its_sets(infoset: Infoset, sized: Path, command: str) -> None:
+    if command == "report":
+        assert infoset("campaign", sized, "--runs", 3, "--out", "runs")[0] == 0
+        asked: tuple[object, ...] = ("report", "runs")
+    else:
+        asked = (command, sized, "--runs", 3, *(("--out", "runs") if command == "campaign" else ()))
+    code, out, _ = infoset(*asked)
+    assert code == 0
+    if command == "compare":
+        assert "true state in the" in out
+        assert "set became" in out
+        assert "hit: miss at" in out
+    else:
+        assert "true state inside the set at every step: 3 of 3 runs (100 %); set became empty: 0 of 3" in out
+        assert "hit (miss at most 10 m): " in out
+
+
+def test_the_json_of_an_experiment_has_its_hits(infoset: Infoset, sized: Path, tmp_path: Path) -> None:
+    code, out, _ = infoset("experiment", sized, "--runs", 5, "--json", "-", "--csv", "all.csv")
+    assert code == 0
+    with (tmp_path / "all.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    for curve in json.loads(out)["curves"]:
+        expected = estimate_hits(sum(miss <= 10.0 for miss in curve["miss_m"]), 5)
+        assert list(curve["hit"]) == KEYS
+        assert curve["hit"] == vars(expected)
+        own = [row for row in rows if row["published_curve"] == str(curve["published_curve"])]
+        assert [row["hit"] == "true" for row in own] == [float(row["miss_m"]) <= 10.0 for row in own]
+
+
+def test_without_a_body_there_is_no_hit(infoset: Infoset, brief_file: Path) -> None:
+    code, out, _ = infoset("experiment", brief_file, "--runs", 2, "--json", "-")
+    assert code == 0
+    assert all("hit" not in curve for curve in json.loads(out)["curves"])
+    code, out, _ = infoset("experiment", brief_file, "--runs", 2)
+    assert "hit" not in out.replace("within", "")
+
+
+def test_the_json_of_a_comparison_has_its_hits(infoset: Infoset, sized: Path) -> None:
+    code, out, _ = infoset("compare", sized, "--runs", 4, "--strategies", "patient", "--json", "-", "--csv", "all.csv")
+    assert code == 0
+    with Path("all.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    for strategy in json.loads(out)["strategies"]:
+        assert list(strategy["hit"]) == KEYS
+        own = [row for row in rows if row["noise"] == strategy["noise"]]
+        missed = {row["run"] for row in own if row["hit"] == "false"}
+        assert strategy["hit"]["hits"] == 4 - len(missed)
+        assert strategy["set_emptied"] == len({row["run"] for row in own if row["set_emptied"] == "true"})
+
+
+def test_the_json_of_campaigns_reports_and_sweeps_has_its_hits(infoset: Infoset, sized: Path) -> None:
+    code, out, _ = infoset("campaign", sized, "--runs", 6, "--noise", "mixed", "--out", "runs", "--json", "-")
+    assert code == 0
+    samples: list[Any] = json.loads(out)["samples"]
+    code, out, _ = infoset("report", "runs", "--json", "-")
+    assert json.loads(out)["samples"] == samples
+    assert all(worst["hit"] == (worst["miss_m"] <= 10.0) for worst in json.loads(out)["worst"])
+    code, out, _ = infoset("sweep", sized, "--vary", "body.radius_m=2:20:2", "--runs", 4, "--out", "s", "--json", "-")
+    assert code == 0
+    cells = json.loads(out)["cells"]
+    samples += [sample for cell in cells for sample in cell["samples"]]
+    for sample in samples:
+        assert list(sample["hit"]) == KEYS
+        assert sample["set_emptied"] == 0
+    small, large = (cell["samples"][0]["hit"]["hits"] for cell in cells)
+    assert small <= large
+
+
+@pytest.mark.parametrize(("radius", "word"), [(1e5, "hit"), (1e-6, "missed")])
+def test_one_engagement_hits_or_misses(infoset: Infoset, sized: Path, radius: float, word: str) -> None:
+    size = ("--set", f"body.radius_m={radius}", "--no-range-meter")
+    code, out, _ = infoset("engage", sized, *size, "--record", "one.npz", "--out", "out")
+    assert code == 0
+    assert f"arrived, {word}" in out
+    assert json.loads(Path("out/results.json").read_text())["hit"] is (word == "hit")
+    code, out, _ = infoset("replay", "one.npz", "--html", "page.html")
+    assert code == 0
+    assert f"arrived, {word}" in out
+    assert f" m/s, {word}" in Path("page.html").read_text()
+
+
+def test_counts_of_sets() -> None:
+    kept, emptied = np.array([True, True, False, False]), np.array([False, True, False, True])
+    counts = set_counts(kept, emptied)
+    assert counts == SetCounts(4, 2, 2, 3)
+    assert counts + SetCounts(6, 6, 0, 0) == SetCounts(10, 8, 2, 3)
+    assert set_warnings(Model.PAPER, SetCounts(5, 5, 0, 0)) == []
+    (line,) = set_warnings(Model.PAPER, counts)
+    assert line.startswith("warning: model paper: in 3 of 4 runs the set lost the true state or became empty; ")
+    assert line.endswith("use --model guaranteed")
+    (line,) = set_warnings(Model.GUARANTEED, counts)
+    assert "exceeds an assumption of the model" in line
+
+
+def test_shares_are_not_rounded_to_certainty(brief: Scenario) -> None:
+    assert [percent(share) for share in (0.0, 0.5, 1.0, 1e-9)] == ["0 %", "50 %", "100 %", "1e-07 %"]
+    assert percent(1.0 - 1e-6) == "99.9999 %"
+    text = hit_text(estimate_hits(187, 200), replace(brief, body=Body(80.0)))
+    assert text == "hit (miss at most 80 m): 187 of 200 runs (93.5 %), 95 % CI 89.14 % to 96.49 %"
+    assert hit_text(None, brief) == ""

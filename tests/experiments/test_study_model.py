@@ -1,0 +1,125 @@
+"""Studies use the guaranteed model unless another one is asked for."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from experiments import load_scenario
+from experiments.interception.scenario_file import scenario_template, scenario_to_toml
+from infoset import Model
+from sim import Scenario
+from sim.storage import read_manifest
+
+Infoset = Callable[..., tuple[int, str, str]]
+LINE = "model: guaranteed, the model of studies; the scenario file says paper: --model paper\n"
+VARY = ("--vary", "thruster.greatest_impulse_m_s=2:8:2")
+OLD = Path(__file__).parents[1] / "data" / "first-format"
+
+
+def model_of(command: str, out: str, tmp_path: Path) -> str:
+    """Model that a command reports."""
+    if command in ("campaign", "sweep"):
+        return read_manifest(tmp_path / "runs").scenario.set_model.kind.value
+    return str(json.loads(out)["model"])
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("campaign", "--runs", 4, "--out", "runs"),
+        ("sweep", *VARY, "--runs", 4, "--out", "runs"),
+        ("compare", "--strategies", "patient", "--runs", 2),
+        ("adversary", "--budget", 8),
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_the_default_model_is_the_guaranteed_one(
+    infoset: Infoset, brief_file: Path, tmp_path: Path, arguments: tuple[str, ...]
+) -> None:
+    """On commit 652bf7c the model is that of the file."""
+    command, *others = arguments
+    code, out, err = infoset(command, brief_file, *others, "--json", "-")
+    assert code == 0
+    assert err.count(LINE) == 1
+    assert model_of(command, out, tmp_path) == "guaranteed"
+    for chosen in (("--model", "paper"), ("--set", "information_set.model=paper")):
+        shutil.rmtree(tmp_path / "runs", ignore_errors=True)
+        code, out, err = infoset(command, brief_file, *others, *chosen, "--json", "-")
+        assert (code, LINE in err) == (0, False)
+        assert model_of(command, out, tmp_path) == "paper"
+    shutil.rmtree(tmp_path / "runs", ignore_errors=True)
+    assert LINE not in infoset(command, brief_file, *others, "--model", "guaranteed")[2]
+    shutil.rmtree(tmp_path / "runs", ignore_errors=True)
+    assert infoset(command, brief_file, *others, "--quiet") == (0, "", "")
+
+
+def test_experiment_and_engage_keep_the_model_of_the_file(infoset: Infoset, brief_file: Path) -> None:
+    for command, others in (("experiment", ("--runs", 2)), ("engage", ())):
+        code, out, err = infoset(command, brief_file, *others)
+        assert (code, err) == (0, "")
+        assert "the paper's Phi (not a bound here)" in out.replace("\n", " ") or "paper's" in out
+
+
+def test_a_new_scenario_has_the_guaranteed_model(infoset: Infoset, tmp_path: Path) -> None:
+    assert infoset("scenarios", "new", "mine.toml")[0] == 0
+    assert load_scenario(tmp_path / "mine.toml").set_model.kind is Model.GUARANTEED
+    assert 'model = "guaranteed"' in scenario_template()
+    assert load_scenario("asteroid-1997").set_model.kind is Model.PAPER
+
+
+@pytest.mark.parametrize("command", ["campaign", "compare", "experiment"])
+def test_a_scenario_outside_the_conditions_of_the_model_is_refused(
+    infoset: Infoset, brief: Scenario, tmp_path: Path, command: str
+) -> None:
+    """`--model guaranteed` was a traceback here."""
+    text = scenario_to_toml(brief).replace("vx_km_s = [-58.0, -57.5]", "vx_km_s = [-130.0, -57.5]", 1)
+    (tmp_path / "wide.toml").write_text(text)
+    others = ("--runs", 2, *(("--out", "runs") if command == "campaign" else ()))
+    code, _, err = infoset(command, "wide.toml", *others, "--model", "guaranteed")
+    assert code == 2
+    assert err.startswith("error: brief with --model guaranteed: uncertainty.vx_km_s: must differ from")
+    code, _, err = infoset(command, "wide.toml", *others)
+    if command == "experiment":
+        assert code == 0
+    else:
+        assert code == 2
+        assert err.endswith("; or choose the model of the file with --model paper\n")
+
+
+def test_a_resumed_folder_keeps_its_model(infoset: Infoset, brief_file: Path, tmp_path: Path) -> None:
+    asked = ("campaign", brief_file, "--chunk", 4, "--out", "runs")
+    assert infoset(*asked, "--runs", 4, "--model", "paper")[0] == 0
+    code, out, err = infoset(*asked, "--runs", 8, "--resume")
+    assert (code, "model: " in err) == (0, False)
+    assert read_manifest(tmp_path / "runs").scenario.set_model.kind is Model.PAPER
+    assert "8 runs" in out
+    code, _, err = infoset(*asked, "--runs", 8, "--resume", "--model", "guaranteed")
+    assert code == 2
+    assert 'scenario.set_model.kind: "paper" in the folder, "guaranteed" now' in err
+    code, _, err = infoset(*asked, "--runs", 8, "--resume", "--set", "information_set.model=guaranteed")
+    assert code == 2
+
+
+def test_a_folder_of_another_model_than_the_file_is_resumed(
+    infoset: Infoset, brief: Scenario, brief_file: Path, tmp_path: Path
+) -> None:
+    asked = ("campaign", "mine.toml", "--chunk", 4, "--out", "runs")
+    text = scenario_to_toml(brief)
+    (tmp_path / "mine.toml").write_text(text.replace('"paper"', '"guaranteed"').replace('"rectangle"', '"box"'))
+    assert infoset(*asked, "--runs", 4, "--model", "paper")[0] == 0
+    code, _, err = infoset(*asked, "--runs", 8, "--resume")
+    assert code == 0
+    assert "model: paper, the model of the resumed folder; the scenario file says guaranteed\n" in err
+
+
+@pytest.mark.parametrize("kind", ["campaign", "sweep"])
+def test_a_report_of_an_old_folder(infoset: Infoset, kind: str) -> None:
+    code, out, err = infoset("report", OLD / kind)
+    assert (code, err) == (0, "")
+    assert "intercepted" not in out
+    assert "lost" not in out

@@ -1,0 +1,139 @@
+from __future__ import annotations
+
+from decimal import Decimal
+from fractions import Fraction
+from math import comb
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sim import QuantileName, Requirement, estimate_hits, estimate_quantiles
+from sim.requirement import (
+    Decision,
+    HitRequirement,
+    critical_counts,
+    judge,
+    p_values,
+    parse_requirement,
+    runs_needed,
+    share_interval,
+)
+from sim.statistics import order_statistics
+
+P99 = Requirement(QuantileName("miss_m", 0.99), 10.0)
+
+
+@given(
+    size=st.integers(1, 400),
+    level=st.sampled_from((0.5, 0.9, 0.95, 0.99)),
+    bound=st.floats(0.5, 8.0),
+    seed=st.integers(0, 2**31),
+)
+@settings(deadline=None)
+def test_a_decision_compares_the_bound_with_the_interval(size: int, level: float, bound: float, seed: int) -> None:
+    values = np.random.default_rng(seed).exponential(size=size)
+    required = Requirement(QuantileName("miss_m", level), bound)
+    verdict = judge(values, required, watched=False)
+    (estimate,) = estimate_quantiles(values, [level])
+    expected = Decision.UNDECIDED
+    if estimate.upper is not None and estimate.upper < bound:
+        expected = Decision.MET
+    elif estimate.lower is not None and estimate.lower > bound:
+        expected = Decision.NOT_MET
+    assert verdict.decision is expected
+    assert (verdict.value, verdict.lower, verdict.upper) == (estimate.value, estimate.lower, estimate.upper)
+    assert critical_counts(size, level, watched=False)[0][-1] == order_statistics(size, level, 0.95)[1]
+
+
+def exact_p_value(runs: int, count: int, share: Fraction) -> Fraction:
+    """Return the inverse of the mean likelihood ratio of the shares above a share, in rational arithmetic."""
+    # The integral of t^k (1 - t)^(n - k) from q to 1 is a sum over the binomial expansion of (1 - t)^(n - k).
+    integral = sum(
+        (Fraction((-1) ** power * comb(runs - count, power), count + power + 1) * (1 - share ** (count + power + 1)))
+        for power in range(runs - count + 1)
+    )
+    mean = integral / (1 - share)
+    return share**count * (1 - share) ** (runs - count) / mean
+
+
+@pytest.mark.parametrize(("runs", "count"), [(1, 0), (1, 1), (20, 20), (40, 37), (40, 0)])
+def test_watched_p_values_are_inverse_likelihood_ratios(runs: int, count: int) -> None:
+    share = Fraction("0.95")
+    met, missed = p_values(runs, count, float(share), watched=True)
+    assert float(met) == pytest.approx(min(1.0, float(exact_p_value(runs, count, share))), rel=1e-9)
+    below = exact_p_value(runs, runs - count, 1 - share)
+    assert float(missed) == pytest.approx(min(1.0, float(below)), rel=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.95, 0.99])
+def test_looks_after_every_run_are_wrong_in_at_most_5_percent(share: float) -> None:
+    """The fixed-size interval, looked at after every run, is wrong in far more than 5 % of the samples."""
+    size, repeats = 1500, 1000
+    counts = np.cumsum(np.random.default_rng(3).random((repeats, size)) < share, axis=1)
+    for watched in (True, False):
+        fewest_met, most_missed = critical_counts(size, share, watched=watched)
+        wrong = ((counts >= fewest_met) | (counts <= most_missed)).any(axis=1).mean()
+        assert (wrong < 0.05) if watched else (wrong > 0.12)
+
+
+def test_a_decision_is_final() -> None:
+    values = np.concatenate([np.ones(600), np.full(40, 20.0)])
+    decided = judge(values[:600], P99, watched=True)
+    later = judge(values, P99, watched=True)
+    assert decided.decision is later.decision is Decision.MET
+    assert later.upper is not None
+    assert later.upper <= P99.bound
+    assert judge(values, P99, watched=False).decision is Decision.NOT_MET
+
+
+@given(hits=st.integers(0, 60), more=st.integers(0, 60))
+@settings(deadline=None)
+def test_the_interval_of_a_share_is_that_of_clopper_and_pearson(hits: int, more: int) -> None:
+    runs = max(1, hits + more)
+    estimate = estimate_hits(hits, runs)
+    assert share_interval(hits, runs, watched=False) == pytest.approx((estimate.lower, estimate.upper), abs=1e-12)
+    lower, upper = share_interval(hits, runs, watched=True)
+    assert lower <= estimate.lower <= estimate.upper <= upper
+
+
+def test_hits_decide() -> None:
+    required = parse_requirement(" hit >= 0.95 ")
+    assert required == parse_requirement("hit>0.95") == HitRequirement(0.95)
+    assert str(required) == "hit>=0.95"
+    hit = np.ones(200)
+    assert judge(hit[:71], required, watched=False).decision is Decision.UNDECIDED
+    assert judge(hit[:72], required, watched=False).decision is Decision.MET
+    assert judge(hit[:104], required, watched=True).decision is Decision.UNDECIDED
+    verdict = judge(hit[:105], required, watched=True)
+    assert (verdict.decision, verdict.value, verdict.upper) == (Decision.MET, 1.0, 1.0)
+    assert verdict.lower is not None
+    assert verdict.lower >= 0.95
+    assert judge(0.0 * hit[:20], required, watched=True).decision is Decision.NOT_MET
+
+
+@pytest.mark.parametrize(
+    "text", ["hit", "hit<0.95", "hit>=1", "hit>=0", "hit>=95", "hit>=nan", "hit p50>=0.9", "hit=>0.9"]
+)
+def test_no_requirement_of_hits(text: str) -> None:
+    with pytest.raises(ValueError, match=r"must be|there is no quantity|must be less than 1|greater than 0"):
+        parse_requirement(text)
+
+
+def test_runs_needed_by_hand() -> None:
+    least = next(size for size in range(1, 1000) if Decimal("0.99") ** size <= Decimal("0.025"))
+    assert judge(np.ones(20), P99, watched=False).runs_needed == least == 368
+    assert runs_needed(20, 20, 0.95, watched=False) == 72
+    assert runs_needed(19, 20, 0.95, watched=False) is None
+    for watched in (True, False):
+        for count, runs, share in ((20, 20, 0.99), (97, 100, 0.95), (180, 200, 0.95)):
+            needed = runs_needed(count, runs, share, watched=watched)
+            assert needed is not None
+            fewest_met, most_missed = critical_counts(2 * needed, share, watched=watched)
+            decided = [
+                size
+                for size in range(runs + 1, 2 * needed)
+                if not most_missed[size - 1] < round(count / runs * size) < fewest_met[size - 1]
+            ]
+            assert decided[0] == pytest.approx(needed, rel=0.15)

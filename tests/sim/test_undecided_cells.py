@@ -1,0 +1,179 @@
+from __future__ import annotations
+
+import random
+import threading
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sim import CampaignNoise, QuantileName, Requirement, Scenario, StoppingRule, Sweep
+from sim.campaign import Progress
+from sim.requirement import Decision, judge
+from sim.storage import Axis, CampaignFolder, ManifestError, read_manifest
+from sim.storage.manifest import write_manifest
+
+ERRORS = (1e-5, 1.2e-4, 1.5e-4, 3e-4)
+REQUIRED = Requirement(QuantileName("miss_m", 0.8), 3.0)
+
+
+class InterruptError(Exception):
+    """Stands for an interruption."""
+
+
+class Shuffled(Executor):
+    """Computes the waiting chunks in a random order."""
+
+    def __init__(self, seed: int) -> None:
+        self._random = random.Random(seed)
+        self._lock = threading.Lock()
+        self._waiting: list[tuple[Future[Any], Callable[[], Any]]] = []
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        self._waiting.append((future, lambda: fn(*args, **kwargs)))
+        threading.Thread(target=self._one).start()
+        return future
+
+    def _one(self) -> None:
+        with self._lock:
+            future, work = self._waiting.pop(self._random.randrange(len(self._waiting)))
+        if future.set_running_or_notify_cancel():
+            future.set_result(work())
+
+
+@pytest.fixture(scope="module")
+def asked(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Sweep:
+    sensor = brief.set_model.angle_sensor
+    cells = tuple(
+        replace(brief, set_model=replace(brief.set_model, angle_sensor=replace(sensor, error_at_zero_range_rad=error)))
+        for error in ERRORS
+    )
+    axis = Axis("angle_sensor.error_at_zero_range_rad", ERRORS)
+    folder = tmp_path_factory.mktemp("undecided") / "sweep"
+    return Sweep(
+        brief, (axis,), cells, 16, folder, seed=3, chunk=16, noise=CampaignNoise.MIXED, until=REQUIRED, most_runs=160
+    )
+
+
+@pytest.fixture(scope="module")
+def flown(asked: Sweep) -> CampaignFolder:
+    """The sweep, simulated by one thread without an interruption."""
+    return asked.run(workers=1).folder
+
+
+def names(folder: Path | str) -> list[str]:
+    return sorted(file.name for file in (Path(folder) / "shards").glob("*.parquet"))
+
+
+def samples(folder: CampaignFolder, cell: int) -> list[np.ndarray[Any, Any]]:
+    return [folder.sample("miss_m", noise, cell) for noise in ("random", "game")]
+
+
+def test_cells_stop_when_they_are_decided(flown: CampaignFolder) -> None:
+    assert flown.complete
+    assert flown.manifest.until == "miss_m p80<3"
+    runs = flown.manifest.cell_runs
+    assert len(set(runs)) > 1
+    assert flown.finished_runs == flown.wanted_runs == sum(runs)
+    for cell, size in enumerate(runs):
+        values = samples(flown, cell)
+        assert sum(sample.size for sample in values) == size
+        verdicts = [judge(sample, REQUIRED, watched=True) for sample in values]
+        decided = [verdict.decision is not Decision.UNDECIDED for verdict in verdicts]
+        assert all(decided) or size == 160
+        if size > 16:
+            before = [judge(sample[: sample.size - 8], REQUIRED, watched=True).decision for sample in values]
+            assert Decision.UNDECIDED in before
+
+
+def test_the_runs_of_a_cell_are_those_of_a_longer_sweep(asked: Sweep, flown: CampaignFolder, tmp_path: Path) -> None:
+    whole = replace(asked, runs=160, until=None, most_runs=None, folder=tmp_path / "whole").run().folder
+    for cell, size in enumerate(flown.manifest.cell_runs):
+        assert flown.table(None, cell).equals(whole.table(None, cell).slice(0, size))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_neither_workers_nor_interruptions_change_what_is_stored(
+    seed: int, asked: Sweep, flown: CampaignFolder, tmp_path: Path
+) -> None:
+    again = replace(asked, folder=tmp_path / "again")
+
+    def interrupt(progress: Progress) -> None:
+        if progress.flown >= 16 * seed:
+            raise InterruptError
+
+    for _ in range(3):
+        with pytest.raises(InterruptError):
+            again.run(Shuffled(seed), workers=5, resume=True, progress=interrupt)
+        assert not CampaignFolder.read(tmp_path / "again").complete
+    result = again.run(Shuffled(seed), workers=5, resume=True)
+    assert names(tmp_path / "again") == names(asked.folder)
+    assert result.folder.manifest.cell_runs == flown.manifest.cell_runs
+    told: list[Progress] = []
+    again.run(resume=True, progress=told.append)
+    assert [progress.flown for progress in told] == [0]
+
+
+def test_a_sweep_of_fixed_runs_is_continued_until_it_is_decided(
+    asked: Sweep, flown: CampaignFolder, tmp_path: Path
+) -> None:
+    for runs in (16, 10):
+        folder = tmp_path / f"{runs}"
+        fixed = replace(asked, runs=runs, until=None, most_runs=None, folder=folder).run()
+        assert len(fixed) == runs * len(ERRORS)
+        replace(asked, folder=folder).run(resume=True)
+        assert names(folder) == names(asked.folder)
+        assert read_manifest(folder).cell_runs == flown.manifest.cell_runs
+
+
+def test_more_runs_in_each_cell_change_no_decision(asked: Sweep, flown: CampaignFolder, tmp_path: Path) -> None:
+    longer = replace(asked, runs=max(flown.manifest.cell_runs), folder=tmp_path / "longer").run().folder
+    assert set(longer.manifest.cell_runs) == {max(flown.manifest.cell_runs)}
+    for cell in range(len(ERRORS)):
+        for short, long in zip(samples(flown, cell), samples(longer, cell), strict=True):
+            decision = judge(short, REQUIRED, watched=True).decision
+            assert decision in (Decision.UNDECIDED, judge(long, REQUIRED, watched=True).decision)
+
+
+def test_a_damaged_shard_is_simulated_again(asked: Sweep, flown: CampaignFolder, tmp_path: Path) -> None:
+    again = replace(asked, folder=tmp_path / "again")
+    again.run()
+    stored = names(again.folder)
+    (tmp_path / "again" / "shards" / stored[1]).write_bytes(b"damaged")
+    (tmp_path / "again" / "shards" / stored[-1]).unlink()
+    assert not CampaignFolder.read(tmp_path / "again").complete
+    assert len(again.run(resume=True).redone) == 1
+    assert names(again.folder) == stored == names(asked.folder)
+
+
+def test_sweeps_of_earlier_versions_are_read_and_resumed_but_not_extended(asked: Sweep, tmp_path: Path) -> None:
+    fixed = replace(asked, runs=32, until=None, most_runs=None, folder=tmp_path / "new")
+    whole = fixed.run().table
+    old = replace(fixed, folder=tmp_path / "old")
+    (tmp_path / "old").mkdir()
+    write_manifest(tmp_path / "old", replace(fixed.manifest(), order="cells"))
+    assert b"order" not in (tmp_path / "old" / "manifest.json").read_bytes()
+    assert b"cell_runs" not in (tmp_path / "old" / "manifest.json").read_bytes()
+    assert b"require" not in (tmp_path / "old" / "manifest.json").read_bytes()
+    assert old.run(resume=True).table.equals(whole)
+    assert read_manifest(tmp_path / "old").order == "cells"
+    assert read_manifest(tmp_path / "old").runs_of(1) == (0, range(16, 32))
+    assert read_manifest(tmp_path / "new").runs_of(1) == (1, range(16))
+    with pytest.raises(ManifestError, match="earlier version wrote the sweep"):
+        replace(old, runs=48).run(resume=True)
+    longer = replace(fixed, runs=48).run(resume=True)
+    assert longer.folder.table(None, 0).slice(0, 32).equals(whole.slice(0, 32))
+
+
+def test_what_does_not_fit_together(asked: Sweep) -> None:
+    with pytest.raises(ValueError, match="most_runs must be at least 16"):
+        replace(asked, most_runs=15)
+    with pytest.raises(ValueError, match="a stopping rule of a campaign, or a requirement of a sweep"):
+        replace(asked, until=StoppingRule(REQUIRED.quantile, 1.0))
+    with pytest.raises(ValueError, match="cell_runs must contain 4 numbers"):
+        replace(asked.manifest(), cell_runs=(1, 2))
