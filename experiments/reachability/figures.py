@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
-from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.mplot3d import proj3d  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
@@ -39,7 +39,6 @@ Shadow = tuple[list[int], Floats]
 _TOLERANCE, _TOLERANCE_IN_SPACE = 2e-3, 1e-2
 """Relative error of the drawn sets."""
 _MOST_TIMES, _MOST_TIMES_IN_SPACE = 6, 4
-_TOGETHER = 0.06
 _MANY_EDGES = 120
 _OUTLINE_POINTS, _ANCHORS = 96, 4
 """Points of an outline that labels avoid, and the step between those at which its own label can stand."""
@@ -53,7 +52,6 @@ _NAMES = {
     "analytic": "analytic centre",
 }
 _MOST_MEMBERS = 4
-_HALO = [Stroke(linewidth=2.2, foreground="white"), Normal()]
 _START: dict[str, Any] = {
     "color": INK,
     "marker": "o",
@@ -64,6 +62,7 @@ _START: dict[str, Any] = {
     "label": "start",
 }
 _END: dict[str, Any] = {"color": INK, "marker": "*", "linestyle": "none", "label": "terminal state of least norm"}
+_LABEL: dict[str, Any] = {"fontsize": 6.5, "color": SET_EDGE, "zorder": 8}
 _SET: dict[str, Any] = {"facecolor": SET_FILL, "edgecolor": SET_EDGE, "linewidth": 0.7}
 _AXES = ("x", "y", "z", "$v_x$", "$v_y$", "$v_z$")
 _PLANES = ((0, 1), (0, 2), (3, 4), (3, 5))
@@ -121,29 +120,16 @@ def _shadows(report: Report, axes: Sequence[int], most_times: int, tolerance: fl
     return groups
 
 
-def _stacked(labels: Sequence[Shadow], bounds: Floats) -> list[tuple[str, Floats]]:
-    """Return the labels of sets at their positions, one above the other where the positions are close."""
-    size = np.maximum(np.ptp(bounds, axis=(0, 2)), 1e-12)
-    stacked: list[tuple[str, Floats]] = []
-    for times, position in labels:
-        below = sum(float(np.abs((other - position) / size).max()) < _TOGETHER for _, other in stacked)
-        stacked.append((_name(times) + "\n" * below, position))
-    return stacked
-
-
 @style()
 def draw_space(report: Report, first: int) -> Figure:
     """Draw three of the six states in space: positions (0) or velocities (3)."""
     figure = new_figure(height_mm=112.0)
     axes: Any = figure.add_axes((-0.03, 0.0, 0.74, 1.0), projection="3d", computed_zorder=False)
     states, (titles, per_si) = slice(first, first + 3), _units(report)
-    factors, labels = per_si[states], []
-    for times, points in _shadows(report, range(first, first + 3), _MOST_TIMES_IN_SPACE, _TOLERANCE_IN_SPACE):
+    factors = per_si[states]
+    shadows = _shadows(report, range(first, first + 3), _MOST_TIMES_IN_SPACE, _TOLERANCE_IN_SPACE)
+    for _, points in shadows:
         _draw_body(axes, points)
-        labels.append((times, points[points[:, 2].argmax()]))
-    for text, position in _stacked(labels, report.tube[:, states] * factors[:, None]):
-        label = axes.text(*position, text, fontsize=7.0, color=SET_EDGE, ha="center", va="bottom", zorder=8)
-        label.set_path_effects(_HALO)
     for look, member, path in _shown(report):
         line = {**look, "marker": "none", "linewidth": None, "zorder": 5}
         axes.plot(*(path[:, states] * factors).T, label=f"{_title(member)}, nonlinear", **line)
@@ -158,9 +144,25 @@ def draw_space(report: Report, first: int) -> Figure:
         getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(6))
     axes.view_init(elev=22.0, azim=-58.0)
     axes.set_box_aspect((1.0, 1.0, 0.85), zoom=1.0)
+    seen = [_on_paper(axes, points) for _, points in shadows]
+    paths = [_on_paper(axes, path[:, states] * factors) for _, _, path in _shown(report)]
+    labels = [
+        (
+            _name(times),
+            points[np.argsort(-points[:, 1])],
+            np.vstack([*paths, *(other for other in seen if other is not points)]),
+        )
+        for (times, _), points in zip(shadows, seen, strict=True)
+    ]
+    place_labels(axes, labels, _on_paper(axes, np.stack([start, end])), **_LABEL)
     handles, _ = axes.get_legend_handles_labels()
     figure.legend(handles=[*handles, Patch(label="tube at t", **_SET)], loc="center left", bbox_to_anchor=(0.705, 0.5))
     return figure
+
+
+def _on_paper(axes: Any, points: Floats) -> Floats:
+    """Return the positions of points in space on the paper, in the coordinates of the axes, shape (n, 2)."""
+    return np.column_stack(proj3d.proj_transform(*points.T, axes.get_proj())[:2])
 
 
 def _draw_body(axes: Any, points: Floats) -> None:
@@ -228,9 +230,7 @@ def draw_planes(report: Report) -> Figure:
             ],
             np.stack([start, end]),
             centred=True,
-            fontsize=6.5,
-            color=SET_EDGE,
-            zorder=8,
+            **_LABEL,
         )
     handles = [Line2D([], [], markersize=3.2, label=_title(member), **look) for look, member, _ in _shown(report)]
     title = "lines: nonlinear model; marks: linear model, at whole periods" if handles else None
