@@ -259,12 +259,11 @@ def _draw_sweep(axes: Axes, solution: EncounterSolution, sweep: DurationSweep) -
     axes.plot(sweep.meeting_s, sweep.group_loss, color=LIMIT, linewidth=2.0, label="group loss")
     meeting_s = solution.encounter.meeting_s
     axes.axvline(meeting_s, linewidth=0.7, **_DOTTED)
-    axes.annotate(
-        f"{meeting_s:g} s in (a) and (b)", (meeting_s, 0.03), xycoords=("data", "axes fraction"), xytext=(-2, 0),
-        textcoords="offset points", rotation=90.0, ha="right", va="bottom", fontsize=6.0, color=LIMIT,
-    )  # fmt: skip
     axes.set_yscale("log")
-    axes.set(xlabel="time of the meeting, s", ylabel=f"$J^2$ and group loss, {_COST}")
+    axes.set(
+        xlabel=f"time of the meeting, s\n(dotted: {meeting_s:g} s, as in (a) and (b))",
+        ylabel=f"$J^2$ and group loss, {_COST}",
+    )
     axes.margins(x=0.0)
     if len(solution.costs) <= _MOST_NAMED:
         axes.legend(loc="best", fontsize=6.5)
