@@ -19,7 +19,7 @@ from sim.chunk import CampaignNoise, Chunk, chunk_size
 from sim.flights import fly_on, fly_on_threads
 from sim.requirement import AnyRequirement
 from sim.scenario import Scenario, strategy_name
-from sim.statistics import QuantileEstimate, estimate_quantiles
+from sim.statistics import HitEstimate, QuantileEstimate, estimate_hits, estimate_quantiles
 from sim.stopping_rule import StoppingRule, Watch
 from sim.storage import (
     Axis,
@@ -71,6 +71,12 @@ class CampaignResult:
         """Return the quantile at a level in (0, 1) of a quantity, over all rows where it is known."""
         (estimate,) = estimate_quantiles(self.folder.numbers(quantity).compressed(), [level])
         return estimate
+
+    @property
+    def hits(self) -> HitEstimate | None:
+        """Probability of a hit over all rows, with its confidence interval; None if the body has no size."""
+        hit = self.folder.numbers("hit")
+        return estimate_hits(int(hit.sum()), int(hit.count())) if hit.count() else None
 
     def __len__(self) -> int:
         """Engagements stored."""

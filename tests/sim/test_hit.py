@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from experiments import load_scenario
-from sim import Body, Outcome, Scenario, fly_one, simulate
+from sim import Body, Campaign, Outcome, Scenario, fly_one, simulate
 
 
 @pytest.fixture(scope="module")
@@ -66,6 +67,12 @@ def test_a_diverged_run_with_an_empty_set_is_counted_as_both(published: Scenario
 def test_a_body_is_smaller_than_the_least_range(published: Scenario) -> None:
     with pytest.raises(ValueError, match=r"body\.radius_m must be less than the least possible range, 5.3013e\+06 m"):
         replace(published, body=Body(6e6))
+
+
+def test_a_campaign_has_the_probability_of_a_hit(brief: Scenario, tmp_path: Path) -> None:
+    sized = replace(brief, body=Body(3.0))
+    assert Campaign(sized, 12, tmp_path / "sized").run(workers=1).hits == simulate(sized, 12).hits
+    assert Campaign(brief, 4, tmp_path / "point").run(workers=1).hits is None
 
 
 def test_the_record_of_a_run_has_its_hit(brief: Scenario) -> None:
