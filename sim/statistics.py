@@ -98,6 +98,22 @@ def quantiles(sample: ArrayLike, levels: ArrayLike) -> Floats:
     return np.asarray(np.quantile(values, at), dtype=np.float64)
 
 
+def shows(size: int, level: float) -> bool:
+    """Return whether a sample of `size` values shows the quantile of a level in [0, 1].
+
+    At least one value must be expected beyond the quantile: size min(p, 1 - p) >= 1, so 100 values for 99 %. With fewer
+    values the interpolated quantile is only the extreme of the sample. Levels 0 and 1 are the extremes.
+    """
+    tail = min(level, 1.0 - level)
+    return tail == 0.0 or size * tail > 1.0 - 1e-9
+
+
+def shown_quantiles(sample: Floats, levels: Sequence[float]) -> list[float | None]:
+    """Return `quantiles`; None where the sample does not show the quantile (`shows`)."""
+    values = quantiles(sample, levels).tolist()
+    return [value if shows(len(sample), level) else None for level, value in zip(levels, values, strict=True)]
+
+
 @dataclass(frozen=True)
 class QuantileEstimate:
     """A quantile of a sample with a confidence interval.

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from rich.console import Console
@@ -33,13 +34,14 @@ from experiments.campaigns.sweep_report import TABLE, default_requirement, figur
 from experiments.common.errors import InputError
 from experiments.common.file_kinds import use_of_file
 from experiments.common.output import Output, output, to_json
-from experiments.common.screen import figure_files, number, say, table_console
+from experiments.common.screen import BeginProgress, figure_files, number, progress_bar, say, table_console
 from experiments.interception.scenario_file import scenario_to_toml
 from sim.results import ending
 from sim.storage import CampaignFolder, need_arrow
 
 FIGURES = ("figure-distributions", "figure-convergence", "figure-dispersion")
 
+Show = Callable[[Console], None]
 Correlations = Mapping[str, Mapping[str, Mapping[str, float | None]]]
 
 
@@ -57,9 +59,11 @@ def run(options: Report) -> None:
             overwrite=options.overwrite,
             quiet=options.quiet,
         ) as written:
-            console = None if options.quiet else table_console(written.stdout_taken)
-            (_report_sweep if swept else _report_campaign)(folder, options, written, console)
-            written.save(SCENARIO_FILE, scenario_to_toml(folder.manifest.scenario))
+            with progress_bar(options.quiet) as begin:
+                show = (_report_sweep if swept else _report_campaign)(folder, options, written, begin)
+                written.save(SCENARIO_FILE, scenario_to_toml(folder.manifest.scenario))
+            if not options.quiet:
+                show(table_console(written.stdout_taken))
 
 
 def _read(options: Report) -> CampaignFolder:
@@ -86,23 +90,28 @@ def _read(options: Report) -> CampaignFolder:
     return folder
 
 
-def _report_sweep(folder: CampaignFolder, options: Report, written: Output, console: Console | None) -> None:
+def _report_sweep(folder: CampaignFolder, options: Report, written: Output, begin: BeginProgress) -> Show:
     sized = bool(folder.numbers("hit").count())
     default = folder.manifest.require or default_requirement(has_size=sized)
     required, shown = quantile_options(options.require, options.show, default)
     if required.quantity == "hit" and not sized:
         raise InputError(f"--require {required}: the body of this sweep has no size; give a bound of the miss instead")
+    progress = begin("report")
     report = sweep_report(folder, required, shown)
+    progress(0.5)
     written.save("report.json", to_json(report.to_json()), "--json")
     if options.out is not None:
         report.save(written)
-    if console is not None:
-        report.show(console)
+    progress(1.0)
+    return report.show
 
 
-def _report_campaign(folder: CampaignFolder, options: Report, written: Output, console: Console | None) -> None:
+def _report_campaign(folder: CampaignFolder, options: Report, written: Output, begin: BeginProgress) -> Show:
+    progress = begin("quantiles")
     columns = _columns(folder)
+    progress(0.3)
     by_noise = samples(folder)
+    progress(1.0)
     # The commands that repeat runs name the scenario file in the folder, or the one that the report writes.
     scenario_file = folder.path / SCENARIO_FILE
     if options.out is not None and not scenario_file.is_file():
@@ -118,10 +127,10 @@ def _report_campaign(folder: CampaignFolder, options: Report, written: Output, c
     }
     written.save("report.json", to_json(report), "--json")
     if options.out is not None:
-        for name, draw in zip(FIGURES, (draw_campaign_distributions, draw_convergence, draw_dispersion), strict=True):
-            written.figure(name, draw(columns))
-    if console is not None:
-        _show(console, folder, by_noise, related, worst)
+        draws = (draw_campaign_distributions, draw_convergence, draw_dispersion)
+        drawings = {name: partial(draw, columns) for name, draw in zip(FIGURES, draws, strict=True)}
+        written.draw(drawings, begin("figures"))
+    return lambda console: _show(console, folder, by_noise, related, worst)
 
 
 def _columns(folder: CampaignFolder) -> list[CampaignColumns]:
@@ -157,7 +166,7 @@ def _show(
 
     manifest = folder.manifest
     stopped = "" if manifest.stopped_after is None else f", stopped by the rule {manifest.until}"
-    line(f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}; quantiles with 95 % confidence limits")
+    line(f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}")
     table, notes = samples_table(by_noise, manifest.scenario)
     console.print(table)
     for note in notes:

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from rich.table import Table
 
 from experiments.common.output import hit_key, library_version
-from experiments.common.screen import number
+from experiments.common.screen import number, number_table, quantile_notes
 from experiments.interception.runs.shared import bound_name
 from experiments.interception.study import SetCounts, hit_text, set_counts, set_warnings
 from sim import HitEstimate, Outcome, QuantileEstimate, Scenario, estimate_hits, estimate_quantiles
+from sim.statistics import shows
 from sim.stopping_rule import QUANTITIES, level_name
 from sim.storage import CampaignFolder, scenario_hash
 
@@ -202,7 +203,7 @@ def sample_json(sample: Sample) -> dict[str, Any]:
             quantity: {
                 **{
                     level_name(estimate.level): {
-                        "value": estimate.value,
+                        "value": _shown(sample, estimate),
                         "lower": estimate.lower,
                         "upper": estimate.upper,
                     }
@@ -215,6 +216,10 @@ def sample_json(sample: Sample) -> dict[str, Any]:
     }
 
 
+def _shown(sample: Sample, estimate: QuantileEstimate) -> float | None:
+    return estimate.value if shows(sample.runs, estimate.level) else None
+
+
 def samples_table(by_noise: Sequence[Sample], scenario: Scenario) -> tuple[Table, list[str]]:
     """Return the quantiles with their intervals, a block for each noise, and lines about hits, sets and outcomes.
 
@@ -222,19 +227,18 @@ def samples_table(by_noise: Sequence[Sample], scenario: Scenario) -> tuple[Table
     """
     phi = bound_name(scenario)
     names = {"miss_m": "miss, m", "impulse_m_s": "impulse, m/s", "guaranteed_miss_m": phi}
-    table = Table("noise", box=None, pad_edge=False)
-    table.add_column("quantity", no_wrap=True)
-    for estimate in by_noise[0].quantiles["miss_m"]:
-        table.add_column(level_name(estimate.level), justify="right")
-    table.add_column("max", justify="right")
+    table = number_table("noise", "quantity", "quantile", "value", "95 % CI", left=2)
     notes = []
     for sample in by_noise:
-        for index, (quantity, estimates) in enumerate(sample.quantiles.items()):
-            values = [number(estimate.value) for estimate in estimates]
-            first = sample.noise if index == 0 else ""
-            table.add_row(first, names[quantity], *values, number(sample.worst[quantity]))
-            table.add_row("", "  lower limit", *(number(estimate.lower) for estimate in estimates), "", style="dim")
-            table.add_row("", "  upper limit", *(number(estimate.upper) for estimate in estimates), "", style="dim")
+        title = sample.noise
+        for quantity, estimates in sample.quantiles.items():
+            name = names[quantity]
+            for estimate in estimates:
+                interval = f"{number(estimate.lower)} to {number(estimate.upper)}"
+                table.add_row(title, name, level_name(estimate.level), number(_shown(sample, estimate)), interval)
+                title = name = ""
+            table.add_row("", "", "max", number(sample.worst[quantity]), "")
+        notes += [f"{sample.noise} noise: {text}" for text in quantile_notes(sample.runs, [*LEVELS])]
         outcomes = ", ".join(f"{count} {name}" for name, count in sample.outcomes.items())
         held = f"; miss within the bound Phi: {sample.phi_held} of {sample.phi_known} runs" if sample.phi_known else ""
         hits = hit_text(sample.hits, scenario)

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import inspect
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from functools import partial
 from importlib import import_module
 from types import NoneType
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
+import typer
+
 from experiments.common.options import choice, read_number
 
+LOADING = "loading ..."
 EXAMPLE = 50
 """Number in a message about an option without a default."""
 
@@ -34,7 +39,9 @@ def command(options: type, module: str) -> Callable[..., None]:
     hints = {parameter.name: _checked(parameter, hints[parameter.name]) for parameter in parameters}
 
     def registered(**values: Any) -> None:
-        import_module(module).run(options(**values))
+        with _loading(bool(values.get("quiet"))):
+            run = import_module(module).run
+        run(options(**values))
 
     # Typer keeps the line breaks of a docstring after its first paragraph.
     paragraphs = (inspect.getdoc(options) or "").split("\n\n")
@@ -44,6 +51,17 @@ def command(options: type, module: str) -> Callable[..., None]:
     )
     registered.__annotations__ = hints
     return registered
+
+
+@contextlib.contextmanager
+def _loading(quiet: bool) -> Iterator[None]:
+    """Show a line on a terminal while modules are loaded, which takes about a second."""
+    shown = not quiet and sys.stderr.isatty()
+    if shown:
+        typer.echo(LOADING, nl=False, err=True)
+    yield
+    if shown:
+        typer.echo(f"\r{' ' * len(LOADING)}\r", nl=False, err=True)
 
 
 def _checked(parameter: inspect.Parameter, hint: Any) -> Any:

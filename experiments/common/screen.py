@@ -11,6 +11,7 @@ import typer
 
 from experiments.common.errors import on_a_screen
 from experiments.common.output import to_json
+from sim.statistics import shows
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -127,6 +128,16 @@ def number(value: float | None) -> str:
     if value is None:
         return "-"
     return f"{value:.1f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+def quantile_notes(runs: int, levels: Sequence[float]) -> list[str]:
+    """Return a line about the quantiles that so many runs do not show; no line if they show all."""
+    hidden = [level for level in levels if not shows(runs, level)]
+    if not hidden:
+        return []
+    needed = max(round(1.0 / min(level, 1.0 - level)) for level in hidden)
+    names = ", ".join(f"{100.0 * level:g} %" for level in hidden)
+    return [f"{runs} runs do not show these quantiles: {names}; {needed} runs show all"]
 
 
 def show_built_in(rows: Sequence[Mapping[str, str]], json: bool, quiet: bool) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance import NoiseKind, Strategy, TieRule
-from sim import HitEstimate, Results, Scenario, estimate_hits, quantiles
+from sim import HitEstimate, Results, Scenario, estimate_hits
+from sim.statistics import shown_quantiles
 
 Floats = NDArray[np.float64]
 Flight = tuple[str, TieRule | None]
@@ -88,7 +89,6 @@ def gather(flown: Mapping[Flight, Results]) -> list[Comparison]:
     return compared
 
 
-def summary(sample: Floats) -> dict[str, float]:
-    """Return the quantiles of a sample: p10, p50, p90, p99 and max."""
-    values = quantiles(sample, list(QUANTILES.values()))
-    return {name: float(value) for name, value in zip(QUANTILES, values, strict=True)}
+def summary(sample: Floats) -> dict[str, float | None]:
+    """Return the quantiles of a sample: p10, p50, p90, p99 and max; None if the sample is too small to show one."""
+    return dict(zip(QUANTILES, shown_quantiles(sample, [*QUANTILES.values()]), strict=True))

@@ -63,7 +63,7 @@ def run(options: PursuitMap) -> None:
         written.save("results.json", to_json(_summary(problem, x, y, solved, elapsed_s)), "--json")
         written.save("map.csv", to_csv(*_table(x, y, solved)), "--csv")
         if options.out is not None:
-            written.figure(FIGURE, draw_map(solved, x.parameter, y.parameter))
+            written.draw({FIGURE: lambda: draw_map(solved, x.parameter, y.parameter)}, begin("figure"))
     if options.quiet:
         return
     lines = [f"{problem.name}: {points} points in {elapsed_s:.1f} s: {counted(solved)}"]

@@ -17,6 +17,7 @@ from typing import Any, get_type_hints
 import pytest
 
 from experiments.cli import COMMANDS, main
+from experiments.common.command import LOADING
 from experiments.common.errors import InputError
 from experiments.common.output import output, to_csv, to_json, write_file
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_text
@@ -568,3 +569,22 @@ def test_the_run_of_every_command_takes_its_options() -> None:
     for options, module, _ in chain.from_iterable(COMMANDS.values()):
         run = importlib.import_module(f"experiments.{module}").run
         assert get_type_hints(run) == {"options": options, "return": type(None)}
+
+
+@pytest.mark.parametrize("command", [["experiment"], ["compare", "--strategies", "patient"]])
+def test_no_99_percent_quantile_of_two_runs(command: list[str], infoset: Command, brief_file: Path) -> None:
+    code, out, _ = infoset(*command, brief_file, "--runs", "2")
+    assert code == 0
+    assert "2 runs do not show these quantiles: 10 %, 90 %, 99 %; 100 runs show all" in out
+    (first, *_) = [line.split("miss, m")[1].split() for line in out.splitlines() if "miss, m" in line]
+    low, median, high, nearly, worst = first
+    assert (low, high, nearly) == ("-", "-", "-")
+    assert float(median) <= float(worst)
+
+
+def test_a_terminal_shows_that_modules_are_loaded(monkeypatch: pytest.MonkeyPatch, infoset: Command) -> None:
+    """The second before the first progress bar is not silent on a terminal, and leaves no trace."""
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    err = infoset("engage", "no-such-scenario")[2]
+    assert err.startswith(f"{LOADING}\r{' ' * len(LOADING)}\rerror: ")
+    assert LOADING not in infoset("engage", "no-such-scenario", "-q")[2]

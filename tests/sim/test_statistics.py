@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim import band_half_width, empirical_distribution, estimate_hits, estimate_quantiles, quantiles
-from sim.statistics import order_statistics
+from sim.statistics import order_statistics, shown_quantiles, shows
 
 
 def test_the_distribution_of_a_small_sample_by_hand() -> None:
@@ -134,3 +134,13 @@ def test_no_hit_and_all_hits_have_closed_forms(runs: int) -> None:
     none, every = estimate_hits(0, runs), estimate_hits(runs, runs)
     assert every.lower == pytest.approx(0.025 ** (1.0 / runs), rel=1e-12)
     assert none.upper == pytest.approx(1.0 - 0.025 ** (1.0 / runs), rel=1e-9)
+
+
+@pytest.mark.parametrize(("level", "fewest"), [(0.5, 2), (0.1, 10), (0.9, 10), (0.99, 100), (0.999, 1000), (1.0, 1)])
+def test_a_quantile_needs_values_beyond_it(level: float, fewest: int) -> None:
+    assert shows(fewest, level)
+    assert shows(10 * fewest, level)
+    assert fewest == 1 or not shows(fewest - 1, level)
+    sample = np.arange(float(fewest))
+    assert shown_quantiles(sample, [level]) == [np.quantile(sample, level)]
+    assert shown_quantiles(np.arange(1.0), [0.99, 1.0]) == [None, 0.0]

@@ -112,7 +112,7 @@ def run(options: Bound) -> None:
         written.save("scenario.toml", scenario_to_toml(scenario))
         written.save("results.json", to_json(summary), "--json")
         if options.out is not None:
-            written.figure(FIGURE, draw_bound(scenario, lower))
+            written.draw({FIGURE: lambda: draw_bound(scenario, lower)}, begin("figure"))
     if not options.quiet:
         _show(table_console(written.stdout_taken), scenario, lower, worst, options)
 

@@ -15,6 +15,7 @@ from experiments.common.screen import (
     number,
     print_lines,
     progress_bar,
+    quantile_notes,
     say_warnings,
     table_console,
 )
@@ -59,7 +60,7 @@ def run(options: Compare) -> None:
         if written.wants("--csv"):
             written.save("results.csv", to_csv(COLUMNS, _rows(compared)), "--csv")
         if options.out is not None:
-            written.figure(FIGURE, draw_comparison(compared, scenario.radius_m))
+            written.draw({FIGURE: lambda: draw_comparison(compared, scenario.radius_m)}, begin("figure"))
     if not options.quiet:
         _show(table_console(written.stdout_taken), scenario, compared)
 
@@ -170,6 +171,7 @@ def _show(console: Console, scenario: Scenario, compared: Sequence[Comparison]) 
         console,
         [
             "game noise: for each run, the worst of its four tie rules",
+            *quantile_notes(runs, [*QUANTILES.values()]),
             *set_warnings(scenario.set_model.kind, total),
         ],
     )

@@ -14,6 +14,7 @@ from experiments.common.screen import (
     number,
     print_lines,
     progress_bar,
+    quantile_notes,
     say,
     say_warnings,
     table_console,
@@ -33,10 +34,11 @@ from experiments.interception.runs.shared import (
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from experiments.interception.study import SetCounts, hit_text, set_counts, set_warnings
 from infoset import Recovery
-from sim import Outcome, Scenario, quantiles
+from sim import Outcome, Scenario
+from sim.statistics import shown_quantiles
 
 FIGURE = "figure-4-distributions"
-LEVELS = (0.1, 0.5, 0.9, 0.99)
+LEVELS = (0.1, 0.5, 0.9, 0.99, 1.0)
 
 
 def run(options: Experiment) -> None:
@@ -84,7 +86,7 @@ def run(options: Experiment) -> None:
         if written.wants("--csv"):
             written.save("results.csv", _csv(curves), "--csv")
         if options.out is not None:
-            written.figure(FIGURE, draw_distributions(curves, radius_m=scenario.radius_m))
+            written.draw({FIGURE: lambda: draw_distributions(curves, radius_m=scenario.radius_m)}, begin("figure"))
     if not options.quiet:
         _show(table_console(written.stdout_taken), scenario, curves)
 
@@ -106,7 +108,7 @@ def _csv(curves: Sequence[Curve]) -> str:
 def _show(console: Console, scenario: Scenario, curves: Sequence[Curve]) -> None:
     table = Table("curve", "quantity", box=None, pad_edge=False)
     for level in LEVELS:
-        table.add_column(f"{level:.0%}", justify="right")
+        table.add_column("worst" if level == 1.0 else f"{level:.0%}", justify="right")
     enlarged = scenario.set_model.recovery is Recovery.WIDENED
     endings = {
         Outcome.BUDGET_SPENT: "too little of the impulse budget was left",
@@ -121,9 +123,9 @@ def _show(console: Console, scenario: Scenario, curves: Sequence[Curve]) -> None
             ("  + range meter" if curve.range_meter else "", "impulse, m/s", results.impulse_m_s),
         )
         for title, quantity, values in rows:
-            table.add_row(title, quantity, *(number(float(value)) for value in quantiles(values, LEVELS)))
-        median = number(float(quantiles(bounds, 0.5))) if len(bounds) else "-"
-        table.add_row("", bound_name(scenario), "", median)
+            table.add_row(title, quantity, *(number(value) for value in shown_quantiles(values, LEVELS)))
+        (median,) = shown_quantiles(bounds, [0.5]) if len(bounds) else (None,)
+        table.add_row("", bound_name(scenario), "", number(median))
         lines = [
             f"in {count} run{'s' if count > 1 else ''} {text} ({outcome.value})"
             for outcome, text in endings.items()
@@ -143,6 +145,7 @@ def _show(console: Console, scenario: Scenario, curves: Sequence[Curve]) -> None
         )
         notes.append(f"paper (one run from z = -8 km, no range meter): {figures}")
     runs = len(curves[0].results)
+    notes += quantile_notes(runs, LEVELS)
     print_lines(console, [f"{scenario.name}: quantiles of {runs} runs per curve"])
     console.print(table)
     print_lines(console, notes)

@@ -1,7 +1,8 @@
 from __future__ import annotations
 
+import contextlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from experiments.campaigns.campaign_figures import (
     draw_convergence,
     draw_dispersion,
 )
+from experiments.common.screen import BeginProgress
 from experiments.interception.scenario_file import load_scenario
 from sim import Campaign, CampaignNoise, Scenario
 from tests.experiments.campaigns.figure_room import need_room
@@ -57,8 +59,26 @@ def test_a_report_of_files_alone(infoset: Infoset, brief: Scenario, folder: Path
     for each in found["worst"]:
         assert each["replay"] == f"infoset engage {scenario} --noise {each['noise']} --seed 0 --run {each['run']}"
         assert each["replay"] in out
-    for title in ("correlation of the miss with", "|z_km|", "Spearman", "the worst runs, each", "p99.9", "lower limit"):
+    for title in ("correlation of the miss with", "|z_km|", "Spearman", "the worst runs, each", "p99.9", "95 % CI"):
         assert title in out
+
+
+def test_a_report_shows_its_progress(
+    infoset: Infoset, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bars: list[str] = []
+
+    @contextlib.contextmanager
+    def recorded(quiet: bool) -> Iterator[BeginProgress]:
+        def begin(name: str) -> Callable[[float], None]:
+            bars.append(name)
+            return lambda done: None
+
+        yield begin
+
+    monkeypatch.setattr("experiments.campaigns.run_report.progress_bar", recorded)
+    assert infoset("report", folder, "--out", tmp_path / "report")[0] == 0
+    assert bars == ["quantiles", "figures"]
 
 
 def test_a_report_writes_nothing_unasked(infoset: Infoset, folder: Path, tmp_path: Path) -> None:

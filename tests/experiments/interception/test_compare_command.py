@@ -57,7 +57,9 @@ def test_compare_as_json(infoset: Infoset, brief: Scenario, brief_file: Path, tm
     for each in strategies:
         for quantity in ("miss_m", "impulse_m_s"):
             assert list(each[quantity]) == LEVELS
-            assert sorted(each[quantity].values()) == list(each[quantity].values())
+            # Three runs show the median and the greatest value only.
+            assert [name for name, value in each[quantity].items() if value is not None] == ["p50", "max"]
+            assert each[quantity]["p50"] <= each[quantity]["max"]
         assert each["truth_kept"] == each["phi_held"] == 4
         assert list(each["ties"]) == ([] if each["noise"] == "random" else ["upper", "lower", "alternate", "random"])
         assert sum(each["outcomes"].values()) == (4 if each["noise"] == "random" else 16)
