@@ -81,10 +81,10 @@ def draw_campaign_distributions(columns: Sequence[CampaignColumns]) -> Figure:
         _draw_impulse(row[1], columns)
         row[0].set_ylabel("distribution function (share of runs)")
         row[1].tick_params(labelleft=False)
-        for axes in row:
-            separate_labels(axes)
         handles, labels = _handles(columns)
         radius = draw_radius(row[0], columns[0].radius_m)
+        for axes in row:
+            separate_labels(axes)
         figure.legend(
             [*handles, *radius],
             [*labels, *(str(line.get_label()) for line in radius)],
