@@ -45,8 +45,8 @@ COMMANDS: Mapping[str, Sequence[tuple[type, str, str]]] = {
         (
             Sweep,
             "campaigns.run_sweep",
-            "sweep --vary angle_sensor.error_at_nominal_range_rad=0.5e-4:5e-4:8,thruster.greatest_impulse_m_s=2:20:7 "
-            "--runs 200 --out sensors",
+            "sweep --set body.radius_m=80 --vary angle_sensor.scale=1:8:8,thruster.greatest_impulse_m_s=2.5:20:8 "
+            "--runs 100 --until decided --out sensors",
         ),
         (Report, "campaigns.run_report", "report runs --out figures"),
     ],

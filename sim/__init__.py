@@ -5,7 +5,7 @@ from sim.bound import BoundError, LowerBound, lower_bound
 from sim.campaign import Campaign, CampaignResult, Sweep
 from sim.chunk import CampaignNoise
 from sim.record import Inconsistency, Record, StepRecord, fly_one
-from sim.requirement import Requirement
+from sim.requirement import HitRequirement, Requirement
 from sim.results import Outcome, Results
 from sim.scenario import Body, Manoeuvre, Scenario, Sun, Target
 from sim.simulate import simulate
@@ -31,6 +31,7 @@ __all__ = [
     "CampaignResult",
     "Distribution",
     "HitEstimate",
+    "HitRequirement",
     "Inconsistency",
     "LowerBound",
     "Manoeuvre",

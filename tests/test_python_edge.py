@@ -144,6 +144,7 @@ SOUND: Mapping[Any, Mapping[str, Any]] = {
     Scenario: SCENARIO,
     QuantileName: {"quantity": "miss_m", "level": 0.9},
     StoppingRule: {"quantile": QuantileName("miss_m", 0.9), "width": 1.0, "confidence": 0.95},
+    HitRequirement: {"share": 0.9},
     Requirement: {"quantile": QuantileName("miss_m", 0.9), "bound": 1.0},
 }
 ZERO_IS_SOUND = {

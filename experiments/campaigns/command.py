@@ -122,11 +122,12 @@ class Campaign(Flight):
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep(Flight):
-    """Simulate a scenario with many values of its keys, for example to find the sensor with 99 % of the misses < 10 m.
+    """Simulate a scenario with many values of its keys, to find those that meet a requirement.
 
-    Each combination of values is a cell. All cells have the same initial states and random errors, and are stored like
-    a campaign. DIR contains the runs; one table, sweep.parquet, with one row for each cell; and one figure: lines for
-    one key, heat maps for two keys.
+    For example, to find which sensor and which engine hit a body of a given size. Each combination of values is a cell.
+    It meets the requirement, does not meet it, or is undecided. All cells have the same initial states and random
+    errors, and are stored like a campaign. DIR contains the runs; one table, sweep.parquet, with one row for each cell;
+    and a figure for each noise: lines for one key, maps for two keys.
     """
 
     vary: Annotated[
@@ -136,7 +137,7 @@ class Sweep(Flight):
             help="Keys of the scenario file and their values, in the units of the file; can be repeated. "
             "KEY=log:FROM:TO:COUNT has logarithmic spacing. KEY1=KEY2=FROM:TO:COUNT gives two keys the same values. "
             "angle_sensor.scale is a factor of all error bounds of a sensor. If the value is a pair, vary KEY.least or "
-            "KEY.greatest. For example: angle_sensor.scale=0.5:4:8,thruster.greatest_impulse_m_s=2:20:7.",
+            "KEY.greatest. For example: angle_sensor.scale=1:8:8,thruster.greatest_impulse_m_s=2.5:20:8.",
         ),
     ]
     require: Required = None
@@ -168,7 +169,7 @@ class Report:
     For a campaign: quantiles with 95 % confidence intervals, outcomes of the runs, correlation of the miss with the
     initial state, and the ten worst runs, each with the command that simulates it again; with --out, figures of the
     distributions, of the convergence of the quantiles, and of the miss against the initial state. For a sweep: the
-    values that meet the requirement; with --out, the table and the figure. --require and --show are for sweeps.
+    values that meet the requirement; with --out, the table and the figures. --require and --show are for sweeps.
     Without --out or --json no file is written.
     """
 

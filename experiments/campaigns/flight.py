@@ -210,7 +210,7 @@ def campaign_progress(name: str, quiet: bool) -> Iterator[Callable[[Progress], N
             nonlocal last_s
             if time.monotonic() - last_s >= _LINE_EVERY_S:
                 last_s = time.monotonic()
-                of = "" if progress.undecided is not None else f" of {progress.total}"
+                of = " runs" if progress.undecided is not None else f" of {progress.total}"
                 typer.echo(f"{name}: {progress.done}{of}, {_pace(progress)}", err=True)
 
         yield line

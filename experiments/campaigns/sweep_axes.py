@@ -25,7 +25,7 @@ from sim.storage import MOST_CELLS, Axis
 
 MOST_AXES = 4
 MOST_VALUES = 1000
-EXAMPLE = "--vary angle_sensor.scale=0.5:4:8,thruster.greatest_impulse_m_s=2:20:7"
+EXAMPLE = "--vary angle_sensor.scale=1:8:8,thruster.greatest_impulse_m_s=2.5:20:8"
 
 _PLACES = Context(prec=12)
 """Values between the ends are rounded to 12 digits."""
