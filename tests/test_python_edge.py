@@ -53,6 +53,7 @@ from rendezvous.relative_motion import ClohessyWiltshire
 from sim import (
     Body,
     Campaign,
+    HitRequirement,
     Manoeuvre,
     QuantileName,
     Requirement,
