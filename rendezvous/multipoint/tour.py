@@ -183,9 +183,10 @@ def nodes_of(targets: MovingTargets, order: Sequence[int], time_s: ArrayLike) ->
         raise ValueError("a time is not finite")
     rendezvous = np.array([targets.targets[index].meet is Meet.RENDEZVOUS for index in order])
     leave_s = times + targets.dwell_s[which]
-    if (leave_s == times).all():
+    meets = bool(rendezvous.any())
+    if not meets or (leave_s == times).all():
         arrive = targets.states(which, times)
-        rate = targets.rates(times, arrive) if rendezvous.any() else arrive  # rates at flybys are not used
+        rate = targets.rates(times, arrive) if meets else arrive  # rates at flybys are not used
         return Nodes(times, times, arrive, arrive, rate, rate, rendezvous)
     both, count = np.concatenate([times, leave_s]), len(times)
     states = targets.states(np.concatenate([which, which]), both)
