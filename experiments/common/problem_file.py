@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from decimal import Decimal
 from enum import Enum
 
+from pydantic import BaseModel
+
 from experiments.common.file_kinds import PROBLEM_COMMANDS, built_in
 from experiments.common.toml_file import Form, KeyPath, Known, Problem, Tables, no_checks
-from experiments.common.toml_values import Constant, Description, Name, Table, key
+from experiments.common.toml_values import Constant, Description, Name, Table, key, quoted_text
 
 MOST_RADIANS = Decimal(1000)
 LEAST_RADIANS = Decimal("1e-9")
@@ -64,6 +66,34 @@ def problem_hash(tables: Tables) -> str:
     """
     values = tables.model_dump(exclude={"name", "description"})
     return hashlib.sha256(json.dumps(values, sort_keys=True, default=_plain).encode()).hexdigest()[:16]
+
+
+def problem_toml(tables: BaseModel) -> str:
+    """Return a file with the values that a problem sets; it is read back as the same problem."""
+    document = tables.model_dump(by_alias=True, exclude_unset=True, exclude_none=True)
+    top, inner = [], []
+    for name, value in document.items():
+        if isinstance(value, dict):
+            inner += ["", f"[{name}]", *_lines(value)]
+        elif isinstance(value, list | tuple) and value and isinstance(value[0], dict):
+            inner += [line for table in value for line in ("", f"[[{name}]]", *_lines(table))]
+        else:
+            top += _lines({name: value})
+    return "\n".join([*top, *inner]) + "\n"
+
+
+def _lines(table: Mapping[str, object]) -> list[str]:
+    return [f"{name} = {_literal(value)}" for name, value in table.items()]
+
+
+def _literal(value: object) -> str:
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(_literal(item) for item in value)}]"
+    if isinstance(value, Enum):
+        return quoted_text(value.value if isinstance(value.value, str) else value.name.lower())
+    if isinstance(value, bool):
+        return str(value).lower()
+    return quoted_text(value) if isinstance(value, str) else str(value)
 
 
 def duplicate_names(known: Known, table: str, count: int) -> Iterator[Problem]:

@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
 from experiments.common.errors import InputError
-from experiments.common.problem_file import ProblemTables, angle_problems, duplicate_names, problem_form, problem_hash
+from experiments.common.problem_file import (
+    ProblemTables,
+    angle_problems,
+    duplicate_names,
+    problem_form,
+    problem_hash,
+    problem_toml,
+)
 from experiments.common.toml_file import KeyPath, Known, Problem, load_tables
 from experiments.common.toml_values import (
     KILO,
@@ -277,6 +284,7 @@ class MultipointProblem:
     name: str
     source: str
     hash: str
+    toml: str
     axes: Axes
     tour: Visits
     times_s: Floats | None
@@ -318,6 +326,7 @@ def load_multipoint(name_or_path: str, settings: Sequence[str] | None = None) ->
         tables.name,
         name_or_path,
         problem_hash(tables),
+        problem_toml(tables),
         tables.axes,
         tour,
         np.array(times_s) if len(times_s) == len(tables.target) else None,

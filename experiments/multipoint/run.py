@@ -32,10 +32,11 @@ def run(options: Multipoint) -> None:
     search = Search(options.order, options.times or (BEST if problem.optimise else GIVEN))
     _check(problem, search)
     with (
-        output_of(options, ("results.json", TRAJECTORIES, *figure_files(*FIGURES))) as written,
+        output_of(options, ("problem.toml", "results.json", TRAJECTORIES, *figure_files(*FIGURES))) as written,
         progress_bar(options.quiet) as begin,
     ):
         report = _solve(problem, search, begin(search.title))
+        written.save("problem.toml", problem.toml)
         written.save("results.json", to_json(report_json(report)), "--json")
         if written.wants("--csv"):
             written.save(TRAJECTORIES, trajectories(report.scene), "--csv")

@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
 from experiments.common.errors import InputError
-from experiments.common.problem_file import ProblemTables, angle_problems, duplicate_names, problem_form, problem_hash
+from experiments.common.problem_file import (
+    ProblemTables,
+    angle_problems,
+    duplicate_names,
+    problem_form,
+    problem_hash,
+    problem_toml,
+)
 from experiments.common.toml_file import Known, Problem, load_tables
 from experiments.common.toml_values import (
     NUMBER,
@@ -129,6 +136,7 @@ class ParetoProblem:
     name: str
     source: str
     hash: str
+    toml: str
     encounter: Encounter
     greatest_control_m_s2: float | None
 
@@ -158,4 +166,11 @@ def load_pareto(name_or_path: str, settings: Sequence[str] | None = None) -> Par
         encounter = Encounter(craft, tables.si("duration_s"), tables.free, fixed, tables.meet)
     except ValueError as error:
         raise InputError(f"{name_or_path}: {error}") from None
-    return ParetoProblem(tables.name, name_or_path, problem_hash(tables), encounter, tables.si("greatest_control_m_s2"))
+    return ParetoProblem(
+        tables.name,
+        name_or_path,
+        problem_hash(tables),
+        problem_toml(tables),
+        encounter,
+        tables.si("greatest_control_m_s2"),
+    )

@@ -50,10 +50,11 @@ def run(options: Pareto) -> None:
     problem = load_pareto(options.problem, options.settings)
     preferred = None if options.prefer is None else _preferred(options.prefer, problem)
     with (
-        output_of(options, ("results.json", TRAJECTORIES, *figure_files(*FIGURES))) as written,
+        output_of(options, ("problem.toml", "results.json", TRAJECTORIES, *figure_files(*FIGURES))) as written,
         progress_bar(options.quiet) as begin,
     ):
         report = _solve(problem, preferred, begin("meetings and coalitions"))
+        written.save("problem.toml", problem.toml)
         written.save("results.json", to_json(report_json(report, options.samples)), "--json")
         if written.wants("--csv"):
             written.save(TRAJECTORIES, trajectories(report, options.samples), "--csv")

@@ -9,14 +9,14 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import PlainValidator
 
 from experiments.common.errors import InputError
-from experiments.common.problem_file import ProblemTables, problem_form, problem_hash
+from experiments.common.problem_file import ProblemTables, problem_form, problem_hash, problem_toml
 from experiments.common.toml_file import Known, Problem, load_tables
 from experiments.common.toml_values import (
     KILO,
@@ -31,7 +31,6 @@ from experiments.common.toml_values import (
     Table,
     Vector,
     key,
-    quoted_text,
     radians,
     si,
     wrong,
@@ -146,7 +145,7 @@ class PursuitProblem:
 
     def to_toml(self) -> str:
         """Return a file that reads back as the same problem."""
-        return _toml(_document(self.tables))
+        return problem_toml(self.tables)
 
     def warnings(self) -> Iterator[str]:
         """Yield a line for each value that is allowed but probably in a wrong unit."""
@@ -345,24 +344,3 @@ def _player(table: PlayerTable, values: Mapping[str, float], mu_si: float) -> Pl
         thrust_n=values["thrust_N"],
         specific_impulse_s=values["specific_impulse_s"],
     )
-
-
-def _document(tables: PursuitTables) -> dict[str, Any]:
-    """Return the values of a problem as TOML, by table and key."""
-    return {name: _written(value) for name, value in tables.model_dump(by_alias=True, exclude_none=True).items()}
-
-
-def _written(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {name: _written(inner) for name, inner in value.items()}
-    if isinstance(value, tuple):
-        return "[" + ", ".join(str(number) for number in value) + "]"
-    return quoted_text(value) if isinstance(value, str) else str(value)
-
-
-def _toml(document: Mapping[str, Any]) -> str:
-    lines = [f"{name} = {value}" for name, value in document.items() if not isinstance(value, dict)]
-    for name, table in document.items():
-        if isinstance(table, dict):
-            lines += ["", f"[{name}]", *(f"{own} = {value}" for own, value in table.items())]
-    return "\n".join(lines) + "\n"

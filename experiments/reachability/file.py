@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
 from experiments.common.errors import InputError
-from experiments.common.problem_file import ProblemTables, problem_form, problem_hash
+from experiments.common.problem_file import ProblemTables, problem_form, problem_hash, problem_toml
 from experiments.common.toml_file import Known, Problem, load_tables
 from experiments.common.toml_values import (
     NUMBER,
@@ -185,6 +185,7 @@ class Rendezvous:
     name: str
     description: str
     hash: str
+    toml: str
     problem: ReachabilityProblem
     motion: ConstantMotion | TschaunerHempel
     truth: NonlinearMotion
@@ -373,6 +374,7 @@ def _rendezvous(tables: ReachabilityTables) -> Rendezvous:
         tables.name,
         tables.description,
         problem_hash(tables),
+        problem_toml(tables),
         problem,
         motion,
         NonlinearMotion(orbit, tables.orbit.si("semi_major_axis_km")),

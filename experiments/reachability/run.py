@@ -51,11 +51,12 @@ def run(options: Reach) -> None:
     request = Request(names, samples, options.seed, route, options.replan, options.noisy_flights)
     rendezvous = load_rendezvous(options.problem, options.settings)
     published = is_published(rendezvous)
-    files = ("results.json", TRAJECTORIES, *((TABLES,) if published else ()), *figure_files(*FIGURES))
+    files = ("problem.toml", "results.json", TRAJECTORIES, *((TABLES,) if published else ()), *figure_files(*FIGURES))
     with output_of(options, files) as written, progress_bar(options.quiet) as begin:
         report = make_report(rendezvous, request, begin(rendezvous.name))
         results = report_json(report)
         comparisons = compare_published(rendezvous, report.solution) if published else ()
+        written.save("problem.toml", rendezvous.toml)
         written.save("results.json", to_json(results), "--json")
         if comparisons:
             written.save(TABLES, to_csv(COLUMNS, [row for comparison in comparisons for row in comparison.rows]))

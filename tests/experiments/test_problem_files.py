@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from experiments.common.file_kinds import PROBLEM_COMMANDS, built_in_files
-from experiments.common.toml_file import keys_of, tables_of
+from experiments.common.problem_file import problem_toml
+from experiments.common.toml_file import keys_of, load_tables, tables_of
 from experiments.problem_files import FILES
 
 Infoset = Callable[..., tuple[int, str, str]]
@@ -138,3 +139,13 @@ def test_records_campaigns_and_toml_files_are_told_apart(infoset: Infoset, tmp_p
         code, out, err = infoset(*arguments)
         assert (code, out, err.count("\n")) == (2, "", 1)
         assert message in err
+
+
+@pytest.mark.parametrize("name", [file.name for file in built_in_files().values() if file.kind in PROBLEM_COMMANDS])
+def test_the_written_problem_is_the_changed_one(name: str, tmp_path: Path) -> None:
+    form, load = FILES[built_in_files()[name].kind]
+    tables = load_tables(form, name, ["name=mine"])
+    (tmp_path / "problem.toml").write_text(problem_toml(tables))
+    again = load_tables(form, tmp_path / "problem.toml")
+    assert again == tables
+    assert load(str(tmp_path / "problem.toml")).hash == load(name).hash

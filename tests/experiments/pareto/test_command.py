@@ -73,7 +73,7 @@ def test_the_published_example_into_a_folder(infoset: Infoset, tmp_path: Path) -
     assert code == 0
     files = [f"{name}.{kind}" for name in FIGURES for kind in ("pdf", "png")]
     assert sorted(each.name for each in (tmp_path / "results").iterdir()) == sorted(
-        [*files, "results.json", "trajectories.csv"]
+        [*files, "problem.toml", "results.json", "trajectories.csv"]
     )
     found = strict((tmp_path / "results" / "results.json").read_text())
     assert list(found) == KEYS

@@ -73,7 +73,7 @@ def test_values_can_be_set_and_are_checked_as_in_a_file() -> None:
         ("thrust_N = 10.0", "thrust_N = -1.0", ["evader.thrust_N", "at least 0"]),
         ("specific_impulse_s = 350.0", "specific_impulse_s = 0", ["specific_impulse_s", "greater than 0"]),
         ("capture_radius_km = 0.0", "capture_radius_km = 7000", ["capture_radius_km", "distance at the start"]),
-        ("j2 = 0", "j2 = 0.001", ["equatorial_radius_km", "j2 refers to it"]),
+        ("capture_radius_km", "j2 = 0.001\ncapture_radius_km", ["equatorial_radius_km", "j2 refers to it"]),
         ("inclination_deg = 1.565\n", "", ["pursuer.inclination_deg", "is missing"]),
         ("[pursuer]\n", "[pursuer]\nposition_km = [1.0, 2.0, 3.0]\n", ["is given together with", "give either"]),
         ("gravitational_parameter_km3_s2 = 398600.4418", "", ["gravitational_parameter_km3_s2", "is missing"]),

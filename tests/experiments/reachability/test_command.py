@@ -59,7 +59,7 @@ def test_reach_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
     assert code == 0
     files = [f"{name}.{kind}" for name in FIGURES for kind in ("pdf", "png")]
     assert sorted(each.name for each in folder.iterdir()) == sorted(
-        [*files, "published-tables.csv", "results.json", "trajectories.csv"]
+        [*files, "problem.toml", "published-tables.csv", "results.json", "trajectories.csv"]
     )
     found = json.loads((folder / "results.json").read_text())
     assert list(found) == KEYS
