@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from infoset.limits import Fraction, Positive, check_fields
+from sim.statistics import shown_quantiles
 from sim.stopping_rule import NUMBER, QuantileName, parse_quantile
 
 Floats = NDArray[np.float64]
@@ -160,8 +161,9 @@ class Verdict:
         Met if the interval is on the right side of the bound, not met if it is on the wrong side.
     runs : int
         Size of the sample.
-    value : float
-        The required quantile of the sample, in its unit, or the share of hits.
+    value : float or None
+        The required quantile of the sample, in its unit, or the share of hits; None if the sample does not show it
+        (`sim.statistics.shows`).
     lower, upper : float or None
         Ends of its 95 % confidence interval; None if the sample is too small to bound that side.
     runs_needed : int or None
@@ -170,7 +172,7 @@ class Verdict:
 
     decision: Decision
     runs: int
-    value: float
+    value: float | None
     lower: float | None
     upper: float | None
     runs_needed: int | None
@@ -207,11 +209,11 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
     size, share = values.size, requirement.share
     holding = np.cumsum(requirement.holds(values))
     fewest_met, most_missed = critical_counts(size, share, watched=watched)
-    value: float
+    value: float | None
     lower: float | None
     upper: float | None
     if isinstance(requirement, Requirement):
-        value = float(np.quantile(values, share))
+        (value,) = shown_quantiles(values, [share])
         lower, upper = _quantile_interval(values, int(fewest_met[-1]), int(most_missed[-1]))
     else:
         value = int(holding[-1]) / size

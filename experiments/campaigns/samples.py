@@ -203,7 +203,7 @@ def sample_json(sample: Sample) -> dict[str, Any]:
             quantity: {
                 **{
                     level_name(estimate.level): {
-                        "value": _shown(sample, estimate),
+                        "value": shown_value(sample, estimate),
                         "lower": estimate.lower,
                         "upper": estimate.upper,
                     }
@@ -216,7 +216,8 @@ def sample_json(sample: Sample) -> dict[str, Any]:
     }
 
 
-def _shown(sample: Sample, estimate: QuantileEstimate) -> float | None:
+def shown_value(sample: Sample, estimate: QuantileEstimate) -> float | None:
+    """Return the value of a quantile; None if the runs of the sample do not show it."""
     return estimate.value if shows(sample.runs, estimate.level) else None
 
 
@@ -235,7 +236,7 @@ def samples_table(by_noise: Sequence[Sample], scenario: Scenario) -> tuple[Table
             name = names[quantity]
             for estimate in estimates:
                 interval = f"{number(estimate.lower)} to {number(estimate.upper)}"
-                table.add_row(title, name, level_name(estimate.level), number(_shown(sample, estimate)), interval)
+                table.add_row(title, name, level_name(estimate.level), number(shown_value(sample, estimate)), interval)
                 title = name = ""
             table.add_row("", "", "max", number(sample.worst[quantity]), "")
         notes += [f"{sample.noise} noise: {text}" for text in quantile_notes(sample.runs, [*LEVELS])]

@@ -81,7 +81,7 @@ def draw_sweep(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> 
     """Draw the decisions and the quantiles of a sweep with one or two axes, for one noise.
 
     With one axis there is a panel for each quantity, with the quantiles as lines; with two axes there is a map of the
-    decisions, and a heat map for each other quantile. The panel of the requirement is the first.
+    decisions, and a heat map for each other quantile that the runs show. The panel of the requirement is the first.
 
     Raises
     ------
@@ -96,10 +96,10 @@ def draw_sweep(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> 
 
 @dataclass(frozen=True)
 class _Point:
-    """A value of a sweep's axis, an estimate there, and the ends of its interval."""
+    """A value of a sweep's axis, an estimate there or None, and the ends of its interval."""
 
     at: float
-    value: float
+    value: float | None
     lower: float | None
     upper: float | None
 
@@ -113,7 +113,8 @@ def _points(table: SweepTable, noise: str, quantile: QuantileName | None) -> lis
         verdict = table.verdict(cell, noise) if is_required else None
         estimate = verdict if verdict is not None or quantile is None else table.estimate(cell, noise, quantile)
         if estimate is not None:
-            points.append(_Point(at, estimate.value, estimate.lower, estimate.upper))
+            value = estimate.value if quantile is None else table.value(cell, noise, quantile)
+            points.append(_Point(at, value, estimate.lower, estimate.upper))
     return points
 
 
@@ -159,9 +160,10 @@ def _line_panel(
     if quantity == "hit":
         lines = [(_points(table, noise, None), "-")]
     for points, look in lines:
+        known = [(point.at, point.value) for point in points if point.value is not None]
         axes.plot(
-            [point.at for point in points],
-            [point.value for point in points],
+            [at for at, _ in known],
+            [value for _, value in known],
             color=colour,
             linestyle=look,
             marker="o",
@@ -169,16 +171,16 @@ def _line_panel(
             zorder=3.0,
         )
         for point in points:
-            lower = point.value if point.lower is None else point.lower
-            upper = point.value if point.upper is None else point.upper
-            axes.plot([point.at, point.at], [lower, upper], color=colour, linewidth=0.8, zorder=2.0)
-            if point.upper is None:
-                axes.plot([point.at], [point.value], marker=CARETUPBASE, markersize=6.0, color=colour, zorder=2.0)
+            ends = [end for end in (point.lower, point.value, point.upper) if end is not None]
+            if ends:
+                axes.plot([point.at, point.at], [ends[0], ends[-1]], color=colour, linewidth=0.8, zorder=2.0)
+            if ends and point.upper is None:
+                axes.plot([point.at], [ends[-1]], marker=CARETUPBASE, markersize=6.0, color=colour, zorder=2.0)
     if quantity == "miss_m" and table.radius_m is not None:
         axes.axhline(table.radius_m, color=LIMIT, linestyle="--", linewidth=0.9, zorder=2.5)
     if quantity == required.quantity:
         axes.axhline(required.bound, color=IMPULSE, linewidth=0.9, zorder=2.5)
-    _scale_values(axes, quantity, [point.value for points, _ in lines for point in points])
+    _scale_values(axes, quantity, [point.value for points, _ in lines for point in points if point.value is not None])
     _scale(axes, axis, "x")
     if quantity == required.quantity:
         _mark_decisions(axes, table, noise)
@@ -224,7 +226,10 @@ def _limit_words(axis: Axis, limit: Limit) -> str:
 def _maps(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figure:
     required = table.required
     quantiles = [
-        quantile for quantile in shown if not (isinstance(required, Requirement) and quantile == required.quantile)
+        quantile
+        for quantile in shown
+        if not (isinstance(required, Requirement) and quantile == required.quantile)
+        and table.grid(noise, quantile).count()
     ]
     columns = min(2, 1 + len(quantiles))
     rows = -(-(1 + len(quantiles)) // columns)
@@ -273,7 +278,8 @@ def _decision_panel(axes: Axes, table: SweepTable, noise: str) -> None:
     _scale(axes, up, "y")
     axes.grid(visible=False)
     values = np.ma.MaskedArray(
-        [0.0 if verdict is None else verdict.value for verdict in verdicts], mask=np.ma.getmaskarray(shown).ravel()
+        [0.0 if verdict is None else verdict.value or 0.0 for verdict in verdicts],
+        mask=[verdict is None or verdict.value is None for verdict in verdicts],
     ).reshape(shape)
     _write_numbers(axes, across, up, values.T, lambda row, column: shown[column, row] == 0, _NUMBER_AT)
     for row, height in enumerate(_heights(up, _BAR_AT)):

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.campaigns.axis_names import tied_keys, unit_of
-from experiments.campaigns.samples import LEVELS, OUTCOMES, Sample, noises_of, samples
+from experiments.campaigns.samples import LEVELS, OUTCOMES, Sample, noises_of, samples, shown_value
 from experiments.interception.study import SetCounts
 from sim import HitEstimate, QuantileEstimate, QuantileName, estimate_hits
 from sim.requirement import AnyRequirement, Decision, Verdict, judge
@@ -76,12 +76,17 @@ class SweepTable:
         estimates = () if sample is None else sample.quantiles.get(quantile.quantity, ())
         return next((estimate for estimate in estimates if estimate.level == quantile.level), None)
 
+    def value(self, cell: int, noise: str, quantile: QuantileName) -> float | None:
+        """Return a quantile of a cell; None if its runs do not show it."""
+        sample, estimate = self.sample(cell, noise), self.estimate(cell, noise, quantile)
+        return None if sample is None or estimate is None else shown_value(sample, estimate)
+
     def grid(self, noise: str, quantile: QuantileName) -> np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]:
-        """Return a quantile over the axes, masked where it is not known."""
-        estimates = [self.estimate(cell, noise, quantile) for cell in range(len(self.cells))]
-        values = np.array([0.0 if estimate is None else estimate.value for estimate in estimates])
+        """Return a quantile over the axes, masked where the runs do not show it."""
+        values = [self.value(cell, noise, quantile) for cell in range(len(self.cells))]
         shape = tuple(len(axis.values) for axis in self.axes)
-        return np.ma.MaskedArray(values, mask=[estimate is None for estimate in estimates]).reshape(shape)
+        known = [0.0 if value is None else value for value in values]
+        return np.ma.MaskedArray(known, mask=[value is None for value in values]).reshape(shape)
 
     def columns(self) -> tuple[dict[str, list[Any]], dict[str, str]]:
         """Return columns with a row for each cell and noise, and the units of the columns."""
@@ -105,7 +110,7 @@ class SweepTable:
                     estimate = self.estimate(cell, noise, QuantileName(quantity, level))
                     name = f"{quantity}_{level_name(level)}"
                     row |= {
-                        name: None if estimate is None else estimate.value,
+                        name: self.value(cell, noise, QuantileName(quantity, level)),
                         f"{name}_lower": None if estimate is None else estimate.lower,
                         f"{name}_upper": None if estimate is None else estimate.upper,
                     }
@@ -152,7 +157,8 @@ class Limit:
     Parameters
     ----------
     value : float or None
-        Interpolated between the estimates of two neighbouring cells; None if undecided cells lie at the limit.
+        Interpolated between the estimates of two neighbouring cells; None if undecided cells lie at the limit, or an
+        estimate is not known.
     lower, upper : float
         The limit lies between these values: where the ends of the confidence intervals reach the bound, or the decided
         cells around the undecided ones.
@@ -199,8 +205,8 @@ def limits(axis: Axis, verdicts: Sequence[Verdict | None], bound: float) -> list
             return near * (far / near) ** share if axis.scale == "log" else near + share * (far - near)
 
         edges = sorted((crossing(first.lower, last.lower), crossing(first.upper, last.upper)))
-        # The estimate of a decided cell is on the same side of the bound as its interval.
-        ends.append(Limit(crossing(first.value, last.value), edges[0], edges[1]))
+        known = first.value is not None and last.value is not None
+        ends.append(Limit(crossing(first.value, last.value) if known else None, edges[0], edges[1]))
     return ends
 
 
