@@ -122,4 +122,4 @@ def test_a_report_of_an_old_folder(infoset: Infoset, kind: str) -> None:
     code, out, err = infoset("report", OLD / kind)
     assert (code, err) == (0, "")
     assert "intercepted" not in out
-    assert "lost" not in out
+    assert "set-lost" not in out
