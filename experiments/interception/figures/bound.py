@@ -79,7 +79,7 @@ def _draw_labels(axes: Axes, lower: LowerBound) -> None:
         color=INK,
     )
     low, high = axes.get_ylim()
-    axes.set_ylim(low, high + 0.08 * (high - low))
+    axes.set_ylim(low, high + 0.5 * (high - low))  # space for the legend
     axes.set_title("(a) bound for all strategies")
     axes.set_xlabel("label: range at $t = 0$, km")
     axes.set_ylabel("lower bound of the guaranteed miss, m")
@@ -87,7 +87,7 @@ def _draw_labels(axes: Axes, lower: LowerBound) -> None:
     if banded:
         handles.append(Patch(facecolor=LIMIT, alpha=0.25))
         names.append("spread over labels within one step")
-    axes.legend(handles, names, title="closing speed", loc="best")
+    axes.legend(handles, names, title="closing speed", loc="upper right")
 
 
 def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
@@ -124,7 +124,13 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
     axes.axvline(alike_until, ymax=0.72, color=LIMIT, linewidth=0.8, linestyle="--")
     top = float(max(half[-1], corridor[-1])) * 1.12
     axes.text(
-        alike_until, -0.93 * top, "  measurements equal until here", color=LIMIT, ha="left", va="bottom", fontsize=7.0
+        alike_until,
+        -0.93 * top,
+        "  measurements\n  equal until here",
+        color=LIMIT,
+        ha="left",
+        va="bottom",
+        fontsize=7.0,
     )
     _bracket(axes, shown, float(half[-1]), pair.correction_m)
     axes.set_xlim(shown, -0.3 * shown)

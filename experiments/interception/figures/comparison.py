@@ -16,6 +16,7 @@ from experiments.common.figure_style import INK, SET_EDGE, SET_FILL, new_figure,
 from experiments.interception.comparison import Comparison
 from experiments.interception.figures.distributions import draw_radius
 from guidance import NoiseKind
+from sim.statistics import shows
 
 Floats = NDArray[np.float64]
 
@@ -116,10 +117,14 @@ def _draw_strategy(axes: Axes, place: int, sample: Floats, ends: tuple[float, fl
     )
     low, middle, high, nearly, worst = np.maximum(np.quantile(sample, (0.1, 0.5, 0.9, 0.99, 1.0)), ends[0])
     level = place + _BAR
+    if shows(len(sample), 0.9):
+        axes.plot([low, high], [level, level], color=INK, linewidth=2.4, zorder=3.0, solid_capstyle="butt")
+    else:
+        high = middle
     axes.plot([high, worst], [level, level], color=INK, linewidth=0.6, zorder=3.0, solid_capstyle="butt")
-    axes.plot([low, high], [level, level], color=INK, linewidth=2.4, zorder=3.0, solid_capstyle="butt")
     axes.plot([middle], [level], marker="o", markersize=5.0, markerfacecolor="white", color=INK, zorder=4.0)
-    axes.plot([nearly], [level], marker="|", markersize=6.0, markeredgewidth=1.0, color=INK, zorder=4.0)
+    if shows(len(sample), 0.99):
+        axes.plot([nearly], [level], marker="|", markersize=6.0, markeredgewidth=1.0, color=INK, zorder=4.0)
     axes.plot([worst], [level], marker="x", markersize=4.5, markeredgewidth=1.0, color=INK, zorder=4.0)
 
 
@@ -132,7 +137,7 @@ def _handles(runs: int) -> list[Line2D | Patch]:
     return [
         Patch(facecolor=SET_FILL, edgecolor=SET_EDGE, linewidth=0.5, label=f"histogram of {runs} runs"),
         mark("o", "median", 5.0),
-        Line2D([], [], color=INK, linewidth=2.4, label="10 to 90 %"),
-        mark("|", "99 %", 6.0),
+        *([Line2D([], [], color=INK, linewidth=2.4, label="10 to 90 %")] if shows(runs, 0.9) else []),
+        *([mark("|", "99 %", 6.0)] if shows(runs, 0.99) else []),
         mark("x", "worst run", 4.5),
     ]

@@ -13,12 +13,14 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from experiments.common.figure_style import figure_bytes, width_mm
+from experiments.interception.comparison import Comparison
 from experiments.interception.curves import Curve, curve_scenarios
+from experiments.interception.figures.comparison import draw_comparison
 from experiments.interception.figures.distributions import axis_limit, draw_distributions
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import MEASUREMENT_MARK, TRUTH_MARK, choose_sections, draw_sets
 from experiments.interception.scenario_file import load_scenario
-from guidance import NoiseKind
+from guidance import NoiseKind, TieRule
 from infoset import ConvexPolygons
 from sim import Record, Results, band_half_width, fly_one, simulate
 
@@ -169,6 +171,17 @@ def test_a_miss_of_kilometres_leaves_the_whole_flight_readable(records: list[Rec
     heights = (angles * 1e3 - low) / (high - low)
     under = (across > left) & (across < right) & (np.abs(heights - up) < 0.1)
     assert not under.any()
+
+
+@pytest.mark.parametrize(
+    ("runs", "marks"), [(2, []), (10, ["10 to 90 %"]), (100, ["10 to 90 %", "99 %"])], ids=["2", "10", "100"]
+)
+def test_a_comparison_draws_only_quantiles_that_the_runs_show(runs: int, marks: list[str]) -> None:
+    results = simulate(load_scenario("asteroid-1997-single"), 2).take(np.arange(runs) % 2)
+    games: dict[TieRule | None, Results] = dict.fromkeys(TieRule, results)
+    compared = [Comparison("a", NoiseKind.RANDOM, {None: results}), Comparison("a", NoiseKind.GAME, games)]
+    texts = [text.get_text() for text in draw_comparison(compared).legends[0].get_texts()]
+    assert texts == [f"histogram of {runs} runs", "median", *marks, "worst run"]
 
 
 def test_sets_beyond_the_flight_show_the_last_step(records: list[Record]) -> None:
