@@ -370,7 +370,7 @@ def _edges(axis: Axis) -> Floats:
 def _scale_values(axes: Axes, quantity: str, values: Sequence[float]) -> None:
     """Set the scale of the estimates: logarithmic if they differ by decades, otherwise from zero."""
     if quantity == "hit":
-        axes.set_ylim(0.0, 1.0)
+        axes.set_ylim(-0.03, 1.03)
         return
     positive = [value for value in values if value > 0.0]
     if positive and len(positive) == len(values) and max(positive) > _LOG_FROM * min(positive):

@@ -181,7 +181,9 @@ def decision_tables(table: SweepTable, noise: str, width: int) -> Iterator[tuple
     """
     first, *others = table.axes
     if not others:
-        shown = number_table(first.key, "decision", "runs", *("95 % CI from", table.required.name, "to"))
+        unit = unit_of(first.key)
+        titles = (f"value, {unit}" if unit else "value", "decision", "runs", "95 % CI from", table.required.name, "to")
+        shown = number_table(*titles, left=2)
         for cell, value in enumerate(first.values):
             verdict = table.verdict(cell, noise)
             if verdict is not None:
