@@ -149,10 +149,8 @@ class _Compiler(CompilerBase):
         super().__init__(_typing_of(typing), *arguments)
 
     def define_pipelines(self) -> list[Any]:
-        """Return Numba's passes, without its checks of itself between them."""
-        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        passes._ENFORCING = False
-        return [passes]
+        """Return Numba's passes."""
+        return [DefaultPassBuilder.define_nopython_pipeline(self.state)]
 
 
 @lower_builtin("__array__", types.Array)  # type: ignore[untyped-decorator]
