@@ -75,8 +75,7 @@ def by_reference(record: T) -> T:
 
     Notes
     -----
-    Otherwise each call of a kernel passes each size and each stride of each array; half of the time of compilation was
-    spent on that.
+    Otherwise each call of a kernel passes each size and each stride of each array, a seventh of the generated code.
     """
 
     @typeof_impl.register(record)
