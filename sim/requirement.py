@@ -218,8 +218,8 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
     else:
         value = int(holding[-1]) / size
         lower, upper = share_interval(int(holding[-1]), size, watched=watched)
-    looks = slice(None) if watched else slice(-1, None)
-    met, missed = holding[looks] >= fewest_met[looks], holding[looks] <= most_missed[looks]
+    looks = holding if watched else holding[-1:]
+    met, missed = looks >= fewest_met, looks <= most_missed
     decided = np.flatnonzero(met | missed)
     if not decided.size:
         needed = runs_needed(int(holding[-1]), size, share, watched=watched)
@@ -259,18 +259,35 @@ def share_interval(count: int, runs: int, *, watched: bool) -> tuple[float, floa
     return end(0, share, 0.0) if count else 0.0, end(1, share, 1.0) if count < runs else 1.0
 
 
-@functools.lru_cache(maxsize=32)
 def critical_counts(size: int, share: float, *, watched: bool) -> tuple[Counts, Counts]:
-    """Return the numbers of runs that satisfy a bound at which a requirement is decided, for 1, ..., `size` runs.
+    """Return the numbers of runs that satisfy a bound at which a requirement is decided.
+
+    Parameters
+    ----------
+    size : int
+        Number of runs.
+    share : float
+        Required share.
+    watched : bool
+        Whether the counts are those for 1, 2, ..., `size` runs; otherwise only for `size` runs.
 
     Returns
     -------
-    fewest_met : ndarray of int, shape (size,)
+    fewest_met : ndarray of int, shape (size,) or (1,)
         The requirement is met from this number on; one more than the number of runs if no number decides.
-    most_missed : ndarray of int, shape (size,)
+    most_missed : ndarray of int, shape (size,) or (1,)
         It is not met up to this number; -1 if no number decides. Both arrays are read-only.
     """
-    runs = np.arange(1, size + 1)
+    if not watched:
+        return _critical_counts(size, size, share, watched)
+    # Powers of two, so that samples of different sizes share the computed counts.
+    fewest_met, most_missed = _critical_counts(1, 1 << (size - 1).bit_length(), share, watched)
+    return fewest_met[:size], most_missed[:size]
+
+
+@functools.lru_cache(maxsize=32)
+def _critical_counts(first: int, last: int, share: float, watched: bool) -> tuple[Counts, Counts]:
+    runs = np.arange(first, last + 1)
     fewest_met = _least(runs, lambda count: p_values(runs, count, share, watched=watched)[0] <= _TAIL)
     most_missed = _least(runs, lambda count: p_values(runs, count, share, watched=watched)[1] > _TAIL) - 1
     for counts in (fewest_met, most_missed):

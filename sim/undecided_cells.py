@@ -50,7 +50,6 @@ class UndecidedCells:
         self._requirement = requirement
         self._noises = noises
         self._least_runs = least_runs
-        self._critical = critical_counts(folder.manifest.runs, requirement.share, watched=True)
         self._waiting: dict[int, tuple[Chunk, Results]] = {}
         zeros, none = [0] * len(noises), [False] * len(noises)
         self._cells = [_Cell(0, [*zeros], [*zeros], [*none]) for _ in range(folder.manifest.cells)]
@@ -65,11 +64,11 @@ class UndecidedCells:
     @property
     def runs(self) -> tuple[int, ...]:
         """Engagements stored without a gap from run 0 on, for each cell."""
-        manifest, finished = self._folder.manifest, self._folder.finished
+        manifest = self._folder.manifest
         counts = []
         for cell in range(manifest.cells):
             number = 0
-            while number < manifest.chunks_a_cell and manifest.index_of(cell, number) in finished:
+            while number < manifest.chunks_a_cell and self._folder.has(manifest.index_of(cell, number)):
                 number += 1
             counts.append(min(number * manifest.chunk, manifest.runs))
         return tuple(counts)
@@ -80,7 +79,7 @@ class UndecidedCells:
         for number in range(manifest.chunks_a_cell):
             for cell in range(manifest.cells):
                 index = manifest.index_of(cell, number)
-                if not self._is_done(cell) and index not in self._folder.finished:
+                if not self._is_done(cell) and not self._folder.has(index):
                     yield index
 
     def store(self, chunk: Chunk, results: Results) -> None:
@@ -99,20 +98,22 @@ class UndecidedCells:
             index = self._folder.manifest.index_of(cell, self._cells[cell].chunks)
             if index in self._waiting:
                 self._folder.write(*self._waiting.pop(index))
-            elif index not in self._folder.finished:
+            elif not self._folder.has(index):
                 return
             self._judge(cell, index)
         for index in [index for index, (chunk, _) in self._waiting.items() if chunk.cell == cell]:
             del self._waiting[index]
 
     def _judge(self, cell: int, index: int) -> None:
-        state, (fewest_met, most_missed) = self._cells[cell], self._critical
+        state, share = self._cells[cell], self._requirement.share
         samples = self._folder.chunk_samples(index, self._requirement.quantity, self._noises)
         for noise, values in enumerate(samples):
             counts = state.holding[noise] + np.cumsum(self._requirement.holds(values))
-            looks = slice(state.known[noise], state.known[noise] + values.size)
-            decided = (counts >= fewest_met[looks]) | (counts <= most_missed[looks])
+            if not values.size:
+                continue
+            before = state.known[noise]
+            fewest_met, most_missed = critical_counts(before + values.size, share, watched=True)
+            decided = (counts >= fewest_met[before:]) | (counts <= most_missed[before:])
             state.decided[noise] |= bool(decided.any())
-            state.known[noise] += values.size
-            state.holding[noise] = int(counts[-1]) if values.size else state.holding[noise]
+            state.known[noise], state.holding[noise] = before + values.size, int(counts[-1])
         state.chunks += 1

@@ -93,6 +93,7 @@ def _ask(swept: Sweep) -> None:
     cells = f"{len(swept.cells)} cells of {swept.greatest_runs} runs"
     question = f"{cells} are {swept.engagements} engagements, more than a million"
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
-        raise InputError(f"{question}; give --yes to start the sweep, or fewer --runs or values")
+        fewer = "--most-runs" if swept.until else "--runs"
+        raise InputError(f"{question}; give --yes to start the sweep, or fewer {fewer} or values")
     if not typer.confirm(f"{question}. Continue?", err=True):
         raise InputError("the sweep was not started; give fewer --runs or values")

@@ -66,6 +66,10 @@ class CampaignFolder:
         """Numbers of the chunks that are stored and undamaged."""
         return frozenset(self._files)
 
+    def has(self, index: int) -> bool:
+        """Return whether a chunk is stored and undamaged."""
+        return index in self._files
+
     @property
     def finished_runs(self) -> int:
         """Engagements of the result that are stored."""
