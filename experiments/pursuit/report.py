@@ -25,6 +25,7 @@ from rendezvous.pursuit_evasion import (
     history,
 )
 
+_LEVELS = ("least", "10%", "50%", "90%", "greatest")
 _FEWEST = 10
 """Number of simulations from which quantiles are printed."""
 
@@ -134,7 +135,9 @@ def _certificate_json(certificate: Certificate) -> dict[str, object]:
 
 
 def _feedback_json(feedback: Feedback) -> dict[str, object]:
-    quantiles = capture_quantiles_s(feedback.flights)
+    quantiles: dict[str, float | None] = dict(zip(_LEVELS, capture_quantiles_s(feedback.flights), strict=False))
+    if sum(flight.ended is Ended.CAPTURED for flight in feedback.flights) < _FEWEST:
+        quantiles |= {name: None for name in quantiles if name in ("10%", "90%")}
     return {
         "policy": feedback.policy,
         "replan_s": feedback.replan_s,
@@ -144,7 +147,7 @@ def _feedback_json(feedback: Feedback) -> dict[str, object]:
         "seed": feedback.seed,
         "runs": len(feedback.flights),
         "captured": _captured(feedback),
-        "capture_time_quantiles_s": dict(zip(("least", "10%", "50%", "90%", "greatest"), quantiles, strict=False)),
+        "capture_time_quantiles_s": quantiles,
         "flights": [
             {
                 "ended": flight.ended,

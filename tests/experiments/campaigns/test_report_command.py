@@ -63,6 +63,17 @@ def test_a_report_of_files_alone(infoset: Infoset, brief: Scenario, folder: Path
         assert title in out
 
 
+def test_no_digit_is_cut_at_60_columns(infoset: Infoset, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    code, out, _ = infoset("report", folder)
+    assert code == 0
+    assert "…" not in out
+    table = [line.split() for line in out.splitlines() if " p99 " in line]
+    assert len(table) == 6  # three quantities, two noises
+    assert all(float(row[row.index("p99") + 1]) > 0.0 for row in table)
+    assert "150 runs do not show these quantiles: 99.9 %; 1000 runs show all" in out
+
+
 def test_a_report_shows_its_progress(
     infoset: Infoset, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

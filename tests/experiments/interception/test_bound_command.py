@@ -103,6 +103,16 @@ def test_bound_as_json_alone(infoset: Infoset, short_file: Path, tmp_path: Path)
     assert infoset(short_file, "--strategies", "patient", "-q", "--budget", 0) == (0, "", "")
 
 
+def test_no_name_and_no_digit_is_cut_at_60_columns(
+    infoset: Infoset, short_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    code, out, _ = infoset(short_file, "--budget", 4)
+    assert code == 0
+    assert "…" not in out
+    assert all(name in out for name in strategy_names())
+
+
 def test_help_has_an_example(infoset: Infoset) -> None:
     code, out, _ = infoset("--help")
     assert code == 0
