@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from experiments.common.command import loading
 from experiments.common.options import AsJson, Overwrite, Quiet
 
 app = typer.Typer(name="problems", epilog="Example: infoset problems new multipoint mine.toml")
@@ -27,7 +28,8 @@ def problems(context: typer.Context, json: AsJson = False, quiet: Quiet = False)
 @app.command("list", epilog="Example: infoset problems list --json")
 def list_problems(json: AsJson = False, quiet: Quiet = False) -> None:
     """List the built-in problems with their kinds; with --quiet, print only their names."""
-    from experiments.problem_files import list_problems
+    with loading(quiet):
+        from experiments.problem_files import list_problems
 
     list_problems(json, quiet)
 
@@ -35,7 +37,8 @@ def list_problems(json: AsJson = False, quiet: Quiet = False) -> None:
 @app.command(epilog="Example: infoset problems show pareto-2008 > mine.toml")
 def show(name: Annotated[str, typer.Argument(help="Name of a built-in problem.")]) -> None:
     """Print the file of a built-in problem, including its comments."""
-    from experiments.common.problem_file import problem_text
+    with loading(False):
+        from experiments.common.problem_file import problem_text
 
     typer.echo(problem_text(name), nl=False)
 
@@ -47,7 +50,8 @@ def check(
     quiet: Quiet = False,
 ) -> None:
     """Check a problem file. The exit code is 0 if it is valid; otherwise it is 2, and all its faults are listed."""
-    from experiments.problem_files import check
+    with loading(quiet):
+        from experiments.problem_files import check
 
     check(file, json, quiet)
 
@@ -67,6 +71,7 @@ def new(
     quiet: Quiet = False,
 ) -> None:
     """Write a problem file with a comment on every key, as a template for your own problem."""
-    from experiments.problem_files import new
+    with loading(quiet):
+        from experiments.problem_files import new
 
     new(kind, file, overwrite, quiet)

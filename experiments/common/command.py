@@ -39,7 +39,7 @@ def command(options: type, module: str) -> Callable[..., None]:
     hints = {parameter.name: _checked(parameter, hints[parameter.name]) for parameter in parameters}
 
     def registered(**values: Any) -> None:
-        with _loading(bool(values.get("quiet"))):
+        with loading(bool(values.get("quiet"))):
             run = import_module(module).run
         run(options(**values))
 
@@ -54,7 +54,7 @@ def command(options: type, module: str) -> Callable[..., None]:
 
 
 @contextlib.contextmanager
-def _loading(quiet: bool) -> Iterator[None]:
+def loading(quiet: bool) -> Iterator[None]:
     """Show a line on a terminal while modules are loaded, which takes about a second."""
     shown = not quiet and sys.stderr.isatty()
     if shown:

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from experiments.common.command import loading
 from experiments.common.options import AsJson, Overwrite, Quiet
 
 app = typer.Typer(name="scenarios", epilog="Example: infoset scenarios new mine.toml")
@@ -24,7 +25,8 @@ def scenarios(context: typer.Context, json: AsJson = False, quiet: Quiet = False
 @app.command("list", epilog="Example: infoset scenarios list --json")
 def list_scenarios(json: AsJson = False, quiet: Quiet = False) -> None:
     """List the built-in scenarios; with --quiet, print only their names."""
-    from experiments.interception.runs.scenarios import list_scenarios
+    with loading(quiet):
+        from experiments.interception.runs.scenarios import list_scenarios
 
     list_scenarios(json, quiet)
 
@@ -32,7 +34,8 @@ def list_scenarios(json: AsJson = False, quiet: Quiet = False) -> None:
 @app.command(epilog="Example: infoset scenarios show asteroid-1997 > mine.toml")
 def show(name: Annotated[str, typer.Argument(help="Name of a built-in scenario.")]) -> None:
     """Print the file of a built-in scenario, including its comments."""
-    from experiments.interception.scenario_file import scenario_text
+    with loading(False):
+        from experiments.interception.scenario_file import scenario_text
 
     typer.echo(scenario_text(name), nl=False)
 
@@ -44,7 +47,8 @@ def check(
     quiet: Quiet = False,
 ) -> None:
     """Check a scenario file. The exit code is 0 if it is valid; otherwise it is 2, and all problems are listed."""
-    from experiments.interception.runs.scenarios import check
+    with loading(quiet):
+        from experiments.interception.runs.scenarios import check
 
     check(file, json, quiet)
 
@@ -56,6 +60,7 @@ def new(
     quiet: Quiet = False,
 ) -> None:
     """Write a scenario file with a comment on every key, as a template for your own scenario."""
-    from experiments.interception.runs.scenarios import new
+    with loading(quiet):
+        from experiments.interception.runs.scenarios import new
 
     new(file, overwrite, quiet)
