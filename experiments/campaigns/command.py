@@ -49,7 +49,7 @@ class Flight:
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
     runs: Annotated[
-        int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs; in a sweep, of each cell.")
+        int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs; in a sweep, of each cell, at least.")
     ]
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the runs; created if needed.")]
     noise: Annotated[
@@ -128,16 +128,19 @@ class Sweep(Flight):
     It meets the requirement, does not meet it, or is undecided. All cells have the same initial states and random
     errors, and are stored like a campaign. DIR contains the runs; one table, sweep.parquet, with one row for each cell;
     and a figure for each noise: lines for one key, maps for two keys.
+
+    Forms of --vary: KEY=FROM:TO:COUNT, equal spacing; KEY=log:FROM:TO:COUNT, logarithmic spacing;
+    KEY1=KEY2=FROM:TO:COUNT, two keys with the same values; KEY.least or KEY.greatest, an end of a pair;
+    angle_sensor.scale, a factor of all error bounds of a sensor. For example: --vary angle_sensor.scale=1:8:8 --vary
+    thruster.greatest_impulse_m_s=2.5:20:8.
     """
 
     vary: Annotated[
         list[str],
         typer.Option(
-            metavar="KEY=FROM:TO:COUNT,...",
-            help="Keys of the scenario file and their values, in the units of the file; can be repeated. "
-            "KEY=log:FROM:TO:COUNT has logarithmic spacing. KEY1=KEY2=FROM:TO:COUNT gives two keys the same values. "
-            "angle_sensor.scale is a factor of all error bounds of a sensor. If the value is a pair, vary KEY.least or "
-            "KEY.greatest. For example: angle_sensor.scale=1:8:8,thruster.greatest_impulse_m_s=2.5:20:8.",
+            metavar="KEY=VALUES,...",
+            help="Keys of the scenario file and their values, in the units of the file; the forms are above. Can be "
+            "repeated.",
         ),
     ]
     require: Required = None
