@@ -19,7 +19,7 @@ from experiments.interception.command import Adversary, Bound, Compare, Engage, 
 from experiments.interception.scenarios_command import app as scenarios
 from experiments.multipoint.command import Multipoint
 from experiments.pareto.command import Pareto
-from experiments.problem_list import app as problems
+from experiments.problems_command import app as problems
 from experiments.pursuit.command import Pursuit, PursuitMap
 from experiments.reachability.command import Reach
 from experiments.reproduce import Reproduce

@@ -12,7 +12,7 @@ from experiments.common.errors import InputError
 from experiments.common.file_kinds import PROBLEM_COMMANDS, SCENARIO, built_in_files, kind_of, taken_by
 from experiments.common.options import choice
 from experiments.common.output import library_version, write_file
-from experiments.common.problem_file import ProblemTables, problem_form
+from experiments.common.problem_file import ProblemTables, problem_form, problem_text
 from experiments.common.screen import show_built_in, show_checked
 from experiments.common.template import template
 from experiments.common.toml_file import Form, document_of
@@ -31,11 +31,16 @@ FILES: Mapping[str, tuple[Form[Any], Callable[[str], Any]]] = {
 """Form and loader of each kind of problem."""
 
 
-def list_problems(json: bool, quiet: bool) -> None:
+def list_files(json: bool, quiet: bool) -> None:
     """List the built-in problems."""
     problems = [file for file in built_in_files().values() if file.kind in PROBLEM_COMMANDS]
     rows = [{"name": file.name, "kind": file.kind, "description": file.description} for file in problems]
     show_built_in(rows, json, quiet)
+
+
+def show(name: str) -> None:
+    """Print the file of a built-in problem."""
+    typer.echo(problem_text(name), nl=False)
 
 
 def check(file: str, json: bool, quiet: bool) -> None:

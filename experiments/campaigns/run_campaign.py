@@ -6,14 +6,13 @@ from collections.abc import Sequence
 
 from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
 from experiments.campaigns.command import Campaign as Options
 from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, Flown, campaign_errors, duration, fly, scenario_of
 from experiments.campaigns.samples import heading, sample_json, samples, samples_table
 from experiments.common.errors import InputError
 from experiments.common.output import Output, output, to_json
-from experiments.common.screen import table_console
+from experiments.common.screen import print_lines, table_console
 from experiments.interception.choices import own_strategy
 from sim import Campaign, CampaignNoise, StoppingRule
 from sim.storage import need_arrow
@@ -71,17 +70,10 @@ def _rule(text: str | None) -> StoppingRule | None:
 def _show(console: Console, flown: Flown, table: Table, notes: Sequence[str]) -> None:
     folder, manifest = flown.result.folder, flown.result.folder.manifest
     stopped = "" if manifest.stopped_after is None else f" of {manifest.runs}, stopped by the rule {manifest.until}"
-
-    def line(text: str) -> None:
-        console.print(Text(text), soft_wrap=True)
-
-    line(
-        f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}, {duration(flown.elapsed_s)}; quantiles with "
-        "95 % confidence limits"
-    )
+    runs = f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}, {duration(flown.elapsed_s)}"
+    print_lines(console, [f"{runs}; quantiles with 95 % confidence limits"])
     console.print(table)
-    for note in notes:
-        line(note)
+    lines = [*notes]
     if manifest.until is not None and manifest.stopped_after is None:
-        line(f"the rule {manifest.until} is not met; continue with --resume and a greater --runs")
-    line(f"to see the results: infoset report {folder.path}")
+        lines.append(f"the rule {manifest.until} is not met; continue with --resume and a greater --runs")
+    print_lines(console, [*lines, f"to see the results: infoset report {folder.path}"])

@@ -7,8 +7,6 @@ from functools import partial
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from experiments.campaigns.campaign_figures import (
     CampaignColumns,
@@ -30,11 +28,21 @@ from experiments.campaigns.samples import (
     samples_table,
     worst_runs,
 )
-from experiments.campaigns.sweep_report import TABLE, default_requirement, figure_names, quantile_options, sweep_report
+from experiments.campaigns.sweep_report import default_requirement, figure_names, quantile_options, sweep_report
+from experiments.campaigns.sweep_table import TABLE
 from experiments.common.errors import InputError
 from experiments.common.file_kinds import use_of_file
 from experiments.common.output import Output, output, to_json
-from experiments.common.screen import BeginProgress, figure_files, number, progress_bar, say, table_console
+from experiments.common.screen import (
+    BeginProgress,
+    figure_files,
+    number,
+    number_table,
+    print_lines,
+    progress_bar,
+    say,
+    table_console,
+)
 from experiments.interception.scenario_file import scenario_to_toml
 from sim.results import ending
 from sim.storage import CampaignFolder, need_arrow
@@ -161,29 +169,22 @@ def _show(
     related: Correlations,
     worst: Sequence[Mapping[str, Any]],
 ) -> None:
-    def line(text: str) -> None:
-        console.print(Text(text), soft_wrap=True)
-
     manifest = folder.manifest
     stopped = "" if manifest.stopped_after is None else f", stopped by the rule {manifest.until}"
-    line(f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}")
     table, notes = samples_table(by_noise, manifest.scenario)
+    print_lines(console, [f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}"])
     console.print(table)
-    for note in notes:
-        line(note)
-    console.print()
-    table = Table("correlation of the miss with", box=None, pad_edge=False)
-    for noise in related:
-        table.add_column(f"{noise}\nPearson", justify="right")
-        table.add_column("\nSpearman", justify="right")
+    print_lines(console, [*notes, ""])
+    titles = [title for noise in related for title in (f"{noise}\nPearson", "\nSpearman")]
+    table = number_table("correlation of the miss with", *titles)
     for name in next(iter(related.values())):
         values = [columns[name][kind] for columns in related.values() for kind in ("pearson", "spearman")]
         table.add_row(name, *(("-" if value is None else f"{value:+.2f}") for value in values))
     console.print(table)
-    console.print()
-    line("the worst runs, each with the command that simulates it again:")
+    lines = ["", "the worst runs, each with the command that simulates it again:"]
     for row in worst:
         miss, impulse = number(row["miss_m"]), number(row["impulse_m_s"])
-        line(f"  miss {miss} m, impulse {impulse} m/s, {ending(row['outcome'], row['hit'])}: {row['replay']}")
+        lines.append(f"  miss {miss} m, impulse {impulse} m/s, {ending(row['outcome'], row['hit'])}: {row['replay']}")
     if not (folder.path / SCENARIO_FILE).is_file():
-        line(f"(the folder has no {SCENARIO_FILE}, which these commands need; --out writes one)")
+        lines.append(f"(the folder has no {SCENARIO_FILE}, which these commands need; --out writes one)")
+    print_lines(console, lines)

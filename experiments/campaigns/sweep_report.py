@@ -4,27 +4,25 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
 from experiments.campaigns.axis_names import unit_of
 from experiments.campaigns.samples import heading, sample_json
 from experiments.campaigns.sweep_figures import draw_sweep
-from experiments.campaigns.sweep_table import SHOWN, SHOWN_WITH_HITS, SweepTable, answers, sweep_table
+from experiments.campaigns.sweep_table import SHOWN, SHOWN_WITH_HITS, TABLE, SweepTable, answers, sweep_table
 from experiments.common.errors import InputError
 from experiments.common.output import Output, hit_key
-from experiments.common.screen import number, number_table
+from experiments.common.screen import number, number_table, print_lines, print_table
 from experiments.interception.study import SetCounts, set_warnings
 from sim import QuantileName, Requirement
 from sim.requirement import CONFIDENCE, MOST_RUNS_NEEDED, AnyRequirement, Decision, Verdict, parse_requirement
 from sim.storage import CampaignFolder, Manifest
 
-TABLE = "sweep.parquet"
 MOST_SHOWN = 8
 MOST_LINES = 40
 
@@ -102,37 +100,33 @@ class SweepReport:
 
     def show(self, console: Console) -> None:
         """Print the decision of every cell, and the limits of the values that meet the requirement."""
-
-        def line(text: str) -> None:
-            console.print(Text(text), soft_wrap=True)
-
         folder, table = self.folder, self.table
         watched = " although runs are added until it is made" if folder.manifest.until else ""
-        line(f"{folder.manifest.scenario.name}, {len(table.cells)} cells, {folder.finished_runs} runs")
-        line(f"the decision in each cell has a confidence of at least 95 %{watched}")
+        lines = [
+            f"{folder.manifest.scenario.name}, {len(table.cells)} cells, {folder.finished_runs} runs",
+            f"the decision in each cell has a confidence of at least 95 %{watched}",
+        ]
         for noise in table.noises:
             verdicts = [table.verdict(cell, noise) for cell in range(len(table.cells))]
             counts = Counter(verdict.decision for verdict in verdicts if verdict is not None)
             decisions = ", ".join(f"{decision} in {counts[decision]}" for decision in Decision)
-            line(f"{noise} noise: {table.required} is {decisions} of {len(verdicts)} cells")
-            self._show_answers(line, noise)
-            for title, part in decision_tables(table, noise, console.width):
-                if title:
-                    line(title)
-                console.print(part)
-            for note in _undecided_notes(verdicts, folder.manifest):
-                line(note)
+            lines.append(f"{noise} noise: {table.required} is {decisions} of {len(verdicts)} cells")
+            print_lines(console, [*lines, *self._answer_lines(noise)])
+            for title, part in decision_tables(table, noise):
+                print_lines(console, [title] if title else [])
+                print_table(console, part)
+            lines = _undecided_notes(verdicts, folder.manifest)
         sets = sum((sample.sets for samples in table.cells for sample in samples), SetCounts())
-        for text in (f"all cells: {sets}", *set_warnings(folder.manifest.scenario.set_model.kind, sets)):
-            line(text)
+        warnings = set_warnings(folder.manifest.scenario.set_model.kind, sets)
+        print_lines(console, [*lines, f"all cells: {sets}", *warnings])
 
-    def _show_answers(self, line: Callable[[str], None], noise: str) -> None:
+    def _answer_lines(self, noise: str) -> Iterator[str]:
         lines = answers(self.table, noise)
-        line(f"along {self.table.axes[0].key}:")
+        yield f"along {self.table.axes[0].key}:"
         for answer in lines[:MOST_LINES]:
-            line(f"  {answer.met}{f' (at {answer.at})' if answer.at else ''}")
+            yield f"  {answer.met}{f' (at {answer.at})' if answer.at else ''}"
         if len(lines) > MOST_LINES:
-            line(f"  {len(lines) - MOST_LINES} more lines are in the JSON report (--json)")
+            yield f"  {len(lines) - MOST_LINES} more lines are in the JSON report (--json)"
 
 
 def _verdict_json(verdict: Verdict | None) -> dict[str, object] | None:
@@ -173,11 +167,10 @@ def _about(count: int) -> str:
     return str(-(-count // step) * step)
 
 
-def decision_tables(table: SweepTable, noise: str, width: int) -> Iterator[tuple[str, Table]]:
+def decision_tables(table: SweepTable, noise: str) -> Iterator[tuple[str, Table]]:
     """Yield decisions and estimates as tables with titles: a row for each value of an axis, or a grid of two axes.
 
-    With more axes there is a grid for each combination of the other values. A grid wider than `width` characters is
-    divided. At most `MOST_LINES` grids are returned.
+    With more axes there is a grid for each combination of the other values, at most `MOST_LINES` grids.
     """
     first, *others = table.axes
     if not others:
@@ -194,18 +187,13 @@ def decision_tables(table: SweepTable, noise: str, width: int) -> Iterator[tuple
     second, *rest = others
     shape = [len(axis.values) for axis in table.axes]
     cells = np.arange(len(table.cells)).reshape(shape)
-    columns = max(1, (width - 14) // 12)
     for indices in itertools.islice(np.ndindex(*shape[2:]), MOST_LINES):
         grid = cells[(slice(None), slice(None), *indices)]
         at = ", ".join(f"{axis.key} = {axis.values[index]:g}" for axis, index in zip(rest, indices, strict=True))
-        for begin in range(0, len(second.values), columns):
-            block = second.values[begin : begin + columns]
-            title = f"{first.key} (rows) and {second.key} (columns){f', at {at}' if at else ''}"
-            shown = number_table("", *(f"{value:g}" for value in block))
-            for row, value in enumerate(first.values):
-                entries = grid[row, begin : begin + columns].tolist()
-                shown.add_row(f"{value:g}", *(_entry(table.verdict(cell, noise)) for cell in entries))
-            yield title, shown
+        shown = number_table("", *(f"{value:g}" for value in second.values))
+        for row, value in enumerate(first.values):
+            shown.add_row(f"{value:g}", *(_entry(table.verdict(cell, noise)) for cell in grid[row].tolist()))
+        yield f"{first.key} (rows) and {second.key} (columns){f', at {at}' if at else ''}", shown
 
 
 def _entry(verdict: Verdict | None) -> str:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import inspect
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from importlib import import_module
 from types import NoneType
@@ -39,9 +38,7 @@ def command(options: type, module: str) -> Callable[..., None]:
     hints = {parameter.name: _checked(parameter, hints[parameter.name]) for parameter in parameters}
 
     def registered(**values: Any) -> None:
-        with loading(bool(values.get("quiet"))):
-            run = import_module(module).run
-        run(options(**values))
+        loaded(module, bool(values.get("quiet"))).run(options(**values))
 
     # Typer keeps the line breaks of a docstring after its first paragraph.
     paragraphs = (inspect.getdoc(options) or "").split("\n\n")
@@ -53,15 +50,15 @@ def command(options: type, module: str) -> Callable[..., None]:
     return registered
 
 
-@contextlib.contextmanager
-def loading(quiet: bool) -> Iterator[None]:
-    """Show a line on a terminal while modules are loaded, which takes about a second."""
+def loaded(module: str, quiet: bool) -> Any:
+    """Import a module, with a line on a terminal: it may take about a second."""
     shown = not quiet and sys.stderr.isatty()
     if shown:
         typer.echo(LOADING, nl=False, err=True)
-    yield
+    imported = import_module(module)
     if shown:
         typer.echo(f"\r{' ' * len(LOADING)}\r", nl=False, err=True)
+    return imported
 
 
 def _checked(parameter: inspect.Parameter, hint: Any) -> Any:

@@ -5,17 +5,18 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
+from rich.cells import cell_len
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Column, Table
+from rich.text import Text
 
 from experiments.common.errors import on_a_screen
 from experiments.common.output import to_json
 from sim.statistics import shows
-
-if TYPE_CHECKING:
-    from rich.console import Console
-    from rich.table import Table
 
 BeginProgress = Callable[[str], Callable[[float], None]]
 _GAP = 2
@@ -47,8 +48,6 @@ def say_warnings(warnings: Iterable[str], quiet: bool, notes: Iterable[str] = ()
 
 def table_console(stdout_taken: bool) -> Console:
     """Return the console for tables and lines: stdout, or stderr if a file is printed on stdout."""
-    from rich.console import Console
-
     return Console(stderr=stdout_taken, highlight=False, markup=False, emoji=False)
 
 
@@ -60,8 +59,6 @@ def print_lines(console: Console, lines: Iterable[str]) -> None:
 
 def number_table(*titles: str, left: int = 1) -> Table:
     """Return an empty table whose first ``left`` columns are text and whose other columns are numbers."""
-    from rich.table import Table
-
     table = Table(*titles[:left], box=None, pad_edge=False)
     for title in titles[left:]:
         table.add_column(title, justify="right")
@@ -73,9 +70,6 @@ def print_table(console: Console, table: Table) -> None:
 
     No number is cut: a part has as many columns of numbers as fit, and at least one.
     """
-    from rich.cells import cell_len
-    from rich.table import Table
-
     cells = [[str(cell) for cell in (column.header, *column.cells)] for column in table.columns]
     widths = [max(cell_len(line) for cell in column for line in cell.splitlines() or [""]) + _GAP for column in cells]
     left = [index for index, column in enumerate(table.columns) if column.justify != "right"]
@@ -110,9 +104,6 @@ def progress_bar(quiet: bool) -> Iterator[BeginProgress]:
     if quiet or not sys.stderr.isatty():
         yield lambda _name: lambda _done: None
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
 
@@ -147,8 +138,6 @@ def show_built_in(rows: Sequence[Mapping[str, str]], json: bool, quiet: bool) ->
     elif quiet:
         typer.echo("\n".join(row["name"] for row in rows))
     else:
-        from rich.table import Column, Table
-
         *first, description = rows[0]
         table = Table(*(Column(title, no_wrap=True) for title in first), description, box=None, pad_edge=False)
         for row in rows:
@@ -161,9 +150,6 @@ def show_checked(summary: Mapping[str, Any], fingerprint: str, json: bool, quiet
     if json:
         typer.echo(to_json(summary), nl=False)
     elif not quiet:
-        from rich.console import Console
-        from rich.text import Text
-
         console = Console(soft_wrap=True)
         console.print(Text.assemble(("ok", "bold green"), f"  {summary['name']}  {fingerprint}"))
         for warning in summary["warnings"]:

@@ -6,21 +6,27 @@ from pathlib import Path
 
 import typer
 
+from experiments.common.file_kinds import SCENARIO, built_in_files
 from experiments.common.output import library_version, write_file
 from experiments.common.screen import show_built_in, show_checked
 from experiments.interception.scenario_file import (
     load_scenario,
     scenario_hash,
-    scenario_names,
     scenario_template,
+    scenario_text,
     scenario_warnings,
 )
 
 
-def list_scenarios(json: bool, quiet: bool) -> None:
+def list_files(json: bool, quiet: bool) -> None:
     """List the built-in scenarios."""
-    scenarios = [load_scenario(name) for name in scenario_names()]
-    show_built_in([{"name": each.name, "description": each.description} for each in scenarios], json, quiet)
+    scenarios = [file for file in built_in_files().values() if file.kind == SCENARIO]
+    show_built_in([{"name": file.name, "description": file.description} for file in scenarios], json, quiet)
+
+
+def show(name: str) -> None:
+    """Print the file of a built-in scenario."""
+    typer.echo(scenario_text(name), nl=False)
 
 
 def check(file: str, json: bool, quiet: bool) -> None:
