@@ -12,17 +12,18 @@ import time
 from importlib.metadata import version
 from itertools import chain, product
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import get_type_hints
 
 import pytest
 
-from experiments.cli import COMMANDS, main
+from experiments.cli import COMMANDS
 from experiments.common.command import LOADING
 from experiments.common.errors import InputError
 from experiments.common.output import output, to_csv, to_json, write_file
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_text
 from infoset import kernels
 from sim import Scenario, simulate
+from tests.experiments.command_line import Command
 
 CURVE_KEYS = [
     "published_curve",
@@ -38,44 +39,6 @@ CURVE_KEYS = [
     "phi_held",
 ]
 OUTCOMES = {"arrived", "set-empty", "budget-spent", "diverged"}
-
-
-@pytest.fixture(autouse=True)
-def _plain_screen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("NO_COLOR", "1")
-    monkeypatch.setenv("COLUMNS", "100")
-    monkeypatch.chdir(tmp_path)
-
-
-class Command:
-    def __init__(self, capsys: pytest.CaptureFixture[str]) -> None:
-        self._capsys = capsys
-
-    def __call__(self, *arguments: object) -> tuple[int, str, str]:
-        """Exit code, stdout and stderr."""
-        with pytest.raises(SystemExit) as left:
-            main([str(each) for each in arguments])
-        captured = self._capsys.readouterr()
-        assert "Traceback" not in captured.err
-        return int(left.value.code or 0), captured.out, captured.err
-
-    def refused(self, *arguments: object) -> str:
-        """The one message of a command that must be refused."""
-        code, out, err = self(*arguments)
-        assert (code, out) == (2, "")
-        assert err.startswith(("error: ", "Usage: "))
-        assert err.count("error: ") + err.count("─ Error ─") == 1
-        return err if err.startswith("error: ") else " ".join(err.replace("│", " ").split())
-
-    def json(self, *arguments: object) -> Any:
-        code, out, _ = self(*arguments, "--json", "-")
-        assert code == 0
-        return json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
-
-
-@pytest.fixture
-def infoset(capsys: pytest.CaptureFixture[str]) -> Command:
-    return Command(capsys)
 
 
 def names_in(folder: Path) -> list[str]:

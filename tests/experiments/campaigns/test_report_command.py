@@ -39,10 +39,24 @@ def folder(brief: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_a_report_of_files_alone(infoset: Infoset, brief: Scenario, folder: Path, tmp_path: Path) -> None:
+def test_a_report_of_files_alone_shows_its_progress(
+    infoset: Infoset, brief: Scenario, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bars: list[str] = []
+
+    @contextlib.contextmanager
+    def recorded(quiet: bool) -> Iterator[BeginProgress]:
+        def begin(name: str) -> Callable[[float], None]:
+            bars.append(name)
+            return lambda done: None
+
+        yield begin
+
+    monkeypatch.setattr("experiments.campaigns.run_report.progress_bar", recorded)
     before = sorted(each.name for each in folder.iterdir())
     code, out, err = infoset("report", folder, "--out", tmp_path / "report")
     assert code == 0
+    assert bars == ["quantiles", "figures"]
     assert sorted(err.removeprefix("wrote ").removesuffix(f" in {tmp_path / 'report'}\n").split(", ")) == [
         *FIGURES,
         "report.json",
@@ -72,24 +86,6 @@ def test_no_digit_is_cut_at_60_columns(infoset: Infoset, folder: Path, monkeypat
     assert len(table) == 6  # three quantities, two noises
     assert all(float(row[row.index("p99") + 1]) > 0.0 for row in table)
     assert "150 runs do not show these quantiles: 99.9 %; 1000 runs show all" in out
-
-
-def test_a_report_shows_its_progress(
-    infoset: Infoset, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bars: list[str] = []
-
-    @contextlib.contextmanager
-    def recorded(quiet: bool) -> Iterator[BeginProgress]:
-        def begin(name: str) -> Callable[[float], None]:
-            bars.append(name)
-            return lambda done: None
-
-        yield begin
-
-    monkeypatch.setattr("experiments.campaigns.run_report.progress_bar", recorded)
-    assert infoset("report", folder, "--out", tmp_path / "report")[0] == 0
-    assert bars == ["quantiles", "figures"]
 
 
 def test_a_report_writes_nothing_unasked(infoset: Infoset, folder: Path, tmp_path: Path) -> None:

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from experiments.cli import main
 from experiments.common.screen import number
 from experiments.interception.choices import with_model
 from experiments.interception.record_file import load_record
 from experiments.interception.scenario_file import load_scenario, scenario_hash
 from infoset import Model
 from sim.adversary import find_worst
+from tests.experiments.command_line import Command
 
 KEYS = [
     "version",
@@ -40,39 +40,6 @@ KEYS = [
     "history",
 ]
 BUDGET = 12
-
-
-@pytest.fixture(autouse=True)
-def _plain_screen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("NO_COLOR", "1")
-    monkeypatch.setenv("COLUMNS", "100")
-    monkeypatch.chdir(tmp_path)
-
-
-class Command:
-    def __init__(self, capsys: pytest.CaptureFixture[str]) -> None:
-        self._capsys = capsys
-
-    def __call__(self, *arguments: object) -> tuple[int, str, str]:
-        """Exit code, stdout and stderr."""
-        with pytest.raises(SystemExit) as left:
-            main([str(each) for each in arguments])
-        captured = self._capsys.readouterr()
-        assert "Traceback" not in captured.err
-        return int(left.value.code or 0), captured.out, captured.err
-
-    def refused(self, *arguments: object) -> str:
-        """The one message of a command that must be refused."""
-        code, out, err = self("adversary", *arguments)
-        assert (code, out) == (2, "")
-        assert err.startswith(("error: ", "Usage: "))
-        assert err.count("error: ") + err.count("─ Error ─") == 1
-        return err if err.startswith("error: ") else " ".join(err.replace("│", " ").split())
-
-
-@pytest.fixture
-def infoset(capsys: pytest.CaptureFixture[str]) -> Command:
-    return Command(capsys)
 
 
 def test_help_has_an_example(infoset: Command) -> None:
@@ -136,15 +103,15 @@ def test_the_table_says_what_was_found_and_how(infoset: Command, tmp_path: Path)
 
 def test_both_greatest_misses_are_those_of_bound(infoset: Command) -> None:
     """The same strategy, seed, budget and model: bound and adversary print the same two numbers."""
-    options = ("--budget", 40, "--model", "paper", "--json", "-", "-q")
-    (of_bound,) = json.loads(infoset("bound", "--strategies", "symmetric-miss", *options)[1])["strategies"]
-    found = json.loads(infoset("adversary", "--strategy", "symmetric-miss", *options)[1])
+    options = ("--budget", 40, "--model", "paper", "--json")
+    table = infoset("bound", "--strategies", "symmetric-miss", *options, "bound.json")[1]
+    shown = infoset("adversary", "--strategy", "symmetric-miss", *options, "adversary.json")[1]
+    (of_bound,) = json.loads(Path("bound.json").read_text())["strategies"]
+    found = json.loads(Path("adversary.json").read_text())
     misses = [found[name] for name in ("worst_of_search_set_kept_m", "worst_of_search_m")]
     assert misses == [of_bound["worst_of_search_set_kept_m"], of_bound["worst_of_search_m"]]
     assert misses[0] < 60.0 < misses[1]
     assert misses[1] == of_bound["worst_found_m"]
-    table = infoset("bound", "--strategies", "symmetric-miss", *options[:4])[1]
-    shown = infoset("adversary", *options[:4])[1]
     for miss in misses:
         assert f" {number(miss)} " in table
         assert f" {number(miss)} " in shown
@@ -196,7 +163,7 @@ def test_quiet_prints_nothing(infoset: Command) -> None:
 )
 def test_what_is_refused_before_anything_is_flown(arguments: list[str], message: str, infoset: Command) -> None:
     Path("there.npz").write_text("something")
-    assert message in infoset.refused(*arguments)
+    assert message in infoset.refused("adversary", *arguments)
     assert Path("there.npz").read_text() == "something"
 
 

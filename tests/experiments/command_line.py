@@ -1,0 +1,39 @@
+"""The command `infoset` in tests."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from experiments.cli import main
+
+
+class Command:
+    """Runs commands in this process."""
+
+    def __init__(self, capsys: pytest.CaptureFixture[str]) -> None:
+        self._capsys = capsys
+
+    def __call__(self, *arguments: object) -> tuple[int, str, str]:
+        """Exit code, stdout and stderr."""
+        with pytest.raises(SystemExit) as left:
+            main([str(each) for each in arguments])
+        captured = self._capsys.readouterr()
+        assert "Traceback" not in captured.err
+        return int(left.value.code or 0), captured.out, captured.err
+
+    def refused(self, *arguments: object) -> str:
+        """The one message of a command that must be refused."""
+        code, out, err = self(*arguments)
+        assert (code, out) == (2, "")
+        assert err.startswith(("error: ", "Usage: "))
+        assert err.count("error: ") + err.count("─ Error ─") == 1
+        return err if err.startswith("error: ") else " ".join(err.replace("│", " ").split())
+
+    def json(self, *arguments: object) -> Any:
+        """The results of a command as JSON."""
+        code, out, _ = self(*arguments, "--json", "-")
+        assert code == 0
+        return json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
