@@ -8,7 +8,7 @@ from typing import Any
 
 import typer
 
-from experiments.common.errors import InputError
+from experiments.common.errors import InputError, nearest, shown
 from experiments.common.file_kinds import PROBLEM_COMMANDS, SCENARIO, built_in_files, kind_of, taken_by
 from experiments.common.options import choice
 from experiments.common.output import library_version, write_file
@@ -16,7 +16,6 @@ from experiments.common.problem_file import ProblemTables, problem_form, problem
 from experiments.common.screen import show_built_in, show_checked
 from experiments.common.template import template
 from experiments.common.toml_file import Form, document_of
-from experiments.common.toml_values import nearest, shown
 from experiments.multipoint import file as multipoint
 from experiments.pareto import file as pareto
 from experiments.pursuit import file as pursuit
@@ -51,7 +50,7 @@ def check(file: str, json: bool, quiet: bool) -> None:
         raise InputError(f"{file}: {taken_by(kind)}")
     if kind is None:
         found = f"found {shown(document['kind'])}" if "kind" in document else "which is missing"
-        guess = nearest(str(document.get("kind")), list(FILES))
+        guess = nearest(str(document.get("kind")), [*FILES])
         remedy = (
             f"did you mean {guess}?" if guess else f'write for example kind = "{pareto.KIND}" above the first table'
         )

@@ -12,8 +12,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from experiments.common.errors import InputError
-from experiments.common.toml_values import shown
+from experiments.common.errors import InputError, shown
 from sim.versions import CALCULATING, calculating_versions, differences, install_command
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from experiments.campaigns.cluster import connected, is_open
 from experiments.campaigns.command import Flight
 from experiments.common.errors import InputError
 from experiments.common.screen import NOT_FINITE, number, say
-from experiments.interception.choices import scenario_with, study_scenario
+from experiments.interception.choices import study_scenario
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from sim import Campaign, CampaignNoise, CampaignResult, Scenario
 from sim.campaign import Progress
@@ -49,18 +49,10 @@ def scenario_of(options: Flight) -> tuple[Scenario, list[str]]:
 
     A resumed folder keeps its model.
     """
-    scenario = scenario_with(
-        options.scenario,
-        options.settings,
-        strategy=options.strategy,
-        model=options.model,
-        tie=options.tie,
-        range_meter=options.range_meter,
-    )
     resumed = None
     if options.resume and (options.out / MANIFEST).is_file():
         resumed = read_manifest(options.out).scenario.set_model.kind
-    scenario, notes = study_scenario(scenario, options.model, options.settings, resumed)
+    scenario, notes = study_scenario(options, resumed)
     return (scenario if options.noise is None else CampaignNoise(options.noise).applied_to(scenario)), notes
 
 

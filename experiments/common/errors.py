@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Sequence
+
 INTERRUPTED = 130
 """Exit code of a program that Ctrl-C ends."""
+LONGEST_SHOWN = 60
+"""Greatest length of a value in a message."""
+_LONGEST_WORD = 100
 
 
 def on_a_screen(message: str) -> str:
@@ -16,3 +22,31 @@ class InputError(Exception):
 
     The command line prints it without a traceback and exits with code 2.
     """
+
+
+def shown(value: object) -> str:
+    """Return a TOML value of any size and depth as a short text for a message."""
+    text = "an array of many values"
+    if isinstance(value, bool):
+        text = "true" if value else "false"
+    elif isinstance(value, str):
+        text = '"' + "".join(c if c.isprintable() else "?" for c in value[: LONGEST_SHOWN + 1]) + '"'
+    elif isinstance(value, dict):
+        text = "a table"
+    elif isinstance(value, list):
+        if len(value) <= 4:
+            text = "[" + ", ".join("[...]" if isinstance(item, list) else shown(item) for item in value) + "]"
+    else:
+        text = str(value).lower().replace("infinity", "inf")
+    return shortened(text)
+
+
+def shortened(text: str) -> str:
+    """Return a text with dots at its end if it is longer than `LONGEST_SHOWN`."""
+    return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 3] + "..."
+
+
+def nearest(word: str, known: Sequence[str]) -> str | None:
+    """Return the most similar known word, or None if none is similar."""
+    similar = difflib.get_close_matches(word[:_LONGEST_WORD], known, n=1, cutoff=0.6)
+    return similar[0] if similar else None

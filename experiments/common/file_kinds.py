@@ -10,8 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from experiments.common.errors import InputError
-from experiments.common.toml_values import nearest, shown
+from experiments.common.errors import InputError, nearest, shown
 
 SCENARIO = "scenario"
 PROBLEM_COMMANDS = {

@@ -11,10 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from experiments.common.errors import InputError
-
-LONGEST_SHOWN = 60
-"""Greatest length of a number in a message."""
+from experiments.common.errors import InputError, nearest, shortened, shown
 
 
 def _page_path(path: Path | None) -> Path | None:
@@ -87,9 +84,7 @@ def choice(option: str, name: str, valid: Sequence[str]) -> str:
     """Return a valid name; raise `InputError`, with the nearest valid name, for any other."""
     if name in valid:
         return name
-    from experiments.common.toml_values import nearest, shown
-
-    guess = nearest(name, list(valid))
+    guess = nearest(name, valid)
     hint = f"did you mean {guess}? " if guess else ""
     raise InputError(f"{option}: there is no {shown(name)}; {hint}choose one of: {', '.join(valid)}")
 
@@ -106,7 +101,7 @@ def read_number(
     """
     if not isinstance(text, str):
         return text
-    quoted = text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 3]}..."
+    quoted = shortened(text)
     try:
         value = kind(text)
     except ValueError:

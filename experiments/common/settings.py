@@ -13,8 +13,8 @@ from collections.abc import Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from typing import Any
 
-from experiments.common.errors import InputError
-from experiments.common.toml_values import decimal_of, nearest, shown
+from experiments.common.errors import InputError, nearest, shown
+from experiments.common.toml_values import decimal_of
 
 ENDS = ("least", "greatest")
 """Names of the ends of a pair, after the name of its key."""
@@ -83,7 +83,7 @@ def similar_key(key: str, known: Sequence[str]) -> str | None:
     """Return the most similar known key, or up to three keys with the same last part, or None."""
     last = key.rsplit(".", 1)[-1]
     alike = [name for name in known if last in name.split(".")]
-    return nearest(key, list(known)) or " or ".join(alike[:3]) or None
+    return nearest(key, known) or " or ".join(alike[:3]) or None
 
 
 def _general(path: Sequence[str]) -> str:

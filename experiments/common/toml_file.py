@@ -13,7 +13,7 @@ from typing import Any, Generic, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from experiments.common.errors import InputError
+from experiments.common.errors import InputError, nearest, shown
 from experiments.common.file_kinds import (
     LARGEST_FILE_BYTES,
     LONGEST_LINE,
@@ -28,7 +28,7 @@ from experiments.common.file_kinds import (
     use_of_folder,
 )
 from experiments.common.settings import read_settings, replace_values
-from experiments.common.toml_values import LONGEST_DESCRIPTION, WRONG, DecimalPair, decimal_of, nearest, shown
+from experiments.common.toml_values import LONGEST_DESCRIPTION, WRONG, DecimalPair, decimal_of
 
 MOST_PROBLEMS = 100
 MISSING = "is missing"

@@ -5,7 +5,6 @@ Numbers stay decimal, as written; the change to SI units rounds them once.
 
 from __future__ import annotations
 
-import difflib
 import types
 import typing
 from dataclasses import dataclass
@@ -17,14 +16,13 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
-from experiments.common.errors import InputError
+from experiments.common.errors import InputError, nearest
 from infoset.limits import Limits, limits_of
 
 LARGEST = Decimal("1e15")
 SMALLEST = Decimal("1e-100")
 LONGEST_NAME = 100
 LONGEST_DESCRIPTION = 300
-LONGEST_SHOWN = 60
 KILO = 3
 
 DecimalPair = tuple[Decimal, Decimal]
@@ -120,29 +118,6 @@ def quoted_text(text: str) -> str:
     """Write a TOML string on one line."""
     escapes = {"\\": "\\\\", '"': '\\"'}
     return '"' + "".join(escapes.get(c, c if c.isprintable() or c == " " else f"\\U{ord(c):08x}") for c in text) + '"'
-
-
-def shown(value: object) -> str:
-    """Return a TOML value of any size and depth as a short text for a message."""
-    text = "an array of many values"
-    if isinstance(value, bool):
-        text = "true" if value else "false"
-    elif isinstance(value, str):
-        text = '"' + "".join(c if c.isprintable() else "?" for c in value[: LONGEST_SHOWN + 1]) + '"'
-    elif isinstance(value, dict):
-        text = "a table"
-    elif isinstance(value, list):
-        if len(value) <= 4:
-            text = "[" + ", ".join("[...]" if isinstance(item, list) else shown(item) for item in value) + "]"
-    else:
-        text = str(value).lower().replace("infinity", "inf")
-    return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 3] + "..."
-
-
-def nearest(word: str, known: list[str]) -> str | None:
-    """Return the most similar known word, or None if none is similar."""
-    found = difflib.get_close_matches(word[:LONGEST_NAME], known, n=1, cutoff=0.6)
-    return found[0] if found else None
 
 
 WRONG = "wrong"
@@ -295,7 +270,7 @@ def known_name(value: object, names: tuple[str, ...]) -> str:
     """Check that a value is one of these names."""
     if isinstance(value, str) and value in names:
         return value
-    guess = nearest(value, list(names)) if isinstance(value, str) else None
+    guess = nearest(value, names) if isinstance(value, str) else None
     listed = ", ".join(f'"{name}"' for name in names)
     problem = f"must be one of {listed}" if len(names) > 1 else f"must be {listed}"
     raise wrong(problem, f'did you mean "{guess}"?' if guess else "")

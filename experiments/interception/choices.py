@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 from experiments.common.errors import InputError
 from experiments.common.options import choice
@@ -23,31 +24,25 @@ from sim.scenario import strategy_name
 MODEL_KEY = "information_set.model"
 
 
-def scenario_with(
-    name: str,
-    settings: Sequence[str] | None = None,
-    *,
-    strategy: str | None = None,
-    model: str | None = None,
-    tie: str | None = None,
-    sections: int | None = None,
-    range_meter: bool | None = None,
-) -> Scenario:
-    """Read a scenario and replace what the options set; None keeps the value of the scenario.
+def scenario_with(options: Any) -> Scenario:
+    """Read the scenario of a command and replace what its options set; None keeps the value of the scenario.
 
     Parameters
     ----------
-    settings : sequence of str or None
-        Values of ``--set``; the other options have precedence.
-    strategy : str or None
-        A built-in name. ``FILE.py:CLASS`` leaves the strategy of the scenario; `own_strategy` returns it.
+    options : dataclass
+        Options of the command: `scenario` and `settings`, and `strategy`, `model`, `tie`, `sections` and `range_meter`
+        if the command has them. ``--strategy FILE.py:CLASS`` leaves the strategy of the scenario; `own_strategy`
+        returns it.
 
     Raises
     ------
     InputError
         If the scenario is unsound, or an option does not fit it.
     """
-    scenario = load_scenario(name, settings)
+    strategy, model, tie, sections, range_meter = (
+        getattr(options, name, None) for name in ("strategy", "model", "tie", "sections", "range_meter")
+    )
+    scenario = load_scenario(options.scenario, options.settings)
     if strategy is not None and not is_own_strategy(strategy):
         scenario = replace(scenario, strategy=choice("--strategy", strategy, strategy_names()))
     if tie is not None:
@@ -89,9 +84,7 @@ def with_model(scenario: Scenario, model: Model) -> Scenario:
     return changed
 
 
-def study_scenario(
-    scenario: Scenario, model: str | None, settings: Sequence[str] | None, resumed: Model | None = None
-) -> tuple[Scenario, list[str]]:
+def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario, list[str]]:
     """Return the scenario of a study, whose default model is the guaranteed one, whatever the scenario file says.
 
     Quantiles of the model `paper` can be those of sets that lost the true state. The list has a line for the screen if
@@ -99,18 +92,15 @@ def study_scenario(
 
     Parameters
     ----------
-    scenario : Scenario
-        From `scenario_with`, with the option ``--model``.
-    model : str or None
-        Value of ``--model``.
-    settings : sequence of str or None
-        Values of ``--set``; one of them may choose the model.
+    options : dataclass
+        As in `scenario_with`. ``--model`` and ``--set`` may choose the model.
     resumed : Model or None
         Model of the folder that is resumed, which is then the default.
     """
-    chosen = model is not None or any(text.partition("=")[0].strip() == MODEL_KEY for text in settings or ())
+    scenario = scenario_with(options)
+    chosen = any(text.partition("=")[0].strip() == MODEL_KEY for text in options.settings or ())
     of_file, default = scenario.set_model.kind.value, resumed or Model.GUARANTEED
-    if chosen or default.value == of_file:
+    if chosen or options.model is not None or default.value == of_file:
         return scenario, []
     try:
         changed = with_model(scenario, default)

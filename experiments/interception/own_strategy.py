@@ -13,8 +13,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from experiments.common.errors import InputError
-from experiments.common.toml_values import nearest, shown
+from experiments.common.errors import InputError, nearest, shown
 from guidance import Situation, Strategy
 from guidance.strategy import checked_impulses
 

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from experiments.common.errors import InputError
+from experiments.common.errors import InputError, shown
 from experiments.common.page_document import page
-from experiments.common.toml_values import shown
 from experiments.interception.record_titles import outcome_title, record_titles
 from infoset import InformationSet, Section
 from infoset.sensors import SENSORS

@@ -25,10 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from experiments.common.errors import InputError
+from experiments.common.errors import InputError, shown
 from experiments.common.file_kinds import ZIP, use_of_file, use_of_folder
 from experiments.common.output import library_version, write_file
-from experiments.common.toml_values import shown
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
 from infoset import ConvexPolygons, Section
 from infoset.limits import LARGEST, SMALLEST

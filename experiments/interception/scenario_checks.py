@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from decimal import Decimal
 
+from experiments.common.errors import shown
 from experiments.common.toml_file import Known, Problem
-from experiments.common.toml_values import KILO, DecimalPair, shown, si
+from experiments.common.toml_values import KILO, DecimalPair, si
 from experiments.interception.scenario_tables import OPTIONAL_SENSORS
 from guidance import Thruster
 from infoset import AngleSensor, Model, SetModel, StateBox

@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from experiments.common.errors import InputError
+from experiments.common.errors import InputError, shown
 from experiments.common.output import TRAJECTORIES, output_of, to_json
 from experiments.common.screen import figure_files, progress_bar, table_console
-from experiments.common.toml_values import LARGEST, shown
+from experiments.common.toml_values import LARGEST
 from experiments.pareto.command import Pareto
 from experiments.pareto.figures import draw_controls, draw_costs, draw_front, draw_trajectories
 from experiments.pareto.file import TERMINAL, ParetoProblem, load_pareto

@@ -7,9 +7,8 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-from experiments.common.errors import InputError
+from experiments.common.errors import InputError, shown
 from experiments.common.options import choice
-from experiments.common.toml_values import shown
 from rendezvous.pursuit_evasion import Policy, RandomSteering, Script, Steering
 
 LONGEST_SCRIPT = 100_000

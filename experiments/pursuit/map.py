@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.common.display_units import M_PER_KM
-from experiments.common.errors import InputError
+from experiments.common.errors import InputError, shown
 from experiments.common.options import choice
 from experiments.common.output import Cell, library_version, output_of, to_csv, to_json
 from experiments.common.screen import figure_files, print_lines, progress_bar, say_warnings, table_console
-from experiments.common.toml_values import shown
 from experiments.pursuit.command import ROWS, PursuitMap
 from experiments.pursuit.file import PursuitProblem, load_pursuit, parameter_names
 from experiments.pursuit.map_figure import S_PER_HOUR, counted, draw_map

@@ -36,4 +36,9 @@ class Command:
         """The results of a command as JSON."""
         code, out, _ = self(*arguments, "--json", "-")
         assert code == 0
-        return json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+        return strict(out)
+
+
+def strict(text: str) -> Any:
+    """Return JSON without NaN and infinity as values."""
+    return json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))

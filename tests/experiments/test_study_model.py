@@ -17,7 +17,11 @@ from sim.storage import read_manifest
 
 Infoset = Callable[..., tuple[int, str, str]]
 LINE = "model: guaranteed, the model of studies; the scenario file says paper: --model paper\n"
-VARY = ("--vary", "thruster.greatest_impulse_m_s=2:8:2")
+VARY = (
+    "--vary",
+    "thruster.greatest_impulse_m_s=2:8:2,thruster.least_impulse_m_s=0.1:0.2:2,angle_sensor.scale=1:2:2",
+)
+"""Three keys, which have no figure."""
 OLD = Path(__file__).parents[1] / "data" / "first-format"
 
 

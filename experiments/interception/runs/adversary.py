@@ -12,7 +12,7 @@ from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
 from experiments.common.output import output_of, to_csv, to_json
 from experiments.common.screen import figure_files, number, print_lines, progress_bar, say_warnings, table_console
-from experiments.interception.choices import own_strategy, scenario_with, study_scenario
+from experiments.interception.choices import own_strategy, study_scenario
 from experiments.interception.command import Adversary
 from experiments.interception.record_file import record_path, write_record
 from experiments.interception.runs.engage import COLUMNS, step_rows
@@ -30,14 +30,7 @@ def run(options: Adversary) -> None:
     """Search, write the files and print the table."""
     if options.record is not None:
         record_path("--record", options.record)
-    scenario = scenario_with(
-        options.scenario,
-        options.settings,
-        strategy=options.strategy,
-        model=options.model,
-        range_meter=options.range_meter,
-    )
-    scenario, notes = study_scenario(scenario, options.model, options.settings)
+    scenario, notes = study_scenario(options)
     own = own_strategy(options.strategy)
     times_s = read_times(options.times)
     names = ("scenario.toml", "results.json", "steps.csv", RECORD, *figure_files(FIGURE_2, FIGURE_3))

@@ -22,7 +22,7 @@ from experiments.common.screen import (
     say_warnings,
     table_console,
 )
-from experiments.interception.choices import chosen_strategies, scenario_with, study_scenario
+from experiments.interception.choices import chosen_strategies, study_scenario
 from experiments.interception.command import Bound
 from experiments.interception.figures.bound import draw_bound
 from experiments.interception.runs.shared import need_finite, summary_head
@@ -86,8 +86,7 @@ class WorstOfStrategy:
 
 def run(options: Bound) -> None:
     """Compute the bound, simulate the strategies, write the files and print the tables."""
-    scenario = scenario_with(options.scenario, options.settings, model=options.model)
-    scenario, notes = study_scenario(scenario, options.model, options.settings)
+    scenario, notes = study_scenario(options)
     strategies = chosen_strategies(scenario, options.strategies)
     with (
         output_of(options, ("scenario.toml", "results.json", *figure_files(FIGURE))) as written,

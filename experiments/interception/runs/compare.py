@@ -19,7 +19,7 @@ from experiments.common.screen import (
     say_warnings,
     table_console,
 )
-from experiments.interception.choices import chosen_strategies, scenario_with, study_scenario
+from experiments.interception.choices import chosen_strategies, study_scenario
 from experiments.interception.command import Compare
 from experiments.interception.comparison import QUANTILES, Comparison, Flight, flights, gather, summary
 from experiments.interception.figures.comparison import draw_comparison
@@ -35,8 +35,7 @@ COLUMNS = ("strategy", "noise", "tie", "run", "miss_m", "impulse_m_s", "outcome"
 
 def run(options: Compare) -> None:
     """Simulate the strategies, write the files and print the table."""
-    scenario = scenario_with(options.scenario, options.settings, model=options.model, range_meter=options.range_meter)
-    scenario, notes = study_scenario(scenario, options.model, options.settings)
+    scenario, notes = study_scenario(options)
     strategies = chosen_strategies(scenario, options.strategies)
     with (
         output_of(options, ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE))) as written,

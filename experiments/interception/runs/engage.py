@@ -33,14 +33,7 @@ COLUMNS = (
 
 def run(options: Engage) -> None:
     """Simulate one or two engagements, write the files and print the table."""
-    scenario = scenario_with(
-        options.scenario,
-        options.settings,
-        strategy=options.strategy,
-        model=options.model,
-        tie=options.tie,
-        range_meter=options.range_meter,
-    )
+    scenario = scenario_with(options)
     own = own_strategy(options.strategy)
     times_s = read_times(options.times)
     both = options.noise == "both"

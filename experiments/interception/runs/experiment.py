@@ -43,14 +43,7 @@ LEVELS = (0.1, 0.5, 0.9, 0.99, 1.0)
 
 def run(options: Experiment) -> None:
     """Simulate the curves, write the files and print the table."""
-    scenario = scenario_with(
-        options.scenario,
-        options.settings,
-        strategy=options.strategy,
-        model=options.model,
-        tie=options.tie,
-        sections=options.sections,
-    )
+    scenario = scenario_with(options)
     own = own_strategy(options.strategy)
     with (
         output_of(options, ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE))) as written,

@@ -8,10 +8,10 @@ from typing import Annotated
 import pytest
 from pydantic import Field, PlainValidator
 
-from experiments.common.errors import InputError
+from experiments.common.errors import InputError, shown
 from experiments.common.problem_file import problem_form, problem_hash
 from experiments.common.toml_file import Known, read_tables
-from experiments.common.toml_values import NUMBER, Name, Numbers, Positive, Table, Vector, key, shown
+from experiments.common.toml_values import NUMBER, Name, Numbers, Positive, Table, Vector, key
 
 
 class CraftTable(Table):

@@ -11,8 +11,9 @@ import pytest
 
 from experiments.cli import main
 from experiments.common.errors import InputError
-from experiments.interception.choices import chosen_strategies, own_strategy, scenario_with
+from experiments.interception.choices import chosen_strategies, own_strategy
 from experiments.interception.own_strategy import load_strategy
+from experiments.interception.scenario_file import load_scenario
 from guidance import SymmetricMiss
 from sim import Scenario, simulate
 
@@ -165,5 +166,5 @@ def test_a_scenario_file_cannot_name_python_code(mine: Path, brief_file: Path) -
     hostile = Path("hostile.toml")
     hostile.write_text(brief_file.read_text().replace('"symmetric-miss"', '"mine.py:Mine"'))
     with pytest.raises(InputError, match=r"guidance\.strategy: must be one of"):
-        scenario_with("hostile.toml")
+        load_scenario("hostile.toml")
     assert "mine" not in sys.modules

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import json
 import re
 import time
 from collections.abc import Callable
@@ -18,6 +17,7 @@ from experiments.common.problem_file import problem_text
 from experiments.multipoint.figures import draw_control, draw_costates, draw_path, draw_times
 from experiments.multipoint.file import KIND, Axes, load_multipoint
 from experiments.multipoint.scene import Scene, cost_curves
+from tests.experiments.command_line import strict
 
 FIGURES = ["figure-control", "figure-costates", "figure-path", "figure-times"]
 KEYS = [
@@ -46,26 +46,10 @@ def infoset(infoset: Infoset) -> Infoset:
     return partial(infoset, "multipoint")
 
 
-@pytest.fixture
-def mine(tmp_path: Path) -> Callable[[str], Path]:
-    """Write a problem file."""
-
-    def write(text: str) -> Path:
-        file = tmp_path / "mine.toml"
-        file.write_text(text, encoding="utf-8")
-        return file
-
-    return write
-
-
 def changed(old: str, new: str, text: str = THREE) -> str:
     """A problem with its first `old` replaced."""
     assert old in text
     return text.replace(old, new, 1)
-
-
-def strict(text: str) -> Any:
-    return json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
 
 
 def told(infoset: Infoset, *arguments: object) -> Any:
@@ -81,11 +65,14 @@ def targets(count: int, apart_s: float = 500.0) -> str:
 
 
 def test_three_targets_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
-    code, out, _ = infoset("--out", "results")
+    (tmp_path / "results").mkdir()
+    (tmp_path / "results" / "notes.txt").write_text("mine")
+    code, out, _ = infoset("--out", "results", "--overwrite")
     assert code == 0
+    assert (tmp_path / "results" / "notes.txt").read_text() == "mine"
     files = [f"{name}.{kind}" for name in FIGURES for kind in ("pdf", "png")]
     assert sorted(each.name for each in (tmp_path / "results").iterdir()) == sorted(
-        [*files, "problem.toml", "results.json", "trajectories.csv"]
+        [*files, "notes.txt", "problem.toml", "results.json", "trajectories.csv"]
     )
     found = strict((tmp_path / "results" / "results.json").read_text())
     assert list(found) == KEYS
@@ -393,8 +380,7 @@ def test_nothing_is_replaced_unless_told(infoset: Infoset, tmp_path: Path) -> No
     assert precious.read_text() == "precious"
     assert infoset("service-2", "--json", precious, "--overwrite", "-q")[0] == 0
     assert strict(precious.read_text())["problem"] == "service-2"
-    assert infoset("service-2", "--out", folder, "--overwrite", "-q")[0] == 0
-    assert (folder / "notes.txt").read_text() == "mine"
+    assert [each.name for each in folder.iterdir()] == ["notes.txt"]
 
 
 def test_figures_say_what_they_show() -> None:

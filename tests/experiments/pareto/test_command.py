@@ -1,12 +1,10 @@
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +13,7 @@ from experiments.common.problem_file import problem_text
 from experiments.pareto.figures import draw_controls, draw_costs, draw_front, draw_trajectories
 from experiments.pareto.file import load_pareto
 from rendezvous.pareto import analyse_coalitions, solve_encounter, sweep_meeting_time, total_impulse
+from tests.experiments.command_line import strict
 
 FIGURES = ["figure-controls", "figure-costs", "figure-front", "figure-trajectories"]
 KEYS = [
@@ -52,28 +51,15 @@ def changed(old: str, new: str, text: str = EXAMPLE) -> str:
     return text.replace(old, new, 1)
 
 
-def strict(text: str) -> Any:
-    return json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
-
-
-@pytest.fixture
-def mine(tmp_path: Path) -> Callable[[str], Path]:
-    """Write a problem file."""
-
-    def write(text: str) -> Path:
-        file = tmp_path / "mine.toml"
-        file.write_text(text, encoding="utf-8")
-        return file
-
-    return write
-
-
 def test_the_published_example_into_a_folder(infoset: Infoset, tmp_path: Path) -> None:
-    code, out, _ = infoset("--out", "results", "--prefer", "y_m=0,z_m=50", "--samples", 4)
+    (tmp_path / "results").mkdir()
+    (tmp_path / "results" / "notes.txt").write_text("mine")
+    code, out, _ = infoset("--out", "results", "--prefer", "y_m=0,z_m=50", "--samples", 4, "--overwrite")
     assert code == 0
+    assert (tmp_path / "results" / "notes.txt").read_text() == "mine"
     files = [f"{name}.{kind}" for name in FIGURES for kind in ("pdf", "png")]
     assert sorted(each.name for each in (tmp_path / "results").iterdir()) == sorted(
-        [*files, "problem.toml", "results.json", "trajectories.csv"]
+        [*files, "notes.txt", "problem.toml", "results.json", "trajectories.csv"]
     )
     found = strict((tmp_path / "results" / "results.json").read_text())
     assert list(found) == KEYS
@@ -381,8 +367,6 @@ def test_nothing_is_replaced_unless_told(infoset: Infoset, tmp_path: Path) -> No
     assert [each.name for each in folder.iterdir()] == ["notes.txt"]
     assert infoset("--json", precious, "--overwrite", "-q")[0] == 0
     assert strict(precious.read_text())["problem"] == "pareto-2008"
-    assert infoset("--out", folder, "--overwrite", "-q")[0] == 0
-    assert (folder / "notes.txt").read_text() == "mine"
 
 
 def test_figures_say_what_they_show() -> None:
