@@ -450,7 +450,7 @@ def test_a_scenario_comes_back_whole(brief: Scenario, ranging: Scenario, comet: 
     rich = replace(
         comet,
         sun=None,
-        rate_sensor=RateSensor(1.0, 1e-6),
+        rate_sensor=RateSensor(0.8, 1e-6),
         target=Target(Manoeuvre.BANG_BANG, 0.1),
         noise=NoiseKind.GAME,
     )
