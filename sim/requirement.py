@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from infoset.limits import Fraction, Positive, check_fields
-from sim.statistics import shown_quantiles
+from sim.statistics import shows
 from sim.stopping_rule import NUMBER, QuantileName, parse_quantile
 
 Floats = NDArray[np.float64]
@@ -88,6 +89,11 @@ class Requirement:
         """Column of the results that it uses."""
         return self.quantile.quantity
 
+    @property
+    def unknown(self) -> float:
+        """Value of a run without the quantity, for example without a bound Phi: it does not satisfy the bound."""
+        return math.inf
+
     def holds(self, values: Floats) -> NDArray[np.bool_]:
         """Return for each of the quantity's `values` whether it is below the bound."""
         return np.asarray(values < self.bound)
@@ -131,6 +137,11 @@ class HitRequirement:
         """Bound of the probability."""
         return self.share
 
+    @property
+    def unknown(self) -> float:
+        """Value of a run without the quantity."""
+        return 0.0
+
     def holds(self, values: Floats) -> NDArray[np.bool_]:
         """Return for each of the `values` of the column, 0 or 1, whether the run hits."""
         return np.asarray(values > 0.0)
@@ -163,11 +174,14 @@ class Verdict:
         Size of the sample.
     value : float or None
         The required quantile of the sample, in its unit, or the share of hits; None if the sample does not show it
-        (`sim.statistics.shows`).
+        (`sim.statistics.shows`), or if too many runs have no value.
     lower, upper : float or None
         Ends of its 95 % confidence interval; None if the sample is too small to bound that side.
     runs_needed : int or None
-        About how many runs decide if further runs are like these; None: more than `MOST_RUNS_NEEDED`.
+        About how many runs decide with `watched=True` if further runs are like these; None if the estimate is at the
+        bound, so that more than `MOST_RUNS_NEEDED` are necessary.
+    known : int
+        Runs with a value of the quantity; the others do not satisfy the bound.
     """
 
     decision: Decision
@@ -176,6 +190,7 @@ class Verdict:
     lower: float | None
     upper: float | None
     runs_needed: int | None
+    known: int
 
 
 def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verdict:
@@ -184,10 +199,16 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
     Parameters
     ----------
     values : ndarray, shape (n,)
-        The required quantity, in the order of the runs; at least one.
+        The required quantity, in the order of the runs; at least one. It is `requirement.unknown` in runs without a
+        value.
     watched : bool
-        Whether the number of runs may depend on the values, because runs are added until the requirement is decided.
-        False: the number of runs was fixed before.
+        Whether the number of runs may depend on the values, because runs were added after a look at them. False: the
+        number of runs was fixed before.
+
+    Raises
+    ------
+    ValueError
+        If there is no value, or a value is NaN.
 
     Notes
     -----
@@ -207,37 +228,45 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
     (2021), Time-uniform, nonparametric, nonasymptotic confidence sequences, Annals of Statistics 49(2).
     """
     size, share = values.size, requirement.share
+    if not size or np.isnan(values).any():
+        raise ValueError("a requirement is judged on at least one value, none of them NaN")
     holding = np.cumsum(requirement.holds(values))
     fewest_met, most_missed = critical_counts(size, share, watched=watched)
     value: float | None
     lower: float | None
     upper: float | None
     if isinstance(requirement, Requirement):
-        (value,) = shown_quantiles(values, [share])
+        with np.errstate(invalid="ignore"):  # infinite values
+            value = _finite(np.quantile(values, share)) if shows(size, share) else None
         lower, upper = _quantile_interval(values, int(fewest_met[-1]), int(most_missed[-1]))
     else:
         value = int(holding[-1]) / size
         lower, upper = share_interval(int(holding[-1]), size, watched=watched)
+    known = int(np.isfinite(values).sum())
     looks = holding if watched else holding[-1:]
     met, missed = looks >= fewest_met, looks <= most_missed
     decided = np.flatnonzero(met | missed)
     if not decided.size:
-        needed = runs_needed(int(holding[-1]), size, share, watched=watched)
-        return Verdict(Decision.UNDECIDED, size, value, lower, upper, needed)
+        needed = runs_needed(int(holding[-1]), size, share, watched=True)
+        return Verdict(Decision.UNDECIDED, size, value, lower, upper, needed, known)
     decision = Decision.MET if met[decided[0]] else Decision.NOT_MET
     # A decision at an earlier run stays valid, although the last interval may contain the bound again.
     if (decision is Decision.MET) == isinstance(requirement, Requirement):
         upper = requirement.bound if upper is None else min(upper, requirement.bound)
     else:
         lower = requirement.bound if lower is None else max(lower, requirement.bound)
-    return Verdict(decision, size, value, lower, upper, size)
+    return Verdict(decision, size, value, lower, upper, size, known)
 
 
 def _quantile_interval(values: Floats, fewest_met: int, most_missed: int) -> tuple[float | None, float | None]:
     """Return the order statistics that enclose a quantile."""
     ordered = np.sort(values)
-    lower = float(ordered[most_missed]) if most_missed >= 0 else None
-    return lower, float(ordered[fewest_met - 1]) if fewest_met <= values.size else None
+    lower = _finite(ordered[most_missed]) if most_missed >= 0 else None
+    return lower, _finite(ordered[fewest_met - 1]) if fewest_met <= values.size else None
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
 
 
 def share_interval(count: int, runs: int, *, watched: bool) -> tuple[float, float]:
@@ -339,7 +368,14 @@ def runs_needed(count: int, runs: int, share: float, *, watched: bool) -> int | 
 
     None is more than `MOST_RUNS_NEEDED`. If all runs satisfy the bound so far, it is the least number that can decide.
     """
+
+    def deciding(sizes: Counts) -> Counts:
+        values = p_values(sizes, count / runs * sizes, share, watched=watched)
+        return sizes[(np.minimum(*values) <= _TAIL) & (sizes > runs)]
+
     sizes = np.unique(np.geomspace(1, MOST_RUNS_NEEDED, 2000).astype(np.int64))
-    values = p_values(sizes, count / runs * sizes, share, watched=watched)
-    enough = sizes[(np.minimum(*values) <= _TAIL) & (sizes > runs)]
-    return int(enough[0]) if enough.size else None
+    enough = deciding(sizes)
+    if not enough.size:
+        return None
+    before = sizes[max(int(np.searchsorted(sizes, enough[0])) - 1, 0)]
+    return int(deciding(np.arange(before, enough[0] + 1))[0])

@@ -15,10 +15,10 @@ from sim.storage import CampaignWriter
 
 @dataclass
 class _Cell:
-    """Progress of a cell: chunks that are judged, and for each noise the known values, those that hold, a decision."""
+    """Progress of a cell: chunks that are judged, and for each noise the runs, those that hold, a decision."""
 
     chunks: int = 0
-    known: list[int] = field(default_factory=list)
+    runs: list[int] = field(default_factory=list)
     holding: list[int] = field(default_factory=list)
     decided: list[bool] = field(default_factory=list)
 
@@ -105,15 +105,16 @@ class UndecidedCells:
             del self._waiting[index]
 
     def _judge(self, cell: int, index: int) -> None:
-        state, share = self._cells[cell], self._requirement.share
-        samples = self._folder.chunk_samples(index, self._requirement.quantity, self._noises)
+        state = self._cells[cell]
+        required = self._requirement
+        samples = self._folder.chunk_samples(index, required.quantity, self._noises, unknown=required.unknown)
         for noise, values in enumerate(samples):
-            counts = state.holding[noise] + np.cumsum(self._requirement.holds(values))
+            counts = state.holding[noise] + np.cumsum(required.holds(values))
             if not values.size:
                 continue
-            before = state.known[noise]
-            fewest_met, most_missed = critical_counts(before + values.size, share, watched=True)
+            before = state.runs[noise]
+            fewest_met, most_missed = critical_counts(before + values.size, required.share, watched=True)
             decided = (counts >= fewest_met[before:]) | (counts <= most_missed[before:])
             state.decided[noise] |= bool(decided.any())
-            state.known[noise], state.holding[noise] = before + values.size, int(counts[-1])
+            state.runs[noise], state.holding[noise] = before + values.size, int(counts[-1])
         state.chunks += 1

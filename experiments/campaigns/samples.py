@@ -51,6 +51,8 @@ class Sample:
         Probability of a hit; None if the body has no size.
     phi_held, phi_known : int
         Runs whose miss is at most Phi, and runs with a Phi; 0 in a model without a guarantee.
+    known : mapping of str to int
+        Runs with a value of each quantity.
     """
 
     noise: str
@@ -62,6 +64,7 @@ class Sample:
     hits: HitEstimate | None
     phi_held: int
     phi_known: int
+    known: Mapping[str, int]
 
 
 def noises_of(folder: CampaignFolder) -> list[str]:
@@ -110,12 +113,13 @@ def samples(folder: CampaignFolder, cell: int | None = None, levels: Sequence[fl
                 count.phi_held += int((numbers["miss_m"][rows].data <= guaranteed.filled(-np.inf)).sum())
     quantiles: dict[str, dict[str, list[QuantileEstimate]]] = {noise: {} for noise in noises}
     worst: dict[str, dict[str, float]] = {noise: {} for noise in noises}
+    sizes: dict[str, dict[str, int]] = {noise: {} for noise in noises}
     for quantity in QUANTITIES:
         for noise in noises:
             known = folder.sample(quantity, noise, cell)
             if known.size:
                 quantiles[noise][quantity] = estimate_quantiles(known, levels)
-                worst[noise][quantity] = float(known.max())
+                worst[noise][quantity], sizes[noise][quantity] = float(known.max()), known.size
             del known  # free the memory before the next quantity is read
     return [
         Sample(
@@ -128,6 +132,7 @@ def samples(folder: CampaignFolder, cell: int | None = None, levels: Sequence[fl
             estimate_hits(count.hits, count.sized) if count.sized else None,
             count.phi_held,
             count.phi_known,
+            sizes[noise],
         )
         for noise, count in counts.items()
         if count.outcomes.any()
@@ -203,7 +208,7 @@ def sample_json(sample: Sample) -> dict[str, Any]:
             quantity: {
                 **{
                     level_name(estimate.level): {
-                        "value": shown_value(sample, estimate),
+                        "value": shown_value(sample, quantity, estimate),
                         "lower": estimate.lower,
                         "upper": estimate.upper,
                     }
@@ -216,9 +221,9 @@ def sample_json(sample: Sample) -> dict[str, Any]:
     }
 
 
-def shown_value(sample: Sample, estimate: QuantileEstimate) -> float | None:
-    """Return the value of a quantile; None if the runs of the sample do not show it."""
-    return estimate.value if shows(sample.runs, estimate.level) else None
+def shown_value(sample: Sample, quantity: str, estimate: QuantileEstimate) -> float | None:
+    """Return the value of a quantile; None if the runs with a value of the quantity do not show it."""
+    return estimate.value if shows(sample.known[quantity], estimate.level) else None
 
 
 def samples_table(by_noise: Sequence[Sample], scenario: Scenario) -> tuple[Table, list[str]]:
@@ -236,7 +241,9 @@ def samples_table(by_noise: Sequence[Sample], scenario: Scenario) -> tuple[Table
             name = names[quantity]
             for estimate in estimates:
                 interval = f"{number(estimate.lower)} to {number(estimate.upper)}"
-                table.add_row(title, name, level_name(estimate.level), number(shown_value(sample, estimate)), interval)
+                table.add_row(
+                    title, name, level_name(estimate.level), number(shown_value(sample, quantity, estimate)), interval
+                )
                 title = name = ""
             table.add_row("", "", "max", number(sample.worst[quantity]), "")
         notes += [f"{sample.noise} noise: {text}" for text in quantile_notes(sample.runs, [*LEVELS])]

@@ -115,7 +115,7 @@ class SweepReport:
             for title, part in decision_tables(table, noise):
                 print_lines(console, [title] if title else [])
                 print_table(console, part)
-            lines = _undecided_notes(verdicts, folder.manifest)
+            lines = [*_unknown_notes(verdicts, table.required), *_undecided_notes(verdicts, folder.manifest)]
         sets = sum((sample.sets for samples in table.cells for sample in samples), SetCounts())
         warnings = set_warnings(folder.manifest.scenario.set_model.kind, sets)
         print_lines(console, [*lines, f"all cells: {sets}", *warnings])
@@ -137,8 +137,18 @@ def _verdict_json(verdict: Verdict | None) -> dict[str, object] | None:
         "value": verdict.value,
         "lower": verdict.lower,
         "upper": verdict.upper,
+        "known": verdict.known,
         "runs_needed": verdict.runs_needed,
     }
+
+
+def _unknown_notes(verdicts: Sequence[Verdict | None], required: AnyRequirement) -> list[str]:
+    """Return a line about the runs without the required quantity; no line if all have it."""
+    stored = [verdict for verdict in verdicts if verdict is not None]
+    runs, known = sum(verdict.runs for verdict in stored), sum(verdict.known for verdict in stored)
+    if runs == known:
+        return []
+    return [f"{known} of {runs} runs have a value of {required.quantity}; the others do not satisfy the bound"]
 
 
 def _undecided_notes(verdicts: Sequence[Verdict | None], manifest: Manifest) -> list[str]:

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -79,7 +80,7 @@ class SweepTable:
     def value(self, cell: int, noise: str, quantile: QuantileName) -> float | None:
         """Return a quantile of a cell; None if its runs do not show it."""
         sample, estimate = self.sample(cell, noise), self.estimate(cell, noise, quantile)
-        return None if sample is None or estimate is None else shown_value(sample, estimate)
+        return None if sample is None or estimate is None else shown_value(sample, quantile.quantity, estimate)
 
     def grid(self, noise: str, quantile: QuantileName) -> np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]:
         """Return a quantile over the axes, masked where the runs do not show it."""
@@ -133,14 +134,15 @@ def sweep_table(folder: CampaignFolder, required: AnyRequirement, quantiles: Seq
     levels = tuple(sorted({*LEVELS, *(quantile.level for quantile in quantiles)}))
     noises, numbers = tuple(noises_of(folder)), range(folder.manifest.cells)
     cells = tuple(tuple(samples(folder, cell, levels)) for cell in numbers)
-    known = [{noise: folder.sample(required.quantity, noise, cell) for noise in noises} for cell in numbers]
+    read = partial(folder.sample, required.quantity, unknown=required.unknown)
+    by_noise = [{noise: read(noise, cell) for noise in noises} for cell in numbers]
     verdicts = tuple(
         {
             noise: judge(values, required, watched=folder.manifest.until is not None)
             for noise, values in samples.items()
             if values.size
         }
-        for samples in known
+        for samples in by_noise
     )
     flags = [folder.numbers("hit", cell).compressed() for cell in numbers]
     hits = tuple(estimate_hits(int(values.sum()), values.size) if values.size else None for values in flags)

@@ -125,20 +125,27 @@ class CampaignFolder:
         for index in self._wanted(cell):
             yield self._columns_of(index, quantities, texts)
 
-    def sample(self, quantity: str, noise: str, cell: int | None = None) -> NDArray[np.float64]:
-        """Return the known values of a quantity under a noise, in the order of cells and runs."""
+    def sample(
+        self, quantity: str, noise: str, cell: int | None = None, *, unknown: float | None = None
+    ) -> NDArray[np.float64]:
+        """Return the values of a quantity under a noise, in the order of cells and runs.
+
+        Runs without a value have the value `unknown`; None omits them.
+        """
         # Room for all rows: the pages of memory that are never written cost nothing.
         values, size = np.empty(self._rows(cell)), 0
         for numbers, codes in self.shards([quantity], {"noise": [noise]}, cell):
-            (known,) = _by_noise(numbers[quantity], codes["noise"], 1)
-            values[size : size + known.size] = known
-            size += known.size
+            (part,) = _by_noise(numbers[quantity], codes["noise"], 1, unknown)
+            values[size : size + part.size] = part
+            size += part.size
         return values[:size]
 
-    def chunk_samples(self, index: int, quantity: str, noises: Sequence[str]) -> list[NDArray[np.float64]]:
-        """Return the known values of a quantity in one chunk, an array for each noise."""
+    def chunk_samples(
+        self, index: int, quantity: str, noises: Sequence[str], *, unknown: float | None = None
+    ) -> list[NDArray[np.float64]]:
+        """Return the values of a quantity in one chunk, an array for each noise, as in `sample`."""
         numbers, codes = self._columns_of(index, [quantity], {"noise": noises})
-        return _by_noise(numbers[quantity], codes["noise"], len(noises))
+        return _by_noise(numbers[quantity], codes["noise"], len(noises), unknown)
 
     def numbers(self, name: str, cell: int | None = None) -> Numbers:
         """Return a column of numbers, masked where it is null."""
@@ -259,9 +266,9 @@ class CampaignFolder:
         return fault
 
 
-def _by_noise(values: Numbers, codes: Codes, noises: int) -> list[NDArray[np.float64]]:
-    known = ~np.ma.getmaskarray(values)
-    return [values.data[known & (codes == code)] for code in range(noises)]
+def _by_noise(values: Numbers, codes: Codes, noises: int, unknown: float | None) -> list[NDArray[np.float64]]:
+    samples = [values[codes == code] for code in range(noises)]
+    return [sample.compressed() if unknown is None else sample.filled(unknown) for sample in samples]
 
 
 def need_arrow() -> ModuleType:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from decimal import Decimal
 from fractions import Fraction
 from math import comb
@@ -127,11 +128,34 @@ def is_decided(size: int, rate: float, share: float, watched: bool) -> bool:
     return not most_missed[-1] < round(rate * size) < fewest_met[-1]
 
 
+def test_runs_without_a_value_do_not_satisfy_the_bound() -> None:
+    median = Requirement(QuantileName("guaranteed_miss_m", 0.5), 60.0)
+    values = np.where(np.arange(80) % 13, median.unknown, 5.0)
+    for watched in (True, False):
+        verdict = judge(values, median, watched=watched)
+        assert (verdict.decision, verdict.known, verdict.runs) == (Decision.NOT_MET, 7, 80)
+        assert (verdict.value, verdict.lower, verdict.upper) == (None, 60.0, None)
+        most = judge(np.where(np.arange(80) % 13, 5.0, median.unknown), median, watched=watched)
+        assert (most.decision, most.known, most.value) == (Decision.MET, 73, 5.0)
+    few = np.append(np.ones(19), median.unknown)
+    assert judge(few, Requirement(QuantileName("guaranteed_miss_m", 0.9), 60.0), watched=False).upper is None
+
+
+@pytest.mark.parametrize("values", [[], [math.nan], [1.0, math.nan]])
+def test_no_sample_for_a_decision(values: list[float]) -> None:
+    with pytest.raises(ValueError, match="at least one value, none of them NaN"):
+        judge(np.array(values), P99, watched=True)
+
+
 def test_runs_needed_by_hand() -> None:
     least = next(size for size in range(1, 1000) if Decimal("0.99") ** size <= Decimal("0.025"))
-    assert judge(np.ones(20), P99, watched=False).runs_needed == least == 368
+    assert runs_needed(20, 20, 0.99, watched=False) == least == 368
     assert runs_needed(20, 20, 0.95, watched=False) == 72
     assert runs_needed(19, 20, 0.95, watched=False) is None
+    # The number is that of --until decided, by which the runs are added.
+    for watched in (True, False):
+        assert judge(np.ones(20), P99, watched=watched).runs_needed == 535
+        assert judge(np.ones(20), HitRequirement(0.95), watched=watched).runs_needed == 105
     for watched in (True, False):
         for count, runs, share in ((20, 20, 0.99), (97, 100, 0.95), (180, 200, 0.95)):
             needed = runs_needed(count, runs, share, watched=watched)
