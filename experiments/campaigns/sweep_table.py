@@ -121,10 +121,7 @@ class SweepTable:
         columns = {name: [row[name] for row in rows] for name in rows[0]}
         units = {key: unit_of(key) for axis in self.axes for key in tied_keys(axis.key)}
         units |= {
-            name: unit
-            for quantity, unit in zip(QUANTITIES, ("m", "m/s", "m"), strict=True)
-            for name in columns
-            if name.startswith(f"{quantity}_")
+            name: unit_of(quantity) for quantity in QUANTITIES for name in columns if name.startswith(f"{quantity}_")
         }
         return columns, units
 

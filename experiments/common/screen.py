@@ -17,6 +17,7 @@ from rich.text import Text
 from experiments.common.errors import on_a_screen
 from experiments.common.output import to_json
 from sim.statistics import shows
+from sim.stopping_rule import level_name
 
 BeginProgress = Callable[[str], Callable[[float], None]]
 _GAP = 2
@@ -127,8 +128,7 @@ def quantile_notes(runs: int, levels: Sequence[float]) -> list[str]:
     if not hidden:
         return []
     needed = max(round(1.0 / min(level, 1.0 - level)) for level in hidden)
-    names = ", ".join(f"{100.0 * level:g} %" for level in hidden)
-    return [f"{runs} runs do not show these quantiles: {names}; {needed} runs show all"]
+    return [f"{runs} runs are too few for {', '.join(map(level_name, hidden))}; {needed} runs show all quantiles"]
 
 
 def show_built_in(rows: Sequence[Mapping[str, str]], json: bool, quiet: bool) -> None:

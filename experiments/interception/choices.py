@@ -106,9 +106,9 @@ def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario
         changed = with_model(scenario, default)
     except InputError as error:
         raise InputError(f"{error}; or choose the model of the file with --model {of_file}") from None
-    reason = "the model of the resumed folder" if resumed else "the model of studies"
-    remedy = "" if resumed else f": --model {of_file}"
-    return changed, [f"model: {default.value}, {reason}; the scenario file says {of_file}{remedy}"]
+    if resumed:
+        return changed, [f"model: {default.value}, the model of the resumed folder; the scenario file has {of_file}"]
+    return changed, [f"model: {default.value}, the default of studies; to use that of the file, add --model {of_file}"]
 
 
 def own_strategy(text: str | None) -> Strategy | None:

@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.interception.study import QUANTILES
 from guidance import NoiseKind, Strategy, TieRule
 from sim import HitEstimate, Results, Scenario, estimate_hits
 from sim.statistics import shown_quantiles
 
 Floats = NDArray[np.float64]
 Flight = tuple[str, TieRule | None]
-
-QUANTILES: Mapping[str, float] = {"p10": 0.1, "p50": 0.5, "p90": 0.9, "p99": 0.99, "max": 1.0}
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from infoset import Model
 from sim import HitEstimate, Scenario
 
+QUANTILES = {"p10": 0.1, "p50": 0.5, "p90": 0.9, "p99": 0.99, "max": 1.0}
+"""Levels of the quantiles in tables and JSON, by name."""
+
 Flags = NDArray[np.bool_]
 
 
@@ -58,8 +61,8 @@ def set_warnings(model: Model, counts: SetCounts) -> list[str]:
     failures = f"in {counts.failed} of {counts.runs} runs the set lost the true state or became empty"
     if model is Model.PAPER:
         return [
-            f"warning: model paper: {failures}; the quantiles describe these failures of the model too; to see those "
-            "of the guidance and the sensors, use --model guaranteed"
+            f"warning: model paper: {failures}; the quantiles include these failures of the model; for quantiles "
+            "without them, use --model guaranteed"
         ]
     return [
         f"warning: model guaranteed: {failures}, so the scenario exceeds an assumption of the model; to find it, use "

@@ -111,10 +111,10 @@ def test_table_of_the_experiment(infoset: Command, brief_file: Path, tmp_path: P
     code, out, _ = infoset("experiment", "--runs", 2)
     assert code == 0
     for part in (
-        "10%",
-        "50%",
-        "90%",
-        "99%",
+        "p10",
+        "p50",
+        "p90",
+        "p99",
         "impulse, m/s",
         "the paper's Phi (not a bound here), m",
         "  + range meter",
@@ -538,7 +538,7 @@ def test_the_run_of_every_command_takes_its_options() -> None:
 def test_no_99_percent_quantile_of_two_runs(command: list[str], infoset: Command, brief_file: Path) -> None:
     code, out, _ = infoset(*command, brief_file, "--runs", "2")
     assert code == 0
-    assert "2 runs do not show these quantiles: 10 %, 90 %, 99 %; 100 runs show all" in out
+    assert "2 runs are too few for p10, p90, p99; 100 runs show all quantiles" in out
     (first, *_) = [line.split("miss, m")[1].split() for line in out.splitlines() if "miss, m" in line]
     low, median, high, nearly, worst = first
     assert (low, high, nearly) == ("-", "-", "-")

@@ -16,7 +16,7 @@ from sim import Scenario
 from sim.storage import read_manifest
 
 Infoset = Callable[..., tuple[int, str, str]]
-LINE = "model: guaranteed, the model of studies; the scenario file says paper: --model paper\n"
+LINE = "model: guaranteed, the default of studies; to use that of the file, add --model paper\n"
 VARY = (
     "--vary",
     "thruster.greatest_impulse_m_s=2:8:2,thruster.least_impulse_m_s=0.1:0.2:2,angle_sensor.scale=1:2:2",
@@ -118,7 +118,7 @@ def test_a_folder_of_another_model_than_the_file_is_resumed(
     assert infoset(*asked, "--runs", 4, "--model", "paper")[0] == 0
     code, _, err = infoset(*asked, "--runs", 8, "--resume")
     assert code == 0
-    assert "model: paper, the model of the resumed folder; the scenario file says guaranteed\n" in err
+    assert "model: paper, the model of the resumed folder; the scenario file has guaranteed\n" in err
 
 
 @pytest.mark.parametrize("kind", ["campaign", "sweep"])

@@ -21,11 +21,11 @@ from experiments.common.screen import (
 )
 from experiments.interception.choices import chosen_strategies, study_scenario
 from experiments.interception.command import Compare
-from experiments.interception.comparison import QUANTILES, Comparison, Flight, flights, gather, summary
+from experiments.interception.comparison import Comparison, Flight, flights, gather, summary
 from experiments.interception.figures.comparison import draw_comparison
 from experiments.interception.runs.shared import Progress, simulate_in_threads, summary_head
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
-from experiments.interception.study import SetCounts, percent, set_counts, set_warnings
+from experiments.interception.study import QUANTILES, SetCounts, percent, set_counts, set_warnings
 from guidance import NoiseKind, Strategy
 from sim import Scenario
 
@@ -132,14 +132,12 @@ def _show(console: Console, scenario: Scenario, compared: Sequence[Comparison]) 
     for part in (table, sets):
         part.add_column("strategy", no_wrap=True)
     table.add_column("quantity", no_wrap=True)
-    for level in QUANTILES.values():
-        table.add_column("worst" if level == 1.0 else f"{level:.0%}", justify="right")
-    body = scenario.body
-    for title in ("true state in the\nset at every step", "set became\nempty"):
-        sets.add_column(title, justify="right")
-    if body is not None:
-        for title in (f"hit: miss at\nmost {body.radius_m:g} m", "95 % CI\nof a hit"):
-            sets.add_column(title, justify="right")
+    titles = ["true state in the\nset at every step", "set became\nempty"]
+    if scenario.body is not None:
+        titles += [f"hit: miss at\nmost {scenario.body.radius_m:g} m", "95 % CI\nof a hit"]
+    for part, names in ((table, [*QUANTILES]), (sets, titles)):
+        for name in names:
+            part.add_column(name, justify="right")
     total = SetCounts()
     for noise in (NoiseKind.RANDOM, NoiseKind.GAME):
         title = noise.value

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rich.console import Console
-from rich.table import Table
 
 from experiments.common.errors import InputError
 from experiments.common.options import read_number
 from experiments.common.output import Output
-from experiments.common.screen import BeginProgress, number, print_lines
+from experiments.common.screen import BeginProgress, number, number_table, print_lines
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import draw_sets
 from experiments.interception.published import PRINTED_SINGLE_RUN, SINGLE
@@ -56,9 +55,7 @@ def show_engagements(records: Sequence[Record], console: Console) -> None:
         paper = PRINTED_SINGLE_RUN.get(record.noise_name)
         if record.scenario.name == SINGLE and record.scenario.range_sensor is None and paper is not None:
             columns.append(["paper", number(paper[0]), number(paper[1]), *[""] * 8])
-    table = Table(columns[0][0], box=None, pad_edge=False)
-    for title, *_ in columns[1:]:
-        table.add_column(title, justify="right")
+    table = number_table(*(title for title, *_ in columns))
     for row in list(zip(*columns, strict=True))[1:]:
         table.add_row(*row)
     print_lines(console, [" | ".join(dict.fromkeys(record.scenario.name for record in records))])

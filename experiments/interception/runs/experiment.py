@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from time import perf_counter
 
 from rich.console import Console
-from rich.table import Table
 
 from experiments.common.output import hit_key, outcome_columns, output_of, to_csv, to_json
 from experiments.common.screen import (
     figure_files,
     number,
+    number_table,
     print_lines,
     progress_bar,
     quantile_notes,
@@ -32,13 +32,12 @@ from experiments.interception.runs.shared import (
     summary_head,
 )
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
-from experiments.interception.study import SetCounts, hit_text, set_counts, set_warnings
+from experiments.interception.study import QUANTILES, SetCounts, hit_text, set_counts, set_warnings
 from infoset import Recovery
 from sim import Outcome, Scenario
 from sim.statistics import shown_quantiles
 
 FIGURE = "figure-4-distributions"
-LEVELS = (0.1, 0.5, 0.9, 0.99, 1.0)
 
 
 def run(options: Experiment) -> None:
@@ -99,9 +98,7 @@ def _csv(curves: Sequence[Curve]) -> str:
 
 
 def _show(console: Console, scenario: Scenario, curves: Sequence[Curve]) -> None:
-    table = Table("curve", "quantity", box=None, pad_edge=False)
-    for level in LEVELS:
-        table.add_column("worst" if level == 1.0 else f"{level:.0%}", justify="right")
+    table, levels = number_table("curve", "quantity", *QUANTILES, left=2), [*QUANTILES.values()]
     enlarged = scenario.set_model.recovery is Recovery.WIDENED
     endings = {
         Outcome.BUDGET_SPENT: "too little of the impulse budget was left",
@@ -116,7 +113,7 @@ def _show(console: Console, scenario: Scenario, curves: Sequence[Curve]) -> None
             ("  + range meter" if curve.range_meter else "", "impulse, m/s", results.impulse_m_s),
         )
         for title, quantity, values in rows:
-            table.add_row(title, quantity, *(number(value) for value in shown_quantiles(values, LEVELS)))
+            table.add_row(title, quantity, *(number(value) for value in shown_quantiles(values, levels)))
         (median,) = shown_quantiles(bounds, [0.5]) if len(bounds) else (None,)
         table.add_row("", bound_name(scenario), "", number(median))
         lines = [
@@ -138,7 +135,7 @@ def _show(console: Console, scenario: Scenario, curves: Sequence[Curve]) -> None
         )
         notes.append(f"paper (one run from z = -8 km, no range meter): {figures}")
     runs = len(curves[0].results)
-    notes += quantile_notes(runs, LEVELS)
+    notes += quantile_notes(runs, levels)
     print_lines(console, [f"{scenario.name}: quantiles of {runs} runs per curve"])
     console.print(table)
     print_lines(console, notes)

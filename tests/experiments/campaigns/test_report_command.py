@@ -85,7 +85,7 @@ def test_no_digit_is_cut_at_60_columns(infoset: Infoset, folder: Path, monkeypat
     table = [line.split() for line in out.splitlines() if " p99 " in line]
     assert len(table) == 6  # three quantities, two noises
     assert all(float(row[row.index("p99") + 1]) > 0.0 for row in table)
-    assert "150 runs do not show these quantiles: 99.9 %; 1000 runs show all" in out
+    assert "150 runs are too few for p99.9; 1000 runs show all quantiles" in out
 
 
 def test_a_report_writes_nothing_unasked(infoset: Infoset, folder: Path, tmp_path: Path) -> None:

@@ -97,7 +97,7 @@ def test_the_table(infoset: Infoset) -> None:
     code, out, _ = infoset(*TWO, "--runs", 2, "--no-range-meter")
     assert code == 0
     assert "asteroid-1997, without range meter, model guaranteed: quantiles of 2 runs" in out
-    for part in ("10%", "50%", "99%", "worst", "symmetric-miss  miss, m", "impulse, m/s", "random", "game"):
+    for part in ("p10", "p50", "p99", "max", "symmetric-miss  miss, m", "impulse, m/s", "random", "game"):
         assert part in out
     assert max(len(line.rstrip()) for line in out.splitlines()[1:]) <= 80
 

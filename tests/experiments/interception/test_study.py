@@ -21,7 +21,7 @@ from sim import Body, Scenario, estimate_hits, quantiles, simulate
 
 Infoset = Callable[..., tuple[int, str, str]]
 KEYS = ["runs", "hits", "probability", "lower", "upper"]
-WARNING = "the quantiles describe these failures of the model too; to see those of the guidance and the sensors, use"
+WARNING = "the quantiles include these failures of the model; for quantiles without them, use --model guaranteed"
 EMPTY = "set became empty: 0 of 3 runs (0 %)"
 
 
