@@ -20,7 +20,14 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocat
 from numpy.typing import NDArray
 
 from experiments.campaigns.axis_names import key_label, unit_of
-from experiments.campaigns.sweep_table import Limit, SweepTable, answers, limits
+from experiments.campaigns.sweep_table import (
+    SweepTable,
+    answers,
+    limit_text,
+    limits,
+    separating_digits,
+    spans_decades,
+)
 from experiments.common.figure_style import (
     CURVE_LOOKS,
     IMPULSE,
@@ -68,8 +75,7 @@ _LETTERS = "abcdefghijklmnopqrstuvwxyz"
 _MOST_TICKS = 8
 _HEAD_ROOM = 1.06
 """Factor of the axis, for the arrow of the topmost point."""
-_LOG_FROM = 30.0
-"""Ratio of the greatest to the least value from which the values have a logarithmic axis."""
+_DIAMOND: dict[str, Any] = {"marker": "D", "markersize": 4.0, "color": IMPULSE, "mec": "white", "mew": 0.6}
 _STRIP = 0.045
 """Height of the strip of decisions above a panel, as a fraction of the panel."""
 _BAR_AT, _NUMBER_AT = 0.2, 0.6
@@ -123,8 +129,8 @@ def _lines(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figu
     levels = sorted({quantile.level for quantile in shown}, reverse=True)
     rows = -(-len(quantities) // 2)
     columns = min(2, len(quantities))
-    figure = new_figure(height_mm=rows * _PANEL_MM + (rows - 1) * 24.0 + 45.0, width_mm=_COLUMN_MM * columns)
-    grid = place_axes(figure, rows, columns, margins_mm=(17.0, 4.0, 34.0, 11.0), gaps_mm=(18.0, 24.0))
+    figure = new_figure(height_mm=rows * _PANEL_MM + (rows - 1) * 24.0 + 49.0, width_mm=_COLUMN_MM * columns)
+    grid = place_axes(figure, rows, columns, margins_mm=(17.0, 4.0, 38.0, 11.0), gaps_mm=(18.0, 24.0))
     panels = [axes for row in grid for axes in row]
     for axes, quantity, letter in zip(panels, quantities, _LETTERS, strict=False):
         quantiles = [quantile for quantile in shown if quantile.quantity == quantity]
@@ -141,9 +147,16 @@ def _lines(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figu
     handles += [Patch(facecolor=colour, label=str(decision)) for decision, colour in DECISION_COLOURS.items()]
     if table.radius_m is not None:
         handles.append(Line2D([], [], color=LIMIT, linestyle="--", linewidth=0.9, label="radius of the body"))
-    note = "bars: 95 % confidence intervals; arrow: too few runs for an upper end; shaded: limit with 95 % confidence"
+    handles.append(Patch(facecolor=IMPULSE, alpha=0.15, label="range of the limit"))
+    handles.append(_interpolated())
+    note = "bars: 95 % confidence intervals; arrow: too few runs for an upper end"
     figure.legend(handles=handles, loc="lower center", ncols=4, title=note, title_fontsize=7.0)
     return figure
+
+
+def _interpolated() -> Line2D:
+    """Return the mark of an interpolated limit for a legend."""
+    return Line2D([], [], linestyle="none", label="limit by interpolation", **_DIAMOND)
 
 
 def _line_panel(
@@ -180,7 +193,12 @@ def _line_panel(
         axes.axhline(table.radius_m, color=LIMIT, linestyle="--", linewidth=0.9, zorder=2.5)
     if quantity == required.quantity:
         axes.axhline(required.bound, color=IMPULSE, linewidth=0.9, zorder=2.5)
-    _scale_values(axes, quantity, [point.value for points, _ in lines for point in points if point.value is not None])
+    values = [point.value for points, _ in lines for point in points if point.value is not None]
+    if quantity == required.quantity:
+        # The scale of the required estimates is also that of the interpolation of limits.
+        verdicts = (table.verdict(cell, noise) for cell in range(len(table.cells)))
+        values = [item.value for item in verdicts if item is not None and item.value is not None] or values
+    _scale_values(axes, quantity, values)
     _scale(axes, axis, "x")
     if quantity == required.quantity:
         _mark_decisions(axes, table, noise)
@@ -211,16 +229,10 @@ def _mark_decisions(axes: Axes, table: SweepTable, noise: str) -> None:
     for limit in answer.limits:
         axes.axvspan(limit.lower, limit.upper, color=IMPULSE, alpha=0.15, linewidth=0.0, zorder=0.5)
         if limit.value is not None:
-            axes.axvline(limit.value, color=IMPULSE, linewidth=0.9, linestyle=":", zorder=2.5)
+            axes.plot([limit.value], [table.required.bound], zorder=5.0, **_DIAMOND)
     if answer.limits:
-        words = "; ".join(_limit_words(axis, limit) for limit in answer.limits[:2])
-        axes.set_xlabel(f"{axes.get_xlabel()}\nlimit: {words}")
-
-
-def _limit_words(axis: Axis, limit: Limit) -> str:
-    unit = unit_of(axis.key)
-    value = "" if limit.value is None else f"{limit.value:.3g}, "
-    return f"{value}between {limit.lower:.3g} and {limit.upper:.3g} {unit}".rstrip()
+        words = "; ".join(limit_text(axis, limit) for limit in answer.limits[:2])
+        axes.set_xlabel("\n".join([axes.get_xlabel(), *textwrap.wrap(f"limit {words}", 60)]))
 
 
 def _maps(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figure:
@@ -245,9 +257,8 @@ def _maps(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figur
     for unused in others[len(quantiles) :]:
         unused.remove()
     handles: list[Any] = [Patch(facecolor=colour, label=str(decision)) for decision, colour in DECISION_COLOURS.items()]
-    handles.append(
-        Line2D([], [], color=IMPULSE, marker="D", markersize=4.0, linewidth=1.5, label="limit, with 95 % confidence")
-    )
+    handles.append(Line2D([], [], color=IMPULSE, linewidth=1.5, label="range of the limit"))
+    handles.append(_interpolated())
     numbers = f"numbers in (a): {QUANTITY_NAMES[required.quantity]}"
     if isinstance(required, Requirement):
         numbers += f", {level_name(required.quantile.level)}"
@@ -284,12 +295,12 @@ def _decision_panel(axes: Axes, table: SweepTable, noise: str) -> None:
     _write_numbers(axes, across, up, values.T, lambda row, column: shown[column, row] == 0, _NUMBER_AT)
     for row, height in enumerate(_heights(up, _BAR_AT)):
         cells = [verdicts[column * shape[1] + row] for column in range(shape[0])]
-        for limit in limits(across, cells, table.required.bound):
+        for limit in limits(across, cells, table.required):
             ends = [limit.lower, limit.upper]
             axes.plot(ends, [height, height], color="white", linewidth=3.2, solid_capstyle="butt", zorder=4.0)
             axes.plot(ends, [height, height], color=IMPULSE, linewidth=1.5, solid_capstyle="butt", zorder=4.5)
             if limit.value is not None:
-                axes.plot([limit.value], [height], "D", markersize=4.0, color=IMPULSE, mec="white", mew=0.6, zorder=5.0)
+                axes.plot([limit.value], [height], zorder=5.0, **_DIAMOND)
     separate_labels(axes)
 
 
@@ -372,8 +383,7 @@ def _scale_values(axes: Axes, quantity: str, values: Sequence[float]) -> None:
     if quantity == "hit":
         axes.set_ylim(-0.03, 1.03)
         return
-    positive = [value for value in values if value > 0.0]
-    if positive and len(positive) == len(values) and max(positive) > _LOG_FROM * min(positive):
+    if spans_decades(values):
         axes.set_yscale("log")
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
@@ -391,8 +401,8 @@ def _scale(axes: Axes, axis: Axis, which: str) -> None:
     if len(axis.values) <= _MOST_TICKS:
         one.set_major_locator(FixedLocator(axis.values))
         one.set_minor_locator(NullLocator())
-    power = _power(axis)
-    one.set_major_formatter(FuncFormatter(lambda tick, _: f"{float(f'{tick / 10.0**power:.3g}'):g}"))
+    power, digits = _power(axis), max(3, separating_digits(axis))
+    one.set_major_formatter(FuncFormatter(lambda tick, _: f"{float(f'{tick / 10.0**power:.{digits}g}'):.{digits}g}"))
     one.set_minor_formatter(NullFormatter())
     one.set_tick_params(length=2.0)
     unit = unit_of(axis.key)

@@ -14,7 +14,16 @@ from rich.table import Table
 from experiments.campaigns.axis_names import unit_of
 from experiments.campaigns.samples import heading, sample_json
 from experiments.campaigns.sweep_figures import draw_sweep
-from experiments.campaigns.sweep_table import SHOWN, SHOWN_WITH_HITS, TABLE, SweepTable, answers, sweep_table
+from experiments.campaigns.sweep_table import (
+    SHOWN,
+    SHOWN_WITH_HITS,
+    TABLE,
+    SweepTable,
+    answers,
+    sweep_table,
+    value_text,
+    values_text,
+)
 from experiments.common.errors import InputError
 from experiments.common.output import Output, hit_key
 from experiments.common.screen import number, number_table, print_lines, print_table
@@ -191,7 +200,7 @@ def decision_tables(table: SweepTable, noise: str) -> Iterator[tuple[str, Table]
             verdict = table.verdict(cell, noise)
             if verdict is not None:
                 ends = (verdict.lower, verdict.value, verdict.upper)
-                shown.add_row(f"{value:g}", str(verdict.decision), str(verdict.runs), *map(number, ends))
+                shown.add_row(value_text(first, value), str(verdict.decision), str(verdict.runs), *map(number, ends))
         yield "", shown
         return
     second, *rest = others
@@ -199,10 +208,12 @@ def decision_tables(table: SweepTable, noise: str) -> Iterator[tuple[str, Table]
     cells = np.arange(len(table.cells)).reshape(shape)
     for indices in itertools.islice(np.ndindex(*shape[2:]), MOST_LINES):
         grid = cells[(slice(None), slice(None), *indices)]
-        at = ", ".join(f"{axis.key} = {axis.values[index]:g}" for axis, index in zip(rest, indices, strict=True))
-        shown = number_table("", *(f"{value:g}" for value in second.values))
+        at = values_text(rest, indices)
+        shown = number_table("", *(value_text(second, value) for value in second.values))
         for row, value in enumerate(first.values):
-            shown.add_row(f"{value:g}", *(_entry(table.verdict(cell, noise)) for cell in grid[row].tolist()))
+            shown.add_row(
+                value_text(first, value), *(_entry(table.verdict(cell, noise)) for cell in grid[row].tolist())
+            )
         yield f"{first.key} (rows) and {second.key} (columns){f', at {at}' if at else ''}", shown
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from experiments.campaigns.axis_names import tied_keys, unit_of
 from experiments.campaigns.samples import LEVELS, OUTCOMES, Sample, noises_of, samples, shown_value
 from experiments.interception.study import SetCounts
-from sim import HitEstimate, QuantileEstimate, QuantileName, estimate_hits
+from sim import HitEstimate, QuantileEstimate, QuantileName, Requirement, estimate_hits
 from sim.requirement import AnyRequirement, Decision, Verdict, judge
 from sim.stopping_rule import QUANTITIES, level_name
 from sim.storage import Axis, CampaignFolder
@@ -25,6 +25,10 @@ Floats = NDArray[np.float64]
 TABLE = "sweep.parquet"
 SHOWN = tuple(QuantileName(quantity, level) for quantity in ("miss_m", "impulse_m_s") for level in (0.5, 0.99))
 SHOWN_WITH_HITS = (SHOWN[0], SHOWN[1], SHOWN[3])
+_LOG_FROM = 30.0
+"""Ratio of the greatest to the least value from which the values have a logarithmic axis."""
+_MOST_WHOLE = 1e9
+"""Whole numbers below this one are printed with all digits."""
 
 
 @dataclass(frozen=True)
@@ -156,11 +160,10 @@ class Limit:
     Parameters
     ----------
     value : float or None
-        Interpolated between the estimates of two neighbouring cells; None if undecided cells lie at the limit, or an
-        estimate is not known.
+        By interpolation between the estimates of two neighbouring cells, without a confidence; None if undecided cells
+        lie between them, or an estimate is not known or is on the other side of the bound than the decision.
     lower, upper : float
-        The limit lies between these values: where the ends of the confidence intervals reach the bound, or the decided
-        cells around the undecided ones.
+        Values of the two decided cells around the limit: one meets the requirement, the other does not.
     """
 
     value: float | None
@@ -168,7 +171,7 @@ class Limit:
     upper: float
 
 
-def limits(axis: Axis, verdicts: Sequence[Verdict | None], bound: float) -> list[Limit]:
+def limits(axis: Axis, verdicts: Sequence[Verdict | None], required: AnyRequirement) -> list[Limit]:
     """Return the limits along an axis, each between a cell that meets the requirement and one that does not.
 
     Cells without runs are treated as undecided.
@@ -178,35 +181,74 @@ def limits(axis: Axis, verdicts: Sequence[Verdict | None], bound: float) -> list
     axis : Axis
         Axis whose scale is that of the interpolation.
     verdicts : sequence of Verdict or None
-        Verdict for each value of the axis.
-    bound : float
-        Bound of the requirement, in the unit of the verdicts.
+        Verdict for each value of the axis. The logarithms of the estimates are interpolated if `spans_decades`.
     """
     decided = [
         (index, verdict)
         for index, verdict in enumerate(verdicts)
         if verdict is not None and verdict.decision is not Decision.UNDECIDED
     ]
+    values = [verdict.value for verdict in verdicts if verdict is not None and verdict.value is not None]
+    log_values = isinstance(required, Requirement) and spans_decades(values)
     ends = []
     for (left, first), (right, last) in itertools.pairwise(decided):
-        if first.decision is last.decision:
-            continue
-        near, far = axis.values[left], axis.values[right]
-        if right > left + 1:
-            ends.append(Limit(None, near, far))
-            continue
-
-        def crossing(begin: float | None, end: float | None, near: float = near, far: float = far) -> float:
-            if begin is None or end is None:
-                # An open end is infinitely far from the bound, so that the line reaches it at the other cell.
-                return near if end is None else far
-            share = min(max((bound - begin) / (end - begin), 0.0), 1.0) if begin != end else 1.0
-            return near * (far / near) ** share if axis.scale == "log" else near + share * (far - near)
-
-        edges = sorted((crossing(first.lower, last.lower), crossing(first.upper, last.upper)))
-        known = first.value is not None and last.value is not None
-        ends.append(Limit(crossing(first.value, last.value) if known else None, edges[0], edges[1]))
+        if first.decision is not last.decision:
+            near, far = axis.values[left], axis.values[right]
+            value = None
+            if right == left + 1 and _agrees(first, required) and _agrees(last, required):
+                begin, bound, end = (
+                    math.log(number) if log_values else number
+                    for number in (first.value or 0.0, required.bound, last.value or 0.0)
+                )
+                share = (bound - begin) / (end - begin)
+                value = near * (far / near) ** share if axis.scale == "log" else near + share * (far - near)
+            ends.append(Limit(value, near, far))
     return ends
+
+
+def _agrees(verdict: Verdict, required: AnyRequirement) -> bool:
+    """Return whether the estimate is known and on the same side of the bound as the decision.
+
+    It can be on the other side if runs were added after the decision.
+    """
+    if verdict.value is None:
+        return False
+    is_below = isinstance(required, Requirement) == (verdict.decision is Decision.MET)
+    return (verdict.value < required.bound) == is_below
+
+
+def spans_decades(values: Sequence[float]) -> bool:
+    """Return whether values are positive and differ so much that they are drawn on a logarithmic axis."""
+    return bool(values) and max(values) > _LOG_FROM * min(values) > 0.0
+
+
+def separating_digits(axis: Axis) -> int:
+    """Return the number of significant digits that separate neighbouring values of an axis."""
+    return max(_digits(max(abs(low), abs(high)), high - low) for low, high in itertools.pairwise(axis.values))
+
+
+def _digits(value: float, gap: float) -> int:
+    """Return the number of digits of a value down to the first digit of a gap."""
+    return 1 + math.floor(math.log10(value)) - math.floor(math.log10(abs(gap) * (1.0 + 1e-9))) if value and gap else 1
+
+
+def value_text(axis: Axis, value: float) -> str:
+    """Return a value of an axis, with six digits or those that separate it from its neighbours."""
+    if value == round(value) and abs(value) < _MOST_WHOLE:
+        return f"{value:.0f}"
+    return f"{value:.{max(6, 1 + separating_digits(axis))}g}"
+
+
+def limit_text(axis: Axis, limit: Limit) -> str:
+    """Return a limit as text: `between the decided cells 2 and 3 s, by interpolation about 2.2 s`."""
+    unit = unit_of(axis.key)
+    ends = f"between the decided cells {value_text(axis, limit.lower)} and {value_text(axis, limit.upper)}"
+    text = _with_unit(ends, unit)
+    if limit.value is None:
+        return text
+    digits = max(1, 1 + _digits(abs(limit.value), limit.upper - limit.lower))
+    value = value_text(axis, float(f"{limit.value:.{digits}g}"))
+    return f"{text}, by interpolation about {_with_unit(value, unit)}"
 
 
 @dataclass(frozen=True)
@@ -228,27 +270,19 @@ class Answer:
     limits: Sequence[Limit]
 
 
-def answer(axis: Axis, verdicts: Sequence[Verdict | None], bound: float, at: str = "") -> Answer:
+def answer(axis: Axis, verdicts: Sequence[Verdict | None], required: AnyRequirement, at: str = "") -> Answer:
     """Return the decisions and limits along an axis."""
     unit = unit_of(axis.key)
     words = ["not simulated" if verdict is None else str(verdict.decision) for verdict in verdicts]
-    ends = limits(axis, verdicts, bound)
+    ends = limits(axis, verdicts, required)
     if len(set(words)) == 1:
         return Answer(at, f"{words[0]} at all {len(words)} values", ends)
     pieces = []
     for word, group in itertools.groupby(range(len(words)), lambda index: words[index]):
         indices = list(group)
-        first, last = (axis.values[index] for index in (indices[0], indices[-1]))
-        pieces.append(
-            _with_unit(f"{word} at {first:g}" if first == last else f"{word} from {first:g} to {last:g}", unit)
-        )
-    for end in ends:
-        interval = _with_unit(f"between {end.lower:.3g} and {end.upper:.3g}", unit)
-        known = "" if end.value is None else f"{_with_unit(f'{end.value:.3g}', unit)}, with 95 % confidence "
-        pieces.append(f"limit {known}{interval}")
-    return Answer(
-        at, "; ".join([", ".join(pieces[: len(pieces) - len(ends)]), *pieces[len(pieces) - len(ends) :]]), ends
-    )
+        first, last = (value_text(axis, axis.values[index]) for index in (indices[0], indices[-1]))
+        pieces.append(_with_unit(f"{word} at {first}" if len(indices) == 1 else f"{word} from {first} to {last}", unit))
+    return Answer(at, "; ".join([", ".join(pieces), *(f"limit {limit_text(axis, end)}" for end in ends)]), ends)
 
 
 def _with_unit(text: str, unit: str) -> str:
@@ -264,8 +298,15 @@ def answers(table: SweepTable, noise: str) -> list[Answer]:
         answer(
             first,
             [table.verdict(cell, noise) for cell in cells[(slice(None), *indices)].tolist()],
-            table.required.bound,
-            ", ".join(f"{axis.key} = {axis.values[index]:g}" for axis, index in zip(others, indices, strict=True)),
+            table.required,
+            values_text(others, indices),
         )
         for indices in np.ndindex(*shape[1:])
     ]
+
+
+def values_text(axes: Sequence[Axis], indices: Sequence[int]) -> str:
+    """Return the values at some indices of axes: `thruster.budget_m_s = 200, nominal.range_km = 5800`."""
+    return ", ".join(
+        f"{axis.key} = {value_text(axis, axis.values[index])}" for axis, index in zip(axes, indices, strict=True)
+    )

@@ -19,7 +19,7 @@ from experiments.campaigns.axis_names import key_label, unit_of
 from experiments.campaigns.samples import Sample
 from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
 from experiments.campaigns.sweep_figures import draw_sweep
-from experiments.campaigns.sweep_table import SHOWN, Limit, SweepTable, answer, limits, sweep_table
+from experiments.campaigns.sweep_table import SHOWN, Limit, SweepTable, answer, limits, spans_decades, sweep_table
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
 from experiments.interception.study import SetCounts
 from sim import (
@@ -33,7 +33,7 @@ from sim import (
     quantiles,
     simulate,
 )
-from sim.requirement import Decision, HitRequirement, Verdict
+from sim.requirement import Decision, HitRequirement, Verdict, judge
 from sim.storage import Axis, CampaignFolder
 from tests.experiments.campaigns.figure_room import need_room
 
@@ -226,49 +226,128 @@ def test_a_large_sweep_asks_on_a_terminal(
 MET, NOT_MET, OPEN = Decision.MET, Decision.NOT_MET, Decision.UNDECIDED
 
 
-def verdict(value: float, decision: Decision, half: float = 1.0) -> Verdict:
-    return Verdict(decision, 20, value, value - half, value + half, 20, 20)
+def verdict(value: float | None, decision: Decision) -> Verdict:
+    return Verdict(decision, 20, value, None, None, 20, 20)
 
 
 def test_limits_are_interpolated_between_neighbouring_decided_cells_only() -> None:
     axis = Axis("guidance.step_s", (1.0, 2.0, 4.0))
     met, missed, undecided = verdict(5.0, MET), verdict(15.0, NOT_MET), verdict(10.5, OPEN)
-    assert limits(axis, (met, missed, met), 10.0) == [Limit(1.5, 1.4, 1.6), Limit(3.0, 2.8, 3.2)]
-    (limit,) = limits(Axis("a", (1.0, 100.0), "log"), (met, missed), 10.0)
-    assert (limit.value, limit.lower, limit.upper) == pytest.approx((10.0, 10.0**0.8, 10.0**1.2))
-    assert limits(axis, (met, undecided, missed), 10.0) == [Limit(None, 1.0, 4.0)]
-    assert limits(axis, (met, None, missed), 10.0) == [Limit(None, 1.0, 4.0)]
-    assert limits(axis, (undecided, missed, undecided), 10.0) == []
-    unbounded = replace(missed, upper=None)
-    assert limits(axis, (met, unbounded, missed), 10.0) == [Limit(1.5, 1.0, 1.6)]
-    assert limits(axis, (unbounded, met, met), 10.0) == [Limit(1.5, 1.4, 2.0)]
+    assert limits(axis, (met, missed, met), REQUIRED) == [Limit(1.5, 1.0, 2.0), Limit(3.0, 2.0, 4.0)]
+    (limit,) = limits(Axis("a", (1.0, 100.0), "log"), (met, missed), REQUIRED)
+    assert (limit.value, limit.lower, limit.upper) == pytest.approx((10.0, 1.0, 100.0))
+    assert limits(axis, (met, undecided, missed), REQUIRED) == [Limit(None, 1.0, 4.0)]
+    assert limits(axis, (met, None, missed), REQUIRED) == [Limit(None, 1.0, 4.0)]
+    assert limits(axis, (undecided, missed, undecided), REQUIRED) == []
+    assert limits(axis, (met, verdict(None, NOT_MET), missed), REQUIRED) == [Limit(None, 1.0, 2.0)]
+    # The logarithms of quantiles over decades are interpolated; shares are interpolated without.
+    decades = (verdict(1.0, MET), verdict(100.0, NOT_MET))
+    assert limits(Axis("a", (1.0, 2.0)), decades, REQUIRED)[0].value == pytest.approx(1.5)
+    shares = (verdict(1.0, MET), verdict(0.02, NOT_MET))
+    assert limits(Axis("a", (1.0, 2.0)), shares, HitRequirement(0.51))[0].value == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize(
+    ("required", "first", "last"),
+    [
+        (REQUIRED, 11.0, 15.0),
+        (REQUIRED, 5.0, 9.0),
+        (REQUIRED, 11.0, 9.0),
+        (HitRequirement(0.95), 0.94, 0.9),
+        (HitRequirement(0.95), 0.97, 0.96),
+    ],
+)
+def test_no_limit_is_interpolated_if_an_estimate_contradicts_its_decision(
+    required: Requirement | HitRequirement, first: float, last: float
+) -> None:
+    axis = Axis("a", (1.0, 2.0))
+    assert limits(axis, (verdict(first, MET), verdict(last, NOT_MET)), required) == [Limit(None, 1.0, 2.0)]
+
+
+def test_an_early_decision_can_exclude_the_estimate_of_its_cell() -> None:
+    required = HitRequirement(0.5)
+    turned = np.repeat([1.0, 0.0], [12, 60])
+    met, missed = judge(turned, required, watched=True), judge(np.zeros(72), required, watched=True)
+    assert (met.decision, missed.decision) == (MET, NOT_MET)
+    assert met.value is not None
+    assert met.value < 0.5
+    assert limits(Axis("a", (1.0, 2.0)), (met, missed), required) == [Limit(None, 1.0, 2.0)]
+
+
+def test_limits_hold_the_true_limit_of_an_exponential_dependence() -> None:
+    """A straight line between the ends of the confidence intervals never holds it: the limit is 1.997."""
+    axis, required = Axis("a", tuple(np.linspace(0.0, 4.0, 4))), Requirement(QuantileName("miss_m", 0.9), 10.0)
+    generator, held = np.random.default_rng(3), 0
+    factor = math.exp(0.5 * 1.2815515655446004)  # the 90 % quantile of the distribution below, by its median
+    for _ in range(50):
+        misses = np.exp(0.5 * generator.standard_normal(400)) / factor
+        verdicts = [judge(0.5 * math.exp(1.5 * x) * misses, required, watched=False) for x in axis.values]
+        (limit,) = limits(axis, verdicts, required)
+        held += limit.lower <= math.log(20.0) / 1.5 <= limit.upper
+        assert limit.value == pytest.approx(math.log(20.0) / 1.5, abs=0.1)
+    assert held == 50
 
 
 def test_answers_in_words() -> None:
     axis = Axis("guidance.step_s", (1.0, 2.0, 4.0))
     met, missed, undecided = verdict(5.0, MET), verdict(15.0, NOT_MET), verdict(10.5, OPEN)
-    assert answer(axis, (met, missed, missed), 10.0).met == (
-        "met at 1 s, not met from 2 to 4 s; limit 1.5 s, with 95 % confidence between 1.4 and 1.6 s"
+    assert answer(axis, (met, missed, missed), REQUIRED).met == (
+        "met at 1 s, not met from 2 to 4 s; limit between the decided cells 1 and 2 s, by interpolation about 1.5 s"
     )
-    assert answer(axis, (met, undecided, missed), 10.0).met == (
-        "met at 1 s, undecided at 2 s, not met at 4 s; limit between 1 and 4 s"
+    assert answer(axis, (met, undecided, missed), REQUIRED).met == (
+        "met at 1 s, undecided at 2 s, not met at 4 s; limit between the decided cells 1 and 4 s"
     )
-    assert answer(axis, (met, met, met), 10.0).met == "met at all 3 values"
-    assert answer(axis, (undecided, undecided, undecided), 10.0).met == "undecided at all 3 values"
-    assert answer(axis, (None, None, None), 10.0).met == "not simulated at all 3 values"
+    assert answer(axis, (met, met, met), REQUIRED).met == "met at all 3 values"
+    assert answer(axis, (undecided, undecided, undecided), REQUIRED).met == "undecided at all 3 values"
+    assert answer(axis, (None, None, None), REQUIRED).met == "not simulated at all 3 values"
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "words"),
+    [
+        (
+            "a.b_m",
+            (1000.1, 1000.2, 1000.3),
+            "met at 1000.1 m, not met from 1000.2 to 1000.3 m; "
+            "limit between the decided cells 1000.1 and 1000.2 m, by interpolation about 1000.15 m",
+        ),
+        (
+            "a.b",
+            (3000000.0, 3000001.0, 3000002.0),
+            "met at 3000000, not met from 3000001 to 3000002; "
+            "limit between the decided cells 3000000 and 3000001, by interpolation about 3000000.5",
+        ),
+        (
+            "a.b_rad",
+            (1e-5, 2e-5, 4e-5),
+            "met at 1e-05 rad, not met from 2e-05 to 4e-05 rad; "
+            "limit between the decided cells 1e-05 and 2e-05 rad, by interpolation about 1.5e-05 rad",
+        ),
+        (
+            "a.b",
+            (0.0, 900.0, 2500000.0),
+            "met at 0, not met from 900 to 2500000; "
+            "limit between the decided cells 0 and 900, by interpolation about 450",
+        ),
+    ],
+)
+def test_digits_of_answers_separate_neighbouring_cells(key: str, values: tuple[float, ...], words: str) -> None:
+    assert answer(Axis(key, values), [verdict(5.0, MET), *[verdict(15.0, NOT_MET)] * 2], REQUIRED).met == words
 
 
 @given(values=st.lists(st.floats(0.0, 20.0), min_size=2, max_size=12), bound=st.floats(1.0, 19.0))
 def test_limits_lie_between_cells_on_either_side_of_the_bound(values: list[float], bound: float) -> None:
     axis = Axis("a", tuple(float(index) for index in range(len(values))))
-    verdicts = [verdict(value, MET if value < bound else NOT_MET, 0.0) for value in values]
-    found = limits(axis, verdicts, bound)
+    verdicts = [verdict(value, MET if value < bound else NOT_MET) for value in values]
+    found = limits(axis, verdicts, Requirement(SHOWN[1], bound))
     changes = [left for left in range(len(values) - 1) if (values[left] < bound) != (values[left + 1] < bound)]
     assert len(found) == len(changes)
+    drawn = np.log if spans_decades(values) else np.array
     for limit, left in zip(found, changes, strict=True):
         assert limit.value is not None
-        assert left <= limit.lower <= limit.value <= limit.upper <= left + 1
-        assert np.interp(limit.value, axis.values, values) == pytest.approx(bound, rel=1e-9)
+        assert (left, left + 1) == (limit.lower, limit.upper)
+        assert left <= limit.value <= left + 1
+        assert np.interp(limit.value, axis.values, drawn(values)) == pytest.approx(drawn(bound), rel=1e-9, abs=1e-9)
 
 
 def test_twenty_runs_decide_no_99_percent_quantile(infoset: Infoset, file: Path, tmp_path: Path) -> None:
