@@ -2,21 +2,10 @@
 
 from __future__ import annotations
 
+from experiments.common.display_units import split_unit
+
 SCALE = "scale"
 """Name, after the table of a sensor, of the factor of its error bounds."""
-UNITS = {
-    "km3_s2": "km\N{SUPERSCRIPT THREE}/s\N{SUPERSCRIPT TWO}",
-    "m_s2": "m/s\N{SUPERSCRIPT TWO}",
-    "km_s": "km/s",
-    "m_s": "m/s",
-    "rad_s": "rad/s",
-    "rad": "rad",
-    "deg": "deg",
-    "km": "km",
-    "m": "m",
-    "s": "s",
-}
-"""Units by the end of the key."""
 
 
 def tied_keys(key: str) -> list[str]:
@@ -26,8 +15,7 @@ def tied_keys(key: str) -> list[str]:
 
 def unit_of(key: str) -> str:
     """Return the unit in the name of a key; empty if it has none."""
-    name = _parts(tied_keys(key)[0])[1]
-    return next((unit for end, unit in UNITS.items() if name.endswith(f"_{end}")), "")
+    return split_unit(_parts(tied_keys(key)[0])[1])[1]
 
 
 def key_label(key: str) -> str:
@@ -47,8 +35,7 @@ def _words(key: str) -> str:
     _, name, end = _parts(key)
     if name == SCALE:
         return "factor of the error bounds"
-    words = next((name.removesuffix(f"_{unit}") for unit in UNITS if name.endswith(f"_{unit}")), name)
-    return f"{words} {end}".strip()
+    return f"{split_unit(name)[0]} {end}".strip()
 
 
 def _parts(key: str) -> tuple[str, str, str]:

@@ -20,8 +20,8 @@ Required = Annotated[
         "--require",
         metavar="RULE",
         help='Requirement: the upper bound of a quantile, "miss_m p99<10", or the least probability of a hit, '
-        '"hit>=0.95". Each cell meets it, does not meet it, or is undecided, with 95 % confidence. Default: one of '
-        "these two, the second if the body has a size; in a report, that of the sweep.",
+        '"hit>=0.95". Each cell meets it, does not meet it, or is undecided, with 95 % confidence. Default: in a '
+        "report, that of the sweep; otherwise hit>=0.95 if the body has a size, else miss_m p99<10.",
     ),
 ]
 Shown = Annotated[
@@ -49,7 +49,7 @@ class Flight:
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
     runs: Annotated[
-        int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs; in a sweep, of each cell, at least.")
+        int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs; in a sweep, of each cell.")
     ]
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the runs; created if needed.")]
     noise: Annotated[

@@ -1,4 +1,4 @@
-"""Units of times and lengths in figures and pages."""
+"""Units in tables, figures and pages."""
 
 from __future__ import annotations
 
@@ -23,3 +23,21 @@ def length_unit(size_m: float) -> Unit:
         if size_m > least:
             return name, 1.0 / metres
     return "m", 1.0
+
+
+_UNITS = {
+    "km3_s2": "km\N{SUPERSCRIPT THREE}/s\N{SUPERSCRIPT TWO}",
+    "m_s2": "m/s\N{SUPERSCRIPT TWO}",
+    "km_s": "km/s",
+    "m_s": "m/s",
+    "rad_s": "rad/s",
+    **{unit: unit for unit in ("rad", "deg", "km", "kg", "m", "s", "N")},
+}
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """Return the words and the unit of a key or a column: ``impulse`` and ``m/s`` of ``impulse_m_s``."""
+    for end, unit in _UNITS.items():
+        if name.endswith(f"_{end}"):
+            return name.removesuffix(f"_{end}").replace("_", " "), unit
+    return name.replace("_", " "), ""

@@ -11,6 +11,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from experiments.common.display_units import split_unit
 from experiments.common.figure_style import INK, LIMIT, new_figure, style
 from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus
 
@@ -41,7 +42,6 @@ _RATIOS = {
     "thrust_ratio": "thrust of the evader / thrust of the pursuer",
     "mass_ratio": "mass of the evader / mass of the pursuer",
 }
-_UNITS = {"km3_s2": "km$^3$/s$^2$", "deg": "deg", "km": "km", "kg": "kg", "N": "N", "s": "s"}
 
 
 def counted(solved: CaptureMap) -> str:
@@ -92,11 +92,7 @@ def draw_map(solved: CaptureMap, column: str, row: str) -> Figure:
 def axis_name(parameter: str) -> str:
     """Return the axis label of a parameter: `evader: inclination, deg` for `evader.inclination_deg`."""
     owner, _, key = parameter.rpartition(".")
-    words = _RATIOS.get(key)
-    for ending, unit in _UNITS.items():
-        if words is None and key.endswith(f"_{ending}"):
-            words = f"{key.removesuffix(f'_{ending}').replace('_', ' ')}, {unit}"
-    words = words or key.replace("_", " ")
+    words = _RATIOS.get(key) or ", ".join(filter(None, split_unit(key)))
     return f"{owner}: {words}" if owner else words
 
 
