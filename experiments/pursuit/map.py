@@ -9,14 +9,14 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.common.display_units import M_PER_KM
+from experiments.common.display_units import M_PER_KM, S_PER_HOUR
 from experiments.common.errors import InputError, shown
 from experiments.common.options import choice
 from experiments.common.output import Cell, library_version, output_of, to_csv, to_json
 from experiments.common.screen import figure_files, print_lines, progress_bar, say_warnings, table_console
 from experiments.pursuit.command import ROWS, PursuitMap
 from experiments.pursuit.file import PursuitProblem, load_pursuit, parameter_names
-from experiments.pursuit.map_figure import S_PER_HOUR, counted, draw_map
+from experiments.pursuit.map_figure import STATUS_WORDS, counted, draw_map
 from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus, capture_map
 
 FIGURE = "figure-map"
@@ -26,6 +26,9 @@ COLUMNS_OF_STATES = "mass_ratio=0.5:1.5:21"
 PHASE_BY_THRUST = 12.0
 """Half the span of the columns in radians, per thrust acceleration over gravity: about the change of phase in one
 revolution."""
+
+
+_COMPUTED = (PointStatus.FOLLOWED, PointStatus.NEIGHBOUR)
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,9 @@ def run(options: PursuitMap) -> None:
     if solved.capture_s.count():
         least, greatest = (float(time_s) / S_PER_HOUR for time_s in (solved.capture_s.min(), solved.capture_s.max()))
         lines.append(f"capture times from {least:.4f} to {greatest:.4f} h")
+    if written.wants("--json") or written.wants("--csv"):
+        words = (f'"{status.value}" is {STATUS_WORDS[status]}' for status in _COMPUTED)
+        lines.append(f"status in the files: {', '.join(words)}")
     if solved.count(PointStatus.NEIGHBOUR):
         lines.append(
             "points continued from a neighbour are local saddle points: earlier captures are not excluded there; "
@@ -127,15 +133,17 @@ def _summary(problem: PursuitProblem, x: Axis, y: Axis, solved: CaptureMap, elap
         "solved_from_nothing": solved.solved_from_nothing,
         "capture_time_s": solved.capture_s,
         "closing_speed_km_s": solved.closing_speed_m_s / M_PER_KM,
+        "status_words": {status.value: words for status, words in STATUS_WORDS.items()},
         "status": [[STATUSES[status] for status in row] for row in solved.status],
     }
 
 
 def _table(x: Axis, y: Axis, solved: CaptureMap) -> tuple[list[str], list[list[Cell]]]:
-    times, speeds = solved.capture_s.tolist(), (solved.closing_speed_m_s / M_PER_KM).tolist()
+    times, hours = solved.capture_s.tolist(), (solved.capture_s / S_PER_HOUR).tolist()
+    speeds = (solved.closing_speed_m_s / M_PER_KM).tolist()
     rows: list[list[Cell]] = [
-        [float(column), float(row), times[j][i], speeds[j][i], STATUSES[solved.status[j, i]].value]
+        [float(column), float(row), times[j][i], hours[j][i], speeds[j][i], STATUSES[solved.status[j, i]].value]
         for j, row in enumerate(y.values)
         for i, column in enumerate(x.values)
     ]
-    return [x.parameter, y.parameter, "capture_time_s", "closing_speed_km_s", "status"], rows
+    return [x.parameter, y.parameter, "capture_time_s", "capture_time_h", "closing_speed_km_s", "status"], rows

@@ -11,13 +11,12 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from experiments.common.display_units import split_unit
+from experiments.common.display_units import S_PER_HOUR, split_unit
 from experiments.common.figure_style import INK, LIMIT, new_figure, style
 from rendezvous.pursuit_evasion import STATUSES, CaptureMap, PointStatus
 
 Floats = NDArray[np.float64]
 
-S_PER_HOUR = 3600.0
 _BOTTOM, _BOTTOM_WITH_LEGEND, _TOP = 0.18, 0.25, 0.93
 _SHADES = LinearSegmentedColormap.from_list("blues", ["#f4f8fc", "#b4d0e8", "#4f8bbf", "#0b3c74"])
 _DARK = 0.6
@@ -29,7 +28,7 @@ _UNKNOWN: dict[PointStatus, tuple[str, str]] = {
     PointStatus.PROPELLANT_EXHAUSTED: ("#d2d2d2", "\\\\\\\\"),
     PointStatus.NO_GAME: ("#ffffff", "xxxx"),
 }
-_WORDS = {
+STATUS_WORDS = {
     PointStatus.FOLLOWED: "solved from scratch",
     PointStatus.NEIGHBOUR: "continued from a neighbour",
     PointStatus.NOT_CERTIFIED: "not certified",
@@ -46,7 +45,7 @@ _RATIOS = {
 
 def counted(solved: CaptureMap) -> str:
     """Return the number of points of each status, for the terminal and the figure."""
-    counts = {words: solved.count(status) for status, words in _WORDS.items()}
+    counts = {words: solved.count(status) for status, words in STATUS_WORDS.items()}
     return ", ".join(f"{count} {words}" for words, count in counts.items() if count)
 
 
@@ -70,8 +69,9 @@ def draw_map(solved: CaptureMap, column: str, row: str) -> Figure:
         if hours.count() > 3 and min(hours.shape) > 1 and float(np.ptp(hours.compressed())) > 0.0:
             _draw_levels(axes, solved, hours)
     handles = _hatch_unknown(axes, solved)
-    axes.set_xlim(*_edges(solved.columns)[[0, -1]])
-    axes.set_ylim(*_edges(solved.rows)[[0, -1]])
+    # The cells of the outer points end at the range of the parameters, which values outside it may not have.
+    axes.set_xlim(*solved.columns[[0, -1]])
+    axes.set_ylim(*solved.rows[[0, -1]])
     axes.set_xlabel(axis_name(column))
     axes.set_ylabel(axis_name(row))
     axes.set_title("capture time, h")
@@ -123,7 +123,7 @@ def _hatch_unknown(axes: Any, solved: CaptureMap) -> list[Patch]:
         for j, first, last in _stretches(where):
             left, right, bottom, top = across[first], across[last + 1], up[j], up[j + 1]
             axes.fill([left, right, right, left], [bottom, bottom, top, top], **look)
-        handles.append(Patch(label=_WORDS[status], **look))
+        handles.append(Patch(label=STATUS_WORDS[status], **look))
     return handles
 
 

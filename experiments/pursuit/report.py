@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from rich.console import Console
 
-from experiments.common.display_units import M_PER_KM
+from experiments.common.display_units import M_PER_KM, S_PER_HOUR
 from experiments.common.output import STATE_COLUMNS, Cell, library_version, trajectories_csv
 from experiments.common.screen import number, number_table, print_lines, print_table
 from experiments.pursuit.file import PursuitProblem
@@ -19,6 +19,7 @@ from rendezvous.pursuit_evasion import (
     Flight,
     Observation,
     PlayerEnd,
+    Route,
     Solution,
     Verdict,
     capture_quantiles_s,
@@ -28,6 +29,12 @@ from rendezvous.pursuit_evasion import (
 _LEVELS = ("least", "10%", "50%", "90%", "greatest")
 _FEWEST = 10
 """Number of simulations from which quantiles are printed."""
+_METHODS = {
+    Route.CONTINUATION: "extremals for increasing durations, from zero to the capture",
+    Route.SWITCHED: "extremals for increasing durations, with a change to those that keep the evader farther away",
+    Route.HOMOTOPY: "the thrust of the evader raised from zero in steps",
+    Route.LINEAR_GAME: "the linear game as initial guess",
+}
 
 
 @dataclass(frozen=True)
@@ -114,6 +121,7 @@ def _certificate_json(certificate: Certificate) -> dict[str, object]:
     return {
         "saddle_point": certificate.claims_saddle_point,
         "failures": certificate.failures,
+        "undecided": certificate.undecided,
         "residual": certificate.residual,
         "hamiltonian_drift": certificate.hamiltonian_drift,
         "second_integrator_gap_m": certificate.integrator_gap_m,
@@ -182,31 +190,45 @@ def _captured(feedback: Feedback) -> int:
 
 def print_report(console: Console, report: Report) -> None:
     """Print the verdict, the players, the certificate and the simulations."""
-    print_lines(console, [f"{report.problem.name}: {_verdict(report.solution)}"])
-    capture = report.solution.capture
-    if capture is not None:
-        table = number_table("player", "propellant\nkg", "final velocity\nkm/s")
-        for name, end in (("pursuer", capture.pursuer), ("evader", capture.evader)):
-            table.add_row(name, f"{end.propellant_kg:.8f}", _listed(end.velocity_m_s / M_PER_KM, 9))
-        print_table(console, table)
-        console.print(f"position of the capture, km: {_listed(capture.position_m / M_PER_KM, 6)}")
-        console.print(f"direction from pursuer to evader: {_listed(capture.direction, 9)}")
-        speed_km_s, curvature = capture.closing_speed_m_s / M_PER_KM, _listed(capture.curvature, 5)
-        console.print(f"closing speed {speed_km_s:.10f} km/s, curvature {curvature}")
+    solution = report.solution
+    print_lines(console, [f"{report.problem.name}: {_verdict(solution)}"])
+    if solution.capture is not None:
+        _print_capture(console, solution.capture, solution)
     if report.certificate is not None:
         print_lines(console, (f"  {line}" for line in _certificate_lines(report.certificate)))
     if report.feedback is not None:
         print_lines(console, _feedback_lines(report.feedback))
 
 
-def _listed(values: np.ndarray, digits: int) -> str:
-    return ", ".join(f"{value:.{digits}f}" for value in values)
+def _print_capture(console: Console, capture: Capture, solution: Solution) -> None:
+    """Print vectors as columns of their components, which a narrow screen does not break, and the scalars as lines."""
+    table = number_table(
+        "", "capture at\nkm", "direction\nto evader", "velocity of\npursuer, km/s", "velocity of\nevader, km/s"
+    )
+    vectors = (
+        capture.position_m / M_PER_KM,
+        capture.direction,
+        capture.pursuer.velocity_m_s / M_PER_KM,
+        capture.evader.velocity_m_s / M_PER_KM,
+    )
+    for axis, components in zip("xyz", zip(*vectors, strict=True), strict=True):
+        table.add_row(axis, *(f"{value:.{digits}f}" for value, digits in zip(components, (6, 9, 9, 9), strict=True)))
+    print_table(console, table)
+    least, greatest = capture.curvature
+    lines = [
+        f"propellant spent, kg: pursuer {capture.pursuer.propellant_kg:.8f}, evader {capture.evader.propellant_kg:.8f}",
+        f"closing speed {capture.closing_speed_m_s / M_PER_KM:.10f} km/s",
+        f"curvatures of the distance over the direction: {least:.5f} and {greatest:.5f} times "
+        f"{solution.units.length_m / M_PER_KM:.6g} km (positive at a saddle point)",
+        f"method: {_METHODS[solution.route]}",
+    ]
+    print_lines(console, lines)
 
 
 def _verdict(solution: Solution) -> str:
     until = f"{solution.looked_at_s:.1f} s" if solution.looked_at_s >= 1.0 else f"{solution.looked_at_s:.3g} s"
     if solution.capture is not None and solution.verdict is Verdict.CAPTURED:
-        return f"captured at {solution.capture.time_s:.6f} s ({solution.route.value})"
+        return f"captured at {solution.capture.time_s:.6f} s ({solution.capture.time_s / S_PER_HOUR:.4f} h)"
     if solution.verdict is Verdict.PROPELLANT_EXHAUSTED:
         return f"propellant-exhausted: the {solution.exhausted} has no propellant after {until}; no capture before"
     if solution.verdict is Verdict.ESCAPES:
@@ -216,7 +238,8 @@ def _verdict(solution: Solution) -> str:
         return "branch-not-certified: no game could be followed, not even a short one; check the units of the values"
     text = f"branch-not-certified: the extremals are a saddle up to a duration of {until}; no claim for longer ones"
     if solution.fallback is not None and solution.fallback_route is not None:
-        text += f" ({solution.fallback_route.value} finds an extremal at {solution.fallback.time_s:.3f} s)"
+        method = _METHODS[solution.fallback_route]
+        text += f" (another method finds an extremal at {solution.fallback.time_s:.3f} s: {method})"
     return text
 
 
@@ -244,10 +267,13 @@ def _certificate_lines(certificate: Certificate) -> Iterator[str]:
             f"directions: {certificate.directions_found} of {certificate.directions_tried} compared; {largest}, "
             f"tolerance {certificate.excess_tolerance_m:.2g} m"
         )
-        if missing := certificate.directions_tried - certificate.directions_found:
-            yield f"{missing} directions are inconclusive: no farthest extremal was found for one craft or both"
-    failures = "; ".join(certificate.failures)
-    yield f"saddle point: {f'not claimed: {failures}' if failures else 'all checks hold'}"
+    if certificate.failures:
+        yield f"saddle point: not claimed: {'; '.join(certificate.failures)}"
+    elif certificate.undecided:
+        why = "no farthest extremal was found for one craft or both"
+        yield f"saddle point: all conclusive checks hold; {'; '.join(certificate.undecided)} ({why})"
+    else:
+        yield "saddle point: all checks hold"
 
 
 def _feedback_lines(feedback: Feedback) -> Iterator[str]:

@@ -129,13 +129,19 @@ class Certificate:
         return tuple(failures)
 
     @property
+    def undecided(self) -> tuple[str, ...]:
+        """Return a phrase for each check that is only partly conclusive; it fails no claim, but limits it."""
+        undecided = self.directions_tried - self.directions_found
+        return (f"{undecided} of {self.directions_tried} directions were not decided",) if undecided else ()
+
+    @property
     def excess_tolerance_m(self) -> float:
         """Return the tolerance of `greatest_excess_m`: the scan is less accurate than the solution of the game."""
         return MOST_EXCESS * self.unit_length_m
 
     @property
     def claims_saddle_point(self) -> bool:
-        """Whether all checks are passed; otherwise the capture is not claimed to be a saddle point."""
+        """Whether no check failed; `undecided` lists what the checks leave open."""
         return not self.failures
 
 

@@ -41,6 +41,15 @@ def test_no_digit_is_cut(line: str, narrow: Callable[[str], str]) -> None:
     assert not re.search(r"\d\.$", out, re.MULTILINE)
 
 
+def test_vectors_of_a_capture_are_columns(narrow: Callable[[str], str]) -> None:
+    out = narrow("pursuit")
+    assert "captured at 45343.620266 s (12.5955 h)" in out
+    assert "continuation" not in out
+    assert re.search(r"^x +-39420.497090 +0.250766441 +1.612976850 +1.436953246$", out, re.MULTILINE)
+    assert re.search(r"^z +604.130676 +0.058574134", out, re.MULTILINE)
+    assert "0.05030 and 0.69579 times 42166 km" in out
+
+
 def test_a_wide_table_is_printed_in_parts_with_its_names(narrow: Callable[[str], str]) -> None:
     out = narrow("multipoint service-5")
     assert len(re.findall(r"^bravo +rendezvous ", out, re.MULTILINE)) == 2

@@ -56,6 +56,16 @@ def test_the_slides_case_as_json(infoset: Infoset, tmp_path: Path) -> None:
     assert {each["policy"] for each in certificate["evader_deviations"]} == {each.value for each in Policy}
 
 
+def test_a_certificate_says_what_it_leaves_open(infoset: Infoset) -> None:
+    code, out, _ = infoset("pursuit", "geo-pursuit", "--certify", "--json", "x.json")
+    assert code == 0
+    assert "all checks hold" not in out
+    assert "saddle point: all conclusive checks hold; 47 of 120 directions were not decided" in out
+    certificate = json.loads(Path("x.json").read_text())["certificate"]
+    assert certificate["undecided"] == ["47 of 120 directions were not decided"]
+    assert (certificate["saddle_point"], certificate["failures"]) == (True, [])
+
+
 def test_the_json_has_what_it_is_asked_for(infoset: Infoset) -> None:
     _, out, _ = infoset("pursuit", "leo-pursuit", "--json", "-")
     found = json.loads(out)
@@ -271,9 +281,13 @@ def test_a_map(infoset: Infoset, tmp_path: Path) -> None:
     assert found["status"][1] == ["escapes"] * 4
     assert found["counts"]["escapes"] == 4
     lines = (tmp_path / "map" / "map.csv").read_text().splitlines()
-    assert lines[0] == "phase_deg,evader.thrust_N,capture_time_s,closing_speed_km_s,status"
+    assert lines[0] == "phase_deg,evader.thrust_N,capture_time_s,capture_time_h,closing_speed_km_s,status"
+    seconds, hours = (float(value) for value in lines[1].split(",")[2:4])
+    assert hours == pytest.approx(seconds / 3600.0)
     assert len(lines) == 9
-    assert lines[-1].endswith(",,,escapes")
+    assert lines[-1].endswith(",,,,escapes")
+    assert found["status_words"]["followed"] == "solved from scratch"
+    assert '"followed" is solved from scratch' in out
 
 
 @pytest.mark.parametrize(
@@ -333,6 +347,8 @@ def test_a_map_says_below_it_what_the_terminal_said() -> None:
     assert [each.get_text() for each in figure.texts] == ["20 points: 19 solved from scratch, 1 not certified"]
     axes = figure.axes[0]
     assert axes.get_title() == "capture time, h"
+    # No ratio below zero.
+    assert (axes.get_xlim(), axes.get_ylim()) == ((0.0, 4.0), (0.0, 3.0))
     # No line ends beside the point that has no time: its four cells are empty.
     (lines,) = (each for each in axes.collections if isinstance(each, ContourSet))
     ends = np.concatenate([each.vertices for each in lines.get_paths()])
