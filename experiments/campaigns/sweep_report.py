@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,11 +29,14 @@ from experiments.common.output import Output, hit_key
 from experiments.common.screen import number, number_table, print_lines, print_table
 from experiments.interception.study import SetCounts, set_warnings
 from sim import QuantileName, Requirement
-from sim.requirement import CONFIDENCE, MOST_RUNS_NEEDED, AnyRequirement, Decision, Verdict, parse_requirement
-from sim.storage import CampaignFolder, Manifest
+from sim.requirement import CONFIDENCE, AnyRequirement, Decision, Verdict, parse_requirement
+from sim.storage import CampaignFolder
 
 MOST_SHOWN = 8
 MOST_LINES = 40
+FIXED = "a fixed number of runs"
+"""Condition of the confidence of an interval that does not allow for runs that are added after a look at the results.
+"""
 
 
 def figure_names(noises: Sequence[str]) -> list[str]:
@@ -74,6 +77,11 @@ class SweepReport:
             ],
             "require": str(table.required),
             "confidence": CONFIDENCE,
+            "confidence_holds": {
+                "requirement": "any number of runs" if self.folder.manifest.is_watched else FIXED,
+                "hit": FIXED,
+                "quantiles": FIXED,
+            },
             "answers": [
                 {
                     "noise": noise,
@@ -110,7 +118,10 @@ class SweepReport:
     def show(self, console: Console) -> None:
         """Print the decision of every cell, and the limits of the values that meet the requirement."""
         folder, table = self.folder, self.table
-        watched = " although runs are added until it is made" if folder.manifest.until else ""
+        manifest = folder.manifest
+        watched = " although runs were added" if manifest.is_watched else ""
+        if manifest.until:
+            watched = " although runs are added until it is made"
         lines = [
             f"{folder.manifest.scenario.name}, {len(table.cells)} cells, {folder.finished_runs} runs",
             f"the decision in each cell has a confidence of at least 95 %{watched}",
@@ -124,10 +135,37 @@ class SweepReport:
             for title, part in decision_tables(table, noise):
                 print_lines(console, [title] if title else [])
                 print_table(console, part)
-            lines = [*_unknown_notes(verdicts, table.required), *_undecided_notes(verdicts, folder.manifest)]
+            lines = [*_unknown_notes(verdicts, table.required), *self._undecided_notes(noise)]
         sets = sum((sample.sets for samples in table.cells for sample in samples), SetCounts())
         warnings = set_warnings(folder.manifest.scenario.set_model.kind, sets)
         print_lines(console, [*lines, f"all cells: {sets}", *warnings])
+
+    def _undecided_notes(self, noise: str) -> list[str]:
+        """Return a line about the runs of the undecided cells, and how many more may decide them."""
+        manifest, noises = self.folder.manifest, len(self.table.noises)
+        undecided = [
+            (sum(sample.runs for sample in samples), verdict.runs_needed)
+            for samples, verdicts in zip(self.table.cells, self.table.verdicts, strict=True)
+            for verdict in (verdicts.get(noise),)
+            if verdict is not None and verdict.decision is Decision.UNDECIDED
+        ]
+        if not undecided:
+            return []
+        text = "1 cell is undecided" if len(undecided) == 1 else f"{len(undecided)} cells are undecided"
+        runs = [count for count, _ in undecided]
+        after = _range(min(runs), max(runs), str)
+        text += f" after {after} {'run' if after == '1' else 'runs'}"
+        if noises > 1:
+            text += " per cell with all noises"
+        more = [needed - count for count, needed in undecided if needed is not None]
+        if more:
+            which = "" if len(more) == len(undecided) else f" in {len(more)} of them"
+            text += f"; about {_range(min(more), max(more), _about)} more runs per cell would decide{which}"
+        if len(more) < len(undecided):
+            where = f" in {len(undecided) - len(more)} of them" if more else ""
+            text += f"; the estimate is at the bound{where}: the number of runs that would decide is not known yet"
+        hint = f"a greater --most-runs than {manifest.runs}" if manifest.until else "--until decided"
+        return [text, f"to add runs to these cells: repeat infoset sweep with --resume and {hint}"]
 
     def _answer_lines(self, noise: str) -> Iterator[str]:
         lines = answers(self.table, noise)
@@ -160,24 +198,8 @@ def _unknown_notes(verdicts: Sequence[Verdict | None], required: AnyRequirement)
     return [f"{known} of {runs} runs have a value of {required.quantity}; the others do not satisfy the bound"]
 
 
-def _undecided_notes(verdicts: Sequence[Verdict | None], manifest: Manifest) -> list[str]:
-    """Return a line about the runs of the undecided cells, and how many more may decide them."""
-    undecided = [verdict for verdict in verdicts if verdict is not None and verdict.decision is Decision.UNDECIDED]
-    if not undecided:
-        return []
-    runs = sorted({verdict.runs for verdict in undecided})
-    after = " to ".join(dict.fromkeys((str(runs[0]), str(runs[-1]))))
-    text = "1 cell is undecided" if len(undecided) == 1 else f"{len(undecided)} cells are undecided"
-    more = sorted(verdict.runs_needed - verdict.runs for verdict in undecided if verdict.runs_needed is not None)
-    if more:
-        amount = " to ".join(dict.fromkeys((_about(more[0]), _about(more[-1]))))
-        which = "" if len(more) == len(undecided) else f" in {len(more)} of them"
-        needed = f"about {amount} more runs per cell would decide{which}"
-    else:
-        needed = f"even {MOST_RUNS_NEEDED} runs per cell would not decide"
-    text += f" after {after} runs; {needed}"
-    hint = f"a greater --most-runs than {manifest.runs}" if manifest.until else "--until decided"
-    return [text, f"to add runs to these cells: repeat infoset sweep with --resume and {hint}"]
+def _range(least: int, most: int, name: Callable[[int], str]) -> str:
+    return " to ".join(dict.fromkeys((name(least), name(most))))
 
 
 def _about(count: int) -> str:

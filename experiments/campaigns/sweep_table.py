@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from experiments.campaigns.axis_names import tied_keys, unit_of
 from experiments.campaigns.samples import LEVELS, OUTCOMES, Sample, noises_of, samples, shown_value
 from experiments.interception.study import SetCounts
-from sim import HitEstimate, QuantileEstimate, QuantileName, Requirement, estimate_hits
+from sim import HitEstimate, QuantileEstimate, QuantileName, Requirement
 from sim.requirement import AnyRequirement, Decision, Verdict, judge
 from sim.stopping_rule import QUANTITIES, level_name
 from sim.storage import Axis, CampaignFolder
@@ -42,9 +42,9 @@ class SweepTable:
     cells : tuple of tuple of Sample
         Samples of each cell, one for each noise; empty for a cell without runs.
     verdicts : tuple of mapping of str to Verdict
-        For each cell, what the runs of each noise say about the requirement.
+        For each cell, what the runs of each noise say about the requirement; `runs_needed` counts the runs of the cell.
     hits : tuple of HitEstimate or None
-        Probability of a hit in each cell, over all runs; None if the body has no size.
+        Probability of a hit in each cell, with the noise with which it is the smallest; None if the body has no size.
     radius_m : float or None
         Radius of the body; None if it has no size, or different sizes.
     """
@@ -110,7 +110,12 @@ class SweepTable:
                 sets = SetCounts() if sample is None else sample.sets
                 row |= {"truth_kept": sets.truth_kept, "set_emptied": sets.set_emptied}
                 verdict = self.verdict(cell, noise)
+                hits = None if sample is None else sample.hits
+                for name in ("hits", "probability", "lower", "upper"):
+                    row[name if name == "hits" else f"hit_{name}"] = None if hits is None else getattr(hits, name)
                 row["requirement"] = None if verdict is None else verdict.decision.value
+                for name in ("value", "lower", "upper", "known"):
+                    row[f"required_{name}"] = None if verdict is None else getattr(verdict, name)
                 for quantity, level in itertools.product(QUANTITIES, self.levels):
                     estimate = self.estimate(cell, noise, QuantileName(quantity, level))
                     name = f"{quantity}_{level_name(level)}"
@@ -124,9 +129,10 @@ class SweepTable:
                 rows.append(row)
         columns = {name: [row[name] for row in rows] for name in rows[0]}
         units = {key: unit_of(key) for axis in self.axes for key in tied_keys(axis.key)}
-        units |= {
-            name: unit_of(quantity) for quantity in QUANTITIES for name in columns if name.startswith(f"{quantity}_")
-        }
+        for quantity in QUANTITIES:
+            units |= {name: unit_of(quantity) for name in columns if name.startswith(f"{quantity}_")}
+        if isinstance(self.required, Requirement):
+            units |= {f"required_{name}": unit_of(self.required.quantity) for name in ("value", "lower", "upper")}
         return columns, units
 
 
@@ -139,18 +145,23 @@ def sweep_table(folder: CampaignFolder, required: AnyRequirement, quantiles: Seq
     by_noise = [{noise: read(noise, cell) for noise in noises} for cell in numbers]
     verdicts = tuple(
         {
-            noise: judge(values, required, watched=folder.manifest.until is not None)
+            noise: _of_cell(judge(values, required, watched=folder.manifest.is_watched), len(noises))
             for noise, values in samples.items()
             if values.size
         }
         for samples in by_noise
     )
-    flags = [folder.numbers("hit", cell).compressed() for cell in numbers]
-    hits = tuple(estimate_hits(int(values.sum()), values.size) if values.size else None for values in flags)
+    estimates = [[sample.hits for sample in samples if sample.hits is not None] for samples in cells]
+    hits = tuple(min(group, key=lambda hits: hits.probability, default=None) for group in estimates)
     axes, body = folder.manifest.axes, folder.manifest.scenario.body
     is_varied = any("body.radius_m" in tied_keys(axis.key) for axis in axes)
     radius_m = None if body is None or is_varied else body.radius_m
     return SweepTable(axes, noises, levels, cells, required, verdicts, hits, radius_m)
+
+
+def _of_cell(verdict: Verdict, noises: int) -> Verdict:
+    """Return a verdict whose `runs_needed` counts the runs of a cell with all noises, like --runs and --most-runs."""
+    return replace(verdict, runs_needed=None if verdict.runs_needed is None else noises * verdict.runs_needed)
 
 
 @dataclass(frozen=True)

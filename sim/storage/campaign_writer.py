@@ -160,7 +160,9 @@ def _continued(stored: Manifest, wanted: Manifest, path: Path) -> Manifest:
             f"{path}: an earlier version wrote the sweep in this folder; its {stored.runs} runs per cell cannot be "
             f"extended to {wanted.runs}; choose another folder"
         )
-    return replace(stored, runs=wanted.runs, until=wanted.until, stopped_after=None, cell_runs=())
+    # Once the number of runs may depend on the results, it may in all later sessions.
+    extended = bool(stored.axes) and (stored.is_watched or wanted.is_watched or wanted.runs > stored.runs)
+    return replace(stored, runs=wanted.runs, until=wanted.until, stopped_after=None, cell_runs=(), extended=extended)
 
 
 def _take_back(shards: Path) -> None:

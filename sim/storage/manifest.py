@@ -25,7 +25,7 @@ MOST_DIFFERENCES = 20
 MOST_CELLS = 10_000
 MOST_RUNS_A_SHARD = 1_000_000
 
-_PROGRESS = ("runs", "until", "stopped_after", "cell_runs", "require", "made_by")
+_PROGRESS = ("runs", "until", "stopped_after", "cell_runs", "require", "extended", "made_by")
 """Keys that may differ between the sessions of a campaign."""
 _DERIVED = ("format", "schema", "version", "kind", "name", "scenario_hash", "sha256")
 """Keys of the file that follow from the others."""
@@ -77,6 +77,8 @@ class Manifest:
         Engagements of each cell of a finished sweep whose cells were stopped by a requirement; otherwise empty.
     require : str or None
         The requirement of a sweep, as asked for last; it does not change any result.
+    extended : bool
+        Whether runs were ever added to a sweep, by a rule or by a greater number of runs.
     scenario : Scenario
         Scenario; for a sweep the one that is varied.
     strategy : str
@@ -106,6 +108,7 @@ class Manifest:
     stopped_after: int | None = None
     cell_runs: tuple[int, ...] = field(default=(), metadata=ADDED_LATER)
     require: str | None = field(default=None, metadata=ADDED_LATER)
+    extended: bool = field(default=False, metadata=ADDED_LATER)
     scenario: Scenario
     seed: int
     noise: CampaignNoise
@@ -136,6 +139,11 @@ class Manifest:
     def kind(self) -> str:
         """`campaign` or `sweep`."""
         return "sweep" if self.axes else "campaign"
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether the number of runs of a sweep may depend on its results (`sim.requirement.judge`)."""
+        return bool(self.axes) and (self.extended or self.until is not None)
 
     @property
     def cells(self) -> int:

@@ -33,8 +33,8 @@ from sim import (
     quantiles,
     simulate,
 )
-from sim.requirement import Decision, HitRequirement, Verdict, judge
-from sim.storage import Axis, CampaignFolder
+from sim.requirement import Decision, HitRequirement, Verdict, judge, share_interval
+from sim.storage import Axis, CampaignFolder, read_manifest
 from tests.experiments.campaigns.figure_room import need_room
 
 Infoset = Callable[..., tuple[int, str, str]]
@@ -395,7 +395,7 @@ def test_runs_without_a_guarantee_do_not_meet_a_bound_of_it(
 ) -> None:
     """The sets of most runs become empty: the others alone have bounds, which all meet the requirement."""
     moving = ("--set", "target.manoeuvre=bang-bang", "--set", "target.acceleration_m_s2=1")
-    asked = ("sweep", file, *moving, "--vary", "target.acceleration_m_s2=1.5:4:2", "--runs", 40, *until)
+    asked = ("sweep", file, *moving, "--vary", "target.acceleration_m_s2=1.8:4:2", "--runs", 40, *until)
     code, out, _ = infoset(*asked, "--require", "guaranteed_miss_m p50<1e9", "--out", "sweep", "--json", "-")
     assert code == 0
     summary = json.loads(out)
@@ -410,6 +410,61 @@ def test_runs_without_a_guarantee_do_not_meet_a_bound_of_it(
     assert 0 < known[0] < 10
     assert sample["guaranteed_miss_m"]["p90"]["value"] is None
     assert sample["miss_m"]["p90"]["value"] is not None
+
+
+def test_numbers_of_a_cell_agree_with_its_decision(infoset: Infoset, file: Path, tmp_path: Path) -> None:
+    """With two noises the cell has the hits of the worse noise; its needed runs count those of both."""
+    asked = ("sweep", file, "--set", "body.radius_m=5", "--vary", "angle_sensor.scale=0.5:1.125:2", "--noise", "mixed")
+    code, out, _ = infoset(*asked, "--runs", 40, "--out", tmp_path / "sweep", "--json", "-")
+    assert code == 0
+    summary = json.loads(out)
+    assert summary["confidence_holds"]["requirement"] == "a fixed number of runs"
+    for cell in summary["cells"]:
+        worst = min(cell["samples"], key=lambda sample: sample["hit"]["probability"])
+        assert cell["hit"] == worst["hit"]
+        assert cell["hit"]["runs"] == 20
+        assert cell["requirement"] == worst["requirement"]["decision"]
+    assert [sample["requirement"]["runs_needed"] for sample in summary["cells"][0]["samples"]] == [210, 210]
+    _, out, _ = infoset("report", tmp_path / "sweep")
+    assert "1 cell is undecided after 40 runs per cell with all noises; about 170 more runs per cell would decide" in out
+
+
+def test_runs_that_are_added_by_hand_are_judged_like_those_of_until(
+    infoset: Infoset, file: Path, tmp_path: Path
+) -> None:
+    asked = ("sweep", file, "--set", "body.radius_m=8", "--vary", "angle_sensor.scale=0.5:3:3", "--out", "sweep")
+    assert infoset(*asked, "--runs", 60)[0] == 0
+    assert not read_manifest(tmp_path / "sweep").is_watched
+    # Runs that are missing, and a repeated command, add no runs.
+    next((tmp_path / "sweep" / "shards").glob("*.parquet")).unlink()
+    assert infoset(*asked, "--runs", 60, "--resume")[0] == 0
+    assert not read_manifest(tmp_path / "sweep").is_watched
+    code, out, _ = infoset(*asked, "--runs", 100, "--resume")
+    assert code == 0
+    assert "the decision in each cell has a confidence of at least 95 % although runs were added" in out
+    assert read_manifest(tmp_path / "sweep").is_watched
+    summary = json.loads((tmp_path / "sweep" / "summary.json").read_text())
+    assert summary["confidence_holds"] == {
+        "requirement": "any number of runs",
+        "hit": "a fixed number of runs",
+        "quantiles": "a fixed number of runs",
+    }
+    rows = pq.read_table(tmp_path / "sweep" / "sweep.parquet").to_pylist()
+    for cell, row in zip(summary["cells"], rows, strict=True):
+        hits, required = cell["hit"], cell["samples"][0]["requirement"]
+        assert (row["hits"], row["hit_probability"]) == (hits["hits"], hits["probability"])
+        assert (row["hit_lower"], row["hit_upper"]) == (hits["lower"], hits["upper"])
+        names = ("value", "lower", "upper", "known")
+        assert [row[f"required_{name}"] for name in names] == [required[name] for name in names]
+        lower, upper = share_interval(hits["hits"], 100, watched=True)
+        # The first run that decides is final: its bound is an end of the interval.
+        assert required["lower"] == max(lower, 0.95 if cell["requirement"] == "met" else 0.0)
+        assert required["upper"] == min(upper, 0.95 if cell["requirement"] == "not-met" else 1.0)
+    # A sweep that was watched once stays so.
+    assert infoset(*asked, "--runs", 100, "--resume", "--until", "decided", "--most-runs", 150)[0] == 0
+    assert infoset(*asked, "--runs", 150, "--resume")[0] == 0
+    assert read_manifest(tmp_path / "sweep").until is None
+    assert read_manifest(tmp_path / "sweep").is_watched
 
 
 def test_a_required_probability_of_a_hit(infoset: Infoset, file: Path, tmp_path: Path) -> None:
