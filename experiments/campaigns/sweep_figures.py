@@ -21,12 +21,14 @@ from numpy.typing import NDArray
 
 from experiments.campaigns.axis_names import key_label, unit_of
 from experiments.campaigns.sweep_table import (
+    Limit,
     SweepTable,
     answers,
-    limit_text,
+    interpolated_text,
     limits,
     separating_digits,
     spans_decades,
+    value_text,
 )
 from experiments.common.figure_style import (
     CURVE_LOOKS,
@@ -119,7 +121,7 @@ def _points(table: SweepTable, noise: str, quantile: QuantileName | None) -> lis
         verdict = table.verdict(cell, noise) if is_required else None
         estimate = verdict if verdict is not None or quantile is None else table.estimate(cell, noise, quantile)
         if estimate is not None:
-            value = estimate.value if quantile is None else table.value(cell, noise, quantile)
+            value = estimate.value if quantile is None or verdict is not None else table.value(cell, noise, quantile)
             points.append(_Point(at, value, estimate.lower, estimate.upper))
     return points
 
@@ -129,8 +131,8 @@ def _lines(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figu
     levels = sorted({quantile.level for quantile in shown}, reverse=True)
     rows = -(-len(quantities) // 2)
     columns = min(2, len(quantities))
-    figure = new_figure(height_mm=rows * _PANEL_MM + (rows - 1) * 24.0 + 49.0, width_mm=_COLUMN_MM * columns)
-    grid = place_axes(figure, rows, columns, margins_mm=(17.0, 4.0, 38.0, 11.0), gaps_mm=(18.0, 24.0))
+    figure = new_figure(height_mm=rows * _PANEL_MM + (rows - 1) * 24.0 + 47.0, width_mm=_COLUMN_MM * columns)
+    grid = place_axes(figure, rows, columns, margins_mm=(17.0, 4.0, 36.0, 11.0), gaps_mm=(18.0, 24.0))
     panels = [axes for row in grid for axes in row]
     for axes, quantity, letter in zip(panels, quantities, _LETTERS, strict=False):
         quantiles = [quantile for quantile in shown if quantile.quantity == quantity]
@@ -230,9 +232,13 @@ def _mark_decisions(axes: Axes, table: SweepTable, noise: str) -> None:
         axes.axvspan(limit.lower, limit.upper, color=IMPULSE, alpha=0.15, linewidth=0.0, zorder=0.5)
         if limit.value is not None:
             axes.plot([limit.value], [table.required.bound], zorder=5.0, **_DIAMOND)
-    if answer.limits:
-        words = "; ".join(limit_text(axis, limit) for limit in answer.limits[:2])
-        axes.set_xlabel("\n".join([axes.get_xlabel(), *textwrap.wrap(f"limit {words}", 60)]))
+    axes.set_xlabel("\n".join([axes.get_xlabel(), *(_limit_words(axis, limit) for limit in answer.limits[:2])]))
+
+
+def _limit_words(axis: Axis, limit: Limit) -> str:
+    lower, upper = (value_text(axis, value, digits=3) for value in (limit.lower, limit.upper))
+    value = interpolated_text(axis, limit)
+    return f"limit between {lower} and {upper} {unit_of(axis.key)}".rstrip() + (f" (diamond: {value})" if value else "")
 
 
 def _maps(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figure:

@@ -243,23 +243,19 @@ def _digits(value: float, gap: float) -> int:
     return 1 + math.floor(math.log10(value)) - math.floor(math.log10(abs(gap) * (1.0 + 1e-9))) if value and gap else 1
 
 
-def value_text(axis: Axis, value: float) -> str:
-    """Return a value of an axis, with six digits or those that separate it from its neighbours."""
+def value_text(axis: Axis, value: float, digits: int = 6) -> str:
+    """Return a value of an axis, with some digits, or more if neighbouring values differ only in these."""
     if value == round(value) and abs(value) < _MOST_WHOLE:
         return f"{value:.0f}"
-    return f"{value:.{max(6, 1 + separating_digits(axis))}g}"
+    return f"{value:.{max(digits, 1 + separating_digits(axis))}g}"
 
 
-def limit_text(axis: Axis, limit: Limit) -> str:
-    """Return a limit as text: `between the decided cells 2 and 3 s, by interpolation about 2.2 s`."""
-    unit = unit_of(axis.key)
-    ends = f"between the decided cells {value_text(axis, limit.lower)} and {value_text(axis, limit.upper)}"
-    text = _with_unit(ends, unit)
+def interpolated_text(axis: Axis, limit: Limit) -> str:
+    """Return the interpolated value with the digits that matter between the two cells; empty if there is none."""
     if limit.value is None:
-        return text
+        return ""
     digits = max(1, 1 + _digits(abs(limit.value), limit.upper - limit.lower))
-    value = value_text(axis, float(f"{limit.value:.{digits}g}"))
-    return f"{text}, by interpolation about {_with_unit(value, unit)}"
+    return value_text(axis, float(f"{limit.value:.{digits}g}"))
 
 
 @dataclass(frozen=True)
@@ -293,7 +289,13 @@ def answer(axis: Axis, verdicts: Sequence[Verdict | None], required: AnyRequirem
         indices = list(group)
         first, last = (value_text(axis, axis.values[index]) for index in (indices[0], indices[-1]))
         pieces.append(_with_unit(f"{word} at {first}" if len(indices) == 1 else f"{word} from {first} to {last}", unit))
-    return Answer(at, "; ".join([", ".join(pieces), *(f"limit {limit_text(axis, end)}" for end in ends)]), ends)
+    texts = [", ".join(pieces)]
+    for end in ends:
+        interval = f"between the decided cells {value_text(axis, end.lower)} and {value_text(axis, end.upper)}"
+        about = interpolated_text(axis, end)
+        about = f", by interpolation about {_with_unit(about, unit)}" if about else ""
+        texts.append(f"limit {_with_unit(interval, unit)}{about}")
+    return Answer(at, "; ".join(texts), ends)
 
 
 def _with_unit(text: str, unit: str) -> str:

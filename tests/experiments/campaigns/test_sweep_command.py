@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -622,6 +622,28 @@ def test_labels_never_touch(axes: tuple[Axis, ...], required: Requirement | HitR
     greatest = math.prod(axis.values[-1] for axis in axes)
     table = made_table(axes, required, lambda *values: 1000.0 * (math.prod(values) / greatest) ** 0.5)
     need_room(draw_sweep(table, SHOWN, "game"))
+
+
+@pytest.mark.parametrize(
+    "misses", [(100.0, 5.0, 4.0, 5.0, 20.0, 40.0, 80.0), (0.1, 0.2, 1.0, 5.0, 200.0, 400.0, 800.0)]
+)
+@pytest.mark.parametrize("scale", ["linear", "log"])
+def test_interpolated_limits_are_marked_on_the_drawn_line(
+    misses: tuple[float, ...], scale: Literal["linear", "log"]
+) -> None:
+    axis = Axis("angle_sensor.error_at_zero_range_rad", tuple(np.geomspace(1.2345e-6, 1.17e-3, 7)), scale)
+    figure = draw_sweep(
+        made_table([axis], REQUIRED, dict(zip(axis.values, misses, strict=True)).__getitem__), SHOWN, "game"
+    )
+    need_room(figure)
+    axes = figure.axes[0]
+    marks = [line for line in axes.lines if line.get_marker() == "D"]
+    drawn = next(line for line in axes.lines if list(np.asarray(line.get_ydata())) == list(misses))
+    assert len(marks) == (2 if misses[0] > 10.0 else 1)
+    on_paper = axes.transData.transform(np.column_stack(drawn.get_data()))
+    for mark in marks:
+        ((x, y),) = axes.transData.transform(np.column_stack(mark.get_data()))
+        assert np.interp(x, *on_paper.T) == pytest.approx(y, abs=1e-6)
 
 
 def test_an_unfinished_sweep_is_reported_as_far_as_it_is(infoset: Infoset, swept: Path, tmp_path: Path) -> None:
