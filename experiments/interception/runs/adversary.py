@@ -112,8 +112,8 @@ def _halfway_m(found: WorstEngagement) -> float | None:
 def _show(console: Console, scenario: Scenario, worst: WorstMisses, options: Adversary, elapsed_s: float) -> None:
     meter = "with" if scenario.range_sensor is not None else "without"
     same = worst.set_kept is worst.overall
-    columns = [("set never empty, and at all" if same else "set never empty", worst.set_kept)]
-    columns += [] if same else [("at all", worst.overall)]
+    columns = [("set never empty, set also empty" if same else "set never empty", worst.set_kept)]
+    columns += [] if same else [("set also empty", worst.overall)]
     table = Table("", *(title for title, _ in columns), box=None, pad_edge=False)
     for title, text in ROWS:
         table.add_row(title, *("-" if found is None else text(found) for _, found in columns))

@@ -8,7 +8,6 @@ from time import perf_counter
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
@@ -17,6 +16,7 @@ from experiments.common.screen import (
     BeginProgress,
     figure_files,
     number,
+    number_table,
     print_lines,
     progress_bar,
     say_warnings,
@@ -198,14 +198,8 @@ def _equal_until_s(pair: TruthPair, scenario: Scenario) -> float:
 def _show(
     console: Console, scenario: Scenario, lower: LowerBound, worst: Sequence[WorstOfStrategy], options: Bound
 ) -> None:
-    bounds = Table(box=None, pad_edge=False)
-    for title in (
-        "closing speed\nkm/s",
-        "bound\nm",
-        "range at t = 0\nkm",
-        "equal measurements until\ns before arrival",
-    ):
-        bounds.add_column(title, justify="right")
+    titles = ("closing speed\nkm/s", "bound\nm", "range at t = 0\nkm", "equal measurements until\ns before arrival")
+    bounds = number_table(*titles, left=0)
     for pair in lower.pairs:
         bounds.add_row(
             f"{-pair.vx_m_s / M_PER_KM:g}",
@@ -213,15 +207,8 @@ def _show(
             f"{pair.label_m / M_PER_KM:.1f}",
             f"{_equal_until_s(pair, scenario):.2f}",
         )
-    strategies = Table("strategy", box=None, pad_edge=False)
-    for title in (
-        "pairs\n\nm",
-        "set never\nempty\nm",
-        "at all\n\nm",
-        "miss /\nbound\n",
-        "guaran-\nteed\nm",
-    ):
-        strategies.add_column(title, justify="right")
+    heads = ("pairs\n\nm", "set never\nempty\nm", "also\nempty\nm", "miss /\nbound\n", "guaran-\nteed\nm")
+    strategies = number_table("strategy", *heads)
     for strategy in worst:
         searched = strategy.searched.misses().values()
         values = (strategy.pairs_m, *searched, strategy.over(lower), strategy.guaranteed_m)
@@ -238,10 +225,10 @@ def _show(
     model = scenario.set_model.kind.value
     notes = [
         "pairs: greatest miss of the states that prove the bound",
-        "set never empty, at all: greatest misses found by `infoset adversary` with "
+        "set never empty, also empty: greatest misses found by `infoset adversary` with "
         f"--model {model} --budget {options.budget} --seed {options.seed}"
         if options.budget
-        else "set never empty, at all: not searched",
+        else "set never empty, also empty: not searched",
         "miss / bound: greatest miss of these engagements with the set never empty, divided by the bound",
     ]
     if any(strategy.results.set_emptied.any() for strategy in worst):

@@ -43,7 +43,7 @@ class WorstMisses:
 def find_worst_misses(
     scenario: Scenario, own: Strategy | None, *, budget: int, seed: int, begin: BeginProgress
 ) -> WorstMisses:
-    """Search for the greatest miss with the set never empty, and for the greatest miss at all.
+    """Search for the greatest miss with the set never empty, and for the greatest miss of all engagements.
 
     The second search is simulated only if the set became empty in the first one. Otherwise both are the same.
     """

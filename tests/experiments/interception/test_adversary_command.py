@@ -91,7 +91,7 @@ def test_the_table_says_what_was_found_and_how(infoset: Command, tmp_path: Path)
     lines = (
         "patient",
         "greatest miss found, m",
-        "set never empty, and at all",
+        "set never empty, set also empty",
         "initial z, x, km",
         "rounds of changes",
         "engagements, ",
