@@ -159,7 +159,12 @@ def parse_requirement(text: str) -> AnyRequirement:
         If the text has another form, or a number is out of its range.
     """
     match = _HIT.fullmatch(text[:100])
-    return Requirement.parse(text) if match is None else HitRequirement(float(match["number"]))
+    if match is None:
+        return Requirement.parse(text)
+    share = float(match["number"])
+    if not 0.0 < share < 1.0:
+        raise ValueError(f"the share of hits must be between 0 and 1, found {match['number']}; for example hit>=0.95")
+    return HitRequirement(share)
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ QUANTITIES = ("miss_m", "impulse_m_s", "guaranteed_miss_m")
 GROWTH = 1.05
 """The sample grows by at least this factor between two checks: a check after every chunk would cost O(N^2)."""
 
-_QUANTILE = r"\s*(?P<quantity>\w+)\s+p(?P<level>\d{1,2}(?:\.\d{1,6})?)\s*"
-NUMBER = r"\s*(?P<number>\d{1,15}(?:\.\d{1,15})?(?:[eE][+-]?\d{1,3})?)\s*"
+_QUANTILE = r"\s*(?P<quantity>\w+)\s+p(?P<level>[0-9]{1,2}(?:\.[0-9]{1,6})?)\s*"
+NUMBER = r"\s*(?P<number>[0-9]{1,15}(?:\.[0-9]{1,15})?(?:[eE][+-]?[0-9]{1,3})?)\s*"
 
 
 @dataclass(frozen=True)
@@ -183,5 +183,5 @@ def parse_quantile(text: str, end: str, wanted: str, number: str = "") -> tuple[
         raise ValueError("the quantile must lie between p0 and p100, for example p99")
     value = float(match["number"]) if end else 0.0
     if end and not 0.0 < value < math.inf:
-        raise ValueError(f"{number} must be greater than 0")
+        raise ValueError(f"{number} must be greater than 0 and finite, found {match['number']}")
     return QuantileName(match["quantity"], level), value

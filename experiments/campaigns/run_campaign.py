@@ -9,7 +9,7 @@ from rich.table import Table
 
 from experiments.campaigns.command import Campaign as Options
 from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, Flown, campaign_errors, duration, fly, scenario_of
-from experiments.campaigns.samples import heading, sample_json, samples, samples_table
+from experiments.campaigns.samples import heading, sample_json, samples, samples_table, stop_notes
 from experiments.common.errors import InputError
 from experiments.common.output import Output, output, to_json
 from experiments.common.screen import print_lines, table_console
@@ -71,9 +71,9 @@ def _show(console: Console, flown: Flown, table: Table, notes: Sequence[str]) ->
     folder, manifest = flown.result.folder, flown.result.folder.manifest
     stopped = "" if manifest.stopped_after is None else f" of {manifest.runs}, stopped by the rule {manifest.until}"
     runs = f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}, {duration(flown.elapsed_s)}"
-    print_lines(console, [f"{runs}; quantiles with 95 % confidence limits"])
+    print_lines(console, [f"{runs}; quantiles with {'' if stopped else '95 % '}confidence limits"])
     console.print(table)
-    lines = [*notes]
+    lines = [*notes, *stop_notes(manifest)]
     if manifest.until is not None and manifest.stopped_after is None:
         lines.append(f"the rule {manifest.until} is not met; continue with --resume and a greater --runs")
     print_lines(console, [*lines, f"to see the results: infoset report {folder.path}"])

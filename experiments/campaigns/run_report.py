@@ -26,6 +26,7 @@ from experiments.campaigns.samples import (
     sample_json,
     samples,
     samples_table,
+    stop_notes,
     worst_runs,
 )
 from experiments.campaigns.sweep_report import default_requirement, figure_names, quantile_options, sweep_report
@@ -104,6 +105,15 @@ def _report_sweep(folder: CampaignFolder, options: Report, written: Output, begi
     required, shown = quantile_options(options.require, options.show, default)
     if required.quantity == "hit" and not sized:
         raise InputError(f"--require {required}: the body of this sweep has no size; give a bound of the miss instead")
+    if (
+        required.quantity == "guaranteed_miss_m"
+        and folder.manifest.scenario.set_model.is_guaranteed
+        and not folder.manifest.guarantee
+    ):
+        raise InputError(
+            f"--require {required}: this sweep was simulated without the bound Phi; simulate it in a new folder with "
+            "infoset sweep --guarantee, or give a bound of miss_m"
+        )
     progress = begin("report")
     report = sweep_report(folder, required, shown)
     progress(0.5)
@@ -174,7 +184,7 @@ def _show(
     table, notes = samples_table(by_noise, manifest.scenario)
     print_lines(console, [f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}"])
     console.print(table)
-    print_lines(console, [*notes, ""])
+    print_lines(console, [*notes, *stop_notes(manifest), ""])
     titles = [title for noise in related for title in (f"{noise}\nPearson", "\nSpearman")]
     table = number_table("correlation of the miss with", *titles)
     for name in next(iter(related.values())):

@@ -19,7 +19,7 @@ from experiments.interception.study import SetCounts, hit_text, set_counts, set_
 from sim import HitEstimate, Outcome, QuantileEstimate, Scenario, estimate_hits, estimate_quantiles
 from sim.statistics import shows
 from sim.stopping_rule import QUANTITIES, level_name
-from sim.storage import CampaignFolder, scenario_hash
+from sim.storage import CampaignFolder, Manifest, scenario_hash
 
 Floats = NDArray[np.float64]
 
@@ -224,6 +224,16 @@ def sample_json(sample: Sample) -> dict[str, Any]:
 def shown_value(sample: Sample, quantity: str, estimate: QuantileEstimate) -> float | None:
     """Return the value of a quantile; None if the runs with a value of the quantity do not show it."""
     return estimate.value if shows(sample.known[quantity], estimate.level) else None
+
+
+def stop_notes(manifest: Manifest) -> list[str]:
+    """Return a line about the confidence of the intervals of a campaign that a rule stopped; no line for others."""
+    if manifest.stopped_after is None:
+        return []
+    return [
+        "the intervals are computed with 95 % confidence for a fixed number of runs; the campaign stopped when an "
+        "interval was narrow, so that the confidence is about 92 to 95 %"
+    ]
 
 
 def samples_table(by_noise: Sequence[Sample], scenario: Scenario) -> tuple[Table, list[str]]:

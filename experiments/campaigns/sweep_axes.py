@@ -168,7 +168,7 @@ def _unknown(key: str, known: Mapping[str, bool]) -> str:
 
 def _number(text: str, key: str) -> Decimal:
     try:
-        value = Decimal(text) if re.fullmatch(r"[+-]?[0-9._]{1,40}(?:[eE][+-]?[0-9]{1,4})?", text) else None
+        value = Decimal(text) if re.fullmatch(r"[+-]?[0-9.]{1,40}(?:[eE][+-]?[0-9]{1,4})?", text) else None
     except InvalidOperation:
         value = None
     if value is None:

@@ -182,6 +182,11 @@ def test_until_stops_and_goes_on(infoset: Infoset, file: Path, tmp_path: Path) -
     stored = CampaignFolder.read(tmp_path / "runs")
     assert 16 <= stored.finished_runs < 400
     assert f"{stored.finished_runs} runs of 400, stopped by the rule miss_m p50 ci<1" in out
+    report = infoset("report", tmp_path / "runs")[1]
+    for text in (out, report):
+        assert "computed with 95 % confidence for a fixed number of runs" in " ".join(text.split())
+        assert "so that the confidence is about 92 to 95 %" in " ".join(text.split())
+    assert "95 % confidence limits" not in out
     assert infoset(*asked[:-1], "miss_m p50 ci<1e-9", "--resume")[0] == 0
     assert CampaignFolder.read(tmp_path / "runs").finished_runs == 400
     code, out, _ = infoset(*asked[:-1], "miss_m p50 ci<1e-9", "--resume")

@@ -160,6 +160,13 @@ def test_three_keys_are_a_table_only(infoset: Infoset, file: Path, tmp_path: Pat
         (["--vary", "thruster.greatest_impulse_m_s=0.01:5:3"], ["brief with thruster.greatest_impulse_m_s = 0.01"]),
         (["--runs", 0], ["--runs", "must be from 1 to "]),
         (["--require", "miss_m<10"], ["--require: must be a quantity, a quantile and a bound"]),
+        (
+            ["--require", "hit>=1"],
+            ["--require: the share of hits must be between 0 and 1, found 1; for example hit>=0"],
+        ),
+        (["--require", "miss_m p99<1e400"], ["--require: the bound must be greater than 0 and finite, found 1e400"]),
+        (["--require", "miss_m p\u0669\u0669<10"], ["--require: must be a quantity, a quantile and a bound"]),
+        (["--vary", "thruster.greatest_impulse_m_s=1_0:20:2"], ["must be a number, found"]),
         (["--show", "miss_m p99,fuel p50"], ["--show: there is no quantity fuel"]),
         (["--show", ",".join(f"miss_m p{each}" for each in range(1, 20))], ["--show: at most 8"]),
         (["--noise", "loud"], ["--noise"]),
@@ -484,6 +491,30 @@ def test_a_required_probability_of_a_hit(infoset: Infoset, file: Path, tmp_path:
         assert cell["samples"][0]["requirement"]["upper"] == pytest.approx(estimate.upper, abs=1e-12)
     code, out, _ = infoset("report", tmp_path / "sweep", "--require", "hit > 0.5", "--json", "-")
     assert json.loads(out)["require"] == "hit>=0.5"
+
+
+def test_a_required_guarantee_must_be_stored(infoset: Infoset, file: Path, tmp_path: Path) -> None:
+    asked = ("sweep", file, "--vary", "angle_sensor.scale=1:2:2", "--runs", 2, "--out", "sweep")
+    code, out, _ = infoset(*asked)
+    assert code == 0
+    assert "2 cells are undecided after 2 runs" in out
+    code, out, err = infoset("report", tmp_path / "sweep", "--require", "guaranteed_miss_m p50<10")
+    assert (code, out) == (2, "")
+    assert "this sweep was simulated without the bound Phi; simulate it in a new folder with infoset" in err
+    code, out, _ = infoset(*asked[:-1], "one", "--runs", 1)
+    assert "2 cells are undecided after 1 run;" in out
+
+
+def test_an_estimate_at_the_bound_does_not_tell_the_runs_that_are_needed(
+    infoset: Infoset, file: Path, tmp_path: Path
+) -> None:
+    asked = ("sweep", file, "--vary", "angle_sensor.scale=1:2:2", "--runs", 10, "--out", tmp_path / "sweep")
+    assert infoset(*asked)[0] == 0
+    misses = np.sort(CampaignFolder.read(tmp_path / "sweep").numbers("miss_m", 0).data)
+    _, out, _ = infoset("report", tmp_path / "sweep", "--require", f"miss_m p50<{misses[4:6].mean():.9f}")
+    assert "the estimate is at the bound: the number of runs that would decide is not known yet" in out or (
+        "the estimate is at the bound in 1 of them: the number of runs that would decide is not known yet" in out
+    )
 
 
 @pytest.mark.parametrize("requirement", ["hit>=0.95", "hit>0.5"])
