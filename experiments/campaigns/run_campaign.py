@@ -12,7 +12,7 @@ from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, Flown, camp
 from experiments.campaigns.samples import heading, sample_json, samples, samples_table, stop_notes
 from experiments.common.errors import InputError
 from experiments.common.output import Output, output, to_json
-from experiments.common.screen import print_lines, table_console
+from experiments.common.screen import print_lines, print_table, table_console
 from experiments.interception.choices import own_strategy
 from sim import Campaign, CampaignNoise, StoppingRule
 from sim.storage import need_arrow
@@ -72,7 +72,7 @@ def _show(console: Console, flown: Flown, table: Table, notes: Sequence[str]) ->
     stopped = "" if manifest.stopped_after is None else f" of {manifest.runs}, stopped by the rule {manifest.until}"
     runs = f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}, {duration(flown.elapsed_s)}"
     print_lines(console, [f"{runs}; quantiles with {'' if stopped else '95 % '}confidence limits"])
-    console.print(table)
+    print_table(console, table)
     lines = [*notes, *stop_notes(manifest)]
     if manifest.until is not None and manifest.stopped_after is None:
         lines.append(f"the rule {manifest.until} is not met; continue with --resume and a greater --runs")

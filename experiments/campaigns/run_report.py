@@ -40,6 +40,7 @@ from experiments.common.screen import (
     number,
     number_table,
     print_lines,
+    print_table,
     progress_bar,
     say,
     table_console,
@@ -183,14 +184,14 @@ def _show(
     stopped = "" if manifest.stopped_after is None else f", stopped by the rule {manifest.until}"
     table, notes = samples_table(by_noise, manifest.scenario)
     print_lines(console, [f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}"])
-    console.print(table)
+    print_table(console, table)
     print_lines(console, [*notes, *stop_notes(manifest), ""])
     titles = [title for noise in related for title in (f"{noise}\nPearson", "\nSpearman")]
     table = number_table("correlation of the miss with", *titles)
     for name in next(iter(related.values())):
         values = [columns[name][kind] for columns in related.values() for kind in ("pearson", "spearman")]
         table.add_row(name, *(("-" if value is None else f"{value:+.2f}") for value in values))
-    console.print(table)
+    print_table(console, table)
     lines = ["", "the worst runs, each with the command that simulates it again:"]
     for row in worst:
         miss, impulse = number(row["miss_m"]), number(row["impulse_m_s"])

@@ -22,6 +22,8 @@ from sim.stopping_rule import level_name
 BeginProgress = Callable[[str], Callable[[float], None]]
 _GAP = 2
 """Width of the space between the columns of a table."""
+_NARROWEST_TEXT = 12
+"""Width to which texts in a table are wrapped before the table is divided; no word is divided."""
 NOT_FINITE = (
     "the numbers of the scenario are so large or so small that the results are not finite; "
     "check its units with: infoset scenarios check FILE"
@@ -69,11 +71,14 @@ def number_table(*titles: str, left: int = 1) -> Table:
 def print_table(console: Console, table: Table) -> None:
     """Print a table of `number_table`; if the screen is too narrow, print it in parts, each with the columns of text.
 
-    No number is cut: a part has as many columns of numbers as fit, and at least one.
+    No number is cut or wrapped: texts are wrapped, and a part has as many columns of numbers as fit, and at least one.
     """
     cells = [[str(cell) for cell in (column.header, *column.cells)] for column in table.columns]
     widths = [max(cell_len(line) for cell in column for line in cell.splitlines() or [""]) + _GAP for column in cells]
     left = [index for index, column in enumerate(table.columns) if column.justify != "right"]
+    for index in left:
+        words = [cell_len(word) for cell in cells[index] for word in cell.split()]
+        widths[index] = min(widths[index], max(_NARROWEST_TEXT, *words, 0) + _GAP)
     parts: list[list[int]] = []
     used = room = console.width + _GAP - sum(widths[index] for index in left)
     for index in sorted(set(range(len(widths))) - set(left)):
@@ -82,15 +87,12 @@ def print_table(console: Console, table: Table) -> None:
             parts.append([])
             used = widths[index]
         parts[-1].append(index)
-    if len(parts) <= 1:
-        console.print(table)
-        return
     for number, numbers in enumerate(parts):
         part = Table(box=None, pad_edge=False)
         chosen = sorted([*left, *numbers])
         for index in chosen:
             column = table.columns[index]
-            part.add_column(column.header, justify=column.justify, no_wrap=index not in left)
+            part.add_column(column.header, justify=column.justify, no_wrap=index not in left and widths[index] <= room)
         for row in zip(*(table.columns[index].cells for index in chosen), strict=True):
             part.add_row(*row)
         console.print(*([""] if number else []), part, sep="\n")

@@ -6,12 +6,20 @@ from collections.abc import Callable
 from time import perf_counter
 
 from rich.console import Console
-from rich.table import Table
 
 from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
 from experiments.common.output import output_of, to_csv, to_json
-from experiments.common.screen import figure_files, number, print_lines, progress_bar, say_warnings, table_console
+from experiments.common.screen import (
+    figure_files,
+    number,
+    number_table,
+    print_lines,
+    print_table,
+    progress_bar,
+    say_warnings,
+    table_console,
+)
 from experiments.interception.choices import own_strategy, study_scenario
 from experiments.interception.command import Adversary
 from experiments.interception.record_file import record_path, write_record
@@ -114,7 +122,7 @@ def _show(console: Console, scenario: Scenario, worst: WorstMisses, options: Adv
     same = worst.set_kept is worst.overall
     columns = [("set never empty, set also empty" if same else "set never empty", worst.set_kept)]
     columns += [] if same else [("set also empty", worst.overall)]
-    table = Table("", *(title for title, _ in columns), box=None, pad_edge=False)
+    table = number_table("", *(title for title, _ in columns))
     for title, text in ROWS:
         table.add_row(title, *("-" if found is None else text(found) for _, found in columns))
     strategy = worst.engagements[0].strategy
@@ -124,7 +132,7 @@ def _show(console: Console, scenario: Scenario, worst: WorstMisses, options: Adv
         f"{count} simulated engagements, {number(count / max(elapsed_s, 1e-9))} per second"
     ]
     print_lines(console, lines)
-    console.print(table)
+    print_table(console, table)
     notes = ["each miss was simulated: the strategy cannot guarantee a smaller one, and greater misses may exist"]
     if not same:
         emptied = max(found.sets_emptied for found in worst.engagements)

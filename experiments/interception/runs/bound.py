@@ -18,6 +18,7 @@ from experiments.common.screen import (
     number,
     number_table,
     print_lines,
+    print_table,
     progress_bar,
     say_warnings,
     table_console,
@@ -199,7 +200,7 @@ def _show(
     console: Console, scenario: Scenario, lower: LowerBound, worst: Sequence[WorstOfStrategy], options: Bound
 ) -> None:
     titles = ("closing speed\nkm/s", "bound\nm", "range at t = 0\nkm", "equal measurements until\ns before arrival")
-    bounds = number_table(*titles, left=0)
+    bounds = number_table(*titles)
     for pair in lower.pairs:
         bounds.add_row(
             f"{-pair.vx_m_s / M_PER_KM:g}",
@@ -207,7 +208,7 @@ def _show(
             f"{pair.label_m / M_PER_KM:.1f}",
             f"{_equal_until_s(pair, scenario):.2f}",
         )
-    heads = ("pairs\n\nm", "set never\nempty\nm", "also\nempty\nm", "miss /\nbound\n", "guaran-\nteed\nm")
+    heads = ("pairs\n\nm", "set never\nempty\nm", "also\nempty\nm", "miss /\nbound\n", "guaranteed\n\nm")
     strategies = number_table("strategy", *heads)
     for strategy in worst:
         searched = strategy.searched.misses().values()
@@ -221,7 +222,9 @@ def _show(
             f"acceleration of the object along z in these pairs: at most {lower.disturbance_m_s2:.3g} m/s^2",
         ],
     )
-    console.print(bounds, "", strategies, sep="\n")
+    print_table(console, bounds)
+    console.print()
+    print_table(console, strategies)
     model = scenario.set_model.kind.value
     notes = [
         "pairs: greatest miss of the states that prove the bound",
@@ -229,7 +232,8 @@ def _show(
         f"--model {model} --budget {options.budget} --seed {options.seed}"
         if options.budget
         else "set never empty, also empty: not searched",
-        "miss / bound: greatest miss of these engagements with the set never empty, divided by the bound",
+        "miss / bound: greatest miss of pairs and search together, each with the set never empty, divided by the bound",
+        "guaranteed: greatest bound Phi on the miss, computed during these engagements",
     ]
     if any(strategy.results.set_emptied.any() for strategy in worst):
         hint = "" if scenario.set_model.is_guaranteed else "; try --model guaranteed"

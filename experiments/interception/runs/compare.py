@@ -7,13 +7,14 @@ from collections.abc import Mapping, Sequence
 from time import perf_counter
 
 from rich.console import Console
-from rich.table import Table
 
 from experiments.common.output import Cell, hit_key, output_of, to_csv, to_json
 from experiments.common.screen import (
     figure_files,
     number,
+    number_table,
     print_lines,
+    print_table,
     progress_bar,
     quantile_notes,
     say_warnings,
@@ -128,16 +129,11 @@ def _rows(compared: Sequence[Comparison]) -> list[list[Cell]]:
 
 
 def _show(console: Console, scenario: Scenario, compared: Sequence[Comparison]) -> None:
-    table, sets = Table("noise", box=None, pad_edge=False), Table("noise", box=None, pad_edge=False)
-    for part in (table, sets):
-        part.add_column("strategy", no_wrap=True)
-    table.add_column("quantity", no_wrap=True)
+    table = number_table("noise", "strategy", "quantity", *QUANTILES, left=3)
     titles = ["true state in the\nset at every step", "set became\nempty"]
     if scenario.body is not None:
         titles += [f"hit: miss at\nmost {scenario.body.radius_m:g} m", "95 % CI\nof a hit"]
-    for part, names in ((table, [*QUANTILES]), (sets, titles)):
-        for name in names:
-            part.add_column(name, justify="right")
+    sets = number_table("noise", "strategy", *titles, left=2)
     total = SetCounts()
     for noise in (NoiseKind.RANDOM, NoiseKind.GAME):
         title = noise.value
@@ -161,9 +157,9 @@ def _show(console: Console, scenario: Scenario, compared: Sequence[Comparison]) 
         console,
         [f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}: quantiles of {runs} runs"],
     )
-    console.print(table)
+    print_table(console, table)
     print_lines(console, ["", f"of the {runs} runs:"])
-    console.print(sets)
+    print_table(console, sets)
     print_lines(
         console,
         [

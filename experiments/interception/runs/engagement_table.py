@@ -9,7 +9,7 @@ from rich.console import Console
 from experiments.common.errors import InputError
 from experiments.common.options import read_number
 from experiments.common.output import Output
-from experiments.common.screen import BeginProgress, number, number_table, print_lines
+from experiments.common.screen import BeginProgress, number, number_table, print_lines, print_table
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import draw_sets
 from experiments.interception.published import PRINTED_SINGLE_RUN, SINGLE
@@ -59,7 +59,7 @@ def show_engagements(records: Sequence[Record], console: Console) -> None:
     for row in list(zip(*columns, strict=True))[1:]:
         table.add_row(*row)
     print_lines(console, [" | ".join(dict.fromkeys(record.scenario.name for record in records))])
-    console.print(table)
+    print_table(console, table)
     print_lines(console, dict.fromkeys(filter(None, (allowance(record.scenario) for record in records))))
 
 

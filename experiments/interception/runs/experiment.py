@@ -13,6 +13,7 @@ from experiments.common.screen import (
     number,
     number_table,
     print_lines,
+    print_table,
     progress_bar,
     quantile_notes,
     say,
@@ -137,5 +138,5 @@ def _show(console: Console, scenario: Scenario, curves: Sequence[Curve]) -> None
     runs = len(curves[0].results)
     notes += quantile_notes(runs, levels)
     print_lines(console, [f"{scenario.name}: quantiles of {runs} runs per curve"])
-    console.print(table)
+    print_table(console, table)
     print_lines(console, notes)

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -79,13 +80,16 @@ def test_bound_into_a_folder(infoset: Infoset, short: Scenario, short_file: Path
         pairs = max(miss for flight in each["flights"] for miss in flight["miss_m"])
         assert each["worst_of_pairs_m"] == pairs
         assert each["worst_found_set_kept_m"] == each["worst_found_m"]
+        assert each["worst_over_bound"] == each["worst_found_set_kept_m"] / found["lower_bound_m"]
         assert each["worst_of_search_set_kept_m"] == each["worst_of_search_m"]
         assert each["worst_found_m"] == max(pairs, each["worst_of_search_m"])
         assert all(all(flight["truth_kept"]) for flight in each["flights"])
         assert each["name"] in out
     assert f"no strategy can guarantee a miss below {found['lower_bound_m']:.3g} m" in out
-    for title in ("pairs", "set never", "also", "closing speed", "equal measurements until", "guaran-"):
+    for title in ("pairs", "set never", "also", "closing speed", "equal measurements until", "guaranteed"):
         assert title in out
+    assert "miss / bound: greatest miss of pairs and search together, each with the set never empty" in out
+    assert re.search(r"^guaranteed: ", out, re.MULTILINE)
 
 
 def test_bound_as_json_alone(infoset: Infoset, short_file: Path, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -21,6 +22,7 @@ from experiments.interception.scenario_file import load_scenario, scenario_hash
 from guidance import NoiseKind, TieRule, strategy_names
 from infoset import Model
 from sim import Scenario, simulate
+from tests.experiments.command_line import Command
 
 TWO = ("--strategies", "symmetric-miss,patient")
 LEVELS = ["p10", "p50", "p90", "p99", "max"]
@@ -229,3 +231,24 @@ def test_the_radius_of_the_body_is_a_line_with_a_label(compared: list[Comparison
     (legend,) = figure.legends
     assert radii == [1, 1, 0, 0]
     assert legend.get_texts()[-1].get_text() == "body radius, 1 m: a smaller miss is a hit"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "compare FILE --strategies symmetric-miss,patient --runs 2 --set body.radius_m=5",
+        "experiment FILE --runs 2",
+        "engage FILE --noise both",
+        "adversary FILE --budget 4",
+        "adversary FILE --budget 20 --model paper",
+    ],
+)
+def test_no_number_is_cut_or_wrapped_at_60_columns(
+    line: str, brief_file: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "60")
+    code, out, _ = Command(capsys)(*(brief_file if word == "FILE" else word for word in line.split()))
+    assert code == 0
+    assert "…" not in out
+    assert not re.search(r"\(\d+$|^ *%\)|\d\.$", out, re.MULTILINE)
