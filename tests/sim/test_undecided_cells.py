@@ -160,6 +160,7 @@ def test_sweeps_of_earlier_versions_are_read_and_resumed_but_not_extended(asked:
     assert b"order" not in (tmp_path / "old" / "manifest.json").read_bytes()
     assert b"cell_runs" not in (tmp_path / "old" / "manifest.json").read_bytes()
     assert b"require" not in (tmp_path / "old" / "manifest.json").read_bytes()
+    assert b"extended" not in (tmp_path / "old" / "manifest.json").read_bytes()
     assert old.run(resume=True).table.equals(whole)
     assert read_manifest(tmp_path / "old").order == "cells"
     assert read_manifest(tmp_path / "old").runs_of(1) == (0, range(16, 32))
