@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -225,6 +226,28 @@ def estimate_hits(hits: int, runs: int, confidence: float = 0.95) -> HitEstimate
     lower = float(betaincinv(hits, runs - hits + 1, tail)) if hits else 0.0
     upper = float(betaincinv(hits + 1, runs - hits, 1.0 - tail)) if hits < runs else 1.0
     return HitEstimate(runs, hits, hits / runs, lower, upper)
+
+
+def correlation_interval(
+    correlation: float, size: int, confidence: float = 0.95, *, ranks: bool = False
+) -> tuple[float, float] | None:
+    """Return the confidence interval of a correlation coefficient by Fisher's z; None with fewer than 4 values.
+
+    The interval is approximate, and assumes two normal variables. `ranks` is for Spearman's coefficient, whose z has
+    a standard deviation larger by a factor of sqrt(1.06).
+
+    References
+    ----------
+    Fieller, Hartley, Pearson (1957), Tests for rank correlation coefficients I.
+    """
+    if size < 4:
+        return None
+    if abs(correlation) >= 1.0:
+        return correlation, correlation
+    deviation = math.sqrt((1.06 if ranks else 1.0) / (size - 3))
+    half = NormalDist().inv_cdf(0.5 + 0.5 * confidence) * deviation
+    z = math.atanh(correlation)
+    return math.tanh(z - half), math.tanh(z + half)
 
 
 def order_statistics(size: int, level: float, confidence: float) -> tuple[int, int]:

@@ -12,12 +12,13 @@ from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 
 from experiments.common.figure_style import CURVE_LOOKS, INK, LIMIT, new_figure, place_axes, separate_labels, style
 from experiments.interception.figures.distributions import axis_limit, draw_band, draw_radius, scale_axis
 from sim import band_half_width, estimate_quantiles
+from sim.statistics import correlation_interval, shows
 from sim.stopping_rule import level_name
 
 Floats = NDArray[np.float64]
@@ -26,6 +27,8 @@ CONVERGING = (0.5, 0.9, 0.99)
 MOST_POINTS = 2000
 """Most points of a curve and of a cloud; more would only make the file larger."""
 
+RUNS_A_BIN = 100
+"""Least mean number of runs in a bin of the median and the 90 % quantile over the initial state."""
 _CONFIDENCE = 0.95
 _LOOKS = 28
 _DOTTED: dict[str, Any] = {"linestyle": (0, (1, 1.2)), "linewidth": 0.9}
@@ -99,27 +102,25 @@ def draw_campaign_distributions(columns: Sequence[CampaignColumns]) -> Figure:
 def draw_convergence(columns: Sequence[CampaignColumns]) -> Figure:
     """Draw quantiles of the miss and the impulse of the first n runs over n, with their confidence intervals.
 
-    Each noise has a row; there must be at least one.
+    A quantile is drawn from the number of runs on that shows it (`sim.statistics.shows`). Each noise has a row; there
+    must be at least one.
     """
     with style():
         figure = new_figure(height_mm=58.0 * len(columns) + 14.0 * len(columns) + 10.0)
         rows = place_axes(figure, len(columns), 2, margins_mm=(16.0, 4.0, 21.0, 7.0), gaps_mm=(14.0, 17.0))
         letter = iter("abcdefghijkl")
+        drawn: set[float] = set()
+        banded: set[float] = set()
         for row, column in zip(rows, columns, strict=True):
             for axes, label, sample in zip(
                 row, ("miss, m", "impulse spent, m/s"), (column.miss_m, column.impulse_m_s), strict=True
             ):
-                _convergence(axes, sample, str(column.look["color"]))
+                _convergence(axes, sample, str(column.look["color"]), drawn, banded)
                 axes.set_title(f"({next(letter)}) {label.split(',')[0]}, {column.noise} noise")
                 axes.set_xlabel("runs")
                 axes.set_ylabel(label)
                 separate_labels(axes)
-        handles: list[Line2D | Patch] = [
-            Line2D([], [], color=INK, linewidth=1.2, linestyle=_line(index), label=level_name(level))
-            for index, level in enumerate(CONVERGING)
-        ]
-        handles.append(Patch(facecolor=LIMIT, alpha=0.3, label="95 % confidence interval, if there are enough runs"))
-        figure.legend(handles=handles, loc="lower center", ncols=len(handles))
+        _convergence_legend(figure, drawn, banded)
     return figure
 
 
@@ -132,10 +133,11 @@ def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
         figure = new_figure(height_mm=44.0 * len(columns) + 15.0 * len(columns) + 6.0)
         rows = place_axes(figure, len(columns), 4, margins_mm=(17.0, 6.0, 20.0, 7.0), gaps_mm=(9.0, 15.0))
         letter = iter("abcdefghijkl")
+        binned = False
         for row, column in zip(rows, columns, strict=True):
             limit = axis_limit([column.miss_m])
             for axes, name in zip(row, _START_LABELS, strict=True):
-                _cloud(axes, column.start[name], column.miss_m, str(column.look["color"]))
+                binned |= _cloud(axes, column.start[name], column.miss_m, str(column.look["color"]))
                 axes.set_xlabel(_START_LABELS[name])
                 axes.set_ylim(0.0, 1.04 * limit or 1.0)
                 axes.locator_params(axis="x", nbins=3)
@@ -143,27 +145,39 @@ def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
                 axes.set_title(f"({next(letter)}) {column.noise} noise")
                 separate_labels(axes)
             row[0].set_ylabel("\n".join(["miss, m", *filter(None, [_beyond("runs", [column.miss_m], 1.04 * limit)])]))
-        handles = [
-            Line2D([], [], linestyle="", marker=".", color=LIMIT, label=f"runs (at most {MOST_POINTS} drawn)"),
-            Line2D([], [], color=INK, label="median"),
-            Line2D([], [], color=INK, linestyle=_line(1), label="p90"),
-        ]
-        figure.legend(handles=handles, loc="lower center", ncols=3)
+        most = max(column.miss_m.size for column in columns)
+        runs = f"runs (at most {MOST_POINTS} drawn)" if most > MOST_POINTS else "runs"
+        handles = [Line2D([], [], linestyle="", marker=".", color=LIMIT, label=runs)]
+        if binned:
+            handles += [
+                Line2D([], [], color=INK, label="median"),
+                Line2D([], [], color=INK, linestyle=_line(1), label="p90"),
+            ]
+        note = None if binned else f"too few runs for median and p90 ({2 * RUNS_A_BIN} of a noise are needed)"
+        figure.legend(handles=handles, loc="lower center", ncols=3, title=note, title_fontsize=7.5)
     return figure
 
 
 def correlations(columns: CampaignColumns) -> dict[str, dict[str, float | None]]:
     """Return Pearson's and Spearman's correlation of the miss with each component of the initial state, by component.
 
-    `|z_km|` and `|vz_km_s|` are included. A correlation is None where the component or the miss does not vary.
+    Each has the ends of its 95 % confidence interval. `|z_km|` and `|vz_km_s|` are included. A correlation is None
+    where the component or the miss does not vary, and its ends also with fewer than 4 runs.
     """
     start = dict(columns.start)
     start |= {f"|{name}|": np.abs(start[name]) for name in ("z_km", "vz_km_s")}
     miss = columns.miss_m
     return {
-        name: {"pearson": _correlation(values, miss), "spearman": _correlation(_ranks(values), _ranks(miss))}
+        name: _with_ends("pearson", _correlation(values, miss), miss.size)
+        | _with_ends("spearman", _correlation(_ranks(values), _ranks(miss)), miss.size)
         for name, values in start.items()
     }
+
+
+def _with_ends(kind: str, value: float | None, size: int) -> dict[str, float | None]:
+    ends = None if value is None else correlation_interval(value, size, _CONFIDENCE, ranks=kind == "spearman")
+    lower, upper = (None, None) if ends is None else ends
+    return {kind: value, f"{kind}_lower": lower, f"{kind}_upper": upper}
 
 
 def _correlation(one: Floats, other: Floats) -> float | None:
@@ -226,22 +240,51 @@ def _distribution(
     axes.plot(values, np.concatenate([[0.0], share, [1.0]]), drawstyle="steps-post", zorder=3.0, **look)
 
 
-def _convergence(axes: Axes, sample: Floats, colour: str) -> None:
+def _convergence_legend(figure: Figure, drawn: set[float], banded: set[float]) -> None:
+    """Draw the legend: the quantiles that are drawn, each with its interval if that is drawn too, and the others."""
+    handles: list[Any] = []
+    labels = []
+    for index, level in enumerate(CONVERGING):
+        if level in drawn:
+            line = Line2D([], [], color=INK, linewidth=1.2, linestyle=_line(index))
+            handles.append((Patch(facecolor=LIMIT, alpha=0.3), line) if level in banded else line)
+            labels.append(f"{level_name(level)}{' and its 95 % confidence interval' if level in banded else ''}")
+    hidden = [level_name(level) for level in CONVERGING if level not in drawn]
+    figure.legend(
+        handles,
+        labels,
+        loc="lower center",
+        ncols=max(1, len(handles)),
+        title=f"too few runs for {', '.join(hidden)}" if hidden else None,
+        title_fontsize=7.5,
+        handler_map={tuple: HandlerTuple(ndivide=1)},
+    )
+
+
+def _convergence(axes: Axes, sample: Floats, colour: str, drawn: set[float], banded: set[float]) -> None:
+    """Draw the quantiles over the number of runs, and add the levels that are drawn, with and without interval."""
     least = min(10, sample.size)
     counts = np.unique(np.geomspace(least, sample.size, _LOOKS).astype(np.int64))
     looks = [estimate_quantiles(sample[:count], CONVERGING, _CONFIDENCE) for count in counts.tolist()]
-    for index in range(len(CONVERGING)):
-        estimates = [look[index] for look in looks]
-        axes.plot(counts, [estimate.value for estimate in estimates], color=colour, linestyle=_line(index), zorder=3.0)
-        intervals = [
-            (runs, estimate.lower, estimate.upper)
-            for runs, estimate in zip(counts, estimates, strict=True)
-            if estimate.width is not None
-        ]
+    for index, level in enumerate(CONVERGING):
+        known = [(runs, look[index]) for runs, look in zip(counts.tolist(), looks, strict=True) if shows(runs, level)]
+        if not known:
+            continue
+        drawn.add(level)
+        values = [estimate.value for _, estimate in known]
+        axes.plot([runs for runs, _ in known], values, color=colour, linestyle=_line(index), zorder=3.0)
+        intervals = [(runs, estimate.lower, estimate.upper) for runs, estimate in known if estimate.width is not None]
         if intervals:
+            banded.add(level)
             runs, lower, upper = zip(*intervals, strict=True)
             axes.fill_between(runs, lower, upper, facecolor=colour, alpha=0.18, linewidth=0.0, zorder=1.5 + 0.1 * index)
-    axes.set_xscale("log")
+            for edge in (lower, upper):
+                axes.plot(runs, edge, color=colour, linestyle=_line(index), linewidth=0.5, alpha=0.6, zorder=2.0)
+    if sample.size >= 10 * least:
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    else:
+        axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes.xaxis.set_major_formatter(
         FuncFormatter(lambda tick, _: f"{tick:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}"))
     )
@@ -252,30 +295,33 @@ def _convergence(axes: Axes, sample: Floats, colour: str) -> None:
     axes.set_ylim(bottom if bottom > 0.5 * top else 0.0, top)
 
 
-def _cloud(axes: Axes, start: Floats, miss: Floats, colour: str) -> None:
+def _cloud(axes: Axes, start: Floats, miss: Floats, colour: str) -> bool:
+    """Draw the runs, and their median and 90 % quantile if they are enough; return whether these are drawn."""
     step = -(-miss.size // MOST_POINTS)
+    size = min(2.2, (MOST_POINTS / miss.size) ** 0.25) if step == 1 else 1.0
     axes.plot(
         start[::step],
         miss[::step],
         linestyle="",
         marker=".",
-        markersize=2.0,
+        markersize=2.5 * size,
         markeredgewidth=0.0,
         color=colour,
-        alpha=0.35,
+        alpha=0.4 * size,
         zorder=2.0,
         rasterized=True,
     )
     least, greatest = float(start.min()), float(start.max())
-    bins = min(_BINS, miss.size // 100)
+    bins = min(_BINS, miss.size // RUNS_A_BIN)
     if bins < 2 or greatest <= least:
-        return
+        return False
     bin_of = np.minimum(((start - least) / (greatest - least) * bins).astype(np.int64), bins - 1)
     middle = least + (np.arange(bins) + 0.5) * (greatest - least) / bins
     for order, level in enumerate((0.5, 0.9)):
         filled = np.unique(bin_of)
         values = [np.quantile(miss[bin_of == number], level) for number in filled]
         axes.plot(middle[filled], values, color=INK, linestyle=_line(order), zorder=3.0)
+    return True
 
 
 def _line(index: int) -> Any:

@@ -186,11 +186,14 @@ def _show(
     print_lines(console, [f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}"])
     print_table(console, table)
     print_lines(console, [*notes, *stop_notes(manifest), ""])
-    titles = [title for noise in related for title in (f"{noise}\nPearson", "\nSpearman")]
-    table = number_table("correlation of the miss with", *titles)
-    for name in next(iter(related.values())):
-        values = [columns[name][kind] for columns in related.values() for kind in ("pearson", "spearman")]
-        table.add_row(name, *(("-" if value is None else f"{value:+.2f}") for value in values))
+    runs = ", ".join(f"{sample.runs} runs of {sample.noise} noise" for sample in by_noise)
+    print_lines(console, [f"correlation of the miss with the initial state ({runs}; CI by Fisher's z):"])
+    table = number_table("noise", "component", "Pearson", "95 % CI", "Spearman", "95 % CI", left=2)
+    for noise, components in related.items():
+        title = noise
+        for name, values in components.items():
+            table.add_row(title, name, *_correlation_cells(values, "pearson"), *_correlation_cells(values, "spearman"))
+            title = ""
     print_table(console, table)
     lines = ["", "the worst runs, each with the command that simulates it again:"]
     for row in worst:
@@ -199,3 +202,9 @@ def _show(
     if not (folder.path / SCENARIO_FILE).is_file():
         lines.append(f"(the folder has no {SCENARIO_FILE}, which these commands need; --out writes one)")
     print_lines(console, lines)
+
+
+def _correlation_cells(values: Mapping[str, float | None], kind: str) -> tuple[str, str]:
+    value, lower, upper = (values[key] for key in (kind, f"{kind}_lower", f"{kind}_upper"))
+    interval = "-" if lower is None or upper is None else f"{lower:+.2f} to {upper:+.2f}"
+    return "-" if value is None else f"{value:+.2f}", interval

@@ -256,7 +256,7 @@ def samples_table(by_noise: Sequence[Sample], scenario: Scenario) -> tuple[Table
                 )
                 title = name = ""
             table.add_row("", "", "max", number(sample.worst[quantity]), "")
-        notes += [f"{sample.noise} noise: {text}" for text in quantile_notes(sample.runs, [*LEVELS])]
+        notes += [f"{sample.noise} noise: {text}" for text in quantile_notes(sample.runs, LEVELS, len(by_noise))]
         outcomes = ", ".join(f"{count} {name}" for name, count in sample.outcomes.items())
         held = f"; miss within the bound Phi: {sample.phi_held} of {sample.phi_known} runs" if sample.phi_known else ""
         hits = hit_text(sample.hits, scenario)

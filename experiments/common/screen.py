@@ -124,13 +124,20 @@ def number(value: float | None) -> str:
     return f"{value:.1f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
-def quantile_notes(runs: int, levels: Sequence[float]) -> list[str]:
-    """Return a line about the quantiles that so many runs do not show; no line if they show all."""
+def quantile_notes(runs: int, levels: Sequence[float], noises: int = 1) -> list[str]:
+    """Return a line about the quantiles that so many runs do not show; no line if they show all.
+
+    Parameters
+    ----------
+    runs : int
+        Number of runs of a noise; --runs is this number times `noises`.
+    """
     hidden = [level for level in levels if not shows(runs, level)]
     if not hidden:
         return []
     needed = max(round(1.0 / min(level, 1.0 - level)) for level in hidden)
-    return [f"{runs} runs are too few for {', '.join(map(level_name, hidden))}; {needed} runs show all quantiles"]
+    each = f" of each noise (--runs {noises * needed})" if noises > 1 else ""
+    return [f"{runs} runs are too few for {', '.join(map(level_name, hidden))}; {needed} runs{each} show all quantiles"]
 
 
 def show_built_in(rows: Sequence[Mapping[str, str]], json: bool, quiet: bool) -> None:

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import spearmanr
+from matplotlib.figure import Figure
+from scipy.stats import pearsonr, spearmanr
 
 from experiments.campaigns.campaign_figures import (
     MOST_POINTS,
@@ -73,7 +74,16 @@ def test_a_report_of_files_alone_shows_its_progress(
     for each in found["worst"]:
         assert each["replay"] == f"infoset engage {scenario} --noise {each['noise']} --seed 0 --run {each['run']}"
         assert each["replay"] in out
-    for title in ("correlation of the miss with", "|z_km|", "Spearman", "the worst runs, each", "p99.9", "95 % CI"):
+    for title in (
+        "correlation of the miss with",
+        "150 runs of random noise",
+        "Fisher's z",
+        "|z_km|",
+        "Spearman",
+        "the worst runs, each",
+        "p99.9",
+        "95 % CI",
+    ):
         assert title in out
 
 
@@ -85,7 +95,7 @@ def test_no_digit_is_cut_at_60_columns(infoset: Infoset, folder: Path, monkeypat
     table = [line.split() for line in out.splitlines() if " p99 " in line]
     assert len(table) == 6  # three quantities, two noises
     assert all(float(row[row.index("p99") + 1]) > 0.0 for row in table)
-    assert "150 runs are too few for p99.9; 1000 runs show all quantiles" in out
+    assert "150 runs are too few for p99.9; 1000 runs of each noise (--runs 2000) show all quantiles" in out
 
 
 def test_a_report_writes_nothing_unasked(infoset: Infoset, folder: Path, tmp_path: Path) -> None:
@@ -193,12 +203,51 @@ def test_correlations_by_hand() -> None:
     rising = np.arange(50.0)
     start = {"z_km": rising - 20.0, "x_km": rising**3, "vz_km_s": -rising, "vx_km_s": np.ones(50)}
     found = correlations(replace(given, miss_m=rising, start=start))
-    assert found["z_km"] == {"pearson": pytest.approx(1.0), "spearman": pytest.approx(1.0)}
+    assert [found["z_km"][kind] for kind in ("pearson", "spearman")] == pytest.approx([1.0, 1.0])
     assert found["x_km"]["spearman"] == pytest.approx(1.0)
     assert found["x_km"]["pearson"] == pytest.approx(np.corrcoef(rising, rising**3)[0, 1])
     assert found["vz_km_s"]["pearson"] == pytest.approx(-1.0)
     assert found["|vz_km_s|"]["pearson"] == pytest.approx(1.0)
-    assert found["vx_km_s"] == {"pearson": None, "spearman": None}
+    assert set(found["vx_km_s"].values()) == {None}
+
+
+def test_correlations_have_confidence_intervals() -> None:
+    given = columns("random", 30)
+    found = correlations(given)["z_km"]
+    pearson, lower, upper = found["pearson"], found["pearson_lower"], found["pearson_upper"]
+    assert pearson is not None
+    interval = pearsonr(given.start["z_km"], given.miss_m).confidence_interval()
+    assert [lower, upper] == pytest.approx([interval.low, interval.high])
+    assert found["spearman_lower"] is not None
+    few = correlations(columns("random", 3))["z_km"]
+    assert (few["pearson_lower"], few["spearman_upper"]) == (None, None)
+    assert few["pearson"] is not None
+
+
+def legend_texts(figure: Figure) -> list[str]:
+    (legend,) = figure.legends
+    return [legend.get_title().get_text(), *(text.get_text() for text in legend.get_texts())]
+
+
+def test_figures_show_no_quantile_of_too_few_runs() -> None:
+    figure = draw_convergence([columns("random", 30)])
+    assert legend_texts(figure) == ["too few runs for p99", "p50 and its 95 % confidence interval", "p90"]
+    figure = draw_convergence([columns("random", 500)])
+    assert legend_texts(figure)[1:] == [f"{level} and its 95 % confidence interval" for level in ("p50", "p90", "p99")]
+    p99 = max(figure.axes[0].get_lines(), key=lambda line: float(np.asarray(line.get_xdata())[0]))
+    assert np.asarray(p99.get_xdata())[0] >= 100.0
+    for size in (30, 60, 150, 4000):
+        for axes in draw_convergence([columns("random", size)]).axes:
+            low, high = axes.get_xlim()
+            assert sum(low <= tick <= high for tick in axes.get_xticks()) >= 3
+
+
+def test_the_dispersion_of_few_runs_is_visible() -> None:
+    few, many = (draw_dispersion([columns("random", size)]) for size in (30, 2000))
+    assert legend_texts(few) == ["too few runs for median and p90 (200 of a noise are needed)", "runs"]
+    assert legend_texts(many)[1:] == ["runs", "median", "p90"]
+    assert few.axes[0].get_lines()[0].get_markersize() > 5.0
+    assert len(few.axes[0].get_lines()) == 1
 
 
 @given(values=st.lists(st.tuples(st.integers(-4, 4), st.integers(-4, 4)), min_size=3, max_size=30))
