@@ -22,6 +22,8 @@ from sim.record import Record, fly_one
 from sim.results import Outcome
 from sim.scenario import Scenario, with_strategy
 
+WORST_FOUND = "worst-found"
+"""Name of the noise with the errors that a search found, in records."""
 CHUNK = 50
 """Engagements in a batch."""
 GENERATION = 100
@@ -99,7 +101,7 @@ class WorstEngagement:
         strategy : Strategy or None
             None is the scenario's. A strategy different from that of the search has a different miss.
         """
-        return fly_one(self.scenario, seed=self.seed, strategy=strategy, noise=self.noise())
+        return replace(fly_one(self.scenario, seed=self.seed, strategy=strategy, noise=self.noise()), noise=WORST_FOUND)
 
 
 def find_worst(

@@ -165,6 +165,9 @@ class Campaign:
         for name, limits in (("runs", COUNT), ("seed", WHOLE), ("chunk", COUNT)):
             if name != "chunk" or self.chunk is not None:
                 limits.need(name, getattr(self, name))
+        if self.noise is not None and not isinstance(self.noise, CampaignNoise):
+            choices = ", ".join(map(str, CampaignNoise))
+            raise TypeError(f"noise must be None or one of {choices}: got {self.noise!r}")
         if len(self.cells) != (math.prod(len(axis.values) for axis in self.axes) if self.axes else 0):
             raise ValueError("a sweep needs at least one axis, and a scenario for each combination of their values")
         if self.until is not None and isinstance(self.until, AnyRequirement) != bool(self.axes):

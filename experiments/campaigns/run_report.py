@@ -126,6 +126,9 @@ def _report_sweep(folder: CampaignFolder, options: Report, written: Output, begi
 
 
 def _report_campaign(folder: CampaignFolder, options: Report, written: Output, begin: BeginProgress) -> Show:
+    for option, value in (("--require", options.require), ("--show", options.show)):
+        if value is not None:
+            raise InputError(f"{option}: is only for a sweep, and {folder.path} is a campaign; omit it")
     progress = begin("quantiles")
     columns = _columns(folder)
     progress(0.3)

@@ -54,10 +54,12 @@ def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
         raise InputError(f"--vary: at most {MOST_AXES} keys can be varied at once, found {len(pieces)}; leave some out")
     axes = tuple(_axis(piece, known) for piece in pieces)
     scaled = _error_bounds(scenario)
-    keys = [key for axis in axes for tied in tied_keys(axis.key) for key in scaled.get(tied, {tied: 0.0})]
-    if len(set(keys)) < len(keys):
-        (twice, *_) = [key for key in keys if keys.count(key) > 1]
-        raise InputError(f"--vary: {twice} is named twice; name each key once")
+    varied = [(key, tied) for axis in axes for tied in tied_keys(axis.key) for key in scaled.get(tied, {tied: 0.0})]
+    for key, _ in varied:
+        names = [tied for other, tied in varied if other == key]
+        if len(names) > 1:
+            problem = "is named twice" if len(set(names)) == 1 else "vary the same value"
+            raise InputError(f"--vary: {' and '.join(dict.fromkeys(names))} {problem}; name each key once")
     cells = math.prod(len(axis.values) for axis in axes)
     if cells > MOST_CELLS:
         raise InputError(f"--vary: {cells} cells are more than the limit of {MOST_CELLS}; give fewer values")
@@ -142,6 +144,8 @@ def _axis(piece: str, known: Mapping[str, bool]) -> Axis:
     first, last = (_number(part, key) for part in parts[:2])
     if first >= last:
         raise InputError(f"--vary: {key}: must go from a smaller to a greater value, found {shown(written)}")
+    if first <= 0 and any(single.endswith(f".{SCALE}") for single in keys):
+        raise InputError(f"--vary: {key} must be greater than 0, found {shown(written)}")
     if scale == "log" and first <= 0:
         raise InputError(f"--vary: {key}: on a logarithmic scale values must be greater than 0, found {shown(written)}")
     count = _count(parts[2], key)

@@ -72,6 +72,8 @@ def replace_values(
             if end not in ENDS or _general(path) not in known:
                 guess = similar_key(key, known)
                 hint = f"did you mean {guess}?" if guess else f"for the keys, see: {shown_by}"
+                if key.endswith("_sensor.scale"):
+                    hint = "a scale is only for --vary of infoset sweep; set each error bound of the sensor"
                 raise InputError(f"--set: a {noun} has no key {shown(key)}; {hint}")
         table = _table(document, path[:-1], key)
         if table is not None:  # a file with a value in place of a table is refused by its checks

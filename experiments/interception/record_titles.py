@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sim import Outcome, Record
+from sim.adversary import WORST_FOUND
 from sim.results import ending
 
 _OUTCOMES = {Outcome.SET_EMPTY: "set empty", Outcome.BUDGET_SPENT: "budget spent", Outcome.DIVERGED: "diverged"}
@@ -12,7 +13,8 @@ _OUTCOMES = {Outcome.SET_EMPTY: "set empty", Outcome.BUDGET_SPENT: "budget spent
 
 def noise_title(record: Record) -> str:
     """Return the title of the noise of an engagement: `random noise`, or `game noise, range meter`."""
-    return f"{record.noise_name} noise" + (", range meter" if record.scenario.range_sensor is not None else "")
+    name = "worst errors found" if record.noise == WORST_FOUND else f"{record.noise_name} noise"
+    return name + (", range meter" if record.scenario.range_sensor is not None else "")
 
 
 def record_titles(records: Sequence[Record]) -> list[str]:

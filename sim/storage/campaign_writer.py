@@ -136,8 +136,11 @@ def need_free(path: Path, *, resume: bool) -> None:
         names = [file.name for file in path.iterdir() if file.name != LOCK and not is_leftover(file)]
     if MANIFEST in names:
         if not resume:
+            kind = "campaign"
+            with contextlib.suppress(ManifestError):
+                kind = read_manifest(path).kind
             raise OccupiedError(
-                f"{path}: contains a campaign already; continue it with --resume, or choose another folder"
+                f"{path}: contains a {kind} already; continue it with --resume, or choose another folder"
             )
     elif names:
         raise OccupiedError(f"{path}: is not empty, and contains no campaign; choose another folder")

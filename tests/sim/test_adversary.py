@@ -62,7 +62,7 @@ def test_what_is_found_is_possible_and_flies_again(worst: WorstEngagement, coars
     assert_flies_again(worst)
     assert np.abs(worst.errors["angle"]).max() == 1.0
     assert not worst.errors["range"].any()
-    assert worst.record().noise_name == "scripted"
+    assert worst.record().noise_name == "worst-found"
 
 
 def test_measurements_of_the_worst_lie_within_the_bounds_of_the_truth(worst: WorstEngagement) -> None:

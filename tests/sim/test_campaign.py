@@ -648,3 +648,8 @@ def test_cells_of_a_sweep_are_campaigns_of_their_scenarios(brief: Scenario, tmp_
         replace(asked, runs=30).run(resume=True)
     with pytest.raises(ValueError, match="a scenario for each combination"):
         replace(asked, cells=cells[:2])
+
+
+def test_a_noise_that_is_no_choice_is_refused(brief: Scenario, tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match=r"noise must be None or one of CampaignNoise\.RANDOM, .*MIXED: got 'foo'"):
+        Campaign(brief, 4, tmp_path, noise="foo")  # type: ignore[arg-type]

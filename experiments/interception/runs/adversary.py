@@ -24,7 +24,7 @@ from experiments.interception.choices import own_strategy, study_scenario
 from experiments.interception.command import Adversary
 from experiments.interception.record_file import record_path, write_record
 from experiments.interception.runs.engage import COLUMNS, step_rows
-from experiments.interception.runs.engagement_table import FIGURE_2, FIGURE_3, draw_engagements, read_times
+from experiments.interception.runs.engagement_table import FIGURE_2, FIGURE_3, draw_engagements, need_times, read_times
 from experiments.interception.runs.shared import summary_head
 from experiments.interception.runs.worst_misses import WorstMisses, find_worst_misses
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
@@ -40,7 +40,7 @@ def run(options: Adversary) -> None:
         record_path("--record", options.record)
     scenario, notes = study_scenario(options)
     own = own_strategy(options.strategy)
-    times_s = read_times(options.times)
+    times_s = read_times(options.times, options.out)
     names = ("scenario.toml", "results.json", "steps.csv", RECORD, *figure_files(FIGURE_2, FIGURE_3))
     with (
         output_of(options, names, {"--record": options.record}) as written,
@@ -57,12 +57,14 @@ def run(options: Adversary) -> None:
                 f"{'omit --keep-set, or ' if options.keep_set else ''}check the units of the scenario with: infoset "
                 "scenarios check FILE"
             )
+        files = [options.record, None if options.out is None else options.out / RECORD]
+        records = [chosen.record(own)] if any(files) else []
+        if records:
+            need_times(options.times, times_s, records)
         summary = {**summary_head(scenario), **_summary(scenario, worst, chosen, options, elapsed_s)}
         written.save("scenario.toml", scenario_to_toml(scenario))
         written.save("results.json", to_json(summary), "--json")
-        files = [options.record, None if options.out is None else options.out / RECORD]
-        if any(files):
-            record = chosen.record(own)
+        for record in records:
             written.save("steps.csv", to_csv(COLUMNS, step_rows([record])))
             for file in filter(None, files):
                 write_record(record, file, overwrite=options.overwrite)

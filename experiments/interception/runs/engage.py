@@ -15,6 +15,7 @@ from experiments.interception.runs.engagement_table import (
     FIGURE_2,
     FIGURE_3,
     draw_engagements,
+    need_times,
     read_times,
     show_engagements,
 )
@@ -35,7 +36,7 @@ def run(options: Engage) -> None:
     """Simulate one or two engagements, write the files and print the table."""
     scenario = scenario_with(options)
     own = own_strategy(options.strategy)
-    times_s = read_times(options.times)
+    times_s = read_times(options.times, options.out)
     both = options.noise == "both"
     noises = [*NoiseKind] if both else [NoiseKind(options.noise or scenario.noise)]
     record_files = {}
@@ -61,6 +62,7 @@ def run(options: Engage) -> None:
             need_finite(record.result)
             records.append(record)
             summaries[noise.value] = {**summary_head(flown, own), **_summary(record, perf_counter() - began_s)}
+        need_times(options.times, times_s, records)
         head = {"version": library_version(), "scenario_hash": scenario_hash(scenario)}
         summary = {**head, **summaries} if both else summaries[noises[0].value]
         written.save("scenario.toml", scenario_to_toml(scenario if both else records[0].scenario))

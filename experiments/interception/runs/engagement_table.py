@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from rich.console import Console
 
@@ -60,6 +61,7 @@ def show_engagements(records: Sequence[Record], console: Console) -> None:
         table.add_row(*row)
     print_lines(console, [" | ".join(dict.fromkeys(record.scenario.name for record in records))])
     print_table(console, table)
+    print_lines(console, filter(None, map(_both_failures, records)))
     print_lines(console, dict.fromkeys(filter(None, (allowance(record.scenario) for record in records))))
 
 
@@ -75,13 +77,38 @@ def _outcome(record: Record) -> str:
     return ending(outcome, record.result.hit.tolist()[0])
 
 
-def read_times(text: str | None) -> tuple[float, ...]:
-    """Return the times of figure 3 that ``--times`` gives, s; raise `InputError` if one is not a time."""
+def _both_failures(record: Record) -> str:
+    """Return a line if the set became empty and the budget was spent: the outcome names only one of them."""
+    result, thruster = record.result, record.scenario.thruster
+    left_m_s = thruster.budget_m_s - float(result.impulse_m_s[0])
+    if not result.set_emptied[0] or left_m_s >= max(thruster.least_impulse_m_s, 1e-9 * thruster.budget_m_s):
+        return ""
+    budget = f"the impulse budget of {thruster.budget_m_s:g} m/s was spent"
+    return f"{record.noise_name} noise: the set became empty, and {budget}"
+
+
+def read_times(text: str | None, folder: Path | None) -> tuple[float, ...]:
+    """Return the times of figure 3 that ``--times`` gives, s.
+
+    `InputError` if one is not a time, or no folder is given for the figure.
+    """
+    if text is not None and folder is None:
+        raise InputError(
+            "--times: chooses the sets of figure 3, which only --out DIR writes; add --out, or omit --times"
+        )
     parts = DEFAULT_TIMES if text is None else text.split(",")
     if len(parts) > MOST_TIMES:
         raise InputError(f"--times: at most {MOST_TIMES} times fit in a figure, found {len(parts)}; omit some")
     example = "--times 0.5,40,90"
     return tuple(read_number("--times", float, part, least=0.0, greatest=None, example=example) for part in parts)
+
+
+def need_times(text: str | None, times_s: Sequence[float], records: Sequence[Record]) -> None:
+    """Raise `InputError` if a time of ``--times`` is after the last step of all engagements."""
+    last_s = max(record.steps[-1].time_s for record in records)
+    late_s = [time_s for time_s in times_s if time_s > last_s]
+    if text is not None and late_s:
+        raise InputError(f"--times: {late_s[0]:g} s is after the last step, at {last_s:g} s; give earlier times")
 
 
 def draw_engagements(

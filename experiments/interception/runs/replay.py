@@ -13,6 +13,7 @@ from experiments.interception.runs.engagement_table import (
     FIGURE_2,
     FIGURE_3,
     draw_engagements,
+    need_times,
     read_times,
     show_engagements,
 )
@@ -23,7 +24,7 @@ def run(options: Replay) -> None:
     """Read the records, write the files and print the table or the terminal replay."""
     if len(options.records) > MOST_RECORDS:
         raise InputError(f"replay needs one record or two records, found {len(options.records)}; omit some")
-    times_s = read_times(options.times)
+    times_s = read_times(options.times, options.out)
     animation_path("--gif", options.gif, GIF)
     animation_path("--mp4", options.mp4, MP4)
     files = {"--html": options.html, "--gif": options.gif, "--mp4": options.mp4}
@@ -38,6 +39,7 @@ def run(options: Replay) -> None:
         progress_bar(options.quiet) as begin,
     ):
         records = [load_record(file) for file in options.records]
+        need_times(options.times, times_s, records)
         if options.html is not None:
             written.deliver("--html", interception_page(records))
         for option, file in (("--gif", options.gif), ("--mp4", options.mp4)):

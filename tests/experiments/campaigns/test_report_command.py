@@ -104,6 +104,10 @@ def test_a_report_writes_nothing_unasked(infoset: Infoset, folder: Path, tmp_pat
     assert "--out writes one" in out
     assert list(tmp_path.iterdir()) == []
     assert infoset("report", folder, "-q") == (0, "", "")
+    for option, value in (("--require", "miss_m p90<10"), ("--show", "miss_m p50")):
+        code, out, err = infoset("report", folder, option, value)
+        assert (code, out) == (2, "")
+        assert f"{option}: is only for a sweep, and {folder} is a campaign; omit it" in err
 
 
 @pytest.mark.parametrize(

@@ -121,7 +121,12 @@ def test_a_factor_of_all_error_bounds_of_a_sensor(asteroid: Scenario) -> None:
             "thruster.budget_m_s=nominal.range_km=1:2:2",
             ["must have the same unit, found thruster.budget_m_s in m/s, nominal.range_km in km"],
         ),
-        ("angle_sensor.scale=1:2:2,angle_sensor.error_at_zero_range_rad=1e-4:2e-4:2", ["is named twice"]),
+        (
+            "angle_sensor.scale=1:2:2,angle_sensor.error_at_zero_range_rad=1e-4:2e-4:2",
+            ["angle_sensor.scale and angle_sensor.error_at_zero_range_rad vary the same value"],
+        ),
+        ("angle_sensor.scale=1:2:2,angle_sensor.scale=1:2:2", ["--vary: angle_sensor.scale is named twice"]),
+        ("angle_sensor.scale=0:4:3", ["--vary: angle_sensor.scale must be greater than 0"]),
         ("thruster.budget_m_s=thruster.budget_m_s=1:2:2", ["is named twice"]),
         ("rate_sensor.scale=1:2:2", ["has no [rate_sensor]; add that table"]),
         ("thruster.scale=1:2:2", ["has no numeric key", "thruster.scale"]),

@@ -71,6 +71,7 @@ def test_tables_of_an_array_are_numbered_from_1_as_in_messages() -> None:
         ("budget_m_s=5", "did you mean thruster.budget_m_s?"),
         ("nonsense=5", "for the keys, see: infoset scenarios new FILE"),
         ("schema=2", "a scenario has no key"),
+        ("angle_sensor.scale=2", "a scale is only for --vary of infoset sweep; set each error bound of the sensor"),
         ("thruster.budget_m_s=much", 'thruster.budget_m_s: must be a number, found "much"; write for example'),
         ('thruster.budget_m_s="5"', "write it without quotes"),
         ("information_set.model=guarantied", 'did you mean "guaranteed"?'),

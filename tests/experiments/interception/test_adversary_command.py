@@ -68,12 +68,12 @@ def test_the_worst_as_json_and_as_a_record_that_replays(infoset: Command, tmp_pa
 
     record = load_record(tmp_path / "worst.npz")
     assert float(record.result.miss_m[0]) == worst.miss_m
-    assert record.noise == record.noise_name == "scripted"
+    assert record.noise == record.noise_name == "worst-found"
     assert record.result.position_m[0].tolist() == worst.position_m.tolist()
     assert record.scenario == worst.scenario
     code, out, _ = infoset("replay", "worst.npz", "--out", "figures")
     assert code == 0
-    assert "scripted + range meter" in out
+    assert "worst-found + range meter" in out
     assert sorted(each.name for each in (tmp_path / "figures").iterdir()) == [
         "figure-2-process.pdf",
         "figure-2-process.png",
@@ -132,7 +132,7 @@ def test_the_worst_in_a_folder_as_engage_writes_it(infoset: Command, tmp_path: P
     assert not record.result.set_emptied[0]
     rows = (tmp_path / "worst" / "steps.csv").read_text().splitlines()
     assert len(rows) == 1 + len(record.steps)
-    assert rows[1].startswith("scripted,0,")
+    assert rows[1].startswith("worst-found,0,")
     assert scenario_hash(load_scenario(tmp_path / "worst" / "scenario.toml")) == found["scenario_hash"]
     code, _, err = infoset("adversary", *options)
     assert code == 2
@@ -170,7 +170,7 @@ def test_what_is_refused_before_anything_is_flown(arguments: list[str], message:
 def test_an_existing_record_is_replaced_when_told(infoset: Command) -> None:
     Path("worst.npz").write_text("something")
     assert infoset("adversary", "--budget", 1, "--record", "worst.npz", "--overwrite", "-q")[0] == 0
-    assert load_record("worst.npz").noise == "scripted"
+    assert load_record("worst.npz").noise == "worst-found"
 
 
 def test_where_no_engagement_counts_it_is_said(infoset: Command, tmp_path: Path) -> None:
