@@ -73,6 +73,8 @@ _DASHES: tuple[tuple[float, Sequence[float]] | None, ...] = (
 )
 """Line styles from the largest quantile down; None is a solid line."""
 
+_NO_VALUE = "\N{EN DASH}"
+"""Text in the cells whose runs do not show the quantile."""
 _LETTERS = "abcdefghijklmnopqrstuvwxyz"
 _MOST_TICKS = 8
 _HEAD_ROOM = 1.06
@@ -137,28 +139,58 @@ def _lines(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figu
     for axes, quantity, letter in zip(panels, quantities, _LETTERS, strict=False):
         quantiles = [quantile for quantile in shown if quantile.quantity == quantity]
         _line_panel(axes, table, noise, quantity, quantiles, levels)
-        axes.set_title(f"({letter}) {noise} noise", pad=6.0 + (4.0 if quantity == table.required.quantity else 0.0))
+        few = _too_few(table, noise, quantiles)
+        axes.set_title(
+            f"({letter}) {noise} noise{few and f'; {few}'}",
+            pad=6.0 + (4.0 if quantity == table.required.quantity else 0.0),
+        )
         axes.set_ylabel(QUANTITY_NAMES[quantity])
     for unused in panels[len(quantities) :]:
         unused.remove()
+    drawn = {quantile.level for quantile in shown if _is_shown(table, noise, quantile)}
     handles: list[Any] = [
         Line2D([], [], color=INK, linestyle=_look(levels, level), marker="o", markersize=3, label=level_name(level))
+        if level in drawn
+        else Line2D([], [], color=INK, linestyle="", marker="^", label=f"{level_name(level)}: lower end only")
         for level in levels
     ]
     handles.append(Line2D([], [], color=IMPULSE, linewidth=0.9, label=f"required: {requirement_words(table.required)}"))
-    handles += [Patch(facecolor=colour, label=str(decision)) for decision, colour in DECISION_COLOURS.items()]
+    handles += _decision_patches(table, noise)
     if table.radius_m is not None:
         handles.append(Line2D([], [], color=LIMIT, linestyle="--", linewidth=0.9, label="radius of the body"))
-    handles.append(Patch(facecolor=IMPULSE, alpha=0.15, label="range of the limit"))
-    handles.append(_interpolated())
+    handles += _limit_handles(table, noise, Patch(facecolor=IMPULSE, alpha=0.15, label="range of the limit"))
     note = "bars: 95 % confidence intervals; arrow: too few runs for an upper end"
     figure.legend(handles=handles, loc="lower center", ncols=4, title=note, title_fontsize=7.0)
     return figure
 
 
-def _interpolated() -> Line2D:
-    """Return the mark of an interpolated limit for a legend."""
-    return Line2D([], [], linestyle="none", label="limit by interpolation", **_DIAMOND)
+def _too_few(table: SweepTable, noise: str, quantiles: Sequence[QuantileName]) -> str:
+    """Return a note about the quantiles that the runs show at no value; empty without such quantiles."""
+    hidden = [level_name(quantile.level) for quantile in quantiles if not _is_shown(table, noise, quantile)]
+    return f"too few runs for {', '.join(hidden)}" if hidden else ""
+
+
+def _is_shown(table: SweepTable, noise: str, quantile: QuantileName) -> bool:
+    return any(point.value is not None for point in _points(table, noise, quantile))
+
+
+def _decision_patches(table: SweepTable, noise: str) -> list[Patch]:
+    """Return the colours of the decisions that are drawn."""
+    verdicts = (table.verdict(cell, noise) for cell in range(len(table.cells)))
+    drawn = {verdict.decision for verdict in verdicts if verdict is not None}
+    return [
+        Patch(facecolor=colour, label=str(decision))
+        for decision, colour in DECISION_COLOURS.items()
+        if decision in drawn
+    ]
+
+
+def _limit_handles(table: SweepTable, noise: str, extent: Line2D | Patch) -> list[Any]:
+    """Return the marks of the limits that are drawn: `extent` for their ranges, and one for interpolated limits."""
+    drawn = [limit for answer in answers(table, noise) for limit in answer.limits]
+    if all(limit.value is None for limit in drawn):
+        return [extent] if drawn else []
+    return [extent, Line2D([], [], linestyle="none", label="limit by interpolation", **_DIAMOND)]
 
 
 def _line_panel(
@@ -262,14 +294,35 @@ def _maps(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figur
         axes.set_title(f"({letter}) {name}, {level_name(quantile.level)}, {unit}; {noise} noise")
     for unused in others[len(quantiles) :]:
         unused.remove()
-    handles: list[Any] = [Patch(facecolor=colour, label=str(decision)) for decision, colour in DECISION_COLOURS.items()]
-    handles.append(Line2D([], [], color=IMPULSE, linewidth=1.5, label="range of the limit"))
-    handles.append(_interpolated())
-    numbers = f"numbers in (a): {QUANTITY_NAMES[required.quantity]}"
-    if isinstance(required, Requirement):
-        numbers += f", {level_name(required.quantile.level)}"
-    figure.legend(handles=handles, loc="lower center", ncols=len(handles), title=numbers, title_fontsize=7.0)
+    handles: list[Any] = [
+        *_decision_patches(table, noise),
+        *_limit_handles(table, noise, Line2D([], [], color=IMPULSE, linewidth=1.5, label="range of the limit")),
+    ]
+    figure.legend(
+        handles=handles,
+        loc="lower center",
+        ncols=max(1, len(handles)),
+        title=_map_notes(table, shown, noise),
+        title_fontsize=7.0,
+    )
     return figure
+
+
+def _map_notes(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> str:
+    """Return the meaning of the numbers in the map of decisions, and of cells and quantiles that are not drawn."""
+    required, notes = table.required, []
+    if len(table.cells) <= MOST_NUMBERS:
+        level = f", {level_name(required.quantile.level)}" if isinstance(required, Requirement) else ""
+        notes.append(f"numbers in (a): {QUANTITY_NAMES[required.quantity]}{level}")
+    values = [table.grid(noise, quantile) for quantile in shown]
+    if any(np.ma.getmaskarray(grid).any() for grid in values):
+        notes.append(f"{_NO_VALUE} or white: too few runs for the quantile")
+    hidden = [
+        f"{QUANTITY_NAMES[quantile.quantity].split(', ')[0]} {level_name(quantile.level)}"
+        for quantile, grid in zip(shown, values, strict=True)
+        if not grid.count() and not (isinstance(required, Requirement) and quantile == required.quantile)
+    ]
+    return "; ".join([*notes, *([f"not drawn (too few runs): {', '.join(hidden)}"] if hidden else [])])
 
 
 def _decision_panel(axes: Axes, table: SweepTable, noise: str) -> None:
@@ -330,24 +383,24 @@ def _map_panel(figure: Figure, axes: Axes, table: SweepTable, noise: str, quanti
 
 
 def _write_numbers(axes: Axes, across: Axis, up: Axis, values: Grid, is_dark: Any, part: float = 0.5) -> None:
-    """Write the known values into the cells of a map, unless there are too many."""
+    """Write the values into the cells of a map, `_NO_VALUE` where they are not known, unless there are too many."""
     if values.size > MOST_NUMBERS:
         return
     room_mm = width_mm(axes) / len(across.values)
     size = min(6.5, room_mm / _MM_PER_POINT / 2.6)
     for row, height in enumerate(_heights(up, part)):
         for column, x in enumerate(across.values):
-            if np.ma.getmaskarray(values)[row, column]:
-                continue
-            value = float(values[row, column])
+            known = not np.ma.getmaskarray(values)[row, column]
+            value = float(values[row, column]) if known else 0.0
+            text = f"{value:.3g}" if value < 100.0 else f"{value:.0f}"
             axes.text(
                 x,
                 height,
-                f"{value:.3g}" if value < 100.0 else f"{value:.0f}",
+                text if known else _NO_VALUE,
                 ha="center",
                 va="center",
                 fontsize=size,
-                color="white" if is_dark(row, column) else INK,
+                color="white" if known and is_dark(row, column) else INK,
                 zorder=6.0,
             )
 

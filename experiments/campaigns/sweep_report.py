@@ -13,7 +13,7 @@ from rich.table import Table
 
 from experiments.campaigns.axis_names import unit_of
 from experiments.campaigns.samples import heading, sample_json
-from experiments.campaigns.sweep_figures import draw_sweep
+from experiments.campaigns.sweep_figures import QUANTITY_NAMES, draw_sweep
 from experiments.campaigns.sweep_table import (
     SHOWN,
     SHOWN_WITH_HITS,
@@ -124,7 +124,8 @@ class SweepReport:
             watched = " although runs are added until it is made"
         lines = [
             f"{folder.manifest.scenario.name}, {len(table.cells)} cells, {folder.finished_runs} runs",
-            f"the decision in each cell has a confidence of at least 95 %{watched}",
+            f"the decision in each cell has a confidence of at least 95 %{watched}; "
+            "this holds for each cell, not for all cells together",
         ]
         for noise in table.noises:
             verdicts = [table.verdict(cell, noise) for cell in range(len(table.cells))]
@@ -236,11 +237,21 @@ def decision_tables(table: SweepTable, noise: str) -> Iterator[tuple[str, Table]
             shown.add_row(
                 value_text(first, value), *(_entry(table.verdict(cell, noise)) for cell in grid[row].tolist())
             )
-        yield f"{first.key} (rows) and {second.key} (columns){f', at {at}' if at else ''}", shown
+        title = f"{first.key} (rows) and {second.key} (columns){f', at {at}' if at else ''}"
+        units = [f"{name} in {unit_of(axis.key)}" for name, axis in (("rows", first), ("columns", second))]
+        named = ", ".join(text for text in units if not text.endswith(" "))
+        cell_lines = f"lines of a cell: decision, {_estimate_name(table.required)} (- if too few runs), number of runs"
+        yield f"{title}\n{named}{named and '; '}{cell_lines}", shown
 
 
 def _entry(verdict: Verdict | None) -> str:
-    return "-" if verdict is None else f"{verdict.decision}\n{number(verdict.value)}"
+    return "-" if verdict is None else f"{verdict.decision}\n{number(verdict.value)}\n{verdict.runs}"
+
+
+def _estimate_name(required: AnyRequirement) -> str:
+    """Return the name of the required estimate with its unit."""
+    unit = QUANTITY_NAMES[required.quantity].partition(", ")[2]
+    return f"{required.name} in {unit}" if unit else required.name
 
 
 def quantile_options(

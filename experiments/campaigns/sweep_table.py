@@ -243,7 +243,7 @@ def _digits(value: float, gap: float) -> int:
     return 1 + math.floor(math.log10(value)) - math.floor(math.log10(abs(gap) * (1.0 + 1e-9))) if value and gap else 1
 
 
-def value_text(axis: Axis, value: float, digits: int = 6) -> str:
+def value_text(axis: Axis, value: float, digits: int = 4) -> str:
     """Return a value of an axis, with some digits, or more if neighbouring values differ only in these."""
     if value == round(value) and abs(value) < _MOST_WHOLE:
         return f"{value:.0f}"
@@ -255,7 +255,7 @@ def interpolated_text(axis: Axis, limit: Limit) -> str:
     if limit.value is None:
         return ""
     digits = max(1, 1 + _digits(abs(limit.value), limit.upper - limit.lower))
-    return value_text(axis, float(f"{limit.value:.{digits}g}"))
+    return value_text(axis, float(f"{limit.value:.{digits}g}"), digits=max(6, digits))
 
 
 @dataclass(frozen=True)

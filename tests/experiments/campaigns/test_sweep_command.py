@@ -3,6 +3,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import re
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -136,6 +137,8 @@ def test_the_report_of_a_sweep_is_from_its_files_alone(infoset: Infoset, swept: 
     assert code == 0
     assert "impulse_m_s p50<60 is met in" in out
     assert "angle_sensor.error_at_zero_range_rad (rows) and thruster.greatest_impulse_m_s (columns)" in out
+    assert "rows in rad, columns in m/s; lines of a cell: decision, impulse_m_s p50 in m/s (- if too few runs)" in out
+    assert re.search(r"met.*\n +[\d.]+ .*\n +20 +20", out)
     names = ["figure-sweep.pdf", "figure-sweep.png", "report.json", "scenario.toml", "sweep.parquet"]
     assert sorted(each.name for each in (tmp_path / "report").iterdir()) == names
     assert pq.read_table(tmp_path / "report" / "sweep.parquet").num_rows == 6
@@ -380,7 +383,10 @@ def test_runs_are_added_until_each_cell_is_decided(infoset: Infoset, file: Path,
     assert "to add runs to these cells: repeat infoset sweep with --resume and --until decided" in out
     code, out, _ = infoset(*asked, "--runs", 10, "--until", "decided", "--most-runs", 300, "--resume")
     assert code == 0
-    assert "the decision in each cell has a confidence of at least 95 % although runs are added until it is made" in out
+    assert (
+        "the decision in each cell has a confidence of at least 95 % although runs are added until it is made;" in out
+    )
+    assert "this holds for each cell, not for all cells together" in out
     summary = json.loads((tmp_path / "sweep" / "summary.json").read_text())
     assert (summary["complete"], summary["until"], summary["require"]) == (True, "miss_m p80<3", "miss_m p80<3")
     runs = [cell["samples"][0]["runs"] for cell in summary["cells"]]
@@ -591,11 +597,15 @@ def test_figures_of_sweeps_with_two_keys(swept: Path) -> None:
     assert [axes.get_xlabel() for axes in panels] == ["angle sensor: error at zero range, $10^{-4}$ rad"] * 4
     assert {axes.get_ylabel() for axes in panels} == {"thruster: greatest impulse, m/s"}
     assert all(len(axes.texts) == 6 for axes in panels)
-    # Twenty runs do not show a quantile of 99 %: it has no heat map, and the map of decisions has no numbers.
+    # Twenty runs do not show a quantile of 99 %: it has no heat map, and a dash in the map of decisions.
     few = draw_sweep(sweep_table(folder, REQUIRED), SHOWN, "random")
     titles = [axes.get_title() for axes in few.axes if axes.get_xlabel()]
     assert [title.split(",")[1] for title in titles[1:]] == [" p50", " p50"]
-    assert few.axes[0].texts[:] == []
+    assert {text.get_text() for text in few.axes[0].texts} == {"\N{EN DASH}"}
+    (legend,) = few.legends
+    assert "\N{EN DASH} or white: too few runs for the quantile" in legend.get_title().get_text()
+    assert "not drawn (too few runs): impulse spent p99" in legend.get_title().get_text()
+    assert "limit by interpolation" not in [text.get_text() for text in legend.get_texts()]
 
 
 def test_figures_of_sweeps_with_one_key(brief: Scenario, tmp_path: Path) -> None:
@@ -605,7 +615,15 @@ def test_figures_of_sweeps_with_one_key(brief: Scenario, tmp_path: Path) -> None
     for noise in ("random", "game"):
         figure = draw_sweep(table, SHOWN, noise)
         need_room(figure)
-        assert [axes.get_title() for axes in figure.axes] == [f"(a) {noise} noise", f"(b) {noise} noise"]
+        # Fifteen runs of a noise do not show a quantile of 99 %.
+        note = f"{noise} noise; too few runs for p99"
+        assert [axes.get_title() for axes in figure.axes] == [f"(a) {note}", f"(b) {note}"]
+        (legend,) = figure.legends
+        texts = [text.get_text() for text in legend.get_texts()]
+        assert texts[:2] == ["p99: lower end only", "p50"]
+        verdicts = [table.verdict(cell, noise) for cell in range(3)]
+        drawn = {str(verdict.decision) for verdict in verdicts if verdict is not None}
+        assert drawn == {text for text in texts if text in {str(decision) for decision in Decision}}
         assert [axes.get_ylabel() for axes in figure.axes] == ["miss, m", "impulse spent, m/s"]
     with pytest.raises(ValueError, match="one or two axes"):
         draw_sweep(table, [], "game")
