@@ -144,7 +144,8 @@ class Campaign:
     Raises
     ------
     TypeError, ValueError
-        If a number is out of its range, the axes and the cells do not fit together, or `until` does not fit.
+        If a number is out of its range, the noise is not a `CampaignNoise`, the axes and the cells do not fit together,
+        or `until` does not fit.
     """
 
     scenario: Scenario

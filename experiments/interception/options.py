@@ -60,7 +60,8 @@ SetTimes = Annotated[
     typer.Option(
         "--times",
         metavar="T1,T2,...",
-        help="Times of the sets in figure 3, s, separated by commas; the nearest step is drawn. Default: 0.5,4,8.",
+        help="Times of the sets in figure 3 of --out, s, separated by commas; the nearest step is drawn. Default: "
+        "0.5,4,8.",
     ),
 ]
 RecordFile = Annotated[

@@ -634,6 +634,8 @@ def test_cells_of_a_sweep_are_campaigns_of_their_scenarios(brief: Scenario, tmp_
     result = asked.run(Late(), resume=True)
     assert result.complete
     assert len(shards(tmp_path / "sweep")) == 9
+    with pytest.raises(OccupiedError, match="contains a sweep already"):
+        asked.run()
     whole = result.table
     assert whole.column_names == ["cell", *COLUMNS]
     assert whole.column("cell").to_pylist() == [0] * 40 + [1] * 40 + [2] * 40
