@@ -44,7 +44,9 @@ def test_python_blocks_run(block: str, tmp_path: Path) -> None:
 def test_there_is_one_example_of_python_and_five_of_the_command_line() -> None:
     assert len(blocks("python")) == 1
     _, _, examples, question = blocks("sh")
-    assert question.startswith("infoset sweep ")
+    install, sweep = question.split("\n", 1)
+    assert install == '.venv/bin/pip install -c constraints.txt ".[campaign]"'
+    assert sweep.startswith("infoset sweep ")
     activation, *lines = examples.splitlines()
     assert activation == ". .venv/bin/activate"
     commands = [line.split()[1] for line in lines]

@@ -209,6 +209,15 @@ def test_set_up_lines_name_what_exists(pages: list[Page]) -> None:
         assert set(asked[1].split(",") if asked else []) <= set(extras), line
 
 
+def test_pages_install_pyarrow_before_the_first_command_that_needs_it(page: Page) -> None:
+    # A reader who did the plain installation only can copy the blocks in their order.
+    lines = [line for block in page.blocks("sh", "console") for line in lines_of(block.text)]
+    needing = [line for line in lines if re.match(r"infoset (campaign|sweep|report)\b", line)]
+    if needing:
+        before = lines[: lines.index(needing[0])]
+        assert any(re.search(r"pip install .*\.\[campaign\b", line) for line in before), needing[0]
+
+
 def check_options(line: str) -> None:
     """Check that the command of a line, and every option in it, exist."""
     words = re.sub(r"[\[\]|,]", " ", line).split()[1:]
