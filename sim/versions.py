@@ -5,6 +5,9 @@ from __future__ import annotations
 import functools
 import json
 from importlib.metadata import PackageNotFoundError, distribution, version
+from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 CALCULATING = ("infoset", "numpy", "numba", "llvmlite")
 
@@ -37,10 +40,17 @@ def _version(name: str) -> str:
 
 
 def install_command(extra: str) -> str:
-    """Return the command that installs an optional extra: from the clone of an editable installation, else by name."""
+    """Return the command that installs an optional extra: from the clone if there is one, else by name.
+
+    References
+    ----------
+    PEP 610: `direct_url.json` has the key `dir_info` if the package was installed from a folder.
+    """
     try:
         origin = json.loads(distribution("infoset").read_text("direct_url.json") or "{}")
-    except PackageNotFoundError:
-        origin = {"dir_info": {"editable": True}}
-    editable = origin.get("dir_info", {}).get("editable", False)
-    return f'pip install -e ".[{extra}]"' if editable else f'pip install "infoset[{extra}]"'
+    except PackageNotFoundError:  # the folder is on the path of Python, not installed
+        origin = {"url": Path(__file__).parents[1].as_uri(), "dir_info": {"editable": True}}
+    if "dir_info" not in origin:
+        return f'pip install "infoset[{extra}]"'
+    folder = url2pathname(urlsplit(origin["url"]).path)
+    return f'pip install {"-e " if origin["dir_info"].get("editable") else ""}"{folder}[{extra}]"'

@@ -11,13 +11,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+import sim
 from experiments.campaigns.flight import duration, size
 from experiments.campaigns.samples import replay_line
 from experiments.common.errors import InputError
@@ -303,14 +304,23 @@ def test_without_dask_it_says_which_extra(infoset: Infoset, file: Path, monkeypa
 @pytest.mark.parametrize(
     ("origin", "command"),
     [
-        ('{"url": "file:///a", "dir_info": {"editable": true}}', 'pip install -e ".[exact]"'),
-        ('{"url": "file:///a", "dir_info": {}}', 'pip install "infoset[exact]"'),
+        ('{"url": "file:///a%20b/clone", "dir_info": {"editable": true}}', 'pip install -e "/a b/clone[exact]"'),
+        ('{"url": "file:///a%20b/clone", "dir_info": {}}', 'pip install "/a b/clone[exact]"'),
+        ('{"url": "file:///a/infoset.whl", "archive_info": {}}', 'pip install "infoset[exact]"'),
         (None, 'pip install "infoset[exact]"'),
     ],
 )
 def test_the_command_for_an_extra(origin: str | None, command: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sim.versions.distribution", lambda _name: SimpleNamespace(read_text=lambda _file: origin))
     assert install_command("exact") == command
+
+
+def test_the_command_for_an_extra_of_a_clone_that_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def not_installed(name: str) -> None:
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr("sim.versions.distribution", not_installed)
+    assert install_command("exact") == f'pip install -e "{Path(sim.__file__).parents[1]}[exact]"'
 
 
 def test_a_large_campaign_says_time_and_disk_first(
