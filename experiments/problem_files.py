@@ -15,7 +15,8 @@ from experiments.common.output import library_version, write_file
 from experiments.common.problem_file import ProblemTables, problem_form, problem_text
 from experiments.common.screen import show_built_in, show_checked
 from experiments.common.template import template
-from experiments.common.toml_file import Form, document_of
+from experiments.common.toml_file import document_of
+from experiments.common.toml_form import Form
 from experiments.multipoint import file as multipoint
 from experiments.pareto import file as pareto
 from experiments.pursuit import file as pursuit

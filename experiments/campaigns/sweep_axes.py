@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 from experiments.campaigns.axis_names import SCALE, tied_keys, unit_of
 from experiments.common.errors import InputError, shown
-from experiments.common.settings import ENDS, similar_key
+from experiments.common.toml_form import ENDS, similar_key
 from experiments.common.toml_values import LARGEST, SMALLEST, number_text
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
 from experiments.interception.scenario_tables import OPTIONAL_SENSORS

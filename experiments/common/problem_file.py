@@ -11,7 +11,7 @@ from enum import Enum
 from pydantic import BaseModel
 
 from experiments.common.file_kinds import PROBLEM_COMMANDS, built_in
-from experiments.common.toml_file import Form, KeyPath, Known, Problem, Tables, no_checks
+from experiments.common.toml_form import Form, KeyPath, Known, Problem, Tables, no_checks
 from experiments.common.toml_values import Constant, Description, Name, Table, key, quoted_text
 
 MOST_RADIANS = Decimal(1000)

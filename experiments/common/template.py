@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from experiments.common.file_kinds import SCENARIO
-from experiments.common.toml_file import Form, Tables, heading, is_array, keys_of, tables_of
+from experiments.common.toml_form import Form, Tables, heading, is_array, keys_of, tables_of
 from experiments.common.toml_values import quoted_text
 
 _WIDTH = 44

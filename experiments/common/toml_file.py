@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import os
+import re
 import tomllib
-import typing
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from decimal import Decimal
+from collections.abc import Mapping, Sequence
+from decimal import Decimal, InvalidOperation
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
@@ -27,114 +27,25 @@ from experiments.common.file_kinds import (
     use_of_file,
     use_of_folder,
 )
-from experiments.common.settings import read_settings, replace_values
-from experiments.common.toml_values import LONGEST_DESCRIPTION, WRONG, DecimalPair, decimal_of
+from experiments.common.toml_form import (
+    ENDS,
+    Form,
+    KeyPath,
+    Known,
+    Problem,
+    Tables,
+    heading,
+    keys_of,
+    settable_keys,
+    similar_key,
+    tables_of,
+)
+from experiments.common.toml_values import LONGEST_DESCRIPTION, WRONG, decimal_of
 
 MOST_PROBLEMS = 100
+_LONGEST_SETTING = 1000
 MISSING = "is missing"
 DID_YOU_MEAN = "did you mean {}?"
-
-KeyPath = tuple[str, ...]
-Tables = TypeVar("Tables", bound=BaseModel)
-
-
-@dataclass(frozen=True)
-class Problem:
-    """One problem of a file.
-
-    Parameters
-    ----------
-    path : tuple of str
-        Table and key; an array of tables has the index of the table, from 0, after its name.
-    text : str
-        What is wrong, and with which value.
-    remedy : str
-        What to do.
-    """
-
-    path: KeyPath
-    text: str
-    remedy: str
-
-
-@dataclass(frozen=True)
-class Known:
-    """The values of a file; those that are invalid are None.
-
-    Parameters
-    ----------
-    document : dict
-        The file as parsed.
-    bad : frozenset of tuple of str
-        Paths of the invalid tables and keys.
-    """
-
-    document: dict[str, Any]
-    bad: frozenset[KeyPath]
-
-    def value(self, *path: str) -> object:
-        """Return the value of a key as parsed, or None."""
-        value: object = self.document
-        for depth, part in enumerate(path, start=1):
-            if path[:depth] in self.bad:
-                return None
-            if isinstance(value, list):
-                value = value[int(part)] if int(part) < len(value) else None
-            else:
-                value = value.get(part) if isinstance(value, dict) else None
-        return value
-
-    def number(self, *path: str) -> Decimal | None:
-        """Return a number, or None."""
-        value = self.value(*path)
-        return Decimal(value) if isinstance(value, int | Decimal) else None
-
-    def pair(self, *path: str) -> DecimalPair | None:
-        """Return an interval, or None; a fixed number has equal ends."""
-        value = self.value(*path)
-        if isinstance(value, list):
-            return Decimal(value[0]), Decimal(value[1])
-        fixed = self.number(*path)
-        return None if fixed is None else (fixed, fixed)
-
-
-def no_checks(_known: Known) -> Iterator[Problem]:
-    """Yield no problem."""
-    return iter(())
-
-
-@dataclass(frozen=True)
-class Form(Generic[Tables]):
-    """A kind of file: its tables, and its names in messages.
-
-    Parameters
-    ----------
-    noun : str
-        Name of such a file in messages: ``scenario``.
-    listed_by : str
-        Command that lists the built-in files.
-    begun_by : str
-        Command that prints or writes a valid file to start from.
-    tables : type
-        The pydantic model of the whole file, made of `experiments.common.toml_values.Table`.
-    checks : callable, optional
-        Checks of relations between values.
-    written : sequence of str, optional
-        Optional tables and keys that the template contains, not as comments: ``chaser.position_m``.
-    kind : str, optional
-        Required value of ``kind``; `SCENARIO` for scenario files, which do not have this key.
-    schema : int, optional
-        Version of the file format.
-    """
-
-    noun: str
-    listed_by: str
-    begun_by: str
-    tables: type[Tables]
-    checks: Callable[[Known], Iterator[Problem]] = no_checks
-    written: Sequence[str] = ()
-    kind: str = SCENARIO
-    schema: int = 1
 
 
 def load_tables(
@@ -148,8 +59,8 @@ def load_tables(
         A built-in name, or the path of a TOML file. A name wins over a file of that name, unless the argument has a
         path separator or ends in ``.toml``.
     settings : sequence of str or None, optional
-        KEY=VALUE: values in place of those of the file, in its units; see `experiments.common.settings`. They are
-        added to the description.
+        KEY=VALUE: values in place of those of the file, in its units, with the keys of `read_tables`. They are added to
+        the description.
 
     Raises
     ------
@@ -157,7 +68,7 @@ def load_tables(
         If there is no such file, or it is invalid; the message lists all its problems.
     """
     text, source = _text_of(form, name_or_path)
-    values = read_settings(settings or ())
+    values = _read_settings(settings or ())
     if not values:
         return read_tables(form, text, source)
     tables = read_tables(form, text, f"{source} with --set", values)
@@ -190,7 +101,9 @@ def read_tables(form: Form[Tables], text: str, source: str, values: Mapping[str,
     source : str
         Name of the file in messages.
     values : mapping of str to str or None, optional
-        TOML values that replace those of the text, by key; see `experiments.common.settings.replace_values`.
+        TOML values that replace those of the text, by key, before the text is checked. A key is written with its table,
+        ``thruster.budget_m_s``; in an array of tables with the number of the table, ``craft.2.weight``. ``.least`` and
+        ``.greatest`` after a key are the ends of a pair. Text may lack its quotes.
 
     Raises
     ------
@@ -202,7 +115,7 @@ def read_tables(form: Form[Tables], text: str, source: str, values: Mapping[str,
     if kind is not None and kind != form.kind:
         raise InputError(f"{source}: {taken_by(kind)}")
     if values:
-        replace_values(document, values, settable_keys(form.tables), form.noun, form.begun_by)
+        _replace_values(form, document, values)
     schema = document.get("schema", form.schema)
     if isinstance(schema, bool) or not isinstance(schema, int) or schema != form.schema:
         raise InputError(
@@ -237,67 +150,86 @@ def read_tables(form: Form[Tables], text: str, source: str, values: Mapping[str,
     return tables
 
 
-def keys_of(tables: type[BaseModel], path: KeyPath = ()) -> dict[str, Any]:
-    """Return the keys of a table as written, with their pydantic fields.
+def _read_settings(settings: Sequence[str]) -> dict[str, str]:
+    """Return the values of ``--set KEY=VALUE`` by key, as written.
 
-    Parameters
-    ----------
-    tables : type
-        The model of the whole file.
-    path : tuple of str, optional
-        The table in it; empty is the top of the file.
+    `InputError` if a setting has another form, or a key is set twice.
     """
-    model = tables
-    for part in path:
-        if part.isdigit():
-            continue
-        inner = _table_in(_fields(model)[part].annotation)
-        if inner is None:
-            return {}
-        model = inner
-    return _fields(model)
+    values: dict[str, str] = {}
+    for setting in settings:
+        key, mark, text = (part.strip() for part in setting.partition("="))
+        if not mark or not key or not text or len(setting) > _LONGEST_SETTING:
+            raise InputError(
+                f"--set: must be KEY=VALUE, found {shown(setting)}; for example --set name=mine, or with the table of "
+                "the key, --set TABLE.KEY=5"
+            )
+        if key in values:
+            raise InputError(f"--set: {key} is set twice; set each key once")
+        values[key] = text
+    return values
 
 
-def tables_of(tables: type[BaseModel]) -> tuple[str, ...]:
-    """Return the names of the tables of a file, in their order."""
-    return tuple(name for name, field in _fields(tables).items() if _table_in(field.annotation) is not None)
+def _replace_values(form: Form[Tables], document: dict[str, Any], values: Mapping[str, str]) -> None:
+    """Replace values of a parsed file, or add them; `InputError` if there is no such key, or no such table of an array.
+
+    The file is checked afterwards, so the values are valid exactly when a file with them is.
+    """
+    known = settable_keys(form.tables)
+    for key, literal in values.items():
+        path, end = key.split("."), None
+        if _general(path) not in known:
+            end = path.pop()
+            if end not in ENDS or _general(path) not in known:
+                guess = similar_key(key, known)
+                hint = f"did you mean {guess}?" if guess else f"for the keys, see: {form.begun_by}"
+                if key.endswith("_sensor.scale"):
+                    hint = "a scale is only for --vary of infoset sweep; set each error bound of the sensor"
+                raise InputError(f"--set: a {form.noun} has no key {shown(key)}; {hint}")
+        table = _table(document, path[:-1], key)
+        if table is not None:  # a file with a value in place of a table is refused by its checks
+            value = _value(literal)
+            table[path[-1]] = value if end is None else _with_end(table.get(path[-1]), end, value, key)
 
 
-def settable_keys(tables: type[BaseModel]) -> list[str]:
-    """Return the keys of a file that ``--set`` replaces, with their tables; ``craft.1.weight`` in an array."""
-    inner = tables_of(tables)
-    top = [name for name in keys_of(tables) if name not in (*inner, "schema", "kind")]
-    return top + [
-        f"{table}.1.{name}" if is_array(tables, table) else f"{table}.{name}"
-        for table in inner
-        for name in keys_of(tables, (table,))
-    ]
+def _general(path: Sequence[str]) -> str:
+    """Return a key as in `settable_keys`, which has the number 1 for all tables of an array."""
+    return ".".join("1" if part.isdecimal() else part for part in path)
 
 
-def _fields(model: type[BaseModel]) -> dict[str, Any]:
-    return {field.alias or name: field for name, field in model.model_fields.items()}
+def _table(document: dict[str, Any], path: Sequence[str], key: str) -> dict[str, Any] | None:
+    """Return a table, which is added if it is missing; None if the file has something else there."""
+    table: Any = document
+    for part, after in itertools.pairwise((*path, "")):
+        if isinstance(table, list) and part.isdecimal():
+            if not 1 <= int(part[:6]) <= len(table):
+                raise InputError(f"--set: {key}: the file has {len(table)} of these tables; give a number from 1")
+            table = table[int(part) - 1]
+        elif isinstance(table, dict):
+            table = table.setdefault(part, [] if after.isdecimal() else {})
+    return table if isinstance(table, dict) else None
 
 
-def _table_in(annotation: Any) -> type[BaseModel] | None:
-    """Return the model of a table, optional or an array of them, or None for a plain value."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    inner = [_table_in(each) for each in typing.get_args(annotation)]
-    return next((each for each in inner if each is not None), None)
+def _value(literal: str) -> Any:
+    """Return a TOML value; other text is a number with a free form, such as ``.5``, or text without quotes."""
+    try:
+        parsed = tomllib.loads(f"value = {literal}", parse_float=decimal_of)
+    except (ValueError, RecursionError):
+        parsed = {}
+    if [*parsed] == ["value"]:
+        return parsed["value"]
+    try:
+        return Decimal(literal) if re.fullmatch(r"[+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?", literal) else literal
+    except InvalidOperation:
+        return literal
 
 
-def is_array(tables: type[BaseModel], name: str) -> bool:
-    """Whether a table is an array of tables."""
-    return any(typing.get_origin(each) in (list, tuple) for each in _options(_fields(tables)[name].annotation))
-
-
-def _options(annotation: Any) -> tuple[Any, ...]:
-    return (annotation, *typing.get_args(annotation))
-
-
-def heading(tables: type[BaseModel], name: str) -> str:
-    """Return the heading of a table: ``[orbit]``, ``[[craft]]``."""
-    return f"[[{name}]]" if is_array(tables, name) else f"[{name}]"
+def _with_end(pair: object, end: str, value: object, key: str) -> list[object]:
+    """Return a pair with a new end; a number is a pair with equal ends."""
+    if pair is None:
+        raise InputError(f"--set: {key}: the file has no such pair; set both ends, for example --set KEY=[1.0, 2.0]")
+    ends = list(pair) if isinstance(pair, list) and len(pair) == len(ENDS) else [pair, pair]
+    ends[ENDS.index(end)] = value
+    return ends
 
 
 def _exists(path: str) -> bool:

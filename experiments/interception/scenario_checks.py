@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from decimal import Decimal
 
 from experiments.common.errors import shown
-from experiments.common.toml_file import Known, Problem
+from experiments.common.toml_form import Known, Problem
 from experiments.common.toml_values import KILO, DecimalPair, si
 from experiments.interception.scenario_tables import OPTIONAL_SENSORS
 from guidance import Thruster

@@ -21,7 +21,8 @@ from experiments.common.problem_file import (
     problem_hash,
     problem_toml,
 )
-from experiments.common.toml_file import KeyPath, Known, Problem, load_tables
+from experiments.common.toml_file import load_tables
+from experiments.common.toml_form import KeyPath, Known, Problem
 from experiments.common.toml_values import (
     KILO,
     NUMBER,

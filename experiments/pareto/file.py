@@ -20,7 +20,8 @@ from experiments.common.problem_file import (
     problem_hash,
     problem_toml,
 )
-from experiments.common.toml_file import Known, Problem, load_tables
+from experiments.common.toml_file import load_tables
+from experiments.common.toml_form import Known, Problem
 from experiments.common.toml_values import (
     NUMBER,
     ZERO,

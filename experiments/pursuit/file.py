@@ -17,7 +17,8 @@ from pydantic import PlainValidator
 
 from experiments.common.errors import InputError
 from experiments.common.problem_file import ProblemTables, problem_form, problem_hash, problem_toml
-from experiments.common.toml_file import Known, Problem, load_tables
+from experiments.common.toml_file import load_tables
+from experiments.common.toml_form import Known, Problem
 from experiments.common.toml_values import (
     KILO,
     NUMBER,

@@ -11,7 +11,8 @@ import pytest
 
 from experiments.common.file_kinds import PROBLEM_COMMANDS, built_in_files
 from experiments.common.problem_file import problem_toml
-from experiments.common.toml_file import keys_of, load_tables, tables_of
+from experiments.common.toml_file import load_tables
+from experiments.common.toml_form import keys_of, tables_of
 from experiments.problem_files import FILES
 
 Infoset = Callable[..., tuple[int, str, str]]

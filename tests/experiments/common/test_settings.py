@@ -13,7 +13,6 @@ import pytest
 from experiments.campaigns.command import Report
 from experiments.cli import COMMANDS
 from experiments.common.errors import InputError
-from experiments.common.settings import read_settings
 from experiments.common.toml_file import load_tables
 from experiments.interception.scenario_file import load_scenario
 from experiments.pareto.file import FORM, load_pareto
@@ -93,7 +92,7 @@ def test_mistakes_are_those_of_a_file_and_name_the_key(setting: str, message: st
 
 def test_a_key_is_set_once() -> None:
     with pytest.raises(InputError, match=r"name is set twice"):
-        read_settings(["name=a", " name = b"])
+        load_tables(FORM, "pareto-2008", ["name=a", " name = b"])
 
 
 def test_the_recorded_scenario_is_the_changed_one(infoset: Infoset) -> None:

@@ -10,7 +10,8 @@ from pydantic import Field, PlainValidator
 
 from experiments.common.errors import InputError, shown
 from experiments.common.problem_file import problem_form, problem_hash
-from experiments.common.toml_file import Known, read_tables
+from experiments.common.toml_file import read_tables
+from experiments.common.toml_form import Known
 from experiments.common.toml_values import NUMBER, Name, Numbers, Positive, Table, Vector, key
 
 
