@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from infoset.limits import Fraction, Positive, check_fields
 from sim.statistics import shows
-from sim.stopping_rule import NUMBER, QuantileName, parse_quantile
+from sim.stopping_rule import NUMBER, QuantileName, number_text, parse_quantile
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -66,7 +66,7 @@ class Requirement:
         check_fields(self)
 
     def __str__(self) -> str:
-        return f"{self.quantile}<{self.bound:g}"
+        return f"{self.quantile}<{number_text(self.bound)}"
 
     @classmethod
     def parse(cls, text: str) -> Requirement:
@@ -120,7 +120,7 @@ class HitRequirement:
         check_fields(self)
 
     def __str__(self) -> str:
-        return f"hit>={self.share:g}"
+        return f"hit>={number_text(self.share)}"
 
     @property
     def name(self) -> str:

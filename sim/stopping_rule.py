@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from decimal import Decimal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,9 @@ QUANTITIES = ("miss_m", "impulse_m_s", "guaranteed_miss_m")
 GROWTH = 1.05
 """The sample grows by at least this factor between two checks: a check after every chunk would cost O(N^2)."""
 
-_QUANTILE = r"\s*(?P<quantity>\w+)\s+p(?P<level>[0-9]{1,2}(?:\.[0-9]{1,6})?)\s*"
-NUMBER = r"\s*(?P<number>[0-9]{1,15}(?:\.[0-9]{1,15})?(?:[eE][+-]?[0-9]{1,3})?)\s*"
+_DIGITS = r"[0-9]{1,20}(?:\.[0-9]{1,25})?(?:[eE][+-]?[0-9]{1,3})?"
+_QUANTILE = rf"\s*(?P<quantity>\w+)\s+p(?P<level>{_DIGITS})\s*"
+NUMBER = rf"\s*(?P<number>{_DIGITS})\s*"
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ class StoppingRule:
         check_fields(self)
 
     def __str__(self) -> str:
-        return f"{self.quantile} ci<{self.width:g}"
+        return f"{self.quantile} ci<{number_text(self.width)}"
 
     @classmethod
     def parse(cls, text: str) -> StoppingRule:
@@ -154,9 +156,15 @@ class Watch:
         return None
 
 
+def number_text(number: float, power: int = 0) -> str:
+    """Return the shortest text of a number, times 10^`power`, from which the same number is read again."""
+    digits = Decimal(repr(float(number))).scaleb(power).normalize()
+    return f"{digits:f}" if -7 < digits.adjusted() < 16 else str(digits).lower()
+
+
 def level_name(level: float) -> str:
     """Return a level as a name: p99 of 0.99, p99.9 of 0.999."""
-    return f"p{round(100.0 * level, 8):g}"
+    return f"p{number_text(level, 2)}"
 
 
 def _checks(chunks: int) -> Iterator[int]:
@@ -178,7 +186,7 @@ def parse_quantile(text: str, end: str, wanted: str, number: str = "") -> tuple[
     match = re.fullmatch(_QUANTILE + end, text[:100])
     if match is None:
         raise ValueError(f"must be {wanted}")
-    level = float(match["level"]) / 100.0
+    level = float(Decimal(match["level"]) / 100)
     if not 0.0 < level < 1.0:
         raise ValueError("the quantile must lie between p0 and p100, for example p99")
     value = float(match["number"]) if end else 0.0

@@ -43,7 +43,7 @@ from experiments.common.figure_style import (
 )
 from sim import QuantileName, Requirement
 from sim.requirement import AnyRequirement, Decision
-from sim.stopping_rule import level_name
+from sim.stopping_rule import level_name, number_text
 from sim.storage import Axis
 
 Floats = NDArray[np.float64]
@@ -484,6 +484,6 @@ def _look(levels: Sequence[float], level: float) -> Any:
 def requirement_words(required: AnyRequirement) -> str:
     """Return a requirement in words: `miss p99 under 10 m`."""
     if not isinstance(required, Requirement):
-        return f"probability of a hit at least {required.share:g}"
+        return f"probability of a hit at least {number_text(required.share)}"
     name, unit = QUANTITY_NAMES[required.quantity].split(", ")
     return f"{name} {level_name(required.quantile.level)} under {required.bound:g} {unit}"

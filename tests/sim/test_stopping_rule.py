@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from infoset.limits import LARGEST, SMALLEST
 from sim import QuantileName, Requirement, StoppingRule, estimate_quantiles
+from sim.requirement import HitRequirement, parse_requirement
 from sim.stopping_rule import Floats, Watch, level_name
 
 RULE = StoppingRule(QuantileName("miss_m", 0.5), 0.5)
@@ -17,12 +19,30 @@ def test_rules_are_read_and_written() -> None:
     rule = StoppingRule.parse("miss_m p99 ci<0.5")
     assert rule == StoppingRule(QuantileName("miss_m", 0.99), 0.5)
     assert str(rule) == "miss_m p99 ci<0.5"
-    assert StoppingRule.parse("  impulse_m_s  p99.9  ci < 1e-1 ").quantile.level == pytest.approx(0.999)
+    assert StoppingRule.parse("  impulse_m_s  p99.9  ci < 1e-1 ").quantile.level == 0.999
     required = Requirement.parse("guaranteed_miss_m p50<12.5")
     assert required == Requirement(QuantileName("guaranteed_miss_m", 0.5), 12.5)
     assert str(required) == "guaranteed_miss_m p50<12.5"
     assert QuantileName.parse("miss_m p5") == QuantileName("miss_m", 0.05)
     assert [level_name(each) for each in (0.05, 0.5, 0.99, 0.999, 0.9999)] == ["p5", "p50", "p99", "p99.9", "p99.99"]
+    assert str(Requirement.parse("miss_m p99.99995<1e-07")) == "miss_m p99.99995<1e-7"
+    assert str(StoppingRule.parse("miss_m p0.5 ci<1234567.5")) == "miss_m p0.5 ci<1234567.5"
+    assert QuantileName.parse("miss_m p1e-3") == QuantileName("miss_m", 1e-5)
+
+
+@given(
+    level=st.floats(SMALLEST, 1.0, exclude_max=True)
+    | st.decimals("0.01", "99.99", places=2).map(lambda p: float(p / 100)),
+    number=st.floats(SMALLEST, LARGEST) | st.floats(1e-9, 1e9),
+)
+def test_the_texts_of_rules_and_requirements_are_exact(level: float, number: float) -> None:
+    # A manifest stores these texts.
+    quantile = QuantileName("guaranteed_miss_m", level)
+    assert QuantileName.parse(str(quantile)) == quantile
+    rule, required, hits = StoppingRule(quantile, number), Requirement(quantile, number), HitRequirement(level)
+    assert StoppingRule.parse(str(rule)) == rule
+    assert parse_requirement(str(required)) == required
+    assert parse_requirement(str(hits)) == hits
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from experiments.campaigns.axis_names import key_label, unit_of
 from experiments.campaigns.samples import Sample
 from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
-from experiments.campaigns.sweep_figures import draw_sweep
+from experiments.campaigns.sweep_figures import draw_sweep, requirement_words
 from experiments.campaigns.sweep_table import SHOWN, Limit, SweepTable, answer, limits, spans_decades, sweep_table
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
 from experiments.interception.study import SetCounts
@@ -34,7 +34,7 @@ from sim import (
     quantiles,
     simulate,
 )
-from sim.requirement import Decision, HitRequirement, Verdict, judge, share_interval
+from sim.requirement import Decision, HitRequirement, Verdict, judge, parse_requirement, share_interval
 from sim.storage import Axis, CampaignFolder, read_manifest
 from tests.experiments.campaigns.figure_room import need_room
 
@@ -584,6 +584,21 @@ def test_keys_as_labels() -> None:
     assert key_label("information_set.sections") == "information set: sections"
     units = {"sun.gravitational_parameter_km3_s2": "km³/s²", "a.b_m_s2": "m/s²", "a.error_rad_s": "rad/s", "a.b_s": "s"}
     assert {key: unit_of(key) for key in units} == units
+
+
+def test_requirements_as_titles_are_exact() -> None:
+    words = {
+        "hit>=0.9999999": "probability of a hit at least 0.9999999",
+        "miss_m p99.995<10": "miss p99.995 under 10 m",
+    }
+    assert {text: requirement_words(parse_requirement(text)) for text in words} == words
+
+
+def test_a_report_accepts_the_stored_requirement(infoset: Infoset, file: Path, tmp_path: Path) -> None:
+    asked = ("sweep", file, "--vary", "body.radius_m=1:2:2", "--set", "body.radius_m=1", "--runs", 2, "--quiet")
+    assert infoset(*asked, "--require", "hit>=0.9999999", "--out", tmp_path / "sweep")[0] == 0
+    code, out, _ = infoset("report", tmp_path / "sweep", "--json", "-")
+    assert (code, json.loads(out)["require"]) == (0, "hit>=0.9999999")
 
 
 def test_figures_of_sweeps_with_two_keys(swept: Path) -> None:
