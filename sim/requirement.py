@@ -252,7 +252,7 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
     met, missed = looks >= fewest_met, looks <= most_missed
     decided = np.flatnonzero(met | missed)
     if not decided.size:
-        needed = runs_needed(int(holding[-1]), size, share, watched=True)
+        needed = runs_needed(int(holding[-1]), size, share)
         return Verdict(Decision.UNDECIDED, size, value, lower, upper, needed, known)
     decision = Decision.MET if met[decided[0]] else Decision.NOT_MET
     # A decision at an earlier run stays valid, although the last interval may contain the bound again.
@@ -368,14 +368,14 @@ def p_values(runs: ArrayLike, count: ArrayLike, share: ArrayLike, *, watched: bo
         return np.exp(np.minimum(above, 0.0)), np.exp(np.minimum(below, 0.0))
 
 
-def runs_needed(count: int, runs: int, share: float, *, watched: bool) -> int | None:
-    """Return about how many runs decide a requirement if the same share of them satisfies the bound.
+def runs_needed(count: int, runs: int, share: float) -> int | None:
+    """Return how many runs, about, decide with `watched=True` if the same share of them satisfies the bound.
 
     None is more than `MOST_RUNS_NEEDED`. If all runs satisfy the bound so far, it is the least number that can decide.
     """
 
     def deciding(sizes: Counts) -> Counts:
-        values = p_values(sizes, count / runs * sizes, share, watched=watched)
+        values = p_values(sizes, count / runs * sizes, share, watched=True)
         return sizes[(np.minimum(*values) <= _TAIL) & (sizes > runs)]
 
     sizes = np.unique(np.geomspace(1, MOST_RUNS_NEEDED, 2000).astype(np.int64))

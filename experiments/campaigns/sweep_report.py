@@ -238,10 +238,10 @@ def decision_tables(table: SweepTable, noise: str) -> Iterator[tuple[str, Table]
                 value_text(first, value), *(_entry(table.verdict(cell, noise)) for cell in grid[row].tolist())
             )
         title = f"{first.key} (rows) and {second.key} (columns){f', at {at}' if at else ''}"
-        units = [f"{name} in {unit_of(axis.key)}" for name, axis in (("rows", first), ("columns", second))]
-        named = ", ".join(text for text in units if not text.endswith(" "))
-        cell_lines = f"lines of a cell: decision, {_estimate_name(table.required)} (- if too few runs), number of runs"
-        yield f"{title}\n{named}{named and '; '}{cell_lines}", shown
+        units = {"rows": unit_of(first.key), "columns": unit_of(second.key)}
+        unit_text = ", ".join(f"{name} in {unit}" for name, unit in units.items() if unit)
+        cell_text = f"lines of a cell: decision, {_estimate_name(table.required)} (- if too few runs), number of runs"
+        yield f"{title}\n{unit_text}; {cell_text}" if unit_text else f"{title}\n{cell_text}", shown
 
 
 def _entry(verdict: Verdict | None) -> str:

@@ -123,8 +123,8 @@ def test_no_requirement_of_hits(text: str) -> None:
         parse_requirement(text)
 
 
-def is_decided(size: int, rate: float, share: float, watched: bool) -> bool:
-    fewest_met, most_missed = critical_counts(size, share, watched=watched)
+def is_decided(size: int, rate: float, share: float) -> bool:
+    fewest_met, most_missed = critical_counts(size, share, watched=True)
     return not most_missed[-1] < round(rate * size) < fewest_met[-1]
 
 
@@ -147,18 +147,25 @@ def test_no_sample_for_a_decision(values: list[float]) -> None:
         judge(np.array(values), P99, watched=True)
 
 
+def test_the_least_fixed_number_of_runs_that_decides() -> None:
+    for share, least in (("0.99", 368), ("0.95", 72)):
+        assert Decimal(share) ** (least - 1) > Decimal("0.025") >= Decimal(share) ** least
+        for size in (least - 1, least):
+            fewest_met, _ = critical_counts(size, float(share), watched=False)
+            assert (int(fewest_met[0]) <= size) is (size == least)
+
+
 def test_runs_needed_by_hand() -> None:
-    least = next(size for size in range(1, 1000) if Decimal("0.99") ** size <= Decimal("0.025"))
-    assert runs_needed(20, 20, 0.99, watched=False) == least == 368
-    assert runs_needed(20, 20, 0.95, watched=False) == 72
-    assert runs_needed(19, 20, 0.95, watched=False) is None
+    for share, least in ((Fraction("0.99"), 535), (Fraction("0.95"), 105)):
+        assert exact_p_value(least - 1, least - 1, share) > Fraction("0.025") >= exact_p_value(least, least, share)
+        assert runs_needed(20, 20, float(share)) == least
+    assert runs_needed(19, 20, 0.95) is None
     # The number is that of --until decided, by which the runs are added.
     for watched in (True, False):
         assert judge(np.ones(20), P99, watched=watched).runs_needed == 535
         assert judge(np.ones(20), HitRequirement(0.95), watched=watched).runs_needed == 105
-    for watched in (True, False):
-        for count, runs, share in ((20, 20, 0.99), (97, 100, 0.95), (180, 200, 0.95)):
-            needed = runs_needed(count, runs, share, watched=watched)
-            assert needed is not None
-            first = next(size for size in range(runs + 1, 2 * needed) if is_decided(size, count / runs, share, watched))
-            assert first == pytest.approx(needed, rel=0.15)
+    for count, runs, share in ((20, 20, 0.99), (97, 100, 0.95), (180, 200, 0.95)):
+        needed = runs_needed(count, runs, share)
+        assert needed is not None
+        first = next(size for size in range(runs + 1, 2 * needed) if is_decided(size, count / runs, share))
+        assert first == pytest.approx(needed, rel=0.15)

@@ -145,6 +145,22 @@ def test_the_report_of_a_sweep_is_from_its_files_alone(infoset: Infoset, swept: 
     assert load_scenario(tmp_path / "report" / "scenario.toml").name == "brief"
 
 
+@pytest.mark.parametrize(
+    ("second", "legend"),
+    [
+        ("information_set.sections=3:5:2", "lines of a cell: decision, "),
+        ("thruster.budget_m_s=50:60:2", "columns in m/s; lines of a cell: decision, "),
+    ],
+)
+def test_tables_name_the_units_of_the_axes_that_have_one(
+    second: str, legend: str, infoset: Infoset, file: Path, tmp_path: Path
+) -> None:
+    axes = ("--vary", f"angle_sensor.scale=1:2:2,{second}")
+    code, out, _ = infoset("sweep", file, *axes, "--runs", 2, "--out", tmp_path / "sweep")
+    assert code == 0
+    assert f"(columns)\n{legend}" in out
+
+
 def test_three_keys_are_a_table_only(infoset: Infoset, file: Path, tmp_path: Path) -> None:
     three = f"{TWO},information_set.sections=3:5:2"
     code, _, err = infoset("sweep", file, "--vary", three, "--runs", 2, "--out", tmp_path / "sweep")
