@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from infoset.limits import Fraction, Positive, check_fields
-from sim.statistics import shows
+from sim.statistics import estimate_hits, shows
 from sim.stopping_rule import NUMBER, QuantileName, number_text, parse_quantile
 
 Floats = NDArray[np.float64]
@@ -245,8 +245,10 @@ def judge(values: Floats, requirement: AnyRequirement, *, watched: bool) -> Verd
             value = _finite(np.quantile(values, share)) if shows(size, share) else None
         lower, upper = _quantile_interval(values, int(fewest_met[-1]), int(most_missed[-1]))
     else:
-        value = int(holding[-1]) / size
-        lower, upper = share_interval(int(holding[-1]), size, watched=watched)
+        estimate = estimate_hits(int(holding[-1]), size, CONFIDENCE)
+        value, lower, upper = estimate.probability, estimate.lower, estimate.upper
+        if watched:
+            lower, upper = share_interval(int(holding[-1]), size)
     known = int(np.isfinite(values).sum())
     looks = holding if watched else holding[-1:]
     met, missed = looks >= fewest_met, looks <= most_missed
@@ -274,16 +276,13 @@ def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def share_interval(count: int, runs: int, *, watched: bool) -> tuple[float, float]:
-    """Return the 95 % confidence interval of a share, by bisection.
-
-    It is the Clopper-Pearson interval, or if `watched` the confidence sequence of `judge`.
-    """
+def share_interval(count: int, runs: int) -> tuple[float, float]:
+    """Return the 95 % confidence interval of a share that holds for any number of runs (see `judge`), by bisection."""
 
     def end(index: int, inside: float, outside: float) -> float:
         for _ in range(_STEPS):
             middle = 0.5 * (inside + outside)
-            if p_values(runs, count, middle, watched=watched)[index] > _TAIL:
+            if p_values(runs, count, middle, watched=True)[index] > _TAIL:
                 inside = middle
             else:
                 outside = middle

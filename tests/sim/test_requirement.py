@@ -92,12 +92,18 @@ def test_a_decision_is_final() -> None:
 
 @given(hits=st.integers(0, 60), more=st.integers(0, 60))
 @settings(deadline=None)
-def test_the_interval_of_a_share_is_that_of_clopper_and_pearson(hits: int, more: int) -> None:
+def test_intervals_of_a_share_are_where_the_p_values_are_2_5_percent(hits: int, more: int) -> None:
     runs = max(1, hits + more)
     estimate = estimate_hits(hits, runs)
-    assert share_interval(hits, runs, watched=False) == pytest.approx((estimate.lower, estimate.upper), abs=1e-12)
-    lower, upper = share_interval(hits, runs, watched=True)
+    lower, upper = share_interval(hits, runs)
     assert lower <= estimate.lower <= estimate.upper <= upper
+    for watched, ends in ((False, (estimate.lower, estimate.upper)), (True, (lower, upper))):
+        for index, end in enumerate(ends):
+            p_value = p_values(runs, hits, end, watched=watched)[index] if 0.0 < end < 1.0 else 0.025
+            assert p_value == pytest.approx(0.025, rel=1e-6)
+    judged = judge(np.where(np.arange(runs) < hits, 1.0, 0.0), HitRequirement(0.5), watched=False)
+    if judged.decision is Decision.UNDECIDED:
+        assert (judged.lower, judged.upper) == (estimate.lower, estimate.upper)
 
 
 def test_hits_decide() -> None:
