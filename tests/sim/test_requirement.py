@@ -162,9 +162,9 @@ def test_the_least_fixed_number_of_runs_that_decides() -> None:
 
 
 def test_runs_needed_by_hand() -> None:
-    for share, least in ((Fraction("0.99"), 535), (Fraction("0.95"), 105)):
-        assert exact_p_value(least - 1, least - 1, share) > Fraction("0.025") >= exact_p_value(least, least, share)
-        assert runs_needed(20, 20, float(share)) == least
+    for exact, least in ((Fraction("0.99"), 535), (Fraction("0.95"), 105)):
+        assert exact_p_value(least - 1, least - 1, exact) > Fraction("0.025") >= exact_p_value(least, least, exact)
+        assert runs_needed(20, 20, float(exact)) == least
     assert runs_needed(19, 20, 0.95) is None
     # The number is that of --until decided, by which the runs are added.
     for watched in (True, False):
