@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset.limits import NotNegative, Part, Positive, check_fields
+from infoset.limits import ADDED_LATER, NotNegative, Part, Positive, check_fields
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,8 @@ class Thruster:
         Bounds mu1 and mu2 of the absolute value of an impulse that is not zero, m/s.
     execution_error_relative : float
         Bound delta of |given / commanded - 1|: a commanded impulse k is executed as k (1 + error).
+    pointing_error_rad : float
+        Bound psi of the angle between the given and the commanded impulse, across the x axis. For space only.
 
     Raises
     ------
@@ -37,6 +39,7 @@ class Thruster:
     least_impulse_m_s: NotNegative
     greatest_impulse_m_s: Positive
     execution_error_relative: Part = 0.0
+    pointing_error_rad: Part = field(default=0.0, metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Annotated
 
-from infoset.limits import NUMBER, POSITIVE, Limits, NotNegative, Part, Positive, check_fields
+from infoset.limits import ADDED_LATER, NUMBER, POSITIVE, Limits, NotNegative, Part, Positive, check_fields
 from infoset.sensors import AngleSensor, Sensor
 
 Interval = tuple[float, float]
@@ -66,20 +66,58 @@ class StateBox:
         Least and greatest lateral offset and range, m.
     vz_m_s, vx_m_s : tuple of float
         Least and greatest relative velocity along z and x, m/s (vx is negative: the object approaches).
+    y_m, vy_m_s : tuple of float, or None
+        Offset, m, and velocity, m/s, along the second lateral axis; both make the box spatial, None is a plane.
 
     Raises
     ------
     TypeError, ValueError
-        If an interval is not a pair of numbers within their limits, or is reversed.
+        If an interval is not a pair of numbers within their limits, or is reversed, or only one of `y_m` and `vy_m_s`
+        is set.
     """
 
     z_m: Annotated[Interval, NUMBER]
     x_m: Annotated[Interval, POSITIVE]
     vz_m_s: Annotated[Interval, NUMBER]
     vx_m_s: Annotated[Interval, _APPROACH]
+    y_m: Annotated[Interval, NUMBER] | None = field(default=None, metadata=ADDED_LATER)
+    vy_m_s: Annotated[Interval, NUMBER] | None = field(default=None, metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         check_fields(self)
+        if (self.y_m is None) != (self.vy_m_s is None):
+            missing = "y_m" if self.y_m is None else "vy_m_s"
+            raise ValueError(f"StateBox: y_m and vy_m_s must both be set, or neither: {missing} is missing")
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Lateral axes: ("z",) in a plane, ("y", "z") in space."""
+        return ("z",) if self.y_m is None else ("y", "z")
+
+    def axis(self, name: str) -> StateBox:
+        """Return the planar box of x and one lateral axis, "y" or "z", which is z in it.
+
+        Raises
+        ------
+        ValueError
+            If the box does not have the axis.
+        """
+        if name not in self.axes:
+            raise ValueError(f"StateBox: its lateral axes are {', '.join(self.axes)}: got {name!r}")
+        if self.y_m is None or self.vy_m_s is None:
+            return self
+        z_m, vz_m_s = (self.y_m, self.vy_m_s) if name == "y" else (self.z_m, self.vz_m_s)
+        return StateBox(z_m, self.x_m, vz_m_s, self.vx_m_s)
+
+    @property
+    def offset_m(self) -> float:
+        """Greatest distance from the x axis, m."""
+        return math.hypot(*(max(abs(z) for z in self.axis(name).z_m) for name in self.axes))
+
+    @property
+    def lateral_speed_m_s(self) -> float:
+        """Greatest velocity across the x axis, m/s."""
+        return math.hypot(*(max(abs(v) for v in self.axis(name).vz_m_s) for name in self.axes))
 
     @property
     def farthest_m(self) -> float:
@@ -89,9 +127,8 @@ class StateBox:
         -----
         Without impulses the distance is a convex function of time: it is greatest at the start or at the end.
         """
-        offset, greatest = max(abs(z) for z in self.z_m), self.x_m[1]
-        across = max(abs(v) for v in self.vz_m_s)
-        return max(math.hypot(greatest, offset), offset + across * (greatest / -self.vx_m_s[1]))
+        offset, greatest = self.offset_m, self.x_m[1]
+        return max(math.hypot(greatest, offset), offset + self.lateral_speed_m_s * (greatest / -self.vx_m_s[1]))
 
 
 @dataclass(frozen=True)
@@ -129,6 +166,10 @@ class SetModel:
         Bound of the relative change of the closing speed by gravity; used by the guaranteed model only.
     execution_error_relative : float
         Bound of |given / commanded - 1| of an impulse; used by the guaranteed model only.
+    disturbance_y_m_s2, gravity_y_m_s2 : float or None
+        `disturbance_m_s2` and `gravity_m_s2` along y; None is the value along z. For space only.
+    pointing_error_rad : float
+        Bound of the angle between the given and the commanded impulse; used by the guaranteed model in space only.
 
     Raises
     ------
@@ -154,6 +195,9 @@ class SetModel:
     gravity_m_s2: NotNegative = 0.0
     gravity_speed_change: NotNegative = 0.0
     execution_error_relative: Part = 0.0
+    disturbance_y_m_s2: NotNegative | None = field(default=None, metadata=ADDED_LATER)
+    gravity_y_m_s2: NotNegative | None = field(default=None, metadata=ADDED_LATER)
+    pointing_error_rad: Part = field(default=0.0, metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -161,8 +205,46 @@ class SetModel:
             raise ValueError(
                 f"SetModel: sections must be at least fewest_sections, {self.fewest_sections}: got {self.sections}"
             )
+        if len(self.axes) == 1:
+            for name, is_set in (
+                ("angle_sensor", self.angle_sensor.is_spatial),
+                ("disturbance_y_m_s2", self.disturbance_y_m_s2 is not None),
+                ("gravity_y_m_s2", self.gravity_y_m_s2 is not None),
+                ("pointing_error_rad", self.pointing_error_rad > 0.0),
+            ):
+                if is_set:
+                    raise ValueError(
+                        f"SetModel: {name} holds a value of an engagement in space, and bounds have no y_m and vy_m_s: "
+                        "set them, or leave the value out"
+                    )
         self.check_period("angle_sensor", self.angle_sensor)
         self.check_start("bounds", self.bounds)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Lateral axes: ("z",) in a plane, ("y", "z") in space."""
+        return self.bounds.axes
+
+    def axis(self, name: str) -> SetModel:
+        """Return the planar model of x and one lateral axis, "y" or "z", which is z in it.
+
+        Notes
+        -----
+        It has plane angles and no error of pointing: `section_laws` adds what couples the two axes.
+        """
+        if len(self.axes) == 1:
+            return self
+        own = name == "y"
+        return replace(
+            self,
+            bounds=self.bounds.axis(name),
+            angle_sensor=self.angle_sensor.axis(name),
+            disturbance_m_s2=_of(self.disturbance_y_m_s2 if own else None, self.disturbance_m_s2),
+            gravity_m_s2=_of(self.gravity_y_m_s2 if own else None, self.gravity_m_s2),
+            disturbance_y_m_s2=None,
+            gravity_y_m_s2=None,
+            pointing_error_rad=0.0,
+        )
 
     def check_period(self, name: str, sensor: Sensor) -> None:
         """Refuse a sensor whose period is not a whole number of steps; `name` is its name in the message.
@@ -199,7 +281,7 @@ class SetModel:
                 f"range_threshold_m must be less than the least range of {name}, {box.x_m[0]:g} m: "
                 f"got {self.range_threshold_m!r}"
             )
-        bound = self.angle_sensor.error_bound(box.farthest_m)
+        bound = min(self.angle_sensor.axis(name).error_bound(box.farthest_m) for name in box.axes)
         if not bound > 0.0:
             raise ValueError(
                 f"angle_sensor: its error bound must be positive up to the greatest distance of {name}, "
@@ -255,3 +337,7 @@ class SetModel:
                 f"gravity_speed_change let it differ by {eta:.3g} of closing_speed_m_s, {self.closing_speed_m_s:g} m/s"
             )
         return least / (1.0 + eta), greatest / (1.0 - eta)
+
+
+def _of(value: float | None, common: float) -> float:
+    return common if value is None else value

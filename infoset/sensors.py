@@ -7,18 +7,41 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import Enum
 from typing import ClassVar, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from infoset.limits import Fraction, Positive, check_fields
+from infoset.limits import ADDED_LATER, Fraction, Part, Positive, check_fields
 
 Floats = NDArray[np.float64]
 RangeOrRanges = TypeVar("RangeOrRanges", float, NDArray[np.float64])
 Measurements = Mapping[str, Floats]
 """Measured values of a batch by the name of the sensor; a sensor that does not measure in a step is left out."""
+
+
+class Convention(Enum):
+    """Which two angles an angle sensor measures in space.
+
+    PLANE: atan2(y, x) and atan2(z, x). GIMBAL: azimuth atan2(y, x) and elevation atan2(z, hypot(x, y)). CONE: a
+    direction, given by the angles of PLANE; the bound is that of the angle between measured and true direction.
+    """
+
+    PLANE = "plane"
+    GIMBAL = "gimbal"
+    CONE = "cone"
+
+
+class ErrorShape(Enum):
+    """Shape of the set of errors of an angle sensor in space.
+
+    BOX: each angle has its own bound. DISC: the root of the sum of squares is within the bound.
+    """
+
+    BOX = "box"
+    DISC = "disc"
 
 
 class Geometry(Protocol):
@@ -50,6 +73,10 @@ class Cuttable(Protocol):
 
     def measure_rate(self, omega_rad_s: Floats, error_rad_s: float, where: NDArray[np.bool_]) -> None:
         """Cut by a rate of the line of sight."""
+
+
+NEGLIGIBLE_ERROR_RAD = 1e-60
+"""Error bound of an axis that is measured without error."""
 
 
 class Sensor(ABC):
@@ -161,11 +188,18 @@ class AngleSensor(Sensor):
         Bound a + h(d) at `nominal_range_m` and at zero range, rad, in (0, 1). The same line continues beyond.
     nominal_range_m : float
         Range at which the first of the two holds, m.
+    error_at_nominal_range_y_rad, error_at_zero_range_y_rad : float or None
+        The same bounds for the angle of the y axis, rad, in [0, 1); None is that of the z axis. For space only.
+    convention : Convention
+        Which two angles are measured in space.
+    error_shape : ErrorShape or None
+        Shape of the set of errors in space; None is DISC for the convention CONE and BOX for the others. The
+        information set takes a disc as the box around it.
 
     Raises
     ------
     TypeError, ValueError
-        If a value is not a number within its limits.
+        If a value is not a number within its limits, or two of them contradict each other.
 
     References
     ----------
@@ -180,9 +214,42 @@ class AngleSensor(Sensor):
     error_at_nominal_range_rad: Fraction
     error_at_zero_range_rad: Fraction
     nominal_range_m: Positive
+    error_at_nominal_range_y_rad: Part | None = field(default=None, metadata=ADDED_LATER)
+    error_at_zero_range_y_rad: Part | None = field(default=None, metadata=ADDED_LATER)
+    convention: Convention = field(default=Convention.PLANE, metadata=ADDED_LATER)
+    error_shape: ErrorShape | None = field(default=None, metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         check_fields(self)
+        if self.convention is Convention.CONE and self.error_shape is ErrorShape.BOX:
+            raise ValueError(
+                "AngleSensor: error_shape must be disc for the convention cone, whose bound is that of one angle: "
+                "got box"
+            )
+        if self.is_disc and self.axis("y") != self.axis("z"):
+            raise ValueError(
+                "AngleSensor: an error in a disc or a cone has one bound: leave error_at_nominal_range_y_rad and "
+                "error_at_zero_range_y_rad out"
+            )
+
+    @property
+    def is_disc(self) -> bool:
+        """Whether the two errors of a measurement in space are in a disc."""
+        return self.convention is Convention.CONE or self.error_shape is ErrorShape.DISC
+
+    @property
+    def is_spatial(self) -> bool:
+        """Whether a value is set that only an engagement in space uses."""
+        return self != self.axis("z")
+
+    def axis(self, name: str) -> AngleSensor:
+        """Return the sensor of one plane angle, "y" or "z"; an error bound of zero becomes negligible."""
+        at_nominal, at_zero = self.error_at_nominal_range_rad, self.error_at_zero_range_rad
+        if name == "y" and self.error_at_nominal_range_y_rad is not None:
+            at_nominal = max(self.error_at_nominal_range_y_rad, NEGLIGIBLE_ERROR_RAD)
+        if name == "y" and self.error_at_zero_range_y_rad is not None:
+            at_zero = max(self.error_at_zero_range_y_rad, NEGLIGIBLE_ERROR_RAD)
+        return AngleSensor(self.period_s, at_nominal, at_zero, self.nominal_range_m)
 
     @property
     def error_slope_rad_per_m(self) -> float:

@@ -15,6 +15,7 @@ from infoset.model import SetModel, StateBox
 from infoset.sensors import RangeSensor, RateSensor, Sensor
 
 _DIRECTION = Limits(least=-2.0 * math.pi, most=2.0 * math.pi)
+_ELEVATION = Limits(least=-0.5 * math.pi, most=0.5 * math.pi)
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,8 @@ class Sun:
         Distance from the spacecraft at t = 0, m.
     direction_rad : float
         Direction of the Sun seen from the spacecraft at t = 0, from the x axis toward z, rad.
+    elevation_rad : float
+        Angle of that direction out of the plane (x, z), toward y, rad. For space only.
 
     Raises
     ------
@@ -39,6 +42,7 @@ class Sun:
     gravitational_parameter_m3_s2: Positive
     distance_m: Positive
     direction_rad: Annotated[float, _DIRECTION]
+    elevation_rad: Annotated[float, _ELEVATION] = field(default=0.0, metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -66,6 +70,8 @@ class Target:
     ----------
     acceleration_m_s2 : float
         Acceleration along z, m/s^2.
+    acceleration_y_m_s2 : float or None
+        Acceleration along y, m/s^2; None is that along z. For space only.
     switching_period_s : float
         Time between changes of sign (bang-bang), or the mean time (random telegraph), s.
 
@@ -78,6 +84,7 @@ class Target:
     manoeuvre: Manoeuvre
     acceleration_m_s2: NotNegative
     switching_period_s: Positive = 10.0
+    acceleration_y_m_s2: NotNegative | None = field(default=None, metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -153,6 +160,7 @@ class Scenario:
         for name, sensor in (("range_sensor", self.range_sensor), ("rate_sensor", self.rate_sensor)):
             if sensor is not None:
                 self.set_model.check_period(name, sensor)
+        self._check_axes()
         self.set_model.check_start("dispersion", self.dispersion)
         greatest = max(self.dispersion.x_m[1], self.set_model.bounds.x_m[1])
         if self.sun is not None and self.sun.distance_m <= greatest:
@@ -165,6 +173,31 @@ class Scenario:
             raise ValueError(
                 f"body.radius_m must be less than the least possible range, {least:g} m: got {self.body.radius_m!r}"
             )
+
+    def _check_axes(self) -> None:
+        """Refuse a start in a plane with a set in space or the other way, and values of space in a plane."""
+        if self.dispersion.axes != self.set_model.axes:
+            raise ValueError(
+                "Scenario: dispersion and set_model.bounds must both have y_m and vy_m_s (an engagement in space), or "
+                "neither"
+            )
+        if self.is_spatial:
+            return
+        for name, is_set in (
+            ("sun.elevation_rad", self.sun is not None and self.sun.elevation_rad != 0.0),
+            ("target.acceleration_y_m_s2", self.target is not None and self.target.acceleration_y_m_s2 is not None),
+            ("thruster.pointing_error_rad", self.thruster.pointing_error_rad > 0.0),
+        ):
+            if is_set:
+                raise ValueError(
+                    f"{name} is a value of an engagement in space, and dispersion has no y_m and vy_m_s: set them, or "
+                    "leave the value out"
+                )
+
+    @property
+    def is_spatial(self) -> bool:
+        """Whether the engagement is in space, with two lateral axes."""
+        return len(self.set_model.axes) > 1
 
     @property
     def radius_m(self) -> float | None:

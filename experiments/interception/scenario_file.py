@@ -181,7 +181,7 @@ def scenario_to_toml(scenario: Scenario) -> str:
         "sun": _values(scenario.sun),
         "nominal": {"range_m": scenario.nominal_range_m, "closing_speed_m_s": model.closing_speed_m_s},
         "uncertainty": vars(model.bounds),
-        "dispersion": {name: pair[0] if pair[0] == pair[1] else pair for name, pair in start},
+        "dispersion": {name: pair[0] if pair[0] == pair[1] else pair for name, pair in start if pair is not None},
         "angle_sensor": vars(sensor),
         **{table: _values(getattr(scenario, table)) for table in (*OPTIONAL_SENSORS, "target", "body")},
         "thruster": vars(scenario.thruster),
