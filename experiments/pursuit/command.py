@@ -16,7 +16,8 @@ ROWS = "thrust_ratio=0:0.8:17"
 class Pursuit(FileOptions):
     """Solve the game of two spacecraft in which the pursuer minimizes the time of capture and the evader maximizes it.
 
-    Each capture has a certificate (a list of checks). The result is called a saddle point only if all checks hold.
+    Each capture has a certificate (a list of checks). The result is called a saddle point only if no check fails. The
+    check with the longest computation, a search in all directions, is made with --certify only.
     Without --out, --json, --csv or --html no file is written.
     """
 
@@ -26,7 +27,8 @@ class Pursuit(FileOptions):
         bool,
         typer.Option(
             "--certify",
-            help="Also search in all directions for a branch of solutions on which the evader keeps a larger distance.",
+            help="Add the last check of the certificate: search all directions at the capture for a solution on which the "
+            "evader keeps a larger distance.",
         ),
     ] = False
     feedback: Annotated[

@@ -271,7 +271,9 @@ def _certificate_lines(certificate: Certificate) -> Iterator[str]:
         yield f"saddle point: not claimed: {'; '.join(certificate.failures)}"
     elif certificate.undecided:
         why = "no farthest extremal was found for one craft or both"
-        yield f"saddle point: all conclusive checks hold; {'; '.join(certificate.undecided)} ({why})"
+        if not certificate.directions_tried:
+            why = "add --certify"
+        yield f"saddle point: no check failed; {'; '.join(certificate.undecided)} ({why})"
     else:
         yield "saddle point: all checks hold"
 

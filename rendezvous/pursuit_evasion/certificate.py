@@ -130,7 +130,9 @@ class Certificate:
 
     @property
     def undecided(self) -> tuple[str, ...]:
-        """Return a phrase for each check that is only partly conclusive; it fails no claim, but limits it."""
+        """Return a phrase for each check that was not made or is only partly conclusive: it limits the claim."""
+        if not self.directions_tried:
+            return ("the other directions at the capture were not compared",)
         undecided = self.directions_tried - self.directions_found
         return (f"{undecided} of {self.directions_tried} directions were not decided",) if undecided else ()
 
