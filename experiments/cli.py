@@ -25,6 +25,8 @@ from experiments.reachability.command import Reach
 from experiments.reproduce import Reproduce
 
 INPUT_ERROR = 2
+_UsageError: Any = typer.BadParameter.__base__
+"""Base of Typer's errors about options and arguments; Typer does not export it."""
 
 TOOLS = "Tools"
 COMMANDS: Mapping[str, Sequence[tuple[type, str, str]]] = {
@@ -71,9 +73,14 @@ COMMANDS: Mapping[str, Sequence[tuple[type, str, str]]] = {
 class _Root(TyperGroup):
     """Reports an error as one message without a traceback."""
 
-    def make_context(self, *args: Any, **options: Any) -> Any:
+    def make_context(self, info_name: str | None, args: list[str], *rest: Any, **options: Any) -> Any:
+        is_bare = not args  # the error is then the help
         try:
-            return super().make_context(*args, **options)
+            return super().make_context(info_name, args, *rest, **options)
+        except _UsageError as error:
+            if is_bare:
+                raise
+            raise _ended(_usage_message(error), INPUT_ERROR) from None
         except KeyboardInterrupt:
             raise _ended("interrupted", INTERRUPTED) from None
 
@@ -82,6 +89,8 @@ class _Root(TyperGroup):
             return super().invoke(ctx)
         except InputError as error:
             raise _ended(f"error: {error}", INPUT_ERROR) from None
+        except _UsageError as error:
+            raise _ended(_usage_message(error), INPUT_ERROR) from None
         except MemoryError as error:
             raise _ended(_out_of_memory(error), INPUT_ERROR) from None
         except OSError as error:
@@ -156,6 +165,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _out_of_memory(error: MemoryError) -> str:
     reason = f" ({error})" if error.args else ""
     return f"error: Not enough memory{reason}. Free some memory and run it again."
+
+
+def _usage_message(error: Any) -> str:
+    """Return the message of an error about options and arguments, in one line and with the command that has help."""
+    message = " ".join(error.format_message().split()).rstrip(".")
+    hint = f"{'' if message.endswith('?') else ';'} see {error.ctx.command_path} --help" if error.ctx else ""
+    return f"error: {message[:1].lower()}{message[1:]}{hint}"
 
 
 def _ended(message: str, code: int) -> typer.Exit:

@@ -27,8 +27,8 @@ class Pursuit(FileOptions):
         bool,
         typer.Option(
             "--certify",
-            help="Add the last check of the certificate: search all directions at the capture for a solution on which the "
-            "evader keeps a larger distance.",
+            help="Add the last check of the certificate: search all directions at the capture for a solution in which "
+            "the evader keeps a larger distance.",
         ),
     ] = False
     feedback: Annotated[

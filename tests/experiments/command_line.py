@@ -28,9 +28,9 @@ class Command:
         """The one message of a command that must be refused."""
         code, out, err = self(*arguments)
         assert (code, out) == (2, "")
-        assert err.startswith(("error: ", "Usage: "))
-        assert err.count("error: ") + err.count("─ Error ─") == 1
-        return err if err.startswith("error: ") else " ".join(err.replace("│", " ").split())
+        assert err.startswith("error: ")
+        assert err.count("error: ") == 1
+        return err
 
     def json(self, *arguments: object) -> Any:
         """The results of a command as JSON."""

@@ -57,12 +57,35 @@ def test_help_has_an_example(command: list[str], infoset: Command) -> None:
 
 
 @pytest.mark.parametrize(
-    "arguments", [["explode"], ["experiment", "--explode"], ["experiment", "--runs", "many"], ["replay"]]
+    ("arguments", "message"),
+    [
+        (["zzz"], "error: no such command 'zzz'; see infoset --help\n"),
+        (["--zzz"], "error: no such option: --zzz; see infoset --help\n"),
+        (["experiment", "--zzz"], "error: no such option: --zzz; see infoset experiment --help\n"),
+        (["scenarios", "zzz"], "error: no such command 'zzz'; see infoset scenarios --help\n"),
+        (["campaign"], "error: missing option '--runs'; see infoset campaign --help\n"),
+        (["experiment", "--runs"], "error: option '--runs' requires an argument\n"),
+        (
+            ["experiment", "--runs", "many"],
+            'error: --runs: must be a whole number, found "many"; for example --runs 50\n',
+        ),
+    ],
 )
-def test_what_the_command_does_not_know(arguments: list[str], infoset: Command) -> None:
-    code, out, err = infoset(*arguments)
-    assert (code, out) == (2, "")
-    assert err
+def test_what_the_command_does_not_know(arguments: list[str], message: str, infoset: Command) -> None:
+    assert infoset(*arguments) == (2, "", message)
+
+
+@pytest.mark.parametrize("arguments", [["replay"], ["reach", "rendezvous-2021", "second"], ["experimnt"]])
+def test_mistakes_in_a_command_line_are_one_line(arguments: list[str], infoset: Command) -> None:
+    message = infoset.refused(*arguments)
+    assert message.count("\n") == 1
+    assert "see infoset" in message
+
+
+def test_the_bare_command_prints_its_help(infoset: Command) -> None:
+    _, out, err = infoset()
+    assert "Usage: infoset" in out
+    assert err == ""
 
 
 def test_help_imports_nothing_heavy() -> None:

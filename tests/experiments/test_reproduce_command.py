@@ -216,10 +216,9 @@ def test_a_wrong_rate_is_seen(infoset: Infoset, monkeypatch: pytest.MonkeyPatch)
 def test_bad_input(infoset: Infoset, tmp_path: Path, arguments: list[str], parts: list[str]) -> None:
     code, out, err = infoset(*arguments)
     assert (code, out) == (2, "")
-    message = " ".join(err.replace("│", " ").split())
-    assert all(part in message for part in parts), err
-    assert err.startswith(("error: ", "Usage: "))
-    assert err.count("error: ") + err.count("─ Error ─") == 1
+    assert all(part in err for part in parts), err
+    assert err.startswith("error: ")
+    assert err.count("error: ") == 1
     assert list(tmp_path.iterdir()) == []
 
 

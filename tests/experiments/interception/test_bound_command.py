@@ -144,11 +144,10 @@ def test_what_is_wrong_is_said_before_the_work(
     )
     code, out, err = infoset(*arguments)
     assert (code, out) == (2, "")
-    assert err.startswith(("error: ", "Usage: "))
-    assert err.count("error: ") + err.count("─ Error ─") == 1
-    message = " ".join(err.replace("│", " ").split())
+    assert err.startswith("error: ")
+    assert err.count("error: ") == 1
     for part in parts:
-        assert part in message
+        assert part in err
     assert list(tmp_path.iterdir()) == []
 
 

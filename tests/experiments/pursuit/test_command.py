@@ -59,7 +59,11 @@ def test_the_slides_case_as_json(infoset: Infoset, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "undecided", "why"),
     [
-        (("--certify",), "47 of 120 directions were not decided", "no farthest extremal was found for one craft or both"),
+        (
+            ("--certify",),
+            "47 of 120 directions were not decided",
+            "no farthest extremal was found for one craft or both",
+        ),
         ((), "the other directions at the capture were not compared", "add --certify"),
     ],
 )
@@ -241,8 +245,8 @@ def test_what_is_wrong_is_said_before_the_work(
     monkeypatch.setattr("experiments.pursuit.run.solve", lambda *_, **__: pytest.fail("began to work"))
     code, out, err = infoset("pursuit", *arguments)
     assert (code, out) == (2, "")
-    assert err.startswith(("error: ", "Usage: "))
-    assert err.count("error: ") + err.count("─ Error ─") == 1
+    assert err.startswith("error: ")
+    assert err.count("error: ") == 1
     for part in parts:
         assert part in err
     assert list(tmp_path.iterdir()) == []
