@@ -7,16 +7,11 @@ from decimal import Decimal
 from itertools import groupby
 
 import typer
-from rich.console import Console
 from rich.text import Text
 
 from experiments.common.output import library_version, output, to_json
 from experiments.common.published_number import Origin, PublishedNumber, Reproduction, Verdict
-from experiments.common.screen import (
-    print_lines,
-    progress_bar,
-    table_console,
-)
+from experiments.common.screen import Part, print_parts, progress_bar, table_console
 from experiments.papers import PAPERS, reproduce_paper
 from experiments.reproduce import Reproduce
 
@@ -35,7 +30,8 @@ def run(options: Reproduce) -> None:
         summary = {"version": library_version(), "papers": [_summary(each) for each in reproductions]}
         written.deliver("--json", to_json(summary))
     if not options.quiet:
-        _show(table_console(written.stdout_taken), reproductions)
+        console = table_console(written.stdout_taken)
+        print_parts(console, _parts(reproductions, console.width))
     disagreed = [number for each in reproductions for number in each.numbers if number.verdict is Verdict.DISAGREED]
     for number in disagreed:
         typer.echo(
@@ -83,18 +79,20 @@ TITLES = {
 ONE_RUN = ("paper, one run", "5 to 95 % of ours")
 
 
-def _show(console: Console, reproductions: Sequence[Reproduction]) -> None:
+def _parts(reproductions: Sequence[Reproduction], width: int) -> Iterator[Part]:
     for reproduction in reproductions:
         notes = list(dict.fromkeys(number.note for number in reproduction.numbers if number.note))
-        console.print(Text(reproduction.title, style="bold"), soft_wrap=True)
+        yield Text(reproduction.title, style="bold")
         for _, numbers in groupby(reproduction.numbers, lambda number: (number.origin, number.spread is None)):
-            print_lines(console, [*_block([*numbers], notes, console.width), ""])
-        print_lines(console, [f"({i}) {note}." for i, note in enumerate(notes, start=1)])
-        print_lines(console, [*(f"* {remark}" for remark in reproduction.remarks), ""])
+            yield from _block([*numbers], notes, width)
+            yield ""
+        yield from (f"({i}) {note}." for i, note in enumerate(notes, start=1))
+        yield from (f"* {remark}" for remark in reproduction.remarks)
+        yield ""
     for reproduction in reproductions:
         counts = [(reproduction.count(verdict), verdict.value) for verdict in Verdict]
         listed = ", ".join(f"{count} {verdict}" for count, verdict in counts if count)
-        print_lines(console, [f"{reproduction.paper}: {len(reproduction.numbers)} numbers: {listed}"])
+        yield f"{reproduction.paper}: {len(reproduction.numbers)} numbers: {listed}"
 
 
 def _block(numbers: Sequence[PublishedNumber], notes: Sequence[str], width: int) -> Iterator[str]:

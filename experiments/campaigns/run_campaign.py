@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
-from rich.console import Console
 from rich.table import Table
 
 from experiments.campaigns.command import Campaign as Options
@@ -12,7 +11,7 @@ from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, Flown, camp
 from experiments.campaigns.samples import heading, sample_json, samples, samples_table, stop_notes
 from experiments.common.errors import InputError
 from experiments.common.output import Output, output, to_json
-from experiments.common.screen import print_lines, print_table, table_console
+from experiments.common.screen import Part, show
 from experiments.interception.choices import own_strategy
 from sim import Campaign, CampaignNoise, StoppingRule
 from sim.storage import need_arrow
@@ -27,7 +26,7 @@ def run(options: Options) -> None:
         output(files={"--json": options.json}, overwrite=options.overwrite, quiet=options.quiet) as written,
     ):
         need_arrow()
-        scenario, notes = scenario_of(options)
+        scenario, model_notes = scenario_of(options)
         campaign = Campaign(
             scenario,
             options.runs,
@@ -39,25 +38,23 @@ def run(options: Options) -> None:
             chunk=options.chunk,
             until=_rule(options.until),
         )
-        flown = fly(campaign, options, notes)
+        flown = fly(campaign, options, model_notes)
         stored = flown.result.folder
         by_noise = samples(stored)
-        summary = to_json(
-            {
-                **heading(stored),
-                **({"warnings": flown.warnings} if flown.warnings else {}),
-                "elapsed_s": flown.elapsed_s,
-                "redone": [{"file": damage.file.name, "reason": damage.reason} for damage in flown.result.redone],
-                "samples": [sample_json(sample) for sample in by_noise],
-            }
-        )
-        tables = samples_table(by_noise, stored.manifest.scenario)
+        results = {
+            **heading(stored),
+            **({"warnings": flown.warnings} if flown.warnings else {}),
+            "elapsed_s": flown.elapsed_s,
+            "redone": [{"file": damage.file.name, "reason": damage.reason} for damage in flown.result.redone],
+            "samples": [sample_json(sample) for sample in by_noise],
+        }
+        table, notes = samples_table(by_noise, stored.manifest.scenario)
+        summary = to_json(results)
         folder = Output(options.out, {}, overwrite=True)
         folder.save(SUMMARY, summary)
         written.written += [options.out / "shards", options.out / SCENARIO_FILE, *folder.written]
         written.deliver("--json", summary)
-    if not options.quiet:
-        _show(table_console(written.stdout_taken), flown, *tables)
+    show(_parts(flown, table, notes), options.quiet, stdout_taken=written.stdout_taken)
 
 
 def _rule(text: str | None) -> StoppingRule | None:
@@ -67,13 +64,13 @@ def _rule(text: str | None) -> StoppingRule | None:
         raise InputError(f"--until: {error}") from None
 
 
-def _show(console: Console, flown: Flown, table: Table, notes: Sequence[str]) -> None:
+def _parts(flown: Flown, table: Table, notes: Sequence[str]) -> Iterator[Part]:
     folder, manifest = flown.result.folder, flown.result.folder.manifest
     stopped = "" if manifest.stopped_after is None else f" of {manifest.runs}, stopped by the rule {manifest.until}"
     runs = f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}, {duration(flown.elapsed_s)}"
-    print_lines(console, [f"{runs}; quantiles with {'' if stopped else '95 % '}confidence limits"])
-    print_table(console, table)
-    lines = [*notes, *stop_notes(manifest)]
+    yield f"{runs}; quantiles with {'' if stopped else '95 % '}confidence limits"
+    yield table
+    yield from (*notes, *stop_notes(manifest))
     if manifest.until is not None and manifest.stopped_after is None:
-        lines.append(f"the rule {manifest.until} is not met; continue with --resume and a greater --runs")
-    print_lines(console, [*lines, f"to see the results: infoset report {folder.path}"])
+        yield f"the rule {manifest.until} is not met; continue with --resume and a greater --runs"
+    yield f"to see the results: infoset report {folder.path}"

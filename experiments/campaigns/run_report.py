@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
-
-from rich.console import Console
 
 from experiments.campaigns.campaign_figures import (
     CampaignColumns,
@@ -34,24 +32,13 @@ from experiments.campaigns.sweep_table import TABLE
 from experiments.common.errors import InputError
 from experiments.common.file_kinds import use_of_file
 from experiments.common.output import Output, output, to_json
-from experiments.common.screen import (
-    BeginProgress,
-    figure_files,
-    number,
-    number_table,
-    print_lines,
-    print_table,
-    progress_bar,
-    say,
-    table_console,
-)
+from experiments.common.screen import BeginProgress, Part, figure_files, number, number_table, progress_bar, say, show
 from experiments.interception.scenario_file import scenario_to_toml
 from sim.results import ending
 from sim.storage import CampaignFolder, need_arrow
 
 FIGURES = ("figure-distributions", "figure-convergence", "figure-dispersion")
 
-Show = Callable[[Console], None]
 Correlations = Mapping[str, Mapping[str, Mapping[str, float | None]]]
 
 
@@ -70,10 +57,9 @@ def run(options: Report) -> None:
             quiet=options.quiet,
         ) as written:
             with progress_bar(options.quiet) as begin:
-                show = (_report_sweep if swept else _report_campaign)(folder, options, written, begin)
+                parts = (_report_sweep if swept else _report_campaign)(folder, options, written, begin)
                 written.save(SCENARIO_FILE, scenario_to_toml(folder.manifest.scenario))
-            if not options.quiet:
-                show(table_console(written.stdout_taken))
+            show(parts, options.quiet, stdout_taken=written.stdout_taken)
 
 
 def _read(options: Report) -> CampaignFolder:
@@ -100,7 +86,7 @@ def _read(options: Report) -> CampaignFolder:
     return folder
 
 
-def _report_sweep(folder: CampaignFolder, options: Report, written: Output, begin: BeginProgress) -> Show:
+def _report_sweep(folder: CampaignFolder, options: Report, written: Output, begin: BeginProgress) -> Iterator[Part]:
     sized = bool(folder.numbers("hit").count())
     default = folder.manifest.require or default_requirement(has_size=sized)
     required, shown = quantile_options(options.require, options.show, default)
@@ -122,10 +108,10 @@ def _report_sweep(folder: CampaignFolder, options: Report, written: Output, begi
     if options.out is not None:
         report.save(written)
     progress(1.0)
-    return report.show
+    return report.parts()
 
 
-def _report_campaign(folder: CampaignFolder, options: Report, written: Output, begin: BeginProgress) -> Show:
+def _report_campaign(folder: CampaignFolder, options: Report, written: Output, begin: BeginProgress) -> Iterator[Part]:
     for option, value in (("--require", options.require), ("--show", options.show)):
         if value is not None:
             raise InputError(f"{option}: is only for a sweep, and {folder.path} is a campaign; omit it")
@@ -152,7 +138,7 @@ def _report_campaign(folder: CampaignFolder, options: Report, written: Output, b
         draws = (draw_campaign_distributions, draw_convergence, draw_dispersion)
         drawings = {name: partial(draw, columns) for name, draw in zip(FIGURES, draws, strict=True)}
         written.draw(drawings, begin("figures"))
-    return lambda console: _show(console, folder, by_noise, related, worst)
+    return _parts(folder, by_noise, related, worst)
 
 
 def _columns(folder: CampaignFolder) -> list[CampaignColumns]:
@@ -176,35 +162,30 @@ def _columns(folder: CampaignFolder) -> list[CampaignColumns]:
     return [column for column in columns if column.miss_m.size]
 
 
-def _show(
-    console: Console,
-    folder: CampaignFolder,
-    by_noise: Sequence[Sample],
-    related: Correlations,
-    worst: Sequence[Mapping[str, Any]],
-) -> None:
+def _parts(
+    folder: CampaignFolder, by_noise: Sequence[Sample], related: Correlations, worst: Sequence[Mapping[str, Any]]
+) -> Iterator[Part]:
     manifest = folder.manifest
     stopped = "" if manifest.stopped_after is None else f", stopped by the rule {manifest.until}"
     table, notes = samples_table(by_noise, manifest.scenario)
-    print_lines(console, [f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}"])
-    print_table(console, table)
-    print_lines(console, [*notes, *stop_notes(manifest), ""])
+    yield f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}"
+    yield table
+    yield from (*notes, *stop_notes(manifest), "")
     runs = ", ".join(f"{sample.runs} runs of {sample.noise} noise" for sample in by_noise)
-    print_lines(console, [f"correlation of the miss with the initial state ({runs}; CI by Fisher's z):"])
+    yield f"correlation of the miss with the initial state ({runs}; CI by Fisher's z):"
     table = number_table("noise", "component", "Pearson", "95 % CI", "Spearman", "95 % CI", left=2)
     for noise, components in related.items():
         title = noise
         for name, values in components.items():
             table.add_row(title, name, *_correlation_cells(values, "pearson"), *_correlation_cells(values, "spearman"))
             title = ""
-    print_table(console, table)
-    lines = ["", "the worst runs, each with the command that simulates it again:"]
+    yield table
+    yield from ("", "the worst runs, each with the command that simulates it again:")
     for row in worst:
         miss, impulse = number(row["miss_m"]), number(row["impulse_m_s"])
-        lines.append(f"  miss {miss} m, impulse {impulse} m/s, {ending(row['outcome'], row['hit'])}: {row['replay']}")
+        yield f"  miss {miss} m, impulse {impulse} m/s, {ending(row['outcome'], row['hit'])}: {row['replay']}"
     if not (folder.path / SCENARIO_FILE).is_file():
-        lines.append(f"(the folder has no {SCENARIO_FILE}, which these commands need; --out writes one)")
-    print_lines(console, lines)
+        yield f"(the folder has no {SCENARIO_FILE}, which these commands need; --out writes one)"
 
 
 def _correlation_cells(values: Mapping[str, float | None], kind: str) -> tuple[str, str]:

@@ -12,7 +12,7 @@ from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
 from experiments.campaigns.sweep_report import default_requirement, quantile_options, sweep_report
 from experiments.common.errors import InputError
 from experiments.common.output import Output, output, to_json
-from experiments.common.screen import say, table_console
+from experiments.common.screen import say, show
 from experiments.interception.choices import own_strategy
 from sim import CampaignNoise, Sweep
 from sim.storage import need_arrow, need_free
@@ -67,10 +67,9 @@ def run(options: Options) -> None:
         folder.save("summary.json", summary)
         written.written += [options.out / "shards", options.out / SCENARIO_FILE, *folder.written]
         written.deliver("--json", summary)
-    if not options.quiet:
-        report.show(table_console(written.stdout_taken))
-        if not report.is_drawn:
-            say("no figure: a figure can show one or two keys only", options.quiet)
+    show(report.parts(), options.quiet, stdout_taken=written.stdout_taken)
+    if not report.is_drawn:
+        say("no figure: a figure can show one or two keys only", options.quiet)
 
 
 def _most_runs(options: Options) -> int | None:

@@ -250,10 +250,9 @@ def samples_table(by_noise: Sequence[Sample], scenario: Scenario) -> tuple[Table
         for quantity, estimates in sample.quantiles.items():
             name = names[quantity]
             for estimate in estimates:
+                value = shown_value(sample, quantity, estimate)
                 interval = f"{number(estimate.lower)} to {number(estimate.upper)}"
-                table.add_row(
-                    title, name, level_name(estimate.level), number(shown_value(sample, quantity, estimate)), interval
-                )
+                table.add_row(title, name, level_name(estimate.level), number(value), interval)
                 title = name = ""
             table.add_row("", "", "max", number(sample.worst[quantity]), "")
         notes += [f"{sample.noise} noise: {text}" for text in quantile_notes(sample.runs, LEVELS, len(by_noise))]

@@ -8,8 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from experiments.campaigns.axis_names import unit_of
 from experiments.campaigns.samples import heading, sample_json
@@ -26,7 +24,7 @@ from experiments.campaigns.sweep_table import (
 )
 from experiments.common.errors import InputError
 from experiments.common.output import Output, hit_key
-from experiments.common.screen import number, number_table, print_lines, print_table
+from experiments.common.screen import Part, number, number_table
 from experiments.interception.study import SetCounts, set_warnings
 from sim import QuantileName, Requirement
 from sim.requirement import CONFIDENCE, AnyRequirement, Decision, Verdict, parse_requirement
@@ -115,31 +113,30 @@ class SweepReport:
             for noise, name in zip(self.table.noises, figure_names(self.table.noises), strict=True):
                 written.figure(name, draw_sweep(self.table, self.shown, noise))
 
-    def show(self, console: Console) -> None:
-        """Print the decision of every cell, and the limits of the values that meet the requirement."""
+    def parts(self) -> Iterator[Part]:
+        """Yield the decision of every cell, and the limits of the values that meet the requirement, for the screen."""
         folder, table = self.folder, self.table
         manifest = folder.manifest
         watched = " although runs were added" if manifest.is_watched else ""
         if manifest.until:
             watched = " although runs are added until it is made"
-        lines = [
-            f"{folder.manifest.scenario.name}, {len(table.cells)} cells, {folder.finished_runs} runs",
+        yield f"{manifest.scenario.name}, {len(table.cells)} cells, {folder.finished_runs} runs"
+        yield (
             f"the decision in each cell has a confidence of at least 95 %{watched}; "
-            "this holds for each cell, not for all cells together",
-        ]
+            "this holds for each cell, not for all cells together"
+        )
         for noise in table.noises:
             verdicts = [table.verdict(cell, noise) for cell in range(len(table.cells))]
             counts = Counter(verdict.decision for verdict in verdicts if verdict is not None)
             decisions = ", ".join(f"{decision} in {counts[decision]}" for decision in Decision)
-            lines.append(f"{noise} noise: {table.required} is {decisions} of {len(verdicts)} cells")
-            print_lines(console, [*lines, *self._answer_lines(noise)])
-            for title, part in decision_tables(table, noise):
-                print_lines(console, [title] if title else [])
-                print_table(console, part)
-            lines = [*_unknown_notes(verdicts, table.required), *self._undecided_notes(noise)]
+            yield f"{noise} noise: {table.required} is {decisions} of {len(verdicts)} cells"
+            yield from self._answer_lines(noise)
+            yield from _decision_tables(table, noise)
+            yield from _unknown_notes(verdicts, table.required)
+            yield from self._undecided_notes(noise)
         sets = sum((sample.sets for samples in table.cells for sample in samples), SetCounts())
-        warnings = set_warnings(folder.manifest.scenario.set_model.kind, sets)
-        print_lines(console, [*lines, f"all cells: {sets}", *warnings])
+        yield f"all cells: {sets}"
+        yield from set_warnings(manifest.scenario.set_model.kind, sets)
 
     def _undecided_notes(self, noise: str) -> list[str]:
         """Return a line about the runs of the undecided cells, and how many more may decide them."""
@@ -209,7 +206,7 @@ def _about(count: int) -> str:
     return str(-(-count // step) * step)
 
 
-def decision_tables(table: SweepTable, noise: str) -> Iterator[tuple[str, Table]]:
+def _decision_tables(table: SweepTable, noise: str) -> Iterator[Part]:
     """Yield decisions and estimates as tables with titles: a row for each value of an axis, or a grid of two axes.
 
     With more axes there is a grid for each combination of the other values, at most `MOST_LINES` grids.
@@ -224,7 +221,7 @@ def decision_tables(table: SweepTable, noise: str) -> Iterator[tuple[str, Table]
             if verdict is not None:
                 ends = (verdict.lower, verdict.value, verdict.upper)
                 shown.add_row(value_text(first, value), str(verdict.decision), str(verdict.runs), *map(number, ends))
-        yield "", shown
+        yield shown
         return
     second, *rest = others
     shape = [len(axis.values) for axis in table.axes]
@@ -241,7 +238,8 @@ def decision_tables(table: SweepTable, noise: str) -> Iterator[tuple[str, Table]
         units = {"rows": unit_of(first.key), "columns": unit_of(second.key)}
         unit_text = ", ".join(f"{name} in {unit}" for name, unit in units.items() if unit)
         cell_text = f"lines of a cell: decision, {_estimate_name(table.required)} (- if too few runs), number of runs"
-        yield f"{title}\n{unit_text}; {cell_text}" if unit_text else f"{title}\n{cell_text}", shown
+        yield f"{title}\n{unit_text}; {cell_text}" if unit_text else f"{title}\n{cell_text}"
+        yield shown
 
 
 def _entry(verdict: Verdict | None) -> str:

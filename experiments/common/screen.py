@@ -20,6 +20,8 @@ from sim.statistics import shows
 from sim.stopping_rule import level_name
 
 BeginProgress = Callable[[str], Callable[[float], None]]
+Part = str | Text | Table
+"""A line or a table of a result on the screen."""
 _GAP = 2
 """Width of the space between the columns of a table."""
 _NARROWEST_TEXT = 12
@@ -54,10 +56,19 @@ def table_console(stdout_taken: bool) -> Console:
     return Console(stderr=stdout_taken, highlight=False, markup=False, emoji=False)
 
 
-def print_lines(console: Console, lines: Iterable[str]) -> None:
-    """Print lines that the terminal wraps."""
-    for line in lines:
-        console.print(line, soft_wrap=True)
+def show(parts: Iterable[Part], quiet: bool, *, stdout_taken: bool = False) -> None:
+    """Print a result, unless `quiet`: lines, which the terminal wraps, and tables of `number_table`."""
+    if not quiet:
+        print_parts(table_console(stdout_taken), parts)
+
+
+def print_parts(console: Console, parts: Iterable[Part]) -> None:
+    """Print lines, which the terminal wraps, and tables of `number_table`."""
+    for part in parts:
+        if isinstance(part, Table):
+            _print_table(console, part)
+        else:
+            console.print(part, soft_wrap=True)
 
 
 def number_table(*titles: str, left: int = 1) -> Table:
@@ -68,8 +79,8 @@ def number_table(*titles: str, left: int = 1) -> Table:
     return table
 
 
-def print_table(console: Console, table: Table) -> None:
-    """Print a table of `number_table`; if the screen is too narrow, print it in parts, each with the columns of text.
+def _print_table(console: Console, table: Table) -> None:
+    """Print a table; if the screen is too narrow, print it in parts, each with the columns of text.
 
     No number is cut or wrapped: texts are wrapped, and a part has as many columns of numbers as fit, and at least one.
     """

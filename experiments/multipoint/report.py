@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, Cell, library_version, trajectories_csv
-from experiments.common.screen import number_table, print_lines, print_table
+from experiments.common.screen import Part, number_table
 from experiments.multipoint.command import BEST, GIVEN
 from experiments.multipoint.file import Axes, MultipointProblem
 from experiments.multipoint.scene import Scene
@@ -113,12 +113,10 @@ def trajectories(scene: Scene) -> str:
     return trajectories_csv(["craft"], ["time_s", *STATE_COLUMNS, *CONTROL_COLUMNS], tracks)
 
 
-def print_report(console: Console, report: Report) -> None:
-    """Print the cost, the visits and the extent of the search."""
+def report_parts(report: Report) -> Iterator[Part]:
+    """Yield the cost, the visits and the extent of the search, for the screen."""
     path, nodes = report.scene.path, report.scene.path.nodes
-    print_lines(
-        console, [f"{report.problem.name}: cost I = {path.cost:.8g} m^2/s^3, peak |u| {report.peak_m_s2:.4g} m/s^2"]
-    )
+    yield f"{report.problem.name}: cost I = {path.cost:.8g} m^2/s^3, peak |u| {report.peak_m_s2:.4g} m/s^2"
     unit, per_s = report.scene.time_unit
     table = number_table(
         "target", "meet", f"time\n{unit}", "relative speed\nm/s", "dI/dt\nm^2/s^4", "costate jump\nm/s^3", left=2
@@ -134,7 +132,7 @@ def print_report(console: Console, report: Report) -> None:
             f"{path.time_gradient[index]:.4g}",
             f"{np.linalg.norm(path.jumps[index, :3]):.4g}",
         )
-    print_table(console, table)
+    yield table
     if BEST not in (report.search.order, report.search.times):
         return
     text = f"{report.evaluations} paths computed"
@@ -142,4 +140,4 @@ def print_report(console: Console, report: Report) -> None:
         text += f", {report.begun} partial orders examined"
         text += f", {report.left_out} left out because no trajectory was found" if report.left_out else ""
         text += f"; {report.unfit} orders do not fit the times" if report.unfit else ""
-    print_lines(console, [text + ("; the times are a local minimum" if report.search.times == BEST else "")])
+    yield text + ("; the times are a local minimum" if report.search.times == BEST else "")

@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 
 from experiments.common.errors import InputError
 from experiments.common.output import TRAJECTORIES, output_of, to_json
-from experiments.common.screen import figure_files, progress_bar, table_console
+from experiments.common.screen import figure_files, progress_bar, show
 from experiments.multipoint.command import BEST, GIVEN, Multipoint
 from experiments.multipoint.figures import draw_control, draw_costates, draw_path, draw_times
 from experiments.multipoint.file import MultipointProblem, load_multipoint
 from experiments.multipoint.page import multipoint_page
-from experiments.multipoint.report import Report, Search, print_report, report_json, trajectories
+from experiments.multipoint.report import Report, Search, report_json, report_parts, trajectories
 from experiments.multipoint.scene import Scene, cost_curves
 from rendezvous.multipoint import MOST_TARGETS, best_order, best_order_of_slots, best_times
 from rendezvous.piecewise import greatest_control
@@ -46,8 +46,7 @@ def run(options: Multipoint) -> None:
         if options.out is not None:
             drawings = _drawings(report, begin("cost against times"))
             written.draw(drawings, begin("figures"))
-    if not options.quiet:
-        print_report(table_console(written.stdout_taken), report)
+    show(report_parts(report), options.quiet, stdout_taken=written.stdout_taken)
 
 
 def _check(problem: MultipointProblem, search: Search) -> None:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, library_version, trajectories_csv
-from experiments.common.screen import number, number_table, print_lines, print_table
+from experiments.common.screen import Part, number, number_table
 from experiments.pareto.file import TERMINAL, ParetoProblem
 from rendezvous.pareto import BoundCheck, Coalitions, DurationSweep, EncounterSolution, Feasibility, distances
 
@@ -156,13 +155,12 @@ def trajectories(report: Report, samples: int) -> str:
     return trajectories_csv(["craft"], ["time_s", *STATE_COLUMNS, *CONTROL_COLUMNS], tracks)
 
 
-def print_report(console: Console, report: Report) -> None:
-    """Print the meeting, the costs, the choices and the coalitions."""
+def report_parts(report: Report) -> Iterator[Part]:
+    """Yield the meeting, the costs, the choices and the coalitions, for the screen."""
     solution, encounter = report.solution, report.problem.encounter
     names = [cost.craft.name for cost in solution.costs]
     meeting = ", ".join(f"{key} = {value:.6g}" for key, value in _named_state(solution, solution.point).items())
-    heading = f"{report.problem.name}: {encounter.meeting.value} at {encounter.meeting_s:g} s: {meeting}"
-    print_lines(console, [heading])
+    yield f"{report.problem.name}: {encounter.meeting.value} at {encounter.meeting_s:g} s: {meeting}"
     table = number_table(
         "craft", "ideal J*^2\nm^2/s^3", "J^2\nm^2/s^3", "excess\nm^2/s^3", "impulse\nm/s", "peak |u|\nm/s^2"
     )
@@ -170,8 +168,10 @@ def print_report(console: Console, report: Report) -> None:
     columns = (ideal, solution.cost_squared(), solution.excess(), report.impulses_m_s, report.peaks_m_s2)
     for name, *row in zip(names, *columns, strict=True):
         table.add_row(name, *(number(float(value)) for value in row))
-    print_table(console, table)
-    print_lines(console, [f"group loss {float(solution.group_loss()):.6g} m^2/s^3", *_exceeded(report), ""])
+    yield table
+    yield f"group loss {float(solution.group_loss()):.6g} m^2/s^3"
+    yield from _exceeded(report)
+    yield ""
     free = [component.name.lower() for component in encounter.free]
     titles = [f"{name}, {'m' if len(name) == 1 else 'm/s'}" for name in free]
     chosen = number_table("choice", *titles, "group loss\nm^2/s^3")
@@ -179,13 +179,14 @@ def print_report(console: Console, report: Report) -> None:
     for name, point in report.selections.items():
         values = (f"{value if abs(value) > _ZERO * scale else 0.0:.6g}" for value in point)
         chosen.add_row(name.replace("_", " "), *values, number(float(solution.group_loss(point))))
-    print_table(console, chosen)
+    yield chosen
     if report.coalitions is None:
-        print_lines(console, ["the coalitions are not computed: there are too many craft"])
+        yield "the coalitions are not computed: there are too many craft"
         return
     pairs = zip(names, report.coalitions.shapley, strict=True)
     shares = ", ".join(f"{name} {number(float(value))}" for name, value in pairs)
-    print_lines(console, [f"Shapley value of the excess, m^2/s^3: {shares}", report.coalitions.core.reason])
+    yield f"Shapley value of the excess, m^2/s^3: {shares}"
+    yield report.coalitions.core.reason
 
 
 def _exceeded(report: Report) -> list[str]:

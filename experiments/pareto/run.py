@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from experiments.common.errors import InputError, shown
 from experiments.common.output import TRAJECTORIES, output_of, to_json
-from experiments.common.screen import figure_files, progress_bar, table_console
+from experiments.common.screen import figure_files, progress_bar, show
 from experiments.common.toml_values import LARGEST
 from experiments.pareto.command import Pareto
 from experiments.pareto.figures import draw_controls, draw_costs, draw_front, draw_trajectories
 from experiments.pareto.file import TERMINAL, ParetoProblem, load_pareto
 from experiments.pareto.page import pareto_page
-from experiments.pareto.report import Report, print_report, report_json, trajectories
+from experiments.pareto.report import Report, report_json, report_parts, trajectories
 from rendezvous.pareto import (
     BoundCheck,
     EncounterSolution,
@@ -61,8 +61,7 @@ def run(options: Pareto) -> None:
         if options.html is not None:
             written.deliver("--html", pareto_page(problem.name, report.solution, report.selections))
         written.draw(_drawings(report), begin("figures"))
-    if not options.quiet:
-        print_report(table_console(written.stdout_taken), report)
+    show(report_parts(report), options.quiet, stdout_taken=written.stdout_taken)
 
 
 def _preferred(text: str, problem: ParetoProblem) -> Floats:

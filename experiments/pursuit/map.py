@@ -13,7 +13,7 @@ from experiments.common.display_units import M_PER_KM, S_PER_HOUR
 from experiments.common.errors import InputError, shown
 from experiments.common.options import choice
 from experiments.common.output import Cell, library_version, output_of, to_csv, to_json
-from experiments.common.screen import figure_files, print_lines, progress_bar, say_warnings, table_console
+from experiments.common.screen import figure_files, progress_bar, say_warnings, show
 from experiments.pursuit.command import ROWS, PursuitMap
 from experiments.pursuit.file import PursuitProblem, load_pursuit, parameter_names
 from experiments.pursuit.map_figure import STATUS_WORDS, counted, draw_map
@@ -66,8 +66,6 @@ def run(options: PursuitMap) -> None:
         written.save("map.csv", to_csv(*_table(x, y, solved)), "--csv")
         if options.out is not None:
             written.draw({FIGURE: lambda: draw_map(solved, x.parameter, y.parameter)}, begin("figure"))
-    if options.quiet:
-        return
     lines = [f"{problem.name}: {points} points in {elapsed_s:.1f} s: {counted(solved)}"]
     if solved.capture_s.count():
         least, greatest = (float(time_s) / S_PER_HOUR for time_s in (solved.capture_s.min(), solved.capture_s.max()))
@@ -80,7 +78,7 @@ def run(options: PursuitMap) -> None:
             "points continued from a neighbour are local saddle points: earlier captures are not excluded there; "
             "--certify solves every point from scratch"
         )
-    print_lines(table_console(written.stdout_taken), lines)
+    show(lines, options.quiet, stdout_taken=written.stdout_taken)
 
 
 def _columns(problem: PursuitProblem) -> str:

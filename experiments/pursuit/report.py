@@ -6,11 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from rich.console import Console
 
 from experiments.common.display_units import M_PER_KM, S_PER_HOUR
 from experiments.common.output import STATE_COLUMNS, Cell, library_version, trajectories_csv
-from experiments.common.screen import number, number_table, print_lines, print_table
+from experiments.common.screen import Part, number, number_table
 from experiments.pursuit.file import PursuitProblem
 from rendezvous.pursuit_evasion import (
     Capture,
@@ -188,20 +187,20 @@ def _captured(feedback: Feedback) -> int:
     return sum(flight.ended is Ended.CAPTURED for flight in feedback.flights)
 
 
-def print_report(console: Console, report: Report) -> None:
-    """Print the verdict, the players, the certificate and the simulations."""
+def report_parts(report: Report) -> Iterator[Part]:
+    """Yield the verdict, the players, the certificate and the simulations, for the screen."""
     solution = report.solution
-    print_lines(console, [f"{report.problem.name}: {_verdict(solution)}"])
+    yield f"{report.problem.name}: {_verdict(solution)}"
     if solution.capture is not None:
-        _print_capture(console, solution.capture, solution)
+        yield from _capture_parts(solution.capture, solution)
     if report.certificate is not None:
-        print_lines(console, (f"  {line}" for line in _certificate_lines(report.certificate)))
+        yield from (f"  {line}" for line in _certificate_lines(report.certificate))
     if report.feedback is not None:
-        print_lines(console, _feedback_lines(report.feedback))
+        yield from _feedback_lines(report.feedback)
 
 
-def _print_capture(console: Console, capture: Capture, solution: Solution) -> None:
-    """Print vectors as columns of their components, which a narrow screen does not break, and the scalars as lines."""
+def _capture_parts(capture: Capture, solution: Solution) -> Iterator[Part]:
+    """Yield vectors as columns of their components, which a narrow screen does not break, and the scalars as lines."""
     table = number_table(
         "", "capture at\nkm", "direction\nto evader", "velocity of\npursuer, km/s", "velocity of\nevader, km/s"
     )
@@ -213,16 +212,16 @@ def _print_capture(console: Console, capture: Capture, solution: Solution) -> No
     )
     for axis, components in zip("xyz", zip(*vectors, strict=True), strict=True):
         table.add_row(axis, *(f"{value:.{digits}f}" for value, digits in zip(components, (6, 9, 9, 9), strict=True)))
-    print_table(console, table)
+    yield table
     least, greatest = capture.curvature
-    lines = [
-        f"propellant spent, kg: pursuer {capture.pursuer.propellant_kg:.8f}, evader {capture.evader.propellant_kg:.8f}",
-        f"closing speed {capture.closing_speed_m_s / M_PER_KM:.10f} km/s",
+    spent = f"pursuer {capture.pursuer.propellant_kg:.8f}, evader {capture.evader.propellant_kg:.8f}"
+    yield f"propellant spent, kg: {spent}"
+    yield f"closing speed {capture.closing_speed_m_s / M_PER_KM:.10f} km/s"
+    yield (
         f"curvatures of the distance over the direction: {least:.5f} and {greatest:.5f} times "
-        f"{solution.units.length_m / M_PER_KM:.6g} km (positive at a saddle point)",
-        f"method: {_METHODS[solution.route]}",
-    ]
-    print_lines(console, lines)
+        f"{solution.units.length_m / M_PER_KM:.6g} km (positive at a saddle point)"
+    )
+    yield f"method: {_METHODS[solution.route]}"
 
 
 def _verdict(solution: Solution) -> str:

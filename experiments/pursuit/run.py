@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 
 from experiments.common.errors import InputError
 from experiments.common.output import TRAJECTORIES, output_of, to_json
-from experiments.common.screen import figure_files, progress_bar, say, say_warnings, table_console
+from experiments.common.screen import figure_files, progress_bar, say, say_warnings, show
 from experiments.pursuit.command import Pursuit
 from experiments.pursuit.evader import EvaderPolicy, evader_policy
 from experiments.pursuit.figures import draw_control, draw_distance, draw_feedback, draw_orbits, draw_relative
 from experiments.pursuit.file import PursuitProblem, load_pursuit
 from experiments.pursuit.page import pursuit_page
-from experiments.pursuit.report import Feedback, Report, print_report, report_json, trajectories
+from experiments.pursuit.report import Feedback, Report, report_json, report_parts, trajectories
 from rendezvous.pursuit_evasion import Observation, PathError, Solution, certify, fly_many, history, solve
 
 FIGURES = ("figure-orbits", "figure-relative", "figure-control", "figure-distance")
@@ -49,8 +49,7 @@ def run(options: Pursuit) -> None:
             if options.out is not None:
                 written.save("problem.toml", problem.to_toml())
                 written.draw(_drawings(report), begin("figures"))
-    if not options.quiet:
-        print_report(table_console(written.stdout_taken), report)
+    show(report_parts(report), options.quiet, stdout_taken=written.stdout_taken)
 
 
 def _check_feedback(options: Pursuit) -> None:

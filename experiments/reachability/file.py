@@ -200,13 +200,14 @@ class Rendezvous:
         """Return the matrices of the states between the periods at which all members are checked."""
         return between_periods(self.motion, self.problem.periods, self.period_s, self.acceleration_m_s2, _INSTANTS)
 
-    def lasting(self, periods: int) -> ReachabilityProblem:
-        """Return the problem with more periods; the last offsets of its constraints continue to hold."""
-        problem, more = self.problem, periods - self.problem.periods
+    @property
+    def longer(self) -> ReachabilityProblem:
+        """The problem with up to four times as many periods; the last offsets of its constraints continue to hold."""
+        problem, periods = self.problem, min(4 * self.problem.periods, MOST_PERIODS)
         transition, control = discretised(self.motion, periods, self.period_s, self.acceleration_m_s2)
         offsets, between = problem.offsets, problem.between
         if offsets is not None:
-            offsets = np.vstack([offsets, np.repeat(offsets[-1:], more, 0)])
+            offsets = np.vstack([offsets, np.repeat(offsets[-1:], periods - problem.periods, 0)])
         if between is not None:
             instants = between.shape[1]
             between = between_periods(self.motion, periods, self.period_s, self.acceleration_m_s2, instants)

@@ -16,7 +16,6 @@ from experiments.common.output import CONTROL_COLUMNS, STATE_COLUMNS, Cell, libr
 from experiments.reachability.file import KIND, Rendezvous
 from infoset.polytope import EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
 from rendezvous.reachability import (
-    MOST_PERIODS,
     EmptyTubeError,
     FeedbackPlan,
     Flight,
@@ -58,7 +57,6 @@ VERTICES, SAMPLES = "vertices", "samples"
 MOST_SAMPLES = 1000
 POINTS = 24
 """Points of a displayed trajectory per period."""
-_LONGER = 4
 _MOST_SHOWN, _ALIKE = 5, 1e-4
 
 
@@ -210,9 +208,7 @@ def _report(rendezvous: Rendezvous, request: Request, progress: Progress) -> Rep
     began_s = perf_counter()
     solution = solve(rendezvous.problem, request.route)
     progress(0.2)
-    searched = rendezvous.problem
-    if solution.optimal.miss > 0.0:
-        searched = rendezvous.lasting(min(_LONGER * searched.periods, MOST_PERIODS))
+    searched = rendezvous.problem if solution.optimal.miss == 0.0 else rendezvous.longer
     least = least_periods(searched)
     progress(0.3)
     forward, tube = (solution.sets.bounds(kind) for kind in (SetKind.FORWARD, SetKind.TUBE))

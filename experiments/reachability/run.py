@@ -4,21 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from rich.console import Console
 from rich.table import Table
 
 from experiments.common.errors import InputError
 from experiments.common.options import choice, read_number
 from experiments.common.output import TRAJECTORIES, output_of, to_csv, to_json
-from experiments.common.screen import (
-    figure_files,
-    number,
-    number_table,
-    print_lines,
-    print_table,
-    progress_bar,
-    table_console,
-)
+from experiments.common.screen import Part, figure_files, number, number_table, progress_bar, show
 from experiments.reachability.command import Reach
 from experiments.reachability.figures import drawings
 from experiments.reachability.file import load_rendezvous
@@ -54,14 +45,14 @@ def run(options: Reach) -> None:
     files = ("problem.toml", "results.json", TRAJECTORIES, *((TABLES,) if published else ()), *figure_files(*FIGURES))
     with output_of(options, files) as written, progress_bar(options.quiet) as begin:
         report = make_report(rendezvous, request, begin(rendezvous.name))
-        results = report_json(report)
         comparisons = compare_published(rendezvous, report.solution) if published else ()
+        results = report_json(report)
+        tracks = trajectories(report) if written.wants("--csv") else ""
         written.save("problem.toml", rendezvous.toml)
         written.save("results.json", to_json(results), "--json")
         if comparisons:
             written.save(TABLES, to_csv(COLUMNS, [row for comparison in comparisons for row in comparison.rows]))
-        if written.wants("--csv"):
-            written.save(TRAJECTORIES, trajectories(report), "--csv")
+        written.save(TRAJECTORIES, tracks, "--csv")
         try:
             if options.html is not None:
                 written.deliver("--html", reachability_page(report))
@@ -70,8 +61,7 @@ def run(options: Reach) -> None:
             raise InputError(
                 f"cannot draw the tube: {error}; the numbers are in results.json, or use --json alone"
             ) from None
-    if not options.quiet:
-        _print_report(table_console(written.stdout_taken), report, comparisons)
+    show(_parts(report, comparisons), options.quiet, stdout_taken=written.stdout_taken)
 
 
 def _selection(text: str) -> tuple[list[str], int]:
@@ -92,15 +82,10 @@ def _selection(text: str) -> tuple[list[str], int]:
     return names, count
 
 
-def _print_report(console: Console, report: Report, comparisons: Sequence[Comparison]) -> None:
-    print_lines(console, _summary(report))
-    for table in _tables(report, comparisons):
-        console.print()
-        print_table(console, table)
-    if comparisons:
-        note = "the misses printed in the paper do not follow from the equations of motion; see docs/reachability.md"
-        print_lines(console, [note])
-    print_lines(console, _feedback(report))
+def _parts(report: Report, comparisons: Sequence[Comparison]) -> Iterator[Part]:
+    yield from _summary(report)
+    yield from _tables(report, comparisons)
+    yield from _feedback(report)
 
 
 def _summary(report: Report) -> Iterator[str]:
@@ -135,7 +120,7 @@ def _feedback(report: Report) -> Iterator[str]:
         yield f"with disturbances, with feedback: {bound}"
 
 
-def _tables(report: Report, comparisons: Sequence[Comparison]) -> Iterator[Table]:
+def _tables(report: Report, comparisons: Sequence[Comparison]) -> Iterator[Part]:
     sets, periods = report.solution.sets, range(1, report.solution.problem.periods + 1)
     counts = [[sets.counts(kind, t) for kind in (SetKind.FORWARD, SetKind.TUBE)] for t in periods]
     if any(count is not None for row in counts for count in row):
@@ -143,15 +128,16 @@ def _tables(report: Report, comparisons: Sequence[Comparison]) -> Iterator[Table
         for t, row in zip(periods, counts, strict=True):
             cells = (("-", "-") if count is None else (count.vertices, count.facets) for count in row)
             table.add_row(str(t), *(str(cell) for pair in cells for cell in pair))
-        yield table
+        yield from ("", table)
     table = number_table("period", *(f"{axis} of the tube\nm" for axis in "xyz"))
     for t in periods:
         table.add_row(str(t), *(f"{low:.1f} .. {high:.1f}" for low, high in report.tube[t, :3] + 0.0))
-    yield table
+    yield from ("", table)
     if report.members:
-        yield _members_table(report)
+        yield from ("", _members_table(report))
     if comparisons:
-        yield _published_table(comparisons)
+        yield from ("", _published_table(comparisons))
+        yield "the misses printed in the paper do not follow from the equations of motion; see docs/reachability.md"
 
 
 def _members_table(report: Report) -> Table:

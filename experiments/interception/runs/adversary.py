@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from time import perf_counter
-
-from rich.console import Console
 
 from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
 from experiments.common.output import output_of, to_csv, to_json
-from experiments.common.screen import (
-    figure_files,
-    number,
-    number_table,
-    print_lines,
-    print_table,
-    progress_bar,
-    say_warnings,
-    table_console,
-)
+from experiments.common.screen import Part, figure_files, number, number_table, progress_bar, say_warnings, show
 from experiments.interception.choices import own_strategy, study_scenario
 from experiments.interception.command import Adversary
 from experiments.interception.record_file import record_path, write_record
@@ -70,8 +59,7 @@ def run(options: Adversary) -> None:
                 write_record(record, file, overwrite=options.overwrite)
                 written.add(file)
             draw_engagements([record], times_s, written, begin)
-    if not options.quiet:
-        _show(table_console(written.stdout_taken), scenario, worst, options, elapsed_s)
+    show(_parts(scenario, worst, options, elapsed_s), options.quiet, stdout_taken=written.stdout_taken)
 
 
 def _summary(
@@ -119,7 +107,7 @@ def _halfway_m(found: WorstEngagement) -> float | None:
     return max((miss for count, miss in found.history if 2 * count <= found.evaluations), default=None)
 
 
-def _show(console: Console, scenario: Scenario, worst: WorstMisses, options: Adversary, elapsed_s: float) -> None:
+def _parts(scenario: Scenario, worst: WorstMisses, options: Adversary, elapsed_s: float) -> Iterator[Part]:
     meter = "with" if scenario.range_sensor is not None else "without"
     same = worst.set_kept is worst.overall
     columns = [("set never empty, set also empty" if same else "set never empty", worst.set_kept)]
@@ -129,19 +117,17 @@ def _show(console: Console, scenario: Scenario, worst: WorstMisses, options: Adv
         table.add_row(title, *("-" if found is None else text(found) for _, found in columns))
     strategy = worst.engagements[0].strategy
     count = sum(found.evaluations for found in worst.engagements)
-    lines = [
+    yield (
         f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}, strategy {strategy}: "
         f"{count} simulated engagements, {number(count / max(elapsed_s, 1e-9))} per second"
-    ]
-    print_lines(console, lines)
-    print_table(console, table)
-    notes = ["each miss was simulated: the strategy cannot guarantee a smaller one, and greater misses may exist"]
+    )
+    yield table
+    yield "each miss was simulated: the strategy cannot guarantee a smaller one, and greater misses may exist"
     if not same:
         emptied = max(found.sets_emptied for found in worst.engagements)
-        notes.append(
+        yield (
             f"the set became empty in {emptied} engagements of a search, and such a miss says little about the strategy"
             + ("" if scenario.set_model.is_guaranteed else "; use --model guaranteed, whose set keeps the true state")
         )
     if options.record is not None:
-        notes.append(f"to draw it: infoset replay {options.record} --out DIR")
-    print_lines(console, notes)
+        yield f"to draw it: infoset replay {options.record} --out DIR"

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
-from rich.console import Console
 
 from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
 from experiments.common.output import output_of, to_json
 from experiments.common.screen import (
     BeginProgress,
+    Part,
     figure_files,
     number,
     number_table,
-    print_lines,
-    print_table,
     progress_bar,
     say_warnings,
-    table_console,
+    show,
 )
 from experiments.interception.choices import chosen_strategies, study_scenario
 from experiments.interception.command import Bound
@@ -113,8 +111,7 @@ def run(options: Bound) -> None:
         written.save("results.json", to_json(summary), "--json")
         if options.out is not None:
             written.draw({FIGURE: lambda: draw_bound(scenario, lower)}, begin("figure"))
-    if not options.quiet:
-        _show(table_console(written.stdout_taken), scenario, lower, worst, options)
+    show(_parts(scenario, lower, worst, options), options.quiet, stdout_taken=written.stdout_taken)
 
 
 def _simulate(
@@ -196,9 +193,7 @@ def _equal_until_s(pair: TruthPair, scenario: Scenario) -> float:
     return pair.arrival_s - pair.last_common_step * scenario.set_model.step_s
 
 
-def _show(
-    console: Console, scenario: Scenario, lower: LowerBound, worst: Sequence[WorstOfStrategy], options: Bound
-) -> None:
+def _parts(scenario: Scenario, lower: LowerBound, worst: Sequence[WorstOfStrategy], options: Bound) -> Iterator[Part]:
     titles = ("closing speed\nkm/s", "bound\nm", "range at t = 0\nkm", "equal measurements until\ns before arrival")
     bounds = number_table(*titles)
     for pair in lower.pairs:
@@ -214,28 +209,18 @@ def _show(
         searched = strategy.searched.misses().values()
         values = (strategy.pairs_m, *searched, strategy.over(lower), strategy.guaranteed_m)
         strategies.add_row(strategy.name, *(number(value) for value in values))
-    print_lines(
-        console,
-        [
-            f"{scenario.name}, model {scenario.set_model.kind.value}: no strategy can guarantee a miss below "
-            f"{number(lower.bound_m)} m",
-            f"acceleration of the object along z in these pairs: at most {lower.disturbance_m_s2:.3g} m/s^2",
-        ],
-    )
-    print_table(console, bounds)
-    console.print()
-    print_table(console, strategies)
     model = scenario.set_model.kind.value
-    notes = [
-        "pairs: greatest miss of the states that prove the bound",
-        "set never empty, also empty: greatest misses found by `infoset adversary` with "
-        f"--model {model} --budget {options.budget} --seed {options.seed}"
-        if options.budget
-        else "set never empty, also empty: not searched",
-        "miss / bound: greatest miss of pairs and search together, each with the set never empty, divided by the bound",
-        "guaranteed: greatest bound Phi on the miss, computed during these engagements",
-    ]
+    yield f"{scenario.name}, model {model}: no strategy can guarantee a miss below {number(lower.bound_m)} m"
+    yield f"acceleration of the object along z in these pairs: at most {lower.disturbance_m_s2:.3g} m/s^2"
+    yield from (bounds, "", strategies)
+    yield "pairs: greatest miss of the states that prove the bound"
+    searched_by = f"`infoset adversary` with --model {model} --budget {options.budget} --seed {options.seed}"
+    found = f"greatest misses found by {searched_by}" if options.budget else "not searched"
+    yield f"set never empty, also empty: {found}"
+    yield (
+        "miss / bound: greatest miss of pairs and search together, each with the set never empty, divided by the bound"
+    )
+    yield "guaranteed: greatest bound Phi on the miss, computed during these engagements"
     if any(strategy.results.set_emptied.any() for strategy in worst):
         hint = "" if scenario.set_model.is_guaranteed else "; try --model guaranteed"
-        notes.append(f"in some engagements a measurement contradicted all states of the set, which became empty{hint}")
-    print_lines(console, notes)
+        yield f"in some engagements a measurement contradicted all states of the set, which became empty{hint}"

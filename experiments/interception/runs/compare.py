@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from time import perf_counter
-
-from rich.console import Console
 
 from experiments.common.output import Cell, hit_key, output_of, to_csv, to_json
 from experiments.common.screen import (
+    Part,
     figure_files,
     number,
     number_table,
-    print_lines,
-    print_table,
     progress_bar,
     quantile_notes,
     say_warnings,
-    table_console,
+    show,
 )
 from experiments.interception.choices import chosen_strategies, study_scenario
 from experiments.interception.command import Compare
@@ -61,8 +58,7 @@ def run(options: Compare) -> None:
             written.save("results.csv", to_csv(COLUMNS, _rows(compared)), "--csv")
         if options.out is not None:
             written.draw({FIGURE: lambda: draw_comparison(compared, scenario.radius_m)}, begin("figure"))
-    if not options.quiet:
-        _show(table_console(written.stdout_taken), scenario, compared)
+    show(_parts(scenario, compared), options.quiet, stdout_taken=written.stdout_taken)
 
 
 def _simulate(
@@ -128,7 +124,7 @@ def _rows(compared: Sequence[Comparison]) -> list[list[Cell]]:
     ]
 
 
-def _show(console: Console, scenario: Scenario, compared: Sequence[Comparison]) -> None:
+def _parts(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Part]:
     table = number_table("noise", "strategy", "quantity", *QUANTILES, left=3)
     titles = ["true state in the\nset at every step", "set became\nempty"]
     if scenario.body is not None:
@@ -153,18 +149,9 @@ def _show(console: Console, scenario: Scenario, compared: Sequence[Comparison]) 
             title = ""
     meter = "with" if scenario.range_sensor is not None else "without"
     runs = len(compared[0].miss_m)
-    print_lines(
-        console,
-        [f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}: quantiles of {runs} runs"],
-    )
-    print_table(console, table)
-    print_lines(console, ["", f"of the {runs} runs:"])
-    print_table(console, sets)
-    print_lines(
-        console,
-        [
-            "game noise: for each run, the worst of its four tie rules",
-            *quantile_notes(runs, [*QUANTILES.values()]),
-            *set_warnings(scenario.set_model.kind, total),
-        ],
-    )
+    yield f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}: quantiles of {runs} runs"
+    yield table
+    yield from ("", f"of the {runs} runs:", sets)
+    yield "game noise: for each run, the worst of its four tie rules"
+    yield from quantile_notes(runs, [*QUANTILES.values()])
+    yield from set_warnings(scenario.set_model.kind, total)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from time import perf_counter
 
 from experiments.common.output import Cell, library_version, outcome_columns, output_of, to_csv, to_json
-from experiments.common.screen import figure_files, progress_bar, say_warnings, table_console
+from experiments.common.screen import figure_files, progress_bar, say_warnings, show
 from experiments.interception.choices import own_strategy, scenario_with
 from experiments.interception.command import Engage
 from experiments.interception.record_file import record_path, write_record
@@ -15,9 +15,9 @@ from experiments.interception.runs.engagement_table import (
     FIGURE_2,
     FIGURE_3,
     draw_engagements,
+    engagement_parts,
     need_times,
     read_times,
-    show_engagements,
 )
 from experiments.interception.runs.shared import need_finite, summary_head
 from experiments.interception.scenario_file import scenario_hash, scenario_to_toml, scenario_warnings
@@ -74,8 +74,7 @@ def run(options: Engage) -> None:
                 write_record(record, file, overwrite=options.overwrite)
                 written.add(file)
         draw_engagements(records, times_s, written, begin)
-    if not options.quiet:
-        show_engagements(records, table_console(written.stdout_taken))
+    show(engagement_parts(records), options.quiet, stdout_taken=written.stdout_taken)
 
 
 def _summary(record: Record, elapsed_s: float) -> dict[str, object]:

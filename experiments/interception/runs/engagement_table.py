@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-
-from rich.console import Console
 
 from experiments.common.errors import InputError
 from experiments.common.options import read_number
 from experiments.common.output import Output
-from experiments.common.screen import BeginProgress, number, number_table, print_lines, print_table
+from experiments.common.screen import BeginProgress, Part, number, number_table
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import draw_sets
 from experiments.interception.published import PRINTED_SINGLE_RUN, SINGLE
@@ -24,8 +22,8 @@ DEFAULT_TIMES = ("0.5", "4", "8")
 MOST_TIMES = 12
 
 
-def show_engagements(records: Sequence[Record], console: Console) -> None:
-    """Print the results of engagements side by side, with the paper's for its scenario."""
+def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
+    """Yield the results of engagements side by side, with the paper's for its scenario, for the screen."""
     bounds = sorted({bound_name(record.scenario).removesuffix(", m") for record in records})
     columns = [
         [
@@ -59,10 +57,10 @@ def show_engagements(records: Sequence[Record], console: Console) -> None:
     table = number_table(*(title for title, *_ in columns))
     for row in list(zip(*columns, strict=True))[1:]:
         table.add_row(*row)
-    print_lines(console, [" | ".join(dict.fromkeys(record.scenario.name for record in records))])
-    print_table(console, table)
-    print_lines(console, filter(None, map(_both_failures, records)))
-    print_lines(console, dict.fromkeys(filter(None, (allowance(record.scenario) for record in records))))
+    yield " | ".join(dict.fromkeys(record.scenario.name for record in records))
+    yield table
+    yield from filter(None, map(_both_failures, records))
+    yield from dict.fromkeys(filter(None, (allowance(record.scenario) for record in records)))
 
 
 def _yes(value: bool | None) -> str:

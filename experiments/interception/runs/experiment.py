@@ -5,20 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from time import perf_counter
 
-from rich.console import Console
-
 from experiments.common.output import hit_key, outcome_columns, output_of, to_csv, to_json
 from experiments.common.screen import (
+    Part,
     figure_files,
     number,
     number_table,
-    print_lines,
-    print_table,
     progress_bar,
     quantile_notes,
     say,
     say_warnings,
-    table_console,
+    show,
 )
 from experiments.interception.choices import own_strategy, scenario_with
 from experiments.interception.command import Experiment
@@ -80,8 +77,7 @@ def run(options: Experiment) -> None:
             written.save("results.csv", _csv(curves), "--csv")
         if options.out is not None:
             written.draw({FIGURE: lambda: draw_distributions(curves, radius_m=scenario.radius_m)}, begin("figure"))
-    if not options.quiet:
-        _show(table_console(written.stdout_taken), scenario, curves)
+    show(_parts(scenario, curves), options.quiet, stdout_taken=written.stdout_taken)
 
 
 def _key(curve: Curve) -> dict[str, int | str | bool]:
@@ -98,7 +94,7 @@ def _csv(curves: Sequence[Curve]) -> str:
     return to_csv((*_key(curves[0]), *columns[0]), rows)
 
 
-def _show(console: Console, scenario: Scenario, curves: Sequence[Curve]) -> None:
+def _parts(scenario: Scenario, curves: Sequence[Curve]) -> list[Part]:
     table, levels = number_table("curve", "quantity", *QUANTILES, left=2), [*QUANTILES.values()]
     enlarged = scenario.set_model.recovery is Recovery.WIDENED
     endings = {
@@ -137,6 +133,4 @@ def _show(console: Console, scenario: Scenario, curves: Sequence[Curve]) -> None
         notes.append(f"paper (one run from z = -8 km, no range meter): {figures}")
     runs = len(curves[0].results)
     notes += quantile_notes(runs, levels)
-    print_lines(console, [f"{scenario.name}: quantiles of {runs} runs per curve"])
-    print_table(console, table)
-    print_lines(console, notes)
+    return [f"{scenario.name}: quantiles of {runs} runs per curve", table, *notes]

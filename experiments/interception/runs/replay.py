@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from experiments.common.errors import InputError
 from experiments.common.output import output
-from experiments.common.screen import figure_files, progress_bar, say, table_console
+from experiments.common.screen import figure_files, progress_bar, say, show, table_console
 from experiments.interception.command import Replay
 from experiments.interception.figures.animation import GIF, MP4, animate, animation_path
 from experiments.interception.page import MOST_RECORDS, interception_page
@@ -13,9 +13,9 @@ from experiments.interception.runs.engagement_table import (
     FIGURE_2,
     FIGURE_3,
     draw_engagements,
+    engagement_parts,
     need_times,
     read_times,
-    show_engagements,
 )
 from experiments.interception.terminal import play
 
@@ -46,10 +46,9 @@ def run(options: Replay) -> None:
             if file is not None:
                 written.deliver(option, animate(records, file.suffix, options.frames, options.width, begin(file.name)))
         draw_engagements(records, times_s, written, begin)
-    console = table_console(False)
     if options.terminal:
-        play(records, console, options.speed)
-    elif not options.quiet:
-        show_engagements(records, console)
+        play(records, table_console(False), options.speed)
+    else:
+        show(engagement_parts(records), options.quiet)
         if not written.written:
             say("--html FILE.html writes an interactive page, --out DIR writes the figures", options.quiet)
