@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from infoset import AngleSensor, SetModel
+from infoset.sensors import Sensor
 from sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 LABELS_A_PERIOD, PERIODS_LOOKED_AT = 8, 7
 """The bound oscillates with the label; the period is the distance travelled between two measurements."""
@@ -41,13 +46,14 @@ class TruthPair:
     last_common_step : int
         Last step whose measurements, and therefore impulses, can be the same; -1 if there is none.
     apart_m : float
-        Their distance along z at x = 0, with the same impulses, m.
+        Their distance across x at x = 0, with the same impulses, m.
     correction_m : float
         Greatest change of one miss by the impulses after `last_common_step`, m.
-    position_m, velocity_m_s : ndarray, shape (2, 2)
-        (z, x) and (V_z, V_x) of the two motions at t = 0.
-    acceleration_m_s2 : ndarray, shape (2, steps)
-        Accelerations of the two motions along z over each step; x = 0 is in the last step.
+    position_m, velocity_m_s : ndarray, shape (2, 2) or (2, 3)
+        (z, x) and (V_z, V_x) of the two motions at t = 0; (y, z, x) and (V_y, V_z, V_x) in space.
+    acceleration_m_s2 : ndarray, shape (2, steps) or (2, 2, steps)
+        Accelerations of the two motions along z over each step; x = 0 is in the last step. In space, those along y
+        and z: axis, motion, step.
     """
 
     label_m: float
@@ -69,14 +75,20 @@ class TruthPair:
         """Time when x = 0, s."""
         return -self.label_m / self.vx_m_s
 
-    def distance_m(self, step_s: float) -> tuple[Floats, Floats]:
-        """Return the times of all steps and of the arrival, s, and the distance of the two along z, m."""
-        steps = self.acceleration_m_s2.shape[1]
+    def difference_m(self, step_s: float) -> tuple[Floats, Floats]:
+        """Return the times of all steps and of the arrival, s, and the differences of the two by axis, m.
+
+        Returns
+        -------
+        times_s : ndarray, shape (n,)
+        difference_m : ndarray, shape (axes, n)
+            First motion minus second, along z, or along y and z.
+        """
+        steps = self.acceleration_m_s2.shape[-1]
         times_s = np.append(np.arange(steps) * step_s, self.arrival_s)
-        offset, velocity, acceleration = (
-            values[0] - values[1] for values in (self.position_m[:, 0], self.velocity_m_s[:, 0], self.acceleration_m_s2)
-        )
-        return times_s, _motion(float(offset), float(velocity), acceleration, times_s)[0]
+        offset, velocity = (-np.diff(values[:, :-1], axis=0)[0] for values in (self.position_m, self.velocity_m_s))
+        first, second = np.moveaxis(self.acceleration_m_s2.reshape(-1, 2, steps), 1, 0)
+        return times_s, _motion(offset, velocity, first - second, times_s)[0]
 
 
 @dataclass(frozen=True)
@@ -90,7 +102,7 @@ class LowerBound:
     by_label : tuple of TruthPair
         Best pairs of all examined labels, in ascending order, for each velocity along x.
     disturbance_m_s2 : float
-        Greatest acceleration of the true motion along z, m/s^2.
+        Greatest acceleration of the true motion along z, m/s^2; `SetModel` contains that along y.
     """
 
     pairs: tuple[TruthPair, ...]
@@ -150,10 +162,15 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
     Later impulses may differ, and each changes one miss by at most mu2 x_j / |V_x|. The distance of the two along z at
     x = 0 is therefore at least |dz(T)| - 2 mu2 sum_{j > s} x_j / |V_x|, and one of the two misses by at least half of
     it. The sum uses the earliest impulses that the budget allows, because they change the miss most.
+
+    The manoeuvres of a pair may differ. Gravity acts on both alike, up to K/R^3 times their distance (1e-11 m/s^2).
+
+    In space, each axis has a linear program, and the impulses limit the modulus. If the errors of the angles are in a
+    box, the two motions of a pair differ along both axes, each by the most that its program allows:
+    |(dy(T), dz(T))| replaces |dz(T)|. If the errors are in a disc, they differ along the axis with the greater bound.
+    Equal axes have one linear program.
     """
     model = scenario.set_model
-    # The manoeuvres of a pair may differ. Gravity acts on both alike, up to K/R^3 times their distance (1e-11 m/s^2).
-    allowed = model.disturbance_m_s2
     slow, fast = max(model.bounds.vx_m_s), min(model.bounds.vx_m_s)
     speeds = sorted({fast, min(max(-model.closing_speed_m_s, fast), slow), slow})
     grids = [label_grid(scenario, speed) for speed in speeds]
@@ -173,7 +190,7 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
                 side = 1.0 if (index - len(grid)) % 2 else -1.0
                 label_m = max(tried, key=_bound_m).label_m + side * width
                 labels.append(min(max(label_m, model.bounds.x_m[0]), model.bounds.x_m[1]))
-            pair = pair_at(scenario, labels[index], speed, allowed, try_first_before_s=before_s)
+            pair = pair_at(scenario, labels[index], speed, try_first_before_s=before_s)
             before_s = pair.arrival_s - pair.last_common_step * model.step_s
             tried.append(pair)
             by_label[speed, pair.label_m] = pair
@@ -183,7 +200,9 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
         best.append(max(tried, key=_bound_m))
     best.sort(key=_bound_m, reverse=True)
     return LowerBound(
-        tuple(best), tuple(pair for _, pair in sorted(by_label.items(), key=lambda item: item[0])), allowed
+        tuple(best),
+        tuple(pair for _, pair in sorted(by_label.items(), key=lambda item: item[0])),
+        model.disturbance_m_s2,
     )
 
 
@@ -207,7 +226,6 @@ def pair_at(
     scenario: Scenario,
     label_m: float,
     vx_m_s: float,
-    disturbance_m_s2: float,
     *,
     last_common_step: int | None = None,
     try_first_before_s: float | None = None,
@@ -218,8 +236,6 @@ def pair_at(
     ----------
     label_m, vx_m_s : float
         Range at t = 0 and velocity along x; the range is x(t) = label + vx t.
-    disturbance_m_s2 : float
-        Greatest acceleration along z, m/s^2.
     last_common_step : int or None
         Last step with the same measurements; None searches for the best one.
     try_first_before_s : float or None
@@ -230,30 +246,37 @@ def pair_at(
     BoundError
         If a linear program is not solved.
     """
-    approach = _Approach(scenario, label_m, vx_m_s, disturbance_m_s2)
+    approach = _Approach(scenario, label_m, vx_m_s)
     if last_common_step is not None:
-        return approach.pair(last_common_step)
+        pairs = [approach.pair(last_common_step, axes) for axes in approach.choices]
+        return max(pairs, key=_unlimited_bound_m)
     candidates = approach.candidates
     start = len(candidates) - 1
     if try_first_before_s is not None:
         wanted = (approach.arrival_s - try_first_before_s) / scenario.set_model.step_s
         start = int(np.abs(candidates - wanted).argmin())
-    return _climb(lambda index: approach.pair(int(candidates[index])), start, len(candidates))
+    pairs = [_climb(partial(approach.pair, axes=axes), candidates, start) for axes in approach.choices]
+    return max(pairs, key=_unlimited_bound_m)
 
 
-def _climb(pair_of: Callable[[int], TruthPair], start: int, count: int) -> TruthPair:
-    """Return the pair at a local maximum, found from an index with steps that double and halve.
+def _unlimited_bound_m(pair: TruthPair) -> float:
+    """Return the bound without its limit at zero, m."""
+    return 0.5 * pair.apart_m - pair.correction_m
+
+
+def _climb(pair_of: Callable[[int], TruthPair], candidates: Integers, start: int) -> TruthPair:
+    """Return the pair at a local maximum over candidates, found from an index with strides that double and halve.
 
     The distance grows linearly and the correction quadratically, so the bound has one maximum.
     """
     known: dict[int, TruthPair] = {}
 
     def value(index: int) -> float:
-        if not 0 <= index < count:
+        if not 0 <= index < len(candidates):
             return -np.inf
         if index not in known:
-            known[index] = pair_of(index)
-        return 0.5 * known[index].apart_m - known[index].correction_m
+            known[index] = pair_of(int(candidates[index]))
+        return _unlimited_bound_m(known[index])
 
     at, stride = start, 1
     while stride:
@@ -268,32 +291,31 @@ def _climb(pair_of: Callable[[int], TruthPair], start: int, count: int) -> Truth
 class _Approach:
     """Data of one label and velocity that all its linear programs use.
 
-    `limits_m` is the greatest distance of the two along z at each step with the same measurements, `miss_limits_m` that
-    of their predicted misses; infinite where nothing is measured.
+    `choices` are the axes along which the motions of a pair differ: all at once if the errors of the angle are in a
+    box, one of them in a disc.
     """
 
-    def __init__(self, scenario: Scenario, label_m: float, vx_m_s: float, disturbance_m_s2: float) -> None:
+    def __init__(self, scenario: Scenario, label_m: float, vx_m_s: float) -> None:
         model = scenario.set_model
-        self.scenario, self.label_m, self.vx_m_s, self.disturbance_m_s2 = scenario, label_m, vx_m_s, disturbance_m_s2
+        self.scenario, self.label_m, self.vx_m_s = scenario, label_m, vx_m_s
         self.arrival_s = -label_m / vx_m_s
         # Steps that start before the arrival, up to rounding.
-        self.steps = max(1, int(np.ceil(self.arrival_s / model.step_s * (1.0 - 1e-12))))
-        self.times_s = np.append(np.arange(self.steps) * model.step_s, self.arrival_s)
-        self.ranges_m = np.maximum(label_m + vx_m_s * self.times_s[:-1], 0.0)
-        self.limits_m = np.full(self.steps, np.inf)
-        self.miss_limits_m = np.full(self.steps, np.inf)
-        for sensor in scenario.sensors.values():
-            due = np.arange(0, self.steps, model.steps_in(sensor.period_s))
-            band = sensor.band(self.ranges_m[due], -vx_m_s, 2.0 * (1.0 - MARGIN))
-            if band is not None:
-                limits = self.miss_limits_m if band[0] else self.limits_m
-                limits[due] = np.minimum(limits[due], band[1])
+        steps = max(1, int(np.ceil(self.arrival_s / model.step_s * (1.0 - 1e-12))))
+        times_s = np.append(np.arange(steps) * model.step_s, self.arrival_s)
+        self.ranges_m = np.maximum(label_m + vx_m_s * times_s[:-1], 0.0)
+        self._models = {name: model.axis(name) for name in model.axes}
+        self._programs = {
+            planar: _Program(planar, scenario.sensors, times_s, self.ranges_m, vx_m_s)
+            for planar in dict.fromkeys(self._models.values())
+        }
+        single = {planar: (name,) for name, planar in self._models.items()}
+        self.choices = [*single.values()] if model.angle_sensor.is_disc else [model.axes]
 
     @property
     def candidates(self) -> Integers:
         """Last common steps that may be the best: those before a measurement, and the end."""
-        measured = np.flatnonzero(np.isfinite(np.minimum(self.limits_m, self.miss_limits_m)))
-        return np.append(measured - 1, self.steps - 1).astype(np.int64)
+        measured = np.logical_or.reduce([program.is_measured for program in self._programs.values()])
+        return np.append(np.flatnonzero(measured) - 1, len(self.ranges_m) - 1).astype(np.int64)
 
     def correction_m(self, last_common_step: int) -> float:
         """Return the greatest change of the miss by impulses after a step, within the budget, m."""
@@ -303,25 +325,65 @@ class _Approach:
         sizes = np.clip(thruster.budget_m_s - spent, 0.0, thruster.greatest_impulse_m_s)
         return float(sizes @ arms_s)
 
-    def pair(self, last_common_step: int) -> TruthPair:
+    def pair(self, last_common_step: int, axes: Sequence[str]) -> TruthPair:
         """Return the pair with the greatest distance at the end of those with the same measurements up to a step."""
-        offset, velocity, acceleration = self._farthest(last_common_step)
-        box = self.scenario.set_model.bounds
+        wanted = dict.fromkeys(self._models[name] for name in axes)
+        farthest = {planar: self._programs[planar].farthest(last_common_step) for planar in wanted}
+        nothing = (0.0, 0.0, np.zeros(len(self.ranges_m)), 0.0)
+        offsets, velocities, accelerations, ends_m = zip(
+            *(farthest[planar] if name in axes else nothing for name, planar in self._models.items()), strict=True
+        )
         sides = np.array([0.5, -0.5])
-        z, vz = 0.5 * sum(box.z_m) + sides * offset, 0.5 * sum(box.vz_m_s) + sides * velocity
+        boxes = [planar.bounds for planar in self._models.values()]
+        z = [0.5 * sum(box.z_m) + sides * offset for box, offset in zip(boxes, offsets, strict=True)]
+        vz = [0.5 * sum(box.vz_m_s) + sides * velocity for box, velocity in zip(boxes, velocities, strict=True)]
+        acceleration = sides[:, None] * np.array(accelerations)[:, None, :]
         return TruthPair(
             self.label_m,
             self.vx_m_s,
             last_common_step,
-            float(_motion(offset, velocity, acceleration, self.times_s)[0][-1]),
+            math.hypot(*ends_m),
             self.correction_m(last_common_step),
-            np.column_stack([z, np.full(2, self.label_m)]),
-            np.column_stack([vz, np.full(2, self.vx_m_s)]),
-            sides[:, None] * acceleration[None, :],
+            np.column_stack([*z, np.full(2, self.label_m)]),
+            np.column_stack([*vz, np.full(2, self.vx_m_s)]),
+            acceleration if self.scenario.is_spatial else acceleration[0],
         )
 
-    def _farthest(self, last_common_step: int) -> tuple[float, float, Floats]:
-        """Return the difference of the two motions: offset and velocity at t = 0, acceleration over each step.
+
+class _Program:
+    """The linear programs of one axis.
+
+    `limits_m` is the greatest distance of the two along the axis at each step with the same measurements,
+    `miss_limits_m` that of their predicted misses; infinite where nothing is measured.
+    """
+
+    def __init__(
+        self,
+        model: SetModel,
+        sensors: Mapping[str, Sensor],
+        times_s: Floats,
+        ranges_m: Floats,
+        vx_m_s: float,
+    ) -> None:
+        self.model, self.times_s, self.ranges_m, self.vx_m_s = model, times_s, ranges_m, vx_m_s
+        self.arrival_s = float(times_s[-1])
+        self.steps = len(ranges_m)
+        self.limits_m = np.full(self.steps, np.inf)
+        self.miss_limits_m = np.full(self.steps, np.inf)
+        for sensor in {**sensors, AngleSensor.name: model.angle_sensor}.values():
+            due = np.arange(0, self.steps, model.steps_in(sensor.period_s))
+            band = sensor.band(self.ranges_m[due], -vx_m_s, 2.0 * (1.0 - MARGIN))
+            if band is not None:
+                limits = self.miss_limits_m if band[0] else self.limits_m
+                limits[due] = np.minimum(limits[due], band[1])
+
+    @property
+    def is_measured(self) -> Flags:
+        """Whether a measurement limits the distance at a step, shape (steps,)."""
+        return np.asarray(np.isfinite(np.minimum(self.limits_m, self.miss_limits_m)))
+
+    def farthest(self, last_common_step: int) -> tuple[float, float, Floats, float]:
+        """Return the difference of the two motions: offset and velocity at t = 0, acceleration over each step, end.
 
         Notes
         -----
@@ -331,14 +393,14 @@ class _Approach:
         """
         from scipy.optimize import linprog  # takes half a second to load
 
-        box = self.scenario.set_model.bounds
+        box = self.model.bounds
         knots = self._knots(last_common_step)
         at_s, count = self.times_s[knots], len(knots)
         blocks = count - 1
         # Units in which all variables are of order one, because the tolerances of the solver are absolute.
-        second = self.scenario.set_model.step_s
+        second = self.model.step_s
         metre = 1.0 / max(float(np.median(self.ranges_m)) * 2e-4, 1e-9)
-        push = 2.0 * self.disturbance_m_s2 * metre
+        push = 2.0 * self.model.disturbance_m_s2 * metre
         step = np.diff(at_s)
         rows = np.arange(blocks)
         z, v, u = rows, count + rows, 2 * count + rows
@@ -390,9 +452,9 @@ class _Approach:
             options={"presolve": False},
         )
         if solved.status != 0:
-            raise BoundError(f"label {self.label_m:g} m, V_x {self.vx_m_s:g} m/s: {solved.message}")
+            raise BoundError(f"label {self.ranges_m[0]:g} m, V_x {self.vx_m_s:g} m/s: {solved.message}")
         pushes = np.clip(np.asarray(solved.x[2 * count :]), -1.0, 1.0)
-        acceleration = 2.0 * self.disturbance_m_s2 * np.repeat(pushes, np.diff(knots))
+        acceleration = 2.0 * self.model.disturbance_m_s2 * np.repeat(pushes, np.diff(knots))
         widths = [box.z_m[1] - box.z_m[0], box.vz_m_s[1] - box.vz_m_s[0]]
         offset, velocity = (
             float(np.clip(value / unit, -width, width))
@@ -405,7 +467,8 @@ class _Approach:
         allowed = np.concatenate([limits / metre, miss_limits / metre])
         share = float(np.divide(allowed, sizes, out=np.full(len(sizes), np.inf), where=sizes > 0.0).min())
         share = min(1.0, share)
-        return share * offset, share * velocity, share * acceleration
+        offset, velocity, acceleration = share * offset, share * velocity, share * acceleration
+        return offset, velocity, acceleration, float(_motion(offset, velocity, acceleration, self.times_s)[0][-1])
 
     def _knots(self, last_common_step: int) -> Integers:
         """Return the steps at which blocks of constant acceleration end, with 0 and the arrival."""
@@ -416,12 +479,19 @@ class _Approach:
         return np.array(knots[::-1], dtype=np.int64)
 
 
-def _motion(offset: float, velocity: float, acceleration: Floats, times_s: Floats) -> tuple[Floats, Floats]:
-    """Return positions and speeds at some times, with constant acceleration between them."""
+def _motion(
+    offset: Floats | float, velocity: Floats | float, acceleration: Floats, times_s: Floats
+) -> tuple[Floats, Floats]:
+    """Return positions and speeds at times, with constant acceleration between them, shape (..., times).
+
+    `offset` and `velocity` have the shape (...), `acceleration` (..., times - 1).
+    """
     step = np.diff(times_s)
-    speeds = velocity + np.concatenate([[0.0], np.cumsum(acceleration * step)])
-    ways = speeds[:-1] * step + 0.5 * acceleration * step**2
-    return offset + np.concatenate([[0.0], np.cumsum(ways)]), speeds
+    start = np.zeros((*acceleration.shape[:-1], 1))
+    changes = np.concatenate([start, np.cumsum(acceleration * step, axis=-1)], axis=-1)
+    speeds = np.asarray(velocity)[..., None] + changes
+    ways = np.cumsum(speeds[..., :-1] * step + 0.5 * acceleration * step**2, axis=-1)
+    return np.asarray(offset)[..., None] + np.concatenate([start, ways], axis=-1), speeds
 
 
 def _sparse(shape: tuple[int, int], *entries: tuple[Integers, Integers, Floats | float]) -> Any:

@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.optimize import linprog
 
 from guidance import Thruster
-from infoset import AngleSensor, RateSensor, SetModel, StateBox
+from infoset import AngleSensor, ErrorShape, RateSensor, SetModel, StateBox
 from sim import Scenario
 from sim.bound import TruthPair, label_grid, lower_bound, pair_at
+from tests.space import in_space
 
 NOMINAL_LABEL_M = 5801.3e3
 
@@ -34,32 +36,64 @@ def toy(vz_m_s: float = 1e3, greatest_impulse_m_s: float = 0.5) -> Scenario:
     )
 
 
+def with_disturbance(scenario: Scenario, disturbance_m_s2: float) -> Scenario:
+    return replace(scenario, set_model=replace(scenario.set_model, disturbance_m_s2=disturbance_m_s2))
+
+
 def positions(pair: TruthPair, scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times of all steps and of the arrival, and z of both truths then, by plain stepping; shape (2, steps + 1)."""
-    steps = pair.acceleration_m_s2.shape[1]
+    """Times of all steps and of the arrival, and the lateral positions then, by plain stepping.
+
+    The positions have the shape (2, steps + 1), or (axes, 2, steps + 1) in space.
+    """
+    steps = pair.acceleration_m_s2.shape[-1]
     times = np.append(np.arange(steps) * scenario.set_model.step_s, pair.arrival_s)
-    z, v = pair.position_m[:, 0], pair.velocity_m_s[:, 0]
+    shape = pair.acceleration_m_s2.shape[:-1]
+    z, v = pair.position_m[:, :-1].T.reshape(shape), pair.velocity_m_s[:, :-1].T.reshape(shape)
     track = [z]
     for i in range(steps):
-        duration, push = times[i + 1] - times[i], pair.acceleration_m_s2[:, i]
+        duration, push = times[i + 1] - times[i], pair.acceleration_m_s2[..., i]
         z, v = z + v * duration + 0.5 * push * duration**2, v + push * duration
         track.append(z)
-    return times, np.array(track).T
+    return times, np.stack(track, axis=-1)
+
+
+def greatest_half_distance_m(scenario: Scenario, label_m: float, last_common_step: int) -> float:
+    """A_s of one axis at 58 km/s, by a dense linear program with one acceleration per step."""
+    model = scenario.set_model.axis("z")
+    steps = int(np.ceil(label_m / 58e3 / model.step_s))
+    times = np.append(np.arange(steps) * model.step_s, label_m / 58e3)
+    since = np.maximum(times[:, None] - times[None, :-1], 0.0)
+    until = np.maximum(times[:, None] - times[None, 1:], 0.0)
+    # Columns: offset and velocity at t = 0, accelerations; each in units of its greatest difference.
+    widths = [model.bounds.z_m[1] - model.bounds.z_m[0], model.bounds.vz_m_s[1] - model.bounds.vz_m_s[0]]
+    motion = np.column_stack(
+        [
+            np.full(len(times), widths[0]),
+            widths[1] * times,
+            2.0 * model.disturbance_m_s2 * 0.5 * (since**2 - until**2),
+        ]
+    )
+    ranges = label_m - 58e3 * times[: last_common_step + 1]
+    limits = 2.0 * ranges * model.angle_sensor.error_bound(ranges)
+    common = motion[: last_common_step + 1] / limits[:, None]
+    solved = linprog(-motion[-1], A_ub=np.vstack([common, -common]), b_ub=np.ones(2 * len(limits)), bounds=(-1.0, 1.0))
+    assert solved.status == 0
+    return float(-0.5 * solved.fun)
 
 
 @pytest.mark.parametrize(("last_common_step", "bound_m"), [(199, 11.5), (198, 18.9), (197, 22.6), (196, 22.6)])
 def test_bound_of_the_nominal_approach(last_common_step: int, bound_m: float, asteroid: Scenario) -> None:
-    pair = pair_at(asteroid, NOMINAL_LABEL_M, -58e3, 0.005, last_common_step=last_common_step)
+    pair = pair_at(asteroid, NOMINAL_LABEL_M, -58e3, last_common_step=last_common_step)
     assert pair.bound_m == pytest.approx(bound_m, abs=0.05)
 
 
 def test_the_best_step_is_found_from_wherever_the_search_begins(asteroid: Scenario) -> None:
     best = max(
-        (pair_at(asteroid, NOMINAL_LABEL_M, -58e3, 0.005, last_common_step=step) for step in range(190, 201)),
+        (pair_at(asteroid, NOMINAL_LABEL_M, -58e3, last_common_step=step) for step in range(190, 201)),
         key=lambda pair: pair.bound_m,
     )
     for first in (None, 2.0, 30.0):
-        found = pair_at(asteroid, NOMINAL_LABEL_M, -58e3, 0.005, try_first_before_s=first)
+        found = pair_at(asteroid, NOMINAL_LABEL_M, -58e3, try_first_before_s=first)
         assert found.last_common_step == best.last_common_step
         assert found.bound_m == pytest.approx(best.bound_m)
 
@@ -78,7 +112,7 @@ def test_two_measurements_by_hand(last_common_step: int, bound_m: float) -> None
     reached from dz(0) = -2 m. No impulse is left, for x = 0 at step 2: 6 / 2 = 3 m.
     """
     half_width = 50.0 if last_common_step == 0 else 2.0
-    pair = pair_at(toy(vz_m_s=half_width), 2000.0, -1000.0, 0.0, last_common_step=last_common_step)
+    pair = pair_at(toy(vz_m_s=half_width), 2000.0, -1000.0, last_common_step=last_common_step)
     assert pair.bound_m == pytest.approx(bound_m, rel=3e-6)
 
 
@@ -92,10 +126,10 @@ def test_two_measurements_by_hand_without_a_binding_box() -> None:
     """
     strong = toy(greatest_impulse_m_s=1e4)
     strong = replace(strong, thruster=replace(strong.thruster, budget_m_s=1e9))
-    found = pair_at(strong, 2000.0, -1000.0, 0.0)
+    found = pair_at(strong, 2000.0, -1000.0)
     assert found.last_common_step == 1
     assert found.bound_m == pytest.approx(4.0, rel=3e-6)
-    assert pair_at(strong, 2000.0, -1000.0, 0.25).bound_m == pytest.approx(4.25, rel=3e-6)
+    assert pair_at(with_disturbance(strong, 0.25), 2000.0, -1000.0).bound_m == pytest.approx(4.25, rel=3e-6)
     assert lower_bound(strong).bound_m == pytest.approx(4.0, rel=3e-6)
 
 
@@ -105,16 +139,16 @@ def test_budget_limits_what_can_be_corrected() -> None:
     The budget of 5 m/s is best spent as 2, 2 and 1 m/s at the first three: 10 + 8 + 3 = 21 m, not 30 m.
     """
     scenario = toy(greatest_impulse_m_s=2.0)
-    rich = pair_at(scenario, 10e3, -1000.0, 0.0, last_common_step=4)
+    rich = pair_at(scenario, 10e3, -1000.0, last_common_step=4)
     poor = replace(scenario, thruster=replace(scenario.thruster, budget_m_s=5.0))
     assert rich.correction_m == pytest.approx(30.0)
-    assert pair_at(poor, 10e3, -1000.0, 0.0, last_common_step=4).correction_m == pytest.approx(21.0)
+    assert pair_at(poor, 10e3, -1000.0, last_common_step=4).correction_m == pytest.approx(21.0)
 
 
 @pytest.mark.parametrize("vx_m_s", [-59e3, -57.7e3])
 def test_the_pair_is_admissible(vx_m_s: float, asteroid: Scenario) -> None:
     box, sensor = asteroid.set_model.bounds, asteroid.set_model.angle_sensor
-    pair = pair_at(asteroid, 5411e3, vx_m_s, 0.005)
+    pair = pair_at(asteroid, 5411e3, vx_m_s)
     assert (pair.position_m[:, 1] == 5411e3).all()
     assert (pair.velocity_m_s[:, 1] == vx_m_s).all()
     assert (np.abs(pair.position_m[:, 0]) <= box.z_m[1]).all()
@@ -133,25 +167,27 @@ def test_the_pair_is_admissible(vx_m_s: float, asteroid: Scenario) -> None:
 
 
 def test_a_rate_sensor_lowers_the_bound(asteroid: Scenario) -> None:
-    without = pair_at(asteroid, NOMINAL_LABEL_M, -58e3, 0.005)
+    without = pair_at(asteroid, NOMINAL_LABEL_M, -58e3)
     sharp = replace(asteroid, rate_sensor=RateSensor(0.5, 2e-6))
-    pair = pair_at(sharp, NOMINAL_LABEL_M, -58e3, 0.005)
+    pair = pair_at(sharp, NOMINAL_LABEL_M, -58e3)
     assert pair.bound_m < 0.9 * without.bound_m
     blunt = replace(asteroid, rate_sensor=RateSensor(0.5, 1.0))
-    assert pair_at(blunt, NOMINAL_LABEL_M, -58e3, 0.005).bound_m == pytest.approx(without.bound_m)
+    assert pair_at(blunt, NOMINAL_LABEL_M, -58e3).bound_m == pytest.approx(without.bound_m)
 
 
 def test_fewer_measurements_raise_the_bound(asteroid: Scenario) -> None:
     model = asteroid.set_model
     slow = replace(asteroid, set_model=replace(model, angle_sensor=replace(model.angle_sensor, period_s=2.0)))
-    often, seldom = (pair_at(each, NOMINAL_LABEL_M, -58e3, 0.005) for each in (asteroid, slow))
+    often, seldom = (pair_at(each, NOMINAL_LABEL_M, -58e3) for each in (asteroid, slow))
     assert seldom.bound_m > often.bound_m
     assert (seldom.last_common_step + 1) % 4 == 0 or seldom.last_common_step == 200
 
 
 def test_gravity_as_a_free_choice_would_hardly_matter(asteroid: Scenario) -> None:
     gravity = 1.5 * 1.324948e20 / 150e9**3 * 6301.3e3
-    strict, free = (pair_at(asteroid, 5309.9e3, -59e3, 0.005 + each).bound_m for each in (0.0, gravity))
+    strict, free = (
+        pair_at(with_disturbance(asteroid, 0.005 + each), 5309.9e3, -59e3).bound_m for each in (0.0, gravity)
+    )
     assert strict <= free < strict + 1e-4
 
 
@@ -183,4 +219,108 @@ def test_one_label_and_one_speed(asteroid: Scenario) -> None:
     known = replace(model, bounds=replace(model.bounds, x_m=(5.8e6, 5.8e6), vx_m_s=(-58e3, -58e3)))
     found = lower_bound(replace(asteroid, set_model=known))
     assert len(found.by_label) == 1
-    assert found.bound_m == pair_at(asteroid, 5.8e6, -58e3, found.disturbance_m_s2).bound_m
+    assert found.bound_m == pair_at(asteroid, 5.8e6, -58e3).bound_m
+
+
+@pytest.mark.parametrize(
+    ("last_common_step", "half_m", "correction_m", "disc_m", "box_m"),
+    [
+        (192, 92.59, 106.34, 0.0, 24.6),
+        (193, 80.75, 79.93, 0.8, 34.3),
+        (194, 69.01, 57.26, 11.8, 40.3),
+        (195, 57.36, 38.34, 19.0, 42.8),
+        (196, 45.81, 23.17, 22.6, 41.6),
+        (197, 34.34, 11.75, 22.6, 36.8),
+        (198, 22.97, 4.09, 18.9, 28.4),
+        (199, 11.69, 0.17, 11.5, 16.4),
+    ],
+)
+def test_bounds_in_space_by_the_last_common_step(
+    last_common_step: int, half_m: float, correction_m: float, disc_m: float, box_m: float, asteroid: Scenario
+) -> None:
+    """A_s and M_s by an independent linear program, and the bounds for errors in a disc and in a box."""
+    box, disc = in_space(asteroid), in_space(asteroid, error_shape=ErrorShape.DISC)
+    planar, joint, single = (
+        pair_at(scenario, NOMINAL_LABEL_M, -58e3, last_common_step=last_common_step)
+        for scenario in (asteroid, box, disc)
+    )
+    independent_m = greatest_half_distance_m(asteroid, NOMINAL_LABEL_M, last_common_step)
+    assert independent_m == pytest.approx(half_m, abs=0.006)
+    assert 0.9999 * independent_m < 0.5 * planar.apart_m < independent_m * (1.0 + 1e-7)
+    assert planar.correction_m == joint.correction_m == single.correction_m == pytest.approx(correction_m, abs=0.005)
+    assert single.bound_m == planar.bound_m == pytest.approx(disc_m, abs=0.06)
+    assert joint.apart_m == pytest.approx(np.sqrt(2.0) * planar.apart_m, rel=1e-14)
+    assert joint.bound_m == pytest.approx(box_m, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("shape", "disturbance_m_s2", "bound_m", "last_common_step"),
+    [(ErrorShape.BOX, 0.005, 42.78, 195), (ErrorShape.DISC, 0.005, 22.63, 196), (ErrorShape.BOX, 4e-10, 41.89, 195)],
+)
+def test_best_bounds_in_space(
+    shape: ErrorShape, disturbance_m_s2: float, bound_m: float, last_common_step: int, asteroid: Scenario
+) -> None:
+    scenario = with_disturbance(in_space(asteroid, error_shape=shape), disturbance_m_s2)
+    pair = pair_at(scenario, NOMINAL_LABEL_M, -58e3)
+    assert pair.last_common_step == last_common_step
+    assert pair.bound_m == pytest.approx(bound_m, abs=0.005)
+
+
+def test_two_measurements_in_space_by_hand() -> None:
+    """As in the plane, with V_z within 2 m/s and V_y within 1 m/s, both measurements the same and no impulse left.
+
+    |dv_y| <= 2 m/s: dy(2) = dy(1) + dv_y is at most 2 + 2 = 4 m, with dy(0) = 0; dz(2) is at most 6 m. With errors in a
+    box one of the two misses by half of |(4, 6)| m; in a disc by 3 m, along z only.
+    """
+    for name, bound_m in (("box", 0.5 * np.hypot(4.0, 6.0)), ("disc", 3.0)):
+        scenario = in_space(toy(vz_m_s=2.0), error_shape=ErrorShape(name))
+        bounds = replace(scenario.set_model.bounds, vy_m_s=(-1.0, 1.0))
+        scenario = replace(scenario, set_model=replace(scenario.set_model, bounds=bounds), dispersion=bounds)
+        pair = pair_at(scenario, 2000.0, -1000.0, last_common_step=1)
+        assert pair.bound_m == pytest.approx(bound_m, rel=3e-6)
+        times, difference = pair.difference_m(1.0)
+        assert times.tolist() == [0.0, 1.0, 2.0]
+        assert difference[:, -1] == pytest.approx([4.0 if name == "box" else 0.0, 6.0], rel=3e-6)
+
+
+@pytest.mark.parametrize("shape", ErrorShape)
+def test_the_pair_in_space_is_admissible(shape: ErrorShape, asteroid: Scenario) -> None:
+    """The y axis has smaller errors and another box."""
+    smaller = {} if shape is ErrorShape.DISC else {"error_at_nominal_range_y_rad": 1e-4}
+    scenario = in_space(asteroid, error_shape=shape, **smaller)
+    bounds = replace(scenario.set_model.bounds, y_m=(500.0, 900.0))
+    model = replace(scenario.set_model, bounds=bounds, disturbance_y_m_s2=0.002)
+    scenario = replace(scenario, set_model=model)
+    pair = pair_at(scenario, 5411e3, -59e3)
+    assert (pair.position_m[:, 2] == 5411e3).all()
+    assert (pair.velocity_m_s[:, 2] == -59e3).all()
+    times, positions_m = positions(pair, scenario)
+    ranges = pair.label_m - 59e3 * times
+    common = slice(0, pair.last_common_step + 1)
+    shares = []
+    for i, name in enumerate(model.axes):
+        planar = model.axis(name)
+        for values, limits in ((pair.position_m, planar.bounds.z_m), (pair.velocity_m_s, planar.bounds.vz_m_s)):
+            assert ((limits[0] <= values[:, i]) & (values[:, i] <= limits[1])).all()
+        assert (np.abs(pair.acceleration_m_s2[i]) <= planar.disturbance_m_s2 * (1.0 + 1e-12)).all()
+        apart = np.abs(positions_m[i, 0] - positions_m[i, 1])[common]
+        shares.append(apart / (2.0 * planar.angle_sensor.error_bound(ranges[common]) * ranges[common]))
+    size = np.hypot(*shares) if shape is ErrorShape.DISC else np.maximum(*shares)
+    assert size.max() == pytest.approx(1.0, rel=2e-6)
+    assert size.max() <= 1.0
+    ends = positions_m[:, 0, -1] - positions_m[:, 1, -1]
+    assert np.hypot(*ends) == pytest.approx(pair.apart_m)
+    assert np.count_nonzero(ends) == (1 if shape is ErrorShape.DISC else 2)
+    assert pair.difference_m(model.step_s)[1] == pytest.approx(positions_m[:, 0] - positions_m[:, 1], abs=1e-6)
+
+
+def test_an_idle_axis_leaves_the_planar_bound(asteroid: Scenario) -> None:
+    scenario = in_space(asteroid, error_at_nominal_range_y_rad=0.0, error_at_zero_range_y_rad=0.0)
+    bounds = replace(scenario.set_model.bounds, y_m=(0.0, 0.0), vy_m_s=(0.0, 0.0))
+    model = replace(scenario.set_model, bounds=bounds, disturbance_y_m_s2=0.0)
+    pair = pair_at(replace(scenario, set_model=model), NOMINAL_LABEL_M, -58e3)
+    planar = pair_at(asteroid, NOMINAL_LABEL_M, -58e3)
+    assert (pair.apart_m, pair.correction_m) == (planar.apart_m, planar.correction_m)
+    assert np.array_equal(pair.position_m[:, 1:], planar.position_m)
+    assert not pair.position_m[:, 0].any()
+    assert not pair.acceleration_m_s2[0].any()

@@ -91,14 +91,17 @@ def _draw_labels(axes: Axes, lower: LowerBound) -> None:
 
 
 def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
-    pair, sensor = lower.pair, scenario.set_model.angle_sensor
-    times, distance = pair.distance_m(scenario.set_model.step_s)
+    pair, model = lower.pair, scenario.set_model
+    times, difference = pair.difference_m(model.step_s)
+    end = difference[:, -1]
+    direction = np.divide(end, pair.apart_m, out=np.zeros_like(end), where=pair.apart_m > 0.0)
     to_go = pair.arrival_s - times
-    alike_until = pair.arrival_s - pair.last_common_step * scenario.set_model.step_s
-    shown = min(_SECONDS_SHOWN * alike_until + 2.0 * scenario.set_model.step_s, float(to_go[0]))
+    alike_until = pair.arrival_s - pair.last_common_step * model.step_s
+    shown = min(_SECONDS_SHOWN * alike_until + 2.0 * model.step_s, float(to_go[0]))
     fine = np.linspace(0.0, shown, 200)
     ranges = -pair.vx_m_s * fine
-    corridor = sensor.error_bound(ranges) * ranges
+    bounds = np.array([model.angle_sensor.axis(name).error_bound(ranges) for name in model.axes])
+    corridor = np.abs(direction) @ bounds * ranges
     seen = fine >= alike_until
     axes.fill_between(
         fine[seen],
@@ -110,7 +113,7 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
     )
     axes.plot(fine, corridor, color=SET_EDGE, linewidth=0.7, linestyle=":")
     axes.plot(fine, -corridor, color=SET_EDGE, linewidth=0.7, linestyle=":")
-    half = 0.5 * distance
+    half = 0.5 * direction @ difference
     corrected = half - _correction(scenario, pair.last_common_step, times)
     after = to_go <= alike_until + 1e-9
     looks: tuple[tuple[float, dict[str, Any], str], ...] = (
@@ -138,7 +141,9 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
     axes.set_xticks([tick for tick in axes.get_xticks() if 0.0 <= tick <= shown])
     axes.set_title("(b) pair of true states that proves the bound")
     axes.set_xlabel("time to arrival, s")
-    axes.set_ylabel("$z$ relative to the midpoint, m")
+    axes.set_ylabel(
+        f"{'$z$' if len(direction) == 1 else 'position along their difference'} relative to the midpoint, m"
+    )
     axes.legend(loc="upper right", handlelength=2.0, borderaxespad=0.2)
 
 

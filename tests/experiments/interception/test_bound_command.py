@@ -185,7 +185,7 @@ def test_figure_of_few_labels_and_of_many(short: Scenario) -> None:
     assert "s" in right.get_xlabel()
     assert not left.collections
     places = np.concatenate([first + np.linspace(0.0, 29e3, 9) for first in (5.3e6, 5.8e6, 6.2e6)])
-    pair = pair_at(short, 1745e3, -58e3, 0.005)
+    pair = pair_at(short, 1745e3, -58e3)
     many = LowerBound(
         (pair,),
         tuple(replace(pair, label_m=at, apart_m=40.0 + 2.0 * math.sin(at), correction_m=0.0) for at in places),
