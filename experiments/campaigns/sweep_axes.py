@@ -19,7 +19,7 @@ from experiments.common.errors import InputError, shown
 from experiments.common.toml_form import ENDS, similar_key
 from experiments.common.toml_values import LARGEST, SMALLEST, number_text
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
-from experiments.interception.scenario_tables import OPTIONAL_SENSORS
+from experiments.interception.scenario_tables import OPTIONAL_SENSORS, SPACE_KEYS
 from sim.scenario import Scenario
 from sim.storage import MOST_CELLS, Axis
 
@@ -104,13 +104,17 @@ def _known_keys(scenario: Scenario) -> dict[str, bool]:
                 known[path] = False
             elif isinstance(value, int | float) and not isinstance(value, bool):
                 known[path] = isinstance(value, int)
+        if scenario.is_spatial:  # bounds of y that the file takes from z
+            known |= {f"{home}.{name}": False for home, name in sorted(SPACE_KEYS) if home == table and "_y_" in name}
     return {"body.radius_m": False} | known | dict.fromkeys(_error_bounds(scenario), False)
 
 
 def _error_bounds(scenario: Scenario) -> dict[str, dict[str, float]]:
     """Return the error bounds of each sensor by key, under the name of their common factor: `angle_sensor.scale`."""
     return {
-        f"{table}.{SCALE}": {f"{table}.{name}": value for name, value in keys.items() if "error" in name}
+        f"{table}.{SCALE}": {
+            f"{table}.{name}": value for name, value in keys.items() if "error" in name and isinstance(value, float)
+        }
         for table, keys in _tables(scenario).items()
         if table in ("angle_sensor", *OPTIONAL_SENSORS)
     }
@@ -165,6 +169,8 @@ def _unknown(key: str, known: Mapping[str, bool]) -> str:
         return f"the scenario has no [{table}]; add that table to its file, or vary something else"
     if f"{key}.least" in known:
         return f"{key} is a pair; vary {key}.least or {key}.greatest"
+    if "uncertainty.y_km.least" not in known and tuple(key.split(".")[:2]) in SPACE_KEYS:
+        return f"{key} is a key of scenarios in space; add y_km and vy_km_s to [uncertainty] and [dispersion]"
     guess = similar_key(key, names)
     hint = f"did you mean {guess}?" if guess else f"its numeric keys are: {', '.join(names)}"
     return f"the scenario has no numeric key {shown(key)}; {hint}"

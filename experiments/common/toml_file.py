@@ -134,17 +134,17 @@ def read_tables(form: Form[Tables], text: str, source: str, values: Mapping[str,
     except ValidationError as error:
         found_wrong = error.errors(include_url=False)
         problems = [_problem(form, details) for details in found_wrong[: MOST_PROBLEMS + 1]]
-        # A key with a misspelt name is not missing too.
-        misspelt = {(*each.path[:-1], each.remedy) for each in problems}
-        problems = [
-            each
-            for each in problems
-            if each.text != MISSING or (*each.path[:-1], DID_YOU_MEAN.format(each.path[-1])) not in misspelt
-        ]
         known = Known(document, frozenset(tuple(str(part) for part in each["loc"]) for each in found_wrong))
     else:
         known = Known(document, frozenset())
     problems += form.checks(known)
+    # A key with a misspelt name is not missing too.
+    misspelt = {(*each.path[:-1], each.remedy) for each in problems}
+    problems = [
+        each
+        for each in problems
+        if each.text != MISSING or (*each.path[:-1], DID_YOU_MEAN.format(each.path[-1])) not in misspelt
+    ]
     if tables is None or problems:
         raise InputError(_report(form, problems, source))
     return tables

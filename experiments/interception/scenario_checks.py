@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from decimal import Decimal
 
 from experiments.common.errors import shown
-from experiments.common.toml_form import Known, Problem
+from experiments.common.toml_file import MISSING
+from experiments.common.toml_form import Known, Problem, keys_of
 from experiments.common.toml_values import KILO, DecimalPair, si
-from experiments.interception.scenario_tables import OPTIONAL_SENSORS
+from experiments.interception.scenario_tables import OPTIONAL_SENSORS, SPACE_KEYS, ScenarioTables
 from guidance import Thruster
 from infoset import AngleSensor, Model, SetModel, StateBox
 from infoset.model import WHOLE_STEPS_TOLERANCE
+from infoset.sensors import NEGLIGIBLE_ERROR_RAD, Convention, ErrorShape
 from sim.draws import MOST_STEPS
 from sim.gravity import greatest_impulses_m_s, with_gravity
 from sim.kepler import LONGEST_SUBSTEP_S
@@ -19,12 +22,17 @@ from sim.scenario import Sun
 
 MOST_LEAPS = 10_000_000
 """Largest number of integration steps of one engagement: some minutes of computing."""
+BOXES = ("uncertainty", "dispersion")
+"""Tables of the possible and the true starts."""
+AXIS_KEYS = ("y_km", "vy_km_s")
+"""Keys of the boxes that make a scenario spatial."""
 AGREE, OTHER_UNIT = 10, 100
 """Ratio of two values below which they are in the same unit, and from which they are in different units."""
 
 
 def cross_problems(known: Known) -> Iterator[Problem]:
     """Yield the problems between valid values."""
+    yield from _space(known)
     yield from _impulses(known)
     yield from _periods(known)
     yield from _sections(known)
@@ -56,6 +64,57 @@ def _other_units(known: Known) -> Iterator[Problem]:
                 )
 
 
+def _space(known: Known) -> Iterator[Problem]:
+    """All keys that make a scenario spatial must be present, or no key of space; a disc has one error bound."""
+    present = [path for path in itertools.product(BOXES, AXIS_KEYS) if _has(known, *path)]
+    if not present:
+        for table, key in sorted(SPACE_KEYS):
+            value = known.value(table, key)
+            default = keys_of(ScenarioTables, (table,))[key].default
+            if value is not None and value != getattr(default, "value", default):
+                yield Problem(
+                    (table, key),
+                    f"belongs to a scenario in space, and this one is in a plane, found {shown(value)}",
+                    "remove it, or add y_km and vy_km_s to [uncertainty] and [dispersion]",
+                )
+        return
+    for table, key in itertools.product(BOXES, AXIS_KEYS):
+        if (table, key) not in present and (table,) not in known.bad:
+            example = keys_of(ScenarioTables, (table,))[key].examples[0]
+            yield Problem(
+                (table, key),
+                MISSING,
+                f"add it under [{table}], for example {key} = {example}: a scenario in space has y_km and vy_km_s in "
+                "[uncertainty] and [dispersion], a scenario in a plane in neither",
+            )
+    yield from _error_shape(known)
+
+
+def _has(known: Known, table: str, key: str) -> bool:
+    """Whether a table has a key, with a valid value or not."""
+    return (table, key) in known.bad or known.value(table, key) is not None
+
+
+def _error_shape(known: Known) -> Iterator[Problem]:
+    table = "angle_sensor"
+    convention, shape = known.value(table, "convention"), known.value(table, "error_shape")
+    is_cone = convention == Convention.CONE.value
+    if is_cone and shape == ErrorShape.BOX.value:
+        yield Problem(
+            (table, "error_shape"),
+            'must be "disc" for convention = "cone", which bounds one angle, found "box"',
+            "remove error_shape, or choose another convention",
+        )
+    for key in ("error_at_nominal_range", "error_at_zero_range"):
+        along_y, along_z = known.number(table, f"{key}_y_rad"), known.number(table, f"{key}_rad")
+        if (is_cone or shape == ErrorShape.DISC.value) and along_y not in (None, along_z):
+            yield Problem(
+                (table, f"{key}_y_rad"),
+                f"must be equal to {key}_rad for errors in a disc or a cone, found {shown(along_y)}",
+                f"remove {key}_y_rad",
+            )
+
+
 def _impulses(known: Known) -> Iterator[Problem]:
     least = known.number("thruster", "least_impulse_m_s")
     greatest = known.number("thruster", "greatest_impulse_m_s")
@@ -84,7 +143,7 @@ def _periods(known: Known) -> Iterator[Problem]:
 
 
 def _spans(known: Known, key: str) -> Iterator[tuple[str, DecimalPair]]:
-    for table in ("uncertainty", "dispersion"):
+    for table in BOXES:
         pair = known.pair(table, key)
         if pair is not None:
             yield f"{table}.{key}", pair
@@ -137,7 +196,9 @@ def _ranges(known: Known) -> Iterator[Problem]:
 
 def _box(known: Known, table: str) -> StateBox | None:
     """Return a box of initial states in SI; None if one of its pairs is missing or invalid."""
-    pairs = [known.pair(table, key) for key in ("z_km", "x_km", "vz_km_s", "vx_km_s")]
+    is_spatial = any(_has(known, table, key) for key in AXIS_KEYS)
+    keys = ("z_km", "x_km", "vz_km_s", "vx_km_s", *(AXIS_KEYS if is_spatial else ()))
+    pairs = [known.pair(table, key) for key in keys]
     if None in pairs:
         return None
     return StateBox(*((si(pair[0], KILO), si(pair[1], KILO)) for pair in pairs if pair is not None))
@@ -145,22 +206,33 @@ def _box(known: Known, table: str) -> StateBox | None:
 
 def _error_law(known: Known) -> Iterator[Problem]:
     nominal_range = known.number("nominal", "range_km")
-    at_nominal = known.number("angle_sensor", "error_at_nominal_range_rad")
-    at_zero = known.number("angle_sensor", "error_at_zero_range_rad")
-    boxes = {f"{table}.x_km": _box(known, table) for table in ("uncertainty", "dispersion")}
+    boxes = {f"{table}.x_km": _box(known, table) for table in BOXES}
     distances = {where: box.farthest_m for where, box in boxes.items() if box is not None}
-    if nominal_range is None or at_nominal is None or at_zero is None or not distances:
+    if nominal_range is None or not distances:
         return
     where = max(distances, key=lambda each: distances[each])
-    bound = AngleSensor(1.0, si(at_nominal), si(at_zero), si(nominal_range, KILO)).error_bound(distances[where])
-    if bound <= 0:
-        farthest_km = float(f"{distances[where] / 1000.0:.6g}")
-        yield Problem(
-            ("angle_sensor", "error_at_nominal_range_rad"),
-            f"leaves no error bound at the greatest possible range, {farthest_km!r} km of {where}: the straight line "
-            f"from {shown(at_zero)} rad at zero range is {bound:.3g} rad there, found {shown(at_nominal)}",
-            "raise it, or lower error_at_zero_range_rad, so that the bound stays positive",
-        )
+    laws = [[_bound_key(known, end, axis) for end in ("nominal", "zero")] for axis in ("z", "y")]
+    for keys in laws[:1] if laws[0] == laws[1] else laws:
+        at_nominal, at_zero = (known.number("angle_sensor", key) for key in keys)
+        if at_nominal is None or at_zero is None:
+            continue
+        first, second = (max(si(end), NEGLIGIBLE_ERROR_RAD) for end in (at_nominal, at_zero))
+        bound = AngleSensor(1.0, first, second, si(nominal_range, KILO)).error_bound(distances[where])
+        if bound <= 0:
+            farthest_km = float(f"{distances[where] / 1000.0:.6g}")
+            yield Problem(
+                ("angle_sensor", keys[0]),
+                f"leaves no error bound at the greatest possible range, {farthest_km!r} km of {where}: the straight "
+                f"line from {shown(at_zero)} rad at zero range is {bound:.3g} rad there, found {shown(at_nominal)}",
+                f"raise it, or lower {keys[1]}, so that the bound stays positive",
+            )
+
+
+def _bound_key(known: Known, end: str, axis: str) -> str:
+    """Return the key of an error bound along an axis; without a key for y it is that of z."""
+    own = f"error_at_{end}_range_y_rad"
+    is_own = axis == "y" and known.value("angle_sensor", own) is not None
+    return own if is_own else f"error_at_{end}_range_rad"
 
 
 def _sections(known: Known) -> Iterator[Problem]:
@@ -215,7 +287,12 @@ def _closing_speeds(known: Known) -> Iterator[Problem]:
     e, vx = si(speed, KILO), box.vx_m_s
     sensor = AngleSensor(si(step), 0.5, 0.5, si(nominal_range, KILO))
     disturbance = si(known.number("information_set", "disturbance_m_s2") or Decimal(0))
-    plain = SetModel(e, si(step), box, sensor, disturbance, kind=Model.GUARANTEED)
+    along_y = known.number("information_set", "disturbance_y_m_s2")
+    plain = SetModel(
+        *(e, si(step), box, sensor, disturbance),
+        kind=Model.GUARANTEED,
+        disturbance_y_m_s2=None if along_y is None or len(box.axes) == 1 else si(along_y),
+    )
     parameter, distance = known.number("sun", "gravitational_parameter_km3_s2"), known.number("sun", "distance_km")
     sun = None
     if parameter is not None and distance is not None:

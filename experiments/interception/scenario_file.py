@@ -19,7 +19,7 @@ from experiments.common.toml_file import load_tables, read_tables
 from experiments.common.toml_form import Form, keys_of
 from experiments.common.toml_values import si_name, si_values, value_text
 from experiments.interception.scenario_checks import cross_problems
-from experiments.interception.scenario_tables import OPTIONAL_SENSORS, SCHEMA, ScenarioTables
+from experiments.interception.scenario_tables import OPTIONAL_SENSORS, SCHEMA, SPACE_KEYS, ScenarioTables
 from guidance.thruster import Thruster
 from infoset.model import InitialSet, Interval, Model, SetModel, StateBox
 from infoset.sensors import AngleSensor
@@ -94,7 +94,8 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
     """Return warnings about values of a scenario that are allowed but probably not intended, one line each."""
     lines = []
     uncertainty, dispersion = scenario.set_model.bounds, scenario.dispersion
-    for key, unit in (("z", "km"), ("x", "km"), ("vz", "km/s"), ("vx", "km/s")):
+    keys = [*scenario.set_model.axes, "x"]
+    for key, unit in [(key, "km") for key in keys] + [(f"v{key}", "km/s") for key in keys]:
         field = f"{key}_m" if unit == "km" else f"{key}_m_s"
         name = f"{key}_km" if unit == "km" else f"{key}_km_s"
         known: Interval = getattr(uncertainty, field)
@@ -122,9 +123,8 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
     thruster = scenario.thruster
     target, model = scenario.target, scenario.set_model
     steepest = max(
-        max(abs(end) for box in (uncertainty, dispersion) for end in box.z_m)
-        / min(uncertainty.x_m[0], dispersion.x_m[0]),
-        max(abs(end) for box in (uncertainty, dispersion) for end in box.vz_m_s) / speed,
+        max(box.offset_m for box in (uncertainty, dispersion)) / min(uncertainty.x_m[0], dispersion.x_m[0]),
+        max(box.lateral_speed_m_s for box in (uncertainty, dispersion)) / speed,
     )
     if steepest > SMALL_ANGLE_RAD and not model.is_guaranteed:
         lines.append(
@@ -132,17 +132,30 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
             f"{steepest:.3g} rad off the x axis: beyond {SMALL_ANGLE_RAD:g} rad the set may lose the true state; "
             "write model = guaranteed"
         )
-    if target is not None and model.is_guaranteed and target.acceleration_m_s2 > model.disturbance_m_s2:
-        lines.append(
-            f"target.acceleration_m_s2, {target.acceleration_m_s2:g}, exceeds information_set.disturbance_m_s2, "
-            f"{model.disturbance_m_s2:g}: the guaranteed model does not allow for it and may lose the true state"
+    for axis in model.axes if target is not None and model.is_guaranteed else ():
+        (key, acceleration), (bound_key, bound) = (
+            _along(axis, target, "acceleration"),
+            _along(axis, model, "disturbance"),
         )
+        line = (
+            f"target.{key}, {acceleration:g}, exceeds information_set.{bound_key}, {bound:g}: "
+            "the guaranteed model does not allow for it and may lose the true state"
+        )
+        if acceleration > bound and line not in lines:
+            lines.append(line)
     if thruster.budget_m_s < thruster.least_impulse_m_s:
         lines.append(
             f"thruster.budget_m_s, {thruster.budget_m_s:g}, is less than thruster.least_impulse_m_s, "
             f"{thruster.least_impulse_m_s:g}: no impulse can be given"
         )
     return lines
+
+
+def _along(axis: str, owner: Target | SetModel | None, name: str) -> tuple[str, float]:
+    """Return an acceleration along an axis, m/s^2, after its key; without a key for y it is that of z."""
+    own = f"{name}_y_m_s2"
+    key = own if axis == "y" and getattr(owner, own) is not None else f"{name}_m_s2"
+    return key, getattr(owner, key)
 
 
 def default_initial_set(model: Model) -> InitialSet:
@@ -158,12 +171,15 @@ def scenario_template() -> str:
             "A scenario. Check it with: infoset scenarios check FILE",
             "Every key carries its unit in its name. z is across the nominal line of approach, x along it, and the",
             "spacecraft is the origin. A line `# key = value` is optional: the default or an example.",
+            "y_km and vy_km_s in [uncertainty] and [dispersion] add a second axis across, y: the scenario is in space.",
         ],
     )
 
 
 def scenario_to_toml(scenario: Scenario) -> str:
-    """Return the TOML of a scenario, with every key; it is read back as the same scenario, bit for bit.
+    """Return the TOML of a scenario; it is read back as the same scenario, bit for bit.
+
+    It has every key; a scenario in a plane lacks the keys of space.
 
     Raises
     ------
@@ -181,7 +197,7 @@ def scenario_to_toml(scenario: Scenario) -> str:
         "sun": _values(scenario.sun),
         "nominal": {"range_m": scenario.nominal_range_m, "closing_speed_m_s": model.closing_speed_m_s},
         "uncertainty": vars(model.bounds),
-        "dispersion": {name: pair[0] if pair[0] == pair[1] else pair for name, pair in start if pair is not None},
+        "dispersion": {name: pair[0] if pair and pair[0] == pair[1] else pair for name, pair in start},
         "angle_sensor": vars(sensor),
         **{table: _values(getattr(scenario, table)) for table in (*OPTIONAL_SENSORS, "target", "body")},
         "thruster": vars(scenario.thruster),
@@ -194,7 +210,12 @@ def scenario_to_toml(scenario: Scenario) -> str:
     for table, values in tables.items():
         if values is not None:
             lines += ["", f"[{table}]"]
-            lines += [f"{key} = {value_text(key, values[si_name(key)])}" for key in keys_of(ScenarioTables, (table,))]
+            written = {key: values[si_name(key)] for key in keys_of(ScenarioTables, (table,))}
+            lines += [
+                f"{key} = {value_text(key, value)}"
+                for key, value in written.items()
+                if (table, key) not in SPACE_KEYS or (scenario.is_spatial and value is not None)
+            ]
     return "\n".join(lines) + "\n"
 
 

@@ -12,8 +12,10 @@ from typing import Annotated, Any
 from pydantic import PlainValidator
 
 import guidance
+from experiments.common.toml_form import keys_of, tables_of
 from experiments.common.toml_values import (
     KILO,
+    ZERO,
     Constant,
     DecimalPair,
     Degrees,
@@ -32,7 +34,7 @@ from guidance.noise import NoiseKind, TieRule
 from guidance.thruster import Thruster
 from infoset.limits import limits_of
 from infoset.model import MOST_SECTIONS, InitialSet, Model, Recovery, SetModel, StateBox
-from infoset.sensors import AngleSensor, RangeSensor, RateSensor
+from infoset.sensors import AngleSensor, Convention, ErrorShape, RangeSensor, RateSensor
 from sim.scenario import Body, Manoeuvre, Scenario, Sun, Target
 
 SCHEMA = 1
@@ -47,6 +49,7 @@ def _strategy(value: object) -> str:
 _SPEED = Number(least=-SPEED_OF_LIGHT_KM_S, most=SPEED_OF_LIGHT_KM_S)
 _APPROACH = Number(below=Decimal(0), least=-SPEED_OF_LIGHT_KM_S)
 
+Elevation = Annotated[Decimal, PlainValidator(Number(least=Decimal(-90), most=Decimal(90)))]
 ClosingSpeed = Annotated[Decimal, PlainValidator(Number(above=Decimal(0), most=SPEED_OF_LIGHT_KM_S))]
 
 OfSun = Annotated[Decimal, limited_by(Sun)]
@@ -55,6 +58,13 @@ OfRangeSensor = Annotated[Decimal, limited_by(RangeSensor)]
 OfRateSensor = Annotated[Decimal, limited_by(RateSensor)]
 OfThruster = Annotated[Decimal, limited_by(Thruster)]
 OfSetModel = Annotated[Decimal, limited_by(SetModel)]
+
+_SPACE = {"space": True}
+
+
+def _space_key(meaning: str, example: str, default: object = None) -> Any:
+    """Describe an optional key that only a scenario in space has."""
+    return key(f"{meaning}; in space only", example, default=default, json_schema_extra=_SPACE)
 
 
 def _pair(field: str, *, fixed: bool = False) -> PlainValidator:
@@ -67,6 +77,7 @@ class SunTable(Table):
     gravitational_parameter_km3_s2: OfSun = key("gravitational parameter of the Sun", "1.324948e11")
     distance_km: OfSun = key("distance of the Sun from the spacecraft at t0", "150.0e6")
     direction_deg: Degrees = key("direction of the Sun at t0, from the x axis toward z", "90.0")
+    elevation_deg: Elevation = _space_key("its angle out of the plane (x, z), toward y", "0.0", ZERO)
 
 
 class NominalTable(Table):
@@ -85,6 +96,10 @@ class UncertaintyTable(Table):
     vx_km_s: Annotated[DecimalPair, PlainValidator(Pair(_APPROACH))] = key(
         "speed along x; negative, the object approaches", "[-59.0, -57.0]"
     )
+    y_km: Annotated[DecimalPair | None, _pair("y_m")] = _space_key(
+        "position along the second axis across", "[-10.0, 10.0]"
+    )
+    vy_km_s: Annotated[DecimalPair | None, PlainValidator(Pair(_SPEED))] = _space_key("speed along it", "[-0.1, 0.1]")
 
 
 class DispersionTable(Table):
@@ -98,6 +113,12 @@ class DispersionTable(Table):
     vx_km_s: Annotated[DecimalPair, PlainValidator(Pair(_APPROACH, fixed=True))] = key(
         "speed along x; negative, the object approaches", "[-58.1, -57.9]"
     )
+    y_km: Annotated[DecimalPair | None, _pair("y_m", fixed=True)] = _space_key(
+        "position along the second axis across", "[-1.0, 1.0]"
+    )
+    vy_km_s: Annotated[DecimalPair | None, PlainValidator(Pair(_SPEED, fixed=True))] = _space_key(
+        "speed along it", "[-0.1, 0.1]"
+    )
 
 
 class AngleSensorTable(Table):
@@ -106,6 +127,14 @@ class AngleSensorTable(Table):
     period_s: OfAngleSensor = key("time between measurements, a multiple of guidance.step_s", "0.5")
     error_at_nominal_range_rad: OfAngleSensor = key("greatest error at nominal.range_km", "0.00015")
     error_at_zero_range_rad: OfAngleSensor = key("greatest error at range zero; a straight line joins both", "0.00023")
+    error_at_nominal_range_y_rad: OfAngleSensor | None = _space_key(
+        "the same for the angle of y; without it: as for z", "0.00015"
+    )
+    error_at_zero_range_y_rad: OfAngleSensor | None = _space_key(
+        "the same for the angle of y; without it: as for z", "0.00023"
+    )
+    convention: Convention = _space_key('which two angles: "plane", "gimbal" or "cone"', '"plane"', Convention.PLANE)
+    error_shape: ErrorShape | None = _space_key('errors in a "box" or a "disc"; the set allows for the box', '"box"')
 
 
 class RangeSensorTable(Table):
@@ -134,6 +163,9 @@ class TargetTable(Table):
     switching_period_s: Annotated[Decimal, limited_by(Target)] = key(
         "time between changes of sign; their mean time if random", "10.0", default=Decimal(10)
     )
+    acceleration_y_m_s2: Annotated[Decimal, limited_by(Target)] | None = _space_key(
+        "its acceleration along y; without it: as along z", "0.005"
+    )
 
 
 class BodyTable(Table):
@@ -148,9 +180,8 @@ class ThrusterTable(Table):
     budget_m_s: OfThruster = key("sum of the absolute values of all impulses", "1000.0")
     least_impulse_m_s: OfThruster = key("smaller impulses become zero", "0.25")
     greatest_impulse_m_s: OfThruster = key("greater impulses are reduced to this one", "7.5")
-    execution_error_relative: OfThruster = key(
-        "greatest relative error of an executed impulse", "0.0", default=Decimal(0)
-    )
+    execution_error_relative: OfThruster = key("greatest relative error of an executed impulse", "0.0", default=ZERO)
+    pointing_error_rad: OfThruster = _space_key("greatest error of the direction of an impulse", "0.0", ZERO)
 
 
 class GuidanceTable(Table):
@@ -180,6 +211,7 @@ class InformationSetTable(Table):
         default=Recovery.WIDENED,
     )
     disturbance_m_s2: OfSetModel = key("bound of the unknown acceleration along z, target included", "0.005")
+    disturbance_y_m_s2: OfSetModel | None = _space_key("the same bound along y; without it: as along z", "0.005")
 
 
 class NoiseTable(Table):
@@ -216,3 +248,12 @@ class ScenarioTables(Table):
     guidance: GuidanceTable = key("how impulses are chosen", "")
     information_set: InformationSetTable = key("the information set", "")
     noise: NoiseTable = key("how measurement errors are chosen", "")
+
+
+SPACE_KEYS = frozenset(
+    (table, name)
+    for table in tables_of(ScenarioTables)
+    for name, field in keys_of(ScenarioTables, (table,)).items()
+    if field.json_schema_extra == _SPACE
+)
+"""Tables and keys that only a scenario in space has."""

@@ -30,9 +30,9 @@ from guidance import strategy_names
 from guidance.noise import NoiseKind, TieRule
 from guidance.thruster import Thruster
 from infoset.model import InitialSet, Model, SetModel, StateBox
-from infoset.sensors import AngleSensor, RangeSensor
+from infoset.sensors import AngleSensor, Convention, ErrorShape, RangeSensor
 from sim.gravity import on_board_model
-from sim.scenario import Body, Scenario, Sun
+from sim.scenario import Body, Manoeuvre, Scenario, Sun, Target
 
 BUILT_IN = ("asteroid-1997", "asteroid-1997-single", "comet-fast")
 PAPER = scenario_text("asteroid-1997")
@@ -758,13 +758,49 @@ def _intervals(least: float, greatest: float) -> st.SearchStrategy[tuple[float, 
     return st.tuples(_floats(least, greatest), _floats(least, greatest)).map(lambda ends: (min(ends), max(ends)))
 
 
-def _boxes() -> st.SearchStrategy[StateBox]:
+def _boxes(*, is_spatial: bool) -> st.SearchStrategy[StateBox]:
+    second_axis = {"y_m": _intervals(-5e5, 5e5), "vy_m_s": _intervals(-3e4, 3e4)} if is_spatial else {}
     return st.builds(
         StateBox,
         z_m=_intervals(-5e5, 5e5),
         x_m=_intervals(1e6, 2e7),
         vz_m_s=_intervals(-3e4, 3e4),
         vx_m_s=_intervals(-9e4, -1e3),
+        **second_axis,
+    )
+
+
+@st.composite
+def _in_space(draw: st.DrawFn, planar: Scenario) -> Scenario:
+    """Every value of space, over all that it permits."""
+    sensor, model, sun = planar.set_model.angle_sensor, planar.set_model, planar.sun
+    convention, shape = draw(st.sampled_from(Convention)), draw(st.none() | st.sampled_from(ErrorShape))
+    if convention is Convention.CONE and shape is ErrorShape.BOX:
+        shape = None
+    sensor = dataclasses.replace(sensor, convention=convention, error_shape=shape)
+    if not sensor.is_disc:
+        at_zero = draw(st.none() | st.just(0.0) | _floats(0.0, sensor.error_at_zero_range_rad))
+        at_nominal = draw(st.none() | _floats(sensor.error_at_zero_range_rad, 0.9))
+        sensor = dataclasses.replace(sensor, error_at_zero_range_y_rad=at_zero, error_at_nominal_range_y_rad=at_nominal)
+    return dataclasses.replace(
+        planar,
+        sun=sun and dataclasses.replace(sun, elevation_rad=draw(_floats(-0.5 * math.pi, 0.5 * math.pi))),
+        dispersion=draw(_boxes(is_spatial=True)),
+        set_model=dataclasses.replace(
+            model,
+            bounds=dataclasses.replace(
+                model.bounds, y_m=draw(_intervals(-5e5, 5e5)), vy_m_s=draw(_intervals(-3e4, 3e4))
+            ),
+            angle_sensor=sensor,
+            disturbance_y_m_s2=draw(st.none() | _floats(0.0, 1.0)),
+        ),
+        thruster=dataclasses.replace(planar.thruster, pointing_error_rad=draw(_floats(0.0, 0.9))),
+        target=draw(
+            st.none()
+            | st.builds(
+                Target, st.sampled_from(Manoeuvre), _floats(0.0, 1.0), acceleration_y_m_s2=st.none() | _floats(0.0, 1.0)
+            )
+        ),
     )
 
 
@@ -775,7 +811,7 @@ def _scenarios(draw: st.DrawFn) -> Scenario:
     sections = draw(st.integers(1, 10_000))
     least_impulse, greatest_impulse = sorted(draw(st.tuples(_floats(0.0, 100.0), _floats(1e-3, 100.0))))
     at_zero = draw(_floats(1e-6, 0.3))
-    bounds = draw(_boxes())
+    bounds = draw(_boxes(is_spatial=False))
     suns = st.builds(Sun, _floats(1e18, 1e22), _floats(1e11, 1e13), _floats(-6.25, 6.25))
     periods = st.integers(1, 50).map(lambda steps: steps * step_s)
     return Scenario(
@@ -783,7 +819,7 @@ def _scenarios(draw: st.DrawFn) -> Scenario:
         description=draw(st.text(st.characters(codec="utf-8"), max_size=50).filter(str.isprintable)),
         sun=draw(st.none() | suns),
         nominal_range_m=nominal_range_m,
-        dispersion=draw(_boxes()),
+        dispersion=draw(_boxes(is_spatial=False)),
         set_model=SetModel(
             # The guaranteed model needs the closing speed to be known to within itself.
             closing_speed_m_s=draw(_floats(max(1e3, -0.51 * bounds.vx_m_s[0]), 9e4)),
@@ -806,7 +842,7 @@ def _scenarios(draw: st.DrawFn) -> Scenario:
 
 
 @settings(max_examples=50, deadline=None)
-@given(_scenarios())
+@given(_scenarios() | _scenarios().flatmap(_in_space))
 def test_any_sound_scenario_comes_back_bit_for_bit(scenario: Scenario) -> None:
     if scenario.set_model.is_guaranteed:
         try:
