@@ -9,17 +9,19 @@ from numpy.typing import NDArray
 
 from infoset.limits import ADDED_LATER, NotNegative, Part, Positive, check_fields
 
+Floats = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class Thruster:
-    """An engine that gives impulses along z, limited in size and in their sum.
+    """An engine that gives impulses across x, along z in a plane, limited in size and in their sum.
 
     Parameters
     ----------
     budget_m_s : float
-        Budget mu: greatest sum of the absolute values of all impulses, m/s.
+        Budget mu: greatest sum of the moduli of all impulses, m/s.
     least_impulse_m_s, greatest_impulse_m_s : float
-        Bounds mu1 and mu2 of the absolute value of an impulse that is not zero, m/s.
+        Bounds mu1 and mu2 of the modulus of an impulse that is not zero, m/s.
     execution_error_relative : float
         Bound delta of |given / commanded - 1|: a commanded impulse k is executed as k (1 + error).
     pointing_error_rad : float
@@ -49,17 +51,45 @@ class Thruster:
                 f"got {self.least_impulse_m_s!r}"
             )
 
-    def give(self, wanted_m_s: NDArray[np.float64], budget_left_m_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    def give(self, wanted_m_s: Floats, budget_left_m_s: Floats) -> Floats:
         """Return the impulses that the engine gives, m/s.
 
-        Zero if |wanted| < mu1 or n < mu1, otherwise `wanted` with its absolute value limited to min(mu2, n).
+        Zero if |wanted| < mu1 or n < mu1, otherwise `wanted` with its modulus limited to min(mu2, n).
 
         Parameters
         ----------
-        wanted_m_s, budget_left_m_s : ndarray, shape (B,)
-            Impulses of the strategy (signed), and the budget n that is left.
+        wanted_m_s : ndarray, shape (B,), or (2, B) in space
+            Impulses of the strategy: signed, or (y, z).
+        budget_left_m_s : ndarray, shape (B,)
+            Budget n that is left.
         """
-        size = np.abs(wanted_m_s)
-        limited = np.copysign(np.minimum(size, np.minimum(self.greatest_impulse_m_s, budget_left_m_s)), wanted_m_s)
+        size, limit = modulus(wanted_m_s), np.minimum(self.greatest_impulse_m_s, budget_left_m_s)
+        given = np.where(size > limit, wanted_m_s / np.where(size > limit, size, 1.0) * limit, wanted_m_s)
+        # Rounding must not make the modulus greater than the limit.
+        while (above := modulus(given) > limit).any():
+            given = np.where(above, np.nextafter(given, 0.0), given)
         idle = (size < self.least_impulse_m_s) | (budget_left_m_s < self.least_impulse_m_s)
-        return np.where(idle, 0.0, limited)
+        return np.where(idle, 0.0, given)
+
+    def executed(self, impulse_m_s: Floats, size: Floats | None, direction: Floats | None) -> Floats:
+        """Return impulses as they are executed, m/s.
+
+        Parameters
+        ----------
+        impulse_m_s : ndarray, shape (B,), or (2, B) in space
+            Commanded impulses.
+        size, direction : ndarray, shape (B,), or None
+            Errors of the modulus, and of the direction from y toward z, in units of their bounds; None is zero.
+        """
+        if size is not None:
+            impulse_m_s = impulse_m_s * (1.0 + self.execution_error_relative * size)
+        if direction is not None:
+            sine, cosine = (turn(self.pointing_error_rad * direction) for turn in (np.sin, np.cos))
+            y, z = impulse_m_s
+            impulse_m_s = np.stack([cosine * y - sine * z, cosine * z + sine * y])
+        return impulse_m_s
+
+
+def modulus(lateral: Floats) -> Floats:
+    """Return the moduli, shape (B,), of lateral values of shape (B,) in a plane or (2, B) in space."""
+    return np.asarray(np.hypot.reduce(np.atleast_2d(lateral), axis=0, initial=0.0))

@@ -90,11 +90,14 @@ class Sensor(ABC):
         What it measures, with the unit: ``measured_<quantity>`` is its column in files.
     stream : int
         Its stream of random numbers (`sim.draws`), different for each kind.
+    is_lateral : bool
+        Whether it measures one value for each lateral axis; in space its arrays are of shape (2, B), not (B,).
     """
 
     name: ClassVar[str]
     quantity: ClassVar[str]
     stream: ClassVar[int]
+    is_lateral: ClassVar[bool] = True
     period_s: float
 
     @abstractmethod
@@ -301,6 +304,7 @@ class RangeSensor(Sensor):
     name: ClassVar[str] = "range"
     quantity: ClassVar[str] = "range_m"
     stream: ClassVar[int] = 2
+    is_lateral: ClassVar[bool] = False
 
     period_s: Positive
     relative_error: Fraction

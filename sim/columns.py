@@ -8,6 +8,8 @@ from enum import Enum
 from functools import cache
 from typing import Any, TypeVar, cast
 
+import numpy as np
+
 from infoset.limits import NUMBER, Limits
 
 _Owner = TypeVar("_Owner")
@@ -29,6 +31,8 @@ class Column:
         `float`, `int`, `bool`, `str`, or an enumeration whose values are texts.
     nullable : bool
         Whether a value may be unknown: masked in an array, null in a file.
+    optional : bool
+        Whether CSV and JSON leave the column out if it is unknown in all runs.
     limits : Limits
         Limits of the numbers.
     field : str
@@ -44,6 +48,7 @@ class Column:
     meaning: str
     kind: type = float
     nullable: bool = False
+    optional: bool = False
     limits: Limits = NUMBER
     field: str = ""
     component: int | None = None
@@ -63,6 +68,15 @@ def columns_of(owner: Any) -> tuple[Column, ...]:
         for field in fields(owner)
         for declared in [field.metadata.get("columns", ())]
         for index, column in enumerate(declared)
+    )
+
+
+def columns_with_values(owner: Any) -> tuple[Column, ...]:
+    """Return the columns of `columns_of` without the optional ones that are unknown in all runs."""
+    return tuple(
+        column
+        for column in columns_of(owner.__class__)
+        if not column.optional or not np.ma.getmaskarray(getattr(owner, column.field)).all()
     )
 
 

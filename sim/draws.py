@@ -10,13 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance import NoiseKind, TieRule
-from infoset import StateBox
+from infoset import AngleSensor, StateBox
 from sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-START, TIE, EXECUTION, TARGET = 0, 3, 5, 6
+START, TIE, EXECUTION, TARGET, POINTING = 0, 3, 5, 6, 7
 """Streams of a run; each kind of sensor has its own as well (`Sensor.stream`)."""
+Y = 16
+"""Difference between the streams of the y axis and those of the z axis, which are also those of a plane."""
 MOST_STEPS = 100_000
 """Greatest number of steps of a flight; all random numbers are drawn before it starts."""
 
@@ -27,15 +29,17 @@ class Draws:
 
     Parameters
     ----------
-    position_m, velocity_m_s : ndarray, shape (B, 2)
-        True relative (z, x) and (V_z, V_x) at t = 0.
-    errors : mapping of str to ndarray, shape (B, steps)
-        Measurement errors by sensor, uniform in [-1, 1], in units of their bounds.
-    tie : ndarray, shape (B, steps)
+    position_m, velocity_m_s : ndarray, shape (B, 2), or (B, 3) in space
+        True relative (z, x) and (V_z, V_x) at t = 0; in space (y, z, x) and (V_y, V_z, V_x).
+    errors : mapping of str to ndarray, shape (B, steps), or (2, B, steps) in space
+        Measurement errors by sensor, in [-1, 1], in units of their bounds; in space those of y and z if the sensor
+        measures both axes.
+    tie : ndarray, shape (B, steps), or (2, B, steps) in space
         Choices between ties, uniform in [-1, 1]; zeros if the scenario does not choose at random.
-    execution, target : ndarray, shape (B, steps), or None
-        Errors of the impulses in units of their bound, and the target's changes of side, uniform in [-1, 1]; None
-        is zero.
+    execution, pointing : ndarray, shape (B, steps), or None
+        Errors of the impulses and of their directions in units of their bounds, uniform in [-1, 1]; None is zero.
+    target : ndarray, shape (B, steps), or (2, B, steps) in space, or None
+        Changes of side of the target, uniform in [-1, 1]; None is zero.
     """
 
     position_m: Floats
@@ -44,11 +48,12 @@ class Draws:
     tie: Floats
     execution: Floats | None = None
     target: Floats | None = None
+    pointing: Floats | None = None
 
     @property
     def steps(self) -> int:
         """Number of steps for which numbers are drawn."""
-        return int(self.tie.shape[1])
+        return int(self.tie.shape[-1])
 
 
 def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
@@ -60,28 +65,61 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
         If a flight takes more than `MOST_STEPS` steps.
     """
     steps = greatest_number_of_steps(scenario)
-    box = scenario.dispersion
+    lower, upper = corners(scenario.dispersion)
     starts = np.stack([generator(seed, run, START).uniform(size=4) for run in runs])
+    if scenario.is_spatial:
+        along_y = np.stack([generator(seed, run, START + Y).uniform(size=2) for run in runs])
+        starts = np.insert(starts, [0, 2], along_y, axis=1)
+    position_m, velocity_m_s = np.split(lower + (upper - lower) * starts, 2, axis=1)
 
     def uniform(stream: int) -> Floats:
         return np.stack([generator(seed, run, stream).uniform(-1.0, 1.0, size=steps) for run in runs])
 
-    nothing = np.broadcast_to(0.0, (len(runs), steps))
-    lower, upper = corners(box)
-    states = lower + (upper - lower) * starts
+    def lateral(stream: int) -> Floats:
+        return np.stack([uniform(stream + Y), uniform(stream)]) if scenario.is_spatial else uniform(stream)
+
+    nothing = np.broadcast_to(0.0, (*([2] if scenario.is_spatial else []), len(runs), steps))
+    errors = {
+        name: (lateral if sensor.is_lateral else uniform)(sensor.stream) for name, sensor in scenario.sensors.items()
+    }
+    if scenario.set_model.angle_sensor.is_disc:
+        errors[AngleSensor.name] = in_disc(errors[AngleSensor.name])
     return Draws(
-        states[:, :2],
-        states[:, 2:],
-        errors={name: uniform(sensor.stream) for name, sensor in scenario.sensors.items()},
-        tie=uniform(TIE) if scenario.noise is NoiseKind.GAME and scenario.tie is TieRule.RANDOM else nothing,
+        position_m,
+        velocity_m_s,
+        errors,
+        tie=lateral(TIE) if scenario.noise is NoiseKind.GAME and scenario.tie is TieRule.RANDOM else nothing,
         execution=uniform(EXECUTION) if scenario.thruster.execution_error_relative > 0.0 else None,
-        target=uniform(TARGET) if scenario.target is not None else None,
+        target=lateral(TARGET) if scenario.target is not None else None,
+        pointing=uniform(POINTING) if scenario.thruster.pointing_error_rad > 0.0 else None,
     )
 
 
+def in_disc(errors: Floats) -> Floats:
+    """Return the points of the unit disc for points of the square [-1, 1]^2, shape (2, ...).
+
+    Notes
+    -----
+    Uniform points of the square become uniform points of the disc. The map commutes with the exchange of the two
+    coordinates and with a change of their signs.
+
+    References
+    ----------
+    Shirley and Chiu (1997), A low distortion map between disk and square.
+    """
+    swapped = np.abs(errors[0]) < np.abs(errors[1])
+    greater, lesser = np.where(swapped, errors[::-1], errors)
+    angle = 0.25 * np.pi * np.divide(lesser, greater, out=np.zeros_like(lesser), where=greater != 0.0)
+    mapped = np.stack([greater * np.cos(angle), greater * np.sin(angle)])
+    return np.where(swapped, mapped[::-1], mapped)
+
+
 def corners(box: StateBox) -> tuple[Floats, Floats]:
-    """Return least and greatest (z, x, V_z, V_x) of a box."""
-    intervals = np.array([box.z_m, box.x_m, box.vz_m_s, box.vx_m_s], dtype=np.float64)
+    """Return least and greatest (z, x, V_z, V_x) of a box, or (y, z, x, V_y, V_z, V_x) of one in space."""
+    lateral = [box.axis(name) for name in box.axes]
+    intervals = np.array(
+        [*(axis.z_m for axis in lateral), box.x_m, *(axis.vz_m_s for axis in lateral), box.vx_m_s], dtype=np.float64
+    )
     return intervals[:, 0], intervals[:, 1]
 
 

@@ -117,6 +117,7 @@ class Engagements:
         self._arrived = np.zeros(batch, dtype=bool)
         self._tracking = np.ones(batch, dtype=bool)
         self._miss = np.full(batch, np.inf)
+        self._lateral_miss = np.zeros(batch)
         self._budget = np.full(batch, float(scenario.thruster.budget_m_s))
         self._impulse = np.zeros(batch)
         self._spent = np.zeros(batch, dtype=bool)
@@ -168,6 +169,7 @@ class Engagements:
         passage = self._truth.advance(model.step_s, self._manoeuvre(sight))
         np.minimum(self._miss, passage.least_distance_m, out=self._miss, where=self._flying)
         passing = self._flying & passage.passed
+        self._lateral_miss = np.where(passing, passage.lateral_m, self._lateral_miss)
         self._arrival_s = np.where(passing, self.step * model.step_s + passage.arrival_s, self._arrival_s)
         self._flying &= ~passage.passed
         self.step += 1
@@ -207,8 +209,10 @@ class Engagements:
 
     def _executed(self, impulse: Floats) -> Floats:
         """Return the executed impulses."""
-        errors, bound = self._draws.execution, self.scenario.thruster.execution_error_relative
-        return impulse if errors is None else impulse * (1.0 + bound * errors[:, self.step])
+        size, direction = (
+            None if errors is None else errors[:, self.step] for errors in (self._draws.execution, self._draws.pointing)
+        )
+        return self.scenario.thruster.executed(impulse, size, direction)
 
     def _manoeuvre(self, sight: Sight) -> Floats | None:
         """Return the acceleration of the targets over this step; None without a target that manoeuvres."""
@@ -261,6 +265,11 @@ class Engagements:
         # Without a closest approach within the greatest number of steps, the miss is the present range.
         miss = np.where(np.isfinite(self._miss), self._miss, self._truth.sight().range_m)
         radius_m = self.scenario.radius_m
+        start, lateral_miss = np.zeros((2, len(runs), 2))
+        if self.scenario.is_spatial:
+            start = np.stack([self._draws.position_m[:, 0], self._draws.velocity_m_s[:, 0]], axis=1)
+            present = self._truth.position_m[:, :-1].T
+            lateral_miss = np.where(np.isfinite(self._miss), self._lateral_miss, present).T
         return Results(
             runs=runs,
             miss_m=miss,
@@ -272,8 +281,10 @@ class Engagements:
             set_emptied=lost,
             hit=np.ma.MaskedArray(miss <= (radius_m or 0.0), mask=radius_m is None),
             truth_margin_m=margin,
-            position_m=self._draws.position_m,
-            velocity_m_s=self._draws.velocity_m_s,
+            position_m=self._draws.position_m[:, -2:],
+            velocity_m_s=self._draws.velocity_m_s[:, -2:],
+            lateral_start=np.ma.MaskedArray(start, mask=not self.scenario.is_spatial),
+            lateral_miss=np.ma.MaskedArray(lateral_miss, mask=not self.scenario.is_spatial),
             guarantees=self._model.is_guaranteed,
         )
 

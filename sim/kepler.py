@@ -16,7 +16,8 @@ Floats = NDArray[np.float64]
 LONGEST_SUBSTEP_S = 0.5
 ARRIVAL_LEAPS = 64
 PASSAGE_LEAPS = 8
-Z, X = 0, 1
+X = -1
+"""Axis x of a motion, after the lateral axes: z in a plane, y and z in space."""
 RELATIVE, SPACECRAFT = 0, 1
 POSITION, VELOCITY, ACCELERATION, LOST = range(4)
 """Parts of a motion. LOST is the rounding error of the position, which the next step adds again."""
@@ -28,12 +29,13 @@ class Sight:
 
     Parameters
     ----------
-    alpha_rad, omega_rad_s : ndarray, shape (B,)
-        Line-of-sight angle and rate, equation (12) of the paper.
+    alpha_rad, omega_rad_s : ndarray, shape (B,), or (2, B) in space
+        Line-of-sight angle and rate, equation (12) of the paper; in space those of the planes (x, y) and (x, z).
     range_m : ndarray, shape (B,)
         Distance between the centres of mass.
-    slope, slope_rate_per_s : ndarray, shape (B,)
-        z/x, that is tan(alpha) without the rounding of the angle, and its rate; zero where x is zero.
+    slope, slope_rate_per_s : ndarray, shape (B,), or (2, B) in space
+        z/x, that is tan(alpha) without the rounding of the angle, and its rate; zero where x is zero. In space y/x
+        and z/x.
     """
 
     alpha_rad: Floats
@@ -55,11 +57,14 @@ class Passage:
         Least distance where the closest approach lies within the step, infinite elsewhere.
     arrival_s : ndarray, shape (B,)
         Time from the beginning of the step to x = 0 where the closest approach lies within the step, zero elsewhere.
+    lateral_m : ndarray, shape (B,), or (2, B) in space
+        z, or (y, z), at the closest approach where it lies within the step, zero elsewhere.
     """
 
     passed: NDArray[np.bool_]
     least_distance_m: Floats
     arrival_s: Floats
+    lateral_m: Floats
 
 
 class KeplerMotion:
@@ -67,16 +72,16 @@ class KeplerMotion:
 
     Parameters
     ----------
-    position_m, velocity_m_s : ndarray, shape (B, 2)
-        Relative (z, x) and (V_z, V_x) at t = 0.
+    position_m, velocity_m_s : ndarray, shape (B, 2), or (B, 3) in space
+        Relative (z, x) and (V_z, V_x) at t = 0; in space (y, z, x) and (V_y, V_z, V_x).
     sun : Sun or None
         None is free space.
 
     Notes
     -----
     Velocity Verlet on the exact difference of the two accelerations, in substeps of at most 0.5 s: about 1e-8 m over
-    100 s here. The spacecraft's orbit, circular and toward +x at t = 0, gives the position of the Sun; impulses change
-    it.
+    100 s here. The spacecraft's orbit is circular at t = 0, in the plane of the Sun and the x axis and toward +x; it
+    gives the position of the Sun. Impulses change it.
 
     References
     ----------
@@ -84,56 +89,57 @@ class KeplerMotion:
     """
 
     def __init__(self, position_m: Floats, velocity_m_s: Floats, sun: Sun | None) -> None:
-        # For each coordinate the relative motion and that of the spacecraft.
-        self._motion = np.zeros((4, 2, 2, len(position_m)))
+        batch, axes = position_m.shape
+        # For each axis the relative motion and that of the spacecraft.
+        self._motion = np.zeros((4, axes, 2, batch))
         self._motion[POSITION, :, RELATIVE] = position_m.T
         self._motion[VELOCITY, :, RELATIVE] = velocity_m_s.T
-        self._manoeuvre = np.zeros(len(position_m))
+        # An index of one axis and a slice of two: arrays of shape (B,) in a plane, (2, B) in space.
+        self._lateral: int | slice = 0 if axes == 2 else slice(0, 2)
+        self._manoeuvre = np.zeros((axes - 1, batch))
         self._gravitational_parameter = 0.0
         if sun is not None:
-            toward_sun = np.array([np.sin(sun.direction_rad), np.cos(sun.direction_rad)])
-            along_orbit = np.array([toward_sun[X], -toward_sun[Z]])
-            if along_orbit[X] < 0.0:
-                along_orbit = -along_orbit
+            toward_sun, along_orbit = sun_and_orbit(sun)
             speed = np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m)
-            self._motion[POSITION, :, SPACECRAFT] = (-sun.distance_m * toward_sun)[:, None]
-            self._motion[VELOCITY, :, SPACECRAFT] = (speed * along_orbit)[:, None]
+            self._motion[POSITION, :, SPACECRAFT] = (-sun.distance_m * toward_sun[-axes:])[:, None]
+            self._motion[VELOCITY, :, SPACECRAFT] = (speed * along_orbit[-axes:])[:, None]
             self._gravitational_parameter = float(sun.gravitational_parameter_m3_s2)
         accelerate_all(self._motion, self._manoeuvre, self._gravitational_parameter)
 
     @property
     def position_m(self) -> Floats:
-        """Relative (z, x), shape (B, 2)."""
+        """Relative (z, x), shape (B, 2); in space (y, z, x), shape (B, 3)."""
         return np.asarray(self._motion[POSITION, :, RELATIVE].T)
 
     @property
     def velocity_m_s(self) -> Floats:
-        """Relative (V_z, V_x), shape (B, 2)."""
+        """Relative (V_z, V_x), shape (B, 2); in space (V_y, V_z, V_x), shape (B, 3)."""
         return np.asarray(self._motion[VELOCITY, :, RELATIVE].T)
 
     def sight(self) -> Sight:
         """Return the present geometry."""
-        (z, x), (v_z, v_x) = self._motion[POSITION, :, RELATIVE], self._motion[VELOCITY, :, RELATIVE]
-        squared, slope = z * z + x * x, _ratio(z, x)
+        position, velocity = self._motion[POSITION, :, RELATIVE], self._motion[VELOCITY, :, RELATIVE]
+        lateral, x, speed, v_x = position[self._lateral], position[X], velocity[self._lateral], velocity[X]
+        slope = _ratio(lateral, x)
         return Sight(
-            alpha_rad=np.arctan2(z, x),
-            omega_rad_s=_ratio(v_z * x - v_x * z, squared),
-            range_m=np.sqrt(squared),
+            alpha_rad=np.arctan2(lateral, x),
+            omega_rad_s=_ratio(speed * x - v_x * lateral, lateral * lateral + x * x),
+            range_m=np.sqrt(_dot(position, position)),
             slope=slope,
-            slope_rate_per_s=_ratio(v_z - v_x * slope, x),
+            slope_rate_per_s=_ratio(speed - v_x * slope, x),
         )
 
     def fire(self, impulse_m_s: Floats) -> None:
-        """Change the spacecraft's velocity along z: V_z becomes V_z - k."""
-        self._motion[VELOCITY, Z, RELATIVE] -= impulse_m_s
-        self._motion[VELOCITY, Z, SPACECRAFT] += impulse_m_s
+        """Change the spacecraft's lateral velocity by impulses of shape (B,), or (2, B) in space: V becomes V - k."""
+        self._motion[VELOCITY, self._lateral, RELATIVE] -= impulse_m_s
+        self._motion[VELOCITY, self._lateral, SPACECRAFT] += impulse_m_s
 
     def arrival_s(self) -> Floats:
         """Return the times from now to x = 0, shape (B,), s.
 
         Notes
         -----
-        The motion without impulses in 64 leaps, and a straight line at the end. Impulses, which are along z, change
+        The motion without impulses in 64 leaps, and a straight line at the end. Impulses, which are across x, change
         this time through gravity by some nanoseconds.
         """
         return self._time_to_zero(self._motion, self._manoeuvre, ARRIVAL_LEAPS)
@@ -146,9 +152,15 @@ class KeplerMotion:
         return np.asarray(duration - motion[POSITION, X, RELATIVE] / motion[VELOCITY, X, RELATIVE])
 
     def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
-        """Advance by one step, with accelerations of the object along z, shape (B,), if it manoeuvres."""
+        """Advance by one step.
+
+        Parameters
+        ----------
+        manoeuvre_m_s2 : ndarray, shape (B,), or (2, B) in space, or None
+            Lateral acceleration of the object from now on; None leaves it as it is.
+        """
         if manoeuvre_m_s2 is not None:
-            self._manoeuvre = manoeuvre_m_s2
+            self._manoeuvre = np.ascontiguousarray(np.atleast_2d(manoeuvre_m_s2))
             accelerate_all(self._motion, self._manoeuvre, self._gravitational_parameter)
         # In free space one leap gives the exact motion over a step, a parabola.
         free_space = self._gravitational_parameter == 0.0
@@ -156,18 +168,22 @@ class KeplerMotion:
         duration = np.full(self._motion.shape[-1], step_s / substeps)
         passed = np.zeros(self._motion.shape[-1], dtype=bool)
         least, arrival = np.full(passed.shape, np.inf), np.zeros(passed.shape)
+        closest = np.zeros(self._motion.shape[1:2] + passed.shape)
         for substep in range(substeps):
             before, self._motion = self._motion, self._leap(self._motion, duration, self._manoeuvre)
             new = (_dot(self._motion[POSITION, :, RELATIVE], self._motion[VELOCITY, :, RELATIVE]) >= 0.0) & ~passed
             if new.any():
                 position, velocity, acceleration = before[:LOST, :, RELATIVE, new]
-                least[new] = closest_distance(position, velocity, acceleration, step_s / substeps)
+                closest[:, new] = closest_position(position, velocity, acceleration, step_s / substeps)
+                least[new] = np.hypot.reduce(closest[:, new])
                 to_zero = self._time_to_zero(
-                    np.ascontiguousarray(before[..., new]), self._manoeuvre[new], PASSAGE_LEAPS
+                    np.ascontiguousarray(before[..., new]),
+                    np.ascontiguousarray(self._manoeuvre[:, new]),
+                    PASSAGE_LEAPS,
                 )
                 arrival[new] = substep * (step_s / substeps) + to_zero
                 passed |= new
-        return Passage(passed, least, arrival)
+        return Passage(passed, least, arrival, closest[self._lateral])
 
     def _leap(self, motion: Floats, duration_s: Floats, manoeuvre_m_s2: Floats) -> Floats:
         """Return a motion at a later time, in new memory."""
@@ -176,12 +192,22 @@ class KeplerMotion:
         return after
 
 
+def sun_and_orbit(sun: Sun) -> tuple[Floats, Floats]:
+    """Return the directions (y, z, x) of the Sun and of the spacecraft's velocity in its orbit.
+
+    The second one is the part of +x across the first, or along z if the Sun is on the x axis.
+    """
+    level = np.cos(sun.elevation_rad)
+    y, z, x = np.sin(sun.elevation_rad), level * np.sin(sun.direction_rad), level * np.cos(sun.direction_rad)
+    across = np.hypot(y, z)
+    along = np.array([-x * (y / across), -x * (z / across), across]) if across > 0.0 else np.array([0.0, x, 0.0])
+    return np.array([y, z, x]), along
+
+
 @inlined
-def attraction(z: float, x: float, gravitational_parameter_m3_s2: float) -> tuple[float, float]:
-    """Return the acceleration -K r / |r|^3 at a position relative to the Sun, along z and x, m/s^2."""
-    squared = z * z + x * x
-    share = -gravitational_parameter_m3_s2 / (squared * math.sqrt(squared))
-    return share * z, share * x
+def attraction_share(squared_m2: float, gravitational_parameter_m3_s2: float) -> float:
+    """Return -K / |r|^3, whose product with r is the acceleration at r from the Sun, from the square of |r|."""
+    return -gravitational_parameter_m3_s2 / (squared_m2 * math.sqrt(squared_m2))
 
 
 @entry
@@ -190,26 +216,32 @@ def accelerate_all(motion: Floats, manoeuvre_m_s2: Floats, gravitational_paramet
 
     Parameters
     ----------
-    motion : ndarray, shape (4, 2, 2, B)
-        Position, velocity, acceleration and lost rounding; along z and x; relative, and of the spacecraft.
-    manoeuvre_m_s2 : ndarray, shape (B,)
-        Acceleration of the object along z.
+    motion : ndarray, shape (4, A + 1, 2, B)
+        Position, velocity, acceleration and lost rounding; along the A lateral axes and x; relative, and of the
+        spacecraft.
+    manoeuvre_m_s2 : ndarray, shape (A, B)
+        Lateral acceleration of the object.
     gravitational_parameter_m3_s2 : float
         K of the Sun; zero is free space.
     """
     for b in range(motion.shape[3]):
-        for axis in (Z, X):
-            for craft in (RELATIVE, SPACECRAFT):
-                motion[ACCELERATION, axis, craft, b] = 0.0
+        own_share = object_share = 0.0
         if gravitational_parameter_m3_s2 > 0.0:
-            own_z, own_x = motion[POSITION, Z, SPACECRAFT, b], motion[POSITION, X, SPACECRAFT, b]
-            z, x = motion[POSITION, Z, RELATIVE, b] + own_z, motion[POSITION, X, RELATIVE, b] + own_x
-            object_z, object_x = attraction(z, x, gravitational_parameter_m3_s2)
-            own_z, own_x = attraction(own_z, own_x, gravitational_parameter_m3_s2)
-            motion[ACCELERATION, Z, SPACECRAFT, b], motion[ACCELERATION, X, SPACECRAFT, b] = own_z, own_x
-            motion[ACCELERATION, Z, RELATIVE, b] = object_z - own_z
-            motion[ACCELERATION, X, RELATIVE, b] = object_x - own_x
-        motion[ACCELERATION, Z, RELATIVE, b] += manoeuvre_m_s2[b]
+            own_squared = object_squared = 0.0
+            for axis in range(motion.shape[1]):
+                own = motion[POSITION, axis, SPACECRAFT, b]
+                of_object = motion[POSITION, axis, RELATIVE, b] + own
+                own_squared += own * own
+                object_squared += of_object * of_object
+            own_share = attraction_share(own_squared, gravitational_parameter_m3_s2)
+            object_share = attraction_share(object_squared, gravitational_parameter_m3_s2)
+        for axis in range(motion.shape[1]):
+            own = motion[POSITION, axis, SPACECRAFT, b]
+            of_object = motion[POSITION, axis, RELATIVE, b] + own
+            motion[ACCELERATION, axis, SPACECRAFT, b] = own_share * own
+            motion[ACCELERATION, axis, RELATIVE, b] = object_share * of_object - own_share * own
+        for axis in range(len(manoeuvre_m_s2)):
+            motion[ACCELERATION, axis, RELATIVE, b] += manoeuvre_m_s2[axis, b]
 
 
 @entry
@@ -217,7 +249,7 @@ def leap_all(
     motion: Floats, duration_s: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3_s2: float, after: Floats
 ) -> None:
     """Write a motion after times of shape (B,), in the form of `accelerate_all`: one step of velocity Verlet."""
-    for axis in (Z, X):
+    for axis in range(motion.shape[1]):
         for craft in (RELATIVE, SPACECRAFT):
             for b in range(motion.shape[3]):
                 before = motion[POSITION, axis, craft, b]
@@ -230,14 +262,14 @@ def leap_all(
                 after[LOST, axis, craft, b] = way - (position - before)
                 after[VELOCITY, axis, craft, b] = at_middle
     accelerate_all(after, manoeuvre_m_s2, gravitational_parameter_m3_s2)
-    for axis in (Z, X):
+    for axis in range(motion.shape[1]):
         for craft in (RELATIVE, SPACECRAFT):
             for b in range(motion.shape[3]):
                 after[VELOCITY, axis, craft, b] += 0.5 * duration_s[b] * after[ACCELERATION, axis, craft, b]
 
 
-def closest_distance(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2: Floats, duration_s: float) -> Floats:
-    """Return the least distance (m) from the origin during uniformly accelerated motion, vectors of shape (2, B).
+def closest_position(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2: Floats, duration_s: float) -> Floats:
+    """Return the position (m) nearest to the origin during uniformly accelerated motion, vectors of shape (axes, B).
 
     Four Newton steps, starting from the closest approach of straight motion.
     """
@@ -247,14 +279,13 @@ def closest_distance(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2
         speed = velocity_m_s + moment * acceleration_m_s2
         slope = _dot(speed, speed) + _dot(at, acceleration_m_s2)
         moment = np.clip(moment - _dot(at, speed) / slope, 0.0, duration_s)
-    at = position_m + moment * velocity_m_s + 0.5 * moment**2 * acceleration_m_s2
-    return np.asarray(np.hypot(at[Z], at[X]))
+    return position_m + moment * velocity_m_s + 0.5 * moment**2 * acceleration_m_s2
 
 
 def _ratio(over: Floats, under: Floats) -> Floats:
     """Return the quotient; zero where the divisor is zero, where no section exists."""
-    return np.divide(over, under, out=np.zeros_like(over), where=under != 0.0)
+    return np.divide(over, under, out=np.zeros_like(over), where=np.broadcast_to(under != 0.0, over.shape))
 
 
 def _dot(first: Floats, second: Floats) -> Floats:
-    return np.asarray(first[Z] * second[Z] + first[X] * second[X])
+    return np.asarray(sum(first * second))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from enum import Enum
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from infoset.limits import NOT_NEGATIVE
 from infoset.set_queries import MaskedFloats
-from sim.columns import Column, columns, columns_of, documented, values_of
+from sim.columns import Column, columns, columns_with_values, documented, values_of
 from sim.pictures import results_html
 from sim.statistics import HitEstimate, estimate_hits
 
@@ -57,6 +58,9 @@ _EMPTY = "A measurement left the set empty, whatever the outcome is; old files l
 _HIT = "Miss at most the radius of the body; unknown if the body has no size"
 
 
+_spatial = partial(Column, nullable=True, optional=True)
+
+
 @documented
 @dataclass(frozen=True)
 class Results:
@@ -75,7 +79,7 @@ class Results:
         metadata=columns(Column("miss_m", "m", "Least distance between the centres of mass", limits=NOT_NEGATIVE))
     )
     impulse_m_s: Floats = field(
-        metadata=columns(Column("impulse_m_s", "m/s", "Sum of the impulses' absolute values", limits=NOT_NEGATIVE))
+        metadata=columns(Column("impulse_m_s", "m/s", "Sum of the impulses' moduli", limits=NOT_NEGATIVE))
     )
     guaranteed_miss_m: MaskedFloats = field(
         metadata=columns(Column("guaranteed_miss_m", "m", _PHI, nullable=True, limits=NOT_NEGATIVE))
@@ -94,6 +98,18 @@ class Results:
     velocity_m_s: Floats = field(
         metadata=columns(
             Column("start_vz_m_s", "m/s", "True V_z at the start"), Column("start_vx_m_s", "m/s", "true V_x")
+        )
+    )
+    lateral_start: MaskedFloats = field(
+        metadata=columns(
+            _spatial("start_y_m", "m", "True y at the start; unknown in a plane"),
+            _spatial("start_vy_m_s", "m/s", "true V_y"),
+        )
+    )
+    lateral_miss: MaskedFloats = field(
+        metadata=columns(
+            _spatial("miss_y_m", "m", "True y at the closest approach; unknown in a plane"),
+            _spatial("miss_z_m", "m", "true z"),
         )
     )
     guarantees: bool = False
@@ -118,7 +134,7 @@ class Results:
 
     def to_dict(self) -> dict[str, list[Any]]:
         """Return the columns by name as plain values, one per run: texts for outcomes, None if unknown."""
-        return {column.name: values_of(self, column) for column in columns_of(Results)}
+        return {column.name: values_of(self, column) for column in columns_with_values(self)}
 
     def to_pandas(self) -> Any:
         """Return the columns as a pandas `DataFrame`, one row per run, with the units in ``frame.attrs["units"]``.
@@ -135,7 +151,7 @@ class Results:
                 "Results.to_pandas needs pandas: install it with `pip install pandas`, or use Results.to_dict"
             ) from None
         frame = pd.DataFrame(self.to_dict())
-        frame.attrs["units"] = {column.name: column.unit for column in columns_of(Results)}
+        frame.attrs["units"] = {column.name: column.unit for column in columns_with_values(self)}
         return frame
 
     def take(self, indices: NDArray[np.intp]) -> Results:

@@ -15,18 +15,18 @@ ROUNDING = 1e-12
 
 
 def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, predicted_miss_m: Floats) -> Floats:
-    """Return the acceleration of the targets of a batch along z over one step, m/s^2, shape (B,).
+    """Return the lateral acceleration of the targets of a batch over one step, m/s^2, shape (B,), or (2, B) in space.
 
     Parameters
     ----------
-    draws : ndarray, shape (B, steps)
+    draws : ndarray, shape (B, steps), or (2, B, steps) in space
         Random numbers, uniform in [-1, 1].
-    predicted_miss_m : ndarray, shape (B,)
-        Predicted miss z + V_z (time to go) of the true state, signed.
+    predicted_miss_m : ndarray, shape (B,), or (2, B) in space
+        Predicted miss z + V_z (time to go) of the true state, signed, and that along y.
     """
-    first = np.where(draws[:, 0] >= 0.0, 1.0, -1.0)
+    first = np.where(draws[..., 0] >= 0.0, 1.0, -1.0)
     if target.manoeuvre is Manoeuvre.NONE:
-        side = np.zeros(len(draws))
+        side = np.zeros_like(first)
     elif target.manoeuvre is Manoeuvre.CONSTANT:
         side = first
     elif target.manoeuvre is Manoeuvre.BANG_BANG:
@@ -35,8 +35,11 @@ def acceleration_m_s2(target: Target, draws: Floats, step: int, step_s: float, p
     elif target.manoeuvre is Manoeuvre.RANDOM_TELEGRAPH:
         # Probability of an odd number of switches within a step of a Poisson process.
         odd = 0.5 * (1.0 - math.exp(-2.0 * step_s / target.switching_period_s))
-        switches = 0.5 * (1.0 + draws[:, 1 : step + 1]) < odd
-        side = first * (-1.0) ** switches.sum(axis=1)
+        switches = 0.5 * (1.0 + draws[..., 1 : step + 1]) < odd
+        side = first * (-1.0) ** switches.sum(axis=-1)
     else:
         side = np.where(predicted_miss_m >= 0.0, 1.0, -1.0)
-    return np.asarray(target.acceleration_m_s2 * side)
+    along_z, along_y = target.acceleration_m_s2, target.acceleration_y_m_s2
+    if draws.ndim == 2:
+        return np.asarray(along_z * side)
+    return np.array([[along_z if along_y is None else along_y], [along_z]]) * side

@@ -33,7 +33,7 @@ from infoset import ConvexPolygons, Section
 from infoset.limits import LARGEST, SMALLEST
 from infoset.sensors import SENSORS
 from sim import Inconsistency, Record, Results, Scenario, StepRecord
-from sim.columns import Column, columns_of, values_of
+from sim.columns import Column, columns_of, columns_with_values, values_of
 from sim.storage.codec import from_json, to_json
 
 FORMAT = "infoset-record"
@@ -231,7 +231,12 @@ def _offsets(counts: list[int]) -> NDArray[np.int64]:
 
 
 def _result_to_json(result: Results) -> dict[str, object]:
-    values = {key: [values_of(result, column)[0] for column in columns] for key, columns in _RESULT.items()}
+    known = {column.field for column in columns_with_values(result)}
+    values = {
+        key: [values_of(result, column)[0] for column in columns]
+        for key, columns in _RESULT.items()
+        if columns[0].field in known
+    }
     return {key: value[0] if len(value) == 1 else value for key, value in values.items()}
 
 
@@ -392,8 +397,12 @@ def _check(arrays: Arrays) -> None:
 
 
 def _result_from_json(found: object, run: int, guarantees: bool) -> Results:
-    # A record written before a nullable column was added lacks it.
-    optional = {key: None for key, columns in _RESULT.items() if columns[0].nullable}
+    # A record written before a nullable column was added lacks it, and one in a plane the columns of space.
+    optional = {
+        key: None if len(columns) == 1 else [None] * len(columns)
+        for key, columns in _RESULT.items()
+        if columns[0].nullable
+    }
     if not isinstance(found, dict) or set(optional | found) != set(_RESULT):
         raise _UnsoundError("its header has a wrong result")
     found = optional | found
@@ -434,7 +443,9 @@ def _array(column: Column, values: list[Any]) -> Any:
     if issubclass(column.kind, Enum):
         return (column.kind(values[0]),)
     if column.nullable:
-        return np.ma.MaskedArray([values[0] or 0], mask=[values[0] is None], dtype=column.kind)
+        unknown = [value is None for value in values]
+        known = np.ma.MaskedArray([value or 0 for value in values], mask=unknown, dtype=column.kind)
+        return known if column.component is None else known[None]
     return np.array(values if column.component is None else [values])
 
 

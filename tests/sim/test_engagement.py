@@ -100,7 +100,7 @@ class ModelMotion:
         self._v = self._v + push * step_s
         self._steps += 1
         before, self._x = self._x, self._start - self._e * step_s * self._steps
-        return Passage(self._x <= 0.0, np.abs(self._z), before / self._e)
+        return Passage(self._x <= 0.0, np.abs(self._z), before / self._e, self._z)
 
 
 def fly_in_the_model(scenario: Scenario, engagements: int, seed: int) -> Results:

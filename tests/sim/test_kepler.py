@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.kepler import KeplerMotion, closest_distance
+from sim.kepler import KeplerMotion, closest_position
 from sim.scenario import Sun
 
 hy = pytest.importorskip("heyoka", reason="needs the extra test: the independent integrator")
@@ -98,8 +98,8 @@ def test_least_distance_between_steps_matches_a_dense_search() -> None:
     moments = np.linspace(0.18, 0.20, 2_000_001)
     z = position[0] + velocity[0] * moments + 0.5 * acceleration[0] * moments**2
     x = position[1] + velocity[1] * moments + 0.5 * acceleration[1] * moments**2
-    found = closest_distance(position, velocity, acceleration, 0.5)
-    assert found[0] == pytest.approx(np.hypot(z, x).min(), rel=1e-9)
+    found = closest_position(position, velocity, acceleration, 0.5)
+    assert np.hypot(*found)[0] == pytest.approx(np.hypot(z, x).min(), rel=1e-9)
 
 
 def test_free_passage_in_free_space_is_the_distance_of_a_straight_line() -> None:
