@@ -1,4 +1,4 @@
-"""Quantiles as text, and when a campaign may stop: the confidence interval of a quantile is narrow enough."""
+"""Quantiles as text, and the rule that stops a campaign: the confidence interval of a quantile is narrow enough."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class StoppingRule:
     Parameters
     ----------
     quantile : QuantileName
-        Whose interval is meant.
+        Quantile whose interval is compared with the width.
     width : float
         In the unit of the quantity.
     confidence : float
@@ -108,7 +108,7 @@ class Watch:
     Parameters
     ----------
     rule : StoppingRule
-        What must be met.
+        Rule to check.
     groups : int
         Samples of each chunk, one for each noise. Each must meet the rule.
     read : callable
@@ -156,15 +156,15 @@ class Watch:
         return None
 
 
-def number_text(number: float, power: int = 0) -> str:
-    """Return the shortest text of a number, times 10^`power`, from which the same number is read again."""
-    digits = Decimal(repr(float(number))).scaleb(power).normalize()
-    return f"{digits:f}" if -7 < digits.adjusted() < 16 else str(digits).lower()
+def number_text(number: float) -> str:
+    """Return the shortest text from which exactly the same number is read."""
+    return repr(float(number)).removesuffix(".0")
 
 
 def level_name(level: float) -> str:
-    """Return a level as a name: p99 of 0.99, p99.9 of 0.999."""
-    return f"p{number_text(level, 2)}"
+    """Return a level as a name, without rounding: p99 of 0.99, p99.9 of 0.999."""
+    percent = Decimal(number_text(level)).scaleb(2) + 0  # the sum has no exponent above zero
+    return f"p{percent}".lower()
 
 
 def _checks(chunks: int) -> Iterator[int]:
