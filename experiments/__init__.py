@@ -1,11 +1,11 @@
-"""Public interface of the commands' side: files, functions that take scenarios by name, and figures.
+"""Public interface of the package `experiments`: files, functions that take scenarios by name, and figures.
 
 Every name is loaded when it is first used, so that the command line starts without heavy libraries.
 """
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # `typing` takes longer to import than all else before an interrupt can be caught
+TYPE_CHECKING = False  # importing `typing` would take most of the time in which an interrupt cannot be caught
 if TYPE_CHECKING:
     from experiments.interception.figures.bound import draw_bound
     from experiments.interception.figures.process import draw_process

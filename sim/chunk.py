@@ -108,9 +108,9 @@ def fly_chunk(chunk: Chunk, check: Callable[[], None] | None = None) -> Results:
 
 
 def chunk_size(runs: int) -> int:
-    """Return the default number of engagements of a chunk: a few hundred chunks of several batches of the engine.
+    """Return the default number of engagements of a chunk: one or more batches of the engine.
 
-    Chunks are small because a process that stops loses its unfinished chunks, and not too many because each is a file.
+    Small chunks limit the work that is lost if a process stops. Large chunks limit the number of files.
     """
     batches = -(-runs // (FEWEST_CHUNKS * ENGAGEMENTS_AT_ONCE))
     return max(1, min(batches, LARGEST_CHUNK // ENGAGEMENTS_AT_ONCE)) * ENGAGEMENTS_AT_ONCE

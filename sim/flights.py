@@ -90,8 +90,9 @@ def worker_processes(count: int) -> Iterator[Executor]:
     """Start processes that simulate chunks, and end the processes on exit from the context.
 
     After an error they end at once; if this process dies, they end too. Processes are spawned, because a forked process
-    would keep the lock of a campaign's folder after the end of its parent. Threads share one interpreter, which half of
-    the work of an engagement needs. Processes do not, but each takes one or two seconds to start, and memory.
+    would keep the lock of a campaign's folder after the end of its parent. Half of the
+    work of an engagement needs the interpreter, which threads share and processes do not. Each process takes one or two
+    seconds to start, and needs additional memory.
 
     Raises
     ------

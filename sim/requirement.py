@@ -169,7 +169,7 @@ def parse_requirement(text: str) -> AnyRequirement:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a sample says about a requirement.
+    """The decision of a sample about a requirement, with the estimate and its interval.
 
     Parameters
     ----------
@@ -183,8 +183,8 @@ class Verdict:
     lower, upper : float or None
         Ends of its 95 % confidence interval; None if the sample is too small to bound that side.
     runs_needed : int or None
-        About how many runs decide with `watched=True` if further runs are like these; None if the estimate is at the
-        bound, so that more than `MOST_RUNS_NEEDED` are necessary.
+        Approximate number of runs that decide with `watched=True`, if the share of runs that satisfy the bound stays
+        the same; None if it is over `MOST_RUNS_NEEDED`, because the estimate is at the bound.
     known : int
         Runs with a value of the quantity; the others do not satisfy the bound.
     """
@@ -277,7 +277,7 @@ def _finite(value: float) -> float | None:
 
 
 def share_interval(count: int, runs: int) -> tuple[float, float]:
-    """Return the 95 % confidence interval of a share that holds for any number of runs (see `judge`), by bisection."""
+    """Return the 95 % confidence interval of a share after `runs` runs of a confidence sequence (`judge`)."""
 
     def end(index: int, inside: float, outside: float) -> float:
         for _ in range(_STEPS):
@@ -302,7 +302,7 @@ def critical_counts(size: int, share: float, *, watched: bool) -> tuple[Counts, 
     share : float
         Required share.
     watched : bool
-        Whether the counts are those for 1, 2, ..., `size` runs; otherwise only for `size` runs.
+        Return the counts for 1, 2, ..., `size` runs, those of the confidence sequence; otherwise only for `size` runs.
 
     Returns
     -------
@@ -368,7 +368,7 @@ def p_values(runs: ArrayLike, count: ArrayLike, share: ArrayLike, *, watched: bo
 
 
 def runs_needed(count: int, runs: int, share: float) -> int | None:
-    """Return how many runs, about, decide with `watched=True` if the same share of them satisfies the bound.
+    """Return the approximate number of runs that decide a requirement with `watched=True`; see `Verdict`.
 
     None is more than `MOST_RUNS_NEEDED`. If all runs satisfy the bound so far, it is the least number that can decide.
     """

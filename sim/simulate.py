@@ -63,7 +63,7 @@ def simulate(
     if numbers.size == 0 or numbers.min() < 0:
         raise ValueError(f"need at least one run, and no negative run numbers: got runs={runs}")
     parts = []
-    # Few engagements at once fit into the processor's cache, and into memory when there are very many sections.
+    # Small batches fit into the processor's cache; with very many sections, larger ones would not fit into memory.
     at_once = max(1, min(ENGAGEMENTS_AT_ONCE, SECTIONS_AT_ONCE // scenario.set_model.sections))
     for first in range(0, numbers.size, at_once):
         chunk = numbers[first : first + at_once]

@@ -205,8 +205,9 @@ class HitEstimate:
 def estimate_hits(hits: int, runs: int, confidence: float = 0.95) -> HitEstimate:
     """Return the share of hits with its Clopper-Pearson interval.
 
-    The interval contains the true probability with at least this confidence, for any number of runs: below `lower`, so
-    many hits or more are less probable than (1 - confidence) / 2; above `upper`, so many or fewer are.
+    If the true probability is less than `lower`, the probability of at least this number of hits is less than
+    (1 - confidence) / 2. If it is greater than `upper`, the same holds for at most this number of hits. For each fixed
+    number of runs, the interval therefore contains the true probability with at least this confidence.
 
     Raises
     ------

@@ -15,7 +15,7 @@ from sim.storage import CampaignWriter
 
 @dataclass
 class _Cell:
-    """Progress of a cell: chunks that are judged, and for each noise the runs, those that hold, a decision."""
+    """Progress of a cell: judged chunks; for each noise the runs, those that satisfy the bound, and the decision."""
 
     chunks: int = 0
     runs: list[int] = field(default_factory=list)
@@ -24,18 +24,18 @@ class _Cell:
 
 
 class UndecidedCells:
-    """The chunks of a sweep that are still to be simulated, and those that are simulated out of order.
+    """The chunks of a sweep that must still be simulated, and those that were simulated before an earlier chunk.
 
     Parameters
     ----------
     folder : CampaignWriter
         Folder of the sweep; the number of runs in its manifest is the limit of each cell.
     requirement : Requirement or HitRequirement
-        Is decided with each noise, by the confidence sequence of `sim.requirement.judge`.
+        Requirement to decide for each noise, by the confidence sequence of `sim.requirement.judge`.
     noises : sequence of str
         Noises of the sweep.
     least_runs : int
-        Runs of each cell before it may stop.
+        Least number of runs of each cell.
 
     Notes
     -----
@@ -83,7 +83,7 @@ class UndecidedCells:
                     yield index
 
     def store(self, chunk: Chunk, results: Results) -> None:
-        """Write a simulated chunk, at the latest when the chunks before it are written, unless its cell is decided."""
+        """Write a simulated chunk once all chunks before it are written; discard it if its cell is then decided."""
         self._waiting[chunk.index] = chunk, results
         self._advance(chunk.cell)
 
@@ -93,7 +93,7 @@ class UndecidedCells:
         return runs == manifest.runs or (runs >= self._least_runs and all(state.decided))
 
     def _advance(self, cell: int) -> None:
-        """Judge the chunks of a cell in their order, as far as they are known and the cell needs them."""
+        """Judge the chunks of a cell in their order, up to the first unknown chunk or the decision of the cell."""
         while not self._is_done(cell):
             index = self._folder.manifest.index_of(cell, self._cells[cell].chunks)
             if index in self._waiting:

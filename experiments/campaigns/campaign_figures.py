@@ -241,7 +241,7 @@ def _distribution(
 
 
 def _convergence_legend(figure: Figure, drawn: set[float], banded: set[float]) -> None:
-    """Draw the legend: the quantiles that are drawn, each with its interval if that is drawn too, and the others."""
+    """Draw the legend: the drawn quantiles, with their drawn intervals, and the levels that are not drawn."""
     handles: list[Any] = []
     labels = []
     for index, level in enumerate(CONVERGING):

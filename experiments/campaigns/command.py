@@ -148,7 +148,7 @@ class Sweep(Flight):
         Literal["decided"] | None,
         typer.Option(
             help="decided: add runs to each cell until the requirement is met or not met there, at most --most-runs. "
-            "The decisions allow for the repeated tests."
+            "The confidence of the decisions holds although runs are added."
         ),
     ] = None
     most_runs: Annotated[

@@ -232,7 +232,7 @@ def stop_notes(manifest: Manifest) -> list[str]:
         return []
     return [
         "the intervals are computed with 95 % confidence for a fixed number of runs; the campaign stopped when an "
-        "interval was narrow, so that the confidence is about 92 to 95 %"
+        "interval was narrow, so their confidence is about 92 to 95 %"
     ]
 
 

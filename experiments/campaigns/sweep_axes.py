@@ -166,7 +166,7 @@ def _unknown(key: str, known: Mapping[str, bool]) -> str:
     names = list(known)
     table = key.partition(".")[0]
     if table in _OPTIONAL and table not in {other.partition(".")[0] for other in known}:
-        return f"the scenario has no [{table}]; add that table to its file, or vary something else"
+        return f"the scenario has no [{table}]; add that table to its file, or vary another key"
     if f"{key}.least" in known:
         return f"{key} is a pair; vary {key}.least or {key}.greatest"
     if "uncertainty.y_km.least" not in known and tuple(key.split(".")[:2]) in SPACE_KEYS:

@@ -78,7 +78,7 @@ _NO_VALUE = "\N{EN DASH}"
 _LETTERS = "abcdefghijklmnopqrstuvwxyz"
 _MOST_TICKS = 8
 _HEAD_ROOM = 1.06
-"""Factor of the axis, for the arrow of the topmost point."""
+"""Factor by which an axis is extended, so that the arrow above the topmost point is visible."""
 _DIAMOND: dict[str, Any] = {"marker": "D", "markersize": 4.0, "color": IMPULSE, "mec": "white", "mew": 0.6}
 _STRIP = 0.045
 """Height of the strip of decisions above a panel, as a fraction of the panel."""

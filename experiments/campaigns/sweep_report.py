@@ -33,8 +33,7 @@ from sim.storage import CampaignFolder
 MOST_SHOWN = 8
 MOST_LINES = 40
 FIXED = "a fixed number of runs"
-"""Condition of the confidence of an interval that does not allow for runs that are added after a look at the results.
-"""
+"""Condition under which the confidence of an interval holds: no runs are added after a look at the results."""
 
 
 def figure_names(noises: Sequence[str]) -> list[str]:

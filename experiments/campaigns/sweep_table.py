@@ -42,9 +42,9 @@ class SweepTable:
     cells : tuple of tuple of Sample
         Samples of each cell, one for each noise; empty for a cell without runs.
     verdicts : tuple of mapping of str to Verdict
-        For each cell, what the runs of each noise say about the requirement; `runs_needed` counts the runs of the cell.
+        For each cell, the verdict of each noise about the requirement; `runs_needed` counts the runs of all noises.
     hits : tuple of HitEstimate or None
-        Probability of a hit in each cell, with the noise with which it is the smallest; None if the body has no size.
+        Probability of a hit in each cell, for the noise with the fewest hits; None if the body has no size.
     radius_m : float or None
         Radius of the body; None if it has no size, or different sizes.
     """
@@ -244,14 +244,14 @@ def _digits(value: float, gap: float) -> int:
 
 
 def value_text(axis: Axis, value: float, digits: int = 4) -> str:
-    """Return a value of an axis, with some digits, or more if neighbouring values differ only in these."""
+    """Return a value of an axis with `digits` digits, or more if neighbouring values would be equal."""
     if value == round(value) and abs(value) < _MOST_WHOLE:
         return f"{value:.0f}"
     return f"{value:.{max(digits, 1 + separating_digits(axis))}g}"
 
 
 def interpolated_text(axis: Axis, limit: Limit) -> str:
-    """Return the interpolated value with the digits that matter between the two cells; empty if there is none."""
+    """Return the interpolated value as text, rounded to the distance of the two cells; empty if there is none."""
     if limit.value is None:
         return ""
     digits = max(1, 1 + _digits(abs(limit.value), limit.upper - limit.lower))

@@ -1,8 +1,8 @@
 """One self-contained HTML document: template, style, scripts and data, with a policy that blocks everything else.
 
-A person's texts (names, descriptions) travel as JSON in a block that no browser runs, with every character that could
-end it escaped; the scripts put them on the page as text alone. The policy names the style and the scripts by their
-hashes, so nothing else runs, and nothing is fetched.
+Texts of users (names, descriptions) are JSON in a block that browsers do not run; every character that could end this
+block is escaped. The scripts insert these texts as text, never as HTML. The policy names the style and the scripts by
+their hashes, so nothing else runs, and nothing is fetched.
 """
 
 from __future__ import annotations
@@ -59,11 +59,11 @@ def page(title: str, scripts: Sequence[str], data: Mapping[str, object], own_scr
 def embedded_json(value: object) -> str:
     """Return a value as JSON that can stand inside a script element of HTML, and is read as the same value.
 
-    It has no ``<``, ``>``, ``&`` and line separators that scripts stumble over. The value is one for
+    It contains no ``<``, ``>`` and ``&``, and no line separators that are not allowed in scripts. The value is one for
     `experiments.common.output.to_json`.
     """
     text = json.dumps(value, allow_nan=False, ensure_ascii=False, separators=(",", ":"), default=json_value)
-    # A half of a surrogate pair is no character that a file can hold.
+    # Half of a surrogate pair cannot be stored in a file: it is escaped.
     return text.translate(_ESCAPES).encode("utf-8", "backslashreplace").decode("utf-8")
 
 

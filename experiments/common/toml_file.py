@@ -103,7 +103,7 @@ def read_tables(form: Form[Tables], text: str, source: str, values: Mapping[str,
     values : mapping of str to str or None, optional
         TOML values that replace those of the text, by key, before the text is checked. A key is written with its table,
         ``thruster.budget_m_s``; in an array of tables with the number of the table, ``craft.2.weight``. ``.least`` and
-        ``.greatest`` after a key are the ends of a pair. Text may lack its quotes.
+        ``.greatest`` after a key are the ends of a pair. Texts may be written without quotes.
 
     Raises
     ------
@@ -276,7 +276,7 @@ def _parse(form: Form[Tables], text: str, source: str) -> dict[str, Any]:
     lines = text.split("\n")
     for number, line in enumerate(lines, start=1):
         if len(line) > LONGEST_LINE:
-            raise InputError(f"{source}: line {number} is over {LONGEST_LINE} characters; no line of a {form.noun} is")
+            raise InputError(f"{source}: line {number} is over {LONGEST_LINE} characters; divide it")
     try:
         return tomllib.loads(text, parse_float=decimal_of)
     except tomllib.TOMLDecodeError as error:

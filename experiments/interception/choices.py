@@ -87,8 +87,8 @@ def with_model(scenario: Scenario, model: Model) -> Scenario:
 def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario, list[str]]:
     """Return the scenario of a study, whose default model is the guaranteed one, whatever the scenario file says.
 
-    Quantiles of the model `paper` can be those of sets that lost the true state. The list has a line for the screen if
-    the model differs from the file's by default.
+    With the model `paper`, quantiles can include runs whose set lost the true state. The list contains a line for the
+    screen if the default replaces the model of the file.
 
     Parameters
     ----------

@@ -279,7 +279,7 @@ def _unpack(content: bytes) -> Arrays:
             if len(set(names)) != len(names):
                 raise _UnsoundError("it has a member twice")
             if any(member.compress_type != zipfile.ZIP_STORED or member.flag_bits & 1 for member in members):
-                raise _UnsoundError("it is compressed or encrypted, which no record is")
+                raise _UnsoundError("it is compressed or encrypted; records are neither")
             if sum(member.file_size for member in members) > len(content):
                 raise _UnsoundError("its declared contents are larger than the file")
             return {
@@ -293,7 +293,7 @@ def _unpack(content: bytes) -> Arrays:
 
 
 def _read_array(member: bytes, filename: str) -> NDArray[Any]:
-    """Read an array after checking that its header tells the truth about its size."""
+    """Read an array after a check of the size in its header."""
     kind, shape_kind = _MEMBERS[filename.removesuffix(".npy")]
     stream = io.BytesIO(member)
     try:
@@ -390,7 +390,7 @@ def _check(arrays: Arrays) -> None:
         if (np.diff(offsets) < least).any():
             raise _UnsoundError(f"{name} does not rise")
     if (arrays["section_range_m"] < SMALLEST).any():
-        raise _UnsoundError(f"section_range_m holds a range that is not positive, at least {SMALLEST:g}")
+        raise _UnsoundError(f"section_range_m holds a range below {SMALLEST:g}")
     for name in ("measured_range_m", "true_range_m"):
         if (arrays[name] < 0.0).any():
             raise _UnsoundError(f"{name} holds a range that is negative")

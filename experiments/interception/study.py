@@ -81,6 +81,6 @@ def hit_text(hits: HitEstimate | None, scenario: Scenario) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share with four digits, rounded away from 0 % and 100 %, which only 0 and 1 are."""
+    """Return a share as a percentage with four digits; only the shares 0 and 1 become 0 % and 100 %."""
     text = f"{100.0 * share:.4g}"
     return f"{f'{100.0 * share:.12g}' if text == '100' and share < 1.0 else text} %"

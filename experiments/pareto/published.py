@@ -49,9 +49,9 @@ _LOST_DIGITS = "the last digits are missing: x_3(0) = 60 is this number minus 8.
 
 _OFF, _MOST_OFF = ("21.929144", "4.514890997e8", "-4.514890597e8"), 2.0
 _LAST_DIGITS = (
-    "differs by 1 to 2 units of the last of eight or ten digits. Tried: start velocities of the smallest largest "
-    "difference (1.1 units then, in twelve numbers), and without (3.1) (6 units there); so the cause is the paper's "
-    "arithmetic, or a further digit of its rate"
+    "differs by 1 to 2 units of the last of eight or ten digits. Tried: start velocities that make the largest "
+    "difference as small as possible (1.1 units, in twelve numbers), and start velocities found without (3.1) (then "
+    "(3.1) differs by 6 units). The cause is therefore the paper's arithmetic, or a further digit of its rate"
 )
 _VELOCITIES = (
     ("-1.2328", "-4.1115", "0.0369"),

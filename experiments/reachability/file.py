@@ -298,7 +298,8 @@ def _size_problems(known: Known) -> Iterator[Problem]:
         if reach > _MOST_REACH:
             yield Problem(
                 ("acceleration_m_s2",),
-                f"full thrust over one period changes {name} by {reach:.3g} bounds, over {_MOST_REACH:g}: found {push}",
+                f"full thrust over one period changes {name} by {reach:.3g} times its bound, over {_MOST_REACH:g}: "
+                f"found {push}",
                 f"check its unit, and those of period_s and bounds.{name}",
             )
 
@@ -336,7 +337,7 @@ def _keep_in_problems(known: Known) -> Iterator[Problem]:
             along = ", ".join(f"{value:.3g}" for value in error.direction)
             yield Problem(path, f"is unbounded along ({along})", "add half-spaces that bound it")
         except UncertainHullError:
-            yield Problem(path, "is so flat or small that rounding errors hide it", "make it wider")
+            yield Problem(path, "is too flat or too small for the precision of the numbers", "make it wider")
 
 
 FORM = problem_form(KIND, ReachabilityTables, _checks)

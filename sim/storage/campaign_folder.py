@@ -260,7 +260,7 @@ class CampaignFolder:
         except OSError as error:
             return f"cannot be read: {error.strerror}"
         if zlib.crc32(content) != checksum:
-            return f"is cut short or changed: {len(content)} bytes whose checksum differs from the one in its name"
+            return f"is truncated or changed: the checksum of its {len(content)} bytes differs from the one in its name"
         wanted = {"campaign": self.manifest.identity, "chunk": str(index)}
         fault: str | None = self._tables.fault(content, wanted, rows, with_cell=bool(self.manifest.axes))
         return fault

@@ -59,7 +59,7 @@ def from_json(kind: Callable[..., Kind], value: object) -> Kind:
         control characters, which could steer a terminal, is refused too.
     """
     if not all(map(str.isprintable, _texts(value))):
-        raise ValueError("holds text with control characters")
+        raise ValueError("contains text with control characters")
     try:
         (made,) = _adapter(kind).validate_json(json.dumps([value]))
     except ValidationError as error:

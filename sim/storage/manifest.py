@@ -76,7 +76,7 @@ class Manifest:
     cell_runs : tuple of int
         Engagements of each cell of a finished sweep whose cells were stopped by a requirement; otherwise empty.
     require : str or None
-        The requirement of a sweep, as asked for last; it does not change any result.
+        Requirement of a sweep, that of the last session; it does not change any result.
     extended : bool
         Whether runs were ever added to a sweep, by a rule or by a greater number of runs.
     scenario : Scenario

@@ -97,7 +97,7 @@ def rows(chunk: Chunk, results: Results, *, with_cell: bool) -> Any:
         need_sound(table, chunk.runs, chunk.cell)
     except ValueError as error:
         raise FloatingPointError(
-            f"results of runs {results.runs[0]} to {results.runs[-1]} are not finite, or of no ordinary size: {error}"
+            f"results of runs {results.runs[0]} to {results.runs[-1]} are not finite or out of their limits: {error}"
         ) from None
     return table
 

@@ -286,7 +286,7 @@ def test_a_damaged_shard_is_said_and_flown_again(harm: str, brief: Scenario, ref
     result = mixed(brief, tmp_path / "campaign").run(resume=True)
     (redone,) = result.redone
     assert redone.file == victim
-    assert {"foreign": "another campaign"}.get(harm, "cut short or changed") in redone.reason
+    assert {"foreign": "another campaign"}.get(harm, "truncated or changed") in redone.reason
     assert result.table.equals(reference)
     assert CampaignFolder.read(tmp_path / "campaign").damaged == []
 

@@ -126,7 +126,7 @@ def _parts(scenario: Scenario, worst: WorstMisses, options: Adversary, elapsed_s
     if not same:
         emptied = max(found.sets_emptied for found in worst.engagements)
         yield (
-            f"the set became empty in {emptied} engagements of a search, and such a miss says little about the strategy"
+            f"the set became empty in {emptied} engagements of a search; these misses show a failure of the model"
             + ("" if scenario.set_model.is_guaranteed else "; use --model guaranteed, whose set keeps the true state")
         )
     if options.record is not None:

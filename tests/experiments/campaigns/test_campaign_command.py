@@ -186,7 +186,7 @@ def test_until_stops_and_goes_on(infoset: Infoset, file: Path, tmp_path: Path) -
     report = infoset("report", tmp_path / "runs")[1]
     for text in (out, report):
         assert "computed with 95 % confidence for a fixed number of runs" in " ".join(text.split())
-        assert "so that the confidence is about 92 to 95 %" in " ".join(text.split())
+        assert "so their confidence is about 92 to 95 %" in " ".join(text.split())
     assert "95 % confidence limits" not in out
     assert infoset(*asked[:-1], "miss_m p50 ci<1e-9", "--resume")[0] == 0
     assert CampaignFolder.read(tmp_path / "runs").finished_runs == 400
@@ -201,11 +201,11 @@ def test_damage_is_said_and_mended(infoset: Infoset, file: Path, tmp_path: Path)
     victim.write_bytes(victim.read_bytes()[:500])
     code, _, err = infoset("report", tmp_path / "runs")
     assert code == 0
-    assert f"{victim}: is cut short" in err
+    assert f"{victim}: is truncated or changed" in err
     assert "32 of 48 runs are stored" in err
     code, _, err = infoset(*asked, "--resume")
     assert code == 0
-    assert f"{victim}: is cut short or changed: 500 bytes" in err
+    assert f"{victim}: is truncated or changed: the checksum of its 500 bytes" in err
     assert "simulated again" in err
     assert CampaignFolder.read(tmp_path / "runs").complete
 
