@@ -7,6 +7,7 @@ docs/guarantee.md contains the theorem and its proof.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +17,8 @@ from infoset._compile import ZERO, allocation_free, by_reference, entry
 from infoset.concave_bounds import bound_between
 from infoset.history import History, Tapes
 from infoset.location import LABEL_RESOLUTION, locate_end, search_window
-from infoset.replays import LOWER, PROBE, UPPER, ReplayRoom, Workspace, keep_section, probe, run, workspace
-from infoset.section_law import SectionLaw
+from infoset.replays import LOWER, PROBE, ROWS, UPPER, ReplayRoom, Workspace, keep_section, probe, run, workspace
+from infoset.section_law import SectionLaw, law_of
 from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape
 from infoset.section_passes import Sections, tape_of
 from infoset.section_stack import SectionStack
@@ -55,9 +56,9 @@ class Outlines(NamedTuple):
     ----------
     labels : ndarray, shape (MOST_LABELS,)
         The labels, m.
-    points : ndarray, shape (MOST_LABELS, CAPACITY, 2)
-        Vertices (V, z) of their sections.
-    counts : ndarray of int, shape (MOST_LABELS,)
+    points : ndarray, shape (C, MOST_LABELS, CAPACITY, 2)
+        Vertices (V, z) of their sections along each axis.
+    counts : ndarray of int, shape (C, MOST_LABELS)
         Numbers of vertices.
     supports : ndarray, shape (4, MOST_LABELS)
         Supports of the sections in four directions.
@@ -73,7 +74,7 @@ class Outlines(NamedTuple):
 def bound_piece(
     outlines: Outlines, number: int, first: int, p: float, q: float, travelled: float, law: SectionLaw
 ) -> tuple[float, float]:
-    """Return bounds of z + V x/e over all sections with labels from p to q.
+    """Return bounds of z + V x/e over all sections of an axis with labels from p to q.
 
     Notes
     -----
@@ -81,7 +82,8 @@ def bound_piece(
     turns with the label. With the middle c of the piece, z + V x/e = (z + V x_c/e) + V (x - x_c)/e: the first term has
     a fixed direction, and the V of the second lies within its extrapolated bounds V_c +- r.
     """
-    labels, points, counts, values = outlines.labels, outlines.points, outlines.counts, outlines.supports
+    labels, values = outlines.labels, outlines.supports
+    points, counts = outlines.points[law.channel], outlines.counts[law.channel]
     e = law.closing_speed
     centre = 0.5 * (p + q)
     tau = (centre - travelled) / e
@@ -111,14 +113,14 @@ def bound_leaving(
     elapsed: int,
     tape: Tape,
     errors: Floats | None,
-    law: SectionLaw,
+    laws: Floats,
     room: Workspace,
     outlines: Outlines,
     pieces: Floats,
 ) -> int:
     """Bound the predicted miss of all living labels between two limits; return the number of pieces written.
 
-    With rates, the window of the tape consists of these limits.
+    The pieces of all axes have the same ends. With rates, the window of the tape consists of these limits.
 
     Parameters
     ----------
@@ -128,20 +130,20 @@ def bound_leaving(
         A label between them that lives; less than `lower` if none is known.
     room, outlines : Workspace, Outlines
         Working arrays.
-    pieces : ndarray, shape (>= PIECES, 4)
+    pieces : ndarray, shape (C, >= PIECES, 4)
         Receives the pieces.
     """
     living, limits, replays = known, room.known, room.replays
     if errors is not None:
         # The living labels need not form an interval, so that the window must be searched.
         first_label = known if known >= lower else 0.5 * (lower + upper)
-        if not search_window(lower, upper, first_label, LABEL_RESOLUTION * upper, tape, errors, law, room):
+        if not search_window(lower, upper, first_label, LABEL_RESOLUTION * upper, tape, errors, laws, room):
             return 0
         living = limits[1].label
-    lower_lives = probe(limits, 0, lower, tape, errors, law, replays)
+    lower_lives = probe(limits, 0, lower, tape, errors, laws, replays)
     if lower_lives:
         keep_section(replays, LOWER)
-    upper_lives = probe(limits, 2, upper, tape, errors, law, replays)
+    upper_lives = probe(limits, 2, upper, tape, errors, laws, replays)
     if upper_lives:
         keep_section(replays, UPPER)
     if lower_lives:
@@ -155,10 +157,11 @@ def bound_leaving(
     first_dead, last_dead = lower, upper
     first, last = lower, upper
     if not lower_lives:
-        first_dead, first = locate_end(limits[0], living, resolution, tape, errors, law, room, LOWER)
+        first_dead, first = locate_end(limits[0], living, resolution, tape, errors, laws, room, LOWER)
     if not upper_lives:
-        last_dead, last = locate_end(limits[2], living, resolution, tape, errors, law, room, UPPER)
+        last_dead, last = locate_end(limits[2], living, resolution, tape, errors, laws, room, UPPER)
     spacing = (last - first) / (LABELS - 1)
+    law = law_of(laws, ZERO)
     travelled = law.closing_speed * (law.step * elapsed)
     number = inner = outer = ZERO
     if spacing <= resolution:
@@ -176,7 +179,7 @@ def bound_leaving(
             row = LOWER
         elif k == LABELS - 1:
             row = UPPER
-        elif run(label, tape, errors, law, replays)[0] != ALIVE:
+        elif run(label, tape, errors, laws, replays)[0] != ALIVE:
             continue
         if outside and k < 0:
             inner = 1
@@ -184,20 +187,27 @@ def bound_leaving(
             outer = 1
         outlines.labels[number] = label
         tau = (label - travelled) / law.closing_speed
-        outlines.counts[number] = whole_chains.outline(
-            replays.origins, replays.rings, replays.marks, row, tau, outlines.points[number]
-        )
+        for channel in range(laws.shape[0]):
+            outlines.counts[channel, number] = whole_chains.outline(
+                replays.origins,
+                replays.rings,
+                replays.marks,
+                ROWS * channel + row,
+                tau,
+                outlines.points[channel, number],
+            )
         number += 1
     if spacing == 0.0 or number < 3:
         # The living labels are equal to within the resolution: one outline and a small margin bound them all.
         width = last_dead - first_dead
         tau = (first - travelled) / law.closing_speed
-        least, greatest = extremes_along(outlines.points[0], outlines.counts[0], tau)
-        magnitude = abs(least) + abs(greatest)
-        margin = SLACK * magnitude + width * magnitude / max(first - travelled, 1.0)
-        drift = 0.5 * law.disturbance * tau * tau
-        pieces[0, LEAST], pieces[0, GREATEST] = least - margin - drift, greatest + margin + drift
-        pieces[0, NEAREST], pieces[0, FARTHEST] = first_dead, last_dead
+        for channel in range(laws.shape[0]):
+            least, greatest = extremes_along(outlines.points[channel, 0], outlines.counts[channel, 0], tau)
+            magnitude = abs(least) + abs(greatest)
+            margin = SLACK * magnitude + width * magnitude / max(first - travelled, 1.0)
+            drift = 0.5 * law_of(laws, channel).disturbance * tau * tau
+            pieces[channel, 0, LEAST], pieces[channel, 0, GREATEST] = least - margin - drift, greatest + margin + drift
+            pieces[channel, 0, NEAREST], pieces[channel, 0, FARTHEST] = first_dead, last_dead
         return 1
     made = 0
     inside = number - inner - outer
@@ -208,9 +218,10 @@ def bound_leaving(
         q = last_dead if piece == inside else outlines.labels[at]
         if q <= p:
             continue
-        least, greatest = bound_piece(outlines, number, at, p, q, travelled, law)
-        pieces[made, LEAST], pieces[made, GREATEST] = least, greatest
-        pieces[made, NEAREST], pieces[made, FARTHEST] = p, q
+        for channel in range(laws.shape[0]):
+            least, greatest = bound_piece(outlines, number, at, p, q, travelled, law_of(laws, channel))
+            pieces[channel, made, LEAST], pieces[channel, made, GREATEST] = least, greatest
+            pieces[channel, made, NEAREST], pieces[channel, made, FARTHEST] = p, q
         made += 1
     return made
 
@@ -225,7 +236,7 @@ def bound_leaving_all(
     tapes: Tapes,
     errors: Floats | None,
     sections: Sections,
-    law: SectionLaw,
+    laws: Floats,
     room: Workspace,
     outlines: Outlines,
     pieces: Floats,
@@ -260,19 +271,22 @@ def bound_leaving_all(
                 window = Tape(tape.kinds, tape.values, tape.applies, tape.events, near, far)
             spread = 0.0
             if may_halve:
-                spread = spread_at(middle, elapsed, window, errors, law, room.replays, outlines.points[0])
+                spread = spread_at(middle, elapsed, window, errors, laws, room.replays, outlines.points[0, 0])
                 if spread > LOOSE * reached:
                     reached = max(
-                        reached, spread_at(middle, elapsed, tape, errors, law, room.replays, outlines.points[0])
+                        reached, spread_at(middle, elapsed, tape, errors, laws, room.replays, outlines.points[0, 0])
                     )
             number = ZERO
-            new_pieces = pieces[b, made[b] :]
+            new_pieces = pieces[:, b, made[b] :]
             if spread <= LOOSE * reached:
-                number = bound_leaving(near, far, known, elapsed, window, errors, law, room, outlines, new_pieces)
-                least, greatest = np.inf, -np.inf
-                for piece in range(number):
-                    least, greatest = min(least, new_pieces[piece, LEAST]), max(greatest, new_pieces[piece, GREATEST])
-                spread = 0.5 * (greatest - least) if number > 0 else 0.0
+                number = bound_leaving(near, far, known, elapsed, window, errors, laws, room, outlines, new_pieces)
+                spread = 0.0
+                for channel in range(laws.shape[0] if number > 0 else 0):
+                    least, greatest = np.inf, -np.inf
+                    for piece in range(number):
+                        least = min(least, new_pieces[channel, piece, LEAST])
+                        greatest = max(greatest, new_pieces[channel, piece, GREATEST])
+                    spread = math.hypot(spread, 0.5 * (greatest - least))
             # Later impulses may centre the interval, so that its width determines Phi.
             if may_halve and spread > LOOSE * reached:
                 windows[count].near, windows[count].far = near, middle
@@ -284,15 +298,19 @@ def bound_leaving_all(
 
 @allocation_free
 def spread_at(
-    label: float, elapsed: int, tape: Tape, errors: Floats | None, law: SectionLaw, room: ReplayRoom, outline: Floats
+    label: float, elapsed: int, tape: Tape, errors: Floats | None, laws: Floats, room: ReplayRoom, outline: Floats
 ) -> float:
-    """Return half the width of the predicted-miss interval at one label, m; zero if the label is dead."""
-    if run(label, tape, errors, law, room)[0] != ALIVE:
+    """Return half the width of the predicted misses at one label, m, in space half the diagonal; zero if it is dead."""
+    if run(label, tape, errors, laws, room)[0] != ALIVE:
         return 0.0
-    tau = (label - law.closing_speed * (law.step * elapsed)) / law.closing_speed
-    count = whole_chains.outline(room.origins, room.rings, room.marks, PROBE, tau, outline)
-    least, greatest = extremes_along(outline, count, tau)
-    return 0.5 * (greatest - least) + 0.5 * law.disturbance * tau * tau
+    spread = 0.0
+    for channel in range(laws.shape[0]):
+        law, row = law_of(laws, channel), ROWS * channel + PROBE
+        tau = (label - law.closing_speed * (law.step * elapsed)) / law.closing_speed
+        count = whole_chains.outline(room.origins, room.rings, room.marks, row, tau, outline)
+        least, greatest = extremes_along(outline, count, tau)
+        spread = math.hypot(spread, 0.5 * (greatest - least) + 0.5 * law.disturbance * tau * tau)
+    return spread
 
 
 class GuaranteedMiss:
@@ -306,8 +324,8 @@ class GuaranteedMiss:
         Greatest |eta|, the relative error of the closing speed.
     """
 
-    def __init__(self, law: SectionLaw, batch: int, speed_error: float) -> None:
-        self._law, self._speed_error = law, speed_error
+    def __init__(self, laws: tuple[SectionLaw, ...], batch: int, speed_error: float) -> None:
+        self._laws, self._law, self._speed_error = laws, laws[0], speed_error
         self._settled = np.zeros(batch)
         self.exists: Flags = np.zeros(batch, dtype=bool)
         # Pieces whose range is not zero yet, so that impulses move them.
@@ -320,38 +338,44 @@ class GuaranteedMiss:
 
     def copy(self) -> GuaranteedMiss:
         """Return an independent copy."""
-        twin = GuaranteedMiss(self._law, len(self._settled), self._speed_error)
+        twin = GuaranteedMiss(self._laws, len(self._settled), self._speed_error)
         twin._settled, twin.exists = self._settled.copy(), self.exists.copy()
         twin._pending = [(pieces.copy(), real.copy()) for pieces, real in self._pending]
         return twin
 
     def fire(self, impulse_m_s: Floats, elapsed: int) -> None:
-        """Apply impulses, m/s, to the labels that have left but not arrived."""
-        e, error = self._law.closing_speed, self._law.impulse_error
+        """Apply impulses, m/s, shape (C, B), to the labels that have left but not arrived."""
+        e = self._law.closing_speed
         travelled = e * (self._law.step * elapsed)
+        doubt = np.stack([self._doubt(impulse_m_s, law) for law in self._laws])
         still = []
         for pieces, real in self._pending:
-            near = np.maximum(pieces[:, :, NEAREST] - travelled, 0.0) / e
-            far = np.maximum(pieces[:, :, FARTHEST] - travelled, 0.0) / e
+            near = np.maximum(pieces[..., NEAREST] - travelled, 0.0) / e
+            far = np.maximum(pieces[..., FARTHEST] - travelled, 0.0) / e
             if not (real & (far > 0.0)).any():
                 self._settled = np.maximum(self._settled, self._worst([(pieces, real)]))
                 continue
-            for_least, for_greatest = (
-                impulse_m_s - error * np.abs(impulse_m_s),
-                impulse_m_s + error * np.abs(impulse_m_s),
-            )
-            moves = np.stack([k[:, None] * x for k in (for_least, for_greatest) for x in (near, far)])
-            pieces[:, :, LEAST] -= moves.max(axis=0)
-            pieces[:, :, GREATEST] -= moves.min(axis=0)
+            for_least, for_greatest = impulse_m_s - doubt, impulse_m_s + doubt
+            moves = np.stack([k[..., None] * x for k in (for_least, for_greatest) for x in (near, far)])
+            pieces[..., LEAST] -= moves.max(axis=0)
+            pieces[..., GREATEST] -= moves.min(axis=0)
             still.append((pieces, real))
         self._pending = still
 
+    @staticmethod
+    def _doubt(impulse_m_s: Floats, law: SectionLaw) -> Floats:
+        along = np.abs(impulse_m_s[law.channel])
+        if law.pointing_across == 0.0:
+            return np.asarray(law.impulse_error * along)
+        size = np.hypot.reduce(impulse_m_s, axis=0)
+        return np.asarray(law.impulse_error * along + (law.pointing_along * along + law.pointing_across * size))
+
     def leave(self, active: Flags, lower: Floats, upper: Floats, stack: SectionStack, history: History) -> None:
         """Add the bound of the labels that leave now: the living ones from `lower` to `upper`."""
-        batch = len(active)
+        channels, batch = len(self._laws), len(active)
         errors = history.errors_if_any
         most = PIECES if errors is None else PIECES * MOST_LEAVING_WINDOWS
-        pieces, made = np.zeros((batch, most, 4)), np.zeros(batch, dtype=np.int64)
+        pieces, made = np.zeros((channels, batch, most, 4)), np.zeros(batch, dtype=np.int64)
         bound_leaving_all(
             active,
             lower,
@@ -361,12 +385,12 @@ class GuaranteedMiss:
             history.tapes,
             errors,
             stack.sections,
-            self._law,
-            workspace(history.events, 1),
+            stack.table,
+            workspace(channels, history.events, 1),
             Outlines(
                 np.empty(MOST_LABELS),
-                np.empty((MOST_LABELS, chains.CAPACITY, 2)),
-                np.empty(MOST_LABELS, dtype=np.int64),
+                np.empty((channels, MOST_LABELS, chains.CAPACITY, 2)),
+                np.empty((channels, MOST_LABELS), dtype=np.int64),
                 np.empty((4, MOST_LABELS)),
             ),
             pieces,
@@ -380,6 +404,6 @@ class GuaranteedMiss:
     def _worst(self, parts: list[tuple[Floats, Flags]]) -> Floats:
         worst = np.zeros_like(self._settled)
         for pieces, real in parts:
-            modulus = np.maximum(pieces[:, :, GREATEST], -pieces[:, :, LEAST])
+            modulus = np.hypot.reduce(np.maximum(pieces[..., GREATEST], -pieces[..., LEAST]), axis=0)
             worst = np.maximum(worst, np.where(real, modulus, 0.0).max(axis=1))
         return worst * ((1.0 + self._speed_error) * (1.0 + SLACK))

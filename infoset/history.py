@@ -14,7 +14,7 @@ ROOM_AT_START = 64
 
 @by_reference
 class Tapes(NamedTuple):
-    """Histories of a batch for the kernels: the fields of `Tape`, with values and applies of shape (events, B)."""
+    """Histories of a batch for the kernels: `Tape` with values of shape (events, C, B) and applies (events, B)."""
 
     kinds: Integers
     values: Floats
@@ -27,6 +27,8 @@ class History:
 
     Parameters
     ----------
+    channels : int
+        Number of lateral axes C.
     batch : int
         Number of engagements B.
 
@@ -36,8 +38,8 @@ class History:
         Kind of each event: an angle, an impulse, a prediction, a rate or a widening.
     errors : ndarray, shape (>= events,)
         Error bound of each measured rate, rad/s; zero for the other kinds.
-    values : ndarray, shape (>= events, B)
-        Measured angle, rad, impulse, m/s, or measured rate, rad/s; unused for the other kinds.
+    values : ndarray, shape (>= events, C, B)
+        Measured angle, rad, impulse, m/s, or measured rate, rad/s, along each axis; unused for the other kinds.
     applies : ndarray of bool, shape (>= events, B)
         Whether the event applies to the engagement; a prediction applies to all.
     events : int
@@ -46,17 +48,17 @@ class History:
         Number of predictions.
     """
 
-    def __init__(self, batch: int) -> None:
+    def __init__(self, channels: int, batch: int) -> None:
         self.kinds = np.zeros(ROOM_AT_START, dtype=np.int64)
         self.errors = np.zeros(ROOM_AT_START)
-        self.values = np.zeros((ROOM_AT_START, batch))
+        self.values = np.zeros((ROOM_AT_START, channels, batch))
         self.applies = np.zeros((ROOM_AT_START, batch), dtype=bool)
         self.events = 0
         self.elapsed = 0
         self._has_rates = False
 
     def record(self, kind: int, values: Floats | None = None, applies: Flags | bool = True, error: float = 0.0) -> int:
-        """Append an event and return its number."""
+        """Append an event, with values of shape (C, B), and return its number."""
         event = self.events
         if event == self.kinds.size:
             self.kinds = np.concatenate((self.kinds, np.zeros_like(self.kinds)))
@@ -80,7 +82,8 @@ class History:
     def total_impulse(self) -> Floats:
         """Return the sum of the impulses' magnitudes in each engagement, m/s, shape (B,)."""
         fired = self.applies[: self.events] & (self.kinds[: self.events] == IMPULSE)[:, None]
-        return np.asarray(np.where(fired, np.abs(self.values[: self.events]), 0.0).sum(axis=0))
+        sizes = np.hypot.reduce(self.values[: self.events], axis=1)
+        return np.asarray(np.where(fired, np.abs(sizes), 0.0).sum(axis=0))
 
     @property
     def tapes(self) -> Tapes:
@@ -89,7 +92,7 @@ class History:
 
     def tape(self, engagement: int) -> Tape:
         """Return the history of one engagement."""
-        values, applies = self.values[:, engagement].copy(), self.applies[:, engagement].copy()
+        values, applies = self.values[:, :, engagement].T.copy(), self.applies[:, engagement].copy()
         return Tape(self.kinds, values, applies, self.events, *NO_WINDOW)
 
     @property

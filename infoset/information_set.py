@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from infoset import section_life
+from infoset import section_life, section_passes
 from infoset.guaranteed_miss import GuaranteedMiss
 from infoset.history import History
 from infoset.limits import COUNT, NOT_NEGATIVE, PART, flags, real_array, shown
 from infoset.model import InitialSet, Recovery, SetModel
-from infoset.section_law import BOUND_SLACK, section_law
-from infoset.section_life import steepest_angle
+from infoset.section_law import BOUND_SLACK, section_laws
 from infoset.section_stack import SectionStack
 from infoset.set_queries import SetQueries
 from infoset.set_state import Flags, Floats, SetState, SetStatus
@@ -20,8 +19,36 @@ from infoset.set_state import Flags, Floats, SetState, SetStatus
 class InformationSetView(SetQueries):
     """Read-only view of an information set. It follows the set and cannot change it."""
 
+    def axis(self, name: str) -> InformationSetView:
+        """Return the view of the plane of x and one lateral axis, "y" or "z", with the queries of a planar set.
+
+        Parameters
+        ----------
+        name : str
+            One of `axes`.
+
+        Raises
+        ------
+        ValueError
+            If the set does not have the axis.
+        """
+        if name not in self.axes:
+            raise ValueError(f"name must be one of the lateral axes, {', '.join(self.axes)}: got {name!r}")
+        return InformationSetView(self._state, name)
+
     def copy(self) -> InformationSet:
-        """Return an independent information set that starts from the state of this one."""
+        """Return an independent information set that starts from the state of this one.
+
+        Raises
+        ------
+        TypeError
+            If this is the view of one axis of a set in space.
+        """
+        if self.axes != self._state.model.axes:
+            raise TypeError(
+                "the view of one axis cannot be copied: copy the view of the whole set, which a strategy with "
+                "`spatial = True` gets"
+            )
         twin = InformationSet.__new__(InformationSet)
         SetQueries.__init__(twin, self._state.copy())
         return twin
@@ -75,19 +102,19 @@ class InformationSet(InformationSetView):
         labels[:, : model.sections] = (
             np.linspace(least, greatest, model.sections) if model.sections > 1 else 0.5 * (least + greatest)
         )
-        law = section_law(model)
+        laws = section_laws(model)
         has_phi = guarantee and model.is_guaranteed and model.initial_set is InitialSet.BOX
         state = SetState(
             model=model,
-            stack=SectionStack(law, labels, np.full(batch, model.sections)),
-            history=History(batch),
+            stack=SectionStack(laws, labels, np.full(batch, model.sections)),
+            history=History(len(laws), batch),
             lower_label=np.full(batch, least),
             upper_label=np.full(batch, greatest),
             status=np.full(batch, SetStatus.TRACKING.value, dtype=np.int64),
             some_left=np.zeros(batch, dtype=bool),
             lost_step=np.full(batch, -1, dtype=np.int64),
             lost_label=np.zeros(batch),
-            phi=GuaranteedMiss(law, batch, model.speed_error) if has_phi else None,
+            phi=GuaranteedMiss(laws, batch, model.speed_error) if has_phi else None,
         )
         super().__init__(state)
 
@@ -133,9 +160,9 @@ class InformationSet(InformationSetView):
             Bound b, in [0, 1).
         where : array_like of bool, shape () or (B,)
             Engagements with a measurement.
-        alpha_rad : array_like, shape () or (B,), or None
-            Angle measured at the same time. In the guaranteed model the measured distance is x / cos(alpha); without
-            a measured angle, alpha is bounded by the greatest possible displacement along z.
+        alpha_rad : array_like, shape () or (B,), in space (2, B), or None
+            Angles measured at the same time. In the guaranteed model the measured distance is x / cos(alpha); without
+            a measured angle, alpha is bounded by the greatest possible displacement across x.
 
         Raises
         ------
@@ -147,14 +174,14 @@ class InformationSet(InformationSetView):
         A range measurement narrows the interval of labels and leaves the polygons of the others unchanged.
         """
         PART.need("relative_error", relative_error)
-        measured = self._spread(range_m, "range_m")
+        measured = real_array("range_m", range_m, (self.batch,))
         if (measured < 0.0).any():
             raise ValueError(f"range_m must not be negative: got {shown(range_m)}")
         state, active = self._state, self._active(where)
         travelled = self.model.closing_speed_m_s * self.time_s
         slack = section_life.CUT_SLACK * (measured + travelled)
         eta = self.model.speed_error
-        nearer = np.cos(self._greatest_alpha(alpha_rad)) if self.model.is_guaranteed else 1.0
+        nearer = self._least_cosine(alpha_rad) if self.model.is_guaranteed else 1.0
         lower = measured * nearer / ((1.0 + relative_error) * (1.0 + eta)) + travelled - slack
         upper = measured / ((1.0 - relative_error) * (1.0 - eta)) + travelled + slack
         before = state.lower_label.copy(), state.upper_label.copy()
@@ -165,28 +192,28 @@ class InformationSet(InformationSetView):
             emptied = self._refine_if_few(active, emptied=SetStatus.EMPTY)
             self._recover(emptied, None, *before)
 
-    def _greatest_alpha(self, measured_rad: ArrayLike | None) -> Floats:
-        """Bound of |alpha| now, rad, shape (B,): from a measured angle, or from the greatest possible velocity."""
-        law, travelled = self._state.stack.law, self.model.closing_speed_m_s * self.time_s
+    def _least_cosine(self, measured_rad: ArrayLike | None) -> Floats:
+        """Lower bound of x over the distance, shape (B,): from measured angles, or from the greatest velocity."""
+        stack, travelled = self._state.stack, self.model.closing_speed_m_s * self.time_s
         if measured_rad is not None:
-            farthest = law.label_greatest - travelled
-            return np.array(
-                [steepest_angle(alpha, farthest, law) for alpha in self._spread(measured_rad, "alpha_rad").tolist()]
-            )
+            alpha, steepest = self._spread(measured_rad, "alpha_rad"), np.empty((2, self.batch))
+            section_passes.steepest_all(alpha, stack.law.label_greatest - travelled, stack.table, steepest)
+            return np.asarray(np.cos(steepest[0]) * np.cos(steepest[1]))
         box = self.model.bounds
         impulses = self._state.history.total_impulse() * (1.0 + self.model.execution_error_relative)
-        fastest = impulses + max(abs(v) for v in box.vz_m_s) + law.disturbance * self.time_s
-        offset = max(abs(z) for z in box.z_m) + fastest * self.time_s
+        disturbance = float(np.hypot.reduce([law.disturbance for law in stack.laws]))
+        fastest = impulses + box.lateral_speed_m_s + disturbance * self.time_s
+        offset = box.offset_m + fastest * self.time_s
         nearest = np.maximum((self._state.lower_label - travelled) * (1.0 - self.model.speed_error), 0.0)
-        return np.asarray(np.arctan2(offset, nearest))
+        return np.asarray(np.cos(np.arctan2(offset, nearest)))
 
     def measure_angle(self, alpha_rad: ArrayLike, where: ArrayLike = True) -> None:
         """Cut every section by a line-of-sight angle measurement: |alpha - alpha_m| <= a + h(x).
 
         Parameters
         ----------
-        alpha_rad : array_like, shape () or (B,)
-            Measured angle alpha_m, rad.
+        alpha_rad : array_like, shape () or (B,), in space (2, B)
+            Measured angle alpha_m, rad; in space both angles in the convention of the sensor, that of y first.
         where : array_like of bool, shape () or (B,)
             Engagements with a measurement.
         """
@@ -203,8 +230,8 @@ class InformationSet(InformationSetView):
 
         Parameters
         ----------
-        omega_rad_s : array_like, shape () or (B,)
-            Measured rate, rad/s.
+        omega_rad_s : array_like, shape () or (B,), in space (2, B)
+            Measured rate, rad/s; in space those of both plane angles, that of y first.
         error_rad_s : float
             Error bound of the rate, rad/s.
         where : array_like of bool, shape () or (B,)
@@ -229,14 +256,14 @@ class InformationSet(InformationSetView):
 
         Parameters
         ----------
-        impulse_m_s : array_like, shape () or (B,)
-            Impulse k along z, m/s.
+        impulse_m_s : array_like, shape () or (B,), in space (2, B)
+            Impulse k along z, m/s; in space along y and z.
         where : array_like of bool, shape () or (B,)
             Engagements with an impulse.
         """
         impulse = self._spread(impulse_m_s, "impulse_m_s")
         state, elapsed = self._state, self._state.history.elapsed
-        active = self._computes_phi & flags("where", where, (self.batch,)) & (impulse != 0.0)
+        active = self._computes_phi & flags("where", where, (self.batch,)) & (impulse != 0.0).any(axis=0)
         if state.phi is not None:
             state.phi.fire(np.where(active, impulse, 0.0), elapsed)
         state.history.record(section_life.IMPULSE, impulse, active)
@@ -302,7 +329,10 @@ class InformationSet(InformationSetView):
         self._state.status[flags("where", where, (self.batch,))] = SetStatus.STOPPED.value
 
     def _spread(self, value: ArrayLike, name: str) -> Floats:
-        return real_array(name, value, (self.batch,))
+        """Return values along each axis, shape (C, B)."""
+        channels = len(self._state.stack.laws)
+        shape = (self.batch,) if channels == 1 else (channels, self.batch)
+        return np.ascontiguousarray(real_array(name, value, shape).reshape(channels, self.batch))
 
     def _active(self, where: ArrayLike) -> Flags:
         return np.asarray(self.tracking & flags("where", where, (self.batch,)))

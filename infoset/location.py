@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset._compile import allocation_free, entry
+from infoset._compile import ZERO, allocation_free, entry, inlined
 from infoset.chains import CAPACITY, copy_section, count_of, room_of
 from infoset.concave_bounds import is_dead_between
 from infoset.history import Tapes
@@ -20,6 +20,7 @@ from infoset.replays import (
     LOWER,
     MOST_HALVED_WINDOWS,
     PROBE,
+    ROWS,
     UPPER,
     Record,
     Workspace,
@@ -29,9 +30,9 @@ from infoset.replays import (
     probe,
     run,
 )
-from infoset.section_law import SectionLaw
+from infoset.section_law import SectionLaw, law_of
 from infoset.section_life import ALIVE, Flags, Floats, Tape, summarise_section
-from infoset.section_passes import Sections, tape_of
+from infoset.section_passes import Sections, row_of, tape_of
 
 LABEL_RESOLUTION = 1e-13
 MOST_PROBES = 200
@@ -62,7 +63,7 @@ def locate_end(
     resolution: float,
     tape: Tape,
     errors: Floats | None,
-    law: SectionLaw,
+    laws: Floats,
     room: Workspace,
     row: int,
 ) -> tuple[float, float]:
@@ -76,7 +77,7 @@ def locate_end(
     variant of regula falsi converges fast. If four probes have not narrowed the bracket to an eighth, because that
     event changes with the label, one bisection follows.
     """
-    run(living, tape, errors, law, room.replays)
+    run(living, tape, errors, laws, room.replays)
     keep_living(room, tape.events, row)
     end, died, overlap = dead.label, dead.died, dead.overlap
     weight_dead = overlap
@@ -96,7 +97,7 @@ def locate_end(
             least = 0.5 * resolution / width
             fraction = min(max(-weight_dead / (weight_living - weight_dead), least), 1.0 - least)
         label = end + fraction * (living - end)
-        probe_died, probe_overlap = run(label, tape, errors, law, room.replays)
+        probe_died, probe_overlap = run(label, tape, errors, laws, room.replays)
         if probe_died == ALIVE:
             living = label
             keep_living(room, tape.events, row)
@@ -112,7 +113,7 @@ def locate_end(
 
 
 @allocation_free
-def search_living(resolution: float, tape: Tape, errors: Floats | None, law: SectionLaw, room: Workspace) -> bool:
+def search_living(resolution: float, tape: Tape, errors: Floats | None, laws: Floats, room: Workspace) -> bool:
     """Search for a living label between the first three known ones, which are dead; the middle one outlives the others.
 
     Returns
@@ -133,7 +134,7 @@ def search_living(resolution: float, tape: Tape, errors: Floats | None, law: Sec
         outer, at = (0, 1) if lower_half else (2, 2)
         for i in range(3):
             four[i if i < at else i + 1] = known[i]
-        lives = probe(four, at, 0.5 * (known[1].label + known[outer].label), tape, errors, law, room.replays)
+        lives = probe(four, at, 0.5 * (known[1].label + known[outer].label), tape, errors, laws, room.replays)
         if not lives and is_dead_between(four, room.latest):
             return False
         if lives or outlives(four[at], known[1]):
@@ -153,7 +154,7 @@ def search_window(
     resolution: float,
     tape: Tape,
     errors: Floats | None,
-    law: SectionLaw,
+    laws: Floats,
     room: Workspace,
 ) -> bool:
     """Return whether a label of the tape's window lives with the bands that are convex on the window.
@@ -162,7 +163,7 @@ def search_window(
     """
     known = room.known
     for i, label in ((1, first), (0, lower), (2, upper)):
-        if probe(known, i, label, tape, errors, law, room.replays):
+        if probe(known, i, label, tape, errors, laws, room.replays):
             known[1] = known[i]
             return True
     for end in (0, 2):
@@ -170,7 +171,7 @@ def search_window(
             known[2 - end] = known[1]
             known[1] = known[end]
             break
-    return search_living(resolution, tape, errors, law, room)
+    return search_living(resolution, tape, errors, laws, room)
 
 
 @allocation_free
@@ -180,7 +181,7 @@ def search_everywhere(
     resolution: float,
     tape: Tape,
     errors: Floats | None,
-    law: SectionLaw,
+    laws: Floats,
     room: Workspace,
 ) -> tuple[bool, float]:
     """Find a living label within limits if the living labels need not form an interval, or prove that none lives.
@@ -206,12 +207,12 @@ def search_everywhere(
         windows[best] = windows[count]
         for p, q in ((near, middle), (middle, far)):
             window = Tape(tape.kinds, tape.values, tape.applies, tape.events, p, q)
-            if not search_window(p, q, 0.5 * (p + q), resolution, window, errors, law, room):
+            if not search_window(p, q, 0.5 * (p + q), resolution, window, errors, laws, room):
                 continue
             new = windows[count]
             new.near, new.far, new.died, new.overlap = p, q, -1, -np.inf
             for label in (room.known[1].label, p, q):
-                if probe(probed, 0, label, tape, errors, law, room.replays):
+                if probe(probed, 0, label, tape, errors, laws, room.replays):
                     return True, label
                 if outlives(probed[0], new):
                     new.died, new.overlap = probed[0].died, probed[0].overlap
@@ -227,7 +228,7 @@ def locate_living(
     sections: Sections,
     tape: Tape,
     errors: Floats | None,
-    law: SectionLaw,
+    laws: Floats,
     room: Workspace,
 ) -> Living:
     """Locate the living labels of an engagement within limits, from its stored labels.
@@ -254,10 +255,10 @@ def locate_living(
     known[0].label, known[end].label = limit_below, limit_above
     some_live = last > 0
     # A limit must be replayed only if no dead label separates it from the living ones.
-    if (not some_live or first == 1) and probe(known, 0, limit_below, tape, errors, law, room.replays):
+    if (not some_live or first == 1) and probe(known, 0, limit_below, tape, errors, laws, room.replays):
         keep_section(room.replays, LOWER)
         first, some_live = 0, True
-    if (not some_live or last == end - 1) and probe(known, end, limit_above, tape, errors, law, room.replays):
+    if (not some_live or last == end - 1) and probe(known, end, limit_above, tape, errors, laws, room.replays):
         keep_section(room.replays, UPPER)
         first = first if some_live else end
         last, some_live = end, True
@@ -271,10 +272,10 @@ def locate_living(
         known[0], known[2] = known[max(best - 1, 0)], known[min(best + 1, end)]
         known[1] = room.four[0]
         first, last, end = 1, 1, 2
-        if not search_living(resolution, tape, errors, law, room):
+        if not search_living(resolution, tape, errors, laws, room):
             if errors is None:
                 return none_lives
-            alive_now, label = search_everywhere(limit_below, limit_above, resolution, tape, errors, law, room)
+            alive_now, label = search_everywhere(limit_below, limit_above, resolution, tape, errors, laws, room)
             if not alive_now:
                 return none_lives
             below, above = limit_below, limit_above
@@ -284,19 +285,25 @@ def locate_living(
                 elif label < labels[b, s] < above:
                     above = labels[b, s]
             known[1].label = label
-            if probe(known, 0, below, tape, errors, law, room.replays):
+            if probe(known, 0, below, tape, errors, laws, room.replays):
                 keep_section(room.replays, LOWER)
                 first = 0
-            if probe(known, 2, above, tape, errors, law, room.replays):
+            if probe(known, 2, above, tape, errors, laws, room.replays):
                 keep_section(room.replays, UPPER)
                 last = 2
     below = lower = known[first].label
     if first > 0:
-        below, lower = locate_end(known[first - 1], lower, resolution, tape, errors, law, room, LOWER)
+        below, lower = locate_end(known[first - 1], lower, resolution, tape, errors, laws, room, LOWER)
     above = upper = known[last].label
     if last < end:
-        above, upper = locate_end(known[last + 1], upper, resolution, tape, errors, law, room, UPPER)
+        above, upper = locate_end(known[last + 1], upper, resolution, tape, errors, laws, room, UPPER)
     return Living(True, below, lower, upper, above)
+
+
+@inlined
+def is_convex(law: SectionLaw) -> bool:
+    """Whether sets without rates are convex in (z, V, label), so that the living labels form one interval."""
+    return not law.rectangle if law.exact_angles else law.error_slope <= 0.0
 
 
 @entry
@@ -309,7 +316,7 @@ def refine_all(
     tapes: Tapes,
     errors: Floats | None,
     sections: Sections,
-    law: SectionLaw,
+    laws: Floats,
     room: Workspace,
 ) -> int:
     """Replace the sections of the wanted engagements by a grid over the living labels, ends included.
@@ -321,23 +328,24 @@ def refine_all(
 
     Notes
     -----
-    `limit_below` and `limit_above` are narrowed to dead labels, except with rates or with the rectangle as initial set
-    of the guaranteed model, since other labels may live beyond them. If no label lives, the engagement has no living
-    section afterwards.
+    `limit_below` and `limit_above` are narrowed to dead labels, except where other labels may live beyond them: with
+    rates, with the rectangle as initial set of the guaranteed model, and with an error bound that rises with range in
+    the paper's model. If no label lives, the engagement has no living section afterwards.
     """
     spare = CAPACITY
     labels, used, alive, died = sections.labels, sections.used, sections.living, sections.died
     overlaps, summaries = sections.overlaps, sections.summaries
     origins, rings, marks, new = sections.origins, sections.rings, sections.marks, room.replays
+    law = law_of(laws, ZERO)
     for b in range(labels.shape[0]):
         if not wanted[b]:
             continue
         tape = tape_of(tapes, b, room.replays.values, room.replays.applies)
-        living = locate_living(b, limit_below[b], limit_above[b], sections, tape, errors, law, room)
+        living = locate_living(b, limit_below[b], limit_above[b], sections, tape, errors, laws, room)
         alive[b, : used[b]] = False
         if not living.exists:
             continue
-        if errors is None and not (law.rectangle and law.exact_angles):
+        if errors is None and is_convex(law):
             limit_below[b] = living.below
             limit_above[b] = living.above
         used[b] = number
@@ -347,16 +355,18 @@ def refine_all(
             if s > 0 and s == number - 1:
                 label = living.upper
             labels[b, s] = label
-            n = b * labels.shape[1] + s
             row = PROBE
             if number > 1 and (s == 0 or s == number - 1):
                 row = LOWER if s == 0 else UPPER
                 died[b, s], overlaps[b, s] = ALIVE, 0.0
             else:
-                died[b, s], overlaps[b, s] = run(label, tape, errors, law, room.replays)
+                died[b, s], overlaps[b, s] = run(label, tape, errors, laws, room.replays)
             alive[b, s] = died[b, s] == ALIVE
             if alive[b, s]:
-                copy_section(new.origins, new.rings, new.marks, row, origins, rings, marks, n)
-                summarise_section(origins, rings, marks, n, label, elapsed, law, summaries, b, s)
-                spare = min(spare, room_of(marks, n) - count_of(marks, n))
+                for channel in range(laws.shape[0]):
+                    n, at = row_of(labels, channel, b, s), ROWS * channel + row
+                    copy_section(new.origins, new.rings, new.marks, at, origins, rings, marks, n)
+                    its = law_of(laws, channel)
+                    summarise_section(origins, rings, marks, n, label, elapsed, its, summaries, b, s)
+                    spare = min(spare, room_of(marks, n) - count_of(marks, n))
     return spare

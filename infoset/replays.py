@@ -11,7 +11,7 @@ from infoset import chains, polygon
 from infoset._compile import allocation_free, by_reference, constants, entry
 from infoset.chains import copy_section, empty_sections, working_room
 from infoset.history import History, Tapes
-from infoset.section_law import SectionLaw
+from infoset.section_law import law_of
 from infoset.section_life import (
     ALIVE,
     AT_START,
@@ -30,7 +30,11 @@ MOST_HALVED_WINDOWS = 1000
 """Greatest number of windows of labels that a search halves. If more are needed, the set counts as empty."""
 
 PROBE, LOWER, UPPER = constants(3)
-"""Rows of the workspace: the section of the last replay, and the sections at the ends of the living labels."""
+"""Rows of the workspace: the section of the last replay, and the sections at the ends of the living labels.
+
+Row i of axis c is `ROWS` c + i.
+"""
+ROWS = 3
 
 
 Records = np.recarray[tuple[int], np.dtype[np.record]]
@@ -51,11 +55,11 @@ class ReplayRoom(NamedTuple):
 
     Parameters
     ----------
-    values, applies : ndarray, shape (E,)
+    values, applies : ndarray, shape (C, E) and (E,)
         History of one engagement in contiguous arrays: angles, rates and impulses, SI, and the events that apply.
     origins, rings, marks : ndarray
         Sections, stored as in `chains`; the last replay is `PROBE`.
-    overlaps : ndarray, shape (E,)
+    overlaps : ndarray, shape (C, E)
         Overlap of section and band at each measurement, m, in the last replay.
     points : ndarray, shape (n, 2)
         Vertices of a section.
@@ -98,21 +102,21 @@ class Workspace(NamedTuple):
     windows: Records
 
 
-def replay_room(events: int, sections: int) -> ReplayRoom:
-    """Allocate the arrays for replays of `events` events, with room for some sections."""
+def replay_room(channels: int, events: int) -> ReplayRoom:
+    """Allocate the arrays for replays of `events` events along a number of axes."""
     return ReplayRoom(
-        np.empty(events),
+        np.empty((channels, events)),
         np.empty(events, dtype=bool),
-        *empty_sections(sections),
-        overlaps=np.empty(events),
+        *empty_sections(ROWS * channels),
+        overlaps=np.empty((channels, events)),
         points=working_room(),
     )
 
 
-def workspace(events: int, slots: int) -> Workspace:
+def workspace(channels: int, events: int, slots: int) -> Workspace:
     """Allocate the arrays for replays of `events` events and a search over `slots` stored labels."""
     return Workspace(
-        replay_room(events, 3),
+        replay_room(channels, events),
         living_overlaps=np.empty(events),
         known=np.recarray(slots + 2, PROBED),
         four=np.recarray(4, PROBED),
@@ -122,34 +126,56 @@ def workspace(events: int, slots: int) -> Workspace:
 
 
 @allocation_free
-def run(label: float, tape: Tape, errors: Floats | None, law: SectionLaw, room: ReplayRoom) -> tuple[int, float]:
-    """Replay a label; return the event at which it became empty, or ALIVE, and the overlap there, or zero."""
-    died = replay(label, tape, errors, law, room.origins, room.rings, room.marks, PROBE, room.overlaps, room.points)
-    return died, room.overlaps[died] if died != ALIVE else 0.0
+def run(label: float, tape: Tape, errors: Floats | None, laws: Floats, room: ReplayRoom) -> tuple[int, float]:
+    """Replay a label along all axes; return the event at which it became empty, or ALIVE, and the overlap there, or 0.
+
+    A label becomes empty with the first of its axes. If several become empty at one event, the least overlap counts.
+    """
+    died, overlap = ALIVE, 0.0
+    kinds, values, applies, events, nearest, farthest = tape
+    for channel in range(laws.shape[0]):
+        # Later events of a label that is empty along one axis do not matter.
+        part = Tape(kinds, values, applies, events if died == ALIVE else died + 1, nearest, farthest)
+        law, row = law_of(laws, channel), ROWS * channel + PROBE
+        died_here = replay(
+            label, part, errors, law, room.origins, room.rings, room.marks, row, room.overlaps, room.points
+        )
+        if died_here != ALIVE:
+            overlap_here = room.overlaps[channel, died_here]
+            overlap = min(overlap, overlap_here) if died_here == died else overlap_here
+            died = died_here
+    return died, overlap
 
 
 @allocation_free
 def probe(
-    known: Records, i: int, label: float, tape: Tape, errors: Floats | None, law: SectionLaw, room: ReplayRoom
+    known: Records, i: int, label: float, tape: Tape, errors: Floats | None, laws: Floats, room: ReplayRoom
 ) -> bool:
     """Replay a label and write it to record `i`; return whether it lives."""
-    died, overlap = run(label, tape, errors, law, room)
+    died, overlap = run(label, tape, errors, laws, room)
     known[i].label, known[i].died, known[i].overlap = label, died, overlap
     return died == ALIVE
 
 
 @allocation_free
 def keep_section(room: ReplayRoom, row: int) -> None:
-    """Copy the section of the last replay to a row of the workspace."""
-    copy_section(room.origins, room.rings, room.marks, PROBE, room.origins, room.rings, room.marks, row)
+    """Copy the sections of the last replay to a row of the workspace."""
+    for first in range(0, ROWS * room.overlaps.shape[0], ROWS):
+        copy_section(
+            room.origins, room.rings, room.marks, first + PROBE, room.origins, room.rings, room.marks, first + row
+        )
 
 
 @allocation_free
 def keep_living(room: Workspace, events: int, row: int) -> None:
-    """Copy section and overlaps of the last replay to those of the living label."""
+    """Copy sections and overlaps of the last replay to those of the living label."""
     keep_section(room.replays, row)
+    overlaps = room.replays.overlaps
     for event in range(events):
-        room.living_overlaps[event] = room.replays.overlaps[event]
+        least = overlaps[0, event]
+        for channel in range(1, overlaps.shape[0]):
+            least = min(least, overlaps[channel, event])
+        room.living_overlaps[event] = least
 
 
 @allocation_free
@@ -158,8 +184,8 @@ def outlives(one: Record, other: Record) -> bool:
     return bool(one.died > other.died or (one.died == other.died and one.overlap > other.overlap))
 
 
-def margins_along(labels: Floats, looks: Integers, v: Floats, z: Floats, history: History, law: SectionLaw) -> Floats:
-    """Return the signed distances, m, of states (V, z) to the boundaries of sections during an engagement, (L, B).
+def margins_along(labels: Floats, looks: Integers, v: Floats, z: Floats, history: History, laws: Floats) -> Floats:
+    """Return the signed distances, m, of states (V, z) to the boundaries of sections during an engagement, (C, L, B).
 
     Parameters
     ----------
@@ -167,17 +193,19 @@ def margins_along(labels: Floats, looks: Integers, v: Floats, z: Floats, history
         Label of each engagement, m.
     looks : ndarray of int, shape (L,)
         Number of events before each state.
-    v, z : ndarray, shape (L, B)
-        The states, m/s and m.
+    v, z : ndarray, shape (C, L, B)
+        The states along each axis, m/s and m.
+    laws : ndarray, shape (C, constants)
+        Constants of the model.
 
     Returns
     -------
-    ndarray, shape (L, B)
+    ndarray, shape (C, L, B)
         Positive inside; for an empty section its overlap with the band that made it empty.
     """
     margins = np.empty(v.shape)
-    room = replay_room(history.events, 1)
-    margins_all(labels, looks, v, z, history.tapes, history.errors_if_any, law, room, margins)
+    room = replay_room(len(laws), history.events)
+    margins_all(labels, looks, v, z, history.tapes, history.errors_if_any, laws, room, margins)
     return margins
 
 
@@ -189,7 +217,7 @@ def margins_all(
     z: Floats,
     tapes: Tapes,
     errors: Floats | None,
-    law: SectionLaw,
+    laws: Floats,
     room: ReplayRoom,
     margins: Floats,
 ) -> None:
@@ -197,19 +225,22 @@ def margins_all(
     origins, rings, marks = room.origins, room.rings, room.marks
     for b in range(labels.shape[0]):
         label, tape = labels[b], tape_of(tapes, b, room.values, room.applies)
-        start_section(origins, rings, marks, PROBE, label, law)
-        died, done = ALIVE, AT_START
-        for look in range(looks.shape[0]):
-            if died == ALIVE:
-                part = Tape(tape.kinds, tape.values, tape.applies, looks[look], tape.nearest, tape.farthest)
-                died, done = continue_replay(
-                    done, label, part, errors, law, origins, rings, marks, PROBE, room.overlaps, room.points
-                )
-            if died == ALIVE:
-                tau = time_to_go(label, done.elapsed, law)
-                margins[look, b] = margin_in(origins, rings, marks, PROBE, tau, v[look, b], z[look, b])
-            else:
-                margins[look, b] = room.overlaps[died]
+        for channel in range(laws.shape[0]):
+            law = law_of(laws, channel)
+            start_section(origins, rings, marks, PROBE, label, law)
+            died, done = ALIVE, AT_START
+            for look in range(looks.shape[0]):
+                if died == ALIVE:
+                    part = Tape(tape.kinds, tape.values, tape.applies, looks[look], tape.nearest, tape.farthest)
+                    died, done = continue_replay(
+                        done, label, part, errors, law, origins, rings, marks, PROBE, room.overlaps, room.points
+                    )
+                if died == ALIVE:
+                    tau = time_to_go(label, done.elapsed, law)
+                    state = v[channel, look, b], z[channel, look, b]
+                    margins[channel, look, b] = margin_in(origins, rings, marks, PROBE, tau, *state)
+                else:
+                    margins[channel, look, b] = room.overlaps[channel, died]
 
 
 @allocation_free
@@ -231,17 +262,6 @@ def margin_in(origins: Floats, rings: Floats, marks: Integers, n: int, tau: floa
 
 
 @entry
-def replay_section(
-    label: float,
-    tape: Tape,
-    errors: Floats | None,
-    law: SectionLaw,
-    origins: Floats,
-    rings: Floats,
-    marks: Integers,
-    n: int,
-    overlaps: Floats,
-    points: Floats,
-) -> int:
-    """Call `replay` from Python."""
-    return replay(label, tape, errors, law, origins, rings, marks, n, overlaps, points)
+def replay_label(label: float, tape: Tape, errors: Floats | None, laws: Floats, room: ReplayRoom) -> int:
+    """Replay a label from Python; return the event at which it became empty, or ALIVE."""
+    return run(label, tape, errors, laws, room)[0]

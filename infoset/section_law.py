@@ -6,15 +6,22 @@ import math
 import sys
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from infoset._compile import inlined
 from infoset.model import InitialSet, Interval, SetModel
+from infoset.sensors import Convention
 
 BOUND_SLACK = 1e-9
 """Relative enlargement of the bounds of the guaranteed model; rounding errors are far smaller."""
 ROUNDING = 16.0 * sys.float_info.epsilon
+PLANE, ELEVATION, CONE = range(3)
+"""How a measured angle bounds the slope of its axis: alone; as elevation of a gimbal; within a cone."""
 
 
 class SectionLaw(NamedTuple):
-    """Constants of a set model for the kernels.
+    """Constants of a set model for the kernels, for one lateral axis, which is called z here.
 
     Parameters
     ----------
@@ -44,6 +51,14 @@ class SectionLaw(NamedTuple):
         Box of initial states, m and m/s; the guaranteed model enlarges it by the error of the scale.
     rectangle : bool
         Whether the initial set is the paper's rectangle in (omega, alpha). Otherwise it is the box.
+    angles : int
+        How a measured angle bounds the slope z/x: `PLANE`, `ELEVATION` or `CONE`.
+    other_error_at_zero_range, other_error_slope : float
+        Error bound of the angle of the other axis; zero in a plane.
+    pointing_along, pointing_across : float
+        Error of an impulse by the engine's direction, as shares of its component along the axis and of its modulus.
+    channel, other : int
+        Number of this axis and of the other one in arrays with an axis of channels; `other` is -1 in a plane.
     """
 
     closing_speed: float
@@ -65,10 +80,77 @@ class SectionLaw(NamedTuple):
     vx_least: float
     vx_greatest: float
     rectangle: bool
+    angles: int
+    other_error_at_zero_range: float
+    other_error_slope: float
+    pointing_along: float
+    pointing_across: float
+    channel: int
+    other: int
 
 
-def section_law(model: SetModel) -> SectionLaw:
-    """Return the constants of a model for the kernels.
+def section_laws(model: SetModel) -> tuple[SectionLaw, ...]:
+    """Return the constants of a model for the kernels, for each of its lateral axes."""
+    laws = [_law(model.axis(name)) for name in model.axes]
+    if len(laws) == 1:
+        return tuple(laws)
+    psi = model.pointing_error_rad if model.is_guaranteed else 0.0
+    angles = {Convention.PLANE: (PLANE, PLANE), Convention.GIMBAL: (PLANE, ELEVATION), Convention.CONE: (CONE, CONE)}
+    return tuple(
+        law._replace(
+            angles=angles[model.angle_sensor.convention][channel] if model.is_guaranteed else PLANE,
+            other_error_at_zero_range=laws[1 - channel].error_at_zero_range,
+            other_error_slope=laws[1 - channel].error_slope,
+            pointing_along=(1.0 - math.cos(psi)) * (1.0 + law.impulse_error),
+            pointing_across=math.sin(psi) * (1.0 + law.impulse_error),
+            channel=channel,
+            other=1 - channel,
+        )
+        for channel, law in enumerate(laws)
+    )
+
+
+def law_table(laws: tuple[SectionLaw, ...]) -> NDArray[np.float64]:
+    """Return the constants of all axes as an array, shape (C, number of constants), for `law_of`."""
+    return np.array(laws, dtype=np.float64)
+
+
+@inlined
+def law_of(table: NDArray[np.float64], channel: int) -> SectionLaw:
+    """Return the constants of one axis from the array of all."""
+    row = np.uint64(channel)
+    return SectionLaw(
+        table[row, 0],  # closing_speed
+        table[row, 1],  # step
+        table[row, 2],  # disturbance
+        table[row, 3],  # half_v
+        table[row, 4],  # half_v_at_start
+        table[row, 5],  # disturbance_lead
+        table[row, 6],  # impulse_error
+        table[row, 7],  # error_at_zero_range
+        table[row, 8],  # error_slope
+        table[row, 9] != 0.0,  # exact_angles
+        table[row, 10],  # label_least
+        table[row, 11],  # label_greatest
+        table[row, 12],  # z_least
+        table[row, 13],  # z_greatest
+        table[row, 14],  # vz_least
+        table[row, 15],  # vz_greatest
+        table[row, 16],  # vx_least
+        table[row, 17],  # vx_greatest
+        table[row, 18] != 0.0,  # rectangle
+        int(table[row, 19]),  # angles
+        table[row, 20],  # other_error_at_zero_range
+        table[row, 21],  # other_error_slope
+        table[row, 22],  # pointing_along
+        table[row, 23],  # pointing_across
+        int(table[row, 24]),  # channel
+        int(table[row, 25]),  # other
+    )
+
+
+def _law(model: SetModel) -> SectionLaw:
+    """Return the constants of a planar model.
 
     Notes
     -----
@@ -118,6 +200,13 @@ def section_law(model: SetModel) -> SectionLaw:
         vx_least=float(box.vx_m_s[0]),
         vx_greatest=float(box.vx_m_s[1]),
         rectangle=model.initial_set is InitialSet.RECTANGLE,
+        angles=PLANE,
+        other_error_at_zero_range=0.0,
+        other_error_slope=0.0,
+        pointing_along=0.0,
+        pointing_across=0.0,
+        channel=0,
+        other=-1,
     )
 
 

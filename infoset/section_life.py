@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import chain_steps, chains, whole_chains
-from infoset._compile import ZERO, allocation_free, entry, inlined
+from infoset._compile import ZERO, allocation_free, inlined
 from infoset.chains import REACH, RIGHT
-from infoset.section_law import SectionLaw
+from infoset.section_law import CONE, ELEVATION, PLANE, SectionLaw
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -28,6 +28,8 @@ CUT_SLACK = 16.0 * chains.EPSILON
 SUM_SLACK = 8.0 * chains.EPSILON
 RIGHT_ANGLE = 0.5 * math.pi
 ANGLE_SLACK = 1e-12
+WIDEST_CONE, CONE_STRETCH = 0.2, 1.01
+"""Greatest error of a direction, rad, that bounds an angle, and a bound of asin(k sin(b))/(k b) up to it."""
 
 ANGLE, IMPULSE, PREDICTION, RATE, WIDENING = range(5)
 ALIVE = np.iinfo(np.int64).max
@@ -44,8 +46,8 @@ class Tape(NamedTuple):
     ----------
     kinds : ndarray of int, shape (>= events,)
         Kind of each event.
-    values : ndarray, shape (>= events,)
-        Angle, rad, impulse, m/s, or rate, rad/s.
+    values : ndarray, shape (C, >= events)
+        Angle, rad, impulse, m/s, or rate, rad/s, along each lateral axis.
     applies : ndarray of bool, shape (>= events,)
         Whether the event applies to this engagement.
     events : int
@@ -74,8 +76,8 @@ class LastSight(NamedTuple):
     ----------
     known : bool
         Whether an angle was measured. If not, the initial box bounds the angle.
-    alpha : float
-        The measured angle, rad.
+    alpha, across : float
+        The measured angles of this axis and of the other one, rad.
     steps : int
         Steps since the measurement.
     moved, doubt : float
@@ -86,6 +88,7 @@ class LastSight(NamedTuple):
 
     known: bool
     alpha: float
+    across: float
     steps: int
     moved: float
     doubt: float
@@ -137,53 +140,123 @@ def start_section(origins: Floats, rings: Floats, marks: Integers, n: int, label
         chain_steps.spread(origins, n, tau, law.half_v_at_start)
 
 
-@entry
-def steepest_angle(alpha: float, range_m: float, law: SectionLaw) -> float:
-    """Return the greatest |alpha|, rad, that agrees with a measured angle up to a range; pi/2 if it is unbounded.
+@allocation_free
+def steepest_angles(alpha: float, across: float, range_m: float, law: SectionLaw) -> tuple[float, float]:
+    """Return the greatest sizes of two measured angles, rad, that agree with the measurements up to a range.
+
+    Parameters
+    ----------
+    alpha, across : float
+        Measured angles of this axis and of the other one, rad.
+
+    Returns
+    -------
+    own, other : float
+        The distance is at most x/(cos(own) cos(other)). If one of them is unbounded, `own` is pi/2 and `other` zero.
 
     Notes
     -----
-    An error bound that grows with the distance r = x/cos(alpha) grows with the angle. The greatest angle is the least
-    solution of s = |alpha_m| + a + h(x/cos(s)). Three fixed-point iterations approach it from below; a fourth step of
-    the length of the third passes it if the right-hand side does not exceed s there.
+    An error bound that grows with the distance r grows with the angles. In a plane r = x/cos(alpha), in space it is at
+    most x/(cos(alpha_y) cos(alpha_z)). The greatest angles are the least solution of s = |alpha_m| + a + h(r(s)). Three
+    fixed-point iterations approach it from below; a fourth step of the length of the third passes it if the right-hand
+    side does not exceed s there.
     """
-    growth = max(law.error_slope, 0.0) * range_m
-    least = abs(alpha) + law.error_at_zero_range
-    before = angle = least + growth
+    growth, other_growth = max(law.error_slope, 0.0) * range_m, max(law.other_error_slope, 0.0) * range_m
+    constant, other_constant = law.error_at_zero_range, law.other_error_at_zero_range
+    if law.angles == CONE:
+        constant, other_constant = constant * CONE_STRETCH / math.cos(across), constant * CONE_STRETCH / math.cos(alpha)
+        growth, other_growth = growth * CONE_STRETCH / math.cos(across), growth * CONE_STRETCH / math.cos(alpha)
+    least, other_least = abs(alpha) + constant, abs(across) + other_constant
+    before = own = least + growth
+    other_before = other = other_least + other_growth
     for _ in range(3):
-        if angle >= RIGHT_ANGLE:
-            return RIGHT_ANGLE
-        before, angle = angle, least + growth / math.cos(angle)
-    angle += (angle - before) + ANGLE_SLACK
-    return angle if angle < RIGHT_ANGLE and least + growth / math.cos(angle) <= angle else RIGHT_ANGLE
+        if own >= RIGHT_ANGLE or other >= RIGHT_ANGLE:
+            return RIGHT_ANGLE, 0.0
+        cosine, other_cosine = math.cos(own), math.cos(other)
+        before, own = own, least + growth / cosine / other_cosine
+        other_before, other = other, other_least + other_growth / cosine / other_cosine
+    own += (own - before) + ANGLE_SLACK
+    other += (other - other_before) + ANGLE_SLACK
+    if own >= RIGHT_ANGLE or other >= RIGHT_ANGLE:
+        return RIGHT_ANGLE, 0.0
+    if law.angles == CONE and max(own - abs(alpha), other - abs(across)) > WIDEST_CONE:
+        return RIGHT_ANGLE, 0.0
+    cosine, other_cosine = math.cos(own), math.cos(other)
+    passed = least + growth / cosine / other_cosine <= own
+    if passed and other_least + other_growth / cosine / other_cosine <= other:
+        return own, other
+    return RIGHT_ANGLE, 0.0
 
 
 @inlined
-def slope_band(alpha: float, label: float, x: float, law: SectionLaw) -> tuple[float, float]:
-    """Return the least and the greatest slope z/x that agree with a measured angle, for a label at range x."""
+def slope_band(alpha: float, across: float, label: float, x: float, law: SectionLaw) -> tuple[float, float]:
+    """Return the least and the greatest slope z/x that agree with measured angles, for a label at range x.
+
+    Parameters
+    ----------
+    alpha, across : float
+        Measured angles of this axis and of the other one, rad. Only a gimbal and a cone use the other one, and an error
+        bound that rises with range.
+
+    Notes
+    -----
+    Bounds over all labels need an upper bound whose product with x is a concave function of x. Therefore the factors by
+    which the angle of the other axis widens the band are the same for all labels.
+    """
     bound = law.error_at_zero_range + law.error_slope * x
-    lower, upper = alpha - bound, alpha + bound
-    if law.exact_angles and law.error_slope > 0.0:
-        # x h(x) is convex here. Bounds over all labels need a concave function: a chord and a tangent are above it.
+    rising = law.exact_angles and law.error_slope > 0.0
+    factor, doubt, half = 1.0, 0.0, 0.0
+    if rising or law.angles != PLANE:
         travelled = label - x
         near, far = max(law.label_least - travelled, 0.0), law.label_greatest - travelled
-        steepest = steepest_angle(alpha, far, law)
-        # The error bound depends on the true distance, x/cos(alpha).
-        longest = (near + far - near * far / x) / math.cos(steepest) if steepest < RIGHT_ANGLE else np.inf
-        half = law.error_at_zero_range + law.error_slope * longest
-        half = half / math.cos(steepest) ** 2 if steepest < RIGHT_ANGLE else np.inf
+        own, other = steepest_angles(alpha, across, far, law)
+        half = np.inf
+        if own < RIGHT_ANGLE:
+            # The error bound depends on the true distance, in a plane x/cos(alpha). Where it rises, x h(x) is convex:
+            # a chord and a tangent are above it.
+            cosine, other_cosine = math.cos(own), math.cos(other)
+            longest = (near + far - near * far / x) / cosine / other_cosine if rising else x
+            farthest = far / cosine / other_cosine
+            half = law.error_at_zero_range + law.error_slope * longest
+            if law.angles == CONE:
+                # asin(sin(b)/cos(across)) is at most its secant k b.
+                greatest = law.error_at_zero_range + max(law.error_slope, 0.0) * farthest
+                stretch = math.asin(math.sin(greatest) / math.cos(across)) / greatest
+                half, bound = half * stretch, bound * stretch
+            elif law.angles == ELEVATION:
+                # z/x is tan(elevation)/cos(azimuth).
+                greatest = law.other_error_at_zero_range + max(law.other_error_slope, 0.0) * farthest
+                least_factor = 1.0 / math.cos(max(abs(across) - greatest, 0.0))
+                greatest_factor = 1.0 / math.cos(abs(across) + greatest)
+                factor = 0.5 * (least_factor + greatest_factor)
+                doubt = 0.5 * (greatest_factor - least_factor) * math.tan(own)
+            half = half / cosine**2
+    lower, upper = alpha - bound, alpha + bound
+    if rising:
         lower, upper = math.tan(alpha) - half, math.tan(alpha) + half
     elif law.exact_angles:
         lower = math.tan(lower) if lower > -RIGHT_ANGLE else -np.inf
         upper = math.tan(upper) if upper < RIGHT_ANGLE else np.inf
+    if law.angles != PLANE:
+        lower, upper = factor * lower - doubt, factor * upper + doubt
+        if half == np.inf:
+            lower, upper = -np.inf, np.inf
     return lower, upper
 
 
 @inlined
 def measure_section(
-    origins: Floats, rings: Floats, marks: Integers, n: int, label: float, elapsed: int, alpha: float, law: SectionLaw
+    origins: Floats,
+    rings: Floats,
+    marks: Integers,
+    n: int,
+    label: float,
+    elapsed: int,
+    alpha: float,
+    across: float,
+    law: SectionLaw,
 ) -> tuple[bool, float]:
-    """Cut a section by an angle measurement.
+    """Cut a section by an angle measurement; `across` is the angle of the other axis.
 
     Returns
     -------
@@ -199,12 +272,12 @@ def measure_section(
     """
     x = range_of(label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x
-    lower, upper = slope_band(alpha, label, x, law)
+    lower, upper = slope_band(alpha, across, label, x, law)
     slack = CUT_SLACK * (label * (abs(alpha) + bound) + origins[n, RIGHT, REACH] * (label / law.closing_speed))
     return chain_steps.cut(origins, rings, marks, n, x / law.closing_speed, x * lower - slack, x * upper + slack)
 
 
-NO_SIGHT = LastSight(False, 0.0, 0, 0.0, 0.0, 0.0)
+NO_SIGHT = LastSight(False, 0.0, 0.0, 0, 0.0, 0.0, 0.0)
 
 
 class Replayed(NamedTuple):
@@ -227,19 +300,41 @@ AT_START = Replayed(ZERO, ZERO, NO_SIGHT)
 
 
 @inlined
-def sight_after(sight: LastSight, kind: int, value: float, applies: bool, law: SectionLaw) -> LastSight:
+def sight_after(
+    sight: LastSight, kind: int, value: float, other_value: float, applies: bool, law: SectionLaw
+) -> LastSight:
     """Return the last sight after one more event of the history."""
-    known, alpha, steps, moved, doubt, fired = sight
+    known, alpha, across, steps, moved, doubt, fired = sight
     if kind == PREDICTION:
         steps += 1
     elif applies and kind == ANGLE:
-        known, alpha, steps, moved, doubt = True, value, 0, 0.0, 0.0
+        known, alpha, across, steps, moved, doubt = True, value, other_value, 0, 0.0, 0.0
     elif applies and kind == IMPULSE:
-        lever, size = law.step * steps, abs(value)
+        lever = law.step * steps
         moved += value * lever
-        doubt += size * law.impulse_error * lever
-        fired += size
-    return LastSight(known, alpha, steps, moved, doubt, fired)
+        doubt += impulse_doubt(value, other_value, law) * lever
+        fired += abs(value) + pointing_doubt(value, other_value, law)
+    return LastSight(known, alpha, across, steps, moved, doubt, fired)
+
+
+@inlined
+def pointing_doubt(impulse: float, across: float, law: SectionLaw) -> float:
+    """Return the error of an impulse along an axis by the direction of the engine, m/s; `across` is the other axis."""
+    if law.pointing_across == 0.0:
+        return 0.0
+    return law.pointing_along * abs(impulse) + law.pointing_across * math.hypot(impulse, across)
+
+
+@inlined
+def impulse_doubt(impulse: float, across: float, law: SectionLaw) -> float:
+    """Return the error bound of an impulse along an axis, m/s; `across` is the impulse along the other axis."""
+    return abs(impulse) * law.impulse_error + pointing_doubt(impulse, across, law)
+
+
+@inlined
+def across_of(tape: Tape, event: int, law: SectionLaw) -> float:
+    """Return the value of an event along the other axis; zero in a plane."""
+    return tape.values[law.other, event] if law.other >= 0 else 0.0
 
 
 @allocation_free
@@ -247,7 +342,8 @@ def last_sight(tape: Tape, law: SectionLaw) -> LastSight:
     """Return the last sight after a whole history."""
     sight = NO_SIGHT
     for event in range(tape.events):
-        sight = sight_after(sight, tape.kinds[event], tape.values[event], tape.applies[event], law)
+        value, across = tape.values[law.channel, event], across_of(tape, event, law)
+        sight = sight_after(sight, tape.kinds[event], value, across, tape.applies[event], law)
     return sight
 
 
@@ -285,8 +381,8 @@ def rate_band(
     then = e * ago
     near_then, far_then = near + then, far + then
     if sight.known:
-        least_near, greatest_near = slope_band(sight.alpha, near_label, near_then, law)
-        least_far, greatest_far = slope_band(sight.alpha, far_label, far_then, law)
+        least_near, greatest_near = slope_band(sight.alpha, sight.across, near_label, near_then, law)
+        least_far, greatest_far = slope_band(sight.alpha, sight.across, far_label, far_then, law)
     else:
         least_near, greatest_near = law.z_least / near_then, law.z_greatest / near_then
         least_far, greatest_far = law.z_least / far_then, law.z_greatest / far_then
@@ -372,12 +468,17 @@ def widen_section(origins: Floats, n: int, label: float, elapsed: int, law: Sect
 
 
 @inlined
-def shift_section(origins: Floats, n: int, label: float, elapsed: int, impulse: float, law: SectionLaw) -> None:
-    """Shift a section by an impulse: V becomes V - k, for all k within the error bound of the commanded impulse."""
+def shift_section(
+    origins: Floats, n: int, label: float, elapsed: int, impulse: float, across: float, law: SectionLaw
+) -> None:
+    """Shift a section by an impulse: V becomes V - k, for all k within the error bound of the commanded impulse.
+
+    `across` is the impulse along the other axis.
+    """
     tau = time_to_go(label, elapsed, law)
     chain_steps.shift(origins, n, tau, -impulse)
     if law.impulse_error > 0.0:
-        chain_steps.spread(origins, n, tau, abs(impulse) * law.impulse_error)
+        chain_steps.spread(origins, n, tau, impulse_doubt(impulse, across, law))
 
 
 @inlined
@@ -409,8 +510,8 @@ def summarise_section(
     tau = time_to_go(label, elapsed, law)
     upper, lower = chain_steps.greatest_and_least_miss(origins, rings, marks, n, tau)
     drift = 0.5 * law.disturbance * tau * tau
-    summaries[b, s, UPPER_MISS] = upper + drift
-    summaries[b, s, LOWER_MISS] = lower - drift
+    summaries[law.channel, b, s, UPPER_MISS] = upper + drift
+    summaries[law.channel, b, s, LOWER_MISS] = lower - drift
 
 
 @allocation_free
@@ -438,11 +539,12 @@ def replay(
         Error bound of each rate, rad/s; None without rates. It is not a field of the tape because the compiler omits
         the code for rates only if an argument is None.
     law : SectionLaw
-        Constants of the model.
+        Constants of the model for the axis of the section.
     origins, rings, marks, n : section
         Receives the section.
-    overlaps : ndarray, shape (>= events,)
-        Receives the overlap of the section with the band of each measurement, up to the one that makes it empty.
+    overlaps : ndarray, shape (C, >= events)
+        Receives in the row of the axis the overlap of the section with the band of each measurement, up to the one that
+        makes it empty.
     points : ndarray, shape (CAPACITY + 2, 2)
         Working array.
 
@@ -477,6 +579,7 @@ def continue_replay(
     kinds, values, applies, events, nearest, farthest = tape
     window = nearest, farthest
     first, elapsed, sight = done
+    channel = law.channel
     for event in range(first, events):
         if kinds[event] == PREDICTION:
             if whole_chains.is_crowded(marks, n):
@@ -486,20 +589,25 @@ def continue_replay(
         elif not applies[event]:
             continue
         elif kinds[event] == ANGLE:
-            living, overlaps[event] = measure_section(origins, rings, marks, n, label, elapsed, values[event], law)
+            value, across = values[channel, event], across_of(tape, event, law)
+            living, overlaps[channel, event] = measure_section(
+                origins, rings, marks, n, label, elapsed, value, across, law
+            )
             if not living:
                 return event, done
         elif kinds[event] == IMPULSE:
-            shift_section(origins, n, label, elapsed, values[event], law)
+            shift_section(origins, n, label, elapsed, values[channel, event], across_of(tape, event, law), law)
         elif kinds[event] == WIDENING:
             widen_section(origins, n, label, elapsed, law)
         elif errors is not None:
             # Not compiled for histories without rates: this branch is most of the code.
-            living, overlaps[event] = measure_rate_section(
-                origins, rings, marks, n, label, elapsed, values[event], errors[event], sight, window, law, points
+            value, error = values[channel, event], errors[event]
+            living, overlaps[channel, event] = measure_rate_section(
+                origins, rings, marks, n, label, elapsed, value, error, sight, window, law, points
             )
             if not living:
                 return event, done
         if errors is not None:
-            sight = sight_after(sight, kinds[event], values[event], applies[event], law)
+            value, across = values[channel, event], across_of(tape, event, law)
+            sight = sight_after(sight, kinds[event], value, across, applies[event], law)
     return ALIVE, Replayed(events, elapsed, sight)

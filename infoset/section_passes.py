@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from infoset import chain_steps, chains, whole_chains
-from infoset._compile import ZERO, allocation_free, by_reference, entry
+from infoset._compile import ZERO, allocation_free, by_reference, entry, inlined
 from infoset.history import Tapes
-from infoset.section_law import SectionLaw
+from infoset.section_law import law_of
 from infoset.section_life import (
     ALIVE,
     CUT_SLACK,
@@ -22,6 +22,7 @@ from infoset.section_life import (
     Floats,
     Integers,
     Tape,
+    impulse_doubt,
     last_sight,
     measure_rate_section,
     measure_section,
@@ -29,6 +30,7 @@ from infoset.section_life import (
     range_of,
     shift_section,
     start_section,
+    steepest_angles,
     summarise_section,
     time_to_go,
 )
@@ -38,7 +40,9 @@ TIE_TOLERANCE = 1e-9
 
 @by_reference
 class Sections(NamedTuple):
-    """B engagements x S slots for one section each.
+    """B engagements x S slots for one section each, in the plane of each of C lateral axes.
+
+    A label lives if it lives in all planes: the set at a label is the product of its sections.
 
     Parameters
     ----------
@@ -47,14 +51,15 @@ class Sections(NamedTuple):
     used : ndarray of int, shape (B,)
         Number of slots in use.
     living : ndarray of bool, shape (B, S)
-        Whether the slot contains a section that is not empty.
+        Whether the slot contains sections that are not empty.
     died : ndarray of int, shape (B, S)
-        Number of the event that made the section empty, or ALIVE.
+        Number of the event that made a section empty, or ALIVE.
     overlaps : ndarray, shape (B, S)
-        Overlap of an empty section with the band that made it empty, m: negative.
+        Overlap of an empty section with the band that made it empty, m: negative. The lesser one if several became
+        empty at that event.
     origins, rings, marks : ndarray
-        The polygons, stored as in `chains`: slot s of engagement b is row b S + s.
-    summaries : ndarray, shape (B, S, columns)
+        The polygons, stored as in `chains`: slot s of engagement b is row (c B + b) S + s for axis c.
+    summaries : ndarray, shape (C, B, S, columns)
         Extremes of the predicted miss and of z, m.
     rows : ndarray of int, shape (B S, 3)
         Working array for a list of sections: row, engagement and slot.
@@ -72,10 +77,10 @@ class Sections(NamedTuple):
     rows: Integers
 
 
-def room_for_sections(labels: Floats, used: Integers) -> Sections:
-    """Allocate the arrays of a batch of sections."""
+def room_for_sections(channels: int, labels: Floats, used: Integers) -> Sections:
+    """Allocate the arrays of a batch of sections for a number of axes."""
     shape = labels.shape
-    origins, rings, marks = chains.empty_sections(labels.size, chains.ROOM_AT_START)
+    origins, rings, marks = chains.empty_sections(channels * labels.size, chains.ROOM_AT_START)
     return Sections(
         labels=labels,
         used=used,
@@ -85,33 +90,61 @@ def room_for_sections(labels: Floats, used: Integers) -> Sections:
         origins=origins,
         rings=rings,
         marks=marks,
-        summaries=np.zeros((*shape, SUMMARY_COLUMNS)),
+        summaries=np.zeros((channels, *shape, SUMMARY_COLUMNS)),
         rows=np.empty((labels.size, 3), dtype=np.int64),
     )
 
 
+@inlined
+def row_of(labels: Floats, channel: int, b: int, s: int) -> int:
+    """Row of a section among the polygons."""
+    return int((channel * labels.shape[0] + b) * labels.shape[1] + s)
+
+
 @entry
-def start_all(sections: Sections, law: SectionLaw) -> None:
+def start_all(sections: Sections, laws: Floats) -> None:
     """Write the initial sections of a batch, without their summaries."""
     labels, used, living = sections.labels, sections.used, sections.living
     origins, rings, marks = sections.origins, sections.rings, sections.marks
-    for b in range(labels.shape[0]):
-        for s in range(used[b]):
-            n = b * labels.shape[1] + s
-            start_section(origins, rings, marks, n, labels[b, s], law)
-            living[b, s] = True
+    for channel in range(laws.shape[0]):
+        law = law_of(laws, channel)
+        for b in range(labels.shape[0]):
+            for s in range(used[b]):
+                start_section(origins, rings, marks, row_of(labels, channel, b, s), labels[b, s], law)
+                living[b, s] = True
+
+
+@inlined
+def is_cut(sections: Sections, channel: int, event: int, b: int, s: int) -> bool:
+    """Whether a section is cut at an event: if the label lives, or another axis has just made it empty.
+
+    The overlap of a label that an event makes empty is the least one of its axes, whatever their order.
+    """
+    return bool(sections.living[b, s] or (channel > 0 and sections.died[b, s] == event))
+
+
+@inlined
+def bury(sections: Sections, event: int, b: int, s: int, overlap: float) -> int:
+    """Note that an event has made a section empty; return 1 if the label lived until now, else 0."""
+    lived = sections.living[b, s]
+    sections.overlaps[b, s] = overlap if lived else min(overlap, sections.overlaps[b, s])
+    sections.living[b, s] = False
+    sections.died[b, s] = event
+    return 1 if lived else 0
 
 
 @allocation_free
-def list_rows(first: Flags, second: Flags, third: Flags, every: bool, sections: Sections) -> int:
-    """List the living sections of the engagements in any of three groups, or of all; return their number."""
-    used, living, rows = sections.used, sections.living, sections.rows
+def list_rows(
+    channel: int, event: int, first: Flags, second: Flags, third: Flags, every: bool, sections: Sections
+) -> int:
+    """List the sections of an axis in any of three groups of engagements, or in all; return their number."""
+    used, labels, rows = sections.used, sections.labels, sections.rows
     count = 0
-    for b in range(living.shape[0]):
+    for b in range(labels.shape[0]):
         if first[b] or second[b] or third[b] or every:
             for s in range(used[b]):
-                if living[b, s]:
-                    rows[count, 0], rows[count, 1], rows[count, 2] = b * living.shape[1] + s, b, s
+                if is_cut(sections, channel, event, b, s):
+                    rows[count, 0], rows[count, 1], rows[count, 2] = row_of(labels, channel, b, s), b, s
                     count += 1
     return count
 
@@ -126,9 +159,9 @@ def step_all(
     elapsed: int,
     event: int,
     sections: Sections,
-    law: SectionLaw,
+    laws: Floats,
 ) -> int:
-    """Predict, cut and summarise the living sections in one pass; return the number of sections that became empty.
+    """Predict, cut and summarise the living sections in one pass; return the number of labels that became empty.
 
     Parameters
     ----------
@@ -140,38 +173,44 @@ def step_all(
         Engagements whose sections are summarised.
     heights_wanted : bool
         Whether to write the least and the greatest z of all sections.
-    alpha : ndarray, shape (B,)
+    alpha : ndarray, shape (C, B)
         Measured angles, rad.
     elapsed, event : int
-        Present step, and number of the measurement.
-    sections, law : Sections, SectionLaw
-        The sections, changed in place, and the constants of the model.
+        Present step, and number of the measurement; -1 without one.
+    sections : Sections
+        The sections, changed in place.
+    laws : ndarray, shape (C, constants)
+        Constants of the model.
     """
     deaths = 0
-    labels, living, died, overlaps = sections.labels, sections.living, sections.died, sections.overlaps
+    labels, living = sections.labels, sections.living
     summaries, rows = sections.summaries, sections.rows
     origins, rings, marks = sections.origins, sections.rings, sections.marks
-    count = list_rows(behind, measured, stale, heights_wanted, sections)
-    for k in range(count):
-        n, b, s = rows[k, 0], rows[k, 1], rows[k, 2]
-        if k + 1 < count:
-            chains.expect(rings, marks, rows[k + 1, 0])
-        if behind[b]:
-            predict_section(origins, rings, marks, n, labels[b, s], elapsed, law)
-        if measured[b]:
-            living[b, s], overlap = measure_section(origins, rings, marks, n, labels[b, s], elapsed, alpha[b], law)
-            if not living[b, s]:
-                died[b, s] = event
-                overlaps[b, s] = overlap
-                deaths += 1
-                continue
-        if measured[b] or stale[b]:
-            summarise_section(origins, rings, marks, n, labels[b, s], elapsed, law, summaries, b, s)
-        if heights_wanted:
-            tau = time_to_go(labels[b, s], elapsed, law)
-            least, greatest = chain_steps.heights(origins, rings, marks, n, tau)
-            summaries[b, s, Z_LEAST] = least
-            summaries[b, s, Z_GREATEST] = greatest
+    for channel in range(laws.shape[0]):
+        law = law_of(laws, channel)
+        count = list_rows(channel, event, behind, measured, stale, heights_wanted, sections)
+        for k in range(count):
+            n, b, s = rows[k, 0], rows[k, 1], rows[k, 2]
+            if k + 1 < count:
+                chains.expect(rings, marks, rows[k + 1, 0])
+            if behind[b]:
+                predict_section(origins, rings, marks, n, labels[b, s], elapsed, law)
+            if measured[b]:
+                across = alpha[law.other, b] if law.other >= 0 else 0.0
+                survives, overlap = measure_section(
+                    origins, rings, marks, n, labels[b, s], elapsed, alpha[channel, b], across, law
+                )
+                if not survives:
+                    deaths += bury(sections, event, b, s, overlap)
+                if not living[b, s]:
+                    continue
+            if measured[b] or stale[b]:
+                summarise_section(origins, rings, marks, n, labels[b, s], elapsed, law, summaries, b, s)
+            if heights_wanted:
+                tau = time_to_go(labels[b, s], elapsed, law)
+                least, greatest = chain_steps.heights(origins, rings, marks, n, tau)
+                summaries[channel, b, s, Z_LEAST] = least
+                summaries[channel, b, s, Z_GREATEST] = greatest
     return deaths
 
 
@@ -179,8 +218,9 @@ def step_all(
 def tape_of(tapes: Tapes, b: int, values: Floats, applies: Flags) -> Tape:
     """Copy the history of one engagement to contiguous arrays, for many replays."""
     for event in range(tapes.events):
-        values[event] = tapes.values[event, b]
         applies[event] = tapes.applies[event, b]
+        for channel in range(values.shape[0]):
+            values[channel, event] = tapes.values[event, channel, b]
     return Tape(tapes.kinds, values, applies, tapes.events, np.inf, -np.inf)
 
 
@@ -195,57 +235,74 @@ def measure_rate_all(
     values: Floats,
     applies: Flags,
     sections: Sections,
-    law: SectionLaw,
+    laws: Floats,
     points: Floats,
 ) -> int:
     """Cut the living sections of the active engagements by rates and summarise them; return how many became empty.
 
-    `values` and `applies` are working arrays for the history of one engagement.
+    `omega` has the shape (C, B); `values` and `applies` are working arrays for the history of one engagement.
     """
     deaths = 0
-    labels, used, living, died = sections.labels, sections.used, sections.living, sections.died
-    overlaps, summaries = sections.overlaps, sections.summaries
+    labels, used, living = sections.labels, sections.used, sections.living
     origins, rings, marks = sections.origins, sections.rings, sections.marks
     for b in range(labels.shape[0]):
         if not active[b]:
             continue
-        sight = last_sight(tape_of(tapes, b, values, applies), law)
-        for s in range(used[b]):
-            if not living[b, s]:
-                continue
-            n, label = b * labels.shape[1] + s, labels[b, s]
-            living[b, s], overlap = measure_rate_section(
-                origins, rings, marks, n, label, elapsed, omega[b], error, sight, (label, label), law, points
-            )
-            if living[b, s]:
-                summarise_section(origins, rings, marks, n, labels[b, s], elapsed, law, summaries, b, s)
-            else:
-                died[b, s] = event
-                overlaps[b, s] = overlap
-                deaths += 1
+        tape = tape_of(tapes, b, values, applies)
+        for channel in range(laws.shape[0]):
+            law = law_of(laws, channel)
+            sight = last_sight(tape, law)
+            for s in range(used[b]):
+                if not is_cut(sections, channel, event, b, s):
+                    continue
+                n, label = row_of(labels, channel, b, s), labels[b, s]
+                survives, overlap = measure_rate_section(
+                    origins,
+                    rings,
+                    marks,
+                    n,
+                    label,
+                    elapsed,
+                    omega[channel, b],
+                    error,
+                    sight,
+                    (label, label),
+                    law,
+                    points,
+                )
+                if not survives:
+                    deaths += bury(sections, event, b, s, overlap)
+                if living[b, s]:
+                    summarise_section(origins, rings, marks, n, label, elapsed, law, sections.summaries, b, s)
     return deaths
 
 
 @entry
-def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, law: SectionLaw) -> None:
-    """Shift the living sections and their summaries by the impulses of the engagements."""
+def shift_all(active: Flags, impulse: Floats, elapsed: int, sections: Sections, laws: Floats) -> None:
+    """Shift the living sections of the active engagements and their summaries by impulses of shape (C, B)."""
     labels, used, living = sections.labels, sections.used, sections.living
     origins, summaries = sections.origins, sections.summaries
-    for b in range(labels.shape[0]):
-        if not active[b] or impulse[b] == 0.0:
-            continue
-        for s in range(used[b]):
-            if not living[b, s]:
+    for channel in range(laws.shape[0]):
+        law = law_of(laws, channel)
+        for b in range(labels.shape[0]):
+            if not active[b]:
                 continue
-            shift_section(origins, b * labels.shape[1] + s, labels[b, s], elapsed, impulse[b], law)
-            tau, error = time_to_go(labels[b, s], elapsed, law), abs(impulse[b]) * law.impulse_error
-            summaries[b, s, UPPER_MISS] += (error - impulse[b]) * tau
-            summaries[b, s, LOWER_MISS] -= (error + impulse[b]) * tau
+            along, across = impulse[channel, b], impulse[law.other, b] if law.other >= 0 else 0.0
+            if along == 0.0 and across == 0.0:
+                continue
+            for s in range(used[b]):
+                if not living[b, s]:
+                    continue
+                n = row_of(labels, channel, b, s)
+                shift_section(origins, n, labels[b, s], elapsed, along, across, law)
+                tau, error = time_to_go(labels[b, s], elapsed, law), impulse_doubt(along, across, law)
+                summaries[channel, b, s, UPPER_MISS] += (error - along) * tau
+                summaries[channel, b, s, LOWER_MISS] -= (error + along) * tau
 
 
 @entry
 def make_room_all(
-    active: Flags, added: int, elapsed: int, sections: Sections, law: SectionLaw, points: Floats, widen: bool
+    active: Flags, added: int, elapsed: int, sections: Sections, laws: Floats, points: Floats, widen: bool
 ) -> tuple[int, int]:
     """Compute the room that the living sections of the active engagements need; with `widen`, enlarge their rings.
 
@@ -253,7 +310,7 @@ def make_room_all(
     ----------
     added : int
         Number of vertices that every section must be able to gain.
-    active, elapsed, sections, law, points
+    active, elapsed, sections, laws, points
         Engagements, present step, sections, constants of the model, and working array.
     widen : bool
         Whether to enlarge rings, for which memory must be allocated, and to reduce sections of `CAPACITY` vertices.
@@ -269,28 +326,31 @@ def make_room_all(
     origins, rings, marks = sections.origins, sections.rings, sections.marks
     floats = ZERO
     spare = chains.CAPACITY
-    for b in range(labels.shape[0]):
-        if not active[b]:
-            continue
-        for s in range(used[b]):
-            if not living[b, s]:
+    for channel in range(laws.shape[0]):
+        law = law_of(laws, channel)
+        for b in range(labels.shape[0]):
+            if not active[b]:
                 continue
-            n = b * labels.shape[1] + s
-            if widen and whole_chains.is_crowded(marks, n):
-                whole_chains.reduce_outward(origins, rings, marks, n, time_to_go(labels[b, s], elapsed, law), points)
-            count, room = chains.count_of(marks, n), chains.room_of(marks, n)
-            wanted = chains.room_for(min(count + added, chains.CAPACITY), room)
-            if wanted > room and widen:
-                chains.widen_rings(rings, marks, n, wanted)
-            elif wanted > room:
-                floats += 2 * chains.floats_of(wanted)
-            spare = min(spare, chains.room_of(marks, n) - count)
+            for s in range(used[b]):
+                if not living[b, s]:
+                    continue
+                n = row_of(labels, channel, b, s)
+                if widen and whole_chains.is_crowded(marks, n):
+                    tau = time_to_go(labels[b, s], elapsed, law)
+                    whole_chains.reduce_outward(origins, rings, marks, n, tau, points)
+                count, room = chains.count_of(marks, n), chains.room_of(marks, n)
+                wanted = chains.room_for(min(count + added, chains.CAPACITY), room)
+                if wanted > room and widen:
+                    chains.widen_rings(rings, marks, n, wanted)
+                elif wanted > room:
+                    floats += 2 * chains.floats_of(wanted)
+                spare = min(spare, chains.room_of(marks, n) - count)
     return floats, spare
 
 
 @entry
-def widest_all(elapsed: int, sections: Sections, law: SectionLaw, exists: Flags, ends: Floats) -> None:
-    """Write the predicted-miss interval of each engagement.
+def widest_all(elapsed: int, sections: Sections, laws: Floats, exists: Flags, ends: Floats) -> None:
+    """Write the predicted-miss interval of each engagement along each axis.
 
     Parameters
     ----------
@@ -298,7 +358,7 @@ def widest_all(elapsed: int, sections: Sections, law: SectionLaw, exists: Flags,
         Present step.
     exists : ndarray of bool, shape (B,)
         Whether the engagement has a living section.
-    ends : ndarray, shape (B, 2, 4)
+    ends : ndarray, shape (C, B, 2, 4)
         For the lower and the upper end: the predicted miss, m, and alpha, rad, omega, rad/s, and range, m, of a state
         that reaches it. Not written for engagements without a living section.
 
@@ -307,34 +367,45 @@ def widest_all(elapsed: int, sections: Sections, law: SectionLaw, exists: Flags,
     An extreme is usually reached on a whole edge. The lowest point is taken for the upper end and the highest for the
     lower end, so that a mirrored engagement gives exactly mirrored results.
     """
-    labels, used, living, summaries = sections.labels, sections.used, sections.living, sections.summaries
+    labels, used, living = sections.labels, sections.used, sections.living
     origins, rings, marks = sections.origins, sections.rings, sections.marks
-    for b in range(labels.shape[0]):
-        lowest = highest = -1
-        for s in range(used[b]):
-            # Only sections of stopped engagements can be at range zero.
-            if not living[b, s] or range_of(labels[b, s], elapsed, law) == 0.0:
+    for channel in range(laws.shape[0]):
+        law, summaries = law_of(laws, channel), sections.summaries
+        for b in range(labels.shape[0]):
+            lowest = highest = -1
+            for s in range(used[b]):
+                # Only sections of stopped engagements can be at range zero.
+                if not living[b, s] or range_of(labels[b, s], elapsed, law) == 0.0:
+                    continue
+                if lowest < 0 or summaries[channel, b, s, LOWER_MISS] < summaries[channel, b, lowest, LOWER_MISS]:
+                    lowest = s
+                if highest < 0 or summaries[channel, b, s, UPPER_MISS] > summaries[channel, b, highest, UPPER_MISS]:
+                    highest = s
+            if lowest < 0:
                 continue
-            if lowest < 0 or summaries[b, s, LOWER_MISS] < summaries[b, lowest, LOWER_MISS]:
-                lowest = s
-            if highest < 0 or summaries[b, s, UPPER_MISS] > summaries[b, highest, UPPER_MISS]:
-                highest = s
-        if lowest < 0:
-            continue
-        exists[b] = True
-        for end, s in ((0, lowest), (1, highest)):
-            tau, x = time_to_go(labels[b, s], elapsed, law), range_of(labels[b, s], elapsed, law)
-            n = b * labels.shape[1] + s
-            points = chain_steps.extreme_points(origins, rings, marks, n, tau, TIE_TOLERANCE, CUT_SLACK)
-            v, m = points[1 - end]
-            alpha = (m - tau * v) / x
-            ends[b, end, 0] = summaries[b, s, LOWER_MISS + end]
-            ends[b, end, 1] = alpha
-            ends[b, end, 2] = (v + law.closing_speed * alpha) / x
-            ends[b, end, 3] = x
+            exists[b] = True
+            for end, s in ((0, lowest), (1, highest)):
+                tau, x = time_to_go(labels[b, s], elapsed, law), range_of(labels[b, s], elapsed, law)
+                n = row_of(labels, channel, b, s)
+                points = chain_steps.extreme_points(origins, rings, marks, n, tau, TIE_TOLERANCE, CUT_SLACK)
+                v, m = points[1 - end]
+                alpha = (m - tau * v) / x
+                ends[channel, b, end, 0] = summaries[channel, b, s, LOWER_MISS + end]
+                ends[channel, b, end, 1] = alpha
+                ends[channel, b, end, 2] = (v + law.closing_speed * alpha) / x
+                ends[channel, b, end, 3] = x
 
 
 @entry
 def write_outline(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, out: Floats) -> int:
     """Call `whole_chains.outline` from Python."""
     return whole_chains.outline(origins, rings, marks, n, tau, out)
+
+
+@entry
+def steepest_all(alpha: Floats, farthest: float, laws: Floats, steepest: Floats) -> None:
+    """Write the greatest sizes of angles of shape (C, B) up to a range: those of `steepest_angles`, shape (2, B)."""
+    law = law_of(laws, ZERO)
+    for b in range(alpha.shape[1]):
+        across = alpha[law.other, b] if law.other >= 0 else 0.0
+        steepest[0, b], steepest[1, b] = steepest_angles(alpha[0, b], across, farthest, law)

@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 from infoset import chains, section_life, section_passes
 from infoset.chains import Chains
 from infoset.history import History
-from infoset.section_law import SectionLaw
+from infoset.section_law import SectionLaw, law_table
 from infoset.section_passes import Sections
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+
+
+NO_EVENT = -1
 
 
 class Freshness(IntEnum):
@@ -32,12 +35,12 @@ class Freshness(IntEnum):
 
 
 class SectionStack:
-    """B engagements x S slots for one section each, updated in place.
+    """B engagements x S slots for one section each, in the plane of each of C lateral axes, updated in place.
 
     Parameters
     ----------
-    law : SectionLaw
-        Constants of the model.
+    laws : tuple of SectionLaw
+        Constants of the model for each axis.
     labels : ndarray, shape (B, S)
         Label of each slot, m; the slots in use are first, with increasing labels.
     used : ndarray of int, shape (B,)
@@ -49,17 +52,23 @@ class SectionStack:
         Lower bound of the labels of living sections, m.
     """
 
-    def __init__(self, law: SectionLaw, labels: Floats, used: NDArray[np.int64]) -> None:
-        self.law = law
-        self.sections = section_passes.room_for_sections(labels, used.astype(np.int64))
+    def __init__(self, laws: tuple[SectionLaw, ...], labels: Floats, used: NDArray[np.int64]) -> None:
+        self.laws = laws
+        self.table = law_table(laws)
+        self.sections = section_passes.room_for_sections(len(laws), labels, used.astype(np.int64))
         self._none = np.zeros(self.batch, dtype=bool)
         self._freshness = Freshness.MOVED
         # Engagements with sections one step behind, and those with summaries out of date.
         self._behind, self._stale = self._none, np.ones(self.batch, dtype=bool)
         # Vertices that every section may still gain, and the present step.
         self._spare = self._elapsed = 0
-        section_passes.start_all(self.sections, law)
+        section_passes.start_all(self.sections, self.table)
         self.least_label = self._least_label()
+
+    @property
+    def law(self) -> SectionLaw:
+        """Constants of the model that all axes have in common, in those of one axis."""
+        return self.laws[-1]
 
     @property
     def batch(self) -> int:
@@ -78,17 +87,17 @@ class SectionStack:
 
     @property
     def summaries(self) -> Floats:
-        """Summaries of the living sections, shape (B, S, columns). The columns of z may be out of date."""
+        """Summaries of the living sections, shape (C, B, S, columns). The columns of z may be out of date."""
         self._summarise(Freshness.SUMMARISED)
         return self.sections.summaries
 
     @property
     def heights(self) -> tuple[Floats, Floats]:
-        """Least and greatest z of each living section, m, each (B, S)."""
+        """Least and greatest z of each living section, m, each (C, B, S)."""
         # The predicted misses are usually needed next: one pass computes both.
         self._summarise(Freshness.WITH_HEIGHTS)
         summaries = self.sections.summaries
-        return summaries[:, :, section_life.Z_LEAST], summaries[:, :, section_life.Z_GREATEST]
+        return summaries[..., section_life.Z_LEAST], summaries[..., section_life.Z_GREATEST]
 
     def _summarise(self, wanted: Freshness) -> None:
         """Update the sections and the summaries."""
@@ -104,9 +113,9 @@ class SectionStack:
 
     def _update(self, stale: Flags, heights_wanted: bool) -> None:
         """Move the sections that are behind, and summarise the stale ones."""
-        alpha = np.empty(0)
+        alpha = np.empty((len(self.laws), 0))
         section_passes.step_all(
-            self._behind, self._none, stale, heights_wanted, alpha, self._elapsed, 0, self.sections, self.law
+            self._behind, self._none, stale, heights_wanted, alpha, self._elapsed, NO_EVENT, self.sections, self.table
         )
         self._behind = self._none
 
@@ -121,17 +130,18 @@ class SectionStack:
             return
         elapsed, points = self._elapsed, chains.working_room()
         make_room = section_passes.make_room_all
-        floats, spare = make_room(active, chains.ROOM_AHEAD, elapsed, self.sections, self.law, points, False)
+        floats, spare = make_room(active, chains.ROOM_AHEAD, elapsed, self.sections, self.table, points, False)
         if floats or spare < chains.MOST_ADDED:
             self.sections = self.sections._replace(rings=chains.with_room(self.sections.rings, floats))
-            _, spare = make_room(active, chains.ROOM_AHEAD, elapsed, self.sections, self.law, points, True)
+            _, spare = make_room(active, chains.ROOM_AHEAD, elapsed, self.sections, self.table, points, True)
         self._spare = spare - chains.MOST_ADDED
 
     def make_room_for_new(self, wanted: Flags, number: int) -> None:
         """Allocate room for `number` sections of any size in each of the wanted engagements."""
         self._catch_up()
         self._freshness = min(self._freshness, Freshness.SUMMARISED)
-        floats = 2 * (2 * chains.CAPACITY + chains.LINE) * number * int(np.count_nonzero(wanted))
+        new = number * int(np.count_nonzero(wanted)) * len(self.laws)
+        floats = 2 * (2 * chains.CAPACITY + chains.LINE) * new
         self.sections = self.sections._replace(rings=chains.with_room(self.sections.rings, floats))
 
     def note_new(self, spare: int) -> None:
@@ -143,9 +153,9 @@ class SectionStack:
         return float(np.where(self.sections.living, self.sections.labels, np.inf).min())
 
     def measure_angle(self, active: Flags, alpha: Floats, elapsed: int, event: int) -> int:
-        """Cut the living sections by angle measurements, rad; return the number of sections that became empty."""
+        """Cut the living sections by angles of shape (C, B), rad; return the number of labels that became empty."""
         deaths = section_passes.step_all(
-            self._behind, active, self._none, False, alpha, elapsed, event, self.sections, self.law
+            self._behind, active, self._none, False, alpha, elapsed, event, self.sections, self.table
         )
         self._behind = self._none
         self._set_summarised(active)
@@ -154,12 +164,22 @@ class SectionStack:
     def measure_rate(
         self, active: Flags, omega: Floats, error: float, elapsed: int, event: int, history: History
     ) -> int:
-        """Cut the living sections by line-of-sight rates, rad/s; return the number of sections that became empty."""
+        """Cut the living sections by rates of shape (C, B), rad/s; return the number of labels that became empty."""
         self._catch_up()
         self._make_room(active)
-        room, values, applies = chains.working_room(), np.empty(history.events), np.empty(history.events, dtype=bool)
+        values, applies = np.empty((len(self.laws), history.events)), np.empty(history.events, dtype=bool)
         deaths = section_passes.measure_rate_all(
-            active, omega, error, elapsed, event, history.tapes, values, applies, self.sections, self.law, room
+            active,
+            omega,
+            error,
+            elapsed,
+            event,
+            history.tapes,
+            values,
+            applies,
+            self.sections,
+            self.table,
+            chains.working_room(),
         )
         self._set_summarised(active)
         return deaths
@@ -171,9 +191,9 @@ class SectionStack:
         self._freshness = Freshness.MOVED if self._stale.any() else Freshness.SUMMARISED
 
     def shift(self, active: Flags, impulse: Floats, elapsed: int) -> None:
-        """Shift the living sections and their summaries by impulses, m/s."""
+        """Shift the living sections and their summaries by impulses of shape (C, B), m/s."""
         self._catch_up()
-        section_passes.shift_all(active, impulse, elapsed, self.sections, self.law)
+        section_passes.shift_all(active, impulse, elapsed, self.sections, self.table)
 
     def predict(self, active: Flags, elapsed: int) -> None:
         """Move the living sections to step `elapsed`.
@@ -201,14 +221,14 @@ class SectionStack:
     def widest(self, elapsed: int) -> tuple[Flags, Floats]:
         """Return the predicted-miss interval of each engagement in the format of `section_passes.widest_all`."""
         self._summarise(Freshness.SUMMARISED)
-        exists, ends = np.zeros(self.batch, dtype=bool), np.zeros((self.batch, 2, 4))
-        section_passes.widest_all(elapsed, self.sections, self.law, exists, ends)
+        exists, ends = np.zeros(self.batch, dtype=bool), np.zeros((len(self.laws), self.batch, 2, 4))
+        section_passes.widest_all(elapsed, self.sections, self.table, exists, ends)
         return exists, ends
 
-    def polygon(self, engagement: int, slot: int, elapsed: int) -> Floats:
+    def polygon(self, channel: int, engagement: int, slot: int, elapsed: int) -> Floats:
         """Return the vertices (V, z) of a living section, counter-clockwise, shape (n, 2)."""
         self._catch_up()
-        row = engagement * self.labels.shape[1] + slot
+        row = (channel * self.batch + engagement) * self.labels.shape[1] + slot
         section = Chains(self.sections.origins, self.sections.rings, self.sections.marks)
         return outline(section, row, float(self.labels[engagement, slot]), elapsed, self.law)
 

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from infoset import section_life
-from infoset.chains import empty_sections, working_room
+from infoset.chains import Chains
 from infoset.convex_polygons import ConvexPolygons
-from infoset.limits import NUMBER, POSITIVE, WHOLE
+from infoset.limits import NUMBER, POSITIVE, WHOLE, real_array
 from infoset.pictures import sections_svg
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
-from infoset.replays import replay_section
+from infoset.replays import PROBE, ROWS, replay_label, replay_room
 from infoset.section_stack import outline
 from infoset.set_state import Flags, Floats, SetState, SetStatus
 
@@ -39,17 +39,25 @@ class Section:
         Nominal closing speed e, m/s.
     polygon : ConvexPolygons
         All (V, z) that agree with the history, m/s and m.
+    polygon_y : ConvexPolygons or None
+        All (V_y, y) in space, where the section is the product of both; None in a plane.
     """
 
     label_m: float
     range_m: float
     closing_speed_m_s: float
     polygon: ConvexPolygons
+    polygon_y: ConvexPolygons | None = None
 
     @property
     def omega_alpha(self) -> ConvexPolygons:
         """The section in the (omega, alpha) plane, rad/s and rad."""
         return to_omega_alpha(self.polygon, self.range_m, self.closing_speed_m_s)
+
+    @property
+    def omega_alpha_y(self) -> ConvexPolygons | None:
+        """The section in the (omega, alpha) plane of the y axis, rad/s and rad; None in a plane."""
+        return None if self.polygon_y is None else to_omega_alpha(self.polygon_y, self.range_m, self.closing_speed_m_s)
 
     def _repr_svg_(self) -> str:
         return sections_svg([self.omega_alpha.polygon()], f"section at x = {self.range_m / 1e3:.6g} km")
@@ -80,12 +88,17 @@ _TRACKING = SetStatus.TRACKING.value
 
 
 class SetQueries:
-    """Queries of B information sets; the leading axis of every result is the engagement.
+    """Queries of B information sets.
+
+    The leading axis of a result is the engagement. In space, a result that belongs to a lateral axis has an axis more
+    in front, of length 2: that of y and that of z.
 
     Parameters
     ----------
     state : SetState
         The state to read. It may be shared with the set that changes it.
+    axis : str or None
+        Lateral axis, "y" or "z", whose plane is read as that of a planar set; None is the whole set.
 
     Attributes
     ----------
@@ -93,9 +106,20 @@ class SetQueries:
         Known constants and assumptions.
     """
 
-    def __init__(self, state: SetState) -> None:
-        self.model = state.model
+    def __init__(self, state: SetState, axis: str | None = None) -> None:
+        self.model = state.model if axis is None else state.model.axis(axis)
         self._state = state
+        names = state.model.axes
+        self._channels = [names.index(name) for name in (names if axis is None else (axis,))]
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Lateral axes: ("z",) in a plane, ("y", "z") in space; one of them in the view of an axis."""
+        return tuple(self._state.model.axes[channel] for channel in self._channels)
+
+    def _by_axis(self, values: Floats) -> Floats:
+        """Return the part of values of shape (C, ...) that belongs to the axes, without their axis if it is one."""
+        return values if len(self._channels) > 1 else np.asarray(values[self._channels[0]])
 
     @property
     def batch(self) -> int:
@@ -168,24 +192,26 @@ class SetQueries:
 
         Returns
         -------
-        alpha_least, alpha_greatest, range_of_least, range_of_greatest : ndarray, shape (B,)
+        alpha_least, alpha_greatest, range_of_least, range_of_greatest : ndarray, shape (B,), in space (2, B)
             rad and m; zeros where no section lives.
         """
         ranges = self.ranges_m
         # Empty or unused slots may have any range, and so may the sections of stopped engagements.
         living = self.living & (ranges != 0.0)
-        rows = np.arange(self.batch)
-        least, greatest = self._state.stack.heights
+        least, greatest = (self._by_axis(values) for values in self._state.stack.heights)
+        living, ranges = np.broadcast_to(living, least.shape), np.broadcast_to(ranges, least.shape)
         alphas_least = np.divide(least, ranges, out=np.full(ranges.shape, np.inf), where=living)
         alphas_greatest = np.divide(greatest, ranges, out=np.full(ranges.shape, -np.inf), where=living)
-        least_at, greatest_at = alphas_least.argmin(axis=1), alphas_greatest.argmax(axis=1)
-        tracked = living.any(axis=1)
-        return (
-            np.where(tracked, alphas_least[rows, least_at], 0.0),
-            np.where(tracked, alphas_greatest[rows, greatest_at], 0.0),
-            np.where(tracked, ranges[rows, least_at], 0.0),
-            np.where(tracked, ranges[rows, greatest_at], 0.0),
+        least_at, greatest_at = alphas_least.argmin(axis=-1)[..., None], alphas_greatest.argmax(axis=-1)[..., None]
+        tracked = living.any(axis=-1)
+        found = (
+            np.take_along_axis(alphas_least, least_at, axis=-1),
+            np.take_along_axis(alphas_greatest, greatest_at, axis=-1),
+            np.take_along_axis(ranges, least_at, axis=-1),
+            np.take_along_axis(ranges, greatest_at, axis=-1),
         )
+        alpha_least, alpha_greatest, of_least, of_greatest = (np.where(tracked, each[..., 0], 0.0) for each in found)
+        return alpha_least, alpha_greatest, of_least, of_greatest
 
     def predicted_miss(self) -> PredictedMiss:
         """Return the predicted-miss interval of each engagement and the states that reach its ends.
@@ -195,34 +221,37 @@ class SetQueries:
         Kumkov and Patsko (1997), equations (13) and (14).
         """
         exists, ends = self._state.stack.widest(self._state.history.elapsed)
-        lower, upper = ends[:, 0].T, ends[:, 1].T
+        lower, upper = ([self._by_axis(ends[:, :, end, column]) for column in range(4)] for end in (0, 1))
         return PredictedMiss(exists, lower[0], upper[0], ExtremePoints(*lower[1:]), ExtremePoints(*upper[1:]))
 
     def worst_predicted_miss_m(self) -> Floats:
         """Return the greatest |predicted miss| in each stored section, m, shape (B, S); zero for empty sections."""
-        summaries = self._state.stack.summaries
-        worst = np.maximum(summaries[:, :, section_life.UPPER_MISS], -summaries[:, :, section_life.LOWER_MISS])
-        return np.where(self.living, worst, 0.0)
+        summaries = self._state.stack.summaries[self._channels]
+        worst = np.maximum(summaries[..., section_life.UPPER_MISS], -summaries[..., section_life.LOWER_MISS])
+        return np.where(self.living, np.hypot.reduce(worst, axis=0), 0.0)
 
     def predicted_miss_by_section_m(self) -> tuple[Floats, Floats]:
         """Return the least and the greatest predicted miss of each section, m, each (B, S); zeros if it is empty."""
-        summaries, living = self._state.stack.summaries, self.living
-        lower, upper = summaries[:, :, section_life.LOWER_MISS], summaries[:, :, section_life.UPPER_MISS]
+        summaries, living = self._by_axis(self._state.stack.summaries), self.living
+        lower, upper = summaries[..., section_life.LOWER_MISS], summaries[..., section_life.UPPER_MISS]
         return np.where(living, lower, 0.0), np.where(living, upper, 0.0)
 
     def sections(self, engagement: int = 0) -> list[Section]:
         """Return the living sections of one engagement in order of increasing range."""
         self._need_engagement(engagement)
-        ranges = self.ranges_m[engagement]
+        stack, elapsed = self._state.stack, self._state.history.elapsed
+        labels, ranges = stack.labels[engagement].tolist(), self.ranges_m[engagement].tolist()
         return [
-            Section(
-                float(self._state.stack.labels[engagement, s]),
-                float(ranges[s]),
-                self.model.closing_speed_m_s,
-                _as_polygon(self._state.stack.polygon(engagement, int(s), self._state.history.elapsed)),
+            self._section(
+                labels[s], ranges[s], [stack.polygon(channel, engagement, s, elapsed) for channel in self._channels]
             )
-            for s in np.flatnonzero(self.living[engagement])
+            for s in np.flatnonzero(self.living[engagement]).tolist()
         ]
+
+    def _section(self, label_m: float, range_m: float, outlines: list[Floats]) -> Section:
+        """Return a section from the vertices along each axis."""
+        polygons = [ConvexPolygons(vertices, np.asarray(len(vertices))) for vertices in outlines]
+        return Section(label_m, range_m, self.model.closing_speed_m_s, *polygons[::-1])
 
     def section_at(self, label_m: float, engagement: int = 0) -> Section:
         """Return the section at any label, computed by replaying the history.
@@ -245,23 +274,25 @@ class SetQueries:
         """
         NUMBER.need("label_m", label_m)
         self._need_engagement(engagement)
-        tape, law, label = self._state.history, self._state.stack.law, float(label_m)
-        section = empty_sections(1)
-        died = replay_section(
-            label, tape.tape(engagement), tape.errors_if_any, law, *section, 0, np.empty(tape.events), working_room()
-        )
-        vertices = outline(section, 0, label, tape.elapsed, law) if died == section_life.ALIVE else np.empty((0, 2))
-        x = label - law.closing_speed * (law.step * tape.elapsed)
-        return Section(label, x, self.model.closing_speed_m_s, _as_polygon(vertices))
+        history, stack, label = self._state.history, self._state.stack, float(label_m)
+        room = replay_room(len(stack.laws), history.events)
+        died = replay_label(label, history.tape(engagement), history.errors_if_any, stack.table, room)
+        chains = Chains(room.origins, room.rings, room.marks)
+        outlines = [np.empty((0, 2)) for _ in self._channels]
+        if died == section_life.ALIVE:
+            rows = [ROWS * channel + PROBE for channel in self._channels]
+            outlines = [outline(chains, row, label, history.elapsed, stack.law) for row in rows]
+        x = label - stack.law.closing_speed * (stack.law.step * history.elapsed)
+        return self._section(label, x, outlines)
 
-    def margin(self, label_m: float, alpha_rad: float, omega_rad_s: float, engagement: int = 0) -> float:
+    def margin(self, label_m: float, alpha_rad: ArrayLike, omega_rad_s: ArrayLike, engagement: int = 0) -> float:
         """Return the signed distance of a state to the boundary of its section: positive inside, negative outside.
 
         Parameters
         ----------
         label_m : float
             Range at t = 0 of the state, m.
-        alpha_rad, omega_rad_s : float
+        alpha_rad, omega_rad_s : float, in space array_like, shape (2,)
             Line-of-sight angle, rad, and its rate, rad/s, now.
         engagement : int
             Number of the engagement.
@@ -269,15 +300,20 @@ class SetQueries:
         Returns
         -------
         float
-            Distance in the plane of V x/e and z, m; -inf if the section is empty.
+            Distance in the plane of V x/e and z, m, in space the lesser one of both; -inf if the section is empty.
         """
-        NUMBER.need("alpha_rad", alpha_rad)
-        NUMBER.need("omega_rad_s", omega_rad_s)
+        shape = () if len(self._channels) == 1 else (len(self._channels),)
+        alphas = np.atleast_1d(real_array("alpha_rad", alpha_rad, shape)).tolist()
+        omegas = np.atleast_1d(real_array("omega_rad_s", omega_rad_s, shape)).tolist()
         section = self.section_at(label_m, engagement)
         x, e = section.range_m, section.closing_speed_m_s
-        scaled = section.polygon.linear_map(np.array([[x / e, 0.0], [0.0, 1.0]]))
-        z, v = alpha_rad * x, omega_rad_s * x - e * alpha_rad
-        return float(scaled.margin(np.array([v * x / e, z])))
+        polygons = [polygon for polygon in (section.polygon_y, section.polygon) if polygon is not None]
+        margins = []
+        for polygon, alpha, omega in zip(polygons, alphas, omegas, strict=True):
+            scaled = polygon.linear_map(np.array([[x / e, 0.0], [0.0, 1.0]]))
+            z, v = alpha * x, omega * x - e * alpha
+            margins.append(float(scaled.margin(np.array([v * x / e, z]))))
+        return min(margins)
 
     def _need_engagement(self, engagement: int) -> None:
         WHOLE.need("engagement", engagement)
@@ -309,7 +345,8 @@ class SetQueries:
     def _repr_svg_(self) -> str:
         which = "" if self.batch == 1 else f", the first of {self.batch} engagements"
         outlines = [section.omega_alpha.polygon() for section in self.sections()]
-        return sections_svg(outlines, f"{self.section_counts[0]} sections at t = {self.time_s:g} s{which}")
+        plane = "" if len(self.axes) == 1 else ", plane (x, z)"
+        return sections_svg(outlines, f"{self.section_counts[0]} sections at t = {self.time_s:g} s{plane}{which}")
 
     def __repr__(self) -> str:
         head = f"{type(self).__name__} at t = {self.time_s:g} s"
@@ -323,11 +360,10 @@ class SetQueries:
             return f"<{head}: {self.status[0].name.lower()}>"
         least, greatest = self.stored_range_interval_m()
         miss = self.predicted_miss()
+        ends = np.stack([miss.lower_m, miss.upper_m]).reshape(2, -1)[:, : len(self.axes)].T.tolist()
+        named = ["predicted miss"] if len(ends) == 1 else [f"predicted miss along {axis}" for axis in self.axes]
+        misses = ", ".join(f"{name} {low:.4g} to {high:.4g} m" for name, (low, high) in zip(named, ends, strict=True))
         return (
             f"<{head}: {self.section_counts[0]} sections, range {least[0] / 1e3:.6g} to {greatest[0] / 1e3:.6g} km, "
-            f"predicted miss {miss.lower_m[0]:.4g} to {miss.upper_m[0]:.4g} m>"
+            f"{misses}>"
         )
-
-
-def _as_polygon(vertices: Floats) -> ConvexPolygons:
-    return ConvexPolygons(vertices, np.asarray(len(vertices)))

@@ -93,8 +93,8 @@ class SetState:
             history.tapes,
             history.errors_if_any,
             stack.sections,
-            stack.law,
-            workspace(history.events, stack.labels.shape[1]),
+            stack.table,
+            workspace(len(stack.laws), history.events, stack.labels.shape[1]),
         )
         stack.note_new(spare)
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from infoset import SetModel
 from infoset.history import History
 from infoset.replays import margins_along
-from infoset.section_law import BOUND_SLACK, section_law
+from infoset.section_law import BOUND_SLACK, law_table, section_laws
 from infoset.section_life import ANGLE, IMPULSE, PREDICTION, RATE
 from infoset.set_queries import MaskedFloats
 from sim.kepler import Sight
@@ -27,7 +27,7 @@ LABEL_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
 
 @dataclass(frozen=True)
 class _Look:
-    """True states of the flights that measure in a step."""
+    """True states of the flights that measure in a step; in space slopes have the shape (2, B)."""
 
     step: int
     where: Flags
@@ -45,10 +45,11 @@ class TruthSection:
     """
 
     def __init__(self, model: SetModel, batch: int) -> None:
-        self._law = section_law(model)
+        laws = section_laws(model)
+        self._law, self._laws = laws[0], law_table(laws)
         self._exact_angles = model.is_guaranteed
         self._least_range_m = model.least_range_m
-        self._history = History(batch)
+        self._history = History(len(laws), batch)
         self._looks: list[_Look] = []
 
     def look(self, where: Flags, sight: Sight) -> None:
@@ -72,8 +73,8 @@ class TruthSection:
         self._history.record(RATE, omega_rad_s, where, error_rad_s * (1.0 + BOUND_SLACK))
 
     def shift(self, impulse_m_s: Floats) -> None:
-        """Store the impulse of this step."""
-        self._history.record(IMPULSE, impulse_m_s, impulse_m_s != 0.0)
+        """Store the impulse of this step, m/s, shape (B,), in space (2, B)."""
+        self._history.record(IMPULSE, impulse_m_s, np.any(np.atleast_2d(impulse_m_s) != 0.0, axis=0))
 
     def predict(self) -> None:
         """End the step."""
@@ -105,13 +106,17 @@ class TruthSection:
         at = [look.step for look in looks]
         ranges = ranges[at]
         where = np.reshape([look.where for look in looks], ranges.shape) & (ranges >= self._least_range_m)
-        slope = np.reshape([look.slope for look in looks], ranges.shape)
-        rate = np.reshape([look.slope_rate_per_s for look in looks], ranges.shape)
+        # Shape (L, C, B), then (C, L, B).
+        each = (len(looks), len(self._laws), len(labels))
+        slope = np.reshape([look.slope for look in looks], each).swapaxes(0, 1)
+        rate = np.reshape([look.slope_rate_per_s for look in looks], each).swapaxes(0, 1)
         # A look is after the measurements of its step and before the impulse.
         ends = np.append(np.flatnonzero(kinds == IMPULSE), history.events)[at]
-        margins = margins_along(labels, ends, rate * ranges - law.closing_speed * slope, slope * ranges, history, law)
+        v, z = rate * ranges - law.closing_speed * slope, slope * ranges
+        margins = margins_along(labels, ends, v, z, history, self._laws)
         # The label of the true state has an error of half an ulp, and so have its z and V.
-        return np.where(where, margins + LABEL_ROUNDING * labels * np.abs(slope), np.inf)
+        margins = margins + LABEL_ROUNDING * labels * np.abs(slope)
+        return np.where(where, margins.min(axis=0), np.inf)
 
 
 def _if_measured(margin: Floats) -> MaskedFloats:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from guidance import LineOfSight, NoiseKind, RandomNoise
 from infoset import InformationSetView, InitialSet, Model, RateSensor, StateBox
-from infoset.section_law import section_law
+from infoset.section_law import section_laws
 from sim import Manoeuvre, Outcome, Results, Scenario, Sun, Target, simulate
 from sim.draws import draw
 from sim.engagement import Engagements
@@ -162,7 +162,7 @@ def test_gravity_moves_the_model_motion_within_its_bounds(asteroid: Scenario, sp
         acceleration = np.abs(np.diff(z_label, n=2, axis=0)) / step_s**2
         for case, z_m in enumerate(widths):
             model = with_gravity(plain[case], sun, 0.0)
-            law = section_law(model)
+            (law,) = section_laws(model)
             mine = slice(4 * case, 4 * case + 4)
             assert (law.vz_least <= label_v[mine]).all()
             assert (label_v[mine] <= law.vz_greatest).all()

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind, RandomNoise, Thruster, TieRule
 from infoset import AngleSensor, InformationSetView, InitialSet, Model, RateSensor, SetModel, StateBox
-from infoset.section_law import BOUND_SLACK, SectionLaw, section_law
+from infoset.section_law import BOUND_SLACK, SectionLaw, section_laws
 from infoset.section_life import LastSight, rate_band
 from sim import Outcome, Results, Scenario, simulate
 from sim.draws import draw
@@ -152,7 +152,7 @@ def flat_law(error_rad: float, rising: bool) -> tuple[SetModel, SectionLaw]:
         5e3, 1.0, box, AngleSensor(1.0, error_rad, (0.5 if rising else 2.0) * error_rad, 5e5), 0.05, 0.0, 5, 2,
         InitialSet.BOX, Model.GUARANTEED, execution_error_relative=0.02,
     )  # fmt: skip
-    return model, section_law(model)
+    return model, section_laws(model)[0]
 
 
 SIDES = st.sampled_from([-1.0, 1.0]) | st.floats(-1.0, 1.0)
@@ -191,7 +191,7 @@ def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(
     omega = omega_true + rate_draw * 1e-9
     size = abs(impulse) if ago else 0.0
     sight = LastSight(
-        measured, alpha, ago, impulse * fired_after if ago else 0.0, size * law.impulse_error * fired_after, size
+        measured, alpha, 0.0, ago, impulse * fired_after if ago else 0.0, size * law.impulse_error * fired_after, size
     )
     if abs(v) + size + law.disturbance * time > 300.0 or abs(z_then) > 1e4:
         return
