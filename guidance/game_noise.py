@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.noise import LineOfSight, TieRule, need_draws
+from guidance.noise import LineOfSight, TieRule, draws_of_step, need_draws
 from infoset import AngleSensor, InformationSetView, PredictedMiss, RangeSensor
 from infoset.sensors import Measurements
 
@@ -23,27 +23,36 @@ class GameNoise:
 
     Parameters
     ----------
-    tie : TieRule
-        Which extreme is kept when both are equal in modulus, as they are at almost every step under U_s.
-    tie_draws : ndarray, shape (B, steps)
+    tie : TieRule, or tuple of two
+        Which extreme is kept when both are equal in modulus, as they are at almost every step under U_s. In space one
+        rule for both axes, or two rules, for y and z.
+    tie_draws : ndarray, shape (B, steps), or (2, B, steps) in space
         Uniform in [-1, 1], used by `TieRule.RANDOM`: the upper extreme where the draw is not negative.
 
     Raises
     ------
     TypeError, ValueError
-        If `tie` is not a `TieRule`, a draw is not within [-1, 1], or the array not of shape (B, steps).
+        If `tie` is not a `TieRule` or two of them, a draw is not within [-1, 1], or the array has another shape.
+
+    Notes
+    -----
+    In space, each axis has its own extremes and its own worse one; the measured angles are chosen for each axis. The
+    range has the rule of the plane, for the corner (worse extreme of y, worse extreme of z) of the rectangle of
+    predicted misses of each section: the point to keep is in the section where this corner has the greatest modulus,
+    the other extreme in that of the opposite corner.
 
     References
     ----------
     Kumkov and Patsko (1997), section 7.
     """
 
-    tie: TieRule
+    tie: TieRule | tuple[TieRule, TieRule]
     tie_draws: Floats
 
     def __post_init__(self) -> None:
-        if not isinstance(self.tie, TieRule):
-            raise TypeError(f"tie must be a TieRule, for example TieRule.UPPER: got {self.tie!r}")
+        rules = self.tie if isinstance(self.tie, tuple) else (self.tie,)
+        if not all(isinstance(rule, TieRule) for rule in rules) or len(rules) > 2 or not rules:
+            raise TypeError(f"tie must be a TieRule, for example TieRule.UPPER, or a pair of them: got {self.tie!r}")
         need_draws("tie_draws", self.tie_draws)
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
@@ -56,22 +65,27 @@ class GameNoise:
             if isinstance(sensor, AngleSensor):
                 chosen = _angle(sensor, sight, predicted, miss, upper_is_worse)
             elif isinstance(sensor, RangeSensor):
-                chosen = _range(sensor, sight, predicted, miss, upper_is_worse)
+                chosen = _range(sensor, sight, predicted, upper_is_worse)
             else:
                 upper, lower = sensor.true_value(miss.upper_point), sensor.true_value(miss.lower_point)
-                worst = np.where(upper_is_worse, upper, lower)
-                chosen = np.clip(worst, true - sensor.bound(sight), true + sensor.bound(sight))
+                chosen = sensor.nearest(sight, np.where(upper_is_worse, upper, lower))
             measured[name] = np.where(miss.exists, chosen, true)
         return measured
 
     def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
         upper, lower = np.abs(miss.upper_m), np.abs(miss.lower_m)
         tie = np.abs(upper - lower) <= TIE_TOLERANCE * (miss.upper_m - miss.lower_m)
-        if self.tie is TieRule.RANDOM:
-            chosen: Flags | bool = self.tie_draws[:, step] >= 0.0
-        else:
-            chosen = self.tie is TieRule.UPPER or (self.tie is TieRule.ALTERNATE and step % 2 == 0)
+        if not isinstance(self.tie, tuple):
+            return np.where(tie, self._upper_at_tie(self.tie, step, tie.shape), upper > lower)
+        if tie.ndim == 1:
+            raise ValueError(f"tie must be one TieRule in a plane, which has one lateral axis: got {self.tie!r}")
+        chosen = [self._upper_at_tie(rule, step, tie.shape)[axis] for axis, rule in enumerate(self.tie)]
         return np.where(tie, chosen, upper > lower)
+
+    def _upper_at_tie(self, rule: TieRule, step: int, shape: tuple[int, ...]) -> Flags:
+        if rule is TieRule.RANDOM:
+            return draws_of_step("tie_draws", self.tie_draws, step, shape) >= 0.0
+        return np.full(shape, rule is TieRule.UPPER or (rule is TieRule.ALTERNATE and step % 2 == 0))
 
 
 @dataclass(frozen=True)
@@ -80,12 +94,12 @@ class SwitchingNoise(GameNoise):
 
     Parameters
     ----------
-    tie_draws : ndarray, shape (B, steps)
+    tie_draws : ndarray, shape (B, steps), or (2, B, steps) in space
         The upper extreme is kept where the value is not negative, the lower one elsewhere.
     """
 
     def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
-        return np.asarray(self.tie_draws[:, step] >= 0.0)
+        return draws_of_step("tie_draws", self.tie_draws, step, miss.upper_m.shape) >= 0.0
 
 
 def _angle(
@@ -94,26 +108,29 @@ def _angle(
     upper, lower = miss.upper_point, miss.lower_point
     worst = np.where(upper_is_worse, upper.alpha_rad, lower.alpha_rad)
     other = np.where(upper_is_worse, lower.alpha_rad, upper.alpha_rad)
-    reach = sensor.error_bound(np.where(upper_is_worse, upper.range_m, lower.range_m))
+    reach = sensor.error_bounds(np.where(upper_is_worse, upper.range_m, lower.range_m))
     least, greatest, range_of_least, range_of_greatest = predicted.least_and_greatest_alpha()
-    bound = sensor.error_bound(sight.range_m)
-    return keep_point(
+    bound = sensor.bound(sight)
+    chosen = keep_point(
         (worst > other) | ((worst == other) & upper_is_worse),
         point_at_top=worst - reach,
         point_at_bottom=worst + reach,
-        least_at_bottom=least + sensor.error_bound(range_of_least),
-        greatest_at_top=greatest - sensor.error_bound(range_of_greatest),
+        least_at_bottom=least + sensor.error_bounds(range_of_least),
+        greatest_at_top=greatest - sensor.error_bounds(range_of_greatest),
         lower=sight.alpha_rad - bound,
         upper=sight.alpha_rad + bound,
     )
+    return sensor.nearest(sight, chosen)
 
 
-def _range(
-    sensor: RangeSensor, sight: LineOfSight, predicted: InformationSetView, miss: PredictedMiss, upper_is_worse: Flags
-) -> Floats:
-    upper, lower, error = miss.upper_point.range_m, miss.lower_point.range_m, sensor.relative_error
-    worst = np.where(upper_is_worse, upper, lower)
-    other = np.where(upper_is_worse, lower, upper)
+def _range(sensor: RangeSensor, sight: LineOfSight, predicted: InformationSetView, upper_is_worse: Flags) -> Floats:
+    lower, upper = predicted.predicted_miss_by_section_m()
+    ranges, error, is_upper = predicted.ranges_m, sensor.relative_error, upper_is_worse[..., None]
+    living = predicted.living & (ranges != 0.0)
+    rows, side = np.arange(len(ranges)), np.where(is_upper, 1.0, -1.0)
+    worst_corners, other_corners = np.where(is_upper, upper, lower), np.where(is_upper, lower, upper)
+    worst = ranges[rows, np.where(living, _size_on_side(worst_corners, side), -np.inf).argmax(axis=1)]
+    other = ranges[rows, np.where(living, _size_on_side(other_corners, side), np.inf).argmin(axis=1)]
     least, greatest = predicted.stored_range_interval_m()
     return keep_point(
         worst >= other,
@@ -124,6 +141,21 @@ def _range(
         lower=sight.range_m * (1.0 - error),
         upper=sight.range_m * (1.0 + error),
     )
+
+
+def _size_on_side(corners_m: Floats, side: Floats) -> Floats:
+    """Return the modulus of points of predicted misses, negative if they are on the other side of zero, shape (B, S).
+
+    Parameters
+    ----------
+    corners_m : ndarray, shape (..., B, S)
+        Points, in a plane of one coordinate and in space of two.
+    side : ndarray, shape (..., B, 1)
+        1 or -1: the side of each coordinate.
+    """
+    shape = (-1, *corners_m.shape[-2:])
+    size = np.hypot.reduce(corners_m.reshape(shape))
+    return np.asarray(np.copysign(size, (side * corners_m).reshape(shape).sum(axis=0)))
 
 
 def keep_point(

@@ -39,8 +39,11 @@ class LineOfSight:
 
     Parameters
     ----------
-    alpha_rad, omega_rad_s, range_m : ndarray, shape (B,)
-        True line-of-sight angle (rad), its rate (rad/s) and range (m).
+    alpha_rad, omega_rad_s : ndarray, shape (B,)
+        True line-of-sight angle (rad) and its rate (rad/s). In space, shape (2, B): the angles atan2(y, x) and
+        atan2(z, x), whatever the convention of the sensor.
+    range_m : ndarray, shape (B,)
+        True distance, m.
     sensors : mapping of str to Sensor
         Sensors that measure in this step, by name: "angle", "range", "rate".
     """
@@ -53,7 +56,7 @@ class LineOfSight:
 
 
 def checked_measurements(measured: Measurements, sight: LineOfSight, noise: object) -> dict[str, Floats]:
-    """Return the measurements of a noise as arrays of shape (B,), if they are finite and of sensors that measure.
+    """Return the measurements of a noise as arrays, if they are finite and of sensors that measure.
 
     Raises
     ------
@@ -74,26 +77,45 @@ def checked_measurements(measured: Measurements, sight: LineOfSight, noise: obje
                 f"{where}: sensor {name!r} does not measure at this step, only {sorted(sight.sensors)}; leave it out: "
                 f"got {shown(values)}"
             )
-    return {name: real_array(f"{where}: {name}", values, sight.alpha_rad.shape) for name, values in measured.items()}
+    return {
+        name: real_array(f"{where}: {name}", values, sight.sensors[name].true_value(sight).shape)
+        for name, values in measured.items()
+    }
 
 
 def need_draws(name: str, draws: Floats) -> None:
-    """Refuse errors, in units of their bounds, that are not of shape (B, steps) or not within [-1, 1].
+    """Refuse errors, in units of their bounds, of a wrong number of dimensions, or not within [-1, 1].
 
     Parameters
     ----------
-    draws : ndarray, shape (B, steps)
-        Errors, or choices between ties.
+    draws : ndarray, shape (B, steps) or (2, B, steps)
+        Errors, or choices between ties; along y and z in space.
 
     Raises
     ------
     TypeError, ValueError
         If they are not.
     """
-    if not isinstance(draws, np.ndarray) or draws.ndim != 2:
-        raise ValueError(f"{name} must have the shape (B, steps): got {np.shape(draws)}")
+    if not isinstance(draws, np.ndarray) or draws.shape[:-2] not in ((), (2,)) or draws.ndim < 2:
+        raise ValueError(f"{name} must have the shape (B, steps), or (2, B, steps) in space: got {np.shape(draws)}")
     if not (np.abs(real_values(name, draws)) <= 1.0).all():  # refuses NaN as well
         raise ValueError(f"{name} must lie within [-1, 1], in units of the bound")
+
+
+def draws_of_step(name: str, draws: Floats, step: int, shape: tuple[int, ...]) -> Floats:
+    """Return the draws of one step, if they have a shape: (B,), or (2, B) along y and z.
+
+    Raises
+    ------
+    ValueError
+        If the shape is different, or there are no draws for this step.
+    """
+    steps = draws.shape[-1]
+    if draws.shape[:-1] != shape:
+        raise ValueError(f"{name} must have the shape {(*shape, steps)} in this engagement: got {draws.shape}")
+    if step >= steps:
+        raise ValueError(f"{name} has {steps} steps, none for step {step}: give one for each step")
+    return draws[..., step]
 
 
 class MeasurementNoise(Protocol):
@@ -110,5 +132,6 @@ class MeasurementNoise(Protocol):
         Returns
         -------
         mapping of str to ndarray, shape (B,)
-            Measured values by sensor, rad, m or rad/s. A sensor that is left out gives no measurement in this step.
+            Measured values by sensor, rad, m or rad/s. A sensor that is left out gives no measurement in this step. In
+            space, angles in the convention of the sensor and rates have shape (2, B).
         """

@@ -9,11 +9,14 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.noise import LineOfSight, need_draws
-from infoset import InformationSetView
+from guidance.noise import LineOfSight, draws_of_step, need_draws
+from infoset import AngleSensor, InformationSetView
 from infoset.sensors import Measurements
 
 Floats = NDArray[np.float64]
+
+DISC_TOLERANCE = 1e-9
+"""Greatest distance outside the unit disc that is taken as rounding."""
 
 
 @dataclass(frozen=True)
@@ -24,12 +27,12 @@ class ScriptedNoise:
     ----------
     errors : mapping of str to ndarray, shape (B, steps)
         Errors by sensor, within [-1, 1]: an angle alpha + u h(d), a range d (1 + u b). A sensor without errors measures
-        the true value.
+        the true value. In space, errors of angles and rates have shape (2, B, steps).
 
     Raises
     ------
     TypeError, ValueError
-        If an error is not within [-1, 1], or the arrays do not have one shape (B, steps).
+        If an error is not within [-1, 1], or B and steps are not the same for all sensors.
 
     References
     ----------
@@ -44,7 +47,7 @@ class ScriptedNoise:
         shapes = set()
         for name, errors in self.errors.items():
             need_draws(f"errors[{name!r}]", errors)
-            shapes.add(errors.shape)
+            shapes.add(errors.shape[-2:])
         if len(shapes) > 1:
             raise ValueError(f"errors must have one shape (B, steps) for all sensors: got {sorted(shapes)}")
 
@@ -54,14 +57,22 @@ class ScriptedNoise:
         Raises
         ------
         ValueError
-            If errors are missing for this step.
+            If errors are missing for this step, have another shape than the measurements, or two of an angle sensor
+            with errors in a disc are outside it.
         """
-        for name, errors in self.errors.items():
-            if sight.step >= errors.shape[1]:
+        errors = {}
+        for name, sensor in sight.sensors.items():
+            if name not in self.errors:
+                continue
+            label, shape = f"errors[{name!r}]", sensor.true_value(sight).shape
+            now = draws_of_step(label, self.errors[name], sight.step, shape)
+            if isinstance(sensor, AngleSensor) and sensor.is_disc and np.hypot(*now).max() > 1.0 + DISC_TOLERANCE:
                 raise ValueError(
-                    f"errors[{name!r}] has {errors.shape[1]} steps, none for step {sight.step}: give one for each step"
+                    f"{label} must lie in the unit disc, because the angle sensor's error is in a disc or a cone: at "
+                    f"step {sight.step} the root of the sum of squares is {np.hypot(*now).max():.6g}"
                 )
-        return measure_with_errors(sight, {name: errors[:, sight.step] for name, errors in self.errors.items()})
+            errors[name] = now
+        return measure_with_errors(sight, errors)
 
 
 @dataclass(frozen=True)
@@ -71,7 +82,8 @@ class RandomNoise(ScriptedNoise):
     Parameters
     ----------
     errors : mapping of str to ndarray, shape (B, steps)
-        Draws by sensor, uniform in [-1, 1]; the error is the draw times the bound.
+        Draws by sensor, uniform in [-1, 1]; the error is the draw times the bound. In space, draws of angles and rates
+        have shape (2, B, steps); those of an angle sensor with errors in a disc are uniform in the unit disc.
 
     References
     ----------
@@ -82,7 +94,7 @@ class RandomNoise(ScriptedNoise):
 
 
 def measure_with_errors(sight: LineOfSight, errors: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Return the measurements of a step from errors in units of the bounds, shape (B,); a missing error is zero."""
+    """Return the measurements of a step from errors in units of the bounds; a missing error is zero."""
     return {
         name: sensor.measured(sight, errors[name]) if name in errors else sensor.true_value(sight)
         for name, sensor in sight.sensors.items()
@@ -91,4 +103,6 @@ def measure_with_errors(sight: LineOfSight, errors: Mapping[str, Floats]) -> dic
 
 def errors_made(sight: LineOfSight, measured: Measurements) -> dict[str, Floats]:
     """Return the errors of measurements in units of the bounds: the inverse of `measure_with_errors`, to rounding."""
-    return {name: np.clip(sight.sensors[name].error(sight, values), -1.0, 1.0) for name, values in measured.items()}
+    return {
+        name: sight.sensors[name].limited(sight.sensors[name].error(sight, values)) for name, values in measured.items()
+    }

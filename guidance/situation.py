@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from guidance.thruster import Thruster
 from infoset import InformationSetView, PredictedMiss
-from infoset.sensors import Measurements, Sensor
+from infoset.sensors import AngleSensor, Measurements, Sensor
 
 Floats = NDArray[np.float64]
 
@@ -18,6 +18,9 @@ Floats = NDArray[np.float64]
 @dataclass(frozen=True)
 class Situation:
     """Everything known on board at one step, for a batch of B engagements.
+
+    In space, predicted misses, measured angles, rates and impulses have shape (2, B), along y and z. `axis` gives the
+    planar situation of x and one of them.
 
     Parameters
     ----------
@@ -56,3 +59,34 @@ class Situation:
     information: InformationSetView
     new: frozenset[str] = frozenset()
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Lateral axes: ("z",) in a plane, ("y", "z") in space."""
+        return self.information.model.axes
+
+    def axis(self, name: str) -> Situation:
+        """Return the planar situation of x and one lateral axis, "y" or "z", which is z in it.
+
+        Notes
+        -----
+        The measured angle is the plane angle, whatever the convention of the sensor. Budget and engine are the whole
+        ones.
+        """
+        if len(self.axes) == 1:
+            return self
+        number, angle_sensor = self.axes.index(name), self.information.model.angle_sensor
+        measured = dict(self.measured)
+        if angle_sensor.name in measured:
+            measured[angle_sensor.name] = angle_sensor.plane_angles(measured[angle_sensor.name])
+        return replace(
+            self,
+            predicted_miss=self.predicted_miss.axis(number),
+            measured={key: values if values.ndim == 1 else values[number] for key, values in measured.items()},
+            last_impulse_m_s=self.last_impulse_m_s[number],
+            information=self.information.axis(name),
+            sensors={
+                key: sensor.axis(name) if isinstance(sensor, AngleSensor) else sensor
+                for key, sensor in self.sensors.items()
+            },
+        )

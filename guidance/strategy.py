@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,8 +12,50 @@ from guidance.situation import Situation
 from infoset.limits import shown
 
 
-def checked_impulses(wanted: object, tracking: NDArray[np.bool_], strategy: object, step: int) -> NDArray[np.float64]:
-    """Return the impulses of a strategy as an array of shape (B,), if they are real and finite.
+def start(strategy: Strategy, batch: int, axes: Sequence[str]) -> list[Any]:
+    """Return the states of a strategy for `decide`: one for each lateral axis, or one if it decides for all axes."""
+    return [strategy.start(batch) for _ in (axes[:1] if _is_spatial(strategy) else axes)]
+
+
+def decide(
+    strategy: Strategy, situation: Situation, states: Sequence[Any], tracking: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return the impulses of a step, m/s, shape (B,); in space (2, B), along y and z.
+
+    Parameters
+    ----------
+    states : sequence
+        Return value of `start`.
+    tracking : ndarray of bool, shape (B,)
+        Engagements that have a set; elsewhere an impulse need not be finite.
+
+    Raises
+    ------
+    ValueError
+        If the strategy returns impulses of another shape, or impulses that are not real and finite.
+
+    Notes
+    -----
+    In space, a strategy that decides for one axis gets the planar situation of each axis.
+    """
+    if _is_spatial(strategy):
+        return checked_impulses(strategy.decide(situation, states[0]), situation, tracking, strategy)
+    planar = [situation.axis(name) for name in situation.axes]
+    wanted = [
+        checked_impulses(strategy.decide(one, state), one, tracking, strategy)
+        for one, state in zip(planar, states, strict=True)
+    ]
+    return wanted[0] if len(wanted) == 1 else np.stack(wanted)
+
+
+def _is_spatial(strategy: Strategy) -> bool:
+    return bool(getattr(strategy, "spatial", False))
+
+
+def checked_impulses(
+    wanted: object, situation: Situation, tracking: NDArray[np.bool_], strategy: object
+) -> NDArray[np.float64]:
+    """Return the impulses of a strategy in a situation as an array, if they are real and finite.
 
     Parameters
     ----------
@@ -22,16 +65,21 @@ def checked_impulses(wanted: object, tracking: NDArray[np.bool_], strategy: obje
     Raises
     ------
     ValueError
-        If they are not.
+        If they are not, or their shape is not that of the impulses of the situation.
     """
-    values = np.asarray(wanted)
+    values, shape = np.asarray(wanted), situation.last_impulse_m_s.shape
     real = values.dtype.kind in "fiu" and not isinstance(wanted, np.ma.MaskedArray)
-    if not real or values.shape != tracking.shape or not np.isfinite(values[tracking]).all():
-        raise ValueError(
-            f"strategy {type(strategy).__name__} must return {len(tracking)} finite impulses (m/s), one an engagement, "
-            f"real and not masked: at step {step} it returned shape {values.shape}, {shown(wanted)}"
-        )
-    return values.astype(np.float64, copy=False)
+    if real and values.shape == shape and np.isfinite(values[..., tracking]).all():
+        return values.astype(np.float64, copy=False)
+    needed = f"{shape[-1]} finite impulses (m/s), one an engagement"
+    if len(shape) > 1:
+        needed = f"finite impulses (m/s) of the shape {shape}, along y and z"
+    elif values.shape == (2, *shape):
+        needed += " (for both axes at once, set `spatial = True` in its class)"
+    raise ValueError(
+        f"strategy {type(strategy).__name__} must return {needed}, real and not masked: at step {situation.step} it "
+        f"returned shape {values.shape}, {shown(wanted)}"
+    )
 
 
 class Strategy(Protocol):
@@ -39,6 +87,10 @@ class Strategy(Protocol):
 
     The thruster limits the impulses that a strategy returns. Where an engagement has no set
     (`situation.predicted_miss.exists` is False) they are ignored.
+
+    In space, a strategy is applied to each lateral axis: `start` once for each axis, `decide` with the planar situation
+    of the axis. A strategy whose class has the attribute ``spatial = True`` gets the whole situation, with arrays of
+    shape (2, B), and returns impulses of shape (2, B), along y and z.
     """
 
     def start(self, batch: int) -> Any:

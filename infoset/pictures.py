@@ -53,20 +53,23 @@ def sections_svg(outlines: Sequence[Floats], title: str) -> str:
 
 
 def predicted_miss_svg(exists: Flags, lower_m: Floats, upper_m: Floats) -> str:
-    """Return a picture of the predicted-miss intervals that exist, one bar per engagement."""
+    """Return a picture of the predicted-miss intervals that exist, one bar per engagement; in space one for y and z."""
     known = np.flatnonzero(exists)[:MOST_INTERVALS]
     if not len(known):
         return note("predicted miss: no set is left")
-    ends = np.stack([lower_m[known], upper_m[known]], axis=1)
+    axes = lower_m.ndim
+    ends = np.stack([lower_m[..., known], upper_m[..., known]]).reshape(2, axes, -1).transpose(2, 1, 0).reshape(-1, 2)
+    along = ("",) if axes == 1 else (" along y", " along z")
     if len(exists) == 1:
-        title = f"predicted miss from {ends[0, 0]:.4g} to {ends[0, 1]:.4g} m"
+        parts = (
+            f"from {least:.4g} to {greatest:.4g} m{axis}" for (least, greatest), axis in zip(ends, along, strict=True)
+        )
+        title = f"predicted miss {', '.join(parts)}"
     else:
-        title = f"predicted miss, {len(known)} of {len(exists)} engagements"
-    y = (-float(len(known)), 1.0)
-    plane = Plane(limits(np.append(ends, 0.0)), y, "predicted miss, m", "", title, 74 + 8 * len(known))
+        title = f"predicted miss{' and'.join(along)}, {len(known)} of {len(exists)} engagements"
+    y = (-float(len(ends)), 1.0)
+    plane = Plane(limits(np.append(ends, 0.0)), y, "predicted miss, m", "", title, 74 + 8 * len(ends))
     plane.line(np.array([[0.0, y[0]], [0.0, y[1]]]), ACCENT, width=1.0)
     for row, (lower, upper) in enumerate(ends):
-        plane.line(
-            np.array([[lower, -row], [upper, -row]]), NEAR if len(known) < 2 else shade(row, len(known)), width=4
-        )
+        plane.line(np.array([[lower, -row], [upper, -row]]), NEAR if len(ends) < 2 else shade(row, len(ends)), width=4)
     return plane.svg()

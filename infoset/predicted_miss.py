@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +19,16 @@ class ExtremePoints:
     Parameters
     ----------
     alpha_rad, omega_rad_s, range_m : ndarray, shape (B,)
-        Line-of-sight angle, its rate, and range: rad, rad/s, m.
+        Line-of-sight angle, its rate, and range: rad, rad/s, m. Shape (2, B) in space, along y and z.
     """
 
     alpha_rad: Floats
     omega_rad_s: Floats
     range_m: Floats
+
+    def axis(self, number: int) -> ExtremePoints:
+        """Return the points of one lateral axis in space."""
+        return ExtremePoints(*(getattr(self, field.name)[number] for field in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,7 @@ class PredictedMiss:
     exists : ndarray of bool, shape (B,)
         Whether the set has a living section; the other fields are zero where it has none.
     lower_m, upper_m : ndarray, shape (B,)
-        Ends pi_* and pi^* of the interval, signed, m.
+        Ends pi_* and pi^* of the interval, signed, m. Shape (2, B) in space, along y and z.
     lower_point, upper_point : ExtremePoints
         States that reach the ends.
 
@@ -50,6 +54,16 @@ class PredictedMiss:
     upper_m: Floats
     lower_point: ExtremePoints
     upper_point: ExtremePoints
+
+    def axis(self, number: int) -> PredictedMiss:
+        """Return the interval of one lateral axis in space; `number` is 0 for y and 1 for z."""
+        return PredictedMiss(
+            self.exists,
+            self.lower_m[number],
+            self.upper_m[number],
+            self.lower_point.axis(number),
+            self.upper_point.axis(number),
+        )
 
     def _repr_svg_(self) -> str:
         return predicted_miss_svg(self.exists, self.lower_m, self.upper_m)

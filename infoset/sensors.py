@@ -45,19 +45,23 @@ class ErrorShape(Enum):
 
 
 class Geometry(Protocol):
-    """True geometry of a batch of engagements: line-of-sight angle, its rate and range, shape (B,)."""
+    """True geometry of a batch of engagements, or other points with angles, rates and ranges.
+
+    The line of sight of a plane has arrays of shape (B,). In space, angles and rates have shape (2, B), along y and z;
+    below, (..., B) stands for both.
+    """
 
     @property
     def alpha_rad(self) -> Floats:
-        """Line-of-sight angle, rad."""
+        """Line-of-sight angles in the planes of x and each lateral axis, atan2(y, x) and atan2(z, x), rad."""
 
     @property
     def omega_rad_s(self) -> Floats:
-        """Its rate, rad/s."""
+        """Their rates, rad/s."""
 
     @property
     def range_m(self) -> Floats:
-        """Distance, m."""
+        """Distance, m, shape (B,), or for points that differ by axis (2, B)."""
 
 
 class Cuttable(Protocol):
@@ -102,23 +106,11 @@ class Sensor(ABC):
 
     @abstractmethod
     def true_value(self, sight: Geometry) -> Floats:
-        """Return the measured quantity without error, shape (B,).
-
-        Parameters
-        ----------
-        sight : Geometry
-            True geometry, or any other points with angle, rate and range.
-        """
+        """Return the measured quantity without error, shape (..., B); that of a range has shape (B,)."""
 
     @abstractmethod
     def bound(self, sight: Geometry) -> Floats | float:
-        """Return the greatest size of the error, in the unit of the quantity.
-
-        Parameters
-        ----------
-        sight : Geometry
-            True geometry.
-        """
+        """Return the greatest size of the error, in the unit of the quantity, broadcast against the true value."""
 
     @abstractmethod
     def cut(self, sets: Cuttable, measured: Measurements, where: NDArray[np.bool_]) -> None:
@@ -128,7 +120,7 @@ class Sensor(ABC):
         ----------
         sets : Cuttable
             Sets of a batch, for example an `InformationSet`.
-        measured : mapping of str to ndarray, shape (B,)
+        measured : mapping of str to ndarray, shape (..., B)
             All measurements of the step (rad, m, rad/s), that of this sensor among them.
         where : ndarray of bool, shape (B,)
             Engagements that have measured.
@@ -155,28 +147,21 @@ class Sensor(ABC):
         return None
 
     def measured(self, sight: Geometry, error: Floats | float) -> Floats:
-        """Return the measured value for an error.
-
-        Parameters
-        ----------
-        sight : Geometry
-            True geometry.
-        error : ndarray, shape (B,), or float
-            In units of the bound, from -1 to 1.
-        """
+        """Return the measured value for an error in units of the bound, from -1 to 1."""
         return self.true_value(sight) + self.bound(sight) * error
 
     def error(self, sight: Geometry, measured: Floats) -> Floats:
-        """Return the error of a measured value in units of the bound.
-
-        Parameters
-        ----------
-        sight : Geometry
-            True geometry.
-        measured : ndarray, shape (B,)
-            Measured values, in the unit of the quantity.
-        """
+        """Return the error of a measured value in units of the bound."""
         return (measured - self.true_value(sight)) / self.bound(sight)
+
+    def limited(self, error: Floats) -> Floats:
+        """Return the possible error (in units of the bound) that is nearest to an error."""
+        return np.clip(error, -1.0, 1.0)
+
+    def nearest(self, sight: Geometry, wanted: Floats) -> Floats:
+        """Return the possible measurement that is nearest to a wanted one."""
+        true, bound = self.true_value(sight), self.bound(sight)
+        return np.clip(wanted, true - bound, true + bound)
 
 
 @dataclass(frozen=True)
@@ -263,13 +248,91 @@ class AngleSensor(Sensor):
         """Return the greatest size of the error at a range (m), rad."""
         return self.error_at_zero_range_rad + self.error_slope_rad_per_m * range_m
 
+    def error_bounds(self, range_m: Floats) -> Floats:
+        """Return the greatest size of the error of each angle, rad, at ranges (m) of shape (..., B).
+
+        Returns
+        -------
+        ndarray, shape (..., B)
+            (2, B) if the two axes differ.
+        """
+        if self.error_at_nominal_range_y_rad is None and self.error_at_zero_range_y_rad is None:
+            return self.error_bound(range_m)
+        y, z = np.broadcast_to(range_m, (2, range_m.shape[-1]))
+        return np.stack([self.axis("y").error_bound(y), self.axis("z").error_bound(z)])
+
+    def plane_angles(self, measured: Floats) -> Floats:
+        """Return the angles atan2(y, x) and atan2(z, x) of measured angles, rad, shape (..., B)."""
+        if self.convention is not Convention.GIMBAL:
+            return measured
+        azimuth, elevation = measured
+        return np.stack([azimuth, np.arctan2(np.tan(elevation), np.cos(azimuth))])
+
+    def of_plane_angles(self, alpha_rad: Floats) -> Floats:
+        """Return the angles of the sensor for angles atan2(y, x) and atan2(z, x), rad: inverse of `plane_angles`."""
+        if self.convention is not Convention.GIMBAL:
+            return alpha_rad
+        y, z = alpha_rad
+        return np.stack([y, np.arctan(np.tan(z) * np.cos(y))])
+
     def true_value(self, sight: Geometry) -> Floats:
-        """Return the line-of-sight angle, rad."""
-        return sight.alpha_rad
+        """Return the line-of-sight angles in the convention of the sensor, rad."""
+        return self.of_plane_angles(sight.alpha_rad)
 
     def bound(self, sight: Geometry) -> Floats:
         """Return the error bound at the true range, rad."""
-        return self.error_bound(sight.range_m)
+        return self.error_bounds(sight.range_m)
+
+    def measured(self, sight: Geometry, error: Floats | float) -> Floats:
+        """Return the measured angles for an error in units of the bound, rad.
+
+        Notes
+        -----
+        In the convention CONE, the true direction is turned by the angle |error| bound toward the projection of
+        (0, error_y, error_z) on the plane across it.
+        """
+        if self.convention is not Convention.CONE:
+            return super().measured(sight, error)
+        (a, b, c), (right, up) = _direction(sight.alpha_rad), np.broadcast_to(error, sight.alpha_rad.shape)
+        along = right * b + up * c
+        x, y, z = -along * a, right - along * b, up - along * c
+        turn, length = self.bound(sight) * np.hypot(right, up), np.hypot(x, np.hypot(y, z))
+        cosine, share = np.cos(turn), np.divide(np.sin(turn), length, out=np.zeros_like(turn), where=length > 0.0)
+        x, y, z = cosine * a + share * x, cosine * b + share * y, cosine * c + share * z
+        return np.stack([np.arctan2(y, x), np.arctan2(z, x)])
+
+    def error(self, sight: Geometry, measured: Floats) -> Floats:
+        """Return the error of measured angles in units of the bound."""
+        if self.convention is not Convention.CONE:
+            return super().error(sight, measured)
+        (a, b, c), (x, y, z) = _direction(sight.alpha_rad), _direction(measured)
+        # The vector product of the true and the measured direction; their sum of products is the cosine.
+        p, q, r = b * z - c * y, c * x - a * z, a * y - b * x
+        turn = np.arctan2(np.hypot(p, np.hypot(q, r)), a * x + (b * y + c * z)) / self.bound(sight)
+        # The component of the measured direction across the true one is the projection of (0, right, up).
+        slope = (q * c - r * b) / a
+        right, up = (r * a - p * c) - slope * b, (p * b - q * a) - slope * c
+        size = np.hypot(right, up)
+        share = np.divide(turn, size, out=np.zeros_like(turn), where=size > 0.0)
+        return np.stack([right * share, up * share])
+
+    def limited(self, error: Floats) -> Floats:
+        """Return the possible error (in units of the bound) that is nearest to an error."""
+        return np.asarray(error / np.maximum(1.0, np.hypot(*error))) if self.is_disc else super().limited(error)
+
+    def nearest(self, sight: Geometry, wanted: Floats) -> Floats:
+        """Return the possible measurement that is nearest to wanted angles; in a disc, with their direction of error.
+
+        Parameters
+        ----------
+        wanted : ndarray, shape (..., B)
+            Angles atan2(y, x) and atan2(z, x), rad; the measurement is in the convention of the sensor.
+        """
+        wanted = self.of_plane_angles(wanted)
+        if not self.is_disc:
+            return super().nearest(sight, wanted)
+        error = self.error(sight, wanted)
+        return np.where(np.hypot(*error) <= 1.0, wanted, self.measured(sight, self.limited(error)))
 
     def cut(self, sets: Cuttable, measured: Measurements, where: NDArray[np.bool_]) -> None:
         """Cut by the angle."""
@@ -278,6 +341,13 @@ class AngleSensor(Sensor):
     def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats]:
         """Return a band of z."""
         return False, errors * self.error_bound(range_m) * range_m
+
+
+def _direction(alpha_rad: Floats) -> Floats:
+    """Return the unit vectors (x, y, z) of angles atan2(y, x) and atan2(z, x), shape (3, B)."""
+    (sin_y, sin_z), (cos_y, cos_z) = np.sin(alpha_rad), np.cos(alpha_rad)
+    x, y, z = cos_y * np.abs(cos_z), sin_y * np.abs(cos_z), sin_z * np.abs(cos_y)
+    return np.asarray(np.array([x, y, z]) / np.hypot(x, np.hypot(y, z)))
 
 
 @dataclass(frozen=True)
@@ -329,7 +399,7 @@ class RangeSensor(Sensor):
         return sight.range_m * (1.0 + self.relative_error * error)
 
     def error(self, sight: Geometry, measured: Floats) -> Floats:
-        """Return (d_m / d - 1) / b."""
+        """Return (d_m / d - 1) / b of measured ranges d_m, m."""
         return (measured / sight.range_m - 1.0) / self.relative_error
 
 

@@ -19,7 +19,7 @@ from guidance import (
     make_strategy,
 )
 from guidance.noise import checked_measurements
-from guidance.strategy import checked_impulses
+from guidance.strategy import decide, start
 from infoset import InformationSet, InformationSetView, PredictedMiss
 from infoset.sensors import Measurements
 from infoset.set_queries import MaskedFloats, MaskedIntegers
@@ -103,8 +103,8 @@ class Engagements:
         self._truth = truth or KeplerMotion(draws.position_m, draws.velocity_m_s, scenario.sun)
         self._noise = noise or _make_noise(scenario, draws)
         self._strategy = strategy or make_strategy(scenario.strategy)
-        self._state = self._strategy.start(batch)
         self._model = model = on_board_model(scenario)
+        self._states = start(self._strategy, batch, model.axes)
         arrival_s = self._truth.arrival_s()
         self._information = InformationSet(model, batch, guarantee=guarantee)
         self._view = self._information.view()
@@ -239,8 +239,7 @@ class Engagements:
             new=frozenset(measured),
             sensors=self._sensors,
         )
-        wanted = self._strategy.decide(situation, self._state)
-        return checked_impulses(wanted, self._tracking, self._strategy, self.step)
+        return decide(self._strategy, situation, self._states, self._tracking)
 
     def _finish_labels(self) -> None:
         """Drop labels below the threshold, and store the predicted miss of those that leave."""

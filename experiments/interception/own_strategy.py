@@ -117,7 +117,7 @@ def _guarded(kind: Any, file: Path, option: str) -> Strategy:
         def decide(self, situation: Situation, state: Any) -> Any:
             with _reporting(file, option):
                 wanted = super().decide(situation, state)
-                return checked_impulses(wanted, situation.predicted_miss.exists, self, situation.step)
+                return checked_impulses(wanted, situation, situation.predicted_miss.exists, self)
 
     Guarded.__module__, Guarded.__qualname__, Guarded.__name__ = kind.__module__, kind.__qualname__, kind.__name__
     strategy: Strategy = Guarded()
