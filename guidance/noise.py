@@ -54,6 +54,10 @@ class LineOfSight:
     range_m: Floats
     sensors: Mapping[str, Sensor]
 
+    def shape(self, sensor: Sensor) -> tuple[int, ...]:
+        """Return the shape of the measurements of a sensor."""
+        return self.alpha_rad.shape if sensor.is_lateral else self.range_m.shape
+
 
 def checked_measurements(measured: Measurements, sight: LineOfSight, noise: object) -> dict[str, Floats]:
     """Return the measurements of a noise as arrays, if they are finite and of sensors that measure.
@@ -78,7 +82,7 @@ def checked_measurements(measured: Measurements, sight: LineOfSight, noise: obje
                 f"got {shown(values)}"
             )
     return {
-        name: real_array(f"{where}: {name}", values, sight.sensors[name].true_value(sight).shape)
+        name: real_array(f"{where}: {name}", values, sight.shape(sight.sensors[name]))
         for name, values in measured.items()
     }
 

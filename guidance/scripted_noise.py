@@ -64,8 +64,8 @@ class ScriptedNoise:
         for name, sensor in sight.sensors.items():
             if name not in self.errors:
                 continue
-            label, shape = f"errors[{name!r}]", sensor.true_value(sight).shape
-            now = draws_of_step(label, self.errors[name], sight.step, shape)
+            label = f"errors[{name!r}]"
+            now = draws_of_step(label, self.errors[name], sight.step, sight.shape(sensor))
             if isinstance(sensor, AngleSensor) and sensor.is_disc and np.hypot(*now).max() > 1.0 + DISC_TOLERANCE:
                 raise ValueError(
                     f"{label} must lie in the unit disc, because the angle sensor's error is in a disc or a cone: at "
