@@ -390,7 +390,7 @@ def _check(arrays: Arrays) -> None:
         if (np.diff(offsets) < least).any():
             raise _UnsoundError(f"{name} does not rise")
     if (arrays["section_range_m"] < SMALLEST).any():
-        raise _UnsoundError(f"section_range_m holds a range below {SMALLEST:g}")
+        raise _UnsoundError(f"section_range_m holds a range that is not positive, or below {SMALLEST:g}")
     for name in ("measured_range_m", "true_range_m"):
         if (arrays[name] < 0.0).any():
             raise _UnsoundError(f"{name} holds a range that is negative")
