@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance.noise import LineOfSight
-from infoset import InformationSetView
-from infoset.sensors import Measurements
+from infoset import AngleSensor, Convention, InformationSetView
+from infoset.sensors import Measurements, Sensor
 
 Floats = NDArray[np.float64]
 
@@ -18,7 +18,8 @@ class PairNoise:
     Parameters
     ----------
     last_common_step : int
-        Last step in which both truths of a pair are measured at the middle between them.
+        Last step in which both truths of a pair are measured at the middle between them: the mean of the measured
+        values, or of the directions if the sensor measures a direction (`Convention.CONE`).
 
     Attributes
     ----------
@@ -39,14 +40,27 @@ class PairNoise:
         """Measure the middle of each pair, or after the last common step the true values."""
         if sight.step > self.last_common_step:
             return {name: sensor.true_value(sight) for name, sensor in sight.sensors.items()}
-        measured = {name: middle(sensor.true_value(sight)) for name, sensor in sight.sensors.items()}
+        measured = {name: _common(sensor, sight) for name, sensor in sight.sensors.items()}
         for name, sensor in sight.sensors.items():
-            share = np.abs(measured[name] - sensor.true_value(sight)) / sensor.bound(sight)
+            error = sensor.error(sight, measured[name])
+            is_disc = isinstance(sensor, AngleSensor) and sensor.is_disc
+            share = np.hypot(*error) if is_disc else np.abs(error)
             self.greatest_share = max(self.greatest_share, float(share.max()))
         return measured
 
 
+def _common(sensor: Sensor, sight: LineOfSight) -> Floats:
+    """Return the common measurement of each pair, for both of them."""
+    true = sensor.true_value(sight)
+    if not (isinstance(sensor, AngleSensor) and sensor.convention is Convention.CONE):
+        return middle(true)
+    slopes = np.tan(true)
+    directions = np.stack([*slopes, np.ones_like(slopes[0])])
+    *lateral, along = middle(directions / np.linalg.norm(directions, axis=0))
+    return np.arctan2(lateral, along)
+
+
 def middle(values: Floats) -> Floats:
-    """Return the mean of each pair of neighbours, for both of them; shape (B,), B even."""
-    pairs = values.reshape(-1, 2)
-    return np.repeat(pairs[:, 0] + 0.5 * (pairs[:, 1] - pairs[:, 0]), 2)
+    """Return the mean of each pair of neighbours, for both of them; shape (..., B), B even."""
+    first, second = values[..., 0::2], values[..., 1::2]
+    return np.repeat(first + 0.5 * (second - first), 2, axis=-1)

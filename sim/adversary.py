@@ -17,7 +17,7 @@ from infoset import StateBox
 from infoset.limits import COUNT, WHOLE
 from sim.draws import Draws, corners, draw
 from sim.engagement import Engagements
-from sim.planned_flights import ANGLE, ROWS, Floats, Flown, PlannedNoise, Plans
+from sim.planned_flights import ANGLE, ROWS, Floats, Flown, PlannedNoise, Plans, by_axis
 from sim.record import Record, fly_one
 from sim.results import Outcome
 from sim.scenario import Scenario, with_strategy
@@ -60,11 +60,12 @@ class WorstEngagement:
         True miss, m.
     truth_kept : bool
         Whether the true state was inside its section after every measurement.
-    position_m, velocity_m_s : ndarray, shape (2,)
-        Start: (z, x) and (V_z, V_x).
+    position_m, velocity_m_s : ndarray, shape (2,) or (3,)
+        Start: (z, x) and (V_z, V_x); (y, z, x) and (V_y, V_z, V_x) in space.
     errors : mapping of str to ndarray, shape (steps,)
-        Measurement errors by sensor in units of their bounds, zero where nothing was measured. `ScriptedNoise` with
-        these errors repeats the engagement, bit for bit.
+        Measurement errors by sensor in units of their bounds, zero where nothing was measured; shape (2, steps), along
+        y and z, for a sensor that measures both axes. `ScriptedNoise` with these errors repeats the engagement, bit for
+        bit.
     construction : str
         Kind of the first plan from which the engagement was derived.
     sets_emptied : int
@@ -91,7 +92,12 @@ class WorstEngagement:
 
     def noise(self) -> ScriptedNoise:
         """Return the errors as the noise of a batch of one."""
-        return ScriptedNoise({name: errors[None] for name, errors in self.errors.items()})
+        return ScriptedNoise({name: errors[..., None, :] for name, errors in self.errors.items()})
+
+    def start(self) -> dict[str, float]:
+        """Return the start by the names of `StateBox`: z_m, x_m, vz_m_s, vx_m_s; in space also y_m, vy_m_s."""
+        names = state_names(self.scenario)
+        return dict(zip(names, [*self.position_m.tolist(), *self.velocity_m_s.tolist()], strict=True))
 
     def record(self, strategy: Strategy | None = None) -> Record:
         """Simulate the engagement again and return its record.
@@ -143,7 +149,8 @@ def find_worst(
     lower extreme in a random or blockwise order, constant and extremal errors, and errors that show the middle between
     the true motion and one with the same measurements. The plans with the greatest misses are then changed, by a few
     steps, blocks, switching times or coordinates of the start, and compete with their changes. In the first part of the
-    search, the number of plans from one first plan is limited.
+    search, the number of plans from one first plan is limited. In space, both axes have errors of their own, and a
+    change of the angle errors is along one axis or both.
 
     References
     ----------
@@ -178,6 +185,7 @@ class _Search:
         self._draws = draw(self.scenario, [0], seed)
         self._steps = self._draws.steps
         self._names = tuple(dict.fromkeys((*ROWS, *scenario.sensors)))
+        self._axes = len(scenario.set_model.axes)
         self._constructions: list[str] = []
         self._elite: Flown | None = None
 
@@ -196,17 +204,22 @@ class _Search:
         if elite is None or not np.isfinite(elite.value[0]):
             raise NothingCountsError("in every simulated engagement the set became empty, or the miss was not finite")
         start = elite.plans.start[0]
-        z, x, vz, vx = ((value, value) for value in start.tolist())
+        ends = {name: (value, value) for name, value in zip(state_names(self.scenario), start.tolist(), strict=True)}
+        position_m, velocity_m_s = np.split(start, 2)
+        errors = {
+            name: by_axis(elite.errors[:1, row], self.scenario.sensors.get(name))[..., 0, :]
+            for row, name in enumerate(self._names)
+        }
         return WorstEngagement(
-            scenario=replace(self.scenario, dispersion=StateBox(z, x, vz, vx)),
+            scenario=replace(self.scenario, dispersion=StateBox(**ends)),
             seed=self._seed,
             strategy=self._strategy_name,
             miss_m=float(elite.value[0]),
             outcome=elite.outcomes[0],
             truth_kept=bool(elite.truth_kept[0]),
-            position_m=start[:2],
-            velocity_m_s=start[2:],
-            errors=dict(zip(self._names, elite.errors[0], strict=True)),
+            position_m=position_m,
+            velocity_m_s=velocity_m_s,
+            errors=errors,
             construction=self._constructions[int(elite.plans.lineage[0])],
             changes=int(elite.plans.changes[0]),
             evaluations=self.evaluations,
@@ -216,12 +229,12 @@ class _Search:
 
     def _fly(self, plans: Plans, tie: TieRule | None) -> Flown:
         size = len(plans)
-        execution, target = (
-            None if drawn is None else np.repeat(drawn, size, axis=0)
-            for drawn in (self._draws.execution, self._draws.target)
+        position_m, velocity_m_s = (part.copy() for part in np.split(plans.start, 2, axis=1))
+        tie_draws, execution, target, pointing = (
+            None if drawn is None else np.repeat(drawn, size, axis=-2)
+            for drawn in (self._draws.tie, self._draws.execution, self._draws.target, self._draws.pointing)
         )
-        tie_draws = np.repeat(self._draws.tie, size, axis=0)
-        draws = Draws(plans.start[:, :2].copy(), plans.start[:, 2:].copy(), {}, tie_draws, execution, target)
+        draws = Draws(position_m, velocity_m_s, {}, tie_draws, execution, target, pointing)
         noise = PlannedNoise(plans, tie, self._names)
         flight = Engagements(self.scenario, draws, self._strategy, noise=noise, guarantee=False)
         while flight.flying:
@@ -276,48 +289,55 @@ class _Search:
             start = self._starts(share)
             angle, prescribed = maker(share, start)
             others = np.repeat(
-                self._random.choice([-1.0, 0.0, 1.0], (share, len(self._names) - 1, 1)), self._steps, axis=2
+                self._random.choice([-1.0, 0.0, 1.0], (share, len(self._names) - 1, self._axes, 1)), self._steps, axis=3
             )
             sequence = np.concatenate([angle[:, None], others], axis=1)
             lineage = len(self._constructions) + np.arange(share)
             self._constructions += [name] * share
             none = np.zeros(share, dtype=np.int64)
-            plans += _in_chunks(Plans(start, sequence, np.full(angle.shape, prescribed), lineage, none), tie)
+            all_steps = np.full((share, self._steps), prescribed)
+            plans += _in_chunks(Plans(start, sequence, all_steps, lineage, none), tie)
         return plans
 
     def _starts(self, count: int) -> Floats:
         """Return starts in B x D; in a quarter of them, some coordinates are at an end of their interval."""
-        share = self._random.random((count, 4))
-        at_end = (self._random.random((count, 4)) < 0.5) & (self._random.random((count, 1)) < 0.5)
+        share = self._random.random((count, len(self._lower)))
+        at_end = (self._random.random(share.shape) < 0.5) & (self._random.random((count, 1)) < 0.5)
         return self._lower + (self._upper - self._lower) * np.where(at_end, np.round(share), share)
 
     def _coins(self, count: int, start: Floats) -> tuple[Floats, bool]:
-        return self._random.choice([LOWER, UPPER], (count, self._steps)), False
+        return self._random.choice([LOWER, UPPER], (count, self._axes, self._steps)), False
 
     def _blocks(self, count: int, start: Floats) -> tuple[Floats, bool]:
-        switches = self._random.random((count, self._steps)) < 10.0 ** self._random.uniform(-2.5, -0.5, (count, 1))
-        return self._random.choice([LOWER, UPPER], (count, 1)) * (-1.0) ** np.cumsum(switches, axis=1), False
+        one = (count, self._axes, 1)
+        switches = self._random.random((*one[:2], self._steps)) < 10.0 ** self._random.uniform(-2.5, -0.5, one)
+        return self._random.choice([LOWER, UPPER], one) * (-1.0) ** np.cumsum(switches, axis=2), False
 
     def _extremal(self, count: int, start: Floats) -> tuple[Floats, bool]:
         return self._blocks(count, start)[0], True
 
     def _constant(self, count: int, start: Floats) -> tuple[Floats, bool]:
-        return np.repeat(self._random.uniform(-1.0, 1.0, (count, 1)), self._steps, axis=1), True
+        return np.repeat(self._random.uniform(-1.0, 1.0, (count, self._axes, 1)), self._steps, axis=2), True
 
     def _pair(self, count: int, start: Floats) -> tuple[Floats, bool]:
         """Return errors that show the middle between the true motion and another straight one.
 
         Shortly before the end the two are two bounds apart and can be distinguished; after that the measurements are
-        exact.
+        exact. In space, the two differ along both axes.
         """
-        step_s, sensor = self.scenario.set_model.step_s, self.scenario.set_model.angle_sensor
-        closing = -start[:, 3:]
-        ranges = np.maximum(start[:, 1:2] - closing * step_s * np.arange(self._steps), 0.0)
-        bound = ranges * sensor.error_bound(ranges)
-        time_left = self._random.uniform(1.0, 12.0, (count, 1)) * step_s
-        apart_at = np.clip(np.round((start[:, 1:2] / closing - time_left) / step_s), 1, self._steps - 1).astype(int)
-        begin = self._random.uniform(-1.0, 1.0, (count, 1)) * bound[:, :1]
-        end = self._random.choice([-1.0, 1.0], (count, 1)) * np.take_along_axis(bound, apart_at, axis=1)
+        model = self.scenario.set_model
+        step_s = model.step_s
+        x, closing = _range_m(start)[:, None, None], -start[:, -1, None, None]
+        ranges = np.maximum(x - closing * step_s * np.arange(self._steps), 0.0)
+        bound = ranges * np.concatenate(
+            [model.angle_sensor.axis(axis).error_bound(ranges) for axis in model.axes], axis=1
+        )
+        time_left = self._random.uniform(1.0, 12.0, (count, 1, 1)) * step_s
+        apart_at = np.clip(np.round((x / closing - time_left) / step_s), 1, self._steps - 1).astype(int)
+        begin = self._random.uniform(-1.0, 1.0, (count, self._axes, 1)) * bound[..., :1]
+        end = self._random.choice([-1.0, 1.0], (count, self._axes, 1)) * np.take_along_axis(
+            bound, np.repeat(apart_at, self._axes, axis=1), axis=2
+        )
         half = begin + (end - begin) * np.arange(self._steps) / apart_at
         errors = np.divide(half, bound, out=np.zeros_like(half), where=bound > 0.0)
         return np.where(np.arange(self._steps) <= apart_at, np.clip(errors, -1.0, 1.0), 0.0), True
@@ -338,7 +358,7 @@ class _Search:
 
     def _last_step(self, plans: Plans, i: int) -> int:
         """Return the last step before the closest approach of a start, plus one."""
-        x, vx = float(plans.start[i, 1]), float(plans.start[i, 3])
+        x, vx = float(_range_m(plans.start[i])), float(plans.start[i, -1])
         return min(self._steps - 1, int(x / (-vx * self.scenario.set_model.step_s)) + 1)
 
     def _step(self, plans: Plans, i: int) -> int:
@@ -353,22 +373,30 @@ class _Search:
         begin = self._step(plans, i)
         return slice(begin, begin + 1 + int(10.0 ** self._random.uniform(0.0, 2.0)))
 
+    def _angle_errors(self, plans: Plans, i: int) -> Floats:
+        """Return the errors of the angles along one axis or both, a view of shape (1 or 2, steps)."""
+        errors = plans.sequence[i, ANGLE]
+        if self._axes == 1:
+            return errors
+        return errors[(slice(0, 1), slice(1, 2), slice(0, 2))[int(self._random.integers(3))]]
+
     def _flip_step(self, plans: Plans, i: int) -> None:
-        plans.sequence[i, ANGLE, self._step(plans, i)] *= -1.0
+        self._angle_errors(plans, i)[:, self._step(plans, i)] *= -1.0
 
     def _flip_block(self, plans: Plans, i: int) -> None:
-        plans.sequence[i, ANGLE, self._span(plans, i)] *= -1.0
+        self._angle_errors(plans, i)[:, self._span(plans, i)] *= -1.0
 
     def _move_switch(self, plans: Plans, i: int) -> None:
-        """Move one switching time by a few steps."""
-        signs = np.sign(plans.sequence[i, ANGLE, : self._last_step(plans, i) + 1])
+        """Move one switching time by a few steps; if both axes are moved, one of the first."""
+        errors = self._angle_errors(plans, i)
+        signs = np.sign(errors[0, : self._last_step(plans, i) + 1])
         switches = np.flatnonzero(np.diff(signs))
         if switches.size:
             at, by = int(self._random.choice(switches)), int(self._random.integers(1, 5))
             if self._random.random() < 0.5:
-                plans.sequence[i, ANGLE, at + 1 : at + 1 + by] *= -1.0
+                errors[:, at + 1 : at + 1 + by] *= -1.0
             else:
-                plans.sequence[i, ANGLE, max(0, at + 1 - by) : at + 1] *= -1.0
+                errors[:, max(0, at + 1 - by) : at + 1] *= -1.0
 
     def _roll(self, plans: Plans, i: int) -> None:
         """Move the whole plan by a few steps."""
@@ -384,32 +412,34 @@ class _Search:
         else:
             plans.prescribed[i, span] = True
             anything = self._random.uniform(-1.0, 1.0)
-            plans.sequence[i, :, span] = self._random.choice([-1.0, 0.0, 1.0, anything], (len(self._names), 1))
+            plans.sequence[i, ..., span] = self._random.choice(
+                [-1.0, 0.0, 1.0, anything], (len(self._names), self._axes, 1)
+            )
 
     def _move_error(self, plans: Plans, i: int) -> None:
         """Change the size of the prescribed errors of a block."""
         span = self._span(plans, i)
-        moved = plans.sequence[i, :, span] + 10.0 ** self._random.uniform(-2.0, 0.0) * self._random.normal(
-            size=(len(self._names), 1)
+        moved = plans.sequence[i, ..., span] + 10.0 ** self._random.uniform(-2.0, 0.0) * self._random.normal(
+            size=(len(self._names), self._axes, 1)
         )
         prescribed = plans.prescribed[i, span]
-        plans.sequence[i, :, span] = np.where(prescribed, np.clip(moved, -1.0, 1.0), plans.sequence[i, :, span])
+        plans.sequence[i, ..., span] = np.where(prescribed, np.clip(moved, -1.0, 1.0), plans.sequence[i, ..., span])
 
     def _cross(self, plans: Plans, i: int) -> None:
         """Replace the end of the plan by that of another plan of the elite."""
         elite = self._elite
         if elite is not None:
             other, begin = int(self._random.integers(len(elite.value))), self._step(plans, i)
-            plans.sequence[i, :, begin:] = elite.plans.sequence[other, :, begin:]
+            plans.sequence[i, ..., begin:] = elite.plans.sequence[other, ..., begin:]
             plans.prescribed[i, begin:] = elite.plans.prescribed[other, begin:]
 
     def _move_start(self, plans: Plans, i: int) -> None:
         """Move the start in some coordinates or in all, or set some coordinates to an end."""
-        which = self._random.random(4) < self._random.choice([0.25, 1.0])
         width = self._upper - self._lower
-        moved = plans.start[i] + width * 10.0 ** self._random.uniform(-5.0, -0.5) * self._random.normal(size=4)
+        which = self._random.random(len(width)) < self._random.choice([0.25, 1.0])
+        moved = plans.start[i] + width * 10.0 ** self._random.uniform(-5.0, -0.5) * self._random.normal(size=len(width))
         if self._random.random() < 0.1:
-            moved = np.where(self._random.random(4) < 0.5, self._lower, self._upper)
+            moved = np.where(self._random.random(len(width)) < 0.5, self._lower, self._upper)
         plans.start[i] = np.clip(np.where(which, moved, plans.start[i]), self._lower, self._upper)
 
     _CHANGES = (
@@ -424,6 +454,17 @@ class _Search:
         _move_start,
         _move_start,
     )
+
+
+def state_names(scenario: Scenario) -> list[str]:
+    """Return the names of the coordinates of a start in their order: `StateBox` has them."""
+    axes = (*scenario.set_model.axes, "x")
+    return [*(f"{axis}_m" for axis in axes), *(f"v{axis}_m_s" for axis in axes)]
+
+
+def _range_m(start: Floats) -> Floats:
+    """Return the range x of starts, m; the last of the positions."""
+    return np.asarray(start[..., start.shape[-1] // 2 - 1])
 
 
 def _in_chunks(plans: Plans, tie: TieRule | None) -> list[tuple[Plans, TieRule | None]]:

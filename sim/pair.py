@@ -23,16 +23,16 @@ STEPS_BEYOND = 2
 
 
 class ScheduledMotion(KeplerMotion):
-    """Kepler motion with a prescribed acceleration of the object along z.
+    """Kepler motion with a prescribed acceleration of the object across x.
 
     Parameters
     ----------
-    position_m, velocity_m_s : ndarray, shape (B, 2)
-        Relative (z, x) and (V_z, V_x) at t = 0.
+    position_m, velocity_m_s : ndarray, shape (B, 2) or (B, 3)
+        Relative (z, x) and (V_z, V_x) at t = 0; (y, z, x) and (V_y, V_z, V_x) in space.
     sun : Sun or None
         None is free space.
-    acceleration_m_s2 : ndarray, shape (B, steps)
-        Acceleration along z over each step; zero after the last.
+    acceleration_m_s2 : ndarray, shape (B, steps) or (2, B, steps)
+        Acceleration along z, or along y and z, over each step; zero after the last.
     """
 
     def __init__(self, position_m: Floats, velocity_m_s: Floats, sun: Sun | None, acceleration_m_s2: Floats) -> None:
@@ -42,8 +42,8 @@ class ScheduledMotion(KeplerMotion):
 
     def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
         """Advance by one step with the prescribed acceleration."""
-        over = self._step >= self._schedule.shape[1]
-        scheduled = np.zeros(len(self._schedule)) if over else self._schedule[:, self._step]
+        over = self._step >= self._schedule.shape[-1]
+        scheduled = np.zeros(self._schedule.shape[:-1]) if over else self._schedule[..., self._step]
         self._step += 1
         return super().advance(step_s, scheduled)
 
@@ -54,8 +54,8 @@ class PairFlight:
 
     Parameters
     ----------
-    impulse_m_s : ndarray, shape (steps, 2)
-        Impulses at each step.
+    impulse_m_s : ndarray, shape (steps, 2) or (steps, 2, 2)
+        Impulses at each step; along y and z in space: step, axis, motion.
     greatest_error_share : float
         Greatest error of a common measurement, in units of its bound.
     """
@@ -86,11 +86,11 @@ def fly_pair(
 
     Notes
     -----
-    The bound assumes straight motion, and |z| at x = 0 as the miss. Here gravity curves the motion, and the miss is the
-    least distance, which is smaller by the relative amount (V_z/V_x)^2 / 2.
+    The bound assumes straight motion, and the distance at x = 0 as the miss. Here gravity curves the motion, and the
+    miss is the least distance, which is smaller by the relative amount (V/V_x)^2 / 2, where V is the velocity across x.
     """
-    steps = pair.acceleration_m_s2.shape[1] + STEPS_BEYOND
-    nothing = np.zeros((2, steps))
+    *shape, steps = pair.acceleration_m_s2.shape
+    nothing = np.zeros((*shape, steps + STEPS_BEYOND))
     draws = Draws(pair.position_m, pair.velocity_m_s, {}, nothing)
     noise = PairNoise(pair.last_common_step)
     truth = ScheduledMotion(pair.position_m, pair.velocity_m_s, scenario.sun, pair.acceleration_m_s2)

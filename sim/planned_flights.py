@@ -12,7 +12,7 @@ from guidance import GameNoise, LineOfSight, TieRule
 from guidance.game_noise import SwitchingNoise
 from guidance.scripted_noise import errors_made, measure_with_errors
 from infoset import InformationSetView
-from infoset.sensors import Measurements
+from infoset.sensors import Measurements, Sensor
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -28,13 +28,14 @@ class Plans:
 
     Parameters
     ----------
-    start : ndarray, shape (n, 4)
-        (z, x, V_z, V_x) at t = 0, m and m/s.
-    sequence : ndarray, shape (n, rows, steps)
-        Errors in units of their bounds, one row per sensor, `ROWS` first.
+    start : ndarray, shape (n, 4) or (n, 6)
+        (z, x, V_z, V_x) at t = 0, m and m/s; (y, z, x, V_y, V_z, V_x) in space.
+    sequence : ndarray, shape (n, rows, axes, steps)
+        Errors in units of their bounds, one row per sensor, `ROWS` first, for each lateral axis. A sensor that does not
+        measure by axis uses the first.
     prescribed : ndarray of bool, shape (n, steps)
-        Whether the errors of a step are those of the sequence. Otherwise the noise keeps the upper extreme of the
-        predicted miss if the element of the angle is not negative, and the lower one if it is.
+        Whether the errors of a step are those of the sequence. Otherwise the noise keeps, along each axis, the upper
+        extreme of the predicted miss if the element of the angle is not negative, and the lower one if it is.
     lineage, changes : ndarray of int, shape (n,)
         Index of the first plan from which a plan was derived, and number of changes since then.
     """
@@ -70,7 +71,7 @@ class PlannedNoise:
 
     Attributes
     ----------
-    errors : ndarray, shape (n, rows, steps)
+    errors : ndarray, shape (n, rows, axes, steps)
         Errors made so far, in units of their bounds; zero where nothing was measured.
     """
 
@@ -83,19 +84,32 @@ class PlannedNoise:
         sequence = self.plans.sequence
         self.errors = np.zeros_like(sequence)
         tie = TieRule.RANDOM if self.tie is None else self.tie
-        self._keeping = (SwitchingNoise if self.tie is None else GameNoise)(tie, sequence[:, ANGLE])
+        self._keeping = (SwitchingNoise if self.tie is None else GameNoise)(tie, by_axis(sequence[:, ANGLE]))
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
         """Return the measurements of this step: with planned errors, or those that keep an extreme of the set."""
         step, prescribed = sight.step, self.plans.prescribed[:, sight.step]
         kept = errors_made(sight, self._keeping.measure(sight, predicted))
-        rows = {name: row for row, name in enumerate(self.names) if name in sight.sensors}
-        errors = {
-            name: np.where(prescribed, self.plans.sequence[:, row, step], kept[name]) for name, row in rows.items()
-        }
-        for name, row in rows.items():
-            self.errors[:, row, step] = errors[name]
+        errors = {}
+        for row, name in enumerate(self.names):
+            if name in sight.sensors:
+                sensor = sight.sensors[name]
+                planned = by_axis(self.plans.sequence[:, row, :, step], sensor)
+                errors[name] = np.where(prescribed, planned, kept[name])
+                self.errors[:, row, :, step] = np.atleast_2d(errors[name]).T
         return measure_with_errors(sight, errors)
+
+
+def by_axis(values: Floats, sensor: Sensor | None = None) -> Floats:
+    """Return values of shape (n, axes, ...) as a sensor uses them: (n, ...), or by axis in space, (2, n, ...).
+
+    Parameters
+    ----------
+    sensor : Sensor or None
+        A sensor that measures by axis, or not (`Sensor.is_lateral`); None is the angle sensor.
+    """
+    is_lateral = sensor is None or sensor.is_lateral
+    return np.moveaxis(values, 1, 0) if is_lateral and values.shape[1] > 1 else values[:, 0]
 
 
 @dataclass(frozen=True)
@@ -106,7 +120,7 @@ class Flown:
     ----------
     value : ndarray, shape (n,)
         Miss, m; -inf if the engagement does not count.
-    errors : ndarray, shape (n, rows, steps)
+    errors : ndarray, shape (n, rows, axes, steps)
         Errors made, in units of their bounds.
     set_emptied : ndarray of bool, shape (n,)
         Whether the set became empty.
