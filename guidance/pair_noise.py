@@ -57,7 +57,7 @@ def _common(sensor: Sensor, sight: LineOfSight) -> Floats:
     slopes = np.tan(true)
     directions = np.stack([*slopes, np.ones_like(slopes[0])])
     *lateral, along = middle(directions / np.linalg.norm(directions, axis=0))
-    return np.arctan2(lateral, along)
+    return np.asarray(np.arctan2(lateral, along))
 
 
 def middle(values: Floats) -> Floats:

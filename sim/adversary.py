@@ -230,10 +230,11 @@ class _Search:
     def _fly(self, plans: Plans, tie: TieRule | None) -> Flown:
         size = len(plans)
         position_m, velocity_m_s = (part.copy() for part in np.split(plans.start, 2, axis=1))
-        tie_draws, execution, target, pointing = (
+        execution, target, pointing = (
             None if drawn is None else np.repeat(drawn, size, axis=-2)
-            for drawn in (self._draws.tie, self._draws.execution, self._draws.target, self._draws.pointing)
+            for drawn in (self._draws.execution, self._draws.target, self._draws.pointing)
         )
+        tie_draws = np.repeat(self._draws.tie, size, axis=-2)
         draws = Draws(position_m, velocity_m_s, {}, tie_draws, execution, target, pointing)
         noise = PlannedNoise(plans, tie, self._names)
         flight = Engagements(self.scenario, draws, self._strategy, noise=noise, guarantee=False)
@@ -375,10 +376,8 @@ class _Search:
 
     def _angle_errors(self, plans: Plans, i: int) -> Floats:
         """Return the errors of the angles along one axis or both, a view of shape (1 or 2, steps)."""
-        errors = plans.sequence[i, ANGLE]
-        if self._axes == 1:
-            return errors
-        return errors[(slice(0, 1), slice(1, 2), slice(0, 2))[int(self._random.integers(3))]]
+        first, end = (0, 1) if self._axes == 1 else ((0, 1), (1, 2), (0, 2))[int(self._random.integers(3))]
+        return np.asarray(plans.sequence[i, ANGLE, first:end])
 
     def _flip_step(self, plans: Plans, i: int) -> None:
         self._angle_errors(plans, i)[:, self._step(plans, i)] *= -1.0

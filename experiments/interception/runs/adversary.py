@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from time import perf_counter
 
+import numpy as np
+from numpy.typing import NDArray
+
 from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
 from experiments.common.output import output_of, to_csv, to_json
@@ -80,27 +83,29 @@ def _summary(
         "record": None if options.record is None else str(options.record),
         "found_from": chosen.construction,
         "changes": chosen.changes,
-        "start": {
-            "z_m": float(chosen.position_m[0]),
-            "x_m": float(chosen.position_m[1]),
-            "vz_m_s": float(chosen.velocity_m_s[0]),
-            "vx_m_s": float(chosen.velocity_m_s[1]),
-        },
+        "start": chosen.start(),
         "history": [{"evaluations": evaluations, "worst_miss_m": miss_m} for evaluations, miss_m in chosen.history],
     }
 
 
-ROWS: tuple[tuple[str, Callable[[WorstEngagement], str]], ...] = (
-    ("greatest miss found, m", lambda found: number(found.miss_m)),
-    ("outcome", lambda found: found.outcome.value),
-    ("true state always in the set", lambda found: "yes" if found.truth_kept else "no"),
-    ("initial z, x, km", lambda found: ", ".join(f"{value:.6g}" for value in found.position_m / M_PER_KM)),
-    ("initial V_z, V_x, km/s", lambda found: ", ".join(f"{value:.6g}" for value in found.velocity_m_s / M_PER_KM)),
-    ("errors of the first candidate", lambda found: found.construction),
-    ("rounds of changes to it", lambda found: str(found.changes)),
-    ("after half the budget, m", lambda found: number(_halfway_m(found))),
-)
-"""Rows of the table: title, and text of an engagement."""
+def _rows(scenario: Scenario) -> list[tuple[str, Callable[[WorstEngagement], str]]]:
+    """Return the rows of the table: title, and text of an engagement."""
+    axes = [*scenario.set_model.axes, "x"]
+    position, velocity = ", ".join(axes), ", ".join(f"V_{axis}" for axis in axes)
+    return [
+        ("greatest miss found, m", lambda found: number(found.miss_m)),
+        ("outcome", lambda found: found.outcome.value),
+        ("true state always in the set", lambda found: "yes" if found.truth_kept else "no"),
+        (f"initial {position}, km", lambda found: _texts(found.position_m / M_PER_KM)),
+        (f"initial {velocity}, km/s", lambda found: _texts(found.velocity_m_s / M_PER_KM)),
+        ("errors of the first candidate", lambda found: found.construction),
+        ("rounds of changes to it", lambda found: str(found.changes)),
+        ("after half the budget, m", lambda found: number(_halfway_m(found))),
+    ]
+
+
+def _texts(values: NDArray[np.float64]) -> str:
+    return ", ".join(f"{value:.6g}" for value in values)
 
 
 def _halfway_m(found: WorstEngagement) -> float | None:
@@ -113,7 +118,7 @@ def _parts(scenario: Scenario, worst: WorstMisses, options: Adversary, elapsed_s
     columns = [("set never empty, set also empty" if same else "set never empty", worst.set_kept)]
     columns += [] if same else [("set also empty", worst.overall)]
     table = number_table("", *(title for title, _ in columns))
-    for title, text in ROWS:
+    for title, text in _rows(scenario):
         table.add_row(title, *("-" if found is None else text(found) for _, found in columns))
     strategy = worst.engagements[0].strategy
     count = sum(found.evaluations for found in worst.engagements)

@@ -29,7 +29,7 @@ from experiments.interception.runs.worst_misses import WorstMisses, find_worst_m
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from guidance import Strategy
 from sim import Outcome, Record, Results, Scenario
-from sim.bound import BoundError, LowerBound, TruthPair, lower_bound
+from sim.bound import BoundError, LowerBound, TruthPair, lower_bound, pair_at
 from sim.pair import PairFlight, fly_pair
 from sim.results import join
 
@@ -95,6 +95,7 @@ def run(options: Bound) -> None:
         began_s = perf_counter()
         try:
             lower = lower_bound(scenario, progress=begin("lower bound"))
+            nominal = _nominal(scenario)
         except BoundError as error:
             raise InputError(
                 f"{scenario.name}: a linear program of the bound has no solution ({error}); check the units of the "
@@ -105,13 +106,13 @@ def run(options: Bound) -> None:
             **summary_head(scenario),
             "model": scenario.set_model.kind.value,
             "elapsed_s": perf_counter() - began_s,
-            **_summary(scenario, lower, worst),
+            **_summary(scenario, lower, nominal, worst),
         }
         written.save("scenario.toml", scenario_to_toml(scenario))
         written.save("results.json", to_json(summary), "--json")
         if options.out is not None:
             written.draw({FIGURE: lambda: draw_bound(scenario, lower)}, begin("figure"))
-    show(_parts(scenario, lower, worst, options), options.quiet, stdout_taken=written.stdout_taken)
+    show(_parts(scenario, lower, nominal, worst, options), options.quiet, stdout_taken=written.stdout_taken)
 
 
 def _simulate(
@@ -138,11 +139,28 @@ def _simulate(
     return worst
 
 
-def _summary(scenario: Scenario, lower: LowerBound, worst: Sequence[WorstOfStrategy]) -> dict[str, object]:
+def _nominal(scenario: Scenario) -> TruthPair:
+    """Return the best pair at the nominal range and closing speed, or at the possible ones nearest to them."""
+    box = scenario.set_model.bounds
+    nominal = ((box.x_m, scenario.nominal_range_m), (box.vx_m_s, -scenario.set_model.closing_speed_m_s))
+    label_m, vx_m_s = (min(max(value, least), greatest) for (least, greatest), value in nominal)
+    return pair_at(scenario, label_m, vx_m_s)
+
+
+def _summary(
+    scenario: Scenario, lower: LowerBound, nominal: TruthPair, worst: Sequence[WorstOfStrategy]
+) -> dict[str, object]:
+    model = scenario.set_model
+    spatial: dict[str, object] = {}
+    if scenario.is_spatial:
+        spatial["disturbance_y_m_s2"] = model.axis("y").disturbance_m_s2
+        spatial["error_shape"] = "disc" if model.angle_sensor.is_disc else "box"
     return {
         "disturbance_m_s2": lower.disturbance_m_s2,
+        **spatial,
         "lower_bound_m": lower.bound_m,
         "reached_at": _where(lower.pair, scenario),
+        "at_nominal_range": {**_where(nominal, scenario), "bound_m": nominal.bound_m},
         "by_label": [
             {
                 "label_m": label.label_m,
@@ -185,7 +203,14 @@ def _where(pair: TruthPair, scenario: Scenario) -> dict[str, object]:
         "closing_speed_m_s": -pair.vx_m_s,
         "last_common_step": pair.last_common_step,
         "alike_until_before_arrival_s": _equal_until_s(pair, scenario),
+        **(_apart(pair, scenario) if scenario.is_spatial else {}),
     }
+
+
+def _apart(pair: TruthPair, scenario: Scenario) -> dict[str, float]:
+    """Return the distance of the two by axis at x = 0, m."""
+    end_m = pair.difference_m(scenario.set_model.step_s)[1][:, -1]
+    return {f"apart_{axis}_m": abs(float(end)) for axis, end in zip(scenario.set_model.axes, end_m, strict=True)}
 
 
 def _equal_until_s(pair: TruthPair, scenario: Scenario) -> float:
@@ -193,7 +218,9 @@ def _equal_until_s(pair: TruthPair, scenario: Scenario) -> float:
     return pair.arrival_s - pair.last_common_step * scenario.set_model.step_s
 
 
-def _parts(scenario: Scenario, lower: LowerBound, worst: Sequence[WorstOfStrategy], options: Bound) -> Iterator[Part]:
+def _parts(
+    scenario: Scenario, lower: LowerBound, nominal: TruthPair, worst: Sequence[WorstOfStrategy], options: Bound
+) -> Iterator[Part]:
     titles = ("closing speed\nkm/s", "bound\nm", "range at t = 0\nkm", "equal measurements until\ns before arrival")
     bounds = number_table(*titles)
     for pair in lower.pairs:
@@ -211,7 +238,16 @@ def _parts(scenario: Scenario, lower: LowerBound, worst: Sequence[WorstOfStrateg
         strategies.add_row(strategy.name, *(number(value) for value in values))
     model = scenario.set_model.kind.value
     yield f"{scenario.name}, model {model}: no strategy can guarantee a miss below {number(lower.bound_m)} m"
-    yield f"acceleration of the object along z in these pairs: at most {lower.disturbance_m_s2:.3g} m/s^2"
+    yield (
+        f"at the range {nominal.label_m / M_PER_KM:.1f} km and closing speed {-nominal.vx_m_s / M_PER_KM:g} km/s, the "
+        f"nominal ones: {number(nominal.bound_m)} m"
+    )
+    for axis in scenario.set_model.axes:
+        greatest = scenario.set_model.axis(axis).disturbance_m_s2
+        yield f"acceleration of the object along {axis} in these pairs: at most {greatest:.3g} m/s^2"
+    if scenario.is_spatial:
+        shape, axes = ("disc", "one axis") if scenario.set_model.angle_sensor.is_disc else ("box", "both axes")
+        yield f"errors of the angles in a {shape}: the states of a pair differ along {axes}"
     yield from (bounds, "", strategies)
     yield "pairs: greatest miss of the states that prove the bound"
     searched_by = f"`infoset adversary` with --model {model} --budget {options.budget} --seed {options.seed}"

@@ -23,7 +23,7 @@ from sim.bound import LowerBound, lower_bound, pair_at
 FILES = ["figure-bound.pdf", "figure-bound.png", "results.json", "scenario.toml"]
 KEYS = [
     *("version", "scenario", "scenario_hash", "model", "elapsed_s", "disturbance_m_s2"),
-    *("lower_bound_m", "reached_at", "by_label", "strategies"),
+    *("lower_bound_m", "reached_at", "at_nominal_range", "by_label", "strategies"),
 ]
 
 Infoset = Callable[..., tuple[int, str, str]]
@@ -71,6 +71,10 @@ def test_bound_into_a_folder(infoset: Infoset, short: Scenario, short_file: Path
     assert {each["closing_speed_m_s"] for each in found["by_label"]} == {57.5e3, 58e3}
     assert all(1740e3 <= each["label_m"] <= 1750e3 for each in found["by_label"])
     assert found["reached_at"]["label_m"] == expected.pair.label_m
+    nominal = found["at_nominal_range"]
+    assert (nominal["label_m"], nominal["closing_speed_m_s"]) == (1745e3, 58e3)
+    assert nominal["bound_m"] == pair_at(short, 1745e3, -58e3).bound_m <= expected.bound_m
+    assert f"at the range 1745.0 km and closing speed 58 km/s, the nominal ones: {nominal['bound_m']:.3g} m" in out
     assert [each["name"] for each in found["strategies"]] == strategy_names()
     for each in found["strategies"]:
         assert each["worst_found_m"] >= found["lower_bound_m"] * (1.0 - 1e-4)
