@@ -20,6 +20,7 @@ from guidance import (
 )
 from guidance.noise import checked_measurements
 from guidance.strategy import decide, start
+from guidance.thruster import modulus
 from infoset import InformationSet, InformationSetView, PredictedMiss
 from infoset.sensors import Measurements
 from infoset.set_queries import MaskedFloats, MaskedIntegers
@@ -38,6 +39,8 @@ Flags = NDArray[np.bool_]
 @dataclass(frozen=True)
 class Step:
     """One step of a batch, after the decision and before the impulse.
+
+    In space, angles, rates, predicted misses and impulses have the shape (2, B), along y and z.
 
     Parameters
     ----------
@@ -117,9 +120,10 @@ class Engagements:
         self._arrived = np.zeros(batch, dtype=bool)
         self._tracking = np.ones(batch, dtype=bool)
         self._miss = np.full(batch, np.inf)
-        self._lateral_miss = np.zeros(batch)
+        lateral = batch if len(model.axes) == 1 else (len(model.axes), batch)
+        self._lateral_miss = np.zeros(lateral)
         self._budget = np.full(batch, float(scenario.thruster.budget_m_s))
-        self._impulse = np.zeros(batch)
+        self._impulse = np.zeros(lateral)
         self._spent = np.zeros(batch, dtype=bool)
         self._guaranteed = np.zeros(batch)
         self._finished_label = np.zeros(batch, dtype=bool)
@@ -143,7 +147,7 @@ class Engagements:
         miss = self._information.predicted_miss()
         tracking = self._tracking = self._tracking & self._information.tracking
         wanted = np.where(tracking, self._decide(miss, measured), 0.0)
-        self._spent |= (self._budget < thruster.least_impulse_m_s) & (np.abs(wanted) >= thruster.least_impulse_m_s)
+        self._spent |= (self._budget < thruster.least_impulse_m_s) & (modulus(wanted) >= thruster.least_impulse_m_s)
         self._impulse = thruster.give(wanted, self._budget)
         if observe is not None:
             observe(
@@ -159,7 +163,7 @@ class Engagements:
                     self._view,
                 )
             )
-        self._budget = np.maximum(self._budget - np.abs(self._impulse), 0.0)
+        self._budget = np.maximum(self._budget - modulus(self._impulse), 0.0)
         self._truth.fire(self._executed(self._impulse))
         self._information.shift(self._impulse, tracking)
         self._truth_section.shift(self._impulse)
