@@ -64,10 +64,12 @@ class Thruster:
             Budget n that is left.
         """
         size, limit = modulus(wanted_m_s), np.minimum(self.greatest_impulse_m_s, budget_left_m_s)
-        given = np.where(size > limit, wanted_m_s / np.where(size > limit, size, 1.0) * limit, wanted_m_s)
-        # Rounding must not make the modulus greater than the limit.
-        while (above := modulus(given) > limit).any():
-            given = np.where(above, np.nextafter(given, 0.0), given)
+        given, over = wanted_m_s, size > limit
+        if over.any():
+            given = np.where(over, wanted_m_s / np.where(over, size, 1.0) * limit, wanted_m_s)
+            # Rounding must not make the modulus greater than the limit.
+            while (above := modulus(given) > limit).any():
+                given = np.where(above, np.nextafter(given, 0.0), given)
         idle = (size < self.least_impulse_m_s) | (budget_left_m_s < self.least_impulse_m_s)
         return np.where(idle, 0.0, given)
 
@@ -92,4 +94,4 @@ class Thruster:
 
 def modulus(lateral: Floats) -> Floats:
     """Return the moduli, shape (B,), of lateral values of shape (B,) in a plane or (2, B) in space."""
-    return np.asarray(np.hypot.reduce(np.atleast_2d(lateral), axis=0, initial=0.0))
+    return np.abs(lateral) if lateral.ndim == 1 else np.hypot(*lateral)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -284,8 +285,8 @@ def closest_position(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2
 
 def _ratio(over: Floats, under: Floats) -> Floats:
     """Return the quotient; zero where the divisor is zero, where no section exists."""
-    return np.divide(over, under, out=np.zeros_like(over), where=np.broadcast_to(under != 0.0, over.shape))
+    return np.divide(over, under, out=np.zeros_like(over), where=under != 0.0)
 
 
 def _dot(first: Floats, second: Floats) -> Floats:
-    return np.asarray(sum(first * second))
+    return reduce(np.add, first * second)

@@ -14,7 +14,7 @@ from infoset import ExtremePoints, PredictedMiss
 THRUSTER = Thruster(budget_m_s=1000.0, least_impulse_m_s=0.25, greatest_impulse_m_s=7.5)
 
 
-def array(*values: float) -> np.ndarray:
+def array(*values: float | list[float]) -> np.ndarray:
     return np.array(values, dtype=np.float64)
 
 
@@ -42,6 +42,57 @@ def test_an_impulse_is_zero_or_within_the_limits_and_the_budget(wanted: float, l
     given_impulse = float(THRUSTER.give(array(wanted), array(left))[0])
     assert given_impulse == 0.0 or 0.25 <= abs(given_impulse) <= min(7.5, left)
     assert given_impulse * wanted >= 0.0
+
+
+@st.composite
+def engines(draw: st.DrawFn) -> tuple[Thruster, float]:
+    """An engine and the budget that is left, often at one of its limits."""
+    least, wider = draw(st.floats(0.0, 10.0)), draw(st.floats(0.0, 20.0) | st.just(1e-3))
+    greatest = max(least + wider, 1e-3)
+    left = draw(st.floats(0.0, 50.0) | st.sampled_from([least, greatest, np.nextafter(greatest, 0.0)]))
+    return Thruster(1000.0, least, greatest), left
+
+
+@given(engines(), st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
+def test_the_modulus_of_an_impulse_in_space_is_limited_and_its_direction_kept(
+    engine: tuple[Thruster, float], y: float, z: float
+) -> None:
+    thruster, left = engine
+    impulse = thruster.give(array([y], [z]), array(left))[:, 0]
+    size, wanted, limit = np.hypot(*impulse), np.hypot(y, z), min(thruster.greatest_impulse_m_s, left)
+    assert size <= limit
+    if size == 0.0:
+        assert min(wanted, limit) == 0.0 or min(wanted, limit) < thruster.least_impulse_m_s
+        return
+    assert size >= thruster.least_impulse_m_s * (1.0 - 4e-16)
+    if wanted <= limit:
+        assert impulse.tolist() == [y, z]
+    else:
+        assert size >= limit * (1.0 - 4e-16)
+        np.testing.assert_allclose(impulse, np.array([y, z]) / wanted * limit, rtol=1e-15, atol=1e-300)
+
+
+@given(engines(), st.floats(-1e6, 1e6))
+def test_an_impulse_along_one_axis_is_that_of_a_plane(engine: tuple[Thruster, float], wanted: float) -> None:
+    thruster, left = engine
+    planar = thruster.give(array(wanted), array(left))
+    assert abs(planar[0]) in (0.0, abs(wanted), min(thruster.greatest_impulse_m_s, left))
+    for rows in ([[wanted], [0.0]], [[0.0], [wanted]]):
+        impulse = thruster.give(array(*rows), array(left))
+        np.testing.assert_array_equal(impulse, np.where(array(*rows) != 0.0, planar, 0.0))
+
+
+def test_errors_of_execution_change_the_modulus_and_turn_the_impulse() -> None:
+    thruster = Thruster(1000.0, 0.25, 7.5, execution_error_relative=0.1, pointing_error_rad=0.2)
+    impulse = np.array([[3.0, 0.0, 0.0, 1.0], [4.0, 5.0, 0.0, -2.0]])
+    size, direction = array(1.0, -0.5, 0.3, 0.0), array(0.0, 1.0, -1.0, -0.5)
+    executed = thruster.executed(impulse, size, direction)
+    np.testing.assert_allclose(np.hypot(*executed), np.hypot(*impulse) * (1.0 + 0.1 * size), rtol=1e-15)
+    np.testing.assert_allclose(executed[:, :2].T, [[3.3, 4.4], [-4.75 * np.sin(0.2), 4.75 * np.cos(0.2)]], rtol=1e-15)
+    turned = np.arctan2(executed[1, 3], executed[0, 3]) - np.arctan2(-2.0, 1.0)
+    assert turned == pytest.approx(-0.1, rel=1e-14)
+    np.testing.assert_array_equal(thruster.executed(impulse, None, None), impulse)
+    np.testing.assert_array_equal(thruster.executed(impulse[1], size, None), impulse[1] * (1.0 + 0.1 * size))
 
 
 def interval(lower: float, upper: float, lower_range: float, upper_range: float, exists: bool = True) -> PredictedMiss:

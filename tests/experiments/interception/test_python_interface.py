@@ -6,10 +6,12 @@ import csv
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
@@ -18,7 +20,9 @@ import sim
 from experiments import find_worst, fly_one, load_record, load_scenario, lower_bound, plot, save, simulate
 from experiments.common.errors import InputError
 from experiments.interception.scenario_file import scenario_text
-from sim import Record, Results
+from sim import CampaignNoise, Record, Results
+from sim.chunk import Chunk
+from sim.results import join
 
 NAME = "asteroid-1997-single"
 
@@ -80,6 +84,51 @@ def test_results_are_saved_by_suffix(results: Results, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"results\.csv"):
         save(results, tmp_path / "results.csv")
     save(results, tmp_path / "results.csv", overwrite=True)
+
+
+def with_lateral_columns(results: Results) -> Results:
+    """Results as those of engagements in space."""
+    start, miss = np.arange(4.0 * len(results)).reshape(2, len(results), 2) - 3.0
+    return replace(results, lateral_start=np.ma.MaskedArray(start), lateral_miss=np.ma.MaskedArray(miss))
+
+
+def test_only_results_in_space_have_the_columns_of_the_second_axis(
+    results: Results, record: Record, tmp_path: Path
+) -> None:
+    columns = ["start_y_m", "start_vy_m_s", "miss_y_m", "miss_z_m"]
+    assert not {*columns} & {*results.to_dict()}
+    spatial = with_lateral_columns(results)
+    assert spatial.to_dict() == {
+        **results.to_dict(),
+        "start_y_m": [-3.0, -1.0, 1.0],
+        "start_vy_m_s": [-2.0, 0.0, 2.0],
+        "miss_y_m": [3.0, 5.0, 7.0],
+        "miss_z_m": [4.0, 6.0, 8.0],
+    }
+    taken = join([spatial.take(np.array([2])), spatial.take(np.array([0, 1]))])
+    assert taken.to_dict()["miss_y_m"] == [7.0, 3.0, 5.0]
+    assert "miss_y_m" not in join([results, results]).to_dict()
+    save(spatial, tmp_path / "results.csv")
+    (head, *_) = csv.reader((tmp_path / "results.csv").read_text().splitlines())
+    assert head[-4:] == columns
+    for name, result in (("planar.npz", record.result), ("spatial.npz", with_lateral_columns(record.result))):
+        save(replace(record, result=result), tmp_path / name)
+        again = load_record(tmp_path / name).result
+        assert again.to_dict() == result.to_dict()
+        assert again.lateral_miss.count() == (0 if name == "planar.npz" else 2)
+
+
+def test_rows_of_a_campaign_in_space_have_the_start_in_km_and_the_miss_in_m(results: Results) -> None:
+    pytest.importorskip("pyarrow")
+    from sim.storage import tables
+
+    chunk = Chunk(0, 0, load_scenario(NAME), range(3), 4, CampaignNoise.RANDOM)
+    for flown, known in ((results, False), (with_lateral_columns(results), True)):
+        rows = tables.rows(chunk, flown, with_cell=False).to_pydict()
+        assert rows["y_km"] == ([-0.003, -0.001, 0.001] if known else [None] * 3)
+        assert rows["vy_km_s"] == ([-0.002, 0.0, 0.002] if known else [None] * 3)
+        assert rows["miss_z_m"] == ([4.0, 6.0, 8.0] if known else [None] * 3)
+        assert rows["z_km"] == (results.position_m[:, 0] / 1e3).tolist()
 
 
 def test_results_and_records_are_drawn(results: Results, record: Record) -> None:

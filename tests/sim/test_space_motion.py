@@ -1,0 +1,308 @@
+"""Motion, random numbers and bounds of engagements in space: the plane, symmetries and an independent integrator."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from infoset import Convention, ErrorShape, SetModel
+from sim import Manoeuvre, Scenario, Sun, Target
+from sim.draws import Draws, Y, corners, draw, generator, in_disc
+from sim.gravity import greatest_impulses_m_s, on_board_model, with_gravity
+from sim.kepler import SPACECRAFT, KeplerMotion, accelerate_all, leap_all, sun_and_orbit
+from sim.target import acceleration_m_s2
+
+Floats = NDArray[np.float64]
+
+SUN = Sun(1.324948e20, 150e9, np.pi / 2)
+BATCH = 20
+
+
+def in_space(scenario: Scenario) -> Scenario:
+    """The numbers of z in both axes."""
+    bounds, start = (
+        replace(box, y_m=box.z_m, vy_m_s=box.vz_m_s) for box in (scenario.set_model.bounds, scenario.dispersion)
+    )
+    return replace(scenario, set_model=replace(scenario.set_model, bounds=bounds), dispersion=start)
+
+
+@pytest.fixture(scope="module")
+def spatial(asteroid: Scenario) -> Scenario:
+    """The paper's engagement with its numbers in both axes."""
+    return in_space(asteroid)
+
+
+@pytest.fixture(scope="module")
+def starts(spatial: Scenario) -> Draws:
+    """Random starts in space."""
+    return draw(spatial, range(BATCH), 5)
+
+
+def flown(position: Floats, velocity: Floats, sun: Sun | None, impulses: Floats, pushes: Floats) -> list[Floats]:
+    """Everything that a flight to its closest approach shows; impulses and pushes have shape (2, B)."""
+    motion = KeplerMotion(position, velocity, sun)
+    plane = position.shape[1] == 2
+    shown = [motion.arrival_s()]
+    for step in range(210):
+        if step % 17 == 3:
+            motion.fire((impulses[0] if plane else impulses) * (-1.0) ** step)
+        push = (pushes[0] if plane else pushes) * (-1.0) ** step if step % 20 == 0 else None
+        passage = motion.advance(0.5, push)
+        shown += [motion.position_m.T, motion.velocity_m_s.T, *astuple(passage)]
+        if (motion.position_m[:, -1] > 0.0).all():
+            shown += astuple(motion.sight())
+    return shown
+
+
+def along(values: Floats, axes: list[int]) -> Floats:
+    """Axes of an array (axes, B) in another order; an array (B,) as it is."""
+    return values if values.ndim == 1 else values[axes[: len(values)]]
+
+
+@pytest.mark.parametrize("sun", [None, SUN, *(replace(SUN, direction_rad=angle) for angle in (0.0, -0.6, 2.5, np.pi))])
+def test_the_plane_is_a_special_case_bit_for_bit(sun: Sun | None, starts: Draws) -> None:
+    lateral = np.linspace(-3.0, 3.0, BATCH) * np.ones((2, 1))
+    lateral[0] = 0.0
+    position, velocity = starts.position_m.copy(), starts.velocity_m_s.copy()
+    position[:, 0] = velocity[:, 0] = 0.0
+    in_plane = flown(position[:, 1:], velocity[:, 1:], sun, lateral[1:], lateral[1:])
+    for planar, spatial in zip(in_plane, flown(position, velocity, sun, lateral, lateral), strict=True):
+        if spatial.ndim == 1:
+            np.testing.assert_array_equal(spatial, planar)
+        else:
+            np.testing.assert_array_equal(spatial[0], 0.0)
+            np.testing.assert_array_equal(spatial[1:], np.atleast_2d(planar))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_exchanging_the_lateral_axes_exchanges_the_motion_bit_for_bit(sign: float, starts: Draws) -> None:
+    along_z = replace(SUN, direction_rad=sign * 0.5 * np.pi)
+    along_y = replace(SUN, direction_rad=0.0, elevation_rad=sign * 0.5 * np.pi)
+    lateral = np.random.default_rng(1).uniform(-5.0, 5.0, (2, BATCH))
+    one = flown(starts.position_m, starts.velocity_m_s, along_z, lateral, 0.1 * lateral)
+    swapped = [starts.position_m[:, [1, 0, 2]], starts.velocity_m_s[:, [1, 0, 2]]]
+    other = flown(swapped[0], swapped[1], along_y, lateral[::-1], 0.1 * lateral[::-1])
+    for here, there in zip(one, other, strict=True):
+        np.testing.assert_array_equal(here, along(there, [1, 0, 2]))
+
+
+@pytest.mark.parametrize("order", [[1, 0, 2], [0, 1, 2]])
+@pytest.mark.parametrize("signs", [(1.0, 1.0, 1.0), (-1.0, 1.0, 1.0), (-1.0, -1.0, 1.0)])
+def test_exchange_and_mirror_for_any_sun_bit_for_bit(order: list[int], signs: tuple[float, ...]) -> None:
+    """The same with any position of the Sun, in the kernels."""
+    random = np.random.default_rng(2)
+    motion = random.normal(size=(4, 3, 2, BATCH)) * np.array([1e6, 1e4, 1.0, 1e-10])[:, None, None, None]
+    motion[0, :, SPACECRAFT] += SUN.distance_m * random.normal(size=(3, BATCH))
+    manoeuvre, step_s = random.normal(size=(2, BATCH)), random.uniform(0.1, 0.5, BATCH)
+
+    def leap(motion: Floats, manoeuvre: Floats) -> Floats:
+        after = np.empty_like(motion)
+        accelerate_all(motion, manoeuvre, SUN.gravitational_parameter_m3_s2)
+        leap_all(motion, step_s, manoeuvre, SUN.gravitational_parameter_m3_s2, after)
+        return after
+
+    def turned(values: Floats, axis: int) -> Floats:
+        flip = np.reshape(signs[: values.shape[axis]], [-1 if i == axis else 1 for i in range(values.ndim)])
+        return np.ascontiguousarray(flip * np.take(values, order[: values.shape[axis]], axis=axis))
+
+    np.testing.assert_array_equal(leap(turned(motion, 1), turned(manoeuvre, 0)), turned(leap(motion, manoeuvre), 1))
+
+
+def test_a_mirrored_sun_mirrors_the_motion_bit_for_bit(starts: Draws) -> None:
+    sun = replace(SUN, direction_rad=0.7, elevation_rad=0.4)
+    lateral = np.random.default_rng(3).uniform(-5.0, 5.0, (2, BATCH))
+    one = flown(starts.position_m, starts.velocity_m_s, sun, lateral, lateral)
+    for signs, mirrored in (
+        ((-1.0, 1.0, 1.0), replace(sun, elevation_rad=-0.4)),
+        ((1.0, -1.0, 1.0), replace(sun, direction_rad=-0.7)),
+        ((-1.0, -1.0, 1.0), replace(sun, direction_rad=-0.7, elevation_rad=-0.4)),
+    ):
+        flip = np.array(signs)
+        push = flip[:2, None] * lateral
+        other = flown(flip * starts.position_m, flip * starts.velocity_m_s, mirrored, push, push)
+        for here, there in zip(one, other, strict=True):
+            np.testing.assert_array_equal(here, there if there.ndim == 1 else flip[: len(there), None] * there)
+
+
+def test_the_orbit_is_across_the_sun_and_toward_x() -> None:
+    for direction, elevation in np.random.default_rng(4).uniform(-1.5, 1.5, (100, 2)):
+        toward, orbit = sun_and_orbit(Sun(1.0, 1.0, 2.0 * direction, elevation))
+        np.testing.assert_allclose([toward @ toward, orbit @ orbit, toward @ orbit], [1.0, 1.0, 0.0], atol=4e-16)
+        np.testing.assert_allclose(np.linalg.det(np.array([toward, orbit, [0.0, 0.0, 1.0]])), 0.0, atol=2e-16)
+        assert orbit[2] > 0.0
+
+
+def relative_by_scipy(position: Floats, velocity: Floats, sun: Sun, duration_s: float) -> Floats:
+    """Relative (y, z, x) and its rate from the heliocentric equations of both craft.
+
+    The unknowns are the displacement of the spacecraft from its start and the relative position: heliocentric
+    positions of the two have rounding errors of 3e-5 m.
+    """
+    angles = sun.direction_rad, sun.elevation_rad
+    toward = np.array([np.sin(angles[1]), np.cos(angles[1]) * np.sin(angles[0]), np.cos(angles[1]) * np.cos(angles[0])])
+    orbit = np.array([0.0, 0.0, 1.0]) - toward[2] * toward
+    orbit /= np.linalg.norm(orbit)
+
+    def attraction(place: Floats) -> Floats:
+        return -sun.gravitational_parameter_m3_s2 * place / np.linalg.norm(place) ** 3
+
+    def rates(_: float, state: Floats) -> Floats:
+        moved, speed, relative, relative_speed = state.reshape(4, 3)
+        craft = moved - sun.distance_m * toward
+        pull = attraction(craft)
+        return np.concatenate([speed, pull, relative_speed, attraction(craft + relative) - pull])
+
+    speed = np.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m) * orbit
+    start = np.concatenate([np.zeros(3), speed, position, velocity])
+    solution = solve_ivp(rates, (0.0, duration_s), start, method="DOP853", rtol=1e-13, atol=1e-12, max_step=5.0)
+    return np.asarray(solution.y[6:, -1])
+
+
+@pytest.mark.parametrize("direction", [90.0, -35.0, 160.0])
+@pytest.mark.parametrize("elevation", [0.0, 25.0, -70.0, 90.0])
+def test_motion_agrees_with_an_independent_integrator(direction: float, elevation: float) -> None:
+    sun = replace(SUN, direction_rad=np.radians(direction), elevation_rad=np.radians(elevation))
+    position, velocity = np.array([[5000.0, -8000.0, 6e6]]), np.array([[-40.0, 90.0, -58_900.0]])
+    motion = KeplerMotion(position, velocity, sun)
+    for _ in range(200):
+        motion.advance(0.5)
+    expected = relative_by_scipy(position[0], velocity[0], sun, 100.0)
+    np.testing.assert_allclose(motion.position_m[0], expected[:3], rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(motion.velocity_m_s[0], expected[3:], rtol=0.0, atol=1e-8)
+
+
+def test_a_sun_out_of_the_plane_moves_y_by_about_a_millimetre() -> None:
+    position, velocity = np.array([[0.0, -1000.0, 5801.3e3]]), np.array([[0.0, 10.0, -58e3]])
+    motion = KeplerMotion(position, velocity, replace(SUN, direction_rad=0.0, elevation_rad=np.pi / 4))
+    motion.advance(100.0)
+    assert 3e-4 < abs(motion.position_m[0, 0]) < 3e-3
+
+
+def test_the_closest_approach_has_its_position_across() -> None:
+    """Free flight: the distance is that of a straight line, and the lateral position is nearly all of it."""
+    position, velocity = np.array([[30.0, -40.0, 100e3]]), np.array([[0.0, 0.0, -58e3]])
+    motion = KeplerMotion(position, velocity, None)
+    *before, passage = (motion.advance(0.5) for _ in range(4))
+    assert passage.passed[0]
+    assert passage.lateral_m.tolist() == [[30.0], [-40.0]]
+    assert passage.least_distance_m[0] == pytest.approx(50.0, rel=1e-12)
+    assert not any(other.passed[0] or other.lateral_m.any() for other in before)
+
+
+def test_gravity_is_never_greater_than_its_bound(spatial: Scenario) -> None:
+    """The true difference of gravity at 10 000 points of the box, for any direction of the Sun."""
+    box = spatial.set_model.bounds
+    impulses = greatest_impulses_m_s(spatial.set_model, spatial.thruster)
+    model = with_gravity(spatial.set_model, SUN, impulses)
+    least, greatest = corners(box)
+    random = np.random.default_rng(6)
+    states = least + (greatest - least) * random.uniform(size=(10_000, 6))
+    moment = random.uniform(size=(10_000, 1)) * states[:, 2:3] / -states[:, 5:]
+    place = (states[:, :3] + moment * states[:, 3:]).astype(np.longdouble)
+    place[:, :2] += impulses * moment * random.uniform(-1.0, 1.0, (10_000, 2)) / np.sqrt(2.0)
+    toward = random.normal(size=(10_000, 3)).astype(np.longdouble)
+    toward[::2, 0] = 0.0  # in the plane of z
+    toward[::4, [1, 2]] = np.sqrt(np.longdouble(0.5)) * np.sign(toward[::4, [1, 2]])  # where the bound is sharp
+    sun = SUN.distance_m * toward / np.sqrt((toward**2).sum(axis=1, keepdims=True))
+    own = sun / SUN.distance_m**3
+    there = (sun - place) / (((sun - place) ** 2).sum(axis=1, keepdims=True)) ** 1.5
+    pull = SUN.gravitational_parameter_m3_s2 * np.abs(there - own)
+    bounds = np.array([model.axis(name).gravity_m_s2 for name in model.axes])
+    assert (pull[:, :2] <= bounds).all()
+    assert pull[:, 1].max() > 0.85 * bounds[1]
+    assert (100.0 * pull[:, 2] <= model.gravity_speed_change * model.closing_speed_m_s).all()
+
+
+def test_without_motion_along_y_the_bound_of_gravity_is_the_planar_one(asteroid: Scenario, spatial: Scenario) -> None:
+    def idle(model: SetModel) -> SetModel:
+        bounds = replace(model.bounds, y_m=(0.0, 0.0), vy_m_s=(0.0, 0.0))
+        return replace(model, bounds=bounds, disturbance_y_m_s2=0.0)
+
+    for sun in (None, SUN):
+        planar = with_gravity(asteroid.set_model, sun, 900.0)
+        alone = with_gravity(idle(spatial.set_model), sun, 900.0)
+        assert alone.axis("z") == planar
+        assert alone.speed_error == planar.speed_error
+        both = with_gravity(spatial.set_model, sun, 900.0)
+        assert both.axis("y") == both.axis("z")
+        assert both.gravity_m_s2 >= planar.gravity_m_s2
+    pointing = replace(spatial, thruster=replace(spatial.thruster, pointing_error_rad=0.01))
+    assert on_board_model(pointing).pointing_error_rad == 0.01
+
+
+def test_a_target_manoeuvres_along_each_axis_as_in_a_plane() -> None:
+    random = np.random.default_rng(7)
+    draws, miss = random.uniform(-1.0, 1.0, (2, BATCH, 40)), random.normal(size=(2, BATCH))
+    for manoeuvre in Manoeuvre:
+        target = Target(manoeuvre, 0.3, 5.0, acceleration_y_m_s2=0.1)
+        for step in (0, 7, 33):
+            both = acceleration_m_s2(target, draws, step, 0.5, miss)
+            for axis, most in ((0, 0.1), (1, 0.3)):
+                planar = acceleration_m_s2(Target(manoeuvre, most, 5.0), draws[axis], step, 0.5, miss[axis])
+                np.testing.assert_array_equal(both[axis], planar)
+    same = acceleration_m_s2(Target(Manoeuvre.CONSTANT, 0.3), draws, 0, 0.5, miss)
+    assert (np.abs(same) == 0.3).all()
+
+
+def test_the_z_axis_has_the_random_numbers_of_the_plane(ranging: Scenario) -> None:
+    planar = replace(
+        ranging,
+        target=Target(Manoeuvre.RANDOM_TELEGRAPH, 0.001),
+        thruster=replace(ranging.thruster, execution_error_relative=0.01),
+    )
+    spatial = in_space(planar)
+    spatial = replace(spatial, thruster=replace(spatial.thruster, pointing_error_rad=0.02))
+    one, both = draw(planar, range(3), 8), draw(spatial, range(3), 8)
+    np.testing.assert_array_equal(both.position_m[:, 1:], one.position_m)
+    np.testing.assert_array_equal(both.velocity_m_s[:, 1:], one.velocity_m_s)
+    assert one.target is not None
+    assert both.target is not None
+    assert both.pointing is not None
+    np.testing.assert_array_equal(both.target[1], one.target)
+    np.testing.assert_array_equal(both.errors["angle"][1], one.errors["angle"])
+    np.testing.assert_array_equal(both.errors["range"], one.errors["range"])
+    assert one.execution is not None
+    np.testing.assert_array_equal(both.execution, one.execution)
+    assert one.pointing is None
+    assert both.pointing.shape == one.execution.shape
+    assert both.tie.shape == (2, *one.tie.shape)
+    assert (both.steps, both.errors["angle"].shape) == (one.steps, (2, *one.errors["angle"].shape))
+    y = spatial.dispersion.axis("y")
+    lateral = np.stack([both.position_m[:, 0], both.velocity_m_s[:, 0]], axis=1)
+    least, greatest = np.transpose([y.z_m, y.vz_m_s])
+    fresh = np.stack([generator(8, run, Y).uniform(size=2) for run in range(3)])
+    np.testing.assert_array_equal(lateral, least + (greatest - least) * fresh)
+
+
+@pytest.mark.parametrize(("convention", "shape"), [(Convention.PLANE, ErrorShape.DISC), (Convention.CONE, None)])
+def test_errors_in_a_disc_are_uniform_in_it(
+    convention: Convention, shape: ErrorShape | None, spatial: Scenario
+) -> None:
+    sensor = replace(spatial.set_model.angle_sensor, convention=convention, error_shape=shape)
+    disc = replace(spatial, set_model=replace(spatial.set_model, angle_sensor=sensor))
+    y, z = draw(disc, range(400), 9).errors["angle"].reshape(2, -1)
+    squared, count = y**2 + z**2, y.size
+    assert squared.max() <= 1.0 + 1e-15
+    for sample, mean, variance in (
+        (y, 0.0, 1 / 4),
+        (y**2, 1 / 4, 1 / 8 - 1 / 16),
+        (z**2, 1 / 4, 1 / 8 - 1 / 16),
+        (y * z, 0.0, 1 / 24),
+        (squared, 1 / 2, 1 / 12),
+        (squared**2, 1 / 3, 4 / 45),
+        (np.cos(4.0 * np.arctan2(y, z)), 0.0, 1 / 2),
+        (np.cos(8.0 * np.arctan2(y, z)), 0.0, 1 / 2),
+    ):
+        assert abs(sample.mean() - mean) < 4.0 * np.sqrt(variance / count)
+
+
+def test_the_map_to_the_disc_keeps_exchange_and_mirrors() -> None:
+    square = np.random.default_rng(10).uniform(-1.0, 1.0, (2, 1000))
+    np.testing.assert_array_equal(in_disc(square[::-1]), in_disc(square)[::-1])
+    flip = np.array([[-1.0], [1.0]])
+    np.testing.assert_array_equal(in_disc(flip * square), flip * in_disc(square))
+    np.testing.assert_array_equal(in_disc(np.array([[0.0, 0.5], [0.0, 0.0]])), [[0.0, 0.5], [0.0, 0.0]])
