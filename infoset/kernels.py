@@ -28,7 +28,6 @@ from numba.core.compiler_machinery import AnalysisPass, register_pass
 from numba.core.targetconfig import ConfigStack
 from numba.core.typed_passes import IRLegalization
 from numba.core.typing.context import Context
-from numba.extending import lower_builtin
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -151,12 +150,6 @@ class _Compiler(CompilerBase):
     def define_pipelines(self) -> list[Any]:
         """Return Numba's passes."""
         return [DefaultPassBuilder.define_nopython_pipeline(self.state)]
-
-
-@lower_builtin("__array__", types.Array)  # type: ignore[untyped-decorator]
-def _same_array(_context: Any, _builder: Any, _signature: Any, arguments: Any) -> Any:
-    """Return an array as it is. Without this, Numba looks for conversions whenever an array is indexed."""
-    return arguments[0]
 
 
 class _LinkedLibrary(JITCodeLibrary):
