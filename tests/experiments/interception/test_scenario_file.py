@@ -34,7 +34,7 @@ from infoset.sensors import AngleSensor, Convention, ErrorShape, RangeSensor
 from sim.gravity import on_board_model
 from sim.scenario import Body, Manoeuvre, Scenario, Sun, Target
 
-BUILT_IN = ("asteroid-1997", "asteroid-1997-single", "comet-fast")
+BUILT_IN = ("asteroid-1997", "asteroid-1997-single", "asteroid-1997-space", "comet-fast")
 PAPER = scenario_text("asteroid-1997")
 
 

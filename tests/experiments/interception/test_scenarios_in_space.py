@@ -75,6 +75,17 @@ def test_two_pairs_in_both_tables_make_a_scenario_spatial(space: Scenario) -> No
     assert scenario_hash(space) != scenario_hash(planar)
 
 
+def test_the_built_in_scenario_has_the_numbers_of_the_plane_in_both_axes() -> None:
+    planar, space = load_scenario("asteroid-1997"), load_scenario("asteroid-1997-space")
+    assert [space.set_model.bounds.axis(name) for name in ("y", "z")] == [planar.set_model.bounds] * 2
+    assert [space.dispersion.axis(name) for name in ("y", "z")] == [planar.dispersion] * 2
+    in_plane = replace(space.set_model, bounds=planar.set_model.bounds)
+    assert replace(space, dispersion=planar.dispersion, set_model=in_plane, name="", description="") == replace(
+        planar, name="", description=""
+    )
+    assert load_scenario("asteroid-1997-space", ["angle_sensor.convention=cone"]).set_model.angle_sensor.is_disc
+
+
 def test_every_key_of_space_is_read_and_written() -> None:
     text = spatial(
         sun__elevation_deg="-30.0",
