@@ -1,0 +1,304 @@
+"""Noises in space: on each axis the rules of the plane, in every convention within the bounds of the sensor."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from guidance import GameNoise, LineOfSight, RandomNoise, ScriptedNoise, TieRule
+from guidance.game_noise import SwitchingNoise
+from guidance.noise import checked_measurements
+from guidance.scripted_noise import errors_made, measure_with_errors
+from infoset import (
+    AngleSensor,
+    Convention,
+    ErrorShape,
+    ExtremePoints,
+    InformationSet,
+    InformationSetView,
+    PredictedMiss,
+    RangeSensor,
+    RateSensor,
+    SetModel,
+    StateBox,
+)
+from infoset.sensors import Sensor
+
+Floats = NDArray[np.float64]
+
+BATCH = 4
+SENSOR = AngleSensor(0.5, 0.00015, 0.00023, 5801.3e3)
+METER, RATE = RangeSensor(0.5, 0.05), RateSensor(0.5, 1e-6)
+BOX = StateBox((-10e3, 10e3), (5301.3e3, 6301.3e3), (-100.0, 100.0), (-59e3, -57e3), (-10e3, 10e3), (-100.0, 100.0))
+MODEL = SetModel(closing_speed_m_s=58e3, step_s=0.5, bounds=BOX, angle_sensor=SENSOR, disturbance_m_s2=0.005)
+KINDS = [
+    (Convention.PLANE, ErrorShape.BOX),
+    (Convention.PLANE, ErrorShape.DISC),
+    (Convention.GIMBAL, ErrorShape.BOX),
+    (Convention.GIMBAL, ErrorShape.DISC),
+    (Convention.CONE, None),
+]
+
+
+def sight(sensors: dict[str, Sensor], seed: int = 0, step: int = 0, batch: int = BATCH) -> LineOfSight:
+    random = np.random.default_rng(seed)
+    x, y, z = 5.8e6 + random.uniform(-2e5, 2e5, batch), *random.uniform(-1e3, 1e3, (2, batch))
+    speed, velocity = -58e3, random.uniform(-50.0, 50.0, (2, batch))
+    across = np.array([y, z])
+    omega = (velocity * x - speed * across) / (x * x + across * across)
+    return LineOfSight(step, np.arctan2(across, x), omega, np.hypot(x, np.hypot(y, z)), sensors)
+
+
+def of_axis(whole: LineOfSight, number: int) -> LineOfSight:
+    """The planar line of sight of one axis."""
+    return replace(
+        whole,
+        alpha_rad=whole.alpha_rad[number],
+        omega_rad_s=whole.omega_rad_s[number],
+        sensors={
+            name: sensor.axis("yz"[number]) if isinstance(sensor, AngleSensor) else sensor
+            for name, sensor in whole.sensors.items()
+        },
+    )
+
+
+def moved(model: SetModel = MODEL, seed: int = 1, exchanged: bool = False) -> InformationSetView:
+    """A set after a few steps with impulses."""
+    information, random = InformationSet(model, BATCH), np.random.default_rng(seed)
+    for _ in range(3):
+        impulse = random.uniform(-5.0, 5.0, (2, BATCH))
+        information.shift(impulse[::-1] if exchanged else impulse)
+        information.predict()
+    return information.view()
+
+
+def draws(seed: int = 5, steps: int = 2) -> Floats:
+    return np.random.default_rng(seed).uniform(-1.0, 1.0, (2, BATCH, steps))
+
+
+def all_sensors(angle: AngleSensor) -> dict[str, Sensor]:
+    return {"range": METER, "angle": angle, "rate": RATE}
+
+
+@pytest.mark.parametrize("tie", list(TieRule))
+@pytest.mark.parametrize("at_tie", [True, False])
+def test_the_game_of_each_axis_is_that_of_the_plane(tie: TieRule, at_tie: bool) -> None:
+    view = InformationSet(MODEL, BATCH).view() if at_tie else moved()
+    for step in range(2):
+        seen = sight({"angle": SENSOR, "rate": RATE}, step=step)
+        measured = GameNoise(tie, draws()).measure(seen, view)
+        for number, name in enumerate("yz"):
+            planar = GameNoise(tie, draws()[number]).measure(of_axis(seen, number), view.axis(name))
+            for key in planar:
+                assert np.array_equal(measured[key][number], planar[key])
+
+
+def test_tie_rules_by_axis() -> None:
+    view, seen = InformationSet(MODEL, BATCH).view(), sight({"angle": SENSOR})
+    for y in TieRule:
+        for z in TieRule:
+            measured = GameNoise((y, z), draws()).measure(seen, view)["angle"]
+            for number, rule in enumerate((y, z)):
+                planar = GameNoise(rule, draws()).measure(seen, view)["angle"]
+                assert np.array_equal(measured[number], planar[number])
+    upper, lower = (GameNoise(tie, draws()).measure(seen, view)["angle"] for tie in (TieRule.UPPER, TieRule.LOWER))
+    assert (upper != lower).all()
+
+
+def test_bounds_by_axis_are_used_by_the_game() -> None:
+    angle = replace(SENSOR, error_at_nominal_range_y_rad=0.0003, error_at_zero_range_y_rad=0.0001)
+    model = replace(MODEL, angle_sensor=angle)
+    seen, view = sight({"angle": angle}), moved(model)
+    measured = GameNoise(TieRule.UPPER, draws()).measure(seen, view)["angle"]
+    for number, name in enumerate("yz"):
+        planar = GameNoise(TieRule.UPPER, draws()[number]).measure(of_axis(seen, number), view.axis(name))["angle"]
+        assert np.array_equal(measured[number], planar)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("make", [GameNoise, SwitchingNoise])
+def test_the_game_is_possible_in_every_convention(kind: Any, make: type[GameNoise]) -> None:
+    angle = replace(SENSOR, convention=kind[0], error_shape=kind[1])
+    box = replace(SENSOR)
+    for seed in range(10):
+        seen = sight(all_sensors(angle), seed)
+        view = moved(seed=seed)
+        noise = make(TieRule.RANDOM, draws(seed))
+        measured = checked_measurements(noise.measure(seen, view), seen, noise)
+        assert {name: values.shape for name, values in measured.items()} == {
+            "range": (BATCH,),
+            "angle": (2, BATCH),
+            "rate": (2, BATCH),
+        }
+        error = angle.error(seen, measured["angle"])
+        size = np.hypot(*error) if angle.is_disc else np.abs(error).max(axis=0)
+        assert size.max() <= 1.0 + 1e-9
+        # On the border, as in the plane: the extremes are far outside of the bounds of one measurement.
+        assert size.max() > 0.99
+        in_box = noise.measure(replace(seen, sensors=all_sensors(box)), view)["angle"]
+        wanted = angle.error(seen, angle.of_plane_angles(in_box))
+        np.testing.assert_allclose(error, angle.limited(wanted), atol=1e-9)
+        again = measure_with_errors(seen, errors_made(seen, measured))
+        for name, values in again.items():
+            np.testing.assert_allclose(values, measured[name], rtol=1e-9, atol=1e-15)
+
+
+def test_the_game_of_exchanged_axes_is_exchanged() -> None:
+    seen, noise, tie = sight(all_sensors(SENSOR)), draws(), (TieRule.UPPER, TieRule.RANDOM)
+    other = replace(seen, alpha_rad=seen.alpha_rad[::-1], omega_rad_s=seen.omega_rad_s[::-1])
+    for kind in (KINDS[0], KINDS[1], KINDS[4]):
+        angle = replace(SENSOR, convention=kind[0], error_shape=kind[1])
+        one, two = (replace(each, sensors=all_sensors(angle)) for each in (seen, other))
+        measured = GameNoise(tie, noise).measure(one, moved())
+        exchanged = GameNoise(tie[::-1], noise[::-1].copy()).measure(two, moved(exchanged=True))
+        assert np.array_equal(exchanged["angle"], measured["angle"][::-1])
+        assert np.array_equal(exchanged["rate"], measured["rate"][::-1])
+        assert np.array_equal(exchanged["range"], measured["range"])
+
+
+class Misses:
+    """The part of a view that the game's rule for ranges reads, with misses by section, shape (2, B, S) or (B, S)."""
+
+    def __init__(self, lower: Floats, upper: Floats, ranges: Floats) -> None:
+        self.lower, self.upper, self.ranges_m = lower, upper, ranges
+        self.living = np.ones(ranges.shape, dtype=bool)
+
+    def predicted_miss_by_section_m(self) -> tuple[Floats, Floats]:
+        return self.lower, self.upper
+
+    def stored_range_interval_m(self) -> tuple[Floats, Floats]:
+        return self.ranges_m.min(axis=1), self.ranges_m.max(axis=1)
+
+    def predicted_miss(self) -> PredictedMiss:
+        nowhere = ExtremePoints(*np.zeros((3, *self.lower.shape[:-1])))
+        exists = np.ones(len(self.ranges_m), dtype=bool)
+        return PredictedMiss(exists, self.lower.min(axis=-1), self.upper.max(axis=-1), nowhere, nowhere)
+
+
+def ranged(noise: GameNoise, misses: Any, distance: float, axes: int = 2) -> float:
+    shape = (1,) if axes == 1 else (2, 1)
+    seen = LineOfSight(0, np.zeros(shape), np.zeros(shape), np.array([distance]), {"range": METER})
+    return float(noise.measure(seen, misses)["range"][0])
+
+
+@pytest.mark.parametrize(("opposite", "share"), [(0, 0.95), (1, 0.95), (2, 1.05)])
+def test_the_range_keeps_the_section_of_the_worst_corner(opposite: int, share: float) -> None:
+    """The section of the worst corner is the second one; measured ranges end there, on the side of the opposite one."""
+    ranges = np.array([[3.0e6, 5.8e6, 8.0e6]])
+    # Corners of modulus 5, 13 and 10: the largest components are in two sections. The opposite ones: 2 and once 20.
+    upper = np.array([[[3.0, 5.0, 8.0]], [[4.0, 12.0, 6.0]]])
+    lower = np.full((2, 1, 3), -(2.0**0.5))
+    lower[:, 0, opposite] = -12.0, -16.0
+    noise = SwitchingNoise(TieRule.UPPER, np.ones((2, 1, 1)))
+    assert ranged(noise, Misses(lower, upper, ranges), 5.8e6) == 5.8e6 * share
+    mirrored = SwitchingNoise(TieRule.UPPER, -np.ones((2, 1, 1)))
+    assert ranged(mirrored, Misses(-upper, -lower, ranges), 5.8e6) == 5.8e6 * share
+    one = SwitchingNoise(TieRule.UPPER, np.array([[[1.0]], [[-1.0]]]))
+    turned = Misses(np.stack([lower[0], -upper[1]]), np.stack([upper[0], -lower[1]]), ranges)
+    assert ranged(one, turned, 5.8e6) == 5.8e6 * share
+
+
+@given(st.integers(0, 10**6), st.sampled_from(list(TieRule)), st.booleans(), st.integers(0, 1))
+def test_with_one_idle_axis_the_range_is_that_of_the_plane(seed: int, tie: TieRule, switching: bool, idle: int) -> None:
+    random = np.random.default_rng(seed)
+    ends = np.sort(random.normal(random.normal(), 1.0, (2, 1, 7)), axis=0)
+    ends[:, :, -1] = ends[:, :, 0]  # equal extremes: the first section counts
+    ranges = np.sort(random.uniform(5e6, 6e6, (1, 7)))
+    nothing = np.zeros_like(ends)
+    both = np.stack([nothing, ends] if idle == 0 else [ends, nothing], axis=1)
+    make = SwitchingNoise if switching else GameNoise
+    draw, distance = random.uniform(-1.0, 1.0, (2, 1, 1)), float(random.uniform(5e6, 6e6))
+    planar = ranged(make(tie, draw[1 - idle]), Misses(ends[0], ends[1], ranges), distance, axes=1)
+    assert ranged(make(tie, draw), Misses(both[0], both[1], ranges), distance) == planar
+
+
+@pytest.mark.parametrize("steps", [0, 3])
+def test_the_sections_of_the_extreme_points_are_those_of_the_planar_rule(steps: int) -> None:
+    """In a plane the rule for ranges reads the sections, not the points: the ranges are the same, bit for bit."""
+    information, random = InformationSet(MODEL.axis("z"), BATCH), np.random.default_rng(2)
+    for _ in range(steps):
+        information.shift(random.uniform(-5.0, 5.0, BATCH))
+        information.predict()
+    miss, (lower, upper) = information.predicted_miss(), information.predicted_miss_by_section_m()
+    rows, living = np.arange(BATCH), information.living
+    highest, lowest = np.where(living, upper, -np.inf).argmax(axis=1), np.where(living, lower, np.inf).argmin(axis=1)
+    assert np.array_equal(information.ranges_m[rows, highest], miss.upper_point.range_m)
+    assert np.array_equal(information.ranges_m[rows, lowest], miss.lower_point.range_m)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_scripted_errors_are_those_of_the_measurements(kind: Any) -> None:
+    angle = replace(SENSOR, convention=kind[0], error_shape=kind[1])
+    scripts = {
+        "angle": angle.limited(draws().reshape(2, -1)).reshape(2, BATCH, 2),
+        "rate": draws(6),
+        "range": draws(7)[0],
+    }
+    view = SimpleNamespace()
+    for step in range(2):
+        seen = sight(all_sensors(angle), step=step)
+        for make in (ScriptedNoise, RandomNoise):
+            noise = make(scripts)
+            measured = checked_measurements(noise.measure(seen, view), seen, noise)  # type: ignore[arg-type]
+            for name, sensor in seen.sensors.items():
+                assert np.array_equal(measured[name], sensor.measured(seen, scripts[name][..., step]))
+            for name, errors in errors_made(seen, measured).items():
+                np.testing.assert_allclose(errors, scripts[name][..., step], atol=1e-9)
+
+
+def test_extremal_errors_are_the_corners() -> None:
+    seen = sight(all_sensors(SENSOR))
+    for corner in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0)):
+        errors = np.broadcast_to(np.array(corner)[:, None, None], (2, BATCH, 1)).copy()
+        measured = ScriptedNoise({"angle": errors}).measure(seen, SimpleNamespace())  # type: ignore[arg-type]
+        assert np.array_equal(measured["angle"], seen.alpha_rad + SENSOR.bound(seen) * np.array(corner)[:, None])
+        assert np.array_equal(measured["rate"], seen.omega_rad_s)
+
+
+@pytest.mark.parametrize("kind", [KINDS[1], KINDS[3], KINDS[4]])
+def test_errors_outside_of_the_disc_are_refused(kind: Any) -> None:
+    angle = replace(SENSOR, convention=kind[0], error_shape=kind[1])
+    noise = ScriptedNoise({"angle": np.full((2, BATCH, 1), 0.8)})
+    with pytest.raises(ValueError, match=r"errors\['angle'\] must lie in the unit disc, .* at step 0 .* is 1\.13137"):
+        noise.measure(sight({"angle": angle}), SimpleNamespace())  # type: ignore[arg-type]
+
+
+def test_draws_of_a_wrong_shape_are_refused() -> None:
+    view, whole = moved(), sight(all_sensors(SENSOR))
+    planar, flat = of_axis(whole, 1), np.zeros((BATCH, 2))
+    wanted = r"must have the shape \(2, 4, 2\) in this engagement: got \(4, 2\)"
+    with pytest.raises(ValueError, match=rf"errors\['angle'\] {wanted}"):
+        ScriptedNoise({"angle": flat}).measure(whole, view)
+    with pytest.raises(ValueError, match=r"errors\['range'\] must have the shape \(4, 2\) .*: got \(2, 4, 2\)"):
+        ScriptedNoise({"range": draws()}).measure(whole, view)
+    with pytest.raises(ValueError, match=r"errors\['angle'\] must have the shape \(4, 2\) .*: got \(2, 4, 2\)"):
+        ScriptedNoise({"angle": draws()}).measure(planar, view.axis("z"))
+    with pytest.raises(ValueError, match=r"errors\['rate'\] must have the shape \(B, steps\), or \(2, B, steps\)"):
+        ScriptedNoise({"rate": np.zeros((3, BATCH, 2))})
+    with pytest.raises(ValueError, match="one shape"):
+        ScriptedNoise({"angle": draws(), "range": np.zeros((BATCH, 3))})
+    for make in (GameNoise, SwitchingNoise):
+        with pytest.raises(ValueError, match=f"tie_draws {wanted}"):
+            make(TieRule.RANDOM, flat).measure(whole, view)
+    with pytest.raises(ValueError, match="tie must be one TieRule in a plane"):
+        GameNoise((TieRule.UPPER, TieRule.LOWER), flat).measure(planar, view.axis("z"))
+    for bad in ((TieRule.UPPER,) * 3, (), ("upper", "lower"), "upper"):
+        with pytest.raises(TypeError, match=r"tie must be a TieRule, .* or a pair of them"):
+            GameNoise(bad, draws())  # type: ignore[arg-type]
+
+
+def test_measurements_of_a_wrong_shape_are_refused() -> None:
+    seen = sight(all_sensors(SENSOR))
+    for measured in ({"angle": seen.alpha_rad[0]}, {"rate": seen.omega_rad_s[1]}, {"range": seen.alpha_rad}):
+        (name,) = measured
+        shape = r"\(4,\)" if name == "range" else r"\(2, 4\)"
+        with pytest.raises(ValueError, match=rf"step 0: {name} must be a number or have the shape {shape}"):
+            checked_measurements(measured, seen, self_named := object())
+    assert checked_measurements({"angle": 0.1}, seen, self_named)["angle"].shape == (2, BATCH)  # type: ignore[dict-item]
