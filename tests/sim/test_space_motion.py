@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from infoset import Convention, ErrorShape, SetModel
-from sim import Manoeuvre, Scenario, Sun, Target
+from infoset import Convention, ErrorShape, Model, SetModel
+from sim import Manoeuvre, Scenario, Sun, Target, simulate
 from sim.draws import Draws, Y, corners, draw, generator, in_disc
 from sim.gravity import greatest_impulses_m_s, on_board_model, with_gravity
 from sim.kepler import SPACECRAFT, KeplerMotion, accelerate_all, leap_all, sun_and_orbit
@@ -217,6 +217,34 @@ def test_gravity_is_never_greater_than_its_bound(spatial: Scenario) -> None:
     assert (100.0 * pull[:, 2] <= model.gravity_speed_change * model.closing_speed_m_s).all()
 
 
+@pytest.mark.parametrize("wide", [1.0, 100.0])
+def test_the_acceleration_of_the_scaled_motion_is_within_its_bound(wide: float, spatial: Scenario) -> None:
+    """Gravity and the change of scale that it causes, for any direction of the Sun and a y axis of any width."""
+    start = spatial.set_model.bounds
+    box = replace(start, y_m=(-1e4 * wide, 1e4 * wide), vy_m_s=(-100.0 * wide, 100.0 * wide))
+    quiet = replace(spatial.set_model, bounds=box, kind=Model.GUARANTEED, disturbance_m_s2=0.0)
+    least, greatest = corners(box)
+    random, worst, speed = np.random.default_rng(12), np.zeros(2), quiet.closing_speed_m_s
+    for number in range(12):
+        diagonal = (0.25 * np.pi * random.choice([-3, -1, 1, 3]), 0.0)
+        anywhere = (random.uniform(-np.pi, np.pi), np.arcsin(random.uniform(-1.0, 1.0)))
+        direction, elevation = anywhere if number % 3 else diagonal
+        sun = replace(SUN, direction_rad=direction, elevation_rad=elevation)
+        share = random.uniform(size=(40, 6))
+        states = least + (greatest - least) * np.where(random.uniform(size=(40, 6)) < 0.5, share.round(), share)
+        motion = KeplerMotion(states[:, :3], states[:, 3:], sun)
+        arrival_s, scaled = motion.arrival_s(), []
+        for second in range(80):
+            scaled.append(motion.sight().slope * speed * (arrival_s - second))
+            motion.advance(1.0)
+        model = with_gravity(quiet, sun, 0.0)
+        bounds = np.array([model.axis(name).acceleration_m_s2 for name in model.axes])
+        worst = np.maximum(worst, np.abs(np.diff(scaled, 2, axis=0)).max(axis=(0, 2)) / bounds)
+        assert np.abs(motion.velocity_m_s[:, 2] - states[:, 5]).max() < model.gravity_speed_change * speed
+    assert (worst <= 1.0).all()
+    assert worst[1] > 0.7
+
+
 def test_without_motion_along_y_the_bound_of_gravity_is_the_planar_one(asteroid: Scenario, spatial: Scenario) -> None:
     def idle(model: SetModel) -> SetModel:
         bounds = replace(model.bounds, y_m=(0.0, 0.0), vy_m_s=(0.0, 0.0))
@@ -306,3 +334,13 @@ def test_the_map_to_the_disc_keeps_exchange_and_mirrors() -> None:
     flip = np.array([[-1.0], [1.0]])
     np.testing.assert_array_equal(in_disc(flip * square), flip * in_disc(square))
     np.testing.assert_array_equal(in_disc(np.array([[0.0, 0.5], [0.0, 0.0]])), [[0.0, 0.5], [0.0, 0.0]])
+
+
+def test_results_in_space_have_the_start_along_y_and_the_miss_along_both_axes(spatial: Scenario) -> None:
+    results, draws = simulate(spatial, 5, seed=11), draw(spatial, range(5), 11)
+    np.testing.assert_array_equal(results.position_m, draws.position_m[:, 1:])
+    np.testing.assert_array_equal(results.velocity_m_s, draws.velocity_m_s[:, 1:])
+    np.testing.assert_array_equal(results.lateral_start[:, 0], draws.position_m[:, 0])
+    np.testing.assert_array_equal(results.lateral_start[:, 1], draws.velocity_m_s[:, 0])
+    np.testing.assert_allclose(np.hypot(*results.lateral_miss.T), results.miss_m, rtol=1e-4)
+    assert {"start_y_m", "start_vy_m_s", "miss_y_m", "miss_z_m"} <= {*results.to_dict()}
