@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset import AngleSensor, SetModel
+from infoset import AngleSensor, Convention, SetModel
 from infoset.sensors import Sensor
 from sim.scenario import Scenario
 
@@ -304,8 +304,13 @@ class _Approach:
         times_s = np.append(np.arange(steps) * model.step_s, self.arrival_s)
         self.ranges_m = np.maximum(label_m + vx_m_s * times_s[:-1], 0.0)
         self._models = {name: model.axis(name) for name in model.axes}
+        margin = MARGIN
+        if model.angle_sensor.convention is Convention.GIMBAL:
+            # The elevation of each of the two depends on its azimuth, up to the product of their slopes.
+            slope = model.bounds.offset_m / model.bounds.x_m[0] + model.bounds.lateral_speed_m_s / -vx_m_s
+            margin += slope * slope
         self._programs = {
-            planar: _Program(planar, scenario.sensors, times_s, self.ranges_m, vx_m_s)
+            planar: _Program(planar, scenario.sensors, times_s, self.ranges_m, vx_m_s, margin)
             for planar in dict.fromkeys(self._models.values())
         }
         single = {planar: (name,) for name, planar in self._models.items()}
@@ -351,7 +356,7 @@ class _Approach:
 
 
 class _Program:
-    """The linear programs of one axis.
+    """The linear programs of one axis; `margin` is the reserve of its limits as a share.
 
     `limits_m` is the greatest distance of the two along the axis at each step with the same measurements,
     `miss_limits_m` that of their predicted misses; infinite where nothing is measured.
@@ -364,6 +369,7 @@ class _Program:
         times_s: Floats,
         ranges_m: Floats,
         vx_m_s: float,
+        margin: float,
     ) -> None:
         self.model, self.times_s, self.ranges_m, self.vx_m_s = model, times_s, ranges_m, vx_m_s
         self.arrival_s = float(times_s[-1])
@@ -372,7 +378,7 @@ class _Program:
         self.miss_limits_m = np.full(self.steps, np.inf)
         for sensor in {**sensors, AngleSensor.name: model.angle_sensor}.values():
             due = np.arange(0, self.steps, model.steps_in(sensor.period_s))
-            band = sensor.band(self.ranges_m[due], -vx_m_s, 2.0 * (1.0 - MARGIN))
+            band = sensor.band(self.ranges_m[due], -vx_m_s, 2.0 * (1.0 - margin))
             if band is not None:
                 limits = self.miss_limits_m if band[0] else self.limits_m
                 limits[due] = np.minimum(limits[due], band[1])

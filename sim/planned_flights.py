@@ -95,7 +95,7 @@ class PlannedNoise:
             if name in sight.sensors:
                 sensor = sight.sensors[name]
                 planned = by_axis(self.plans.sequence[:, row, :, step], sensor)
-                errors[name] = np.where(prescribed, planned, kept[name])
+                errors[name] = sensor.limited(np.where(prescribed, planned, kept[name]))
                 self.errors[:, row, :, step] = np.atleast_2d(errors[name]).T
         return measure_with_errors(sight, errors)
 

@@ -9,11 +9,12 @@ import pytest
 
 from guidance import Situation
 from guidance.scripted_noise import ScriptedNoise
-from infoset import InitialSet, Model, RateSensor, StateBox
+from infoset import Convention, ErrorShape, InitialSet, Model, RateSensor, StateBox
 from sim import Outcome, Scenario
 from sim.adversary import NothingCountsError, WorstEngagement, find_worst
 from sim.draws import corners, draw
 from sim.engagement import Engagements
+from tests.space import in_space
 
 BUDGET = 40
 
@@ -37,8 +38,14 @@ def guaranteed(scenario: Scenario) -> Scenario:
 def assert_flies_again(found: WorstEngagement) -> None:
     """Alone with everything kept, and in other company, to the last bit."""
     assert float(found.record().result.miss_m[0]) == found.miss_m
+    assert_flies_again_in_company(found)
+
+
+def assert_flies_again_in_company(found: WorstEngagement) -> None:
     company = 3
-    noise = ScriptedNoise({name: np.repeat(each[None], company, axis=0) for name, each in found.errors.items()})
+    noise = ScriptedNoise(
+        {name: np.repeat(each[..., None, :], company, axis=-2) for name, each in found.errors.items()}
+    )
     flight = Engagements(found.scenario, draw(found.scenario, [0] * company, found.seed), noise=noise)
     while flight.flying:
         flight.advance()
@@ -90,6 +97,31 @@ def test_with_all_sensors_in_the_guaranteed_model(name: str, request: pytest.Fix
     assert found.errors["range"].any()
     assert found.errors["rate"].any()
     assert found.truth_kept
+
+
+@pytest.mark.parametrize(("convention", "shape"), [("plane", "box"), ("gimbal", "disc"), ("cone", "disc")])
+def test_with_all_sensors_in_space(convention: str, shape: str, ranging: Scenario) -> None:
+    spatial = in_space(ranging, convention=Convention(convention), error_shape=ErrorShape(shape))
+    model = replace(guaranteed(spatial).set_model, sections=9, fewest_sections=3)
+    scenario = replace(spatial, rate_sensor=RateSensor(1.5, 1e-4), set_model=model)
+    found = find_worst(scenario, budget=24, seed=2)
+    assert (found.sets_emptied, found.truth_kept) == (0, True)
+    assert_possible(found, scenario)
+    assert_flies_again_in_company(found)
+    assert list(found.start()) == ["y_m", "z_m", "x_m", "vy_m_s", "vz_m_s", "vx_m_s"]
+    assert {name: errors.ndim for name, errors in found.errors.items()} == {"angle": 2, "range": 1, "rate": 2}
+    assert all(errors.any() for errors in found.errors.values())
+    assert (found.errors["angle"][0] != found.errors["angle"][1]).any()
+    sizes = np.hypot(*found.errors["angle"])
+    assert sizes.max() <= (1.0 + 1e-12 if shape == "disc" else np.sqrt(2.0))
+
+
+def test_the_worst_in_space_is_worse_than_in_the_plane(coarse: Scenario) -> None:
+    spatial = guaranteed(in_space(coarse))
+    found = find_worst(spatial, budget=60, seed=3)
+    assert found.miss_m > find_worst(guaranteed(coarse), budget=60, seed=3).miss_m
+    again = find_worst(spatial, budget=60, seed=3, threads=2)
+    assert (again.miss_m, again.history) == (found.miss_m, found.history)
 
 
 def test_the_search_keeps_its_account(worst: WorstEngagement) -> None:
