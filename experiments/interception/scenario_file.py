@@ -143,6 +143,14 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
         )
         if acceleration > bound and line not in lines:
             lines.append(line)
+    sensor, still = model.angle_sensor, (0.0, 0.0)
+    exact = sensor.error_at_nominal_range_y_rad == sensor.error_at_zero_range_y_rad == 0.0
+    if exact and not uncertainty.y_m == uncertainty.vy_m_s == still:
+        lines.append(
+            "angle_sensor.error_at_nominal_range_y_rad and error_at_zero_range_y_rad are 0, and uncertainty.y_km and "
+            "vy_km_s are not both [0, 0]: a measurement leaves a single range, and the set may become empty; write "
+            "positive bounds"
+        )
     if thruster.budget_m_s < thruster.least_impulse_m_s:
         lines.append(
             f"thruster.budget_m_s, {thruster.budget_m_s:g}, is less than thruster.least_impulse_m_s, "

@@ -244,6 +244,14 @@ def test_warnings_of_y_are_those_of_z(values: dict[str, str], part: str) -> None
     assert part in line
 
 
+def test_an_exact_angle_is_warned_of_unless_the_object_stays_in_the_plane() -> None:
+    exact = {"angle_sensor__error_at_nominal_range_y_rad": "0.0", "angle_sensor__error_at_zero_range_y_rad": "0.0"}
+    (line,) = scenario_warnings(read_scenario(spatial(**exact), "mine.toml"))
+    assert "a measurement leaves a single range" in line
+    still = {f"{table}__{key}": "[0.0, 0.0]" for table in AXIS for key in ("y_km", "vy_km_s")}
+    assert scenario_warnings(read_scenario(spatial(**exact, **still), "mine.toml")) == []
+
+
 @pytest.mark.parametrize(
     ("acceleration", "disturbance", "lines"),
     [
