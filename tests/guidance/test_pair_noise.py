@@ -26,7 +26,6 @@ from infoset.sensors import Sensor
 from sim import Scenario, Sun
 from sim.bound import TruthPair, lower_bound, pair_at
 from sim.pair import PairFlight, ScheduledMotion, fly_pair
-from tests.space import in_space
 
 QUICK = 4
 """Random scenarios of the quick tests: of one label, so that there are few linear programs."""
@@ -57,7 +56,7 @@ def sight(step: int, *sensors: Sensor) -> LineOfSight:
 
 @pytest.fixture(scope="module")
 def published_in_space() -> Scenario:
-    return in_space(load_scenario("asteroid-1997"))
+    return load_scenario("asteroid-1997-space")
 
 
 @pytest.fixture

@@ -29,7 +29,8 @@ _SECONDS_SHOWN = 3.0
 def draw_bound(scenario: Scenario, lower: LowerBound) -> Figure:
     """Draw (a) the bound over the label, one curve per closing speed, and (b) the pair of true states that proves it.
 
-    The bound is the result of `sim.lower_bound` for this scenario.
+    The bound is the result of `sim.lower_bound` for this scenario. In space, (b) has the offset of the two states along
+    the direction of their difference at x = 0.
     """
     with style():
         figure = new_figure(height_mm=_HEIGHT_MM + 19.0)
@@ -141,9 +142,7 @@ def _draw_pair(axes: Axes, scenario: Scenario, lower: LowerBound) -> None:
     axes.set_xticks([tick for tick in axes.get_xticks() if 0.0 <= tick <= shown])
     axes.set_title("(b) pair of true states that proves the bound")
     axes.set_xlabel("time to arrival, s")
-    axes.set_ylabel(
-        f"{'$z$' if len(direction) == 1 else 'position along their difference'} relative to the midpoint, m"
-    )
+    axes.set_ylabel(f"{'offset' if scenario.is_spatial else '$z$'} relative to the midpoint, m")
     axes.legend(loc="upper right", handlelength=2.0, borderaxespad=0.2)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
@@ -185,6 +186,7 @@ def _summary(
                         **_where(pair, scenario),
                         "bound_m": pair.bound_m,
                         "miss_m": flight.results.miss_m.tolist(),
+                        **_by_axis("miss", flight.results.lateral_miss.T, scenario),
                         "impulse_m_s": flight.results.impulse_m_s.tolist(),
                         "outcomes": [outcome.value for outcome in flight.results.outcomes],
                         "truth_kept": flight.results.truth_kept.tolist(),
@@ -203,14 +205,17 @@ def _where(pair: TruthPair, scenario: Scenario) -> dict[str, object]:
         "closing_speed_m_s": -pair.vx_m_s,
         "last_common_step": pair.last_common_step,
         "alike_until_before_arrival_s": _equal_until_s(pair, scenario),
-        **(_apart(pair, scenario) if scenario.is_spatial else {}),
+        **_by_axis("apart", np.abs(pair.difference_m(scenario.set_model.step_s)[1][:, -1]), scenario),
     }
 
 
-def _apart(pair: TruthPair, scenario: Scenario) -> dict[str, float]:
-    """Return the distance of the two by axis at x = 0, m."""
-    end_m = pair.difference_m(scenario.set_model.step_s)[1][:, -1]
-    return {f"apart_{axis}_m": abs(float(end)) for axis, end in zip(scenario.set_model.axes, end_m, strict=True)}
+def _by_axis(quantity: str, values_m: NDArray[np.float64], scenario: Scenario) -> dict[str, object]:
+    """Return values by axis, m, with the names of their keys; nothing in a plane."""
+    if not scenario.is_spatial:
+        return {}
+    return {
+        f"{quantity}_{axis}_m": value for axis, value in zip(scenario.set_model.axes, values_m.tolist(), strict=True)
+    }
 
 
 def _equal_until_s(pair: TruthPair, scenario: Scenario) -> float:

@@ -16,9 +16,10 @@ import pytest
 from experiments.interception.figures.bound import draw_bound, ripples
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
 from guidance import strategy_names
-from infoset import StateBox
+from infoset import ErrorShape, StateBox
 from sim import Scenario
 from sim.bound import LowerBound, lower_bound, pair_at
+from tests.space import in_space
 
 FILES = ["figure-bound.pdf", "figure-bound.png", "results.json", "scenario.toml"]
 KEYS = [
@@ -109,6 +110,40 @@ def test_bound_as_json_alone(infoset: Infoset, short_file: Path, tmp_path: Path)
     assert "symmetric-miss" in err
     assert [each.name for each in tmp_path.iterdir()] == ["short.toml"]
     assert infoset(short_file, "--strategies", "patient", "-q", "--budget", 0) == (0, "", "")
+
+
+@pytest.mark.parametrize("shape", ["box", "disc"])
+def test_bound_in_space(shape: str, infoset: Infoset, short: Scenario, tmp_path: Path) -> None:
+    spatial = in_space(short, error_shape=ErrorShape(shape))
+    file = tmp_path / "space.toml"
+    file.write_text(scenario_to_toml(spatial))
+    options = ("--strategies", "symmetric-miss", "--budget", 0, "--model", "guaranteed", "--out", tmp_path / "results")
+    code, out, _ = infoset(file, *options)
+    assert code == 0
+    found = json.loads((tmp_path / "results" / "results.json").read_text())
+    planar, expected = lower_bound(short), lower_bound(spatial)
+    assert (found["disturbance_y_m_s2"], found["error_shape"]) == (0.005, shape)
+    assert found["lower_bound_m"] == expected.bound_m
+    if shape == "disc":
+        assert expected.bound_m == planar.bound_m
+    else:
+        assert 1.5 * planar.bound_m < expected.bound_m < 2.0 * planar.bound_m
+    assert found["at_nominal_range"]["bound_m"] == pair_at(spatial, 1745e3, -58e3).bound_m
+    apart = [found["reached_at"][f"apart_{axis}_m"] for axis in ("y", "z")]
+    assert np.hypot(*apart) == pytest.approx(expected.pair.apart_m)
+    assert (apart[0] == 0.0) == (shape == "disc")
+    for flight in found["strategies"][0]["flights"]:
+        assert np.hypot(flight["miss_y_m"], flight["miss_z_m"]) == pytest.approx(flight["miss_m"], rel=1e-3)
+        assert max(flight["miss_m"]) >= flight["bound_m"] * (1.0 - 1e-4)
+        assert all(flight["truth_kept"])
+    axes = "one axis" if shape == "disc" else "both axes"
+    assert f"errors of the angles in a {shape}: the states of a pair differ along {axes}" in out
+    for axis in ("y", "z"):
+        assert f"acceleration of the object along {axis} in these pairs: at most 0.005 m/s^2" in out
+    (_, right) = draw_bound(spatial, expected).axes
+    assert right.get_ylabel() == "offset relative to the midpoint, m"
+    half = right.get_lines()[2].get_ydata()[-1]  # type: ignore[index]
+    assert half == pytest.approx(0.5 * expected.pair.apart_m)
 
 
 def test_no_name_and_no_digit_is_cut_at_60_columns(
