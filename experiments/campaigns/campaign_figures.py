@@ -34,8 +34,10 @@ _LOOKS = 28
 _DOTTED: dict[str, Any] = {"linestyle": (0, (1, 1.2)), "linewidth": 0.9}
 _BINS = 24
 _START_LABELS = {
+    "y_km": "initial y, km",
     "z_km": "initial z, km",
     "x_km": "initial x, km",
+    "vy_km_s": "initial V$_y$, km/s",
     "vz_km_s": "initial V$_z$, km/s",
     "vx_km_s": "initial V$_x$, km/s",
 }
@@ -52,7 +54,7 @@ class CampaignColumns:
     guaranteed_miss_m : ndarray, shape (m,)
         Known values of the guaranteed miss.
     start : mapping of str to ndarray, shape (n,)
-        Components of the initial state, by column.
+        Components of the initial state, by column: of position, then of velocity.
     radius_m : float or None
         Radius of the body, m; None if it has no size.
     """
@@ -127,16 +129,19 @@ def draw_convergence(columns: Sequence[CampaignColumns]) -> Figure:
 def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
     """Draw the miss over each component of the initial state: the runs, their median and their 90 % quantile.
 
-    Each noise has a row; there must be at least one.
+    Each noise has a row, in space one of positions and one of velocities; there must be at least one noise.
     """
+    names = [*columns[0].start]
+    lines = [names] if len(names) == 4 else [names[:3], names[3:]]
+    rows = [(column, line) for column in columns for line in lines]
     with style():
-        figure = new_figure(height_mm=44.0 * len(columns) + 15.0 * len(columns) + 6.0)
-        rows = place_axes(figure, len(columns), 4, margins_mm=(17.0, 6.0, 20.0, 7.0), gaps_mm=(9.0, 15.0))
+        figure = new_figure(height_mm=44.0 * len(rows) + 15.0 * len(rows) + 6.0)
+        grid = place_axes(figure, len(rows), len(lines[0]), margins_mm=(17.0, 6.0, 20.0, 7.0), gaps_mm=(9.0, 15.0))
         letter = iter("abcdefghijkl")
         binned = False
-        for row, column in zip(rows, columns, strict=True):
+        for row, (column, line) in zip(grid, rows, strict=True):
             limit = axis_limit([column.miss_m])
-            for axes, name in zip(row, _START_LABELS, strict=True):
+            for axes, name in zip(row, line, strict=True):
                 binned |= _cloud(axes, column.start[name], column.miss_m, str(column.look["color"]))
                 axes.set_xlabel(_START_LABELS[name])
                 axes.set_ylim(0.0, 1.04 * limit or 1.0)
@@ -161,11 +166,12 @@ def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
 def correlations(columns: CampaignColumns) -> dict[str, dict[str, float | None]]:
     """Return Pearson's and Spearman's correlation of the miss with each component of the initial state, by component.
 
-    Each has the ends of its 95 % confidence interval. `|z_km|` and `|vz_km_s|` are included. A correlation is None
-    where the component or the miss does not vary, and its ends also with fewer than 4 runs.
+    Each has the ends of its 95 % confidence interval. The moduli of the lateral components are included, for example
+    `|z_km|`. A correlation is None where the component or the miss does not vary, and its ends also with fewer than 4
+    runs.
     """
     start = dict(columns.start)
-    start |= {f"|{name}|": np.abs(start[name]) for name in ("z_km", "vz_km_s")}
+    start |= {f"|{name}|": np.abs(values) for name, values in start.items() if name not in ("x_km", "vx_km_s")}
     miss = columns.miss_m
     return {
         name: _with_ends("pearson", _correlation(values, miss), miss.size)

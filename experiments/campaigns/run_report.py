@@ -145,7 +145,7 @@ def _columns(folder: CampaignFolder) -> list[CampaignColumns]:
     """Return the columns of all rows, one entry for each noise with rows."""
     scenario = folder.manifest.scenario
     miss, impulse, guaranteed = (folder.numbers(name) for name in ("miss_m", "impulse_m_s", "guaranteed_miss_m"))
-    start = {name: folder.numbers(name).data for name in START}
+    start = {name: values.data for name in START if (values := folder.numbers(name)).count()}
     columns = [
         CampaignColumns(
             noise,

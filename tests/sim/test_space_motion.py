@@ -15,19 +15,12 @@ from sim.draws import Draws, Y, corners, draw, generator, in_disc
 from sim.gravity import greatest_impulses_m_s, on_board_model, with_gravity
 from sim.kepler import SPACECRAFT, KeplerMotion, accelerate_all, leap_all, sun_and_orbit
 from sim.target import acceleration_m_s2
+from tests.space import in_space
 
 Floats = NDArray[np.float64]
 
 SUN = Sun(1.324948e20, 150e9, np.pi / 2)
 BATCH = 20
-
-
-def in_space(scenario: Scenario) -> Scenario:
-    """The numbers of z in both axes."""
-    bounds, start = (
-        replace(box, y_m=box.z_m, vy_m_s=box.vz_m_s) for box in (scenario.set_model.bounds, scenario.dispersion)
-    )
-    return replace(scenario, set_model=replace(scenario.set_model, bounds=bounds), dispersion=start)
 
 
 @pytest.fixture(scope="module")
@@ -308,10 +301,9 @@ def test_the_z_axis_has_the_random_numbers_of_the_plane(ranging: Scenario) -> No
 
 @pytest.mark.parametrize(("convention", "shape"), [(Convention.PLANE, ErrorShape.DISC), (Convention.CONE, None)])
 def test_errors_in_a_disc_are_uniform_in_it(
-    convention: Convention, shape: ErrorShape | None, spatial: Scenario
+    convention: Convention, shape: ErrorShape | None, asteroid: Scenario
 ) -> None:
-    sensor = replace(spatial.set_model.angle_sensor, convention=convention, error_shape=shape)
-    disc = replace(spatial, set_model=replace(spatial.set_model, angle_sensor=sensor))
+    disc = in_space(asteroid, convention=convention, error_shape=shape)
     y, z = draw(disc, range(400), 9).errors["angle"].reshape(2, -1)
     squared, count = y**2 + z**2, y.size
     assert squared.max() <= 1.0 + 1e-15

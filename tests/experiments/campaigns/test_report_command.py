@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from experiments.campaigns.campaign_figures import (
     draw_convergence,
     draw_dispersion,
 )
+from experiments.campaigns.samples import START
 from experiments.common.screen import BeginProgress
 from experiments.interception.scenario_file import load_scenario
 from sim import Campaign, CampaignNoise, Scenario
@@ -140,9 +141,12 @@ def test_nothing_is_replaced_unless_told(infoset: Infoset, folder: Path, tmp_pat
     assert [each.name for each in (tmp_path / "report").iterdir()] == ["notes.txt"]
 
 
-def columns(noise: str, size: int) -> CampaignColumns:
+PLANE = ("z_km", "x_km", "vz_km_s", "vx_km_s")
+
+
+def columns(noise: str, size: int, components: Sequence[str] = PLANE) -> CampaignColumns:
     rng = np.random.default_rng([size, noise == "game"])
-    start = {name: rng.uniform(size=size) for name in ("z_km", "x_km", "vz_km_s", "vx_km_s")}
+    start = {name: rng.uniform(size=size) for name in components}
     return CampaignColumns(
         noise, False, rng.exponential(size=size), rng.normal(100.0, 5.0, size), np.zeros(0), start, False
     )
@@ -200,6 +204,21 @@ def test_texts_of_figures_never_touch() -> None:
             need_room(draw(drawn))
     row = draw_dispersion([far]).axes[0]
     assert row.get_ylabel() == "miss, m\nruns beyond the axis: 1 of 400"
+
+
+def test_in_space_the_components_along_y_are_shown_too() -> None:
+    both = [columns("random", 400, START), columns("game", 400, START)]
+    figure = draw_dispersion(both)
+    need_room(figure)
+    labels = [axes.get_xlabel() for axes in figure.axes]
+    assert labels == 2 * [
+        *("initial y, km", "initial z, km", "initial x, km"),
+        *("initial V$_y$, km/s", "initial V$_z$, km/s", "initial V$_x$, km/s"),
+    ]
+    assert [bool(axes.get_ylabel()) for axes in figure.axes] == 4 * [True, False, False]
+    moduli = ["|y_km|", "|z_km|", "|vy_km_s|", "|vz_km_s|"]
+    assert [*correlations(both[0])] == [*START, *moduli]
+    assert [*correlations(columns("random", 50))] == [*PLANE, "|z_km|", "|vz_km_s|"]
 
 
 def test_correlations_by_hand() -> None:
