@@ -4,7 +4,7 @@ from sim.adversary import NothingCountsError, WorstEngagement, find_worst
 from sim.bound import BoundError, LowerBound, lower_bound
 from sim.campaign import Campaign, CampaignResult, Sweep
 from sim.chunk import CampaignNoise
-from sim.record import Inconsistency, Record, StepRecord, fly_one
+from sim.record import AxisStep, Inconsistency, Record, StepRecord, fly_one
 from sim.requirement import HitRequirement, Requirement
 from sim.results import Outcome, Results
 from sim.scenario import Body, Manoeuvre, Scenario, Sun, Target
@@ -24,6 +24,7 @@ from sim.storage import Axis
 
 __all__ = [
     "Axis",
+    "AxisStep",
     "Body",
     "BoundError",
     "Campaign",

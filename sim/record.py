@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from guidance import MeasurementNoise, Strategy
 from infoset import Section
@@ -16,6 +17,32 @@ from sim.pictures import course_html
 from sim.results import Results, ending
 from sim.scenario import Scenario, strategy_name, with_strategy
 
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class AxisStep:
+    """One step of one engagement along one lateral axis.
+
+    Parameters
+    ----------
+    measured : mapping of str to float
+        Values measured in this step by sensor: "angle" (rad, in the convention of the sensor), "rate" (rad/s) and
+        "range" (m), which is the same for both axes.
+    true_angle_rad, true_rate_rad_s : float
+        True line of sight in the plane of x and the axis.
+    impulse_m_s : float
+        Component of the impulse.
+    predicted_miss_m : tuple of float, or None
+        (pi_*, pi^*) after the measurement and before the impulse; None without a set.
+    """
+
+    measured: Mapping[str, float]
+    true_angle_rad: float
+    true_rate_rad_s: float
+    impulse_m_s: float
+    predicted_miss_m: tuple[float, float] | None
+
 
 @dataclass(frozen=True)
 class StepRecord:
@@ -23,12 +50,8 @@ class StepRecord:
 
     Parameters
     ----------
-    measured : mapping of str to float
-        Values measured in this step by sensor: "angle" (rad), "range" (m), "rate" (rad/s).
-    true_angle_rad, true_rate_rad_s, true_range_m : float
-        True line of sight.
-    predicted_miss_m : tuple of float, or None
-        (pi_*, pi^*) after the measurement and before the impulse; None without a set.
+    axes : mapping of str to AxisStep
+        The step along each lateral axis: "z" in a plane, "y" and "z" in space.
     truth_margin_m : float or None
         Signed margin of the true state in its section at the last measurement; None before the first.
     sections : tuple of Section
@@ -36,14 +59,36 @@ class StepRecord:
     """
 
     time_s: float
-    measured: Mapping[str, float]
-    true_angle_rad: float
-    true_rate_rad_s: float
+    axes: Mapping[str, AxisStep]
     true_range_m: float
-    impulse_m_s: float
-    predicted_miss_m: tuple[float, float] | None
     truth_margin_m: float | None
     sections: tuple[Section, ...]
+
+    @property
+    def measured(self) -> Mapping[str, float]:
+        """Values measured along z, and the range."""
+        return self.axes["z"].measured
+
+    @property
+    def true_angle_rad(self) -> float:
+        """True angle of the line of sight along z."""
+        return self.axes["z"].true_angle_rad
+
+    @property
+    def true_rate_rad_s(self) -> float:
+        """True rate of the line of sight along z."""
+        return self.axes["z"].true_rate_rad_s
+
+    @property
+    def predicted_miss_m(self) -> tuple[float, float] | None:
+        """Predicted miss along z."""
+        return self.axes["z"].predicted_miss_m
+
+    @property
+    def impulse_m_s(self) -> float:
+        """The impulse along z in a plane, the modulus of the impulse in space."""
+        components = [axis.impulse_m_s for axis in self.axes.values()]
+        return components[0] if len(components) == 1 else float(np.hypot.reduce(components))
 
 
 @dataclass(frozen=True)
@@ -164,17 +209,30 @@ def fly_one(
     flight = Engagements(scenario, draws, own_strategy, noise=noise)
     recorded: list[StepRecord] = []
 
+    axes = scenario.set_model.axes
+
+    def by_axis(values: Floats) -> list[float]:
+        return list(np.broadcast_to(values, (len(axes), 1))[:, 0].tolist())
+
     def record(step: Step) -> None:
         miss = step.predicted_miss
+        measured = {name: by_axis(values) for name, values in step.measured.items()}
+        angles, rates, impulses = map(by_axis, (step.sight.alpha_rad, step.sight.omega_rad_s, step.impulse_m_s))
+        misses = [*zip(by_axis(miss.lower_m), by_axis(miss.upper_m), strict=True)] if miss.exists[0] else [None] * 2
         recorded.append(
             StepRecord(
                 time_s=step.time_s,
-                measured={name: float(values[0]) for name, values in step.measured.items()},
-                true_angle_rad=float(step.sight.alpha_rad[0]),
-                true_rate_rad_s=float(step.sight.omega_rad_s[0]),
+                axes={
+                    axis: AxisStep(
+                        measured={name: values[i] for name, values in measured.items()},
+                        true_angle_rad=angles[i],
+                        true_rate_rad_s=rates[i],
+                        impulse_m_s=impulses[i],
+                        predicted_miss_m=misses[i],
+                    )
+                    for i, axis in enumerate(axes)
+                },
                 true_range_m=float(step.sight.range_m[0]),
-                impulse_m_s=float(step.impulse_m_s[0]),
-                predicted_miss_m=(float(miss.lower_m[0]), float(miss.upper_m[0])) if miss.exists[0] else None,
                 truth_margin_m=None,
                 sections=tuple(step.information.sections()),
             )

@@ -1,7 +1,8 @@
 """Records of engagements as `.npz` files: a JSON header and plain arrays, no pickle.
 
 The members of the archive are stored, not compressed, so that no file can hold more than its own size. The sets are
-flat arrays of vertices with offsets. A value that is not known in a step has a mask.
+flat arrays of vertices with offsets. A value that is not known in a step has a mask. The record of an engagement in
+space has further members, those of the y axis; the members that a record in a plane has, too, are those of the z axis.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from experiments.interception.scenario_file import read_scenario, scenario_to_to
 from infoset import ConvexPolygons, Section
 from infoset.limits import LARGEST, SMALLEST
 from infoset.sensors import SENSORS
-from sim import Inconsistency, Record, Results, Scenario, StepRecord
+from sim import AxisStep, Inconsistency, Record, Results, Scenario, StepRecord
 from sim.columns import Column, columns_of, columns_with_values, values_of
 from sim.storage.codec import from_json, to_json
 
@@ -49,8 +50,8 @@ Arrays = dict[str, NDArray[Any]]
 _STEPS, _STEPS_2, _STEPS_AND_1, _SECTIONS, _SECTIONS_AND_1, _VERTICES_2, _ANY = range(7)
 _FLOAT, _FLAG, _COUNT, _BYTE = "<f8", "|b1", "<i8", "|u1"
 
-_NUMBERS = ("time_s", "true_angle_rad", "true_rate_rad_s", "true_range_m", "impulse_m_s")
-"""Numbers of each step that are always known: names of members and of fields of `StepRecord`."""
+_OF_AXIS = ("true_angle_rad", "true_rate_rad_s", "impulse_m_s")
+"""Numbers of each step and axis that are always known: names of members and of fields of `AxisStep`."""
 
 _MEASURED: Mapping[str, tuple[str, int]] = {
     name: (kind, _STEPS)
@@ -58,7 +59,7 @@ _MEASURED: Mapping[str, tuple[str, int]] = {
     for name, kind in ((f"{sensor.name}_measured", _FLAG), (f"measured_{sensor.quantity}", _FLOAT))
 }
 """Members of the sensors; a record written before a kind of sensor was added lacks those of that kind."""
-_MEMBERS: Mapping[str, tuple[str, int]] = {
+_MEMBERS: dict[str, tuple[str, int]] = {
     "header": (_BYTE, _ANY),
     "time_s": (_FLOAT, _STEPS),
     **_MEASURED,
@@ -77,6 +78,22 @@ _MEMBERS: Mapping[str, tuple[str, int]] = {
     "vertex_v_m_s_z_m": (_FLOAT, _VERTICES_2),
 }
 """Type and shape of each member."""
+_OF_Y: Mapping[str, str] = {
+    **{
+        f"measured_{kind.quantity}": f"measured_{kind.quantity}".replace(kind.name, f"{kind.name}_y")
+        for kind in SENSORS
+        if kind.is_lateral
+    },
+    "true_angle_rad": "true_angle_y_rad",
+    "true_rate_rad_s": "true_rate_y_rad_s",
+    "impulse_m_s": "impulse_y_m_s",
+    "predicted_miss_m": "predicted_miss_y_m",
+    "vertex_offsets": "vertex_y_offsets",
+    "vertex_v_m_s_z_m": "vertex_v_m_s_y_m",
+}
+"""Members of the y axis, in space only, by those of the z axis."""
+_REQUIRED = [name for name in _MEMBERS if name not in _MEASURED]
+_MEMBERS |= {along_y: _MEMBERS[along_z] for along_z, along_y in _OF_Y.items()}
 _RESULT: dict[str, list[Column]] = {}
 """Columns of the result in the header by key; the two components of a start have one key."""
 for _column in columns_of(Results):
@@ -199,20 +216,35 @@ def _to_arrays(record: Record) -> Arrays:
     """Put the steps of a record into flat arrays."""
     steps = record.steps
     sections = [section for step in steps for section in step.sections]
-    polygons = [section.polygon.vertices[: int(section.polygon.counts)] for section in sections]
-    arrays: Arrays = {name: _floats(getattr(step, name) for step in steps) for name in _NUMBERS}
+    along_y = {}
+    if record.scenario.is_spatial:
+        polygons = [section.polygon_y for section in sections if section.polygon_y is not None]
+        arrays = _of_axis([step.axes["y"] for step in steps], polygons)
+        along_y = {name: arrays[along_z] for along_z, name in _OF_Y.items()}
+    return {
+        **_of_axis([step.axes["z"] for step in steps], [section.polygon for section in sections]),
+        **along_y,
+        **_optional("truth_margin_known", "truth_margin_m", [step.truth_margin_m for step in steps]),
+        "time_s": _floats(step.time_s for step in steps),
+        "true_range_m": _floats(step.true_range_m for step in steps),
+        "section_offsets": _offsets([len(step.sections) for step in steps]),
+        "section_label_m": _floats(section.label_m for section in sections),
+        "section_range_m": _floats(section.range_m for section in sections),
+    }
+
+
+def _of_axis(steps: Sequence[AxisStep], polygons: Sequence[ConvexPolygons]) -> Arrays:
+    """Put the steps and the sections of one axis into arrays, named as those of the z axis."""
+    vertices = [polygon.polygon() for polygon in polygons]
+    arrays: Arrays = {name: _floats(getattr(step, name) for step in steps) for name in _OF_AXIS}
     for sensor in SENSORS:
         values = [step.measured.get(sensor.name) for step in steps]
         arrays |= _optional(f"{sensor.name}_measured", f"measured_{sensor.quantity}", values)
     return {
         **arrays,
         **_optional("predicted_miss_exists", "predicted_miss_m", [step.predicted_miss_m for step in steps], (0.0, 0.0)),
-        **_optional("truth_margin_known", "truth_margin_m", [step.truth_margin_m for step in steps]),
-        "section_offsets": _offsets([len(step.sections) for step in steps]),
-        "section_label_m": _floats(section.label_m for section in sections),
-        "section_range_m": _floats(section.range_m for section in sections),
-        "vertex_offsets": _offsets([len(polygon) for polygon in polygons]),
-        "vertex_v_m_s_z_m": np.concatenate([np.empty((0, 2)), *polygons]),
+        "vertex_offsets": _offsets([len(outline) for outline in vertices]),
+        "vertex_v_m_s_z_m": np.concatenate([np.empty((0, 2)), *vertices]),
     }
 
 
@@ -254,9 +286,9 @@ def _pack(arrays: Arrays) -> bytes:
     """Return an `.npz` archive that depends on nothing but its arrays."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_STORED) as archive:
-        for name, (kind, _) in _MEMBERS.items():
+        for name in (name for name in _MEMBERS if name in arrays):
             member = io.BytesIO()
-            values = np.ascontiguousarray(arrays[name], dtype=np.dtype(kind))
+            values = np.ascontiguousarray(arrays[name], dtype=np.dtype(_MEMBERS[name][0]))
             np.lib.format.write_array(member, values, version=(1, 0), allow_pickle=False)
             archive.writestr(zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0)), member.getvalue())
     return content.getvalue()
@@ -272,7 +304,7 @@ def _unpack(content: bytes) -> Arrays:
             names = [member.filename for member in members]
             wanted = [f"{name}.npy" for name in _MEMBERS]
             unknown = sorted(set(names) - set(wanted))
-            missing = [name for name in wanted if name not in names and name.removesuffix(".npy") not in _MEASURED]
+            missing = [f"{name}.npy" for name in _REQUIRED if f"{name}.npy" not in names]
             if unknown or missing:
                 what = f"it has {shown(unknown[0])}" if unknown else f"it has no {missing[0]}"
                 raise _UnsoundError(f"{what}: another program wrote it")
@@ -346,6 +378,10 @@ def _to_record(header: Mapping[str, Any], arrays: Arrays, source: str) -> Record
         raise _UnsoundError(f"its header is wrong: {error}") from None
     except InputError as error:
         raise _UnsoundError(f"its scenario is unsound: {error}") from None
+    of_y = {along_y for along_z, along_y in _OF_Y.items() if scenario.is_spatial and along_z in arrays}
+    for name in sorted(of_y ^ (set(_OF_Y.values()) & set(arrays))):
+        where = "in space, and it has no" if name in of_y else "in a plane, and it has"
+        raise _UnsoundError(f"its scenario is {where} {name}.npy")
     nothing = {name: np.zeros(len(arrays["time_s"]), dtype=kind) for name, (kind, _) in _MEASURED.items()}
     arrays = nothing | arrays
     _check(arrays)
@@ -354,7 +390,7 @@ def _to_record(header: Mapping[str, Any], arrays: Arrays, source: str) -> Record
         raise _UnsoundError("its header is wrong: inconsistency is not at a step of the record")
     return Record(
         scenario=scenario,
-        result=_result_from_json(header["result"], engagement.run, scenario.set_model.is_guaranteed),
+        result=_result_from_json(header["result"], engagement.run, scenario),
         steps=_to_steps(arrays, scenario),
         **vars(engagement),
     )
@@ -382,7 +418,12 @@ def _check(arrays: Arrays) -> None:
         raise _UnsoundError("it has no step")
     if (np.diff(arrays["time_s"]) <= 0.0).any() or arrays["time_s"][0] < 0.0:
         raise _UnsoundError("time_s does not rise")
-    for name, size, least in (("section_offsets", sections, 0), ("vertex_offsets", len(arrays["vertex_v_m_s_z_m"]), 1)):
+    vertices = {"vertex_offsets": "vertex_v_m_s_z_m", "vertex_y_offsets": "vertex_v_m_s_y_m"}
+    sizes_and_least = {
+        "section_offsets": (sections, 0),
+        **{name: (len(arrays[values]), 1) for name, values in vertices.items() if name in arrays},
+    }
+    for name, (size, least) in sizes_and_least.items():
         offsets = arrays[name]
         # The ends are compared before the differences, and one by one: a difference may overflow.
         if offsets[0] != 0 or offsets[-1] != size or (offsets < 0).any() or (offsets > size).any():
@@ -396,7 +437,7 @@ def _check(arrays: Arrays) -> None:
             raise _UnsoundError(f"{name} holds a range that is negative")
 
 
-def _result_from_json(found: object, run: int, guarantees: bool) -> Results:
+def _result_from_json(found: object, run: int, scenario: Scenario) -> Results:
     # A record written before a nullable column was added lacks it, and one in a plane the columns of space.
     optional = {
         key: None if len(columns) == 1 else [None] * len(columns)
@@ -406,13 +447,15 @@ def _result_from_json(found: object, run: int, guarantees: bool) -> Results:
     if not isinstance(found, dict) or set(optional | found) != set(_RESULT):
         raise _UnsoundError("its header has a wrong result")
     found = optional | found
-    fields: dict[str, Any] = {"runs": np.array([run]), "guarantees": guarantees}
+    fields: dict[str, Any] = {"runs": np.array([run]), "guarantees": scenario.set_model.is_guaranteed}
     for key, columns in _RESULT.items():
         values = [found[key]] if len(columns) == 1 else found[key]
         if not isinstance(values, list) or len(values) != len(columns):
             raise _UnsoundError("its header has a wrong start")
         for column, value in zip(columns, values, strict=True):
             problem = _problem(column, value)
+            if column.optional and (value is None) == scenario.is_spatial:
+                problem = f"is {'unknown in space' if value is None else 'known in a plane'}"
             if problem is not None:
                 raise _UnsoundError(f"its header has a wrong result: {column.name} {problem}")
         fields[columns[0].field] = _array(columns[0], values)
@@ -450,31 +493,50 @@ def _array(column: Column, values: list[Any]) -> Any:
 
 
 def _to_steps(arrays: Arrays, scenario: Scenario) -> tuple[StepRecord, ...]:
-    speed = scenario.set_model.closing_speed_m_s
-    vertices = arrays["vertex_v_m_s_z_m"]
+    # The arrays of the z axis come first, as the polygons of a section do.
+    along = {"z": arrays}
+    if scenario.is_spatial:
+        along["y"] = arrays | {along_z: arrays[along_y] for along_z, along_y in _OF_Y.items() if along_y in arrays}
+    numbers = (arrays[name].tolist() for name in ("section_label_m", "section_range_m"))
     sections = [
-        Section(label, now, speed, ConvexPolygons(vertices[first:last].copy(), np.asarray(last - first)))
-        for label, now, (first, last) in zip(
-            arrays["section_label_m"].tolist(),
-            arrays["section_range_m"].tolist(),
-            pairwise(arrays["vertex_offsets"].tolist()),
-            strict=True,
-        )
+        Section(label, now, scenario.set_model.closing_speed_m_s, *polygons)
+        for label, now, *polygons in zip(*numbers, *map(_polygons, along.values()), strict=True)
+    ]
+    columns = (
+        arrays["time_s"].tolist(),
+        [dict(zip(along, step, strict=True)) for step in zip(*map(_axis_steps, along.values()), strict=True)],
+        arrays["true_range_m"].tolist(),
+        _known(arrays, "truth_margin_known", "truth_margin_m"),
+        [tuple(sections[first:last]) for first, last in pairwise(arrays["section_offsets"].tolist())],
+    )
+    return tuple(StepRecord(*row) for row in zip(*columns, strict=True))
+
+
+def _polygons(arrays: Arrays) -> list[ConvexPolygons]:
+    """Return the sections of one axis."""
+    vertices = arrays["vertex_v_m_s_z_m"]
+    return [
+        ConvexPolygons(vertices[first:last].copy(), np.asarray(last - first))
+        for first, last in pairwise(arrays["vertex_offsets"].tolist())
     ]
 
-    def optional(mask: str, values: str) -> list[Any]:
-        pairs = zip(arrays[mask].tolist(), arrays[values].tolist(), strict=True)
-        return [value if known else None for known, value in pairs]
 
-    by_sensor = [optional(f"{sensor.name}_measured", f"measured_{sensor.quantity}") for sensor in SENSORS]
-    columns = {
-        **{name: arrays[name].tolist() for name in _NUMBERS},
-        "measured": [
+def _axis_steps(arrays: Arrays) -> list[AxisStep]:
+    """Return the steps of one axis."""
+    by_sensor = [_known(arrays, f"{sensor.name}_measured", f"measured_{sensor.quantity}") for sensor in SENSORS]
+    columns = (
+        [
             {sensor.name: value for sensor, value in zip(SENSORS, values, strict=True) if value is not None}
             for values in zip(*by_sensor, strict=True)
         ],
-        "predicted_miss_m": [miss and tuple(miss) for miss in optional("predicted_miss_exists", "predicted_miss_m")],
-        "truth_margin_m": optional("truth_margin_known", "truth_margin_m"),
-        "sections": [tuple(sections[first:last]) for first, last in pairwise(arrays["section_offsets"].tolist())],
-    }
-    return tuple(StepRecord(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True))
+        *(arrays[name].tolist() for name in _OF_AXIS),
+        [miss and tuple(miss) for miss in _known(arrays, "predicted_miss_exists", "predicted_miss_m")],
+    )
+    return [AxisStep(*row) for row in zip(*columns, strict=True)]
+
+
+def _known(arrays: Arrays, mask: str, values: str) -> list[Any]:
+    """Return the values of an array, None where they are not known."""
+    return [
+        value if known else None for known, value in zip(arrays[mask].tolist(), arrays[values].tolist(), strict=True)
+    ]

@@ -77,7 +77,8 @@ def test_a_record_equals_itself_alone(record: Record, content: bytes, tmp_path: 
     (tmp_path / "x.npz").write_bytes(content)
     found = load_record(tmp_path / "x.npz")
     assert same_records(found, record)
-    object.__setattr__(found.steps[3], "impulse_m_s", np.nextafter(found.steps[3].impulse_m_s, 9.0))
+    along_z = found.steps[3].axes["z"]
+    object.__setattr__(along_z, "impulse_m_s", np.nextafter(along_z.impulse_m_s, 9.0))
     assert not same_records(found, record)
 
 

@@ -10,10 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from guidance import LineOfSight, NoiseKind
-from infoset import InformationSetView, InitialSet, Model, RangeSensor, Recovery, Sensor
+from infoset import Convention, InformationSetView, InitialSet, Model, RangeSensor, Recovery, Sensor
 from infoset.sensors import SENSORS, Cuttable, Geometry, Measurements
-from sim import Outcome, Scenario, fly_one, lower_bound
+from sim import Outcome, Scenario, fly_one, lower_bound, simulate
 from sim.draws import EXECUTION, START, TARGET, TIE
+from tests.space import in_space
 
 Floats = NDArray[np.float64]
 
@@ -33,6 +34,25 @@ def test_the_measurement_that_empties_the_set_for_good_is_kept(brief: Scenario) 
     assert record.result.outcomes == (Outcome.SET_EMPTY,)
     assert first.measured == {"range": 10.0 * first.true_range_m}
     assert later.measured == {}
+
+
+def test_a_record_in_space_has_both_axes(brief: Scenario) -> None:
+    record = fly_one(in_space(brief, convention=Convention.GIMBAL), 2, seed=5)
+    results = simulate(in_space(brief, convention=Convention.GIMBAL), 3, seed=5)
+    assert record.result.miss_m[0] == results.miss_m[2]
+    steps = [(step, step.axes["y"], step.axes["z"]) for step in record.steps]
+    assert all(step.impulse_m_s == np.hypot(y.impulse_m_s, z.impulse_m_s) for step, y, z in steps)
+    assert sum(step.impulse_m_s for step in record.steps) == pytest.approx(float(results.impulse_m_s[2]), rel=1e-12)
+    first, y, z = steps[0]
+    assert (first.true_angle_rad, first.predicted_miss_m) == (z.true_angle_rad, z.predicted_miss_m)
+    assert y.true_angle_rad == np.arctan2(results.lateral_start[2, 0], results.position_m[2, 1])
+    assert z.true_angle_rad == np.arctan2(*results.position_m[2])
+    sensor = record.scenario.set_model.angle_sensor
+    elevation = np.arctan(np.tan(z.true_angle_rad) * np.cos(y.true_angle_rad))
+    bound = sensor.error_bound(first.true_range_m)
+    assert abs(y.measured["angle"] - y.true_angle_rad) <= bound
+    assert abs(z.measured["angle"] - elevation) <= bound
+    assert {section.polygon_y is not None for section in first.sections} == {True}
 
 
 def test_each_kind_of_sensor_has_its_own_name_column_and_stream() -> None:

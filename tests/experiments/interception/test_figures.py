@@ -3,6 +3,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from experiments.interception.figures.sets import MEASUREMENT_MARK, TRUTH_MARK, 
 from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind, TieRule
 from infoset import ConvexPolygons
-from sim import Record, Results, band_half_width, fly_one, simulate
+from sim import Record, Results, StepRecord, band_half_width, fly_one, simulate
 
 UNITS = (", m", ", s", ", m/s", ", mrad", ", µrad/s", "(share of runs)")
 RUNS = 6
@@ -47,6 +48,11 @@ def shortened(record: Record, vertices: Sequence[tuple[float, float]]) -> Record
     step = record.steps[0]
     section = replace(step.sections[0], polygon=ConvexPolygons(np.array(vertices), len(vertices)))
     return replace(record, steps=(replace(step, sections=(section,)),))
+
+
+def along_z(step: StepRecord, **values: Any) -> StepRecord:
+    """A step of a plane with some values of its axis replaced."""
+    return replace(step, axes={"z": replace(step.axes["z"], **values)})
 
 
 def line(axes: Axes, label: str) -> Line2D:
@@ -93,7 +99,7 @@ def test_process_says_where_a_curve_leaves_the_axes(records: list[Record]) -> No
 
 
 def test_process_gives_a_fast_rate_in_whole_units_and_breaks_a_long_title(records: list[Record]) -> None:
-    last = replace(records[1].steps[-1], true_rate_rad_s=-2.074)
+    last = along_z(records[1].steps[-1], true_rate_rad_s=-2.074)
     text = "a description so long that it would run over the edge of the page"
     scenario = replace(records[1].scenario, name=text)
     fast = replace(records[1], scenario=scenario, steps=(*records[1].steps[:-1], last))
@@ -142,7 +148,7 @@ def test_a_figure_has_no_legend_of_what_it_does_not_show(records: list[Record]) 
     def legend(record: Record) -> list[str]:
         return [text.get_text() for text in draw_sets([record]).legends[0].get_texts()]
 
-    blind = replace(records[0], steps=tuple(replace(step, measured={}) for step in records[0].steps))
+    blind = replace(records[0], steps=tuple(along_z(step, measured={}) for step in records[0].steps))
     assert legend(blind) == [TRUTH_MARK, "section of the set, with its range in km"]
     assert len(legend(records[0])) == 4
 
@@ -156,7 +162,7 @@ def test_a_miss_of_kilometres_leaves_the_whole_flight_readable(records: list[Rec
     record = replace(
         records[0],
         steps=tuple(
-            replace(step, true_angle_rad=angle, measured={"angle": angle + 1e-4})
+            along_z(step, true_angle_rad=angle, measured={"angle": angle + 1e-4})
             for step, angle in zip(steps, angles.tolist(), strict=True)
         ),
     )

@@ -19,8 +19,9 @@ from experiments.interception import record_file
 from experiments.interception.record_file import load_record, write_record
 from experiments.interception.scenario_file import load_scenario
 from guidance import LineOfSight, NoiseKind, Situation
-from infoset import InformationSetView, RateSensor
+from infoset import Convention, InformationSetView, RateSensor
 from sim import Record, StepRecord, fly_one
+from tests.space import in_space
 
 
 class Idle:
@@ -58,6 +59,14 @@ def content(record: Record, tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return file.read_bytes()
 
 
+@pytest.fixture(scope="module")
+def spatial_content(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    whole = fly_one(in_space(load_scenario("asteroid-1997")), 3, seed=11)
+    file = tmp_path_factory.mktemp("record") / "x.npz"
+    write_record(dataclasses.replace(whole, steps=whole.steps[:6]), file)
+    return file.read_bytes()
+
+
 def refused(content: bytes, tmp_path: Path) -> str:
     """The message about a file with this content."""
     file = tmp_path / "bad.npz"
@@ -78,6 +87,9 @@ def assert_same_step(one: StepRecord, other: StepRecord) -> None:
     for a, b in zip(one.sections, other.sections, strict=True):
         assert (a.label_m, a.range_m, a.closing_speed_m_s) == (b.label_m, b.range_m, b.closing_speed_m_s)
         assert np.array_equal(a.polygon.polygon(), b.polygon.polygon())
+        assert (a.polygon_y is None) == (b.polygon_y is None)
+        if a.polygon_y is not None and b.polygon_y is not None:
+            assert np.array_equal(a.polygon_y.polygon(), b.polygon_y.polygon())
 
 
 def assert_same(one: Record, other: Record) -> None:
@@ -103,6 +115,31 @@ def test_a_record_comes_back_bit_for_bit(name: str, noise: NoiseKind, tmp_path: 
     assert [each.name for each in tmp_path.iterdir()] == ["x.npz"]
 
 
+@pytest.mark.parametrize("convention", Convention)
+def test_a_record_in_space_comes_back_bit_for_bit(convention: Convention, tmp_path: Path) -> None:
+    planar = dataclasses.replace(load_scenario("asteroid-1997"), rate_sensor=RateSensor(1.0, 1e-6))
+    flown = fly_one(in_space(planar, convention=convention), 1)
+    assert {tuple(step.axes) for step in flown.steps} == {("y", "z")}
+    ranges = [[axis.measured.get("range") for axis in step.axes.values()] for step in flown.steps]
+    assert any(y is not None for y, _ in ranges)
+    assert all(y == z for y, z in ranges)
+    write_record(flown, tmp_path / "x.npz")
+    assert_same(load_record(tmp_path / "x.npz"), flown)
+
+
+def test_a_record_in_space_has_the_members_of_a_plane_and_those_of_y(spatial_content: bytes, content: bytes) -> None:
+    members = []
+    for file in (content, spatial_content):
+        with zipfile.ZipFile(io.BytesIO(file)) as archive:
+            members.append(archive.namelist())
+    planar, spatial = members
+    assert spatial[: len(planar)] == planar
+    assert sorted(spatial[len(planar) :]) == [
+        *("impulse_y_m_s.npy", "measured_angle_y_rad.npy", "measured_rate_y_rad_s.npy", "predicted_miss_y_m.npy"),
+        *("true_angle_y_rad.npy", "true_rate_y_rad_s.npy", "vertex_v_m_s_y_m.npy", "vertex_y_offsets.npy"),
+    ]
+
+
 def test_a_record_of_ones_own_strategy(tmp_path: Path) -> None:
     flown = fly_one(load_scenario("asteroid-1997-single"), strategy=Idle())
     write_record(flown, tmp_path / "x.npz")
@@ -124,8 +161,7 @@ def test_measured_rates_and_where_data_contradict_the_model_come_back(tmp_path: 
 def test_what_is_not_known_comes_back_as_not_known(record: Record, tmp_path: Path) -> None:
     blank = dataclasses.replace(
         record.steps[0],
-        measured={},
-        predicted_miss_m=None,
+        axes={"z": dataclasses.replace(record.steps[0].axes["z"], measured={}, predicted_miss_m=None)},
         truth_margin_m=None,
         sections=(),
     )
@@ -373,12 +409,52 @@ def shorter(name: str) -> Callable[[Arrays], None]:
         (lambda arrays: arrays.update(predicted_miss_m=np.zeros((6, 3))), "shape"),
         (lambda arrays: arrays.update(predicted_miss_m=np.asfortranarray(arrays["predicted_miss_m"])), "shape"),
         (lambda arrays: arrays.update({name: values[:0] for name, values in arrays.items() if name != "json"}), "rows"),
+        (lambda arrays: arrays.update(impulse_y_m_s=np.zeros(6)), "in a plane, and it has impulse_y_m_s.npy"),
+        (result(lateral_start=[0.0, 0.0]), "start_y_m is known in a plane"),
     ],
 )
 def test_what_does_not_fit_together(
     change: Callable[[Arrays], None], part: str, content: bytes, tmp_path: Path
 ) -> None:
     assert part in refused(remade(content, change), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "part"),
+    [
+        (lambda arrays: arrays.pop("impulse_y_m_s"), "in space, and it has no impulse_y_m_s.npy"),
+        (lambda arrays: arrays.pop("measured_angle_y_rad"), "in space, and it has no measured_angle_y_rad.npy"),
+        (lambda arrays: [arrays.pop(name) for name in [*arrays] if "_y_" in name], "it has no impulse_y_m_s.npy"),
+        (lambda arrays: arrays["json"]["result"].pop("lateral_miss"), "miss_y_m is unknown in space"),
+        (result(lateral_start=[1.0]), "wrong start"),
+        (result(lateral_miss=[1e300, 1.0]), "miss_y_m must be"),
+        (put("true_angle_y_rad", 0, math.nan), "true_angle_y_rad holds what is not a finite number"),
+        (put("vertex_v_m_s_y_m", 0, 1e300), "vertex_v_m_s_y_m holds 1e+300, more than 1e+60 in size"),
+        (put("vertex_y_offsets", 1, 0), "vertex_y_offsets does not rise"),
+        (put("vertex_y_offsets", 5, 2**63 - 1), "vertex_y_offsets does not run"),
+        (shorter("vertex_v_m_s_y_m"), "vertex_y_offsets does not run"),
+        (shorter("vertex_y_offsets"), "vertex_y_offsets has"),
+        (shorter("impulse_y_m_s"), "impulse_y_m_s has 5 rows, not 6"),
+        (cast("impulse_y_m_s", "<f4"), "holds float32"),
+        (lambda arrays: arrays.update(predicted_miss_y_m=np.zeros((6, 3))), "shape"),
+    ],
+)
+def test_members_of_y_that_do_not_fit(
+    change: Callable[[Arrays], None], part: str, spatial_content: bytes, tmp_path: Path
+) -> None:
+    assert part in refused(remade(spatial_content, change), tmp_path)
+
+
+def test_a_record_in_space_without_a_kind_of_sensor_has_no_measurement_of_it(
+    spatial_content: bytes, tmp_path: Path
+) -> None:
+    def without_rates(arrays: Arrays) -> None:
+        for name in ("rate_measured", "measured_rate_rad_s", "measured_rate_y_rad_s"):
+            del arrays[name]
+
+    (tmp_path / "x.npz").write_bytes(remade(spatial_content, without_rates))
+    steps = load_record(tmp_path / "x.npz").steps
+    assert all(set(axis.measured) <= {"angle", "range"} for step in steps for axis in step.axes.values())
 
 
 def test_contents_that_were_changed(content: bytes, tmp_path: Path) -> None:
