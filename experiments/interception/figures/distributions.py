@@ -26,6 +26,9 @@ _LEVELS = np.linspace(0.15, 0.85, 29)
 _INSIDE = 0.05, 0.95
 """Horizontal range of curve numbers, as shares of the axes."""
 
+RADIUS_LOOK: dict[str, Any] = {"color": INK, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 0.9}
+"""Line of the radius of the body."""
+
 _LOGARITHMIC_FROM = 30.0
 _LEAST_SHOWN = 0.01
 """Quantile at which a logarithmic axis starts: misses can be arbitrarily small."""
@@ -79,11 +82,10 @@ def draw_radius(axes: Axes, radius_m: float | None) -> list[Line2D]:
         return []
     low, high = axes.get_xlim()
     inside = low <= radius_m <= high
-    look: dict[str, Any] = {"color": INK, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 0.9}
     if inside:
-        axes.axvline(radius_m, zorder=2.5, label="_radius", **look)
+        axes.axvline(radius_m, zorder=2.5, label="_radius", **RADIUS_LOOK)
     where = "a smaller miss is a hit" if inside else "beyond the axis"
-    return [Line2D([], [], label=f"body radius, {radius_m:g} m: {where}", **look)]
+    return [Line2D([], [], label=f"body radius, {radius_m:g} m: {where}", **RADIUS_LOOK)]
 
 
 def axis_limit(samples: Sequence[Floats]) -> float:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from time import perf_counter
+
+from matplotlib.figure import Figure
 
 from experiments.common.output import Cell, hit_key, output_of, to_csv, to_json
 from experiments.common.screen import (
@@ -20,6 +23,7 @@ from experiments.common.screen import (
 from experiments.interception.choices import chosen_strategies, study_scenario
 from experiments.interception.command import Compare
 from experiments.interception.comparison import Comparison, Flight, flights, gather, summary
+from experiments.interception.figures.b_plane import B_PLANE, cloud, draw_b_plane
 from experiments.interception.figures.comparison import draw_comparison
 from experiments.interception.runs.shared import Progress, simulate_in_threads, summary_head
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
@@ -35,8 +39,11 @@ def run(options: Compare) -> None:
     """Simulate the strategies, write the files and print the table."""
     scenario, notes = study_scenario(options)
     strategies = chosen_strategies(scenario, options.strategies)
+    b_planes = B_PLANE if scenario.is_spatial else {}
     with (
-        output_of(options, ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE))) as written,
+        output_of(
+            options, ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE, *b_planes.values()))
+        ) as written,
         progress_bar(options.quiet) as begin,
     ):
         say_warnings(scenario_warnings(scenario), options.quiet, notes)
@@ -57,8 +64,17 @@ def run(options: Compare) -> None:
         if written.wants("--csv"):
             written.save("results.csv", to_csv(COLUMNS, _rows(compared)), "--csv")
         if options.out is not None:
-            written.draw({FIGURE: lambda: draw_comparison(compared, scenario.radius_m)}, begin("figure"))
+            drawings = {FIGURE: lambda: draw_comparison(compared, scenario.radius_m)}
+            drawings |= {name: partial(_b_plane, scenario, compared, noise) for noise, name in b_planes.items()}
+            written.draw(drawings, begin("figure"))
     show(_parts(scenario, compared), options.quiet, stdout_taken=written.stdout_taken)
+
+
+def _b_plane(scenario: Scenario, compared: Sequence[Comparison], noise: NoiseKind) -> Figure:
+    """Draw the misses across the approach of each strategy; with game noise, those of the worst tie rule of a run."""
+    title = {NoiseKind.RANDOM: "random noise", NoiseKind.GAME: "game noise, worst tie rule"}[noise]
+    clouds = [cloud(f"{each.strategy}\n{title}", [*each.results.values()]) for each in compared if each.noise is noise]
+    return draw_b_plane(clouds, scenario.radius_m)
 
 
 def _simulate(

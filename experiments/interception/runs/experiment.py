@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from time import perf_counter
+
+from matplotlib.figure import Figure
 
 from experiments.common.output import hit_key, outcome_columns, output_of, to_csv, to_json
 from experiments.common.screen import (
@@ -20,6 +23,7 @@ from experiments.common.screen import (
 from experiments.interception.choices import own_strategy, scenario_with
 from experiments.interception.command import Experiment
 from experiments.interception.curves import Curve, curve_scenarios
+from experiments.interception.figures.b_plane import B_PLANE, cloud, draw_b_plane
 from experiments.interception.figures.distributions import draw_distributions
 from experiments.interception.published import MANY, PRINTED_SINGLE_RUN, SINGLE
 from experiments.interception.runs.shared import (
@@ -31,6 +35,7 @@ from experiments.interception.runs.shared import (
 )
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from experiments.interception.study import QUANTILES, SetCounts, hit_text, set_counts, set_warnings
+from guidance import NoiseKind
 from infoset import Recovery
 from sim import Outcome, Scenario
 from sim.statistics import shown_quantiles
@@ -42,8 +47,11 @@ def run(options: Experiment) -> None:
     """Simulate the curves, write the files and print the table."""
     scenario = scenario_with(options)
     own = own_strategy(options.strategy)
+    b_planes = B_PLANE if scenario.is_spatial else {}
     with (
-        output_of(options, ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE))) as written,
+        output_of(
+            options, ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE, *b_planes.values()))
+        ) as written,
         progress_bar(options.quiet) as begin,
     ):
         say_warnings(scenario_warnings(scenario), options.quiet)
@@ -76,8 +84,20 @@ def run(options: Experiment) -> None:
         if written.wants("--csv"):
             written.save("results.csv", _csv(curves), "--csv")
         if options.out is not None:
-            written.draw({FIGURE: lambda: draw_distributions(curves, radius_m=scenario.radius_m)}, begin("figure"))
+            drawings = {FIGURE: lambda: draw_distributions(curves, radius_m=scenario.radius_m)}
+            drawings |= {name: partial(_b_plane, scenario, curves, noise) for noise, name in b_planes.items()}
+            written.draw(drawings, begin("figure"))
     show(_parts(scenario, curves), options.quiet, stdout_taken=written.stdout_taken)
+
+
+def _b_plane(scenario: Scenario, curves: Sequence[Curve], noise: NoiseKind) -> Figure:
+    """Draw the misses across the approach of the curves with one noise."""
+    clouds = [
+        cloud(f"{noise.value} noise, {'with' if curve.range_meter else 'no'} range meter", [curve.results])
+        for curve in curves
+        if curve.noise is noise
+    ]
+    return draw_b_plane(clouds, scenario.radius_m)
 
 
 def _key(curve: Curve) -> dict[str, int | str | bool]:
