@@ -79,9 +79,9 @@ def locate_end(
     """
     run(living, tape, errors, laws, room.replays)
     keep_living(room, tape.events, row)
-    end, died, overlap = dead.label, dead.died, dead.overlap
+    end, died, overlap, emptied = dead.label, dead.died, dead.overlap, dead.emptied
     weight_dead = overlap
-    weight_living = room.living_overlaps[died]
+    weight_living = room.living_overlaps[emptied, died]
     side = 0
     before = 0.0
     for probes in range(MOST_PROBES):
@@ -97,17 +97,17 @@ def locate_end(
             least = 0.5 * resolution / width
             fraction = min(max(-weight_dead / (weight_living - weight_dead), least), 1.0 - least)
         label = end + fraction * (living - end)
-        probe_died, probe_overlap = run(label, tape, errors, laws, room.replays)
+        probe_died, probe_overlap, probe_emptied = run(label, tape, errors, laws, room.replays)
         if probe_died == ALIVE:
             living = label
             keep_living(room, tape.events, row)
-            weight_living = room.living_overlaps[died]
+            weight_living = room.living_overlaps[emptied, died]
             weight_dead = 0.5 * weight_dead if side == 1 else overlap
             side = 1
         else:
-            end, died, overlap = label, probe_died, probe_overlap
+            end, died, overlap, emptied = label, probe_died, probe_overlap, probe_emptied
             weight_dead = overlap
-            weight_living = (0.5 if side == -1 else 1.0) * room.living_overlaps[died]
+            weight_living = (0.5 if side == -1 else 1.0) * room.living_overlaps[emptied, died]
             side = -1
     return end, living
 
@@ -246,7 +246,7 @@ def locate_living(
     for s in range(stored):
         if limit_below < labels[b, s] < limit_above:
             new = known[end]
-            new.label, new.overlap = labels[b, s], sections.overlaps[b, s]
+            new.label, new.overlap, new.emptied = labels[b, s], sections.overlaps[b, s], sections.emptied[b, s]
             new.died = ALIVE if alive[b, s] else sections.died[b, s]
             if alive[b, s]:
                 first = first if last > 0 else end
@@ -360,7 +360,7 @@ def refine_all(
                 row = LOWER if s == 0 else UPPER
                 died[b, s], overlaps[b, s] = ALIVE, 0.0
             else:
-                died[b, s], overlaps[b, s] = run(label, tape, errors, laws, room.replays)
+                died[b, s], overlaps[b, s], sections.emptied[b, s] = run(label, tape, errors, laws, room.replays)
             alive[b, s] = died[b, s] == ALIVE
             if alive[b, s]:
                 for channel in range(laws.shape[0]):

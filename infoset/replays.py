@@ -41,8 +41,8 @@ Records = np.recarray[tuple[int], np.dtype[np.record]]
 Record = Any
 """One of the records: a label that was replayed, or a window."""
 
-OUTCOME = [("died", np.int64), ("overlap", np.float64)]
-"""Event at which a label became empty, or ALIVE, and its overlap with the band there, m."""
+OUTCOME = [("died", np.int64), ("overlap", np.float64), ("emptied", np.int64)]
+"""Event at which a label became empty, or ALIVE, its overlap with the band there, m, and along which axis."""
 PROBED = np.dtype([("label", np.float64), *OUTCOME])
 """A replayed label, m."""
 WINDOW = np.dtype([("near", np.float64), ("far", np.float64), *OUTCOME])
@@ -82,7 +82,7 @@ class Workspace(NamedTuple):
     ----------
     replays : ReplayRoom
         Arrays of the replays, with the sections `PROBE`, `LOWER` and `UPPER`.
-    living_overlaps : ndarray, shape (E,)
+    living_overlaps : ndarray, shape (C, E)
         Overlaps of the last replay of a living label, m.
     known : recarray of PROBED, shape (K,)
         Replayed labels.
@@ -117,7 +117,7 @@ def workspace(channels: int, events: int, slots: int) -> Workspace:
     """Allocate the arrays for replays of `events` events and a search over `slots` stored labels."""
     return Workspace(
         replay_room(channels, events),
-        living_overlaps=np.empty(events),
+        living_overlaps=np.empty((channels, events)),
         known=np.recarray(slots + 2, PROBED),
         four=np.recarray(4, PROBED),
         latest=np.empty((2, 4)),
@@ -126,12 +126,23 @@ def workspace(channels: int, events: int, slots: int) -> Workspace:
 
 
 @allocation_free
-def run(label: float, tape: Tape, errors: Floats | None, laws: Floats, room: ReplayRoom) -> tuple[int, float]:
-    """Replay a label along all axes; return the event at which it became empty, or ALIVE, and the overlap there, or 0.
+def run(label: float, tape: Tape, errors: Floats | None, laws: Floats, room: ReplayRoom) -> tuple[int, float, int]:
+    """Replay a label along all axes.
 
+    Returns
+    -------
+    died : int
+        Event at which it became empty, or ALIVE.
+    overlap : float
+        Overlap with the band there, m, or zero.
+    emptied : int
+        Axis of that overlap.
+
+    Notes
+    -----
     A label becomes empty with the first of its axes. If several become empty at one event, the least overlap counts.
     """
-    died, overlap = ALIVE, 0.0
+    died, overlap, emptied = ALIVE, 0.0, 0
     kinds, values, applies, events, nearest, farthest = tape
     for channel in range(laws.shape[0]):
         # Later events of a label that is empty along one axis do not matter.
@@ -142,9 +153,10 @@ def run(label: float, tape: Tape, errors: Floats | None, laws: Floats, room: Rep
         )
         if died_here != ALIVE:
             overlap_here = room.overlaps[channel, died_here]
-            overlap = min(overlap, overlap_here) if died_here == died else overlap_here
+            if died_here != died or overlap_here < overlap:
+                overlap, emptied = overlap_here, channel
             died = died_here
-    return died, overlap
+    return died, overlap, emptied
 
 
 @allocation_free
@@ -152,8 +164,8 @@ def probe(
     known: Records, i: int, label: float, tape: Tape, errors: Floats | None, laws: Floats, room: ReplayRoom
 ) -> bool:
     """Replay a label and write it to record `i`; return whether it lives."""
-    died, overlap = run(label, tape, errors, laws, room)
-    known[i].label, known[i].died, known[i].overlap = label, died, overlap
+    died, overlap, emptied = run(label, tape, errors, laws, room)
+    known[i].label, known[i].died, known[i].overlap, known[i].emptied = label, died, overlap, emptied
     return died == ALIVE
 
 
@@ -171,11 +183,9 @@ def keep_living(room: Workspace, events: int, row: int) -> None:
     """Copy sections and overlaps of the last replay to those of the living label."""
     keep_section(room.replays, row)
     overlaps = room.replays.overlaps
-    for event in range(events):
-        least = overlaps[0, event]
-        for channel in range(1, overlaps.shape[0]):
-            least = min(least, overlaps[channel, event])
-        room.living_overlaps[event] = least
+    for channel in range(overlaps.shape[0]):
+        for event in range(events):
+            room.living_overlaps[channel, event] = overlaps[channel, event]
 
 
 @allocation_free

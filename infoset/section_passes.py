@@ -55,8 +55,10 @@ class Sections(NamedTuple):
     died : ndarray of int, shape (B, S)
         Number of the event that made a section empty, or ALIVE.
     overlaps : ndarray, shape (B, S)
-        Overlap of an empty section with the band that made it empty, m: negative. The lesser one if several became
+        Overlap of an empty section with the band that made it empty, m: negative. The least one if several became
         empty at that event.
+    emptied : ndarray of int, shape (B, S)
+        Axis of the section with that overlap.
     origins, rings, marks : ndarray
         The polygons, stored as in `chains`: slot s of engagement b is row (c B + b) S + s for axis c.
     summaries : ndarray, shape (C, B, S, columns)
@@ -70,6 +72,7 @@ class Sections(NamedTuple):
     living: Flags
     died: Integers
     overlaps: Floats
+    emptied: Integers
     origins: Floats
     rings: Floats
     marks: Integers
@@ -87,6 +90,7 @@ def room_for_sections(channels: int, labels: Floats, used: Integers) -> Sections
         living=np.zeros(shape, dtype=bool),
         died=np.full(shape, ALIVE, dtype=np.int64),
         overlaps=np.zeros(shape),
+        emptied=np.zeros(shape, dtype=np.int64),
         origins=origins,
         rings=rings,
         marks=marks,
@@ -124,10 +128,11 @@ def is_cut(sections: Sections, channel: int, event: int, b: int, s: int) -> bool
 
 
 @inlined
-def bury(sections: Sections, event: int, b: int, s: int, overlap: float) -> int:
+def bury(sections: Sections, channel: int, event: int, b: int, s: int, overlap: float) -> int:
     """Note that an event has made a section empty; return 1 if the label lived until now, else 0."""
     lived = sections.living[b, s]
-    sections.overlaps[b, s] = overlap if lived else min(overlap, sections.overlaps[b, s])
+    if lived or overlap < sections.overlaps[b, s]:
+        sections.overlaps[b, s], sections.emptied[b, s] = overlap, channel
     sections.living[b, s] = False
     sections.died[b, s] = event
     return 1 if lived else 0
@@ -201,7 +206,7 @@ def step_all(
                     origins, rings, marks, n, labels[b, s], elapsed, alpha[channel, b], across, law
                 )
                 if not survives:
-                    deaths += bury(sections, event, b, s, overlap)
+                    deaths += bury(sections, channel, event, b, s, overlap)
                 if not living[b, s]:
                     continue
             if measured[b] or stale[b]:
@@ -271,7 +276,7 @@ def measure_rate_all(
                     points,
                 )
                 if not survives:
-                    deaths += bury(sections, event, b, s, overlap)
+                    deaths += bury(sections, channel, event, b, s, overlap)
                 if living[b, s]:
                     summarise_section(origins, rings, marks, n, label, elapsed, law, sections.summaries, b, s)
     return deaths
