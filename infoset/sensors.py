@@ -233,11 +233,18 @@ class AngleSensor(Sensor):
     def axis(self, name: str) -> AngleSensor:
         """Return the sensor of one plane angle, "y" or "z"; an error bound of zero becomes negligible."""
         at_nominal, at_zero = self.error_at_nominal_range_rad, self.error_at_zero_range_rad
-        if name == "y" and self.error_at_nominal_range_y_rad is not None:
-            at_nominal = max(self.error_at_nominal_range_y_rad, NEGLIGIBLE_ERROR_RAD)
-        if name == "y" and self.error_at_zero_range_y_rad is not None:
-            at_zero = max(self.error_at_zero_range_y_rad, NEGLIGIBLE_ERROR_RAD)
+        if name == "y":
+            at_nominal, at_zero = (max(bound, NEGLIGIBLE_ERROR_RAD) for bound in self._bounds_of_y)
         return AngleSensor(self.period_s, at_nominal, at_zero, self.nominal_range_m)
+
+    @property
+    def _bounds_of_y(self) -> tuple[float, float]:
+        """The bounds of the angle of the y axis at the nominal range and at range zero, rad; they may be zero."""
+        at_nominal, at_zero = self.error_at_nominal_range_y_rad, self.error_at_zero_range_y_rad
+        return (
+            self.error_at_nominal_range_rad if at_nominal is None else at_nominal,
+            self.error_at_zero_range_rad if at_zero is None else at_zero,
+        )
 
     @property
     def error_slope_rad_per_m(self) -> float:
@@ -259,7 +266,8 @@ class AngleSensor(Sensor):
         if self.error_at_nominal_range_y_rad is None and self.error_at_zero_range_y_rad is None:
             return self.error_bound(range_m)
         y, z = np.broadcast_to(range_m, (2, range_m.shape[-1]))
-        return np.stack([self.axis("y").error_bound(y), self.axis("z").error_bound(z)])
+        at_nominal, at_zero = self._bounds_of_y
+        return np.stack([at_zero + (at_nominal - at_zero) / self.nominal_range_m * y, self.error_bound(z)])
 
     def plane_angles(self, measured: Floats) -> Floats:
         """Return the angles atan2(y, x) and atan2(z, x) of measured angles, rad, shape (..., B)."""
@@ -304,7 +312,7 @@ class AngleSensor(Sensor):
     def error(self, sight: Geometry, measured: Floats) -> Floats:
         """Return the error of measured angles in units of the bound."""
         if self.convention is not Convention.CONE:
-            return super().error(sight, measured)
+            return (measured - self.true_value(sight)) / np.maximum(self.bound(sight), NEGLIGIBLE_ERROR_RAD)
         (a, b, c), (x, y, z) = _direction(sight.alpha_rad), _direction(measured)
         # The vector product of the true and the measured direction; their sum of products is the cosine.
         p, q, r = b * z - c * y, c * x - a * z, a * y - b * x

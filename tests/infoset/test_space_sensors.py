@@ -250,11 +250,12 @@ def test_bounds_that_differ_by_axis() -> None:
 def test_an_axis_without_error_is_measured_exactly(kind: Any, right: float, up: float) -> None:
     assume(kind[0] is not Convention.CONE and kind[1] is ErrorShape.BOX)
     one = replace(sensor(kind), error_at_nominal_range_y_rad=0.0, error_at_zero_range_y_rad=0.0)
-    place = Place(2e6, 3e3, -4e3)
-    measured = one.measured(place, np.array([[right], [up]]))
-    assert measured[0, 0] == one.true_value(place)[0, 0]
-    assert np.array_equal(one.nearest(place, place.alpha_rad + 1e-3)[0], one.true_value(place)[0])
-    assert one.error(place, measured)[0, 0] == 0.0
+    for place in (Place(2e6, 3e3, -4e3), Place(2e6, 0.0, 0.0)):
+        measured = one.measured(place, np.array([[right], [up]]))
+        assert measured[0, 0] == one.true_value(place)[0, 0]
+        assert np.array_equal(one.nearest(place, place.alpha_rad + 1e-3)[0], one.true_value(place)[0])
+        assert one.error(place, measured)[0, 0] == 0.0
+        assert one.error(place, measured + 1e-12)[0, 0] > 1e40
 
 
 def test_range_and_rate_in_space() -> None:
