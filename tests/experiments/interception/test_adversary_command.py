@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,12 @@ import pytest
 from experiments.common.screen import number
 from experiments.interception.choices import with_model
 from experiments.interception.record_file import load_record
-from experiments.interception.scenario_file import load_scenario, scenario_hash
-from infoset import Model
+from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
+from infoset import ErrorShape, Model
+from sim import Scenario
 from sim.adversary import find_worst
 from tests.experiments.command_line import Command
+from tests.space import in_space
 
 KEYS = [
     "version",
@@ -99,6 +102,28 @@ def test_the_table_says_what_was_found_and_how(infoset: Command, tmp_path: Path)
     for part in (*lines, "greater misses may exist"):
         assert part in out
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_worst_in_space_as_json_table_and_record(infoset: Command, brief: Scenario, tmp_path: Path) -> None:
+    file = tmp_path / "space.toml"
+    file.write_text(scenario_to_toml(in_space(brief, error_shape=ErrorShape.DISC)))
+    code, out, _ = infoset("adversary", file, "--budget", BUDGET, "--record", "worst.npz", "--json", "worst.json")
+    assert code == 0
+    assert "initial y, z, x, km" in out
+    assert "initial V_y, V_z, V_x, km/s" in out
+    found = json.loads((tmp_path / "worst.json").read_text())
+    assert list(found) == KEYS
+    assert list(found["start"]) == ["y_m", "z_m", "x_m", "vy_m_s", "vz_m_s", "vx_m_s"]
+    record = load_record(tmp_path / "worst.npz")
+    result = record.result
+    assert float(result.miss_m[0]) == found["worst_miss_m"]
+    assert [*result.lateral_start[0].tolist(), *result.position_m[0].tolist(), *result.velocity_m_s[0].tolist()] == [
+        found["start"][name] for name in ("y_m", "vy_m_s", "z_m", "x_m", "vz_m_s", "vx_m_s")
+    ]
+    sensor = record.scenario.set_model.angle_sensor
+    for step in record.steps:
+        errors = [axis.measured["angle"] - axis.true_angle_rad for axis in step.axes.values()]
+        assert math.hypot(*errors) <= sensor.error_bound(step.true_range_m) * (1.0 + 1e-9)
 
 
 def test_both_greatest_misses_are_those_of_bound(infoset: Command) -> None:

@@ -117,7 +117,7 @@ def test_bound_in_space(shape: str, infoset: Infoset, short: Scenario, tmp_path:
     spatial = in_space(short, error_shape=ErrorShape(shape))
     file = tmp_path / "space.toml"
     file.write_text(scenario_to_toml(spatial))
-    options = ("--strategies", "symmetric-miss", "--budget", 0, "--model", "guaranteed", "--out", tmp_path / "results")
+    options = ("--strategies", "symmetric-miss", "--budget", 4, "--model", "guaranteed", "--out", tmp_path / "results")
     code, out, _ = infoset(file, *options)
     assert code == 0
     found = json.loads((tmp_path / "results" / "results.json").read_text())
@@ -136,6 +136,9 @@ def test_bound_in_space(shape: str, infoset: Infoset, short: Scenario, tmp_path:
         assert np.hypot(flight["miss_y_m"], flight["miss_z_m"]) == pytest.approx(flight["miss_m"], rel=1e-3)
         assert max(flight["miss_m"]) >= flight["bound_m"] * (1.0 - 1e-4)
         assert all(flight["truth_kept"])
+    (strategy,) = found["strategies"]
+    assert strategy["worst_found_m"] == max(strategy["worst_of_pairs_m"], strategy["worst_of_search_m"])
+    assert strategy["worst_found_m"] <= strategy["guaranteed_m"]
     axes = "one axis" if shape == "disc" else "both axes"
     assert f"errors of the angles in a {shape}: the states of a pair differ along {axes}" in out
     for axis in ("y", "z"):
