@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from guidance import Strategy, Thruster, TieRule
 from infoset import AngleSensor, InitialSet, Model, RateSensor, SetModel, StateBox
 from infoset.model import Interval
+from infoset.sensors import Convention
 from sim import Body, Results, Scenario, Target
 from sim.draws import Draws, corners, greatest_number_of_steps
 from sim.engagement import Engagements, Step
@@ -48,8 +49,12 @@ def engagement(
     *,
     error: float = 0.1,
     speed_error: float = 1e-3,
+    convention: Convention | None = None,
 ) -> Scenario:
-    """An engagement whose numbers are all in proportion to an angle, a range, a speed and a step."""
+    """An engagement whose numbers are all in proportion to an angle, a range, a speed and a step.
+
+    With a convention of its two angles it is in space.
+    """
     slope = math.tan(angle_rad)
     z, v = range_m * slope, 0.2 * speed_m_s * slope
     bounds = StateBox(
@@ -59,6 +64,12 @@ def engagement(
         (-speed_m_s * (1.0 + speed_error), -speed_m_s * (1.0 - speed_error)),
     )
     sensor = AngleSensor(step_s, error * angle_rad, 1.5 * error * angle_rad, range_m)
+    thruster, disturbance = Thruster(10.0 * v, 1e-3 * v, 0.2 * v), 0.01 * slope * speed_m_s**2 / range_m
+    along_y = None
+    if convention is not None:
+        bounds = replace(bounds, y_m=(-0.6 * z, 0.9 * z), vy_m_s=(-0.8 * v, v))
+        sensor, thruster = replace(sensor, convention=convention), replace(thruster, pointing_error_rad=0.01)
+        along_y = 0.5 * disturbance
     guaranteed = model is Model.GUARANTEED
     return Scenario(
         "stress",
@@ -71,15 +82,16 @@ def engagement(
             step_s,
             bounds,
             sensor,
-            0.01 * slope * speed_m_s**2 / range_m,
+            disturbance,
             0.02 * range_m,
             sections,
             min(5, sections),
             InitialSet.BOX if guaranteed else InitialSet.RECTANGLE,
             model,
+            disturbance_y_m_s2=along_y,
         ),
         None,
-        Thruster(10.0 * v, 1e-3 * v, 0.2 * v),
+        thruster,
     )
 
 
@@ -89,19 +101,24 @@ def numbers(scenario: Scenario, seed: int, batch: int = 3) -> Draws:
     steps = greatest_number_of_steps(scenario)
     least, greatest = corners(scenario.dispersion)
 
-    def uniform() -> Floats:
-        return np.clip(generator.uniform(-2.0, 2.0, (batch, steps)), -1.0, 1.0)
+    shape = (2, batch, steps) if scenario.is_spatial else (batch, steps)
 
-    states = least + (greatest - least) * generator.uniform(size=(batch, 4))
-    errors, tie = {name: uniform() for name in ("angle", "range")}, uniform()
+    def uniform(shape: tuple[int, ...] = shape) -> Floats:
+        return np.clip(generator.uniform(-2.0, 2.0, shape), -1.0, 1.0)
+
+    states = least + (greatest - least) * generator.uniform(size=(batch, len(least)))
+    errors, tie = {"angle": uniform(), "range": uniform((batch, steps))}, uniform()
+    if scenario.set_model.angle_sensor.is_disc:
+        errors["angle"] /= np.maximum(1.0, np.hypot(*errors["angle"]))
     if scenario.rate_sensor is not None:
         errors["rate"] = uniform()
     return Draws(
-        states[:, :2],
-        states[:, 2:],
+        states[:, : len(least) // 2],
+        states[:, len(least) // 2 :],
         errors=errors,
         tie=tie,
         target=uniform() if scenario.target is not None else None,
+        pointing=uniform((batch, steps)) if scenario.thruster.pointing_error_rad > 0.0 else None,
     )
 
 
@@ -134,13 +151,16 @@ def turned(interval: Interval) -> Interval:
 
 def mirrored(scenario: Scenario, draws: Draws) -> tuple[Scenario, Draws]:
     def across(box: StateBox) -> StateBox:
-        return replace(box, z_m=turned(box.z_m), vz_m_s=turned(box.vz_m_s))
+        mirror = replace(box, z_m=turned(box.z_m), vz_m_s=turned(box.vz_m_s))
+        if box.y_m is None or box.vy_m_s is None:
+            return mirror
+        return replace(mirror, y_m=turned(box.y_m), vy_m_s=turned(box.vy_m_s))
 
     swapped = {TieRule.UPPER: TieRule.LOWER, TieRule.LOWER: TieRule.UPPER}
-    sun, flip = scenario.sun, np.array([-1.0, 1.0])
+    sun, flip = scenario.sun, np.array([-1.0] * len(scenario.set_model.axes) + [1.0])
     image = replace(
         scenario,
-        sun=None if sun is None else replace(sun, direction_rad=-sun.direction_rad),
+        sun=None if sun is None else replace(sun, direction_rad=-sun.direction_rad, elevation_rad=-sun.elevation_rad),
         dispersion=across(scenario.dispersion),
         set_model=replace(scenario.set_model, bounds=across(scenario.set_model.bounds)),
         tie=swapped.get(scenario.tie, scenario.tie),
@@ -160,11 +180,12 @@ def scaled(scenario: Scenario, draws: Draws, length: float, time: float) -> tupl
     speed, acceleration = length / time, length / time**2
 
     def box(given_box: StateBox) -> StateBox:
-        ends = {
-            name: (unit * low, unit * high)
-            for (name, (low, high)), unit in zip(vars(given_box).items(), (length, length, speed, speed), strict=True)
-        }
+        units = {name: speed if name.endswith("_m_s") else length for name in vars(given_box)}
+        ends = {name: tuple(units[name] * end for end in ends) for name, ends in vars(given_box).items() if ends}
         return StateBox(**ends)
+
+    def in_units(acceleration_m_s2: float | None) -> float | None:
+        return None if acceleration_m_s2 is None else acceleration * acceleration_m_s2
 
     model, engine, sun, target = scenario.set_model, scenario.thruster, scenario.sun, scenario.target
     ranging, rating = scenario.range_sensor, scenario.rate_sensor
@@ -182,10 +203,14 @@ def scaled(scenario: Scenario, draws: Draws, length: float, time: float) -> tupl
                 sensor, period_s=time * sensor.period_s, nominal_range_m=length * sensor.nominal_range_m
             ),
             disturbance_m_s2=acceleration * model.disturbance_m_s2,
+            disturbance_y_m_s2=in_units(model.disturbance_y_m_s2),
             range_threshold_m=length * model.range_threshold_m,
         ),
-        thruster=Thruster(
-            speed * engine.budget_m_s, speed * engine.least_impulse_m_s, speed * engine.greatest_impulse_m_s
+        thruster=replace(
+            engine,
+            budget_m_s=speed * engine.budget_m_s,
+            least_impulse_m_s=speed * engine.least_impulse_m_s,
+            greatest_impulse_m_s=speed * engine.greatest_impulse_m_s,
         ),
         sun=None
         if sun is None
@@ -198,6 +223,11 @@ def scaled(scenario: Scenario, draws: Draws, length: float, time: float) -> tupl
         rate_sensor=None if rating is None else RateSensor(time * rating.period_s, rating.error_rad_s / time),
         target=None
         if target is None
-        else Target(target.manoeuvre, acceleration * target.acceleration_m_s2, time * target.switching_period_s),
+        else Target(
+            target.manoeuvre,
+            acceleration * target.acceleration_m_s2,
+            time * target.switching_period_s,
+            in_units(target.acceleration_y_m_s2),
+        ),
         body=None if scenario.body is None else Body(length * scenario.body.radius_m),
     ), replace(draws, position_m=length * draws.position_m, velocity_m_s=speed * draws.velocity_m_s)
