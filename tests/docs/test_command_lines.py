@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import itertools
 import re
 import shlex
 import subprocess
@@ -163,8 +164,9 @@ def test_the_quick_lines_run(page: Page, pages: list[Page], folder: Path) -> Non
     for other in pages[: [each.name for each in pages].index(page.name)]:
         there = quick_lines(other)
         shared = [line for line in lines if line in there]
-        if shared == there[: len(shared)]:  # the other page begins with them and tests them
-            lines = [line for line in lines if line not in there]
+        same = itertools.takewhile(lambda pair: pair[0] == pair[1], zip(shared, there, strict=False))
+        tested = [line for line, _ in same]  # the other page begins with them
+        lines = [line for line in lines if line not in tested]
     for line in lines:
         run(line, folder)
 
