@@ -305,6 +305,9 @@ class SetQueries:
         shape = () if len(self._channels) == 1 else (len(self._channels),)
         alphas = np.atleast_1d(real_array("alpha_rad", alpha_rad, shape)).tolist()
         omegas = np.atleast_1d(real_array("omega_rad_s", omega_rad_s, shape)).tolist()
+        for name, values in (("alpha_rad", alphas), ("omega_rad_s", omegas)):
+            for value in values:
+                NUMBER.need(name, value)
         section = self.section_at(label_m, engagement)
         x, e = section.range_m, section.closing_speed_m_s
         polygons = [polygon for polygon in (section.polygon_y, section.polygon) if polygon is not None]

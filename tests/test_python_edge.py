@@ -36,7 +36,9 @@ from guidance import (
 )
 from infoset import (
     AngleSensor,
+    Convention,
     ConvexPolygons,
+    ErrorShape,
     InformationSet,
     InitialSet,
     Model,
@@ -115,6 +117,23 @@ THRUSTER: dict[str, Any] = {
     "least_impulse_m_s": 0.25,
     "greatest_impulse_m_s": 7.5,
     "execution_error_relative": 0.0,
+    "pointing_error_rad": 0.0,
+}
+SPACE_BOX: dict[str, Any] = {**BOX, "y_m": (-2e3, 1e3), "vy_m_s": (-20.0, 10.0)}
+SPACE_SENSOR: dict[str, Any] = {
+    **SENSOR,
+    "error_at_nominal_range_y_rad": 1e-4,
+    "error_at_zero_range_y_rad": 2e-4,
+    "convention": Convention.GIMBAL,
+    "error_shape": ErrorShape.BOX,
+}
+SPACE_MODEL: dict[str, Any] = {
+    **MODEL,
+    "bounds": StateBox(**SPACE_BOX),
+    "angle_sensor": AngleSensor(**SPACE_SENSOR),
+    "disturbance_y_m_s2": 0.006,
+    "gravity_y_m_s2": 0.0,
+    "pointing_error_rad": 0.0,
 }
 SCENARIO: dict[str, Any] = {
     "name": "edge",
@@ -133,14 +152,19 @@ SCENARIO: dict[str, Any] = {
     "body": None,
 }
 SOUND: Mapping[Any, Mapping[str, Any]] = {
-    AngleSensor: SENSOR,
+    AngleSensor: SPACE_SENSOR,
     RangeSensor: {"period_s": 0.5, "relative_error": 0.05},
     RateSensor: {"period_s": 0.5, "error_rad_s": 1e-6},
-    StateBox: BOX,
-    SetModel: MODEL,
+    StateBox: SPACE_BOX,
+    SetModel: SPACE_MODEL,
     Thruster: THRUSTER,
-    Sun: {"gravitational_parameter_m3_s2": 1.3e20, "distance_m": 1.5e11, "direction_rad": 1.0},
-    Target: {"manoeuvre": Manoeuvre.BANG_BANG, "acceleration_m_s2": 0.1, "switching_period_s": 10.0},
+    Sun: {"gravitational_parameter_m3_s2": 1.3e20, "distance_m": 1.5e11, "direction_rad": 1.0, "elevation_rad": 0.5},
+    Target: {
+        "manoeuvre": Manoeuvre.BANG_BANG,
+        "acceleration_m_s2": 0.1,
+        "switching_period_s": 10.0,
+        "acceleration_y_m_s2": 0.2,
+    },
     Body: {"radius_m": 80.0},
     Scenario: SCENARIO,
     QuantileName: {"quantity": "miss_m", "level": 0.9},
@@ -158,7 +182,18 @@ ZERO_IS_SOUND = {
     "least_impulse_m_s",
     "acceleration_m_s2",
     "direction_rad",
+    "elevation_rad",
+    "pointing_error_rad",
 }
+NONE_IS_SOUND = {
+    "error_at_nominal_range_y_rad",
+    "error_at_zero_range_y_rad",
+    "error_shape",
+    "disturbance_y_m_s2",
+    "gravity_y_m_s2",
+    "acceleration_y_m_s2",
+}
+"""Values of y that may be left to those of z, of which zero is one."""
 FIELDS = [(kind, field) for kind, values in SOUND.items() for field in values]
 
 
@@ -183,6 +218,7 @@ def test_every_field_is_looked_at(kind: Any) -> None:
 @pytest.mark.parametrize(("kind", "field"), FIELDS, ids=lambda each: getattr(each, "__name__", each))
 def test_what_is_no_value_of_a_field(kind: Any, field: str) -> None:
     sound = SOUND[kind][field]
+    none = () if field in NONE_IS_SOUND else (None,)
     bad: list[Any]
     if isinstance(sound, tuple):
         bad = [None, 1.0, "ab", (), (sound[0],), (*sound, 1.0), sound[::-1]]
@@ -191,15 +227,15 @@ def test_what_is_no_value_of_a_field(kind: Any, field: str) -> None:
         bad = [None, 0, *NO_COUNTS]
     elif isinstance(sound, float):
         bad = [
-            None,
+            *none,
             *NO_NUMBERS,
-            *(() if field == "direction_rad" else (-1.0,)),
-            *(() if field in ZERO_IS_SOUND else (0.0,)),
+            *(() if field in ("direction_rad", "elevation_rad") else (-1.0,)),
+            *(() if field in ZERO_IS_SOUND | NONE_IS_SOUND else (0.0,)),
         ]
     elif isinstance(sound, str):
         bad = [None, 1.0, b"x"]
     else:  # an enumeration, another dataclass, or one that may be missing
-        bad = ["paper", 1.0, object, *([] if sound is None else [None])]
+        bad = ["paper", 1.0, object, *([] if sound is None else none)]
     for value in bad:
         refused(partial(kind, **{**SOUND[kind], field: value}), field)
 
@@ -567,8 +603,8 @@ NUMBERS = [
     for path, kind in NESTED
     for field, value in SOUND[kind].items()
     if isinstance(value, float | tuple)
-    and field not in ("gravity_m_s2", "gravity_speed_change")
-    and (kind, field) != (SetModel, "execution_error_relative")
+    and field not in ("gravity_m_s2", "gravity_y_m_s2", "gravity_speed_change")
+    and (kind, field) not in ((SetModel, "execution_error_relative"), (SetModel, "pointing_error_rad"))
 ]
 
 
@@ -579,8 +615,12 @@ def changed(owner: Any, path: tuple[str, ...], field: str, value: Any) -> Any:
 
 
 def agree(place: tuple[tuple[str, ...], str], first: float, second: float) -> bool:
-    """Give a field a value; whatever Python takes, a file takes. Return whether it was taken."""
-    scenario = load_scenario("asteroid-1997")
+    """Give a field a value; whatever Python takes, a file takes. Return whether it was taken in a plane or in space."""
+    plane, space = (_agree(load_scenario(f"asteroid-1997{end}"), place, first, second) for end in ("", "-space"))
+    return plane or space
+
+
+def _agree(scenario: Scenario, place: tuple[tuple[str, ...], str], first: float, second: float) -> bool:
     target = Target(Manoeuvre.CONSTANT, 0.001)
     whole = replace(scenario, rate_sensor=RateSensor(1.0, 1e-6), target=target, body=Body(80.0))
     path, field = place

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from experiments.pareto.file import COMPONENTS
 from guidance import NoiseKind, TieRule, strategy_names
 from infoset.model import InitialSet, Model, Recovery
+from infoset.sensors import Convention, ErrorShape
 from sim import Manoeuvre
 
 Draw = Callable[[st.SearchStrategy[float]], float]
@@ -59,6 +60,21 @@ def _text(value: object) -> str:
 
 
 @st.composite
+def _angles_in_space(draw: st.DrawFn, error: float) -> Values:
+    """Keys of an angle sensor in space."""
+    convention = draw(st.sampled_from(Convention))
+    shape = draw(st.none() | st.sampled_from(ErrorShape)) if convention is not Convention.CONE else None
+    is_disc = convention is Convention.CONE or shape is ErrorShape.DISC
+    along_y = None if is_disc else draw(st.none() | st.just(0.5 * error))
+    return {
+        "convention": convention.value,
+        "error_shape": shape and shape.value,
+        "error_at_nominal_range_y_rad": along_y,
+        "error_at_zero_range_y_rad": along_y,
+    }
+
+
+@st.composite
 def scenarios(draw: st.DrawFn) -> str:
     """Flights of 3 to 25 steps in a millisecond to a thousand seconds, at 1 m/s to 100 km/s, with every option."""
     speed, duration_s = draw(sizes(1e-3, 1e2)), draw(sizes(1e-3, 1e3))
@@ -73,6 +89,9 @@ def scenarios(draw: st.DrawFn) -> str:
         "vz_km_s": [-slow, slow],
         "vx_km_s": [-speed * (1.0 + part), -speed * (1.0 - part)],
     }
+    is_spatial = draw(st.booleans())
+    if is_spatial:
+        box |= {"y_km": [-across, 0.5 * across], "vy_km_s": [-slow, 0.5 * slow]}
     period_s, sun_km = step_s * draw(st.integers(1, 3)), range_km * draw(sizes(10.0, 1e4))
     impulse = slow * 1e3 * draw(sizes(1e-3, 10.0))
     optional = draw(st.lists(st.sampled_from(["sun", "range_sensor", "rate_sensor", "target", "body"]), unique=True))
@@ -81,6 +100,7 @@ def scenarios(draw: st.DrawFn) -> str:
             "gravitational_parameter_km3_s2": speed**2 * sun_km * draw(sizes(1e-6, 1e-2)),
             "distance_km": sun_km,
             "direction_deg": draw(angles(-360.0, 360.0)),
+            "elevation_deg": draw(angles(-90.0, 90.0)) if is_spatial else None,
         },
         "range_sensor": {"period_s": period_s, "relative_error": draw(sizes(1e-6, 0.9))},
         "rate_sensor": {"period_s": period_s, "error_rad_s": draw(sizes(1e-12, 1e-2))},
@@ -88,6 +108,7 @@ def scenarios(draw: st.DrawFn) -> str:
             "manoeuvre": switch.value,
             "acceleration_m_s2": draw(sizes(1e-9, 1.0)),
             "switching_period_s": step_s,
+            "acceleration_y_m_s2": draw(st.none() | sizes(1e-9, 1.0)) if is_spatial else None,
         },
         "body": {"radius_m": range_km * draw(sizes(1e-9, 1e2))},
     }
@@ -99,12 +120,14 @@ def scenarios(draw: st.DrawFn) -> str:
             "period_s": step_s,
             "error_at_nominal_range_rad": error,
             "error_at_zero_range_rad": min(error * slope, 0.9),
+            **(draw(_angles_in_space(error)) if is_spatial else {}),
         },
         "thruster": {
             "budget_m_s": impulse * draw(sizes(0.1, 1e3)),
             "least_impulse_m_s": impulse * draw(st.sampled_from([0.0, 0.1, 1.0])),
             "greatest_impulse_m_s": impulse,
             "execution_error_relative": draw(st.sampled_from([0.0, 0.1])),
+            "pointing_error_rad": draw(st.sampled_from([0.0, 0.01])) if is_spatial else None,
         },
         "guidance": {
             "step_s": step_s,
@@ -118,10 +141,12 @@ def scenarios(draw: st.DrawFn) -> str:
             "fewest_sections": draw(st.integers(1, sections)),
             "recovery": draw(st.sampled_from(Recovery)).value,
             "disturbance_m_s2": draw(st.just(0.0) | sizes(1e-9, 1.0)),
+            "disturbance_y_m_s2": draw(st.none() | sizes(1e-9, 1.0)) if is_spatial else None,
         },
         "noise": {"kind": draw(st.sampled_from(NoiseKind)).value, "tie": draw(st.sampled_from(TieRule)).value},
     }
-    return toml({"schema": 1, "name": "any"}, tables | {name: rare[name] for name in optional})
+    top = {"schema": 1, "name": "any", "description": draw(st.none() | st.just("One of many."))}
+    return toml(top, tables | {name: rare[name] for name in optional})
 
 
 @st.composite

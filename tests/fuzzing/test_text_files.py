@@ -6,18 +6,21 @@ import json
 import random
 import re
 import time
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, Phase, find, given, settings
 from hypothesis import strategies as st
 
 from experiments.cli import main
 from experiments.common.errors import InputError
 from experiments.common.file_kinds import LARGEST_FILE_BYTES
 from experiments.common.toml_file import MOST_PROBLEMS as MOST
+from experiments.common.toml_form import settable_keys
+from experiments.interception.scenario_tables import ScenarioTables
 
 from .documents import KINDS
 from .mutations import mutated_toml
@@ -162,6 +165,18 @@ def test_as_much_text_as_is_read_takes_under_two_seconds(name: str, tmp_path: Pa
     assert time.process_time() - begun < MOST_SECONDS
     assert message
     assert len(message) < 50_000
+
+
+@pytest.mark.parametrize("key", settable_keys(ScenarioTables))
+def test_some_sound_scenario_has_the_key(key: str) -> None:
+    table, _, name = key.rpartition(".")
+
+    def has_key(text: str) -> bool:
+        values = tomllib.loads(text)
+        return name in (values.get(table, {}) if table else values)
+
+    whatever = settings(max_examples=1000, derandomize=True, database=None, phases=[Phase.generate])
+    assert has_key(find(KINDS["scenario"][1], has_key, settings=whatever))
 
 
 def test_the_attacks_reach_every_reader() -> None:
