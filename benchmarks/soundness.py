@@ -4,6 +4,7 @@
     python -m benchmarks.soundness --engagements 200000 --hostile      # execution errors of 2 %, a manoeuvring target
     python -m benchmarks.soundness --engagements 200000 --random rate  # random scenarios, each with a rate sensor
     python -m benchmarks.soundness --engagements 100000 --random       # random scenarios without one
+    python -m benchmarks.soundness --engagements 200000 --space        # out of the plane, all conventions, Sun anywhere
 
 Counted are engagements whose true state left its section (by any amount), whose set was lost, whose true miss exceeded
 Phi, and those without a Phi. All counts must be zero; a warning ends the run. A batch has all kinds of noise, the true
@@ -26,13 +27,13 @@ from benchmarks.random_scenarios import random_scenario
 from experiments.interception.scenario_file import load_scenario
 from guidance import GameNoise, LineOfSight, MeasurementNoise, NoiseKind, RandomNoise, TieRule
 from guidance.pair_noise import middle
-from infoset import InformationSetView, InitialSet, Model
+from infoset import AngleSensor, Convention, ErrorShape, InformationSetView, InitialSet, Model, RateSensor
 from sim import Manoeuvre, Outcome, Scenario, Target
 from sim.draws import Draws, draw
 from sim.engagement import Engagements
 
 Floats = NDArray[np.float64]
-BATCH = 80
+BATCH, SPACE_BATCH = 80, 160
 KINDS = ("random", "game, upper", "game, lower", "game, alternate", "game, random", "extremal", "constant", "pair")
 
 
@@ -44,8 +45,9 @@ class BoundedPairNoise:
         """Measure the mean of both engagements of a pair."""
         measured = {}
         for name, sensor in sight.sensors.items():
-            true, bound = sensor.true_value(sight), sensor.bound(sight)
-            measured[name] = true.copy() if name == "range" else np.clip(middle(true), true - bound, true + bound)
+            true = sensor.true_value(sight)
+            wanted = sight.alpha_rad if name == "angle" else true
+            measured[name] = true.copy() if name == "range" else sensor.nearest(sight, middle(wanted))
         return measured
 
 
@@ -57,7 +59,7 @@ class MixedNoise:
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> dict[str, Floats]:
         """Measure with all kinds, and choose that of each engagement."""
-        kind = kind_of(sight.alpha_rad.size)
+        kind = kind_of(sight.range_m.size)
         measurements = [part.measure(sight, predicted) for part in self.parts]
         return {name: np.choose(kind, [measured[name] for measured in measurements]) for name in sight.sensors}
 
@@ -67,14 +69,19 @@ def kind_of(batch: int) -> NDArray[np.int64]:
     return np.arange(batch) // 2 % len(KINDS)
 
 
-def every_noise(draws: Draws) -> MixedNoise:
+def every_noise(draws: Draws, sensor: AngleSensor) -> MixedNoise:
     """Return the noise of a batch, with all kinds."""
     signs = np.where(draws.tie >= 0.0, 1.0, -1.0)
     # Half of the biases are at the bound, the others anywhere.
-    bias = np.where(np.arange(len(signs)) % 4 < 2, signs[:, 0], draws.tie[:, 0])
-    constant = np.broadcast_to(bias[:, None], signs.shape)
+    bias = np.where(np.arange(signs.shape[-2]) % 4 < 2, signs[..., 0], draws.tie[..., 0])
+    constant = np.broadcast_to(bias[..., None], signs.shape)
     extremal = {name: np.where(errors >= 0.0, 1.0, -1.0) for name, errors in draws.errors.items()}
-    constants = {name: errors[:, :1] + np.zeros_like(signs) for name, errors in extremal.items()}
+    constants = {name: errors[..., :1] + np.zeros_like(errors) for name, errors in extremal.items()}
+    if sensor.is_disc:
+        # The rim of the disc, half of the time along one of the axes, where plane angles are exceeded most.
+        along = np.abs(draws.tie[:1]) < 0.5
+        signs = np.where(along, signs * np.array([1.0, 0.0])[:, None, None], signs * (np.sqrt(0.5) * (1.0 - 1e-15)))
+        constant = constant / np.maximum(1.0, np.hypot(*constant) * (1.0 + 1e-15))
     return MixedNoise(
         (
             RandomNoise(draws.errors),
@@ -86,6 +93,38 @@ def every_noise(draws: Draws) -> MixedNoise:
     )
 
 
+def in_space(scenario: Scenario, number: int) -> Scenario:
+    """Return the scenario out of the plane: another y axis, convention, direction of the Sun for every number."""
+    random = np.random.default_rng(np.random.SeedSequence(entropy=21, spawn_key=(number,)))
+    model, sun = scenario.set_model, scenario.sun
+    convention = list(Convention)[number % len(Convention)]
+    sensor = model.angle_sensor
+    if random.uniform() < 0.25:  # a bound that rises with range
+        swapped = sensor.error_at_zero_range_rad, sensor.error_at_nominal_range_rad
+        sensor = replace(sensor, error_at_nominal_range_rad=swapped[0], error_at_zero_range_rad=swapped[1])
+    is_disc = convention is Convention.CONE or random.uniform() < 0.25
+    differ = not is_disc and random.uniform() < 0.5
+    sensor = replace(
+        sensor,
+        convention=convention,
+        error_shape=ErrorShape.DISC if is_disc else None,
+        error_at_nominal_range_y_rad=1.5 * sensor.error_at_nominal_range_rad if differ else None,
+        error_at_zero_range_y_rad=0.7 * sensor.error_at_zero_range_rad if differ else None,
+    )
+    box = model.bounds
+    widths = 10.0 ** random.uniform(-1.5, 0.5, 2)
+    bounds = replace(
+        box,
+        y_m=(-float(widths[0]) * 1e4, 1e4),
+        vy_m_s=(-100.0, float(widths[1]) * 100.0),
+    )
+    if sun is not None:
+        direction, height = random.uniform(-np.pi, np.pi), random.uniform(-1.0, 1.0)
+        sun = replace(sun, direction_rad=float(direction), elevation_rad=float(np.arcsin(height)))
+    known = replace(model, bounds=bounds, angle_sensor=sensor)
+    return replace(scenario, sun=sun, dispersion=bounds, set_model=known)
+
+
 def guaranteed(scenario: Scenario, hostile: bool) -> Scenario:
     """Return the scenario with the guaranteed model and starts anywhere in B x D."""
     model = replace(scenario.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
@@ -94,7 +133,9 @@ def guaranteed(scenario: Scenario, hostile: bool) -> Scenario:
     if not hostile:
         return scenario
     target = Target(Manoeuvre.WORST_CASE, model.disturbance_m_s2)
-    return replace(scenario, thruster=replace(scenario.thruster, execution_error_relative=0.02), target=target)
+    pointing = 0.02 if scenario.is_spatial else 0.0
+    engine = replace(scenario.thruster, execution_error_relative=0.02, pointing_error_rad=pointing)
+    return replace(scenario, thruster=engine, target=target)
 
 
 @dataclass(frozen=True)
@@ -120,7 +161,9 @@ def fly(scenario: Scenario, first: int, batch: int, seed: int) -> Count:
         manoeuvres = [manoeuvre for manoeuvre in Manoeuvre if manoeuvre is not Manoeuvre.NONE]
         target = replace(scenario.target, manoeuvre=manoeuvres[first // batch % len(manoeuvres)])
         scenario = replace(scenario, target=target)
-    flight = Engagements(scenario, draws, noise=every_noise(draws))
+    if draws.pointing is not None and first // batch % 2:
+        draws = replace(draws, pointing=np.where(draws.pointing >= 0.0, 1.0, -1.0))
+    flight = Engagements(scenario, draws, noise=every_noise(draws, scenario.set_model.angle_sensor))
     while flight.flying:
         flight.advance()
     results = flight.results(np.arange(first, first + batch))
@@ -149,6 +192,19 @@ def fly_batch(number: int, hostile: bool, seed: int) -> Count:
     return fly(chosen, number * BATCH, BATCH, seed)
 
 
+def fly_space_batch(number: int, hostile: bool, seed: int) -> Count:
+    """Simulate batch `number` out of the plane: some have a range meter, a comet or rates."""
+    scenario = load_scenario("comet-fast" if number % 32 == 7 else "asteroid-1997")
+    sensor = scenario.range_sensor if number // 8 % 2 else None
+    scenario = replace(scenario, rate_sensor=RateSensor(1.0, 5e-8) if number % 128 == 5 else None)
+    return fly(
+        guaranteed(in_space(replace(scenario, range_sensor=sensor), number), hostile),
+        number * SPACE_BATCH,
+        SPACE_BATCH,
+        seed,
+    )
+
+
 def fly_random_batch(number: int, rate_sensor: bool, seed: int) -> Count:
     """Simulate batch `number`, which has a random scenario."""
     return fly(random_scenario(seed * 1_000_000 + number, rate_sensor=rate_sensor), number * BATCH, BATCH, seed)
@@ -161,6 +217,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--hostile", action="store_true", help="execution errors of 2 %% and a manoeuvring target")
     parser.add_argument("--random", nargs="?", const="plain", choices=("plain", "rate"), help="random scenarios")
+    parser.add_argument("--space", action="store_true", help="out of the plane")
     parser.add_argument("--first", type=int, default=0, metavar="BATCH", help="number of the first batch")
     parser.add_argument("--workers", type=int, default=1)
     options = parser.parse_args()
@@ -168,9 +225,11 @@ def main() -> None:
     began = time.perf_counter()
     total = Count()
     with ThreadPoolExecutor(options.workers) as pool:
-        numbers = range(options.first, options.first - (-options.engagements // BATCH))
+        batch = SPACE_BATCH if options.space else BATCH
+        numbers = range(options.first, options.first - (-options.engagements // batch))
         if options.random is None:
-            jobs = [pool.submit(fly_batch, number, options.hostile, options.seed) for number in numbers]
+            fly_one_batch = fly_space_batch if options.space else fly_batch
+            jobs = [pool.submit(fly_one_batch, number, options.hostile, options.seed) for number in numbers]
         else:
             rate = options.random == "rate"
             jobs = [pool.submit(fly_random_batch, number, rate, options.seed) for number in numbers]
