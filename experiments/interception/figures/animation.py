@@ -15,10 +15,10 @@ from PIL import Image, ImageSequence
 
 from experiments.common.errors import InputError
 from experiments.common.figure_style import INK, new_figure, place_axes, plain, style
-from experiments.interception.figures.process import draw_predicted_miss, level_predicted_miss
-from experiments.interception.figures.sets import choose_sections, draw_step, extent_of, level_planes
+from experiments.interception.figures.process import draw_predicted_miss, level_predicted_miss, traces_of
+from experiments.interception.figures.sets import Plane, draw_plane, level_planes, planes_at
 from experiments.interception.record_titles import record_titles
-from sim import Record, StepRecord
+from sim import Record
 
 GIF, MP4 = ".gif", ".mp4"
 DURATION_S = 8.0
@@ -75,26 +75,28 @@ def animate(
     chosen = times[np.unique(np.linspace(0, len(times) - 1, count).round().astype(int))]
     fps = max(1, round(most_frames / DURATION_S))
     writer: AbstractMovieWriter = PillowWriter(fps=fps) if ending == GIF else FFMpegWriter(fps=fps)
-    width_mm, usual_px = (180.0, 640) if len(records) > 1 else (120.0, 425)
+    traces = traces_of(records)
+    in_space = any(record.scenario.is_spatial for record in records)
+    width_mm, usual_px = {1: (120.0, 425), 2: (180.0, 640)}.get(len(traces), (90.0 * len(traces), 320 * len(traces)))
     width = usual_px if width_px is None else width_px
     with style(), TemporaryDirectory() as folder:
         file = Path(folder) / f"animation{ending}"
-        figure = new_figure(height_mm=86.0 + _SECOND_MM, width_mm=width_mm)
-        above, below = place_axes(
-            figure, 2, len(records), margins_mm=(18.0, 5.0, 11.0, 8.0), gaps_mm=(8.0 if len(records) > 1 else 0.0, 15.0)
-        )
+        figure = new_figure(height_mm=86.0 + _SECOND_MM + 4.0 * in_space, width_mm=width_mm)
+        gap = 0.0 if len(traces) == 1 else 16.0 if in_space else 8.0
+        margins = (18.0, 5.0, 11.0, 8.0 + 4.0 * in_space)
+        above, below = place_axes(figure, 2, len(traces), margins_mm=margins, gaps_mm=(gap, 15.0))
         titles = [plain(each) for each in record_titles(records)]
-        for axes, record in zip(below, records, strict=True):
-            draw_predicted_miss(axes, record)
+        for axes, trace in zip(below, traces, strict=True):
+            draw_predicted_miss(axes, trace)
             axes.set_xlabel("time t, s")
-            axes.set_ylabel("predicted miss π, m" if axes is below[0] else "")
-            axes.tick_params(labelleft=axes is below[0])
-        level_predicted_miss(below, records)
+            along = f" along {trace[1]}" if in_space else ""
+            axes.set_ylabel(f"predicted miss π{along}, m" if in_space or axes is below[0] else "")
+            axes.tick_params(labelleft=in_space or axes is below[0])
+        level_predicted_miss(below, traces)
         lines = [axes.axvline(float(chosen[0]), color=INK, linewidth=1.0) for axes in below]
         with writer.saving(figure, str(file), width / figure.get_figwidth()):
             for index, time in enumerate(chosen.tolist()):
-                steps = [min(record.steps, key=lambda step: abs(step.time_s - time)) for record in records]
-                _draw_planes(above, steps, titles)
+                _draw_planes(above, planes_at(records, titles, time, _SECTIONS))
                 for line in lines:
                     line.set_xdata([time, time])
                 writer.grab_frame()
@@ -113,15 +115,17 @@ def _few_colours(file: Path) -> bytes:
     return content.getvalue()
 
 
-def _draw_planes(row: Sequence[Axes], steps: Sequence[StepRecord], titles: Sequence[str]) -> None:
+def _draw_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
     """Draw the sets of one time."""
     for axes in row:
         axes.clear()
-    shown = [choose_sections(step.sections, _SECTIONS) for step in steps]
-    level_planes(row, [extent_of(step, each) for step, each in zip(steps, shown, strict=True)])
-    for axes, step, each, title in zip(row, steps, shown, titles, strict=True):
-        draw_step(axes, step, each)
-        axes.set_title(f"{title}, t = {step.time_s:.1f} s")
-        axes.set_xlabel("line-of-sight rate ω, µrad/s")
-        axes.set_ylabel("angle α, mrad" if axes is row[0] else "")
-        axes.tick_params(labelleft=axes is row[0])
+    level_planes(row, planes)
+    for axes, plane in zip(row, planes, strict=True):
+        draw_plane(axes, plane)
+        in_space = plane.record.scenario.is_spatial
+        along = f" along {plane.axis}" if in_space else ""
+        title = f"{plane.title}\nalong {plane.axis}" if in_space else plane.title
+        axes.set_title(f"{title}, t = {plane.step.time_s:.1f} s")
+        axes.set_xlabel(f"line-of-sight rate ω{along}, µrad/s")
+        axes.set_ylabel(f"angle α{along}, mrad" if in_space or axes is row[0] else "")
+        axes.tick_params(labelleft=in_space or axes is row[0])

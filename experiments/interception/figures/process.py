@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -46,64 +47,100 @@ _LETTER_MM, _LINE_MM = 1.8, 4.0
 _MOST_DECADES = 4
 """Number of decades up to which each decade has a label."""
 
+_NARROW_MM = 50.0
+"""Width of axes up to which notes are short, or have two lines."""
+
+Trace = tuple[Record, str]
+"""An engagement and one of its lateral axes."""
+
+_MODULUS = "#c9c9c9"
 _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def draw_process(records: Sequence[Record]) -> Figure:
-    """Draw angle, angular rate, impulse and predicted miss over time, one column per record.
+    """Draw angle, angular rate, impulse and predicted miss over time, one column per record and lateral axis.
 
     The axes of a row have the same limits. At least one record is needed.
     """
     if not records:
         raise ValueError("at least one record is needed")
+    traces = traces_of(records)
+    gap = 7.0 if len(traces) > 1 else 0.0
+    column_mm = (WIDTH_MM - 25.0 - gap * (len(traces) - 1)) / len(traces)
+    titles = []
+    for title, record in zip(map(plain, record_titles(records)), records, strict=True):
+        letters = int((column_mm + record.scenario.is_spatial * (gap + column_mm)) / _LETTER_MM)
+        titles.append("\n".join([*textwrap.wrap(title, letters), *textwrap.wrap(outcome_title(record), letters)]))
+    in_space = any(record.scenario.is_spatial for record in records)
+    top = 4.0 + _LINE_MM * (max(title.count("\n") for title in titles) + 1 + in_space)
     with style():
-        gap = 7.0 if len(records) > 1 else 0.0
-        letters = int((WIDTH_MM - 25.0 - gap * (len(records) - 1)) / len(records) / _LETTER_MM)
-        titles = [
-            "\n".join([*textwrap.wrap(title, letters), *textwrap.wrap(outcome_title(record), letters)])
-            for title, record in zip(map(plain, record_titles(records)), records, strict=True)
-        ]
-        top = 4.0 + _LINE_MM * max(title.count("\n") + 1 for title in titles)
         figure = new_figure(height_mm=184.0 + top)
-        grid = place_axes(figure, _ROWS, len(records), margins_mm=(21.0, 4.0, 24.0, top), gaps_mm=(gap, 4.0))
-        for record, title, column in zip(records, titles, zip(*grid, strict=True), strict=True):
-            _draw_sight(column[0], record, "angle", "true_angle_rad", 1e3)
+        grid = place_axes(figure, _ROWS, len(traces), margins_mm=(21.0, 4.0, 24.0, top), gaps_mm=(gap, 4.0))
+        for trace, column in zip(traces, zip(*grid, strict=True), strict=True):
+            _draw_sight(column[0], trace, "angle", "true_angle_rad", 1e3)
             column[1].axhline(0.0, color=LIMIT, linewidth=0.6)
-            _draw_sight(column[1], record, "rate", "true_rate_rad_s", 1e6)
-            _draw_impulse(column[2], record)
-            draw_predicted_miss(column[3], record)
-            column[0].set_title(title, linespacing=1.3)
+            _draw_sight(column[1], trace, "rate", "true_rate_rad_s", 1e6)
+            _draw_impulse(column[2], trace)
+            draw_predicted_miss(column[3], trace)
             column[-1].set_xlabel("time t, s")
-        _level(grid[0], [_extent(each, "angle", "true_angle_rad", ANGLE_RANGE_SHARE) for each in records], scale=1e3)
-        _level(grid[1], [_extent(each, "rate", "true_rate_rad_s", RATE_RANGE_SHARE) for each in records], scale=1e6)
+        _write_titles(grid[0], records, titles)
+        _level(grid[0], [_extent(each, "angle", "true_angle_rad", ANGLE_RANGE_SHARE) for each in traces], scale=1e3)
+        _level(grid[1], [_extent(each, "rate", "true_rate_rad_s", RATE_RANGE_SHARE) for each in traces], scale=1e6)
         _level_impulse(grid[2], records)
-        level_predicted_miss(grid[3], records)
-        for record, column in zip(records, zip(*grid, strict=True), strict=True):
-            _note_exit(column[0], _course(record, "true_angle_rad") * 1e3, record, 1.0, "mrad")
-            _note_exit(column[1], _course(record, "true_rate_rad_s") * 1e6, record, 1e-3, "mrad/s")
+        level_predicted_miss(grid[3], traces)
+        for trace, column in zip(traces, zip(*grid, strict=True), strict=True):
+            _note_exit(column[0], _course(trace, "true_angle_rad") * 1e3, trace, 1.0, "mrad")
+            _note_exit(column[1], _course(trace, "true_rate_rad_s") * 1e6, trace, 1e-3, "mrad/s")
         _finish(figure, grid, records)
     return figure
 
 
-def _draw_sight(axes: Axes, record: Record, sensor: str, field: str, scale: float) -> None:
+def traces_of(records: Sequence[Record]) -> list[Trace]:
+    """Return the columns of figures: each record with each of its lateral axes."""
+    return [(record, axis) for record in records for axis in record.scenario.set_model.axes]
+
+
+def _write_titles(row: Sequence[Axes], records: Sequence[Record], titles: Sequence[str]) -> None:
+    """Write the title of each record above its columns; in space, also the axis of each column."""
+    columns = iter(row)
+    for record, title in zip(records, titles, strict=True):
+        first = next(columns)
+        if not record.scenario.is_spatial:
+            first.set_title(title, linespacing=1.3)
+            continue
+        last = next(columns)
+        for axes, name in ((first, "y"), (last, "z")):
+            axes.set_title(f"along {name}")
+        boxes = [axes.get_position() for axes in (first, last)]
+        middle = 0.5 * (boxes[1].x1 - boxes[0].x0) / boxes[0].width
+        look: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": first.title.get_fontsize()}
+        place: dict[str, Any] = {"xytext": (0.0, 18.0), "textcoords": "offset points", "xycoords": "axes fraction"}
+        first.annotate(title, (middle, 1.0), linespacing=1.3, **place, **look)
+
+
+def _draw_sight(axes: Axes, trace: Trace, sensor: str, field: str, scale: float) -> None:
     """Draw a quantity of the line of sight, and its measurements as dots."""
-    measured = [(step.time_s, step.measured[sensor]) for step in record.steps if sensor in step.measured]
+    record, axis = trace
+    steps = [(step.time_s, step.axes[axis].measured) for step in record.steps]
+    measured = [(time_s, values[sensor]) for time_s, values in steps if sensor in values]
     if measured:
         times, values = np.array(measured).T
         size = 6.0 if _marker(record) and sensor == "angle" else 3.0
         axes.plot(times, values * scale, ".", color=MEASURED, markersize=size, markeredgewidth=0.0)
-    times, true = _course(record, "time_s"), _course(record, field)
+    times, true = _times(record), _course(trace, field)
     axes.plot(times, true * scale, color=TRUTH, marker=_marker(record), markersize=3.0)
 
 
-def _draw_impulse(axes: Axes, record: Record) -> None:
-    times, impulses = _course(record, "time_s"), _course(record, "impulse_m_s")
+def _draw_impulse(axes: Axes, trace: Trace) -> None:
+    """Draw the impulses along an axis; in space, behind them, their moduli, all upward."""
+    record, _ = trace
+    times, impulses = _times(record), _course(trace, "impulse_m_s")
     greatest = record.scenario.thruster.greatest_impulse_m_s
     axes.axhline(0.0, color=LIMIT, linewidth=0.6)
     for limit in (-greatest, greatest):
         axes.axhline(limit, color=LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
     axes.annotate(
-        f"greatest impulse ±{greatest:g} m/s",
+        f"{'greatest impulse' if width_mm(axes) > _NARROW_MM else 'limit'} ±{greatest:g} m/s",
         (0.985, greatest),
         xycoords=axes.get_yaxis_transform(),
         xytext=(0.0, 2.5),
@@ -111,18 +148,21 @@ def _draw_impulse(axes: Axes, record: Record) -> None:
         ha="right",
         va="bottom",
     )
+    if record.scenario.is_spatial:
+        moduli = np.array([step.impulse_m_s for step in record.steps])
+        axes.vlines(times[moduli > 0.0], 0.0, moduli[moduli > 0.0], color=_MODULUS, linewidth=0.9)
     given = impulses != 0.0
     axes.vlines(times[given], 0.0, impulses[given], color=IMPULSE, linewidth=0.9)
     axes.plot(times[given], impulses[given], ".", color=IMPULSE, markersize=2.2, markeredgewidth=0.0)
 
 
-def draw_predicted_miss(axes: Axes, record: Record) -> None:
+def draw_predicted_miss(axes: Axes, trace: Trace) -> None:
     """Draw the predicted-miss interval over time."""
-    times, lower, upper = _predicted_miss(record)
+    times, lower, upper = _predicted_miss(trace)
     axes.axhline(0.0, color=LIMIT, linewidth=0.6)
     axes.fill_between(times, lower, upper, color=SET_FILL, linewidth=0.0)
     for bound in (lower, upper):
-        axes.plot(times, bound, color=SET_EDGE, linewidth=0.9, marker=_marker(record), markersize=3.0)
+        axes.plot(times, bound, color=SET_EDGE, linewidth=0.9, marker=_marker(trace[0]), markersize=3.0)
 
 
 def _level(row: Sequence[Axes], extents: Sequence[tuple[float, float]], scale: float) -> None:
@@ -139,9 +179,9 @@ def _level_impulse(row: Sequence[Axes], records: Sequence[Record]) -> None:
         axes.set_ylim(-1.2 * greatest, 1.35 * greatest)
 
 
-def level_predicted_miss(row: Sequence[Axes], records: Sequence[Record]) -> None:
+def level_predicted_miss(row: Sequence[Axes], traces: Sequence[Trace]) -> None:
     """Give axes of predicted misses the same limits: linear to ten metres, logarithmic beyond."""
-    bounds = np.concatenate([np.concatenate(_predicted_miss(record)[1:]) for record in records])
+    bounds = np.concatenate([np.concatenate(_predicted_miss(trace)[1:]) for trace in traces])
     greatest = float(np.abs(bounds).max(initial=10.0))
     decades = int(np.log10(greatest) + 1e-9)
     powers = range(1, decades + 1) if decades <= _MOST_DECADES else range(1, decades + 1, 2)
@@ -158,7 +198,7 @@ def level_predicted_miss(row: Sequence[Axes], records: Sequence[Record]) -> None
         axes.set_ylim(-2.0 * greatest, 2.0 * greatest)
 
 
-def _note_exit(axes: Axes, values: Floats, record: Record, scale: float, unit: str) -> None:
+def _note_exit(axes: Axes, values: Floats, trace: Trace, scale: float, unit: str) -> None:
     """Write the largest value of a curve that leaves the axes."""
     low, high = axes.get_ylim()
     beyond = np.maximum(values - high, low - values)
@@ -168,17 +208,23 @@ def _note_exit(axes: Axes, values: Floats, record: Record, scale: float, unit: s
     value = float(values[worst]) * scale
     if abs(value) >= 1e3:
         value, unit = 1e-3 * value, unit.removeprefix("m")
-    text = f"reaches {_signed(value)} {unit} at {record.steps[worst].time_s:g} s"
+    space = " " if width_mm(axes) > _NARROW_MM else "\n"
+    text = f"reaches {_signed(value)} {unit}{space}at {trace[0].steps[worst].time_s:g} s"
     # The four corners of the part before the curve leaves the axes: the one with the fewest values.
-    across = np.interp(_course(record, "time_s"), axes.get_xlim(), (0.0, 1.0))
+    across = np.interp(_times(trace[0]), axes.get_xlim(), (0.0, 1.0))
     up = (values - low) / (high - low)
     last = float(across[max(int((beyond > 0.0).argmax()) - 1, 0)])
-    note_width = 1.7 * len(text) / width_mm(axes)
+    note_width = 1.7 * max(map(len, text.splitlines())) / width_mm(axes)
+    note_height = 0.2 if space == " " else 0.3
     corners = [(right, top) for right in (0.985, last - 0.015) for top in (values[worst] < low, values[worst] >= low)]
 
     def hidden(corner: tuple[float, bool]) -> int:
         right, top = corner
-        inside = (across <= right) & (across >= right - note_width) & ((up > 0.8) if top else (up < 0.2))
+        inside = (
+            (across <= right)
+            & (across >= right - note_width)
+            & ((up > 1.0 - note_height) if top else (up < note_height))
+        )
         return int(inside.sum())
 
     right, top = min(corners, key=hidden)
@@ -186,6 +232,7 @@ def _note_exit(axes: Axes, values: Floats, record: Record, scale: float, unit: s
         text,
         (right, 0.94 if top else 0.06),
         xycoords="axes fraction",
+        fontsize=8.0 if space == " " else 6.5,
         ha="right",
         va="top" if top else "bottom",
         bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
@@ -193,10 +240,11 @@ def _note_exit(axes: Axes, values: Floats, record: Record, scale: float, unit: s
 
 
 def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], records: Sequence[Record]) -> None:
+    in_space = any(record.scenario.is_spatial for record in records)
     labels = (
         "line-of-sight angle α, mrad",
         "line-of-sight rate ω, µrad/s",
-        "impulse k, m/s",
+        "impulse component k, m/s" if in_space else "impulse k, m/s",
         "predicted miss π, m\n(linear within ±10 m)",
     )
     end = max(record.steps[-1].time_s for record in records)
@@ -211,33 +259,44 @@ def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], records: Sequence[Re
         row[0].yaxis.set_label_coords(-12.5 / width_mm(row[0]), 0.5)
     rated = any("rate" in step.measured for record in records for step in record.steps)
     measured = "measured angle and rate" if rated else "measured angle"
-    handles = [
+    handles: list[Line2D | Patch] = [
         Line2D([], [], color=TRUTH, label="true angle and rate"),
         Line2D([], [], color=MEASURED, marker=".", markersize=7, linestyle="none", label=measured),
-        Line2D([], [], color=IMPULSE, linewidth=1.2, label="impulse"),
+        Line2D([], [], color=IMPULSE, linewidth=1.2, label="impulse component" if in_space else "impulse"),
         Line2D([], [], color=LIMIT, linewidth=0.8, linestyle=(0, (4, 2)), label="greatest impulse"),
         Patch(facecolor=SET_FILL, edgecolor=SET_EDGE, label="predicted-miss interval"),
     ]
+    if in_space:
+        modulus = "modulus of the impulse vector, upward"
+        handles.insert(3, Line2D([], [], color=_MODULUS, linewidth=1.8, label=modulus))
     figure.legend(handles=handles, loc="lower center", ncols=3, columnspacing=2.5, labelcolor=INK)
 
 
-def _course(record: Record, field: str) -> Floats:
-    """Return a field of all steps."""
-    return np.array([getattr(step, field) for step in record.steps])
+def _times(record: Record) -> Floats:
+    return np.array([step.time_s for step in record.steps])
 
 
-def _predicted_miss(record: Record) -> tuple[Floats, Floats, Floats]:
-    known = [(step.time_s, *step.predicted_miss_m) for step in record.steps if step.predicted_miss_m is not None]
-    times, lower, upper = np.array(known).reshape(-1, 3).T
+def _course(trace: Trace, field: str) -> Floats:
+    """Return a field of all steps along an axis."""
+    record, axis = trace
+    return np.array([getattr(step.axes[axis], field) for step in record.steps])
+
+
+def _predicted_miss(trace: Trace) -> tuple[Floats, Floats, Floats]:
+    record, axis = trace
+    ends = [(step.time_s, step.axes[axis].predicted_miss_m) for step in record.steps]
+    times, lower, upper = np.array([(time_s, *miss) for time_s, miss in ends if miss is not None]).reshape(-1, 3).T
     return times, lower, upper
 
 
-def _extent(record: Record, sensor: str, field: str, range_share: float) -> tuple[float, float]:
+def _extent(trace: Trace, sensor: str, field: str, range_share: float) -> tuple[float, float]:
     """Return the least and the greatest value, true or measured, without the last part of the way."""
-    ranges = _course(record, "true_range_m")
+    record, axis = trace
+    ranges = np.array([step.true_range_m for step in record.steps])
     ends = []
     for share in (FAR_SHARE, range_share):
-        steps = [step for step, far in zip(record.steps, ranges >= share * ranges.max(), strict=True) if far]
+        far = ranges >= share * ranges.max()
+        steps = [step.axes[axis] for step, shown in zip(record.steps, far, strict=True) if shown]
         seen = [getattr(step, field) for step in steps]
         seen += [step.measured[sensor] for step in steps if sensor in step.measured]
         ends.append((min(seen), max(seen)))

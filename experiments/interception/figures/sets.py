@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from string import ascii_lowercase
 from typing import Any
@@ -16,10 +17,10 @@ from matplotlib.patches import Patch, Polygon
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from experiments.common.figure_style import INK, MEASURED, new_figure, place_axes, plain, style, width_mm
+from experiments.common.figure_style import INK, MEASURED, WIDTH_MM, new_figure, place_axes, plain, style, width_mm
 from experiments.interception.record_titles import record_titles
 from infoset import Section
-from sim import Record, StepRecord
+from sim import AxisStep, Record, StepRecord
 
 Floats = NDArray[np.float64]
 Colour = tuple[float, float, float]
@@ -28,14 +29,16 @@ TRUTH_MARK = "true (ω, α)"
 MEASUREMENT_MARK = "measured α, drawn at the true ω"
 
 _DARK, _LIGHT = (0.03, 0.14, 0.36), (0.36, 0.66, 0.86)
+_PLANE_MM = 90.0
+"""Least width of a plane and its labels in space, mm."""
 _LABEL_MM, _LABEL_ROOM_MM = 14.0, 19.0
 """Position of the labels, and width that the sets leave for them, from the right side of the axes."""
 
 
 def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8.0), sections: int = 5) -> Figure:
-    """Draw sections of the sets after the measurement: one row per time, one column per record.
+    """Draw sections of the sets after the measurement: one row per time, one column per record and lateral axis.
 
-    The axes of a row have the same limits.
+    The planes of a row have the same limits for each lateral axis.
 
     Parameters
     ----------
@@ -48,36 +51,38 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
         raise ValueError("at least one record and one time are needed")
     if sections < 1:
         raise ValueError(f"at least one section must be shown: got {sections}")
+    in_space = any(record.scenario.is_spatial for record in records)
+    titles = [plain(each) for each in record_titles(records)]
+    if len(records) > 1:
+        titles = [title.removeprefix(f"({letter}) ") for title, letter in zip(titles, ascii_lowercase, strict=False)]
+    rows = [planes_at(records, titles, time_s, sections) for time_s in times_s]
+    columns, count = len(rows[0]), len(rows) * len(rows[0])
+    letters = iter([f"({each}) " for each in ascii_lowercase[:count]] if 1 < count <= 26 else [""] * count)
     with style():
-        figure = new_figure(height_mm=25.0 + 63.0 * len(times_s))
+        figure = new_figure(
+            height_mm=25.0 + (63.0 + 4.0 * in_space) * len(times_s),
+            width_mm=max(WIDTH_MM, _PLANE_MM * columns * in_space),
+        )
         grid = place_axes(
             figure,
-            len(times_s),
-            len(records),
-            margins_mm=(17.0, 4.0, 26.0, 11.0),
-            gaps_mm=(6.0 if len(records) > 1 else 0.0, 15.5),
+            len(rows),
+            columns,
+            margins_mm=(17.0, 4.0, 26.0, 11.0 + 4.0 * in_space),
+            gaps_mm=(0.0 if columns == 1 else 17.0 if in_space else 6.0, 15.5 + 4.0 * in_space),
         )
-        titles = [plain(each) for each in record_titles(records)]
-        if len(records) > 1:
-            titles = [
-                title.removeprefix(f"({letter}) ") for title, letter in zip(titles, ascii_lowercase, strict=False)
-            ]
-        count = len(times_s) * len(records)
-        letters = iter([f"({each}) " for each in ascii_lowercase[:count]] if 1 < count <= 26 else [""] * count)
-        measured = False
-        for time, row in zip(times_s, grid, strict=True):
-            steps = [min(record.steps, key=lambda step: abs(step.time_s - time)) for record in records]
-            measured = measured or any("angle" in step.measured for step in steps)
-            shown = [choose_sections(step.sections, sections) for step in steps]
-            level_planes(row, [extent_of(step, chosen) for step, chosen in zip(steps, shown, strict=True)])
-            for axes, record, step, chosen, title in zip(row, records, steps, shown, titles, strict=True):
-                _shade_allowed(axes, record, step, chosen)
-                draw_step(axes, step, chosen)
-                axes.set_title(f"{next(letters)}{title}, t = {step.time_s:g} s")
-                axes.set_xlabel("line-of-sight rate ω, µrad/s", labelpad=2.0)
-                axes.set_ylabel("line-of-sight angle α, mrad")
-                axes.yaxis.label.set_visible(axes is row[0])
-                axes.tick_params(labelleft=axes is row[0])
+        for row, planes in zip(grid, rows, strict=True):
+            level_planes(row, planes)
+            for axes, plane in zip(row, planes, strict=True):
+                _shade_allowed(axes, plane)
+                draw_plane(axes, plane)
+                title = f"{plane.title}\nalong {plane.axis}" if in_space else plane.title
+                axes.set_title(f"{next(letters)}{title}, t = {plane.step.time_s:g} s")
+                along = f" along {plane.axis}" if in_space else ""
+                axes.set_xlabel(f"line-of-sight rate ω{along}, µrad/s", labelpad=2.0)
+                axes.set_ylabel(f"line-of-sight angle α{along}, mrad")
+                axes.yaxis.label.set_visible(in_space or axes is row[0])
+                axes.tick_params(labelleft=in_space or axes is row[0])
+        measured = any("angle" in plane.along.measured for planes in rows for plane in planes)
         handles: list[Line2D | Patch] = [
             Line2D([], [], label=TRUTH_MARK, **_TRUTH_LOOK),
             Line2D([], [], color=_colour(0, 2), label="section of the set, with its range in km"),
@@ -88,6 +93,47 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
             handles.append(Patch(facecolor=MEASURED, alpha=0.22, label=allowed))
         figure.legend(handles=handles, loc="lower center", ncols=2, columnspacing=2.5)
     return figure
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Sections of one step in the (omega, alpha) plane of one lateral axis."""
+
+    title: str
+    record: Record
+    axis: str
+    step: StepRecord
+    chosen: Sequence[Section]
+
+    @property
+    def along(self) -> AxisStep:
+        """The step along the axis."""
+        return self.step.axes[self.axis]
+
+    @property
+    def outlines(self) -> list[Floats]:
+        """Vertices of the sections, omega in µrad/s and alpha in mrad."""
+        polygons = [each.omega_alpha if self.axis == "z" else each.omega_alpha_y for each in self.chosen]
+        return [polygon.polygon() * np.array([1e6, 1e3]) for polygon in polygons if polygon is not None]
+
+    @property
+    def extent(self) -> Floats:
+        """All points (omega in µrad/s, alpha in mrad) that a drawing must contain."""
+        rate, angle = self.along.true_rate_rad_s * 1e6, self.along.true_angle_rad * 1e3
+        marks = [[rate, angle]]
+        if "angle" in self.along.measured:
+            marks.append([rate, self.along.measured["angle"] * 1e3])
+        return np.concatenate([np.array(marks), *self.outlines])
+
+
+def planes_at(records: Sequence[Record], titles: Sequence[str], time_s: float, sections: int) -> list[Plane]:
+    """Return the planes of each record at its step nearest to a time, with at most so many sections."""
+    planes = []
+    for record, title in zip(records, titles, strict=True):
+        step = min(record.steps, key=lambda step: abs(step.time_s - time_s))
+        chosen = choose_sections(step.sections, sections)
+        planes += [Plane(title, record, axis, step, chosen) for axis in record.scenario.set_model.axes]
+    return planes
 
 
 def choose_sections(sections: Sequence[Section], most: int) -> list[Section]:
@@ -119,28 +165,29 @@ _MEASUREMENT_LOOK: dict[str, Any] = {
 }
 
 
-def draw_step(axes: Axes, step: StepRecord, chosen: Sequence[Section]) -> None:
-    """Draw sections of one step with the true state and the measurement, on axes with fixed limits."""
-    outlines = [_outline(section) for section in chosen]
+def draw_plane(axes: Axes, plane: Plane) -> None:
+    """Draw sections with the true state and the measurement, on axes with fixed limits."""
+    outlines, along = plane.outlines, plane.along
     for index, outline in enumerate(outlines):
         _draw_outline(axes, outline, _colour(index, len(outlines)), zorder=3.0 - 0.01 * index)
-    _label(axes, chosen, outlines)
+    _label(axes, plane.chosen, outlines)
     halo = [patheffects.withStroke(linewidth=3.2, foreground="white")]
-    rate = step.true_rate_rad_s * 1e6
-    if "angle" in step.measured:
-        axes.plot(rate, step.measured["angle"] * 1e3, zorder=5, label=MEASUREMENT_MARK, **_MEASUREMENT_LOOK)
-    axes.plot(rate, step.true_angle_rad * 1e3, zorder=6, label=TRUTH_MARK, path_effects=halo, **_TRUTH_LOOK)
+    rate = along.true_rate_rad_s * 1e6
+    if "angle" in along.measured:
+        axes.plot(rate, along.measured["angle"] * 1e3, zorder=5, label=MEASUREMENT_MARK, **_MEASUREMENT_LOOK)
+    axes.plot(rate, along.true_angle_rad * 1e3, zorder=6, label=TRUTH_MARK, path_effects=halo, **_TRUTH_LOOK)
     if not outlines:
         axes.text(0.5, 0.94, "no section is left", transform=axes.transAxes, ha="center", va="top")
 
 
-def _shade_allowed(axes: Axes, record: Record, step: StepRecord, chosen: Sequence[Section]) -> None:
+def _shade_allowed(axes: Axes, plane: Plane) -> None:
     """Shade the angles that the measurement allows at the nearest and the farthest drawn section."""
-    if "angle" not in step.measured or not chosen:
+    if "angle" not in plane.along.measured or not plane.chosen:
         return
-    for section in (chosen[0], chosen[-1]):
-        error = float(record.scenario.set_model.angle_sensor.error_bound(section.range_m))
-        low, high = ((step.measured["angle"] + sign * error) * 1e3 for sign in (-1.0, 1.0))
+    sensor = plane.record.scenario.set_model.axis(plane.axis).angle_sensor
+    for section in (plane.chosen[0], plane.chosen[-1]):
+        error = float(sensor.error_bound(section.range_m))
+        low, high = ((plane.along.measured["angle"] + sign * error) * 1e3 for sign in (-1.0, 1.0))
         axes.axhspan(low, high, color=MEASURED, alpha=0.09, linewidth=0.0, zorder=0.4)
 
 
@@ -210,31 +257,21 @@ def _spread(wanted: Sequence[float], spacing: float, low: float, high: float) ->
     return np.asarray(heights - over)
 
 
-def level_planes(row: Sequence[Axes], points: Sequence[Floats]) -> None:
-    """Give planes of sets the same limits, with space for the labels; `extent_of` returns what must be seen."""
-    everything = np.concatenate(points)
-    least, greatest = everything.min(axis=0), everything.max(axis=0)
-    margin = 0.07 * (greatest - least)
-    margin = np.where(margin > 0.0, margin, np.maximum(0.05 * np.abs(greatest), 1e-6))
-    least, greatest = least - margin, greatest + margin
-    for axes in row:
-        room = _LABEL_ROOM_MM / width_mm(axes)
-        axes.set_xlim(float(least[0]), float(greatest[0] + room / (1.0 - room) * (greatest[0] - least[0])))
-        axes.set_ylim(float(least[1]), float(greatest[1]))
-        axes.xaxis.set_major_locator(MaxNLocator(nbins=6 if np.abs(least[0]) < 1e4 else 3, steps=[1, 2, 2.5, 5, 10]))
-
-
-def extent_of(step: StepRecord, chosen: Sequence[Section]) -> Floats:
-    """Return all points (omega in µrad/s, alpha in mrad) that a drawing of a step must contain."""
-    rate, angle = step.true_rate_rad_s * 1e6, step.true_angle_rad * 1e3
-    marks = [[rate, angle]]
-    if "angle" in step.measured:
-        marks.append([rate, step.measured["angle"] * 1e3])
-    return np.concatenate([np.array(marks), *(_outline(section) for section in chosen)])
-
-
-def _outline(section: Section) -> Floats:
-    return np.asarray(section.omega_alpha.polygon() * np.array([1e6, 1e3]))
+def level_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
+    """Give the planes of each lateral axis the same limits, with space for the labels."""
+    for axis in {plane.axis for plane in planes}:
+        same = [(axes, plane) for axes, plane in zip(row, planes, strict=True) if plane.axis == axis]
+        everything = np.concatenate([plane.extent for _, plane in same])
+        least, greatest = everything.min(axis=0), everything.max(axis=0)
+        margin = 0.07 * (greatest - least)
+        margin = np.where(margin > 0.0, margin, np.maximum(0.05 * np.abs(greatest), 1e-6))
+        least, greatest = least - margin, greatest + margin
+        for axes, _ in same:
+            room = _LABEL_ROOM_MM / width_mm(axes)
+            axes.set_xlim(float(least[0]), float(greatest[0] + room / (1.0 - room) * (greatest[0] - least[0])))
+            axes.set_ylim(float(least[1]), float(greatest[1]))
+            nbins = 6 if np.abs(least[0]) < 1e4 else 3
+            axes.xaxis.set_major_locator(MaxNLocator(nbins=nbins, steps=[1, 2, 2.5, 5, 10]))
 
 
 def _colour(index: int, count: int) -> Colour:

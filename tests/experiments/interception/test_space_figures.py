@@ -3,25 +3,38 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Polygon
+from PIL import Image, ImageSequence
 
+from experiments.interception.figures.animation import GIF, animate
 from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane
+from experiments.interception.figures.process import draw_process
+from experiments.interception.figures.sets import TRUTH_MARK, choose_sections, draw_sets
 from experiments.interception.scenario_file import load_scenario
-from sim import Results, simulate
+from guidance import NoiseKind
+from sim import Record, Results, fly_one, simulate
 from tests.experiments.command_line import Command
 
 RUNS = 12
+AXES = ("y", "z")
 
 
 @pytest.fixture(scope="module")
 def results() -> Results:
     return simulate(load_scenario("asteroid-1997-space"), RUNS)
+
+
+@pytest.fixture(scope="module")
+def records() -> list[Record]:
+    scenario = load_scenario("asteroid-1997-space")
+    return [fly_one(replace(scenario, noise=kind)) for kind in NoiseKind]
 
 
 def circles(axes: Axes) -> dict[str, float]:
@@ -90,6 +103,83 @@ def test_quantiles_that_the_runs_do_not_show_are_left_out() -> None:
     assert "circle: 90 % of the misses" not in legend(figure)
     with pytest.raises(ValueError, match="at least one cloud"):
         draw_b_plane([])
+
+
+def test_process_has_the_courses_of_both_axes(records: list[Record]) -> None:
+    figure = draw_process(records[:1])
+    steps = records[0].steps
+    assert len(figure.axes) == 8
+    assert [axes.get_title() for axes in figure.axes[:2]] == ["along y", "along z"]
+    assert figure.axes[0].texts[0].get_text().startswith("random noise, range meter\nmiss ")
+    for column, axis in enumerate(AXES):
+        angle, rate, _, below = figure.axes[column::2]
+        for axes, field, scale in ((angle, "true_angle_rad", 1e3), (rate, "true_rate_rad_s", 1e6)):
+            true = [getattr(step.axes[axis], field) * scale for step in steps]
+            assert any(np.array_equal(np.asarray(line.get_ydata()), true) for line in axes.lines)
+        measured = [step.axes[axis].measured["angle"] * 1e3 for step in steps]
+        np.testing.assert_allclose(np.asarray(angle.lines[0].get_ydata()), measured)
+        lower = [miss[0] for step in steps if (miss := step.axes[axis].predicted_miss_m) is not None]
+        assert any(np.array_equal(np.asarray(line.get_ydata()), lower) for line in below.lines)
+    for row in range(4):
+        first, second = figure.axes[2 * row : 2 * row + 2]
+        assert first.get_ylim() == second.get_ylim()
+
+
+def test_process_shows_the_components_and_the_modulus_of_an_impulse(records: list[Record]) -> None:
+    figure = draw_process(records[1:])
+    steps = records[1].steps
+    moduli = np.array([step.impulse_m_s for step in steps])
+    for axes, axis in zip(figure.axes[4:6], AXES, strict=True):
+        behind, before = (
+            np.array([np.asarray(path.vertices)[1, 1] for path in lines.get_paths()]) for lines in axes.collections
+        )
+        np.testing.assert_allclose(behind, moduli[moduli > 0.0])
+        component = np.array([step.axes[axis].impulse_m_s for step in steps])
+        np.testing.assert_allclose(before, component[component != 0.0])
+    assert {"impulse component", "modulus of the impulse vector, upward"} <= set(legend(figure))
+
+
+def test_process_of_two_records_has_four_columns(records: list[Record]) -> None:
+    figure = draw_process(records)
+    assert [axes.get_title() for axes in figure.axes[:4]] == ["along y", "along z"] * 2
+    assert [figure.axes[k].texts[0].get_text()[:3] for k in (0, 2)] == ["(a)", "(b)"]
+    for axes in figure.axes:
+        for text in axes.texts[1:]:
+            assert text.get_window_extent().width < 1.2 * axes.get_window_extent().width
+
+
+def test_the_sets_of_both_planes_are_side_by_side(records: list[Record]) -> None:
+    figure = draw_sets(records[:1], (0.5, 8.0), sections=3)
+    titles = [
+        "(a) {}\nalong y, t = 0.5 s",
+        "(b) {}\nalong z, t = 0.5 s",
+        "(c) {}\nalong y, t = 8 s",
+        "(d) {}\nalong z, t = 8 s",
+    ]
+    assert [axes.get_title() for axes in figure.axes] == [each.format("random noise, range meter") for each in titles]
+    for number, axes in enumerate(figure.axes):
+        step, axis = records[0].steps[(1, 16)[number // 2]], AXES[number % 2]
+        assert axes.get_xlabel() == f"line-of-sight rate ω along {axis}, µrad/s"
+        assert axes.get_ylabel() == f"line-of-sight angle α along {axis}, mrad"
+        chosen = choose_sections(step.sections, 3)
+        polygons = [section.omega_alpha if axis == "z" else section.omega_alpha_y for section in chosen]
+        drawn = [patch.get_xy() for patch in axes.patches if isinstance(patch, Polygon) and patch.get_closed()]
+        for outline, polygon in zip(drawn[-3:], polygons, strict=True):
+            assert polygon is not None
+            np.testing.assert_allclose(np.asarray(outline)[:-1], polygon.polygon() * [1e6, 1e3])
+        (truth,) = [line for line in axes.lines if line.get_label() == TRUTH_MARK]
+        along = step.axes[axis]
+        true = np.array([[along.true_rate_rad_s * 1e6, along.true_angle_rad * 1e3]])
+        np.testing.assert_allclose(np.asarray(truth.get_xydata(), dtype=np.float64), true)
+        assert {text.get_text() for text in axes.texts} == {f"{section.range_m / 1e3:.0f} km" for section in chosen}
+
+
+def test_an_animation_shows_both_axes(records: list[Record]) -> None:
+    sizes = []
+    for shown in (records[:1], records):
+        with Image.open(BytesIO(animate(shown, GIF, 2))) as animation:
+            sizes.append((animation.size[0], len(list(ImageSequence.Iterator(animation)))))
+    assert sizes == [(640, 2), (1280, 2)]
 
 
 @pytest.mark.parametrize("name", ["experiment", "compare"])
