@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset.svg import ACCENT, NEAR, Plane, evenly, limits, note, shade
+from infoset.svg import ACCENT, NEAR, Plane, evenly, limits, note, shade, side_by_side
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -39,17 +39,23 @@ def outlines_svg(outlines: Sequence[Floats], x_title: str, y_title: str, title: 
     return plane.svg()
 
 
-def sections_svg(outlines: Sequence[Floats], title: str) -> str:
-    """Return a picture of sections in the (omega, alpha) plane, coloured from the nearest (dark) to the farthest.
+def sections_svg(planes: Mapping[str, Sequence[Floats]], title: str) -> str:
+    """Return a picture of sections in (omega, alpha) planes, coloured from the nearest (dark) to the farthest.
 
     Parameters
     ----------
-    outlines : sequence of ndarray, shape (n, 2)
-        Vertices (omega, alpha) of each section, rad/s and rad.
+    planes : mapping of str to sequence of ndarray, shape (n, 2)
+        Vertices (omega, alpha) of each section, rad/s and rad, by what the title of the plane ends with. Planes are
+        side by side.
     title : str
-        Text above the picture.
+        Text above each plane.
     """
-    return outlines_svg([outline * 1e6 for outline in outlines], "rate ω, µrad/s", "angle α, µrad", title)
+    return side_by_side(
+        [
+            outlines_svg([outline * 1e6 for outline in outlines], "rate ω, µrad/s", "angle α, µrad", f"{title}{plane}")
+            for plane, outlines in planes.items()
+        ]
+    )
 
 
 def predicted_miss_svg(exists: Flags, lower_m: Floats, upper_m: Floats) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -60,7 +61,7 @@ class Section:
         return None if self.polygon_y is None else to_omega_alpha(self.polygon_y, self.range_m, self.closing_speed_m_s)
 
     def _repr_svg_(self) -> str:
-        return sections_svg([self.omega_alpha.polygon()], f"section at x = {self.range_m / 1e3:.6g} km")
+        return sections_svg(_outlines([self]), f"section at x = {self.range_m / 1e3:.6g} km")
 
 
 def to_omega_alpha(polygon: ConvexPolygons, range_m: float, closing_speed_m_s: float) -> ConvexPolygons:
@@ -82,6 +83,13 @@ def to_omega_alpha(polygon: ConvexPolygons, range_m: float, closing_speed_m_s: f
     POSITIVE.need("closing_speed_m_s", closing_speed_m_s)
     x, e = range_m, closing_speed_m_s
     return polygon.linear_map(np.array([[1.0 / x, e / x**2], [0.0, 1.0 / x]]))
+
+
+def _outlines(sections: Sequence[Section]) -> dict[str, list[Floats]]:
+    """Return the vertices of sections in the (omega, alpha) plane, or in those of y and z."""
+    of_z = [section.omega_alpha.polygon() for section in sections]
+    of_y = [polygon.polygon() for section in sections if (polygon := section.omega_alpha_y) is not None]
+    return {", plane (x, y)": of_y, ", plane (x, z)": of_z} if of_y else {"": of_z}
 
 
 _TRACKING = SetStatus.TRACKING.value
@@ -347,9 +355,8 @@ class SetQueries:
 
     def _repr_svg_(self) -> str:
         which = "" if self.batch == 1 else f", the first of {self.batch} engagements"
-        outlines = [section.omega_alpha.polygon() for section in self.sections()]
-        plane = "" if len(self.axes) == 1 else ", plane (x, z)"
-        return sections_svg(outlines, f"{self.section_counts[0]} sections at t = {self.time_s:g} s{plane}{which}")
+        title = f"{self.section_counts[0]} sections at t = {self.time_s:g} s{which}"
+        return sections_svg(_outlines(self.sections()), title)
 
     def __repr__(self) -> str:
         head = f"{type(self).__name__} at t = {self.time_s:g} s"

@@ -98,6 +98,15 @@ class Plane:
             self._add(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}"{more}>{escaped}</text>')
 
 
+def side_by_side(pictures: Sequence[str]) -> str:
+    """Return pictures of the same size as one picture."""
+    if len(pictures) == 1:
+        return pictures[0]
+    placed = [picture.replace("<svg ", f'<svg x="{i * WIDTH}" ', 1) for i, picture in enumerate(pictures)]
+    size = f'width="{WIDTH * len(pictures)}" height="{HEIGHT}"'
+    return f'<svg xmlns="http://www.w3.org/2000/svg" {size} role="img">{"".join(placed)}</svg>'
+
+
 def note(text: str) -> str:
     """Return a picture that contains only a text."""
     return (

@@ -43,28 +43,31 @@ def course_html(
     caption: str,
     facts: Mapping[str, str],
     time_s: Floats,
-    impulse_m_s: Floats,
+    impulses_m_s: Mapping[str, Floats],
     greatest_impulse_m_s: float,
     miss_time_s: Floats,
-    miss_m: Floats,
+    misses_m: Mapping[str, Floats],
 ) -> str:
     """Return the course of one engagement as HTML: facts, predicted miss and impulses over time.
 
     Parameters
     ----------
-    time_s, impulse_m_s : ndarray, shape (steps,)
-        Impulse of each step.
+    time_s : ndarray, shape (steps,)
+        Times of the steps.
+    impulses_m_s : mapping of str to ndarray, shape (steps,)
+        Impulse of each step by direction: an empty text in a plane, ``" along y"`` and ``" along z"`` in space.
     miss_time_s : ndarray, shape (n,)
         Times at which a predicted miss exists, s.
-    miss_m : ndarray, shape (n, 2)
-        Least and greatest predicted miss at these times, m.
+    misses_m : mapping of str to ndarray, shape (n, 2)
+        Least and greatest predicted miss at these times by direction, m.
     """
     table = _table(caption, (), [(name, [text]) for name, text in facts.items()])
-    impulses = _impulse_svg(time_s, impulse_m_s, greatest_impulse_m_s)
-    return table + (_miss_svg(miss_time_s, miss_m) if len(miss_time_s) else "") + impulses
+    misses = [_miss_svg(miss_time_s, miss_m, along) for along, miss_m in misses_m.items() if len(miss_time_s)]
+    impulses = [_impulse_svg(time_s, each, greatest_impulse_m_s, along) for along, each in impulses_m_s.items()]
+    return "".join([table, *misses, *impulses])
 
 
-def _miss_svg(time_s: Floats, miss_m: Floats) -> str:
+def _miss_svg(time_s: Floats, miss_m: Floats, along: str) -> str:
     """Draw the predicted-miss interval over time: linear up to 10 m, one unit per decade beyond."""
     scaled = miss_m / _DECADES
     size = np.abs(scaled)
@@ -72,7 +75,12 @@ def _miss_svg(time_s: Floats, miss_m: Floats) -> str:
     powers = range(1, 1 + int(np.abs(bent).max()))
     marks = [(float(sign * power), f"{sign * 10**power:g}") for power in powers for sign in (-1, 1)] + [(0.0, "0")]
     plane = Plane(
-        limits(time_s, 0.02), limits(bent), "time t, s", "m", "predicted miss without further impulses", levels=marks
+        limits(time_s, 0.02),
+        limits(bent),
+        "time t, s",
+        "m",
+        f"predicted miss{along} without further impulses",
+        levels=marks,
     )
     low, high = bent.T
     around = np.concatenate([np.stack([time_s, low], axis=1), np.stack([time_s, high], axis=1)[::-1]])
@@ -80,9 +88,9 @@ def _miss_svg(time_s: Floats, miss_m: Floats) -> str:
     return plane.svg()
 
 
-def _impulse_svg(time_s: Floats, impulse_m_s: Floats, greatest_m_s: float) -> str:
+def _impulse_svg(time_s: Floats, impulse_m_s: Floats, greatest_m_s: float, along: str) -> str:
     span = (-1.1 * greatest_m_s, 1.1 * greatest_m_s)
-    plane = Plane(limits(time_s, 0.02), span, "time t, s", "impulse k, m/s", "impulses", 170)
+    plane = Plane(limits(time_s, 0.02), span, "time t, s", "impulse k, m/s", f"impulses{along}", 170)
     for time, impulse in zip(time_s.tolist(), impulse_m_s.tolist(), strict=True):
         if impulse != 0.0:
             plane.line(np.array([[time, 0.0], [time, impulse]]), ACCENT)

@@ -154,21 +154,24 @@ class Record:
 
     def _repr_html_(self) -> str:
         result, thruster = self.result, self.scenario.thruster
-        known = [(step.time_s, step.predicted_miss_m) for step in self.steps if step.predicted_miss_m is not None]
+        known = [step for step in self.steps if step.predicted_miss_m is not None]
+        axes = self.scenario.set_model.axes
+        along = {axis: f" along {axis}" if len(axes) > 1 else "" for axis in axes}
+        lateral = zip(result.lateral_miss[0].compressed(), along.values(), strict=False)  # no miss by axis in a plane
         return course_html(
             f"{self.ending}: {len(self.steps)} steps, seed {self.seed}, run {self.run}",
             {
                 "scenario": self.scenario.name,
                 "noise, strategy": f"{self.noise_name}, {self.strategy}",
-                "miss": f"{result.miss_m[0]:.4g} m",
+                "miss": ", ".join(f"{miss:.4g} m{mark}" for miss, mark in [(result.miss_m[0], ""), *lateral]),
                 "impulse": f"{result.impulse_m_s[0]:.4g} m/s of {thruster.budget_m_s:g}",
                 "truth kept": "yes" if result.truth_kept[0] else "no",
             },
             np.array([step.time_s for step in self.steps]),
-            np.array([step.impulse_m_s for step in self.steps]),
+            {along[axis]: np.array([step.axes[axis].impulse_m_s for step in self.steps]) for axis in axes},
             thruster.greatest_impulse_m_s,
-            np.array([time for time, _ in known]),
-            np.array([miss for _, miss in known]),
+            np.array([step.time_s for step in known]),
+            {along[axis]: np.array([step.axes[axis].predicted_miss_m for step in known]) for axis in axes},
         )
 
 
