@@ -493,14 +493,14 @@ def _array(column: Column, values: list[Any]) -> Any:
 
 
 def _to_steps(arrays: Arrays, scenario: Scenario) -> tuple[StepRecord, ...]:
-    # The arrays of the z axis come first, as the polygons of a section do.
     along = {"z": arrays}
     if scenario.is_spatial:
-        along["y"] = arrays | {along_z: arrays[along_y] for along_z, along_y in _OF_Y.items() if along_y in arrays}
+        of_y = {along_z: arrays[along_y] for along_z, along_y in _OF_Y.items() if along_y in arrays}
+        along = {"y": arrays | of_y, "z": arrays}
     numbers = (arrays[name].tolist() for name in ("section_label_m", "section_range_m"))
     sections = [
         Section(label, now, scenario.set_model.closing_speed_m_s, *polygons)
-        for label, now, *polygons in zip(*numbers, *map(_polygons, along.values()), strict=True)
+        for label, now, *polygons in zip(*numbers, *map(_polygons, reversed(along.values())), strict=True)
     ]
     columns = (
         arrays["time_s"].tolist(),

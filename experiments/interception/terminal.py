@@ -55,14 +55,15 @@ def frame(records: Sequence[Record], step: int, console: Console) -> Group:
         An engagement that has ended shows its last step.
     """
     braille = "utf" in console.encoding.lower()
-    beside = len(records) if console.width >= len(records) * (_LEAST_COLUMNS + 6) else 1
+    least = _LEAST_COLUMNS * max(len(record.steps[0].axes) for record in records)
+    beside = len(records) if console.width >= len(records) * (least + 6) else 1
     columns = int(np.clip(console.width // beside - 6, _LEAST_COLUMNS, _MOST_COLUMNS))
     shown = [
         Panel(
             Group(
-                *(Text(line) for line in _plane(_step_of(record, step), columns, braille)),
+                *(Text(line) for line in _planes(_step_of(record, step), columns, braille)),
                 Text(),
-                Text(_bar(record, _step_of(record, step), columns)),
+                *(Text(line) for line in _bars(record, _step_of(record, step), columns)),
                 _numbers(record, min(step, len(record.steps) - 1)),
             ),
             title=Text(title),
@@ -77,12 +78,27 @@ def _step_of(record: Record, step: int) -> StepRecord:
     return record.steps[min(step, len(record.steps) - 1)]
 
 
-def _plane(step: StepRecord, columns: int, braille: bool) -> list[str]:
-    """Sections in the (omega, alpha) plane, with X for the true state."""
+def _planes(step: StepRecord, columns: int, braille: bool) -> list[str]:
+    """Return the (omega, alpha) plane of z, or those of y and z side by side, with the limits of each below."""
+    if len(step.axes) == 1:
+        dots, limits = _plane(step, "z", columns, braille)
+        return [*dots, *(text[:columns] for text in limits)]
+    width = columns // 2 - 1
+    (left, of_y), (right, of_z) = (_plane(step, name, width, braille) for name in step.axes)
+    heads = [f"{'y':^{width}}  {'z':^{width}}"]
+    limits = [f"{name} {text}"[:columns] for name, texts in (("y", of_y), ("z", of_z)) for text in texts]
+    return [*heads, *(f"{y:<{width}}  {z}" for y, z in zip(left, right, strict=True)), *limits]
+
+
+def _plane(step: StepRecord, name: str, columns: int, braille: bool) -> tuple[list[str], list[str]]:
+    """Sections in the (omega, alpha) plane of an axis, with X for the true state, and the limits of the plane."""
+    axis = step.axes[name]
     last = len(step.sections) - 1
     places = {round(each) for each in np.linspace(0, last, _SECTIONS).tolist()} if step.sections else set()
-    outlines = [step.sections[place].omega_alpha.polygon() for place in sorted(places)]
-    truth = (step.true_rate_rad_s, step.true_angle_rad)
+    shown = [step.sections[place] for place in sorted(places)]
+    polygons = [section.omega_alpha_y if name == "y" else section.omega_alpha for section in shown]
+    outlines = [polygon.polygon() for polygon in polygons if polygon is not None]
+    truth = (axis.true_rate_rad_s, axis.true_angle_rad)
     points = np.concatenate([np.array([truth]), *outlines])
     low, high = points.min(axis=0), points.max(axis=0)
     room = np.maximum(0.05 * (high - low), 1e-12 + 1e-6 * np.abs(high))
@@ -91,27 +107,34 @@ def _plane(step: StepRecord, columns: int, braille: bool) -> list[str]:
     for outline in outlines:
         dots.outline(outline, closed=len(outline) > 2)
     dots.letter(truth, "X")
+    rate = f"rate {low[0] * 1e6:.4g} .. {high[0] * 1e6:.4g} µrad/s"
+    angle = f"angle {low[1] * 1e3:.4g} .. {high[1] * 1e3:.4g} mrad"
+    return dots.lines(), [rate, angle]
+
+
+def _bars(record: Record, step: StepRecord, columns: int) -> list[str]:
+    """Return the predicted-miss interval of each axis, on lines of one scale."""
+    if step.predicted_miss_m is None:
+        return ["the set is empty".center(columns)]
+    known = [axis.predicted_miss_m for each in record.steps for axis in each.axes.values()]
+    greatest = max((abs(end) for miss in known if miss is not None for end in miss), default=_DECADE_M)
+    if len(step.axes) == 1:
+        return [_bar(step.predicted_miss_m, greatest, columns)]
     return [
-        *dots.lines(),
-        f"rate {low[0] * 1e6:.4g} .. {high[0] * 1e6:.4g} µrad/s"[:columns],
-        f"angle {low[1] * 1e3:.4g} .. {high[1] * 1e3:.4g} mrad"[:columns],
+        f"{name} {_bar(axis.predicted_miss_m, greatest, columns - 2)}"
+        for name, axis in step.axes.items()
+        if axis.predicted_miss_m is not None
     ]
 
 
-def _bar(record: Record, step: StepRecord, columns: int) -> str:
+def _bar(miss_m: tuple[float, float], greatest_m: float, columns: int) -> str:
     """The predicted-miss interval on a line with zero in the middle, logarithmic beyond ten metres."""
-    if step.predicted_miss_m is None:
-        return "the set is empty".center(columns)
-    greatest = max(
-        (abs(end) for each in record.steps if each.predicted_miss_m is not None for end in each.predicted_miss_m),
-        default=_DECADE_M,
-    )
 
     def place(metres: float) -> int:
-        share = _bent(metres) / max(_bent(greatest), 1.0)
+        share = _bent(metres) / max(_bent(greatest_m), 1.0)
         return round((0.5 + 0.5 * share) * (columns - 1))
 
-    lower, upper = (place(end) for end in step.predicted_miss_m)
+    lower, upper = map(place, miss_m)
     line = [" "] * columns
     line[lower : upper + 1] = "=" * (upper - lower + 1)
     line[place(0.0)] = "|" if line[place(0.0)] == " " else "+"
@@ -126,13 +149,18 @@ def _bent(metres: float) -> float:
 def _numbers(record: Record, index: int) -> Table:
     step = record.steps[index]
     spent = sum(abs(each.impulse_m_s) for each in record.steps[: index + 1])
-    miss = step.predicted_miss_m
+    spatial = len(step.axes) > 1
+    misses = {f"predicted miss {name}" if spatial else "predicted miss": axis for name, axis in step.axes.items()}
     table = Table(box=None, show_header=False, pad_edge=False)
     rows = (
         ("time", f"{step.time_s:g} s"),
         ("true range", f"{step.true_range_m / 1e3:.6g} km"),
-        ("predicted miss", "none" if miss is None else f"{miss[0]:.5g} .. {miss[1]:.5g} m"),
+        *(
+            (title, "none" if (miss := axis.predicted_miss_m) is None else f"{miss[0]:.5g} .. {miss[1]:.5g} m")
+            for title, axis in misses.items()
+        ),
         ("impulse", f"{step.impulse_m_s:.4g} m/s"),
+        *((f"  along {name}", f"{axis.impulse_m_s:.4g} m/s") for name, axis in step.axes.items() if spatial),
         ("budget left", f"{max(record.scenario.thruster.budget_m_s - spent, 0.0):.5g} m/s"),
         ("sections", str(len(step.sections))),
         ("at the end", outcome_title(record)),

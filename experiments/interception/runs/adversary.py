@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from experiments.common.display_units import M_PER_KM
 from experiments.common.errors import InputError
-from experiments.common.output import output_of, to_csv, to_json
+from experiments.common.output import output_of, to_json
 from experiments.common.screen import Part, figure_files, number, number_table, progress_bar, say_warnings, show
 from experiments.interception.choices import own_strategy, study_scenario
 from experiments.interception.command import Adversary
 from experiments.interception.record_file import record_path, write_record
-from experiments.interception.runs.engage import COLUMNS, step_rows
+from experiments.interception.runs.engage import steps_csv
 from experiments.interception.runs.engagement_table import FIGURE_2, FIGURE_3, draw_engagements, need_times, read_times
 from experiments.interception.runs.shared import summary_head
 from experiments.interception.runs.worst_misses import WorstMisses, find_worst_misses
@@ -57,7 +57,7 @@ def run(options: Adversary) -> None:
         written.save("scenario.toml", scenario_to_toml(scenario))
         written.save("results.json", to_json(summary), "--json")
         for record in records:
-            written.save("steps.csv", to_csv(COLUMNS, step_rows([record])))
+            written.save("steps.csv", steps_csv([record]))
             for file in filter(None, files):
                 write_record(record, file, overwrite=options.overwrite)
                 written.add(file)

@@ -33,6 +33,7 @@ from sim import Scenario
 
 FIGURE = "figure-comparison"
 COLUMNS = ("strategy", "noise", "tie", "run", "miss_m", "impulse_m_s", "outcome", "truth_kept", "set_emptied", "hit")
+COLUMNS_IN_SPACE = (*COLUMNS, "miss_y_m", "miss_z_m")
 
 
 def run(options: Compare) -> None:
@@ -62,7 +63,9 @@ def run(options: Compare) -> None:
         written.save("scenario.toml", scenario_to_toml(scenario))
         written.save("results.json", to_json(result), "--json")
         if written.wants("--csv"):
-            written.save("results.csv", to_csv(COLUMNS, _rows(compared)), "--csv")
+            written.save(
+                "results.csv", to_csv(COLUMNS_IN_SPACE if scenario.is_spatial else COLUMNS, _rows(compared)), "--csv"
+            )
         if options.out is not None:
             drawings = {FIGURE: lambda: draw_comparison(compared, scenario.radius_m)}
             drawings |= {name: partial(_b_plane, scenario, compared, noise) for noise, name in b_planes.items()}
@@ -133,6 +136,7 @@ def _rows(compared: Sequence[Comparison]) -> list[list[Cell]]:
             bool(results.truth_kept[i]),
             bool(results.set_emptied[i]),
             results.hit.tolist()[i],
+            *(miss for miss in results.lateral_miss[i].tolist() if miss is not None),
         ]
         for comparison in compared
         for tie, results in comparison.results.items()

@@ -22,14 +22,9 @@ from experiments.interception.runs.engagement_table import (
 from experiments.interception.runs.shared import need_finite, summary_head
 from experiments.interception.scenario_file import scenario_hash, scenario_to_toml, scenario_warnings
 from guidance import NoiseKind
+from infoset import AngleSensor, Convention
 from infoset.sensors import SENSORS
-from sim import Inconsistency, Record, fly_one
-
-COLUMNS = (
-    *("noise", "step", "time_s", *(f"measured_{kind.quantity}" for kind in SENSORS)),
-    *("true_angle_rad", "true_rate_rad_s", "true_range_m", "impulse_m_s"),
-    *("predicted_miss_lower_m", "predicted_miss_upper_m", "truth_margin_m", "sections"),
-)
+from sim import AxisStep, Inconsistency, Record, StepRecord, fly_one
 
 
 def run(options: Engage) -> None:
@@ -67,7 +62,7 @@ def run(options: Engage) -> None:
         summary = {**head, **summaries} if both else summaries[noises[0].value]
         written.save("scenario.toml", scenario_to_toml(scenario if both else records[0].scenario))
         written.save("results.json", to_json(summary), "--json")
-        written.save("steps.csv", to_csv(COLUMNS, step_rows(records)), "--csv")
+        written.save("steps.csv", steps_csv(records), "--csv")
         for record, name in zip(records, folder_records, strict=True):
             targets = [record_files.get(record.scenario.noise), None if options.out is None else options.out / name]
             for file in filter(None, targets):
@@ -93,11 +88,9 @@ def _summary(record: Record, elapsed_s: float) -> dict[str, object]:
         "steps": [
             {
                 "time_s": step.time_s,
-                **{f"measured_{kind.quantity}": step.measured.get(kind.name) for kind in SENSORS},
-                "true_angle_rad": step.true_angle_rad,
-                "true_rate_rad_s": step.true_rate_rad_s,
-                "impulse_m_s": step.impulse_m_s,
-                "predicted_miss_m": None if step.predicted_miss_m is None else list(step.predicted_miss_m),
+                **_line_of_sight(record, step),
+                **_impulses(step),
+                **{f"predicted_miss{mark}_m": axis.predicted_miss_m for mark, axis in _marked(step).items()},
                 "sections": len(step.sections),
                 "truth_margin_m": step.truth_margin_m,
             }
@@ -112,22 +105,54 @@ def _where(record: Record, contradiction: Inconsistency) -> dict[str, object]:
     return {"step": step, "time_s": record.steps[step].time_s, "label_m": contradiction.label_m}
 
 
-def step_rows(records: Sequence[Record]) -> list[list[Cell]]:
-    """Return a row for each step of engagements, with `COLUMNS`."""
-    return [
-        [
-            record.noise_name,
-            number,
-            step.time_s,
-            *(step.measured.get(kind.name) for kind in SENSORS),
-            step.true_angle_rad,
-            step.true_rate_rad_s,
-            step.true_range_m,
-            step.impulse_m_s,
-            *(step.predicted_miss_m or (None, None)),
-            step.truth_margin_m,
-            len(step.sections),
-        ]
+def steps_csv(records: Sequence[Record]) -> str:
+    """Return a line for each step of engagements of one scenario, as CSV; in space, columns name the axis."""
+    rows: list[dict[str, Cell]] = [
+        {
+            "noise": record.noise_name,
+            "step": number,
+            "time_s": step.time_s,
+            **_line_of_sight(record, step),
+            "true_range_m": step.true_range_m,
+            **_impulses(step),
+            **{
+                f"predicted_miss{mark}_{end}_m": value
+                for mark, axis in _marked(step).items()
+                for end, value in zip(("lower", "upper"), axis.predicted_miss_m or (None, None), strict=True)
+            },
+            "truth_margin_m": step.truth_margin_m,
+            "sections": len(step.sections),
+        }
         for record in records
         for number, step in enumerate(record.steps)
     ]
+    return to_csv([*rows[0]], [[*row.values()] for row in rows])
+
+
+def _marked(step: StepRecord) -> dict[str, AxisStep]:
+    """Return the axes by what names of columns contain: nothing in a plane, ``_y`` and ``_z`` in space."""
+    return {"" if len(step.axes) == 1 else f"_{name}": axis for name, axis in step.axes.items()}
+
+
+def _line_of_sight(record: Record, step: StepRecord) -> dict[str, float | None]:
+    """Return the measured values and the true plane angles and rates; a gimbal measures azimuth and elevation."""
+    gimbal = record.scenario.set_model.angle_sensor.convention is Convention.GIMBAL
+    axes, values = _marked(step), {}
+    for kind in SENSORS:
+        for mark, axis in axes.items():
+            name = kind.name + mark * kind.is_lateral
+            if gimbal and kind is AngleSensor:
+                name = {"_y": "azimuth", "_z": "elevation"}[mark]
+            values[f"measured_{kind.quantity.replace(kind.name, name)}"] = axis.measured.get(kind.name)
+    for quantity, unit in (("angle", "rad"), ("rate", "rad_s")):
+        values |= {
+            f"true_{quantity}{mark}_{unit}": getattr(axis, f"true_{quantity}_{unit}") for mark, axis in axes.items()
+        }
+    return values
+
+
+def _impulses(step: StepRecord) -> dict[str, float]:
+    """Return the impulse, in space the modulus and the components."""
+    return {"impulse_m_s": step.impulse_m_s} | {
+        f"impulse{mark}_m_s": a.impulse_m_s for mark, a in _marked(step).items()
+    }

@@ -25,9 +25,11 @@ MOST_TIMES = 12
 def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
     """Yield the results of engagements side by side, with the paper's for its scenario, for the screen."""
     bounds = sorted({bound_name(record.scenario).removesuffix(", m") for record in records})
+    lateral = any(record.scenario.is_spatial for record in records)
     columns = [
         [
-            *("", "miss, m", "impulse, m/s", f"{' / '.join(bounds)}, m", "outcome"),
+            *("", "miss, m", *(("miss along y, m", "miss along z, m") if lateral else ()), "impulse, m/s"),
+            *(f"{' / '.join(bounds)}, m", "outcome"),
             "true state inside the set\nat every step",
             "smallest distance from the true\nstate to the set's boundary, m",
             *("miss within the bound Phi", "steps", "seed, run", "strategy"),
@@ -40,6 +42,7 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
             [
                 f"{record.noise_name}{meter}",
                 number(float(result.miss_m[0])),
+                *(number(miss) for miss in result.lateral_miss[0].tolist() if lateral),
                 number(float(result.impulse_m_s[0])),
                 number(result.guaranteed_miss_m.tolist()[0]),
                 _outcome(record),
@@ -53,7 +56,7 @@ def engagement_parts(records: Sequence[Record]) -> Iterator[Part]:
         )
         paper = PRINTED_SINGLE_RUN.get(record.noise_name)
         if record.scenario.name == SINGLE and record.scenario.range_sensor is None and paper is not None:
-            columns.append(["paper", number(paper[0]), number(paper[1]), *[""] * 8])
+            columns.append(["paper", number(paper[0]), *[""] * 2 * lateral, number(paper[1]), *[""] * 8])
     table = number_table(*(title for title, *_ in columns))
     for row in list(zip(*columns, strict=True))[1:]:
         table.add_row(*row)

@@ -88,10 +88,16 @@ def allowance(scenario: Scenario) -> str | None:
     model = on_board_model(scenario)
     if not model.is_guaranteed:
         return None
+    accelerations = ", ".join(
+        f"acceleration along {axis} at most {along.acceleration_m_s2:.5g} m/s^2 (from manoeuvres "
+        f"{along.disturbance_m_s2:g} and gravity {along.gravity_m_s2:.2g})"
+        for axis, along in ((axis, model.axis(axis)) for axis in model.axes)
+    )
+    pointing = model.pointing_error_rad
+    direction = f", error of their direction at most {pointing:g} rad" if pointing else ""
     return (
-        f"the guaranteed model assumes: acceleration along z at most {model.acceleration_m_s2:.5g} m/s^2 (from "
-        f"manoeuvres {model.disturbance_m_s2:g} and gravity {model.gravity_m_s2:.2g}); relative error of the closing "
-        f"speed at most {model.speed_error:.2%}, of impulses at most {model.execution_error_relative:.2%}"
+        f"the guaranteed model assumes: {accelerations}; relative error of the closing speed at most "
+        f"{model.speed_error:.2%}, of impulses at most {model.execution_error_relative:.2%}{direction}"
     )
 
 

@@ -83,6 +83,7 @@ def assert_same_step(one: StepRecord, other: StepRecord) -> None:
     for field in dataclasses.fields(StepRecord):
         if field.name != "sections":
             assert getattr(one, field.name) == getattr(other, field.name)
+    assert [*one.axes] == [*other.axes]
     assert len(one.sections) == len(other.sections)
     for a, b in zip(one.sections, other.sections, strict=True):
         assert (a.label_m, a.range_m, a.closing_speed_m_s) == (b.label_m, b.range_m, b.closing_speed_m_s)

@@ -1,0 +1,194 @@
+"""Commands of single engagements and of experiments with a scenario in space: files, tables, terminal, notebooks."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from experiments.interception.choices import with_model
+from experiments.interception.record_file import load_record
+from experiments.interception.scenario_file import load_scenario, scenario_to_toml
+from experiments.interception.terminal import frame
+from infoset import Convention, InformationSet, Model
+from sim import Scenario, fly_one, simulate
+from tests.experiments.command_line import Command, strict
+from tests.space import in_space
+
+CONVENTIONS = {
+    Convention.PLANE: ["measured_angle_y_rad", "measured_angle_z_rad"],
+    Convention.GIMBAL: ["measured_azimuth_rad", "measured_elevation_rad"],
+    Convention.CONE: ["measured_angle_y_rad", "measured_angle_z_rad"],
+}
+OF_A_STEP = [
+    *("measured_range_m", "measured_rate_y_rad_s", "measured_rate_z_rad_s", "true_angle_y_rad", "true_angle_z_rad"),
+    *("true_rate_y_rad_s", "true_rate_z_rad_s"),
+]
+IMPULSES = ["impulse_m_s", "impulse_y_m_s", "impulse_z_m_s"]
+
+
+@pytest.fixture
+def file(brief: Scenario, tmp_path: Path) -> Path:
+    path = tmp_path / "space.toml"
+    path.write_text(scenario_to_toml(in_space(brief)))
+    return path
+
+
+def rows(text: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+@pytest.mark.parametrize("convention", Convention)
+def test_the_files_of_engage_name_the_axis(
+    brief: Scenario, tmp_path: Path, infoset: Command, convention: Convention
+) -> None:
+    file = tmp_path / "space.toml"
+    file.write_text(scenario_to_toml(in_space(brief, convention=convention)))
+    code, out, err = infoset("engage", file, "--record", "r.npz", "--json", "r.json", "--csv", "r.csv")
+    assert (code, err) == (0, "wrote r.json, r.csv, r.npz\n")
+    record = load_record("r.npz")
+    written = strict(Path("r.json").read_text())
+    steps, table = written.pop("steps"), rows(Path("r.csv").read_text())
+    angles = CONVENTIONS[convention]
+    assert [*steps[0]] == [
+        *("time_s", *angles, *OF_A_STEP, *IMPULSES),
+        *("predicted_miss_y_m", "predicted_miss_z_m", "sections", "truth_margin_m"),
+    ]
+    ends = [f"predicted_miss_{axis}_{end}_m" for axis in ("y", "z") for end in ("lower", "upper")]
+    assert [*table[0]] == [
+        *("noise", "step", "time_s", *angles, *OF_A_STEP, "true_range_m", *IMPULSES),
+        *(*ends, "truth_margin_m", "sections"),
+    ]
+    for step, row, recorded in zip(steps, table, record.steps, strict=True):
+        y, z = recorded.axes.values()
+        assert [step[name] for name in angles] == [y.measured["angle"], z.measured["angle"]]
+        assert [step[name] for name in IMPULSES] == [recorded.impulse_m_s, y.impulse_m_s, z.impulse_m_s]
+        misses = [*(y.predicted_miss_m or (None, None)), *(z.predicted_miss_m or (None, None))]
+        assert [float(row[end]) if row[end] else None for end in ends] == misses
+        assert (step["predicted_miss_y_m"], step["predicted_miss_z_m"]) == (
+            None if y.predicted_miss_m is None else [*y.predicted_miss_m],
+            None if z.predicted_miss_m is None else [*z.predicted_miss_m],
+        )
+    assert np.hypot(written["miss_y_m"], written["miss_z_m"]) == pytest.approx(written["miss_m"], rel=1e-3)
+    assert sum(step["impulse_m_s"] for step in steps) == pytest.approx(written["impulse_m_s"], rel=1e-12)
+    assert re.search(rf"^miss along y, m +{written['miss_y_m']:.3g}$", out, re.MULTILINE)
+    assert re.search(rf"^miss along z, m +{written['miss_z_m']:.3g}$", out, re.MULTILINE)
+
+
+def test_a_table_of_a_plane_and_of_space(file: Path, brief_file: Path, infoset: Command) -> None:
+    infoset("engage", file, "--record", "space.npz", "--quiet")
+    infoset("engage", brief_file, "--record", "plane.npz", "--quiet")
+    _, out, _ = infoset("replay", "plane.npz", "space.npz")
+    assert re.search(r"^miss along y, m +- +-?\d", out, re.MULTILINE)
+    _, alone, _ = infoset("replay", "plane.npz")
+    assert "along" not in alone
+
+
+@pytest.mark.parametrize("width", [60, 100])
+def test_the_terminal_shows_both_planes(brief: Scenario, width: int) -> None:
+    record = fly_one(in_space(brief))
+    console = Console(file=io.StringIO(), width=width, record=True)
+    for step in (0, 10):
+        console.print(frame([record, record], step, console))
+    text = console.export_text()
+    assert text.count("X") >= 8
+    for step in (0, 10):
+        for name, axis in record.steps[step].axes.items():
+            assert axis.predicted_miss_m is not None
+            lower, upper = axis.predicted_miss_m
+            assert text.count(f"predicted miss {name}  {lower:.5g} .. {upper:.5g} m") == 2
+    for name in ("y", "z"):
+        assert len(re.findall(rf"{name} rate \S+ \.\. \S+ µrad/s", text)) == 4
+        assert len(re.findall(rf"{name} angle \S+ \.\. \S+ mrad", text)) == 4
+        assert len(re.findall(rf"│ {name} [ =+|]+ │", text)) == 4
+
+
+def test_the_terminal_shows_an_empty_set_once(brief: Scenario) -> None:
+    record = fly_one(in_space(brief))
+    step = record.steps[0]
+    empty = replace(
+        step, sections=(), axes={name: replace(axis, predicted_miss_m=None) for name, axis in step.axes.items()}
+    )
+    console = Console(file=io.StringIO(), width=70, record=True)
+    console.print(frame([replace(record, steps=(empty,))], 0, console))
+    assert console.export_text().count("the set is empty") == 1
+
+
+def test_replay_draws_and_prints_a_record_in_space(file: Path, infoset: Command) -> None:
+    infoset("engage", file, "--record", "r.npz", "--quiet")
+    code, out, _ = infoset("replay", "r.npz", "--terminal")
+    assert code == 0
+    assert "predicted miss y" in out
+
+
+def test_the_files_of_experiment_have_the_columns_of_space(file: Path, infoset: Command) -> None:
+    code, _, _ = infoset("experiment", file, "--runs", 3, "--json", "x.json", "--csv", "x.csv")
+    assert code == 0
+    scenario = load_scenario(str(file))
+    flown = simulate(replace(scenario, range_sensor=None), 3).to_dict()
+    lateral = ("start_y_m", "start_vy_m_s", "miss_y_m", "miss_z_m")
+    table = rows(Path("x.csv").read_text())
+    for name in lateral:
+        assert [float(row[name]) for row in table[:3]] == flown[name]
+    curve = strict(Path("x.json").read_text())["curves"][0]
+    assert [curve[name] for name in ("miss_m", "miss_y_m", "miss_z_m")] == [
+        flown[name] for name in ("miss_m", "miss_y_m", "miss_z_m")
+    ]
+    assert not {"start_y_m", "start_z_m"} & set(curve)
+
+
+def test_experiment_says_what_the_guaranteed_model_assumes_along_each_axis(file: Path, infoset: Command) -> None:
+    settings = ["--set", "information_set.disturbance_y_m_s2=0.002", "--set", "thruster.pointing_error_rad=0.001"]
+    _, out, _ = infoset("experiment", file, "--runs", 1, "--model", "guaranteed", *settings)
+    (line,) = [line for line in out.splitlines() if line.startswith("the guaranteed model assumes")]
+    assert "acceleration along y at most 0.002" in line
+    assert "acceleration along z at most 0.005" in line
+    assert line.endswith("error of their direction at most 0.001 rad")
+
+
+def test_compare_in_space(file: Path, infoset: Command) -> None:
+    arguments = ["compare", file, "--runs", 2, "--strategies", "patient,kalman,least-squares,zero-effort-miss"]
+    code, out, _ = infoset(*arguments, "--json", "c.json", "--csv", "c.csv")
+    assert code == 0
+    assert "kalman" in out
+    table = rows(Path("c.csv").read_text())
+    scenario = load_scenario(str(file))
+    flown = simulate(with_model(replace(scenario, strategy="patient"), Model.GUARANTEED), 2).to_dict()
+    first = [row for row in table if row["strategy"] == "patient" and row["noise"] == "random"]
+    for name in ("miss_y_m", "miss_z_m"):
+        assert [float(row[name]) for row in first] == flown[name]
+    assert len(json.loads(Path("c.json").read_text())["strategies"]) == 8
+
+
+def test_notebooks_show_both_axes(brief: Scenario) -> None:
+    scenario = in_space(brief)
+    record, information = fly_one(scenario), InformationSet(scenario.set_model)
+    page = record._repr_html_()
+    y, z = record.result.lateral_miss[0].tolist()
+    assert f"{y:.4g} m along y, {z:.4g} m along z" in page
+    for name in ("y", "z"):
+        assert f"predicted miss along {name} without further impulses" in page
+        assert f"impulses along {name}" in page
+    assert page.count("<svg") == 4
+    for picture in (
+        information._repr_svg_(),
+        information.sections()[0]._repr_svg_(),
+        record.steps[3].sections[0]._repr_svg_(),
+    ):
+        assert picture.startswith("<svg")
+        assert "plane (x, y)" in picture
+        assert "plane (x, z)" in picture
+
+
+def test_notebooks_show_a_plane_as_before(brief: Scenario) -> None:
+    page: Any = fly_one(brief)._repr_html_()
+    assert "along" not in page
+    assert page.count("<svg") == 2
