@@ -167,8 +167,8 @@ def lower_bound(scenario: Scenario, *, progress: Callable[[float], None] | None 
 
     In space, each axis has a linear program, and the impulses limit the modulus. If the errors of the angles are in a
     box, the two motions of a pair differ along both axes, each by the most that its program allows:
-    |(dy(T), dz(T))| replaces |dz(T)|. If the errors are in a disc, they differ along the axis with the greater bound.
-    Equal axes have one linear program.
+    |(dy(T), dz(T))| replaces |dz(T)|, so the bound is never below that of one axis. If the errors are in a disc, they
+    differ along the axis with the greater bound. Equal axes have one linear program.
     """
     model = scenario.set_model
     slow, fast = max(model.bounds.vx_m_s), min(model.bounds.vx_m_s)
