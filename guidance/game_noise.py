@@ -65,7 +65,7 @@ class GameNoise:
             if isinstance(sensor, AngleSensor):
                 chosen = _angle(sensor, sight, predicted, miss, upper_is_worse)
             elif isinstance(sensor, RangeSensor):
-                chosen = _range(sensor, sight, predicted, upper_is_worse)
+                chosen = _range(sensor, sight, predicted, miss, upper_is_worse)
             else:
                 upper, lower = sensor.true_value(miss.upper_point), sensor.true_value(miss.lower_point)
                 chosen = sensor.nearest(sight, np.where(upper_is_worse, upper, lower))
@@ -79,13 +79,13 @@ class GameNoise:
             return np.where(tie, self._upper_at_tie(self.tie, step, tie.shape), upper > lower)
         if tie.ndim == 1:
             raise ValueError(f"tie must be one TieRule in a plane, which has one lateral axis: got {self.tie!r}")
-        chosen = [self._upper_at_tie(rule, step, tie.shape)[axis] for axis, rule in enumerate(self.tie)]
-        return np.where(tie, chosen, upper > lower)
+        y, z = (self._upper_at_tie(rule, step, tie.shape) for rule in self.tie)
+        return np.where(tie, np.where([[True], [False]], y, z), upper > lower)
 
-    def _upper_at_tie(self, rule: TieRule, step: int, shape: tuple[int, ...]) -> Flags:
+    def _upper_at_tie(self, rule: TieRule, step: int, shape: tuple[int, ...]) -> Flags | bool:
         if rule is TieRule.RANDOM:
             return draws_of_step("tie_draws", self.tie_draws, step, shape) >= 0.0
-        return np.full(shape, rule is TieRule.UPPER or (rule is TieRule.ALTERNATE and step % 2 == 0))
+        return rule is TieRule.UPPER or (rule is TieRule.ALTERNATE and step % 2 == 0)
 
 
 @dataclass(frozen=True)
@@ -120,17 +120,17 @@ def _angle(
         lower=sight.alpha_rad - bound,
         upper=sight.alpha_rad + bound,
     )
-    return sensor.nearest(sight, chosen)
+    return chosen if sensor.has_plane_angles_in_box else sensor.nearest(sight, chosen)
 
 
-def _range(sensor: RangeSensor, sight: LineOfSight, predicted: InformationSetView, upper_is_worse: Flags) -> Floats:
-    lower, upper = predicted.predicted_miss_by_section_m()
-    ranges, error, is_upper = predicted.ranges_m, sensor.relative_error, upper_is_worse[..., None]
-    living = predicted.living & (ranges != 0.0)
-    rows, side = np.arange(len(ranges)), np.where(is_upper, 1.0, -1.0)
-    worst_corners, other_corners = np.where(is_upper, upper, lower), np.where(is_upper, lower, upper)
-    worst = ranges[rows, np.where(living, _size_on_side(worst_corners, side), -np.inf).argmax(axis=1)]
-    other = ranges[rows, np.where(living, _size_on_side(other_corners, side), np.inf).argmin(axis=1)]
+def _range(
+    sensor: RangeSensor, sight: LineOfSight, predicted: InformationSetView, miss: PredictedMiss, upper_is_worse: Flags
+) -> Floats:
+    upper, lower, error = miss.upper_point.range_m, miss.lower_point.range_m, sensor.relative_error
+    worst = np.where(upper_is_worse, upper, lower)
+    other = np.where(upper_is_worse, lower, upper)
+    if upper_is_worse.ndim > 1:
+        worst, other = _ranges_of_corners(predicted, upper_is_worse)
     least, greatest = predicted.stored_range_interval_m()
     return keep_point(
         worst >= other,
@@ -143,19 +143,25 @@ def _range(sensor: RangeSensor, sight: LineOfSight, predicted: InformationSetVie
     )
 
 
-def _size_on_side(corners_m: Floats, side: Floats) -> Floats:
-    """Return the modulus of points of predicted misses, negative if they are on the other side of zero, shape (B, S).
+def _ranges_of_corners(predicted: InformationSetView, upper_is_worse: Flags) -> tuple[Floats, Floats]:
+    """Return the ranges of the sections of the worst corner and of the opposite one, m, each (B,).
 
-    Parameters
-    ----------
-    corners_m : ndarray, shape (..., B, S)
-        Points, in a plane of one coordinate and in space of two.
-    side : ndarray, shape (..., B, 1)
-        1 or -1: the side of each coordinate.
+    Notes
+    -----
+    Corners on the other side of zero count as negative, so that the rule is that of the plane if an axis is exactly
+    zero.
     """
-    shape = (-1, *corners_m.shape[-2:])
-    size = np.hypot.reduce(corners_m.reshape(shape))
-    return np.asarray(np.copysign(size, (side * corners_m).reshape(shape).sum(axis=0)))
+    lower, upper = predicted.predicted_miss_by_section_m()
+    is_upper, ranges = upper_is_worse[..., None], predicted.ranges_m
+    living, rows, side = predicted.living & (ranges != 0.0), np.arange(len(ranges)), np.where(is_upper, 1.0, -1.0)
+    worst, other = (
+        np.copysign(np.hypot(*corner), (side * corner).sum(axis=0))
+        for corner in (np.where(is_upper, upper, lower), np.where(is_upper, lower, upper))
+    )
+    return (
+        ranges[rows, np.where(living, worst, -np.inf).argmax(axis=1)],
+        ranges[rows, np.where(living, other, np.inf).argmin(axis=1)],
+    )
 
 
 def keep_point(

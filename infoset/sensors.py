@@ -161,7 +161,7 @@ class Sensor(ABC):
     def nearest(self, sight: Geometry, wanted: Floats) -> Floats:
         """Return the possible measurement that is nearest to a wanted one."""
         true, bound = self.true_value(sight), self.bound(sight)
-        return np.clip(wanted, true - bound, true + bound)
+        return np.minimum(np.maximum(wanted, true - bound), true + bound)
 
 
 @dataclass(frozen=True)
@@ -224,6 +224,11 @@ class AngleSensor(Sensor):
     def is_disc(self) -> bool:
         """Whether the two errors of a measurement in space are in a disc."""
         return self.convention is Convention.CONE or self.error_shape is ErrorShape.DISC
+
+    @property
+    def has_plane_angles_in_box(self) -> bool:
+        """Whether each plane angle is measured with a bound of its own, as in a plane."""
+        return self.convention is Convention.PLANE and not self.is_disc
 
     @property
     def is_spatial(self) -> bool:

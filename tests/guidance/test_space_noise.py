@@ -177,9 +177,10 @@ class Misses:
         return self.ranges_m.min(axis=1), self.ranges_m.max(axis=1)
 
     def predicted_miss(self) -> PredictedMiss:
-        nowhere = ExtremePoints(*np.zeros((3, *self.lower.shape[:-1])))
-        exists = np.ones(len(self.ranges_m), dtype=bool)
-        return PredictedMiss(exists, self.lower.min(axis=-1), self.upper.max(axis=-1), nowhere, nowhere)
+        none, exists = np.zeros(self.lower.shape[:-1]), np.ones(len(self.ranges_m), dtype=bool)
+        lower, upper = self.lower.argmin(axis=-1), self.upper.argmax(axis=-1)
+        points = (ExtremePoints(none, none, self.ranges_m[0, which]) for which in (lower, upper))
+        return PredictedMiss(exists, self.lower.min(axis=-1), self.upper.max(axis=-1), *points)
 
 
 def ranged(noise: GameNoise, misses: Any, distance: float, axes: int = 2) -> float:
@@ -217,20 +218,6 @@ def test_with_one_idle_axis_the_range_is_that_of_the_plane(seed: int, tie: TieRu
     draw, distance = random.uniform(-1.0, 1.0, (2, 1, 1)), float(random.uniform(5e6, 6e6))
     planar = ranged(make(tie, draw[1 - idle]), Misses(ends[0], ends[1], ranges), distance, axes=1)
     assert ranged(make(tie, draw), Misses(both[0], both[1], ranges), distance) == planar
-
-
-@pytest.mark.parametrize("steps", [0, 3])
-def test_the_sections_of_the_extreme_points_are_those_of_the_planar_rule(steps: int) -> None:
-    """In a plane the rule for ranges reads the sections, not the points: the ranges are the same, bit for bit."""
-    information, random = InformationSet(MODEL.axis("z"), BATCH), np.random.default_rng(2)
-    for _ in range(steps):
-        information.shift(random.uniform(-5.0, 5.0, BATCH))
-        information.predict()
-    miss, (lower, upper) = information.predicted_miss(), information.predicted_miss_by_section_m()
-    rows, living = np.arange(BATCH), information.living
-    highest, lowest = np.where(living, upper, -np.inf).argmax(axis=1), np.where(living, lower, np.inf).argmin(axis=1)
-    assert np.array_equal(information.ranges_m[rows, highest], miss.upper_point.range_m)
-    assert np.array_equal(information.ranges_m[rows, lowest], miss.lower_point.range_m)
 
 
 @pytest.mark.parametrize("kind", KINDS)
