@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from experiments import load_scenario
 from guidance import (
+    GameNoise,
     Kalman,
     LeastSquares,
     NoiseKind,
@@ -35,7 +37,9 @@ from infoset import (
     SetModel,
     StateBox,
 )
-from sim import Scenario, simulate
+from sim import Results, Scenario, simulate
+from sim.draws import Draws, draw
+from sim.engagement import Engagements
 
 Floats = NDArray[np.float64]
 
@@ -280,3 +284,75 @@ def test_every_sensor_is_flown(sensor: dict[str, Any]) -> None:
         results = simulate(replace(space(**sensor), noise=noise), 4)
         assert np.median(results.miss_m) < 30.0
         assert not results.set_emptied.any()
+
+
+def fly(scenario: Scenario, draws: Draws, noise: GameNoise | None = None) -> Results:
+    flight = Engagements(scenario, draws, noise=noise)
+    while flight.flying:
+        flight.advance()
+    return flight.results(np.arange(len(draws.position_m)))
+
+
+def by_axis(draws: Draws, change: Callable[[Floats], Floats]) -> Draws:
+    """Draws of an engagement in free space, with the parts of the two axes, shape (2, ...), changed."""
+    start = (
+        np.concatenate([change(part[:, :2].T), part[:, 2:].T]).T for part in (draws.position_m, draws.velocity_m_s)
+    )
+    errors = {name: change(values) if values.ndim == 3 else values for name, values in draws.errors.items()}
+    position, velocity = start
+    return replace(draws, position_m=position, velocity_m_s=velocity, errors=errors, tie=change(draws.tie))
+
+
+def in_free_space(name: str, noise: NoiseKind, tie: TieRule = TieRule.RANDOM) -> Scenario:
+    scenario = replace(load_scenario("asteroid-1997-space"), strategy=name, noise=noise, tie=tie, sun=None)
+    return replace(scenario, rate_sensor=RateSensor(0.5, 1e-6))
+
+
+@pytest.mark.parametrize("name", strategy_names())
+@pytest.mark.parametrize("noise", list(NoiseKind))
+def test_an_engagement_with_exchanged_axes_is_the_same_bit_for_bit(name: str, noise: NoiseKind) -> None:
+    scenario = in_free_space(name, noise)
+    draws = draw(scenario, range(3), 3)
+    there, back = fly(scenario, draws), fly(scenario, by_axis(draws, lambda values: values[::-1].copy()))
+    assert np.array_equal(back.miss_m, there.miss_m)
+    assert np.array_equal(back.impulse_m_s, there.impulse_m_s)
+    assert np.array_equal(back.lateral_miss, there.lateral_miss[:, ::-1])
+
+
+@pytest.mark.parametrize("name", ["symmetric-miss", "patient", "zero-effort-miss"])
+@pytest.mark.parametrize("signs", [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0)])
+def test_a_mirrored_engagement_is_mirrored(name: str, signs: tuple[float, float]) -> None:
+    """To rounding, as in the plane. If one axis is mirrored, so is its tie rule."""
+    scenario, mirror = in_free_space(name, NoiseKind.GAME), np.array(signs)
+    draws = draw(scenario, range(3), 3)
+    back = by_axis(draws, lambda values: values * mirror.reshape(2, *[1] * (values.ndim - 1)))
+    rules = [TieRule.UPPER if sign > 0.0 else TieRule.LOWER for sign in signs]
+    one, other = (
+        fly(scenario, *each)
+        for each in ((draws, GameNoise(TieRule.UPPER, draws.tie)), (back, GameNoise((rules[0], rules[1]), back.tie)))
+    )
+    np.testing.assert_allclose(other.miss_m, one.miss_m, rtol=1e-6)
+    np.testing.assert_allclose(other.impulse_m_s, one.impulse_m_s, rtol=1e-6)
+    np.testing.assert_allclose(other.lateral_miss, one.lateral_miss * mirror, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("noise", "tie"), [(NoiseKind.RANDOM, TieRule.UPPER), *((NoiseKind.GAME, tie) for tie in TieRule)]
+)
+def test_an_engagement_without_uncertainty_along_y_is_the_planar_one(noise: NoiseKind, tie: TieRule) -> None:
+    plane = replace(load_scenario("asteroid-1997"), noise=noise, tie=tie, rate_sensor=RateSensor(0.5, 1e-6))
+    model, idle = plane.set_model, {"y_m": (0.0, 0.0), "vy_m_s": (0.0, 0.0)}
+    space = replace(
+        plane,
+        set_model=replace(
+            model,
+            bounds=replace(model.bounds, **idle),
+            angle_sensor=replace(model.angle_sensor, error_at_nominal_range_y_rad=0.0, error_at_zero_range_y_rad=0.0),
+            disturbance_y_m_s2=0.0,
+        ),
+        dispersion=replace(plane.dispersion, **idle),
+    )
+    one, other = (fly(scenario, draw(scenario, range(4), 3)) for scenario in (plane, space))
+    assert np.array_equal(other.miss_m, one.miss_m)
+    assert np.array_equal(other.impulse_m_s, one.impulse_m_s)
+    assert np.array_equal(np.abs(other.lateral_miss[:, 0]), np.zeros(4))
