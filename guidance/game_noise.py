@@ -179,18 +179,18 @@ def keep_point(
 
     Parameters
     ----------
-    is_larger : ndarray of bool, shape (B,)
+    is_larger : ndarray of bool, shape (..., B)
         Whether the point to keep is the larger of the two extremes in the measured quantity.
-    point_at_top, point_at_bottom : ndarray, shape (B,)
+    point_at_top, point_at_bottom : ndarray, shape (..., B)
         Measured values whose interval ends at the point, above or below.
-    least_at_bottom, greatest_at_top : ndarray, shape (B,)
+    least_at_bottom, greatest_at_top : ndarray, shape (..., B)
         Measured values whose interval begins at the least value of the set, or ends at its greatest.
-    lower, upper : ndarray, shape (B,)
+    lower, upper : ndarray, shape (..., B)
         Measured values that the true value allows.
 
     Returns
     -------
-    ndarray, shape (B,)
+    ndarray, shape (..., B)
         Within [lower, upper].
 
     References
