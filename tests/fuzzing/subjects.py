@@ -94,9 +94,9 @@ def _read_pursuit(path: str) -> object:
         return error
 
 
-def small_record() -> Record:
+def small_record(scenario: str = "asteroid-1997") -> Record:
     """Return the beginning of an engagement."""
-    whole = fly_one(load_scenario("asteroid-1997"), 3, seed=11)
+    whole = fly_one(load_scenario(scenario), 3, seed=11)
     return dataclasses.replace(whole, steps=whole.steps[:6])
 
 

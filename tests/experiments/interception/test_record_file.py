@@ -427,6 +427,8 @@ def test_what_does_not_fit_together(
         (lambda arrays: arrays.pop("measured_angle_y_rad"), "in space, and it has no measured_angle_y_rad.npy"),
         (lambda arrays: [arrays.pop(name) for name in [*arrays] if "_y_" in name], "it has no impulse_y_m_s.npy"),
         (lambda arrays: arrays["json"]["result"].pop("lateral_miss"), "miss_y_m is unknown in space"),
+        (result(lateral_miss=[None, 1.0]), "miss_y_m is unknown in space"),
+        (result(lateral_start=[1.0, None]), "start_vy_m_s is unknown in space"),
         (result(lateral_start=[1.0]), "wrong start"),
         (result(lateral_miss=[1e300, 1.0]), "miss_y_m must be"),
         (put("true_angle_y_rad", 0, math.nan), "true_angle_y_rad holds what is not a finite number"),

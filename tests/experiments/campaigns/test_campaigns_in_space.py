@@ -1,0 +1,89 @@
+"""Campaigns, sweeps and their reports with a scenario in space."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from experiments.interception.choices import with_model
+from experiments.interception.scenario_file import load_scenario, scenario_to_toml
+from guidance import NoiseKind
+from infoset import Model
+from sim import Scenario, simulate
+from sim.storage import CampaignFolder
+from tests.experiments.command_line import Command, strict
+from tests.space import in_space
+
+SWEPT = "uncertainty.y_km.greatest=0.1:0.2:2,angle_sensor.error_at_zero_range_y_rad=0.0001:0.0004:2"
+
+
+@pytest.fixture
+def file(brief: Scenario, tmp_path: Path) -> Path:
+    path = tmp_path / "space.toml"
+    path.write_text(scenario_to_toml(in_space(brief)))
+    return path
+
+
+def test_a_campaign_in_space_is_resumed_and_reported(file: Path, infoset: Command) -> None:
+    assert infoset("campaign", file, "--runs", 8, "--noise", "mixed", "--out", "runs", "--seed", 3)[0] == 0
+    code, _, _ = infoset("campaign", file, "--runs", 12, "--noise", "mixed", "--out", "runs", "--seed", 3, "--resume")
+    assert code == 0
+    table = CampaignFolder.read(Path("runs")).table()
+    assert table.column("run").to_pylist() == list(range(12))
+    scenario = with_model(load_scenario(str(file)), Model.GUARANTEED)
+    for kind, first in ((NoiseKind.RANDOM, 0), (NoiseKind.GAME, 1)):
+        flown = simulate(replace(scenario, noise=kind), 12, seed=3)
+        rows = table.take(list(range(first, 12, 2)))
+        assert rows.column("miss_m").to_pylist() == flown.miss_m[first::2].tolist()
+        for index, name in enumerate(("miss_y_m", "miss_z_m")):
+            assert rows.column(name).to_pylist() == flown.lateral_miss[first::2, index].tolist()
+        y_km, vy_km_s = flown.lateral_start[first::2].T / 1e3
+        assert rows.column("y_km").to_pylist() == y_km.tolist()
+        assert rows.column("vy_km_s").to_pylist() == vy_km_s.tolist()
+    report = infoset.json("report", "runs", "--quiet")
+    assert (report["runs"], report["complete"]) == (12, True)
+    assert {"y_km", "vy_km_s"} < set(report["correlation_with_miss"]["random"])
+    worst = report["worst"][0]
+    flown = strict(infoset(*worst["replay"].split()[1:], "--json", "-")[1])
+    assert flown["miss_m"] == worst["miss_m"]
+    assert flown["miss_y_m"] in table.column("miss_y_m").to_pylist()
+
+
+def test_a_sweep_over_keys_of_space_is_resumed_and_reported(file: Path, infoset: Command) -> None:
+    sweep = ["sweep", file, "--vary", SWEPT, "--noise", "random", "--out", "cells"]
+    assert infoset(*sweep, "--runs", 3)[0] == 0
+    code, out, _ = infoset(*sweep, "--runs", 5, "--resume")
+    assert code == 0
+    assert "uncertainty.y_km.greatest (rows) and angle_sensor.error_at_zero_range_y_rad (columns)" in out
+    scenario = with_model(load_scenario(str(file)), Model.GUARANTEED)
+    model, sensor = scenario.set_model, scenario.set_model.angle_sensor
+    last = replace(
+        model,
+        bounds=replace(model.bounds, y_m=(-100.0, 200.0)),
+        angle_sensor=replace(sensor, error_at_zero_range_y_rad=0.0004),
+    )
+    table = CampaignFolder.read(Path("cells")).table(["cell", "miss_m", "miss_y_m"])
+    flown = simulate(replace(scenario, set_model=last, noise=NoiseKind.RANDOM, tie=scenario.tie), 5)
+    of_last = [row for row in table.to_pylist() if row["cell"] == 3]
+    assert [row["miss_m"] for row in of_last] == flown.miss_m.tolist()
+    assert [row["miss_y_m"] for row in of_last] == flown.lateral_miss[:, 0].tolist()
+    report = infoset.json("report", "cells", "--quiet")
+    assert [axis["key"] for axis in report["axes"]] == [part.split("=")[0] for part in SWEPT.split(",")]
+    assert report["runs"] == 20
+
+
+@pytest.mark.parametrize(
+    "vary",
+    [
+        "sun.elevation_deg=0:90:2",
+        "thruster.pointing_error_rad=0:0.01:2",
+        "information_set.disturbance_y_m_s2=0.001:0.01:2",
+        "dispersion.vy_km_s.least=-0.01:0:2",
+        "angle_sensor.scale=1:2:2",
+    ],
+)
+def test_each_number_of_space_can_be_varied(vary: str, file: Path, infoset: Command) -> None:
+    code, _, err = infoset("sweep", file, "--vary", vary, "--runs", 1, "--out", "cells")
+    assert code == 0, err
