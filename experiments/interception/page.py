@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,7 +36,11 @@ def interception_page(records: Sequence[Record]) -> str:
     titles = record_titles(records)
     return page(
         f"Replay of {' and '.join(names)}",
-        ["sets.js", "interception.js"],
+        [
+            "sets.js",
+            *(["b-plane.js"] if any(record.scenario.is_spatial for record in records) else []),
+            "interception.js",
+        ],
         {
             "heading": f"Replay of {' and '.join(names)}",
             "about": list(
@@ -49,54 +53,77 @@ def interception_page(records: Sequence[Record]) -> str:
 
 def _data(record: Record, title: str) -> dict[str, object]:
     scenario, steps = record.scenario, record.steps
-    sensor, thruster, model = scenario.set_model.angle_sensor, scenario.thruster, scenario.set_model
-    impulses = np.array([step.impulse_m_s for step in steps])
-    velocity_x_m_s = float(record.result.velocity_m_s[0, 1])
+    thruster, model = scenario.thruster, scenario.set_model
+    spent = np.cumsum([abs(step.impulse_m_s) for step in steps])
+    stages = list(replayed(record))
+    states = [state for each in stages for state in (each.before, each.measured)]
+    sections = [section for state in states for section in state]
     return {
         "title": title,
         "outcome": outcome_title(record),
         "facts": f"{record.strategy} strategy, {model.kind.value} model, seed {record.seed}, run {record.run}",
         "closing_speed_m_s": model.closing_speed_m_s,
-        "angle_error_rad": sensor.error_at_zero_range_rad,
-        "angle_error_slope_rad_m": sensor.error_slope_rad_per_m,
         "range_error_relative": scenario.range_sensor.relative_error if scenario.range_sensor is not None else None,
         "rate_error_rad_s": scenario.rate_sensor.error_rad_s if scenario.rate_sensor is not None else None,
         "greatest_impulse_m_s": thruster.greatest_impulse_m_s,
         "budget_m_s": thruster.budget_m_s,
+        "radius_m": scenario.radius_m,
         "time_s": [step.time_s for step in steps],
-        **{f"measured_{kind.quantity}": [step.measured.get(kind.name) for step in steps] for kind in SENSORS},
+        "measured_range_m": [step.measured.get("range") for step in steps],
+        "true_range_m": [step.true_range_m for step in steps],
+        "modulus_m_s": [abs(step.impulse_m_s) for step in steps],
+        "budget_left_m_s": np.maximum(thruster.budget_m_s - spent, 0.0).tolist(),
+        "sections": {
+            "starts": _packed(np.concatenate([[0], np.cumsum([len(state) for state in states])]), "<u4"),
+            "labels_m": _packed([section.label_m for section in sections], "<f8"),
+            "ranges_m": _packed([section.range_m for section in sections], "<f8"),
+        },
+        "axes": [
+            {
+                "along": f" along {axis}" if scenario.is_spatial else "",
+                **_axis_data(record, axis),
+                "outlines": {
+                    "predicted_miss_m": _packed(np.concatenate([each.miss_m[axis] for each in stages]), "<f8"),
+                    **packed_outlines([_omega_alpha(section, axis) for section in sections]),
+                },
+            }
+            for axis in model.axes
+        ],
+    }
+
+
+def _axis_data(record: Record, axis: str) -> dict[str, object]:
+    """Return what belongs to one lateral axis: the line of sight in its plane with x, impulses and predicted misses."""
+    steps = [step.axes[axis] for step in record.steps]
+    model = on_board_model(record.scenario).axis(axis)
+    # omega (x^2 + a^2) = V_a x - V_x a, and a + V_a x / |V_x| is the miss of the true state without further impulses.
+    slopes = np.tan([[step.axes[name].true_angle_rad for name in step.axes] for step in record.steps])
+    own = np.tan([step.true_angle_rad for step in steps])
+    share = (1.0 + own**2) / (1.0 + np.sum(slopes**2, axis=1))
+    rates, ranges = np.array([(step.axes[axis].true_rate_rad_s, step.true_range_m) for step in record.steps]).T
+    misses = -rates * ranges**2 / float(record.result.velocity_m_s[0, 1]) * share
+    return {
+        "axis": axis,
+        "angle_error_rad": model.angle_sensor.error_at_zero_range_rad,
+        "angle_error_slope_rad_m": model.angle_sensor.error_slope_rad_per_m,
+        "disturbance_m_s2": model.disturbance_m_s2,
+        **{
+            f"measured_{kind.quantity}": [step.measured.get(kind.name) for step in steps]
+            for kind in SENSORS
+            if kind.is_lateral
+        },
         "true_angle_rad": [step.true_angle_rad for step in steps],
         "true_rate_rad_s": [step.true_rate_rad_s for step in steps],
-        "true_range_m": [step.true_range_m for step in steps],
-        # omega r^2 = V_z x - V_x z, and z + V_z x / |V_x| is the miss of the true state without further impulses.
-        "true_predicted_miss_m": [-step.true_rate_rad_s * step.true_range_m**2 / velocity_x_m_s for step in steps],
+        "true_predicted_miss_m": misses.tolist(),
         "predicted_miss_m": [step.predicted_miss_m for step in steps],
-        "impulse_m_s": impulses.tolist(),
-        "budget_left_m_s": np.maximum(thruster.budget_m_s - np.cumsum(np.abs(impulses)), 0.0).tolist(),
-        "sets": _sets(record),
+        "impulse_m_s": [step.impulse_m_s for step in steps],
     }
 
 
-def _sets(record: Record) -> dict[str, str]:
-    """Sections in (omega, alpha) of every state: of step i before the measurement (2 i) and after it (2 i + 1)."""
-    states: list[tuple[Section, ...]] = []
-    misses: list[tuple[float, float]] = []
-    for stages in replayed(record):
-        states += [stages.before, stages.measured]
-        misses += stages.miss_m
-    sections = [section for state in states for section in state]
-    return {
-        "starts": _packed(np.concatenate([[0], np.cumsum([len(state) for state in states])]), "<u4"),
-        "labels_m": _packed([section.label_m for section in sections], "<f8"),
-        "ranges_m": _packed([section.range_m for section in sections], "<f8"),
-        "predicted_miss_m": _packed(misses, "<f8"),
-        **packed_outlines([_omega_alpha(section) for section in sections]),
-    }
-
-
-def _omega_alpha(section: Section) -> Floats:
+def _omega_alpha(section: Section, axis: str) -> Floats:
     """Vertices of a section in (omega, alpha), as `Section.omega_alpha` but without its checks."""
-    v, z = section.polygon.vertices[: int(section.polygon.counts)].T
+    polygon = section.polygon if axis == "z" or section.polygon_y is None else section.polygon_y
+    v, z = polygon.vertices[: int(polygon.counts)].T
     alpha = z / section.range_m
     return np.stack([(v + section.closing_speed_m_s * alpha) / section.range_m, alpha], axis=1)
 
@@ -111,13 +138,13 @@ class Stages:
         Predicted from the previous step.
     measured : tuple of Section
         After the measurement: equal to the recorded sections.
-    miss_m : tuple of tuple of float
-        Predicted-miss interval of each measured section, m.
+    miss_m : mapping of str to ndarray, shape (sections, 2)
+        Predicted-miss interval of each measured section, m, for each lateral axis.
     """
 
     before: tuple[Section, ...]
     measured: tuple[Section, ...]
-    miss_m: tuple[tuple[float, float], ...]
+    miss_m: Mapping[str, Floats]
 
 
 def replayed(record: Record) -> Iterator[Stages]:
@@ -135,11 +162,16 @@ def replayed(record: Record) -> Iterator[Stages]:
     After the impulse k a section is the measured one with V reduced by k; after the prediction it is `before` of the
     next step. Two of the four stages are therefore enough. The cost is that of the steps of the set, a few ms.
     """
-    scenario = record.scenario
+    scenario, axes = record.scenario, record.scenario.set_model.axes
     information = InformationSet(on_board_model(scenario))
     for number, step in enumerate(record.steps):
+        along = [step.axes[axis] for axis in axes]
         before = tuple(information.sections())
-        values = {name: np.array([value]) for name, value in step.measured.items()}
+        values = {
+            name: _of_batch([each.measured[name] for each in along[: len(axes) if sensor.is_lateral else 1]])
+            for name, sensor in scenario.sensors.items()
+            if name in step.measured
+        }
         for name, sensor in scenario.sensors.items():
             if name in values:
                 sensor.cut(information, values, np.array([True]))
@@ -149,14 +181,18 @@ def replayed(record: Record) -> Iterator[Stages]:
                 f"the record of {shown(scenario.name)}: replaying it gives different sets at step {number}; "
                 "another version of infoset wrote it: create it again with `infoset engage --record FILE.npz`"
             )
-        lower, upper = information.predicted_miss_by_section_m()
-        living = information.living[0]
-        ends = zip(lower[0][living].tolist(), upper[0][living].tolist(), strict=True)
-        yield Stages(before, measured, tuple(ends))
-        information.shift(step.impulse_m_s)
+        intervals = np.stack(information.predicted_miss_by_section_m(), axis=-1)[..., information.living[0], :]
+        by_axis = intervals.reshape(len(axes), -1, 2)
+        yield Stages(before, measured, dict(zip(axes, by_axis, strict=True)))
+        information.shift(_of_batch([each.impulse_m_s for each in along]))
         information.drop_below_threshold()
         information.predict()
-    yield Stages(tuple(information.sections()), (), ())
+    yield Stages(tuple(information.sections()), (), dict.fromkeys(axes, np.empty((0, 2))))
+
+
+def _of_batch(values: Sequence[float]) -> Floats:
+    """Return values of a batch of one: along several axes with shape (axes, 1), else with shape (1,)."""
+    return np.array(values).reshape((-1, 1) if len(values) > 1 else -1)
 
 
 def packed_outlines(outlines: Sequence[Floats]) -> dict[str, str]:

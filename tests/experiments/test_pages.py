@@ -27,7 +27,7 @@ from experiments.multipoint.scene import Scene
 from experiments.pursuit.file import load_pursuit
 from experiments.pursuit.page import pursuit_page
 from guidance import NoiseKind
-from infoset import InitialSet, Model, RateSensor, Recovery
+from infoset import Convention, InitialSet, Model, RateSensor, Recovery
 from rendezvous.pursuit_evasion import solve
 from sim import Outcome, Record, fly_one
 
@@ -81,13 +81,18 @@ def flown(name: str) -> Record:
     if name == "guaranteed":
         sound = replace(model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
         return fly_one(replace(scenario, set_model=sound, rate_sensor=RateSensor(1.0, 2e-6)))
+    if name == "space":
+        space = load_scenario("asteroid-1997-space")
+        sensor = replace(space.set_model.angle_sensor, convention=Convention.CONE)
+        sound = replace(space.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX, angle_sensor=sensor)
+        return fly_one(replace(space, set_model=sound, rate_sensor=RateSensor(1.0, 2e-6)))
     if name == "game":
         return fly_one(replace(scenario, noise=NoiseKind.GAME))
     recovery = Recovery.NONE if name == "lost" else Recovery.WIDENED
     return fly_one(replace(scenario, noise=NoiseKind.GAME, set_model=replace(model, recovery=recovery)), 2)
 
 
-@pytest.mark.parametrize("name", ["game", "guaranteed", "lost", "recovered"])
+@pytest.mark.parametrize("name", ["game", "guaranteed", "lost", "recovered", "space"])
 def test_replaying_gives_the_recorded_sets_bit_for_bit(name: str) -> None:
     record = flown(name)
     assert (record.result.outcomes[0] is Outcome.SET_EMPTY) == (name in ("lost", "recovered"))
@@ -97,9 +102,12 @@ def test_replaying_gives_the_recorded_sets_bit_for_bit(name: str) -> None:
         for found, recorded in zip(each.measured, step.sections, strict=True):
             assert (found.label_m, found.range_m) == (recorded.label_m, recorded.range_m)
             np.testing.assert_array_equal(found.polygon.polygon(), recorded.polygon.polygon())
-        ends = [end for miss in each.miss_m for end in miss]
-        assert (step.predicted_miss_m is None) == (not ends)
-        assert step.predicted_miss_m is None or (min(ends), max(ends)) == step.predicted_miss_m
+            if recorded.polygon_y is not None and found.polygon_y is not None:
+                np.testing.assert_array_equal(found.polygon_y.polygon(), recorded.polygon_y.polygon())
+        for axis, along in step.axes.items():
+            ends = each.miss_m[axis]
+            assert (along.predicted_miss_m is None) == (not ends.size)
+            assert along.predicted_miss_m is None or (ends.min(), ends.max()) == along.predicted_miss_m
 
 
 def test_a_record_of_another_librarys_sets_is_refused(record: Record) -> None:

@@ -29,29 +29,30 @@ function moment(record, frame) {
 function truthAt(record, { step, stage }) {
   const at = stage === PREDICTED ? Math.min(step + 1, record.time_s.length - 1) : step;
   const range = record.true_range_m[at];
-  const rate = record.true_rate_rad_s[at] - (stage === IMPULSE ? record.impulse_m_s[at] / range : 0);
-  return { rate, angle: record.true_angle_rad[at], range };
+  const impulse = stage === IMPULSE ? record.impulse_m_s[at] : 0;
+  const miss = record.true_predicted_miss_m[at] - (impulse * range) / record.closing_speed_m_s;
+  return { rate: record.true_rate_rad_s[at] - impulse / range, angle: record.true_angle_rad[at], range, miss };
 }
 
-/** One record: its panels and its table of numbers. */
+const swatches = {
+  stroke: (colour, look = {}) => (context) =>
+    drawPath(context, [[1, 6], [21, 6]], { stroke: theme.colours[colour], width: 2, ...look }),
+  nearToFar: (context) => [0, 1, 2].forEach((k) =>
+    drawPath(context, [[1, 2 + 4 * k], [21, 2 + 4 * k]], { stroke: ramp(1 - k / 2), width: 2 })),
+  fill: (colour, opacity) => (context) =>
+    drawPath(context, [[1, 1], [21, 1], [21, 11], [1, 11]], { fill: theme.colours[colour], opacity, closed: true }),
+  mark: (kind, colour) => (context) => drawMark(context, 11, 6, kind, theme.colours[colour], 4),
+};
+
+/** The panels of one lateral axis of a record; `record` has the values of that axis. */
 class Column {
-  constructor(record, host) {
-    Object.assign(this, { record, sets: new Sets(record.sets), step: 0, stage: BEFORE });
-    const half = element("div");
-    const other = element("div");
-    const low = element("div", { class: "whole" });
-    host.append(element("div", { class: "whole" }, element("h2", {}, record.title), element("p", {}, record.outcome),
-      element("p", {}, record.facts)), half, other, low);
-    const stroke = (colour, look = {}) => (context) =>
-      drawPath(context, [[1, 6], [21, 6]], { stroke: theme.colours[colour], width: 2, ...look });
-    const nearToFar = (context) => [0, 1, 2].forEach((k) =>
-      drawPath(context, [[1, 2 + 4 * k], [21, 2 + 4 * k]], { stroke: ramp(1 - k / 2), width: 2 }));
-    const fill = (colour, opacity) => (context) =>
-      drawPath(context, [[1, 1], [21, 1], [21, 11], [1, 11]], { fill: theme.colours[colour], opacity, closed: true });
-    const mark = (kind, colour) => (context) => drawMark(context, 11, 6, kind, theme.colours[colour], 4);
-    this.plane = new Chart(half, {
-      caption: "Sections of the set: line-of-sight rate \u03c9 and angle \u03b1",
-      label: "Sections of the information set in the plane of rate and angle",
+  constructor(record, hosts) {
+    const { along } = record;
+    Object.assign(this, { record, along, sets: new Sets({ ...record.sections, ...record.outlines }), step: 0, stage: BEFORE });
+    const { stroke, nearToFar, fill, mark } = swatches;
+    this.plane = new Chart(hosts.plane, {
+      caption: `Sections of the set: line-of-sight rate \u03c9 and angle \u03b1${along}`,
+      label: `Sections of the information set in the plane of rate and angle${along}`,
       ratio: 0.8,
       legend: [
         ["sections (lowest line: the nearest one)", nearToFar],
@@ -62,9 +63,9 @@ class Column {
       draw: () => this.drawPlane(),
       tell: (x, y) => this.tellPlane(x, y),
     });
-    this.scene = new Scene(other, {
-      caption: "The same set over the range x",
-      label: "The information set in three dimensions: rate, angle and range",
+    this.scene = new Scene(hosts.scene, {
+      caption: `The same set over the range x${along && `: rate and angle${along}`}`,
+      label: `The information set in three dimensions: rate, angle and range${along}`,
       ratio: 0.8,
       legend: [
         ["sections", nearToFar],
@@ -74,34 +75,24 @@ class Column {
       draw: () => this.drawScene(),
       tell: (x, y) => this.tellScene(x, y),
     });
-    this.numbers = element("table", { "aria-label": `Numbers at this time: ${record.title}` });
-    low.append(element("figure", {}, element("figcaption", {}, "Numbers at this time"), this.numbers));
-    this.miss = new Chart(low, {
-      caption: "Predicted miss without further impulses",
-      label: "Predicted-miss interval against time",
-      ratio: 0.3,
+    this.miss = new Chart(hosts.miss, {
+      caption: `Predicted miss${along} without further impulses`,
+      label: `Predicted-miss interval${along} against time`,
+      ratio: along ? 0.45 : 0.3,
       legend: [
         ["interval over the set", fill("set", 0.35)],
         ["true predicted miss", stroke("ink", { dash: [6, 3] })],
       ],
       draw: () => this.drawMiss(),
-      tell: (x) => this.tellTime(x, (step) => this.missLines(step)),
+      tell: (x) => stepUnder(this.miss, record, x, (step) => this.missLines(step)),
     });
-    this.impulses = new Chart(low, {
-      caption: "Impulses",
-      label: "Impulses against time",
-      ratio: 0.22,
+    this.impulses = new Chart(hosts.impulses, {
+      caption: `Impulses${along}`,
+      label: `Impulses${along} against time`,
+      ratio: along ? 0.36 : 0.22,
       legend: [["impulse k", stroke("impulse")], ["limit of an impulse", stroke("line", { dash: [5, 3] })]],
       draw: () => this.drawImpulses(),
-      tell: (x) => this.tellTime(x, (step) => this.impulseLines(step)),
-    });
-    this.budget = new Chart(low, {
-      caption: "Budget left",
-      label: "Impulse budget left against time",
-      ratio: 0.2,
-      legend: [["budget left", stroke("extra")]],
-      draw: () => this.drawBudget(),
-      tell: (x) => this.tellTime(x, (step) => this.impulseLines(step)),
+      tell: (x) => stepUnder(this.impulses, record, x, (step) => this.impulseLines(step)),
     });
   }
 
@@ -138,7 +129,10 @@ class Column {
     const { plane, truth, record } = this;
     const { rates, angles, rateUnit, angleUnit } = this.limits;
     plane.begin({
-      x: rates, y: angles, xTitle: `line-of-sight rate \u03c9, ${rateUnit[0]}`, yTitle: `line-of-sight angle \u03b1, ${angleUnit[0]}`,
+      x: rates,
+      y: angles,
+      xTitle: `line-of-sight rate \u03c9${this.along}, ${rateUnit[0]}`,
+      yTitle: `line-of-sight angle \u03b1${this.along}, ${angleUnit[0]}`,
     });
     const place = ([rate, angle]) => [rate * rateUnit[1], angle * angleUnit[1]];
     const drawn = this.chosen(this.sections);
@@ -201,7 +195,7 @@ class Column {
   drawMiss() {
     const { miss, record } = this;
     const known = record.time_s.map((time, index) => [time, record.predicted_miss_m[index], index]).filter(([, ends]) => ends);
-    miss.begin({ x: span, y: missLimits, xTitle: "time t, s", yTitle: "predicted miss, m", yScale: symlog(10) });
+    miss.begin({ x: span, y: missLimits, xTitle: "time t, s", yTitle: `predicted miss${this.along}, m`, yScale: symlog(10) });
     for (const [points, opacity] of [[known, 0.12], [known.filter(([, , index]) => index <= this.step), 0.35]]) {
       const [lower, upper] = [0, 1].map((end) => points.map(([time, ends]) => [time, ends[end]]));
       miss.area(lower, upper, { fill: theme.colours.set, opacity });
@@ -210,45 +204,19 @@ class Column {
     miss.level(0, { stroke: theme.colours.line, width: 1 });
     miss.curve(record.time_s.map((time, index) => [time, record.true_predicted_miss_m[index]]).slice(0, this.step + 1),
       { stroke: theme.colours.ink, width: 1.4, dash: [6, 3] });
-    this.now(miss);
+    markNow(miss, record.time_s[this.step]);
     miss.describe(this.missLines(this.step).join(", "));
   }
 
   drawImpulses() {
     const { impulses, record } = this;
     const limit = record.greatest_impulse_m_s;
-    impulses.begin({ x: span, y: [-1.15 * limit, 1.15 * limit], xTitle: "time t, s", yTitle: "k, m/s" });
+    impulses.begin({ x: span, y: [-1.15 * limit, 1.15 * limit], xTitle: "time t, s", yTitle: `k${this.along}, m/s` });
     impulses.level(0, { stroke: theme.colours.line, width: 1 });
     for (const side of [-limit, limit]) impulses.level(side, { stroke: theme.colours.line, width: 1, dash: [5, 3] });
-    record.impulse_m_s.forEach((impulse, index) => {
-      if (impulse === 0) return;
-      const look = { stroke: index <= this.step ? theme.colours.impulse : theme.colours.grid, width: 1.6 };
-      impulses.curve([[record.time_s[index], 0], [record.time_s[index], impulse]], look);
-    });
-    this.now(impulses);
+    drawStems(impulses, record.time_s, record.impulse_m_s, this.step);
+    markNow(impulses, record.time_s[this.step]);
     impulses.describe(this.impulseLines(this.step).join(", "));
-  }
-
-  drawBudget() {
-    const { budget, record } = this;
-    budget.begin({ x: span, y: [0, 1.06 * record.budget_m_s], xTitle: "time t, s", yTitle: "left, m/s" });
-    let left = record.budget_m_s;
-    const stairs = record.time_s.flatMap((time, index) => {
-      const before = left;
-      left = record.budget_left_m_s[index];
-      return [[time, before, index], [time, left, index]];
-    });
-    budget.curve(stairs, { stroke: theme.colours.grid, width: 2 });
-    budget.curve(stairs.filter(([, , index]) => index <= this.step), { stroke: theme.colours.extra, width: 2 });
-    this.now(budget);
-    budget.describe(this.impulseLines(this.step).join(", "));
-  }
-
-  /** The line of the present time; ends the drawing of a chart over time. */
-  now(chart) {
-    const time = this.record.time_s[this.step];
-    chart.upright(time, time, { stroke: theme.colours.quiet, width: 1, dash: [2, 2] });
-    chart.end();
   }
 
   missLines(step) {
@@ -256,8 +224,8 @@ class Column {
     const ends = record.predicted_miss_m[step];
     return [
       `t = ${shown(record.time_s[step], "s")}`,
-      ends ? `predicted miss from ${shown(ends[0], "m")} to ${shown(ends[1], "m")}` : "no set is left",
-      `true predicted miss ${shown(record.true_predicted_miss_m[step], "m")}`,
+      ends ? `predicted miss${this.along} from ${shown(ends[0], "m")} to ${shown(ends[1], "m")}` : "no set is left",
+      `true predicted miss${this.along} ${shown(record.true_predicted_miss_m[step], "m")}`,
     ];
   }
 
@@ -265,15 +233,9 @@ class Column {
     const { record } = this;
     return [
       `t = ${shown(record.time_s[step], "s")}`,
-      `impulse ${shown(record.impulse_m_s[step], "m/s")}`,
+      `impulse${this.along} ${shown(record.impulse_m_s[step], "m/s")}`,
       `budget left ${shown(record.budget_left_m_s[step], "m/s")}`,
     ];
-  }
-
-  tellTime(x, lines) {
-    const { miss, record } = this;
-    if (x < miss.left - 5 || x > miss.right + 5) return null;
-    return lines(nearest(record.time_s, miss.under(x, 0)[0]));
   }
 
   tellPlane(px, py) {
@@ -330,25 +292,151 @@ class Column {
     ];
   }
 
+  /** Predicted-miss intervals of the sections at the present stage, m: z + V x/e -+ nu/2 (x/e)^2, equations (13), (14). */
+  missIntervals(sections) {
+    const { closing_speed_m_s: e, disturbance_m_s2: nu } = this.record;
+    return sections.map(({ range, box, miss }) => {
+      const drift = (nu / 2) * (range / e) ** 2;
+      return miss ?? [(box[0] * range ** 2) / e - drift, (box[2] * range ** 2) / e + drift];
+    });
+  }
+}
+
+/** Impulses as lines from zero; those after the present step are pale. */
+function drawStems(chart, times, impulses, step) {
+  impulses.forEach((impulse, index) => {
+    if (impulse === 0) return;
+    const look = { stroke: index <= step ? theme.colours.impulse : theme.colours.grid, width: 1.6 };
+    chart.curve([[times[index], 0], [times[index], impulse]], look);
+  });
+}
+
+/** The line of the present time; ends the drawing of a chart over time. */
+function markNow(chart, time) {
+  chart.upright(time, time, { stroke: theme.colours.quiet, width: 1, dash: [2, 2] });
+  chart.end();
+}
+
+/** Lines about the step under the pointer in a chart over time. */
+function stepUnder(chart, record, x, lines) {
+  if (x < chart.left - 5 || x > chart.right + 5) return null;
+  return lines(nearest(record.time_s, chart.under(x, 0)[0]));
+}
+
+/** One record: the panels of its lateral axes, what they have in common, and its table of numbers. */
+class Engagement {
+  constructor(record, host) {
+    this.record = record;
+    const spatial = record.axes.length > 1;
+    const { stroke } = swatches;
+    const cell = (attributes = {}) => {
+      const made = element("div", attributes);
+      host.append(made);
+      return made;
+    };
+    cell({ class: "whole" }).append(
+      element("h2", {}, record.title), element("p", {}, record.outcome), element("p", {}, record.facts));
+    // In a plane: plane and scene side by side, all else below. In space: y and z side by side.
+    const planes = record.axes.map(() => cell());
+    const across = spatial ? cell() : null;
+    const table = spatial ? cell() : null;
+    const scenes = record.axes.map(() => cell());
+    const courses = spatial ? record.axes.map(() => cell()) : [];
+    const low = cell({ class: "whole" });
+    this.numbers = element("table", { class: spatial ? "wide" : "", "aria-label": `Numbers at this time: ${record.title}` });
+    (table ?? low).append(element("figure", {}, element("figcaption", {}, "Numbers at this time"), this.numbers));
+    this.columns = record.axes.map((axis, k) => {
+      const [plane, scene, course] = [planes[k], scenes[k], courses[k] ?? low];
+      return new Column({ ...record, ...axis }, { plane, scene, miss: course, impulses: course });
+    });
+    this.joint = spatial ? [new BPlane(record, this.columns, across)] : [];
+    const overTime = (caption, label, legend, draw) => {
+      const chart = new Chart(low, {
+        caption, label, ratio: 0.2, legend, draw: () => draw(chart),
+        tell: (x) => stepUnder(chart, record, x, (step) => this.impulseLines(step)),
+      });
+      return chart;
+    };
+    this.courses = [
+      ...(spatial ? [overTime("Impulse modulus", "Modulus of the impulse against time",
+        [["modulus of the impulse vector", stroke("impulse")], ["limit of an impulse", stroke("line", { dash: [5, 3] })]],
+        (chart) => this.drawModulus(chart))] : []),
+      overTime("Budget left", "Impulse budget left against time", [["budget left", stroke("extra")]],
+        (chart) => this.drawBudget(chart)),
+    ];
+  }
+
+  show(frame) {
+    for (const column of this.columns) column.show(frame);
+    this.step = this.columns[0].step;
+  }
+
+  draw() {
+    for (const column of this.columns) {
+      column.plane.draw();
+      column.scene.draw();
+    }
+    for (const panel of this.joint) panel.chart.draw();
+    // What is drawn over time does not change with the stage.
+    if (this.step !== this.drawnStep) {
+      for (const panel of [...this.columns.flatMap(({ miss, impulses }) => [miss, impulses]), ...this.courses]) panel.draw();
+    }
+    this.drawnStep = this.step;
+    fillTable(this.numbers, this.rows());
+  }
+
+  drawModulus(chart) {
+    const { record } = this;
+    const limit = record.greatest_impulse_m_s;
+    chart.begin({ x: span, y: [0, 1.15 * limit], xTitle: "time t, s", yTitle: "|k|, m/s" });
+    chart.level(limit, { stroke: theme.colours.line, width: 1, dash: [5, 3] });
+    drawStems(chart, record.time_s, record.modulus_m_s, this.step);
+    markNow(chart, record.time_s[this.step]);
+    chart.describe(this.impulseLines(this.step).join(", "));
+  }
+
+  drawBudget(chart) {
+    const { record } = this;
+    chart.begin({ x: span, y: [0, 1.06 * record.budget_m_s], xTitle: "time t, s", yTitle: "left, m/s" });
+    let left = record.budget_m_s;
+    const stairs = record.time_s.flatMap((time, index) => {
+      const before = left;
+      left = record.budget_left_m_s[index];
+      return [[time, before, index], [time, left, index]];
+    });
+    chart.curve(stairs, { stroke: theme.colours.grid, width: 2 });
+    chart.curve(stairs.filter(([, , index]) => index <= this.step), { stroke: theme.colours.extra, width: 2 });
+    markNow(chart, record.time_s[this.step]);
+    chart.describe(this.impulseLines(this.step).join(", "));
+  }
+
+  impulseLines(step) {
+    const { record, columns } = this;
+    const [time, ...impulses] = columns.flatMap((column, k) => column.impulseLines(step).slice(k ? 1 : 0, 2));
+    const modulus = columns.length > 1 ? [`impulse modulus ${shown(record.modulus_m_s[step], "m/s")}`] : [];
+    return [time, ...impulses, ...modulus, `budget left ${shown(record.budget_left_m_s[step], "m/s")}`];
+  }
+
   /** The numbers of the moment, for those who read rather than look. */
   rows() {
-    const { record, step, truth } = this;
-    const [, interval, trueMiss] = this.missLines(step);
+    const { record, step, columns } = this;
+    const along = (name, text) => columns.map((column) => [`${name}${column.along}`, text(column)]);
+    const scaled = (value, factor, unit) => shown(value && value * factor, unit);
     return [
       ["time", shown(record.time_s[step], "s")],
-      ["measured angle", shown(record.measured_angle_rad[step] && record.measured_angle_rad[step] * 1e3, "mrad")],
-      ...(record.range_error_relative === null ? [] : [
-        ["measured range", shown(record.measured_range_m[step] && record.measured_range_m[step] / 1e3, "km")]]),
-      ...(record.rate_error_rad_s === null ? [] : [
-        ["measured rate", shown(record.measured_rate_rad_s[step] && record.measured_rate_rad_s[step] * 1e6, "\u00b5rad/s")]]),
-      ["true angle", shown(truth.angle * 1e3, "mrad")],
-      ["true rate", shown(truth.rate * 1e6, "\u00b5rad/s")],
-      ["true range", shown(truth.range / 1e3, "km")],
-      ["predicted miss", interval.replace("predicted miss ", "")],
-      ["true predicted miss", trueMiss.replace("true predicted miss ", "")],
-      ["impulse", shown(record.impulse_m_s[step], "m/s")],
+      ...along("measured angle", (column) => scaled(column.record.measured_angle_rad[step], 1e3, "mrad")),
+      ...(record.range_error_relative === null ? [] : [["measured range", scaled(record.measured_range_m[step], 1e-3, "km")]]),
+      ...(record.rate_error_rad_s === null ? [] : along("measured rate",
+        (column) => scaled(column.record.measured_rate_rad_s[step], 1e6, "µrad/s"))),
+      ...along("true angle", ({ truth }) => shown(truth.angle * 1e3, "mrad")),
+      ...along("true rate", ({ truth }) => shown(truth.rate * 1e6, "µrad/s")),
+      ["true range", shown(columns[0].truth.range / 1e3, "km")],
+      ...along("predicted miss", (column) => column.missLines(step)[1].replace(`predicted miss${column.along} `, "")),
+      ...along("true predicted miss", (column) => shown(column.record.true_predicted_miss_m[step], "m")),
+      ...along("impulse", (column) => shown(column.record.impulse_m_s[step], "m/s")),
+      ...(columns.length > 1 ? [["impulse modulus", shown(record.modulus_m_s[step], "m/s")]] : []),
       ["budget left", shown(record.budget_left_m_s[step], "m/s")],
-      ["sections", String(this.sections.length)],
+      ["sections", String(columns[0].sections.length)],
     ];
   }
 }
@@ -372,35 +460,34 @@ function levelled(columns) {
 
 const span = limitsOf(times, 0.015);
 const missLimits = (() => {
-  const ends = DATA.records.flatMap((record) => record.predicted_miss_m.filter((each) => each).flat());
+  const ends = DATA.records.flatMap((record) => record.axes.flatMap((axis) => axis.predicted_miss_m.filter((each) => each).flat()));
   const greatest = Math.max(10, ...ends.map(Math.abs));
   return [-2 * greatest, 2 * greatest];
 })();
 
 const main = document.getElementById("main");
 const host = element("div", { class: DATA.records.length > 1 ? "columns" : "columns single" });
-const columns = DATA.records.map((record) => {
+const engagements = DATA.records.map((record) => {
   const section = element("section");
   host.append(section);
-  return new Column(record, section);
+  return new Engagement(record, section);
 });
+const columns = engagements.flatMap((engagement) => engagement.columns);
 
 const player = new Player({
   frames: 4 * times.length,
   coarse: 4,
   name: (frame) => `t = ${timeAndStage(frame)[0]} s, ${STAGES[timeAndStage(frame)[1]]}`,
   draw: (frame) => {
-    columns.forEach((column) => column.show(frame));
-    const together = levelled(columns);
-    for (const column of columns) column.limits = options.own ? levelled([column]) : together;
-    for (const column of columns) {
-      column.plane.draw();
-      column.scene.draw();
-      // What is drawn over time does not change with the stage.
-      if (column.step !== column.drawnStep) for (const panel of [column.miss, column.impulses, column.budget]) panel.draw();
-      column.drawnStep = column.step;
-      fillTable(column.numbers, column.rows());
+    for (const engagement of engagements) engagement.show(frame);
+    for (const axis of new Set(columns.map((column) => column.record.axis))) {
+      const same = columns.filter((column) => column.record.axis === axis);
+      const together = levelled(same);
+      for (const column of same) column.limits = options.own ? levelled([column]) : together;
     }
+    const joint = engagements.flatMap((engagement) => engagement.joint);
+    for (const panel of joint) panel.shareLimits(options.own ? [panel] : joint);
+    for (const engagement of engagements) engagement.draw();
   },
 });
 
@@ -417,7 +504,7 @@ main.append(
       options.stage = value === "" ? null : Number(value);
       player.count(options.stage === null ? 4 : 1, times.length, time);
     }),
-    ...(columns.length > 1 ? [choice("Axes", [["", "the same for both"], ["1", "each its own"]], "", pick("own"))] : [])),
+    ...(engagements.length > 1 ? [choice("Axes", [["", "the same for both"], ["1", "each its own"]], "", pick("own"))] : [])),
   host,
   element("p", {}, "Keys: space plays and pauses; left and right go a stage on, with Shift a step; Home and End go to the ends."),
 );

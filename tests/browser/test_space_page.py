@@ -1,0 +1,159 @@
+"""The replay page of engagements in space in a browser."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.interception.page import interception_page
+from experiments.interception.scenario_file import load_scenario
+from guidance import NoiseKind
+from sim import Body, Record, fly_one
+from tests.browser.conftest import Opened, numbers
+
+Open = Callable[..., Opened]
+STEP = 120
+MEASURED, IMPULSE = 4 * STEP + 1, 4 * STEP + 2
+SIX_DIGITS = 5e-6
+AXES = ("y", "z")
+
+
+@pytest.fixture(scope="module")
+def space() -> list[Record]:
+    scenario = replace(load_scenario("asteroid-1997-space"), body=Body(40.0))
+    return [fly_one(replace(scenario, noise=kind)) for kind in NoiseKind]
+
+
+@pytest.fixture(scope="module")
+def page(space: list[Record]) -> str:
+    return interception_page(space[1:])
+
+
+def test_both_planes_show_the_sections_of_the_record(open_page: Open, page: str, space: list[Record]) -> None:
+    opened = open_page(page)
+    opened.page.evaluate(f"player.show({MEASURED})")
+    captions = opened.page.locator("figcaption").all_inner_texts()
+    for column, axis in enumerate(AXES):
+        assert f"Sections of the set: line-of-sight rate ω and angle α along {axis}" in captions
+        found = opened.page.evaluate(f"columns[{column}].sections.map((section) => section.points)")
+        sections = space[1].steps[STEP].sections
+        polygons = [section.omega_alpha if axis == "z" else section.omega_alpha_y for section in sections]
+        assert len(found) == len(polygons)
+        for outline, polygon in zip(found, polygons, strict=True):
+            assert polygon is not None
+            wanted = polygon.polygon()
+            np.testing.assert_allclose(outline, wanted, rtol=0.0, atol=1e-5 * np.ptp(wanted, axis=0).max())
+
+
+def test_the_b_plane_shows_the_predicted_misses_of_the_record(open_page: Open, page: str, space: list[Record]) -> None:
+    opened = open_page(page)
+    opened.page.evaluate(f"player.show({MEASURED})")
+    panel = "engagements[0].joint[0]"
+    boxes = np.array(opened.page.evaluate(f"{panel}.rectangles(MEASURED, true)"))
+    step = space[1].steps[STEP]
+    assert len(boxes) == len(step.sections)
+    bounding = [*boxes[:, :2].min(axis=0), *boxes[:, 2:].max(axis=0)]
+    ends = np.array([step.axes[axis].predicted_miss_m for axis in AXES])
+    assert bounding == ends.T.ravel().tolist()
+    path = opened.page.evaluate(f"{panel}.path")
+    assert path[STEP] == pytest.approx(ends.mean(axis=1).tolist(), rel=1e-12, abs=1e-9)
+    assert len(path) == len(space[1].steps)
+    limits = opened.page.evaluate(f"[{panel}.chart.x, [{panel}.chart.low, {panel}.chart.high]]")
+    factor = opened.page.evaluate(f"{panel}.unit[1]")
+    for (low, high), (least, greatest) in zip(limits, ends, strict=True):
+        assert low < least * factor
+        assert high > greatest * factor
+    pixels = opened.page.evaluate(f"(({{ left, right, top, bottom }}) => [right - left, bottom - top])({panel}.chart)")
+    scale = [(high - low) / length for (low, high), length in zip(limits, pixels, strict=True)]
+    assert scale[0] == pytest.approx(scale[1])
+
+
+def test_an_impulse_moves_the_rectangles(open_page: Open, page: str, space: list[Record]) -> None:
+    opened = open_page(page)
+    boxes = []
+    for frame, stage in ((MEASURED, "MEASURED"), (IMPULSE, "IMPULSE")):
+        opened.page.evaluate(f"player.show({frame})")
+        boxes.append(np.array(opened.page.evaluate(f"engagements[0].joint[0].rectangles({stage}, true)")))
+    step, speed = space[1].steps[STEP], space[1].scenario.set_model.closing_speed_m_s
+    assert step.impulse_m_s > 0.0
+    times_s = np.array([section.range_m / speed for section in step.sections])
+    impulse = np.array([step.axes[axis].impulse_m_s for axis in AXES] * 2)
+    np.testing.assert_allclose(boxes[1], boxes[0] - times_s[:, None] * impulse, atol=1e-6)
+
+
+def test_numbers_name_the_axes(open_page: Open, page: str, space: list[Record]) -> None:
+    opened = open_page(page)
+    opened.page.evaluate(f"player.show({MEASURED})")
+    cells = opened.page.locator("table").first.locator("th, td").all_inner_texts()
+    rows = dict(zip(*[iter(cells)] * 2, strict=True))
+    step = space[1].steps[STEP]
+    for axis in AXES:
+        along = step.axes[axis]
+        assert along.predicted_miss_m is not None
+        assert numbers(rows[f"predicted miss along {axis}"]) == pytest.approx(along.predicted_miss_m, rel=SIX_DIGITS)
+        assert numbers(rows[f"impulse along {axis}"]) == pytest.approx([along.impulse_m_s], rel=SIX_DIGITS)
+        assert numbers(rows[f"measured angle along {axis}"]) == pytest.approx(
+            [along.measured["angle"] * 1e3], rel=SIX_DIGITS
+        )
+    assert numbers(rows["impulse modulus"]) == pytest.approx([step.impulse_m_s], rel=SIX_DIGITS)
+    spent = sum(each.impulse_m_s for each in space[1].steps[: STEP + 1])
+    budget = space[1].scenario.thruster.budget_m_s
+    assert numbers(rows["budget left"]) == pytest.approx([budget - spent], rel=SIX_DIGITS)
+
+
+def test_hover_in_the_b_plane(open_page: Open, page: str, space: list[Record]) -> None:
+    opened = open_page(page)
+    opened.page.get_by_label("Sections drawn").select_option("1")
+    opened.page.evaluate(f"player.show({MEASURED})")
+    panel = "engagements[0].joint[0]"
+    box = opened.page.evaluate(f"{panel}.rectangles(MEASURED, false)")[0]
+    near = [0.9 * box[0] + 0.1 * box[2], 0.9 * box[3] + 0.1 * box[1]]
+    opened.point_at(f"{panel}.chart", f"{panel}.chart.at([{panel}.place({near})])[0]")
+    text = opened.tip()
+    found = numbers(text)
+    assert found[3:] == pytest.approx([box[0], box[2], box[1], box[3]], rel=SIX_DIGITS)
+    assert "predicted miss along y from" in text
+    truth = f"{panel}.place({panel}.columns.map((column) => column.truth.miss))"
+    opened.point_at(f"{panel}.chart", f"{panel}.chart.at([{truth}])[0]")
+    assert opened.tip().startswith("true predicted miss\nalong y ")
+    label = opened.page.evaluate(f"{panel}.chart.canvas.getAttribute('aria-label')")
+    assert "predicted miss along z from" in label
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(390, "dark"), (1300, "light")])
+def test_wide_and_narrow(open_page: Open, page: str, screenshots: Path, width: int, scheme: str) -> None:
+    opened = open_page(page, width, scheme)
+    opened.page.evaluate(f"player.show({MEASURED})")
+    assert opened.page.evaluate("document.documentElement.scrollWidth") <= width
+    opened.page.keyboard.press("ArrowRight")
+    assert opened.shown_at() == "t = 60 s, after the impulse"
+    opened.page.wait_for_timeout(50)
+    opened.page.screenshot(path=screenshots / f"space-{width}-{scheme}.png", full_page=True)
+
+
+def test_engagements_in_space_and_in_a_plane_side_by_side(
+    open_page: Open, space: list[Record], records: list[Record], screenshots: Path
+) -> None:
+    opened = open_page(interception_page([records[1], space[1]]))
+    page = opened.page
+    last = page.evaluate("player.frames") - 1
+    for frame in (*range(0, last, 101), last):
+        page.evaluate(f"player.show({frame})")
+    page.evaluate(f"player.show({MEASURED})")
+    assert page.evaluate("columns.map((column) => column.record.axis)") == ["z", "y", "z"]
+    assert page.evaluate("columns[0].limits === columns[2].limits")
+    assert page.evaluate("engagements.map((engagement) => engagement.joint.length)") == [0, 1]
+    page.screenshot(path=screenshots / "space-and-plane.png", full_page=True)
+
+
+def test_two_engagements_in_space_share_their_limits(open_page: Open, space: list[Record]) -> None:
+    page = open_page(interception_page(space)).page
+    page.evaluate(f"player.show({MEASURED})")
+    limits = "JSON.stringify(engagements[0].joint[0].limits) === JSON.stringify(engagements[1].joint[0].limits)"
+    assert page.evaluate(limits)
+    page.get_by_label("Axes").select_option("each its own")
+    assert not page.evaluate(limits)
