@@ -192,3 +192,34 @@ def test_notebooks_show_a_plane_as_before(brief: Scenario) -> None:
     page: Any = fly_one(brief)._repr_html_()
     assert "along" not in page
     assert page.count("<svg") == 2
+
+
+OWN = """
+import numpy as np
+
+
+class Mine:
+    name = "mine"
+    spatial = {spatial}
+
+    def start(self, batch):
+        return None
+
+    def decide(self, situation, state):
+        wanted = 0.5 * (situation.predicted_miss.lower_m + situation.predicted_miss.upper_m) / 10.0
+        return np.where(situation.predicted_miss.exists, wanted{more}, 0.0)
+"""
+
+
+@pytest.mark.parametrize("spatial", [False, True])
+def test_a_strategy_of_a_file_gets_one_axis_or_both(spatial: bool, file: Path, infoset: Command) -> None:
+    whole, none = f"strategy_{spatial}.py", f"nothing_{spatial}.py"
+    Path(whole).write_text(OWN.format(spatial=spatial, more=""))
+    code, out, err = infoset("engage", file, "--strategy", f"{whole}:Mine", "--json", "-")
+    assert code == 0, err
+    steps = strict(out)["steps"]
+    assert max(abs(step["impulse_y_m_s"]) for step in steps) > 0.0
+    Path(none).write_text(OWN.format(spatial=spatial, more="[:, :0]" if spatial else "[:0]"))
+    message = infoset.refused("engage", file, "--strategy", f"{none}:Mine")
+    assert f"{none}: ValueError: strategy Mine must return" in message
+    assert ("shape (2, 1), along y and z" in message) == spatial
