@@ -16,8 +16,9 @@ from infoset.sensors import Convention
 BOUND_SLACK = 1e-9
 """Relative enlargement of the bounds of the guaranteed model; rounding errors are far smaller."""
 ROUNDING = 16.0 * sys.float_info.epsilon
-PLANE, ELEVATION, CONE = range(3)
-"""How a measured angle bounds the slope of its axis: alone; as elevation of a gimbal; within a cone."""
+PLANE, RISING, ELEVATION, CONE = range(4)
+"""How a measured angle bounds the slope of its axis: alone; alone, with a bound that rises with range; as elevation of
+a gimbal; within a cone."""
 
 
 class SectionLaw(NamedTuple):
@@ -52,7 +53,7 @@ class SectionLaw(NamedTuple):
     rectangle : bool
         Whether the initial set is the paper's rectangle in (omega, alpha). Otherwise it is the box.
     angles : int
-        How a measured angle bounds the slope z/x: `PLANE`, `ELEVATION` or `CONE`.
+        How a measured angle bounds the slope z/x: `PLANE`, `RISING`, `ELEVATION` or `CONE`.
     other_error_at_zero_range, other_error_slope : float
         Error bound of the angle of the other axis; zero in a plane.
     pointing_along, pointing_across : float
@@ -95,10 +96,14 @@ def section_laws(model: SetModel) -> tuple[SectionLaw, ...]:
     if len(laws) == 1:
         return tuple(laws)
     psi = model.pointing_error_rad if model.is_guaranteed else 0.0
-    angles = {Convention.PLANE: (PLANE, PLANE), Convention.GIMBAL: (PLANE, ELEVATION), Convention.CONE: (CONE, CONE)}
+    angles, convention = [law.angles for law in laws], model.angle_sensor.convention
+    if model.is_guaranteed and convention is Convention.GIMBAL:
+        angles[1] = ELEVATION
+    elif model.is_guaranteed and convention is Convention.CONE:
+        angles = [CONE, CONE]
     return tuple(
         law._replace(
-            angles=angles[model.angle_sensor.convention][channel] if model.is_guaranteed else PLANE,
+            angles=angles[channel],
             other_error_at_zero_range=laws[1 - channel].error_at_zero_range,
             other_error_slope=laws[1 - channel].error_slope,
             pointing_along=(1.0 - math.cos(psi)) * (1.0 + law.impulse_error),
@@ -200,7 +205,7 @@ def _law(model: SetModel) -> SectionLaw:
         vx_least=float(box.vx_m_s[0]),
         vx_greatest=float(box.vx_m_s[1]),
         rectangle=model.initial_set is InitialSet.RECTANGLE,
-        angles=PLANE,
+        angles=RISING if guaranteed and slope > 0.0 else PLANE,
         other_error_at_zero_range=0.0,
         other_error_slope=0.0,
         pointing_along=0.0,

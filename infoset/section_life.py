@@ -195,52 +195,59 @@ def slope_band(alpha: float, across: float, label: float, x: float, law: Section
     Parameters
     ----------
     alpha, across : float
-        Measured angles of this axis and of the other one, rad. Only a gimbal and a cone use the other one, and an error
-        bound that rises with range.
+        Measured angles of this axis and of the other one, rad.
+    """
+    if law.angles != PLANE:
+        return wide_slope_band(alpha, across, label, x, law)
+    bound = law.error_at_zero_range + law.error_slope * x
+    lower, upper = alpha - bound, alpha + bound
+    if law.exact_angles:
+        lower = math.tan(lower) if lower > -RIGHT_ANGLE else -np.inf
+        upper = math.tan(upper) if upper < RIGHT_ANGLE else np.inf
+    return lower, upper
+
+
+@allocation_free
+def wide_slope_band(alpha: float, across: float, label: float, x: float, law: SectionLaw) -> tuple[float, float]:
+    """Return what `slope_band` does if the band of an axis depends on the angle of the other one, or is not concave.
 
     Notes
     -----
     Bounds over all labels need an upper bound whose product with x is a concave function of x. Therefore the factors by
-    which the angle of the other axis widens the band are the same for all labels.
+    which the angle of the other axis widens the band are the same for all labels, and an error bound that rises with
+    range is replaced by a greater one: x h(x) is convex then, and a chord and a tangent are above it.
     """
+    travelled = label - x
+    near, far = max(law.label_least - travelled, 0.0), law.label_greatest - travelled
+    own, other = steepest_angles(alpha, across, far, law)
+    if own >= RIGHT_ANGLE:
+        return -np.inf, np.inf
+    cosine, other_cosine = math.cos(own), math.cos(other)
+    # The error bound depends on the true distance, in a plane x/cos(alpha).
+    farthest = far / cosine / other_cosine
+    rising = law.error_slope > 0.0
     bound = law.error_at_zero_range + law.error_slope * x
-    rising = law.exact_angles and law.error_slope > 0.0
-    factor, doubt, half = 1.0, 0.0, 0.0
-    if rising or law.angles != PLANE:
-        travelled = label - x
-        near, far = max(law.label_least - travelled, 0.0), law.label_greatest - travelled
-        own, other = steepest_angles(alpha, across, far, law)
-        half = np.inf
-        if own < RIGHT_ANGLE:
-            # The error bound depends on the true distance, in a plane x/cos(alpha). Where it rises, x h(x) is convex:
-            # a chord and a tangent are above it.
-            cosine, other_cosine = math.cos(own), math.cos(other)
-            longest = (near + far - near * far / x) / cosine / other_cosine if rising else x
-            farthest = far / cosine / other_cosine
-            half = law.error_at_zero_range + law.error_slope * longest
-            if law.angles == CONE:
-                # asin(sin(b)/cos(across)) is at most its secant k b.
-                greatest = law.error_at_zero_range + max(law.error_slope, 0.0) * farthest
-                stretch = math.asin(math.sin(greatest) / math.cos(across)) / greatest
-                half, bound = half * stretch, bound * stretch
-            elif law.angles == ELEVATION:
-                # z/x is tan(elevation)/cos(azimuth).
-                greatest = law.other_error_at_zero_range + max(law.other_error_slope, 0.0) * farthest
-                least_factor = 1.0 / math.cos(max(abs(across) - greatest, 0.0))
-                greatest_factor = 1.0 / math.cos(abs(across) + greatest)
-                factor = 0.5 * (least_factor + greatest_factor)
-                doubt = 0.5 * (greatest_factor - least_factor) * math.tan(own)
-            half = half / cosine**2
-    lower, upper = alpha - bound, alpha + bound
     if rising:
-        lower, upper = math.tan(alpha) - half, math.tan(alpha) + half
-    elif law.exact_angles:
+        bound = law.error_at_zero_range + law.error_slope * ((near + far - near * far / x) / cosine / other_cosine)
+    if law.angles == CONE:
+        # asin(sin(b)/cos(across)) is at most its secant k b.
+        greatest = law.error_at_zero_range + max(law.error_slope, 0.0) * farthest
+        bound *= math.asin(math.sin(greatest) / math.cos(across)) / greatest
+    if rising:
+        bound = bound / cosine**2
+        lower, upper = math.tan(alpha) - bound, math.tan(alpha) + bound
+    else:
+        lower, upper = alpha - bound, alpha + bound
         lower = math.tan(lower) if lower > -RIGHT_ANGLE else -np.inf
         upper = math.tan(upper) if upper < RIGHT_ANGLE else np.inf
-    if law.angles != PLANE:
+    if law.angles == ELEVATION:
+        # z/x is tan(elevation)/cos(azimuth), with the factor 1/cos(azimuth) between two bounds.
+        greatest = law.other_error_at_zero_range + max(law.other_error_slope, 0.0) * farthest
+        least_factor = 1.0 / math.cos(max(abs(across) - greatest, 0.0))
+        greatest_factor = 1.0 / math.cos(abs(across) + greatest)
+        factor = 0.5 * (least_factor + greatest_factor)
+        doubt = 0.5 * (greatest_factor - least_factor) * math.tan(own)
         lower, upper = factor * lower - doubt, factor * upper + doubt
-        if half == np.inf:
-            lower, upper = -np.inf, np.inf
     return lower, upper
 
 

@@ -229,7 +229,8 @@ class SetQueries:
         Kumkov and Patsko (1997), equations (13) and (14).
         """
         exists, ends = self._state.stack.widest(self._state.history.elapsed)
-        lower, upper = ([self._by_axis(ends[:, :, end, column]) for column in range(4)] for end in (0, 1))
+        ends = self._by_axis(ends)
+        lower, upper = ([ends[..., end, column] for column in range(4)] for end in (0, 1))
         return PredictedMiss(exists, lower[0], upper[0], ExtremePoints(*lower[1:]), ExtremePoints(*upper[1:]))
 
     def worst_predicted_miss_m(self) -> Floats:

@@ -112,7 +112,7 @@ class TruthSection:
         rate = np.reshape([look.slope_rate_per_s for look in looks], each).swapaxes(0, 1)
         # A look is after the measurements of its step and before the impulse.
         ends = np.append(np.flatnonzero(kinds == IMPULSE), history.events)[at]
-        v, z = rate * ranges - law.closing_speed * slope, slope * ranges
+        v, z = np.ascontiguousarray(rate * ranges - law.closing_speed * slope), np.ascontiguousarray(slope * ranges)
         margins = margins_along(labels, ends, v, z, history, self._laws)
         # The label of the true state has an error of half an ulp, and so have its z and V.
         margins = margins + LABEL_ROUNDING * labels * np.abs(slope)
