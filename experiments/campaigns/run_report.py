@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from experiments.campaigns.campaign_figures import (
     CampaignColumns,
     correlations,
@@ -33,11 +35,13 @@ from experiments.common.errors import InputError
 from experiments.common.file_kinds import use_of_file
 from experiments.common.output import Output, output, to_json
 from experiments.common.screen import BeginProgress, Part, figure_files, number, number_table, progress_bar, say, show
+from experiments.interception.figures.b_plane import Cloud, draw_b_plane
 from experiments.interception.scenario_file import scenario_to_toml
 from sim.results import ending
 from sim.storage import CampaignFolder, need_arrow
 
 FIGURES = ("figure-distributions", "figure-convergence", "figure-dispersion")
+B_PLANE = "figure-b-plane"
 
 Correlations = Mapping[str, Mapping[str, Mapping[str, float | None]]]
 
@@ -48,7 +52,8 @@ def run(options: Report) -> None:
         need_arrow()
         folder = _read(options)
         swept = bool(folder.manifest.axes)
-        figures = [*figure_files(*figure_names(noises_of(folder))), TABLE] if swept else figure_files(*FIGURES)
+        campaign_figures = (*FIGURES, B_PLANE) if folder.manifest.scenario.is_spatial else FIGURES
+        figures = [*figure_files(*figure_names(noises_of(folder))), TABLE] if swept else figure_files(*campaign_figures)
         with output(
             folder=options.out,
             names=[*figures, "report.json", SCENARIO_FILE],
@@ -137,6 +142,8 @@ def _report_campaign(folder: CampaignFolder, options: Report, written: Output, b
     if options.out is not None:
         draws = (draw_campaign_distributions, draw_convergence, draw_dispersion)
         drawings = {name: partial(draw, columns) for name, draw in zip(FIGURES, draws, strict=True)}
+        if folder.manifest.scenario.is_spatial:
+            drawings[B_PLANE] = partial(draw_b_plane, _clouds(folder), folder.manifest.scenario.radius_m)
         written.draw(drawings, begin("figures"))
     return _parts(folder, by_noise, related, worst)
 
@@ -160,6 +167,14 @@ def _columns(folder: CampaignFolder) -> list[CampaignColumns]:
         for noise, rows in noise_flags(folder).items()
     ]
     return [column for column in columns if column.miss_m.size]
+
+
+def _clouds(folder: CampaignFolder) -> list[Cloud]:
+    """Return the misses across the approach of each noise with rows."""
+    miss_m = folder.numbers("miss_m").data
+    across_m = np.column_stack([folder.numbers(name).data for name in ("miss_y_m", "miss_z_m")])
+    clouds = [(noise, across_m[rows], miss_m[rows]) for noise, rows in noise_flags(folder).items()]
+    return [Cloud(f"{noise} noise, {len(miss)} runs", across, miss) for noise, across, miss in clouds if len(miss)]
 
 
 def _parts(

@@ -81,7 +81,7 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
     Parameters
     ----------
     clouds : sequence of Cloud
-        One panel each, at least one; of equal numbers of runs.
+        One panel each, at least one.
     radius_m : float or None
         Radius of the body, m, drawn as a circle; None draws none.
     """
@@ -96,7 +96,7 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
     lines = 2 + max(each.title.count("\n") for each in clouds)
     top, between = 3.0 + 4.0 * lines, 11.5 + 4.0 * lines
     halves = [_half_width([each] if alone else clouds, radius_m) for each in clouds]
-    handles = _handles(len(clouds[0].miss_m), radius_m, max(halves))
+    handles = _handles({len(each.miss_m) for each in clouds}, radius_m, max(halves))
     legend_columns = min(2, columns)
     bottom = 16.0 + 4.5 * -(-len(handles) // legend_columns)
     figure = new_figure(
@@ -169,15 +169,16 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
     return ", ".join(quantiles)
 
 
-def _handles(runs: int, radius_m: float | None, half: float) -> list[Line2D]:
+def _handles(runs: set[int], radius_m: float | None, half: float) -> list[Line2D]:
+    runs_per_panel = f", {max(runs)} runs per panel" if len(runs) == 1 else ""
     handles = [
-        Line2D([], [], markersize=4.0, label=f"miss of one run, {runs} runs per panel", **_POINT),
+        Line2D([], [], markersize=4.0, label=f"miss of one run{runs_per_panel}", **_POINT),
         Line2D([], [], color=INK, marker="+", linestyle="none", markersize=7.0, label="centre of the body"),
     ]
     handles += [
         Line2D([], [], color=_CIRCLE_COLOUR, linestyle=dashes, label=f"circle: {name}")
         for level, name, dashes in _CIRCLES
-        if shows(runs, level)
+        if shows(max(runs), level)
     ]
     if radius_m is not None:
         where = "a smaller miss is a hit" if radius_m <= half else "beyond the axes"

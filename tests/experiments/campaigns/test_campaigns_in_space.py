@@ -42,7 +42,8 @@ def test_a_campaign_in_space_is_resumed_and_reported(file: Path, infoset: Comman
         y_km, vy_km_s = flown.lateral_start[first::2].T / 1e3
         assert rows.column("y_km").to_pylist() == y_km.tolist()
         assert rows.column("vy_km_s").to_pylist() == vy_km_s.tolist()
-    report = infoset.json("report", "runs", "--quiet")
+    report = infoset.json("report", "runs", "--quiet", "--out", "figures")
+    assert Path("figures/figure-b-plane.png").is_file()
     assert (report["runs"], report["complete"]) == (12, True)
     assert {"y_km", "vy_km_s"} < set(report["correlation_with_miss"]["random"])
     worst = report["worst"][0]
