@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from infoset.limits import Fraction, Positive, check_fields
-from sim.statistics import estimate_hits, shows
-from sim.stopping_rule import NUMBER, QuantileName, number_text, parse_quantile
+from sim.statistics import estimate_hits, number_text, shows
+from sim.stopping_rule import NUMBER, QuantileName, parse_quantile
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]

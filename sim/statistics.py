@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from statistics import NormalDist
 
 import numpy as np
@@ -275,3 +276,14 @@ def _least_count(size: int, level: float, probability: float) -> int:
         else:
             low = middle + 1
     return low
+
+
+def number_text(number: float) -> str:
+    """Return the shortest text from which exactly the same number is read."""
+    return repr(float(number)).removesuffix(".0")
+
+
+def level_name(level: float) -> str:
+    """Return a level as a name, without rounding: p99 of 0.99, p99.9 of 0.999."""
+    percent = Decimal(number_text(level)).scaleb(2) + 0  # the sum has no exponent above zero
+    return f"p{percent}".lower()

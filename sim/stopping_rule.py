@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset.limits import Fraction, Positive, check_fields
-from sim.statistics import estimate_quantiles
+from sim.statistics import estimate_quantiles, level_name, number_text
 
 Floats = NDArray[np.float64]
 
@@ -154,17 +154,6 @@ class Watch:
                 if all(self._rule.met_by(sample[0]) for sample in self._samples):
                     return self._seen
         return None
-
-
-def number_text(number: float) -> str:
-    """Return the shortest text from which exactly the same number is read."""
-    return repr(float(number)).removesuffix(".0")
-
-
-def level_name(level: float) -> str:
-    """Return a level as a name, without rounding: p99 of 0.99, p99.9 of 0.999."""
-    percent = Decimal(number_text(level)).scaleb(2) + 0  # the sum has no exponent above zero
-    return f"p{percent}".lower()
 
 
 def _checks(chunks: int) -> Iterator[int]:

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from experiments.common.figure_style import CURVE_LOOKS, INK, LIMIT, new_figure, place_axes, separate_labels, style
 from experiments.interception.figures.distributions import axis_limit, draw_band, draw_radius, scale_axis
 from sim import band_half_width, estimate_quantiles
-from sim.statistics import correlation_interval, shows
-from sim.stopping_rule import level_name
+from sim.statistics import correlation_interval, level_name, shows
 
 Floats = NDArray[np.float64]
 

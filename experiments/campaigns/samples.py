@@ -17,8 +17,8 @@ from experiments.common.screen import number, number_table, quantile_notes
 from experiments.interception.runs.shared import bound_name
 from experiments.interception.study import SetCounts, hit_text, set_counts, set_warnings
 from sim import HitEstimate, Outcome, QuantileEstimate, Scenario, estimate_hits, estimate_quantiles
-from sim.statistics import shows
-from sim.stopping_rule import QUANTITIES, level_name
+from sim.statistics import level_name, shows
+from sim.stopping_rule import QUANTITIES
 from sim.storage import CampaignFolder, Manifest, scenario_hash
 
 Floats = NDArray[np.float64]

@@ -43,7 +43,7 @@ from experiments.common.figure_style import (
 )
 from sim import QuantileName, Requirement
 from sim.requirement import AnyRequirement, Decision
-from sim.stopping_rule import level_name, number_text
+from sim.statistics import level_name, number_text
 from sim.storage import Axis
 
 Floats = NDArray[np.float64]

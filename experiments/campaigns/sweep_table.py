@@ -17,7 +17,8 @@ from experiments.campaigns.samples import LEVELS, OUTCOMES, Sample, noises_of, s
 from experiments.interception.study import SetCounts
 from sim import HitEstimate, QuantileEstimate, QuantileName, Requirement
 from sim.requirement import AnyRequirement, Decision, Verdict, judge
-from sim.stopping_rule import QUANTITIES, level_name
+from sim.statistics import level_name
+from sim.stopping_rule import QUANTITIES
 from sim.storage import Axis, CampaignFolder
 
 Floats = NDArray[np.float64]

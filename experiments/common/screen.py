@@ -16,8 +16,7 @@ from rich.text import Text
 
 from experiments.common.errors import on_a_screen
 from experiments.common.output import to_json
-from sim.statistics import shows
-from sim.stopping_rule import level_name
+from sim.statistics import level_name, shows
 
 BeginProgress = Callable[[str], Callable[[float], None]]
 Part = str | Text | Table

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from infoset.limits import LARGEST, SMALLEST
 from sim import QuantileName, Requirement, StoppingRule, estimate_quantiles
 from sim.requirement import HitRequirement, parse_requirement
-from sim.stopping_rule import Floats, Watch, level_name
+from sim.statistics import level_name
+from sim.stopping_rule import Floats, Watch
 
 RULE = StoppingRule(QuantileName("miss_m", 0.5), 0.5)
 
