@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from infoset import chains, polygon
-from infoset._compile import allocation_free, by_reference, constants, entry
+from infoset._compile import allocation_free, by_reference, constants, entry, inlined
 from infoset.chains import copy_section, empty_sections, working_room
 from infoset.history import History, Tapes
 from infoset.section_law import law_of
@@ -253,19 +253,31 @@ def margins_all(
                     margins[channel, look, b] = room.overlaps[channel, died]
 
 
+@inlined
+def vertex_from(
+    origins: Floats, rings: Floats, marks: Integers, n: int, side: int, i: int, tau: float, v: float, z: float
+) -> tuple[float, float]:
+    """Vertex of a chain relative to a state, in the plane of V x/e and z, m."""
+    offset_v = tau * (origins[n, side, chains.V_ORIGIN] - v + origins[n, side, chains.V_REST])
+    offset_z = chains.origin_height(origins, n, side, tau) - z
+    chain_v, chain_m = chains.read(rings, chains.offset_of(marks, n, side, i))
+    return tau * chain_v + offset_v, (chain_m - tau * chain_v) + offset_z
+
+
 @allocation_free
 def margin_in(origins: Floats, rings: Floats, marks: Integers, n: int, tau: float, v: float, z: float) -> float:
     """Signed distance of a state to the boundary of a section in the plane of V x/e and z, m; positive inside."""
-    nearest, inside = np.inf, False
     last_v, last_m = chains.vertex(origins, rings, marks, n, chains.LEFT, chains.end_of(marks, n, chains.LEFT) - 1)
-    last = (tau * (last_v - v), (last_m - tau * last_v) - z)
+    rounded = (tau * (last_v - v), (last_m - tau * last_v) - z)
+    end = vertex_from(origins, rings, marks, n, chains.LEFT, chains.end_of(marks, n, chains.LEFT) - 1, tau, v, z)
+    last = vertex_from(origins, rings, marks, n, chains.RIGHT, chains.begin_of(marks, n, chains.RIGHT), tau, v, z)
+    # The edge between the chains: a start rounded to absolute coordinates may be beyond the state in a section that is
+    # thinner than this rounding. It is used for the distance only, which keeps the last digit of published margins.
+    nearest, _ = polygon.pass_edge(np.inf, False, rounded, last, 0.0, 0.0)
+    _, inside = polygon.pass_edge(np.inf, False, end, last, 0.0, 0.0)
     for side in (chains.RIGHT, chains.LEFT):
-        # Origin of the chain relative to the state, in the plane of the distance.
-        offset_v = tau * (origins[n, side, chains.V_ORIGIN] - v + origins[n, side, chains.V_REST])
-        offset_z = chains.origin_height(origins, n, side, tau) - z
         for i in range(chains.begin_of(marks, n, side), chains.end_of(marks, n, side)):
-            chain_v, chain_m = chains.read(rings, chains.offset_of(marks, n, side, i))
-            vertex = (tau * chain_v + offset_v, (chain_m - tau * chain_v) + offset_z)
+            vertex = vertex_from(origins, rings, marks, n, side, i, tau, v, z)
             nearest, inside = polygon.pass_edge(nearest, inside, last, vertex, 0.0, 0.0)
             last = vertex
     return math.sqrt(nearest) if inside else -math.sqrt(nearest)

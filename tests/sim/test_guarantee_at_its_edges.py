@@ -212,6 +212,18 @@ def test_a_rate_band_holds_the_truth_and_is_convex_over_its_window(
         assert alone[1] - alone[0] <= 1.01 * 2.0 * (abs(omega) * 0.01 + rate_error) * x**2 / e
 
 
+def test_a_truth_inside_a_section_that_is_thinner_than_rounding_is_not_outside(asteroid: Scenario) -> None:
+    """z and V are known exactly, and the bound of the acceleration makes the section 900 m wide and 1e-14 m high."""
+    step_s, range_m = 19.0, 2.5e6
+    box = StateBox((0.0, 0.0), (range_m, 1.2 * range_m), (-0.1, -0.1), (-58.1e3, -57.9e3))
+    model = SetModel(
+        58e3, step_s, box, AngleSensor(step_s, 0.00015, 0.00023, 5.8e6), 1.0, 5e3, 29, 5,
+        InitialSet.BOX, Model.GUARANTEED,
+    )  # fmt: skip
+    scenario = replace(asteroid, sun=None, nominal_range_m=range_m, dispersion=box, set_model=model, range_sensor=None)
+    assert sound(simulate(scenario, 50, seed=1))
+
+
 # Living labels that form two intervals ----------------------------------------------------------------------------
 
 
