@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from infoset._compile import ZERO, allocation_free, entry, inlined
+from infoset._compile import allocation_free, entry
 from infoset.chains import CAPACITY, copy_section, count_of, room_of
 from infoset.concave_bounds import is_dead_between
 from infoset.history import Tapes
@@ -30,7 +30,7 @@ from infoset.replays import (
     probe,
     run,
 )
-from infoset.section_law import SectionLaw, law_of
+from infoset.section_law import law_of
 from infoset.section_life import ALIVE, Flags, Floats, Tape, summarise_section
 from infoset.section_passes import Sections, row_of, tape_of
 
@@ -300,10 +300,14 @@ def locate_living(
     return Living(True, below, lower, upper, above)
 
 
-@inlined
-def is_convex(law: SectionLaw) -> bool:
-    """Whether sets without rates are convex in (z, V, label), so that the living labels form one interval."""
-    return not law.rectangle if law.exact_angles else law.error_slope <= 0.0
+@allocation_free
+def is_convex(laws: Floats) -> bool:
+    """Whether sets without rates are convex along all axes, so that the living labels form one interval."""
+    for channel in range(laws.shape[0]):
+        law = law_of(laws, channel)
+        if law.rectangle if law.exact_angles else law.error_slope > 0.0:
+            return False
+    return True
 
 
 @entry
@@ -336,7 +340,6 @@ def refine_all(
     labels, used, alive, died = sections.labels, sections.used, sections.living, sections.died
     overlaps, summaries = sections.overlaps, sections.summaries
     origins, rings, marks, new = sections.origins, sections.rings, sections.marks, room.replays
-    law = law_of(laws, ZERO)
     for b in range(labels.shape[0]):
         if not wanted[b]:
             continue
@@ -345,7 +348,7 @@ def refine_all(
         alive[b, : used[b]] = False
         if not living.exists:
             continue
-        if errors is None and is_convex(law):
+        if errors is None and is_convex(laws):
             limit_below[b] = living.below
             limit_above[b] = living.above
         used[b] = number

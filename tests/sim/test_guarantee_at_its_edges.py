@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind, RandomNoise, Thruster, TieRule
-from infoset import AngleSensor, InformationSetView, InitialSet, Model, RateSensor, SetModel, StateBox
+from infoset import AngleSensor, InformationSet, InformationSetView, InitialSet, Model, RateSensor, SetModel, StateBox
 from infoset.section_law import BOUND_SLACK, SectionLaw, section_laws
 from infoset.section_life import LastSight, rate_band
 from sim import Outcome, Results, Scenario, simulate
 from sim.draws import draw
-from sim.engagement import Engagements
+from sim.engagement import Engagements, Step
 
 Floats = NDArray[np.float64]
 CASES = Path(__file__).parent / "cases"
@@ -227,8 +227,8 @@ def test_a_truth_inside_a_section_that_is_thinner_than_rounding_is_not_outside(a
 # Living labels that form two intervals ----------------------------------------------------------------------------
 
 
-def test_living_labels_of_the_published_model_may_form_two_intervals() -> None:
-    """A bound that rises with range and the rectangle at the start: nothing lives for 150 km between them."""
+def two_intervals(steps: int) -> tuple[SetModel, Floats, InformationSetView]:
+    """Model, measured angles and last set of a flight with a bound that rises with range and the rectangle."""
     e, range_m = 20e3, 2.5e6
     generator = np.random.default_rng(170)
     step_s = float(generator.choice([1.0, 2.0, 5.0]))
@@ -245,9 +245,21 @@ def test_living_labels_of_the_published_model_may_form_two_intervals() -> None:
     signs = np.where(draws.errors["angle"] >= 0.0, 1.0, -1.0)
     flight = Engagements(scenario, draws, noise=RandomNoise({**draws.errors, "angle": signs}))
     views: list[InformationSetView] = []
-    while flight.step < 15:
-        flight.advance(lambda step: views.append(step.information))
-    information, run = views[-1], 2
+    measured = []
+
+    def look(step: Step) -> None:
+        views.append(step.information)
+        measured.append(step.measured["angle"])
+
+    while flight.step < steps:
+        flight.advance(look)
+    return model, np.array(measured), views[-1]
+
+
+def test_living_labels_of_the_published_model_may_form_two_intervals() -> None:
+    """A bound that rises with range and the rectangle at the start: nothing lives for 150 km between them."""
+    model, _, information = two_intervals(15)
+    run = 2
     assert not information.inconsistent[run]
     labels = np.linspace(*model.label_limits_m, 120)
     living = np.array([len(information.section_at(label, run).polygon.polygon()) > 0 for label in labels])
@@ -257,9 +269,61 @@ def test_living_labels_of_the_published_model_may_form_two_intervals() -> None:
     # What is done: the stored sections that live are kept, on both sides, and the interval spans both.
     stored = information.labels_m[run][information.living[run]]
     assert not ((stored > edges[1] + 1e4) & (stored < edges[2])).any()
-    least, greatest = (ends[run] + e * step_s * 15 for ends in information.living_range_interval_m())
+    travelled = model.closing_speed_m_s * model.step_s * 15
+    least, greatest = (ends[run] + travelled for ends in information.living_range_interval_m())
     assert edges[0] < least < edges[1]
     assert greatest == pytest.approx(model.label_limits_m[1], rel=1e-9)
+
+
+@pytest.mark.parametrize("y", [None, "mirror of z", "bound that falls with range"])
+def test_a_new_grid_takes_the_interval_of_its_stored_sections_and_keeps_the_limits(y: str | None) -> None:
+    """Two intervals of living labels, at 2400 km and above 2560 km; the measurement of step 16 empties the latter."""
+    model, measured, _ = two_intervals(17)
+    angles = measured[:, 2]
+    if y is not None:
+        box, sensor = model.bounds, model.angle_sensor
+        if y == "bound that falls with range":
+            sensor = replace(sensor, error_at_nominal_range_y_rad=0.01, error_at_zero_range_y_rad=0.02)
+        model = replace(model, bounds=replace(box, y_m=box.z_m, vy_m_s=box.vz_m_s), angle_sensor=sensor)
+        angles = np.stack([-angles if y == "mirror of z" else 0.0 * angles, angles])
+
+    def after(steps: int, sections: int) -> InformationSet:
+        information = InformationSet(replace(model, sections=sections))
+        for step in range(steps):
+            if step > 0:
+                information.predict()
+            information.measure_angle(angles[..., step, None])
+        for section in information.sections():
+            replayed = information.section_at(section.label_m)
+            np.testing.assert_array_equal(section.polygon.polygon(), replayed.polygon.polygon())
+            if section.polygon_y is not None and replayed.polygon_y is not None:
+                np.testing.assert_array_equal(section.polygon_y.polygon(), replayed.polygon_y.polygon())
+        return information
+
+    def lives(information: InformationSet, label_m: float) -> bool:
+        section = information.section_at(label_m)
+        return all(polygon is None or len(polygon.polygon()) > 0 for polygon in (section.polygon, section.polygon_y))
+
+    def stored(information: InformationSet) -> Floats:
+        return information.labels_m[information.living]
+
+    # Many sections: both intervals are stored, and the set goes on with the one that lives longer.
+    many = after(16, 29)
+    assert [lives(many, label) for label in (2.4e6, 2.48e6, 2.59e6)] == [True, False, True]
+    assert stored(many).min() < 2.41e6
+    assert stored(many).max() > 2.55e6
+    many = after(17, 29)
+    assert not many.inconsistent.any()
+    assert len(stored(many)) == 7
+    assert ((stored(many) > 2.39e6) & (stored(many) < 2.41e6)).all()
+    # Three sections: the new grid of step 12 takes the interval in which one is stored. The limits still contain the
+    # other one, in which no section is stored. The set is empty, to the search, when the first one is.
+    few = after(16, 3)
+    assert len(stored(few)) == 7
+    assert stored(few).min() > 2.55e6
+    assert lives(few, 2.4e6)
+    assert (few._state.lower_label[0], few._state.upper_label[0]) == model.label_limits_m
+    assert after(17, 3).inconsistent.all()
 
 
 def test_phi_covers_a_truth_that_passes_its_closest_approach_before_its_label_leaves(asteroid: Scenario) -> None:
