@@ -47,7 +47,9 @@ def rows() -> Iterator[tuple[str, Scenario]]:
         yield f"game, {tie.value}", replace(spatial, noise=NoiseKind.GAME, tie=tie)
     yield "random in the disc", replace(spatial, set_model=disc)
     yield "game in the disc, upper", replace(spatial, set_model=disc, noise=NoiseKind.GAME)
+    # Gravity is the only acceleration, as in the prototype.
     sure = of_model(spatial, Model.GUARANTEED)
+    sure = replace(sure, set_model=replace(sure.set_model, disturbance_m_s2=0.0))
     ranging = replace(sure, range_sensor=meter)
     anywhere = replace(sure, dispersion=sure.set_model.bounds)
     for title, scenario in (
@@ -106,6 +108,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=900, help="runs of a row with random noise")
     parser.add_argument("--game-runs", type=int, default=300, help="runs of a row with game noise")
+    parser.add_argument("--only", default="", metavar="TEXT", help="only rows whose title begins with this text")
     parser.add_argument("--cost", action="store_true", help="print only the cost of the second axis")
     options = parser.parse_args()
     if options.cost:
@@ -114,6 +117,7 @@ def main() -> None:
         lines = (
             line(title, flown(scenario, options.game_runs if scenario.noise is NoiseKind.GAME else options.runs))
             for title, scenario in rows()
+            if title.startswith(options.only)
         )
     for text in lines:
         sys.stdout.write(f"{text}\n")

@@ -389,7 +389,7 @@ def test_lengths_a_power_of_two_as_long_give_the_same_digits(
     model: SetModel, events: list[tuple[float, float, float]], label: float, power: int
 ) -> None:
     unit = 2.0**power
-    box = StateBox(*((unit * least, unit * greatest) for least, greatest in vars(BOUNDS).values()))
+    box = StateBox(*((unit * ends[0], unit * ends[1]) for ends in vars(BOUNDS).values() if ends is not None))
     scaled = replace(
         model,
         closing_speed_m_s=unit * E,
