@@ -13,8 +13,30 @@ from infoset.limits import shown
 
 
 def start(strategy: Strategy, batch: int, axes: Sequence[str]) -> list[Any]:
-    """Return the states of a strategy for `decide`: one for each lateral axis, or one if it decides for all axes."""
+    """Return the states of a strategy for `decide`: one for each lateral axis, or one if it decides for both axes.
+
+    Raises
+    ------
+    ValueError
+        If it decides for both axes, and the engagement is in a plane.
+    """
+    check_axes(strategy, axes)
     return [strategy.start(batch) for _ in (axes[:1] if _is_spatial(strategy) else axes)]
+
+
+def check_axes(strategy: Strategy, axes: Sequence[str]) -> None:
+    """Refuse a strategy that decides for both lateral axes in an engagement that has one.
+
+    Raises
+    ------
+    ValueError
+        If its class has ``spatial = True`` and there is one axis. Engagements of a batch would be taken for axes.
+    """
+    if _is_spatial(strategy) and len(axes) == 1:
+        raise ValueError(
+            f"strategy {type(strategy).__name__} decides for both lateral axes (its class has `spatial = True`), and "
+            "the scenario is in a plane: use a scenario in space, or a strategy without `spatial = True`"
+        )
 
 
 def decide(

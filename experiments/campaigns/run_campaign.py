@@ -33,7 +33,7 @@ def run(options: Options) -> None:
             options.out,
             seed=options.seed,
             noise=None if options.noise is None else CampaignNoise(options.noise),
-            strategy=own_strategy(options.strategy),
+            strategy=own_strategy(options.strategy, scenario),
             guarantee=options.guarantee,
             chunk=options.chunk,
             until=_rule(options.until),

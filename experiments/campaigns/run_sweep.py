@@ -49,7 +49,7 @@ def run(options: Options) -> None:
             options.out,
             seed=options.seed,
             noise=None if options.noise is None else CampaignNoise(options.noise),
-            strategy=own_strategy(options.strategy),
+            strategy=own_strategy(options.strategy, scenario),
             guarantee=guarantee,
             chunk=options.chunk,
             until=required if options.until else None,

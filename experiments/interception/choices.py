@@ -16,6 +16,7 @@ from experiments.interception.scenario_file import (
     scenario_to_toml,
 )
 from guidance import Strategy, TieRule, strategy_names
+from guidance.strategy import check_axes
 from infoset import Model
 from infoset.model import MOST_SECTIONS
 from sim import Scenario
@@ -111,12 +112,20 @@ def study_scenario(options: Any, resumed: Model | None = None) -> tuple[Scenario
     return changed, [f"model: {default.value}, the default of studies; to use that of the file, add --model {of_file}"]
 
 
-def own_strategy(text: str | None) -> Strategy | None:
+def own_strategy(text: str | None, scenario: Scenario, option: str = "--strategy") -> Strategy | None:
     """Return the strategy that ``--strategy FILE.py:CLASS`` names; None for a built-in name.
 
-    `InputError` if the file has no such strategy, or its code raises an exception.
+    `InputError` if the file has no such strategy, its code raises an exception, or it decides for both lateral axes
+    and the scenario is in a plane.
     """
-    return load_strategy(text) if text is not None and is_own_strategy(text) else None
+    if text is None or not is_own_strategy(text):
+        return None
+    own = load_strategy(text, option)
+    try:
+        check_axes(own, scenario.set_model.axes)
+    except ValueError as error:
+        raise InputError(f"{option}: {text}: {error}") from None
+    return own
 
 
 def chosen_strategies(scenario: Scenario, names: str | None) -> Mapping[str, Strategy | None]:
@@ -135,7 +144,7 @@ def chosen_strategies(scenario: Scenario, names: str | None) -> Mapping[str, Str
     valid = strategy_names()
     chosen: dict[str, Strategy | None] = {}
     for text in valid if names is None else [part.strip() for part in names.split(",")]:
-        own = load_strategy(text, "--strategies") if is_own_strategy(text) else None
+        own = own_strategy(text, scenario, "--strategies")
         name = choice("--strategies", text, valid) if own is None else strategy_name(scenario, own)
         if name in chosen:
             raise InputError(f"--strategies: {name} is named twice; name each strategy once")

@@ -194,12 +194,14 @@ def test_a_planar_strategy_has_one_state_for_each_axis_and_a_spatial_one_has_one
     assert whole == [now]
 
 
-def test_in_a_plane_both_kinds_get_the_planar_situation() -> None:
+def test_in_a_plane_a_strategy_gets_the_planar_situation_and_one_for_both_axes_is_refused() -> None:
     now = planar("z", situations(MODEL)[0])
-    for kind in (Noted, Vector):
-        states = start(kind(), BATCH, ("z",))
-        assert decide(kind(), now, states, ALL).shape == (BATCH,)
-        assert states == [[now]]
+    states = start(Noted(), BATCH, ("z",))
+    assert decide(Noted(), now, states, ALL).shape == (BATCH,)
+    assert states == [[now]]
+    # With two engagements its arrays of shape (2, B) would be taken from arrays of shape (B,): engagements for axes.
+    with pytest.raises(ValueError, match=r"strategy Vector decides for both lateral axes .* scenario is in a plane"):
+        start(Vector(), BATCH, ("z",))
 
 
 class Returns(Noted):

@@ -31,7 +31,7 @@ def run(options: Adversary) -> None:
     if options.record is not None:
         record_path("--record", options.record)
     scenario, notes = study_scenario(options)
-    own = own_strategy(options.strategy)
+    own = own_strategy(options.strategy, scenario)
     times_s = read_times(options.times, options.out)
     names = ("scenario.toml", "results.json", "steps.csv", RECORD, *figure_files(FIGURE_2, FIGURE_3))
     with (

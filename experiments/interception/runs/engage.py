@@ -30,7 +30,7 @@ from sim import AxisStep, Inconsistency, Record, StepRecord, fly_one
 def run(options: Engage) -> None:
     """Simulate one or two engagements, write the files and print the table."""
     scenario = scenario_with(options)
-    own = own_strategy(options.strategy)
+    own = own_strategy(options.strategy, scenario)
     times_s = read_times(options.times, options.out)
     both = options.noise == "both"
     noises = [*NoiseKind] if both else [NoiseKind(options.noise or scenario.noise)]

@@ -46,7 +46,7 @@ FIGURE = "figure-4-distributions"
 def run(options: Experiment) -> None:
     """Simulate the curves, write the files and print the table."""
     scenario = scenario_with(options)
-    own = own_strategy(options.strategy)
+    own = own_strategy(options.strategy, scenario)
     b_planes = B_PLANE if scenario.is_spatial else {}
     with (
         output_of(

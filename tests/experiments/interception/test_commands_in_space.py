@@ -223,3 +223,6 @@ def test_a_strategy_of_a_file_gets_one_axis_or_both(spatial: bool, file: Path, i
     message = infoset.refused("engage", file, "--strategy", f"{none}:Mine")
     assert f"{none}: ValueError: strategy Mine must return" in message
     assert ("shape (2, 1), along y and z" in message) == spatial
+    if spatial:
+        message = infoset.refused("engage", "asteroid-1997", "--strategy", f"{whole}:Mine")
+        assert "decides for both lateral axes" in message and "the scenario is in a plane" in message

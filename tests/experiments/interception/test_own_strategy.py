@@ -60,14 +60,14 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, st
 
 
 def test_a_strategy_of_a_file_is_simulated_and_can_be_pickled(mine: Path, brief: Scenario) -> None:
-    own = own_strategy("mine.py:Mine")
+    own = own_strategy("mine.py:Mine", brief)
     assert own is not None
     expected = simulate(brief, 2, strategy=SymmetricMiss()).impulse_m_s
     for strategy in (own, pickle.loads(pickle.dumps(own))):
         assert (type(strategy).__module__, type(strategy).__qualname__) == ("mine", "Mine")
         assert (simulate(brief, 2, strategy=strategy).impulse_m_s == expected).all()
-    assert own_strategy("patient") is None
-    assert own_strategy(None) is None
+    assert own_strategy("patient", brief) is None
+    assert own_strategy(None, load_scenario("asteroid-1997")) is None
 
 
 @pytest.mark.parametrize(
