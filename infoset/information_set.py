@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from infoset import section_life, section_passes
 from infoset.guaranteed_miss import GuaranteedMiss
 from infoset.history import History
-from infoset.limits import COUNT, NOT_NEGATIVE, PART, flags, real_array, shown
+from infoset.limits import COUNT, NOT_NEGATIVE, PART, flags, real_array, real_values, shown
 from infoset.model import InitialSet, Recovery, SetModel
 from infoset.section_law import BOUND_SLACK, section_laws
 from infoset.section_stack import SectionStack
@@ -160,7 +160,7 @@ class InformationSet(InformationSetView):
             Bound b, in [0, 1).
         where : array_like of bool, shape () or (B,)
             Engagements with a measurement.
-        alpha_rad : array_like, shape () or (B,), in space (2, B), or None
+        alpha_rad : array_like, shape () or (B,), in space (2,) or (2, B), or None
             Angles measured at the same time. In the guaranteed model the measured distance is x / cos(alpha); without
             a measured angle, alpha is bounded by the greatest possible displacement across x.
 
@@ -212,7 +212,7 @@ class InformationSet(InformationSetView):
 
         Parameters
         ----------
-        alpha_rad : array_like, shape () or (B,), in space (2, B)
+        alpha_rad : array_like, shape () or (B,), in space (2,) or (2, B)
             Measured angle alpha_m, rad; in space both angles in the convention of the sensor, that of y first.
         where : array_like of bool, shape () or (B,)
             Engagements with a measurement.
@@ -230,7 +230,7 @@ class InformationSet(InformationSetView):
 
         Parameters
         ----------
-        omega_rad_s : array_like, shape () or (B,), in space (2, B)
+        omega_rad_s : array_like, shape () or (B,), in space (2,) or (2, B)
             Measured rate, rad/s; in space those of both plane angles, that of y first.
         error_rad_s : float
             Error bound of the rate, rad/s.
@@ -256,7 +256,7 @@ class InformationSet(InformationSetView):
 
         Parameters
         ----------
-        impulse_m_s : array_like, shape () or (B,), in space (2, B)
+        impulse_m_s : array_like, shape () or (B,), in space (2,) or (2, B)
             Impulse k along z, m/s; in space along y and z.
         where : array_like of bool, shape () or (B,)
             Engagements with an impulse.
@@ -331,8 +331,14 @@ class InformationSet(InformationSetView):
     def _spread(self, value: ArrayLike, name: str) -> Floats:
         """Return values along each axis, shape (C, B)."""
         channels = len(self._state.stack.laws)
-        shape = (self.batch,) if channels == 1 else (channels, self.batch)
-        return np.ascontiguousarray(real_array(name, value, shape).reshape(channels, self.batch))
+        if channels == 1:
+            return np.ascontiguousarray(real_array(name, value, (self.batch,)).reshape(1, self.batch))
+        values, shape = real_values(name, value), (channels, self.batch)
+        if values.shape not in ((channels,), shape):
+            raise ValueError(
+                f"{name} must have two values, along y and z, or the shape {shape}: got the shape {values.shape}"
+            )
+        return real_array(name, np.broadcast_to(values.T, shape[::-1]).T, shape)
 
     def _active(self, where: ArrayLike) -> Flags:
         return np.asarray(self.tracking & flags("where", where, (self.batch,)))

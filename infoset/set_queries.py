@@ -349,7 +349,10 @@ class SetQueries:
         return SetQueries(refined).stored_range_interval_m()
 
     def to_shapely(self, engagement: int = 0) -> list[BaseGeometry]:
-        """Return the living sections of one engagement as shapely geometries of (omega, alpha), rad/s and rad."""
+        """Return the living sections of one engagement as shapely geometries of (omega, alpha), rad/s and rad.
+
+        Those of a set in space are of the z axis; ``axis("y").to_shapely()`` returns those of y.
+        """
         from infoset.shapes import to_shapely
 
         return [to_shapely(section.omega_alpha) for section in self.sections(engagement)]

@@ -52,6 +52,22 @@ def test_a_section_replayed_equals_the_one_carried_from_the_start() -> None:
         assert replayed.range_m == section.range_m
 
 
+def test_in_space_a_value_is_needed_for_each_axis_and_is_used_in_all_engagements() -> None:
+    model = replace(MODEL, bounds=replace(KNOWN, y_m=(-8e3, 8e3), vy_m_s=(-80.0, 80.0)))
+    for batch in (1, 3):
+        one, each = InformationSet(model, batch), InformationSet(model, batch)
+        one.measure_angle([0.0002, 0.0004])
+        one.shift([1.0, 2.0])
+        each.measure_angle(np.array([[0.0002] * batch, [0.0004] * batch]))
+        each.shift(np.array([[1.0] * batch, [2.0] * batch]))
+        np.testing.assert_array_equal(one.predicted_miss().upper_m, each.predicted_miss().upper_m)
+        for change in (one.measure_angle, one.shift):
+            for value in (0.0004, [0.0004], [0.1, 0.2, 0.3], [[0.1, 0.2]] * 3, [np.nan, 0.1], "ab"):
+                with pytest.raises((ValueError, TypeError), match="two values, along y and z|finite|numbers"):
+                    change(value)
+        np.testing.assert_array_equal(one.predicted_miss().upper_m, each.predicted_miss().upper_m)
+
+
 def test_regridding_gives_twice_the_fewest_and_one_over_the_living_range_ends_included() -> None:
     model = replace(MODEL, sections=5, fewest_sections=5)
     information = InformationSet(model)
