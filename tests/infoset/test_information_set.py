@@ -63,7 +63,7 @@ def test_in_space_a_value_is_needed_for_each_axis_and_is_used_in_all_engagements
         np.testing.assert_array_equal(one.predicted_miss().upper_m, each.predicted_miss().upper_m)
         for change in (one.measure_angle, one.shift):
             for value in (0.0004, [0.0004], [0.1, 0.2, 0.3], [[0.1, 0.2]] * 3, [np.nan, 0.1], "ab"):
-                with pytest.raises((ValueError, TypeError), match="two values, along y and z|finite|numbers"):
+                with pytest.raises((ValueError, TypeError), match=r"two values, along y and z|finite|numbers"):
                     change(value)
         np.testing.assert_array_equal(one.predicted_miss().upper_m, each.predicted_miss().upper_m)
 
