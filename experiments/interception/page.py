@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from experiments.common.errors import InputError, shown
 from experiments.common.page_document import page
 from experiments.interception.record_titles import outcome_title, record_titles
-from infoset import InformationSet, Section
+from infoset import Convention, InformationSet, Section
 from infoset.sensors import SENSORS
-from sim import Record
+from sim import Record, Scenario
 from sim.gravity import on_board_model
 
 Floats = NDArray[np.float64]
@@ -81,6 +81,7 @@ def _data(record: Record, title: str) -> dict[str, object]:
         "axes": [
             {
                 "along": f" along {axis}" if scenario.is_spatial else "",
+                "measured_name": _measured_name(scenario, axis),
                 **_axis_data(record, axis),
                 "outlines": {
                     "predicted_miss_m": _packed(np.concatenate([each.miss_m[axis] for each in stages]), "<f8"),
@@ -90,6 +91,13 @@ def _data(record: Record, title: str) -> dict[str, object]:
             for axis in model.axes
         ],
     }
+
+
+def _measured_name(scenario: Scenario, axis: str) -> str:
+    """Return the name of the measured angle of an axis: a gimbal measures azimuth and elevation."""
+    if scenario.set_model.angle_sensor.convention is Convention.GIMBAL:
+        return {"y": "measured azimuth", "z": "measured elevation"}[axis]
+    return f"measured angle along {axis}" if scenario.is_spatial else "measured angle"
 
 
 def _axis_data(record: Record, axis: str) -> dict[str, object]:

@@ -250,7 +250,7 @@ class Column {
     const error = this.errorAt(truth.range);
     const measured = this.record.measured_angle_rad[this.step];
     if (this.stage !== MEASURED || measured === null || Math.abs(y / angleUnit[1] - measured) > error) return null;
-    return [`measured angle ${shown(measured * angleUnit[1], angleUnit[0])}`,
+    return [`${this.record.measured_name} ${shown(measured * angleUnit[1], angleUnit[0])}`,
       `error at most ${shown(error * angleUnit[1], angleUnit[0])} at x = ${shown(truth.range / 1e3, "km")}`];
   }
 
@@ -424,7 +424,7 @@ class Engagement {
     const scaled = (value, factor, unit) => shown(value && value * factor, unit);
     return [
       ["time", shown(record.time_s[step], "s")],
-      ...along("measured angle", (column) => scaled(column.record.measured_angle_rad[step], 1e3, "mrad")),
+      ...columns.map(({ record: of }) => [of.measured_name, scaled(of.measured_angle_rad[step], 1e3, "mrad")]),
       ...(record.range_error_relative === null ? [] : [["measured range", scaled(record.measured_range_m[step], 1e-3, "km")]]),
       ...(record.rate_error_rad_s === null ? [] : along("measured rate",
         (column) => scaled(column.record.measured_rate_rad_s[step], 1e6, "µrad/s"))),

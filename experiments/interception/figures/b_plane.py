@@ -149,7 +149,7 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
         quantiles.append(f"{'median' if level == 0.5 else f'{100 * level:g} %'}: {number(quantile)} m")
     if radius_m is not None and radius_m <= half:
         look = {"edgecolor": RADIUS_LOOK["color"], **{key: RADIUS_LOOK[key] for key in ("linestyle", "linewidth")}}
-        axes.add_patch(Circle((0.0, 0.0), radius_m, fill=False, zorder=2.8, label="_radius", **look))
+        axes.add_patch(Circle((0.0, 0.0), radius_m, fill=False, zorder=3.2, label="_radius", **look))
     axes.plot(0.0, 0.0, marker="+", color=INK, markersize=7.0, markeredgewidth=1.1, linestyle="none", zorder=4.0)
     beyond = int((np.abs(each.across_m) > half).any(axis=1).sum())
     if beyond:

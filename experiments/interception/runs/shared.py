@@ -89,8 +89,8 @@ def allowance(scenario: Scenario) -> str | None:
     if not model.is_guaranteed:
         return None
     accelerations = ", ".join(
-        f"acceleration along {axis} at most {along.acceleration_m_s2:.5g} m/s^2 (from manoeuvres "
-        f"{along.disturbance_m_s2:g} and gravity {along.gravity_m_s2:.2g})"
+        f"acceleration along {axis} at most {along.acceleration_m_s2:.5g} m/s^2 (manoeuvres "
+        f"{along.disturbance_m_s2:g} and gravity {along.gravity_m_s2:.2g}, divided by 1 - {along.speed_error:.4f})"
         for axis, along in ((axis, model.axis(axis)) for axis in model.axes)
     )
     pointing = model.pointing_error_rad

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -17,8 +18,10 @@ from experiments.interception.figures.animation import GIF, animate
 from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import TRUTH_MARK, choose_sections, draw_sets
+from experiments.interception.page import interception_page
 from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind
+from infoset import Convention
 from sim import Record, Results, fly_one, simulate
 from tests.experiments.command_line import Command
 
@@ -76,6 +79,25 @@ def test_the_radius_of_the_body_is_a_circle(results: Results) -> None:
         assert ("_radius" in circles(figure.axes[0])) == drawn
         assert legend(figure)[-1] == f"body radius, {radius:g} m: {where}"
     assert "radius" not in " ".join(legend(draw_b_plane([one])))
+
+
+def test_a_circle_of_a_quantile_does_not_hide_the_radius_of_the_body(results: Results) -> None:
+    (axes,) = draw_b_plane([cloud("random noise", [results])], float(np.median(results.miss_m))).axes
+    orders = {patch.get_label(): patch.get_zorder() for patch in axes.patches}
+    assert orders.pop("_radius") > max(orders.values())
+
+
+@pytest.mark.parametrize(
+    ("convention", "names"),
+    [
+        (Convention.GIMBAL, ["measured azimuth", "measured elevation"]),
+        (Convention.CONE, ["measured angle along y", "measured angle along z"]),
+    ],
+)
+def test_the_page_names_the_measured_angles(convention: Convention, names: list[str]) -> None:
+    scenario = load_scenario("asteroid-1997-space", [f"angle_sensor.convention={convention.value}"])
+    text = interception_page([fly_one(scenario)])
+    assert re.findall(r'"measured_name": ?"([^"]*)"', text) == names
 
 
 def test_samples_that_differ_much_have_limits_for_each_panel(results: Results) -> None:
