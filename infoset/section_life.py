@@ -164,6 +164,8 @@ def steepest_angles(alpha: float, across: float, range_m: float, law: SectionLaw
     growth, other_growth = max(law.error_slope, 0.0) * range_m, max(law.other_error_slope, 0.0) * range_m
     constant, other_constant = law.error_at_zero_range, law.other_error_at_zero_range
     if law.angles == CONE:
+        if max(abs(alpha), abs(across)) >= RIGHT_ANGLE:
+            return RIGHT_ANGLE, 0.0
         constant, other_constant = constant * CONE_STRETCH / math.cos(across), constant * CONE_STRETCH / math.cos(alpha)
         growth, other_growth = growth * CONE_STRETCH / math.cos(across), growth * CONE_STRETCH / math.cos(alpha)
     least, other_least = abs(alpha) + constant, abs(across) + other_constant

@@ -1,0 +1,115 @@
+"""Bands of the guaranteed model in space: they contain the truth at every label, and are convex in the label."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from infoset import AngleSensor, Convention, InitialSet, Model, SetModel, StateBox
+from infoset.section_law import section_laws
+from infoset.section_life import slope_band
+
+Floats = NDArray[np.float64]
+
+EPS = float(np.finfo(np.float64).eps)
+WIDE, SLOW = (-1e7, 1e7), (-100.0, 100.0)
+KNOWN = StateBox(WIDE, (5.3e6, 6.3e6), SLOW, (-59e3, -57e3), WIDE, SLOW)
+
+shares = st.floats(0.0, 1.0)
+signed = st.floats(-1.0, 1.0)
+bounds = st.one_of(st.floats(1e-6, 0.05), st.sampled_from([1e-9, 1e-4]))
+
+
+@dataclass(frozen=True)
+class Sight:
+    """The line of sight of one engagement; the rates are not used."""
+
+    alpha_rad: Floats
+    range_m: Floats
+
+    @property
+    def omega_rad_s(self) -> Floats:
+        return np.zeros_like(self.alpha_rad)
+
+
+def sight(x_m: float, angles: tuple[float, float]) -> Sight:
+    alpha = np.array(angles)[:, None]
+    return Sight(alpha, x_m * np.sqrt(1.0 + (np.tan(alpha) ** 2).sum(axis=0)))
+
+
+def bands(model: SetModel, measured: Floats, elapsed_m: float) -> Callable[[float], list[tuple[float, float]]]:
+    """Return the bands of y/x and z/x of the engine as a function of the label."""
+    y, z = measured[:, 0].tolist()
+    law_y, law_z = section_laws(model)
+    return lambda label: [
+        slope_band(y, z, label, label - elapsed_m, law_y),
+        slope_band(z, y, label, label - elapsed_m, law_z),
+    ]
+
+
+@settings(deadline=None)
+@given(
+    st.sampled_from(Convention), bounds, bounds, st.none() | st.tuples(st.just(0.0) | bounds, st.just(0.0) | bounds),
+    st.tuples(signed, signed), st.tuples(signed, signed), st.booleans(), signed, shares, shares,
+)  # fmt: skip
+def test_bands_contain_the_truth_and_are_convex(
+    convention: Convention,
+    at_nominal: float,
+    at_zero: float,
+    of_y: tuple[float, float] | None,
+    angles: tuple[float, float],
+    error: tuple[float, float],
+    extremal: bool,
+    speed: float,
+    label_share: float,
+    flown: float,
+) -> None:
+    sensor = AngleSensor(0.5, at_nominal, max(at_zero, 0.3 * at_nominal), 5.8e6, convention=convention)
+    if of_y is not None and convention is not Convention.CONE:
+        at_zero_y = max(of_y[1], 0.3 * of_y[0])
+        sensor = replace(sensor, error_at_nominal_range_y_rad=of_y[0], error_at_zero_range_y_rad=at_zero_y)
+    # The falling bound must be positive up to the greatest distance.
+    if min(sensor.error_bounds(np.array([3e7]))[..., 0].min(), sensor.error_bound(3e7)) < 0.0:
+        sensor = replace(sensor, nominal_range_m=5.8e7)
+    model = SetModel(58e3, 0.5, KNOWN, sensor, initial_set=InitialSet.BOX, kind=Model.GUARANTEED)
+    least, greatest = model.label_limits_m
+    label, elapsed_m = least + label_share * (greatest - least), 0.999 * flown * least
+    x = label - elapsed_m
+    true = sight(x * (1.0 + speed * model.speed_error), angles)
+    errors = np.array(error)[:, None]
+    if extremal:
+        errors = np.where(errors < 0.0, -1.0, 1.0) * (np.sqrt(0.5) if sensor.is_disc else 1.0)
+    measured = sensor.measured(true, sensor.limited(errors))
+    band = bands(model, measured, elapsed_m)
+    for (lower, upper), slope in zip(band(label), np.tan(angles), strict=True):
+        rounding = 64.0 * EPS * (1.0 + slope**2) * label / x
+        assert lower - rounding <= slope <= upper + rounding
+    labels = np.linspace(least, greatest, 7)
+    ranges = labels - elapsed_m
+    heights = np.array([band(each) for each in labels.tolist()]) * ranges[:, None, None]
+    if np.isfinite(heights).all():
+        bend = np.diff(heights, n=2, axis=0)
+        rounding = 64.0 * EPS * greatest * (1.0 + np.abs(heights / ranges[:, None, None]).max())
+        assert bend[..., 0].min() >= -rounding
+        assert bend[..., 1].max() <= rounding
+
+
+@settings(deadline=None)
+@given(signed, signed, signed)
+def test_a_direction_measured_beyond_a_right_angle_bounds_nothing_that_is_not_true(
+    turn: float, steep: float, other: float
+) -> None:
+    """Both measured angles may pass a right angle, where the cosines of the cone's bounds are negative."""
+    sensor = AngleSensor(0.5, 0.1, 0.1, 5.8e6, convention=Convention.CONE)
+    model = SetModel(58e3, 0.5, KNOWN, sensor, initial_set=InitialSet.BOX, kind=Model.GUARANTEED)
+    angles = 1.5 + 0.07 * steep, 1.5 + 0.07 * other
+    error = np.array([[np.cos(np.pi * turn)], [np.sin(np.pi * turn)]])
+    label = 5.8e6
+    measured = sensor.measured(sight(label, angles), error)
+    for (lower, upper), slope in zip(bands(model, measured, 0.0)(label), np.tan(angles), strict=True):
+        assert lower - 1e-9 * slope <= slope <= upper + 1e-9 * slope
