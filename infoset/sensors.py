@@ -9,6 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import lru_cache
 from typing import ClassVar, Protocol, TypeVar
 
 import numpy as np
@@ -240,7 +241,7 @@ class AngleSensor(Sensor):
         at_nominal, at_zero = self.error_at_nominal_range_rad, self.error_at_zero_range_rad
         if name == "y":
             at_nominal, at_zero = (max(bound, NEGLIGIBLE_ERROR_RAD) for bound in self._bounds_of_y)
-        return AngleSensor(self.period_s, at_nominal, at_zero, self.nominal_range_m)
+        return _planar_sensor(self.period_s, at_nominal, at_zero, self.nominal_range_m)
 
     @property
     def _bounds_of_y(self) -> tuple[float, float]:
@@ -354,6 +355,12 @@ class AngleSensor(Sensor):
     def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats]:
         """Return a band of z."""
         return False, errors * self.error_bound(range_m) * range_m
+
+
+@lru_cache(maxsize=64)
+def _planar_sensor(period_s: float, at_nominal_rad: float, at_zero_rad: float, nominal_range_m: float) -> AngleSensor:
+    """Return a sensor of one angle; strategies ask for it at every step."""
+    return AngleSensor(period_s, at_nominal_rad, at_zero_rad, nominal_range_m)
 
 
 def _direction(alpha_rad: Floats) -> Floats:
