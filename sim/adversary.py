@@ -71,6 +71,8 @@ class WorstEngagement:
     sets_emptied : int
         Number of simulated engagements whose set became empty. If it is zero, the search with `keep_set` and the
         search without it are the same.
+    lateral_miss_m : mapping of str to float
+        Position at the closest approach by lateral axis, y and z, m; empty in a plane.
     history : tuple of (int, float)
         Evaluations and greatest miss so far, m, at each increase.
     """
@@ -88,6 +90,7 @@ class WorstEngagement:
     changes: int
     evaluations: int
     sets_emptied: int
+    lateral_miss_m: Mapping[str, float]
     history: tuple[tuple[int, float], ...]
 
     def noise(self) -> ScriptedNoise:
@@ -224,6 +227,9 @@ class _Search:
             changes=int(elite.plans.changes[0]),
             evaluations=self.evaluations,
             sets_emptied=self.sets_emptied,
+            lateral_miss_m=(
+                dict(zip("yz", elite.lateral_miss_m[0].tolist(), strict=True)) if self.scenario.is_spatial else {}
+            ),
             history=tuple(self.history),
         )
 
@@ -248,7 +254,8 @@ class _Search:
         if tie is not None:  # the errors of the game become the plan
             plans.sequence[:], plans.prescribed[:] = noise.errors, True
         value = np.where(counts, results.miss_m, -np.inf)
-        return Flown(plans, value, noise.errors, outcomes, results.set_emptied, results.truth_kept)
+        lateral = results.lateral_miss.filled(np.nan)
+        return Flown(plans, value, noise.errors, outcomes, results.set_emptied, results.truth_kept, lateral)
 
     def _select(self, outcomes: Flown, young: bool) -> None:
         """Update the elite and the history with new flights."""

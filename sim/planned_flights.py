@@ -126,6 +126,8 @@ class Flown:
         Whether the set became empty.
     truth_kept : ndarray of bool, shape (n,)
         Whether the true state was inside its section at every step.
+    lateral_miss_m : ndarray, shape (n, 2)
+        Position (y, z) at the closest approach, m; without meaning in a plane.
     """
 
     plans: Plans
@@ -134,6 +136,7 @@ class Flown:
     outcomes: NDArray[np.object_]
     set_emptied: Flags
     truth_kept: Flags
+    lateral_miss_m: Floats
 
     def take(self, which: Counts | slice) -> Flown:
         """Return some plans with their outcomes."""

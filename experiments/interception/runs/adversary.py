@@ -77,6 +77,7 @@ def _summary(
         **worst.misses(),
         "keep_set": options.keep_set,
         "worst_miss_m": chosen.miss_m,
+        **{f"worst_miss_{axis}_m": value for axis, value in chosen.lateral_miss_m.items()},
         "outcome": chosen.outcome.value,
         "truth_kept": chosen.truth_kept,
         "evaluations": chosen.evaluations,
@@ -92,8 +93,10 @@ def _rows(scenario: Scenario) -> list[tuple[str, Callable[[WorstEngagement], str
     """Return the rows of the table: title, and text of an engagement."""
     axes = [*scenario.set_model.axes, "x"]
     position, velocity = ", ".join(axes), ", ".join(f"V_{axis}" for axis in axes)
+    across = [("miss along y, z, m", lambda found: ", ".join(map(number, found.lateral_miss_m.values())))]
     return [
         ("greatest miss found, m", lambda found: number(found.miss_m)),
+        *(across if scenario.is_spatial else []),
         ("outcome", lambda found: found.outcome.value),
         ("true state always in the set", lambda found: "yes" if found.truth_kept else "no"),
         (f"initial {position}, km", lambda found: _texts(found.position_m / M_PER_KM)),

@@ -111,12 +111,15 @@ def test_the_worst_in_space_as_json_table_and_record(infoset: Command, brief: Sc
     assert code == 0
     assert "initial y, z, x, km" in out
     assert "initial V_y, V_z, V_x, km/s" in out
+    assert "miss along y, z, m" in out
     found = json.loads((tmp_path / "worst.json").read_text())
-    assert list(found) == KEYS
+    across = ["worst_miss_y_m", "worst_miss_z_m"]
+    assert [key for key in found if key not in across] == KEYS
     assert list(found["start"]) == ["y_m", "z_m", "x_m", "vy_m_s", "vz_m_s", "vx_m_s"]
     record = load_record(tmp_path / "worst.npz")
     result = record.result
     assert float(result.miss_m[0]) == found["worst_miss_m"]
+    assert result.lateral_miss[0].tolist() == [found[name] for name in across]
     assert [*result.lateral_start[0].tolist(), *result.position_m[0].tolist(), *result.velocity_m_s[0].tolist()] == [
         found["start"][name] for name in ("y_m", "vy_m_s", "z_m", "x_m", "vz_m_s", "vx_m_s")
     ]
