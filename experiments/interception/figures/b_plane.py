@@ -39,6 +39,9 @@ _RADIUS_SHOWN = 3.0
 _VECTOR_POINTS = 2000
 """Number of points of a panel above which they are pixels in the PDF file."""
 
+_POINTS_IN_FRONT = 300
+"""Number of points of a panel up to which they are in front of the circles."""
+
 _POINT: dict[str, Any] = {"color": SET_EDGE, "marker": "o", "linestyle": "none", "markeredgewidth": 0.0}
 _CIRCLES: tuple[tuple[float, str, Any], ...] = (
     (0.5, "median of the miss", "-"),
@@ -136,6 +139,7 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
         markersize=float(np.clip(45.0 / np.sqrt(count), 1.6, 3.5)),
         alpha=float(np.clip(30.0 / np.sqrt(count), 0.35, 0.8)),
         rasterized=count > _VECTOR_POINTS,
+        zorder=2.0 if count > _POINTS_IN_FRONT else 3.1,  # the white edge of a circle hides the points on it
         label="_misses",
     )
     quantiles = []

@@ -85,6 +85,8 @@ def test_a_circle_of_a_quantile_does_not_hide_the_radius_of_the_body(results: Re
     (axes,) = draw_b_plane([cloud("random noise", [results])], float(np.median(results.miss_m))).axes
     orders = {patch.get_label(): patch.get_zorder() for patch in axes.patches}
     assert orders.pop("_radius") > max(orders.values())
+    (points,) = [line for line in axes.lines if line.get_label() == "_misses"]
+    assert points.get_zorder() > max(orders.values())
 
 
 @pytest.mark.parametrize(
