@@ -297,4 +297,4 @@ def _flat(value: Any, path: str = "") -> dict[str, Any]:
 
 
 def _shown(flat: Mapping[str, Any], key: str) -> str:
-    return json.dumps(flat[key])[:200] if key in flat else "nothing"
+    return json.dumps(flat[key])[:200] if key in flat else "not set"

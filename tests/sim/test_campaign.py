@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from guidance import NoiseKind, Situation, TieRule
 from sim import (
+    Body,
     Campaign,
     CampaignNoise,
     CampaignResult,
@@ -384,6 +385,10 @@ def test_another_campaign_is_refused_and_every_difference_shown(brief: Scenario,
             ['scenario.noise: "random" in the folder, "game" now', 'noise: "mixed" in the folder, "game" now'],
         ),
         (replace(asked, guarantee=False), ["guarantee: true in the folder, false now"]),
+        (
+            replace(asked, scenario=replace(brief, body=Body(80.0))),
+            ["scenario.body.radius_m: not set in the folder, 80.0 now"],
+        ),
         (replace(asked, chunk=8), ["chunk: 16 in the folder, 8 now"]),
         (
             replace(asked, scenario=other),
