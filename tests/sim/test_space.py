@@ -47,7 +47,12 @@ def flat(box: StateBox) -> StateBox:
 
 
 @pytest.mark.parametrize(
-    ("name", "strategy"), [("asteroid", "symmetric-miss"), ("asteroid", "patient"), ("ranging", "symmetric-miss")]
+    ("name", "strategy"),
+    [
+        ("asteroid", "symmetric-miss"),
+        pytest.param("asteroid", "patient", marks=pytest.mark.slow),
+        pytest.param("ranging", "symmetric-miss", marks=pytest.mark.slow),
+    ],
 )
 @pytest.mark.parametrize("model", list(Model))
 @pytest.mark.parametrize(("noise", "tie"), NOISES)
@@ -122,7 +127,7 @@ def exchanged(scenario: Scenario) -> Scenario:
     return replace(scenario, dispersion=exchanged_box(scenario.dispersion), set_model=known)
 
 
-@pytest.mark.parametrize("name", ["asteroid", "ranging"])
+@pytest.mark.parametrize("name", ["asteroid", pytest.param("ranging", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("model", list(Model))
 @pytest.mark.parametrize(("noise", "tie"), NOISES)
 def test_an_exchange_of_the_axes_changes_nothing(
