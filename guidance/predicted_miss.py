@@ -46,7 +46,7 @@ def symmetric_impulse(interval: PredictedMiss, closing_speed_m_s: float) -> Floa
     POSITIVE.need("closing_speed_m_s", closing_speed_m_s)
     ranges = interval.upper_point.range_m + interval.lower_point.range_m
     wanted = (interval.upper_m + interval.lower_m) * closing_speed_m_s
-    return np.divide(wanted, ranges, out=np.zeros_like(ranges), where=interval.exists & (ranges != 0.0))
+    return np.divide(wanted, ranges, out=np.zeros(ranges.shape), where=interval.exists & (ranges != 0.0))
 
 
 def impulse_beyond_dead_zone(

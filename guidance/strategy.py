@@ -91,7 +91,7 @@ def checked_impulses(
     """
     values, shape = np.asarray(wanted), situation.last_impulse_m_s.shape
     real = values.dtype.kind in "fiu" and not isinstance(wanted, np.ma.MaskedArray)
-    if real and values.shape == shape and np.isfinite(values[..., tracking]).all():
+    if real and values.shape == shape and (np.isfinite(values) | ~tracking).all():
         return values.astype(np.float64, copy=False)
     needed = f"{shape[-1]} finite impulses (m/s), one an engagement"
     if len(shape) > 1:

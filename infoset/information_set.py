@@ -349,7 +349,7 @@ class InformationSet(InformationSetView):
         if not empty.any():
             return empty
         self._state.refine(empty, 2 * self.model.fewest_sections + 1)
-        empty &= self.section_counts == 0
+        empty &= ~self.living.any(axis=1)
         self._state.status[empty] = emptied.value
         if emptied is SetStatus.EMPTY:
             self._state.status[empty & self._state.some_left] = SetStatus.REFUTED.value

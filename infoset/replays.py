@@ -7,22 +7,32 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from infoset import chains, polygon
-from infoset._compile import allocation_free, by_reference, constants, entry, inlined
+from infoset import chains, polygon, whole_chains
+from infoset._compile import ZERO, allocation_free, by_reference, constants, entry, inlined
 from infoset.chains import copy_section, empty_sections, working_room
 from infoset.history import History, Tapes
 from infoset.section_law import law_of
 from infoset.section_life import (
     ALIVE,
-    AT_START,
+    ANGLE,
+    IMPULSE,
+    NO_SIGHT,
+    PREDICTION,
+    WIDENING,
     Flags,
     Floats,
     Integers,
+    LastSight,
     Tape,
-    continue_replay,
-    replay,
+    across_of,
+    measure_rate_section,
+    measure_section,
+    predict_section,
+    shift_section,
+    sight_after,
     start_section,
     time_to_go,
+    widen_section,
 )
 from infoset.section_passes import tape_of
 
@@ -125,6 +135,91 @@ def workspace(channels: int, events: int, slots: int) -> Workspace:
     )
 
 
+class Replayed(NamedTuple):
+    """Part of a history that is replayed.
+
+    Parameters
+    ----------
+    events, elapsed : int
+        Number of events, and of the predictions among them.
+    sight : LastSight
+        The last sight after them.
+    """
+
+    events: int
+    elapsed: int
+    sight: LastSight
+
+
+AT_START = Replayed(ZERO, ZERO, NO_SIGHT)
+
+
+@allocation_free
+def replay(label: float, tape: Tape, errors: Floats | None, laws: Floats, channel: int, room: ReplayRoom) -> int:
+    """Compute the section at any label along one axis from a whole history, in row `PROBE` of the axis.
+
+    Returns
+    -------
+    int
+        Number of the event that made the section empty, or ALIVE.
+    """
+    start_section(room.origins, room.rings, room.marks, ROWS * channel + PROBE, label, law_of(laws, channel))
+    return continue_replay(AT_START, label, tape, errors, laws, channel, room)[0]
+
+
+@allocation_free
+def continue_replay(
+    done: Replayed, label: float, tape: Tape, errors: Floats | None, laws: Floats, channel: int, room: ReplayRoom
+) -> tuple[int, Replayed]:
+    """Apply the events of a tape that are not done yet; return what `replay` does, and the events done.
+
+    Parameters
+    ----------
+    errors : ndarray, shape (>= events,), or None
+        Error bound of each rate, rad/s; None without rates. It is not a field of the tape because the compiler omits
+        the code for rates only if an argument is None.
+    room : ReplayRoom
+        Receives the section, and the overlaps with the bands of the measurements up to the one that makes it empty.
+
+    Notes
+    -----
+    About 30 ns per event.
+    """
+    kinds, values, applies, events, nearest, farthest = tape
+    origins, rings, marks, points = room.origins, room.rings, room.marks, room.points
+    window, law, n = (nearest, farthest), law_of(laws, channel), ROWS * channel + PROBE
+    first, elapsed, sight = done
+    own, overlaps = values[law.channel], room.overlaps[law.channel]
+    for event in range(first, events):
+        if kinds[event] == PREDICTION:
+            if whole_chains.is_crowded(marks, n):
+                whole_chains.reduce_outward(origins, rings, marks, n, time_to_go(label, elapsed, law), points)
+            elapsed += 1
+            predict_section(origins, rings, marks, n, label, elapsed, law)
+        elif not applies[event]:
+            continue
+        elif kinds[event] == ANGLE:
+            living, overlaps[event] = measure_section(
+                origins, rings, marks, n, label, elapsed, own[event], across_of(tape, event, law), law
+            )
+            if not living:
+                return event, done
+        elif kinds[event] == IMPULSE:
+            shift_section(origins, n, label, elapsed, own[event], across_of(tape, event, law), law)
+        elif kinds[event] == WIDENING:
+            widen_section(origins, n, label, elapsed, law)
+        elif errors is not None:
+            # Not compiled for histories without rates: this branch is most of the code.
+            living, overlaps[event] = measure_rate_section(
+                origins, rings, marks, n, label, elapsed, own[event], errors[event], sight, window, law, points
+            )
+            if not living:
+                return event, done
+        if errors is not None:
+            sight = sight_after(sight, kinds[event], own[event], across_of(tape, event, law), applies[event], law)
+    return ALIVE, Replayed(events, elapsed, sight)
+
+
 @allocation_free
 def run(label: float, tape: Tape, errors: Floats | None, laws: Floats, room: ReplayRoom) -> tuple[int, float, int]:
     """Replay a label along all axes.
@@ -147,10 +242,7 @@ def run(label: float, tape: Tape, errors: Floats | None, laws: Floats, room: Rep
     for channel in range(laws.shape[0]):
         # Later events of a label that is empty along one axis do not matter.
         part = Tape(kinds, values, applies, events if died == ALIVE else died + 1, nearest, farthest)
-        law, row = law_of(laws, channel), ROWS * channel + PROBE
-        died_here = replay(
-            label, part, errors, law, room.origins, room.rings, room.marks, row, room.overlaps, room.points
-        )
+        died_here = replay(label, part, errors, laws, channel, room)
         if died_here != ALIVE:
             overlap_here = room.overlaps[channel, died_here]
             if died_here != died or overlap_here < overlap:
@@ -236,19 +328,17 @@ def margins_all(
     for b in range(labels.shape[0]):
         label, tape = labels[b], tape_of(tapes, b, room.values, room.applies)
         for channel in range(laws.shape[0]):
-            law = law_of(laws, channel)
-            start_section(origins, rings, marks, PROBE, label, law)
+            law, row = law_of(laws, channel), ROWS * channel + PROBE
+            start_section(origins, rings, marks, row, label, law)
             died, done = ALIVE, AT_START
             for look in range(looks.shape[0]):
                 if died == ALIVE:
                     part = Tape(tape.kinds, tape.values, tape.applies, looks[look], tape.nearest, tape.farthest)
-                    died, done = continue_replay(
-                        done, label, part, errors, law, origins, rings, marks, PROBE, room.overlaps, room.points
-                    )
+                    died, done = continue_replay(done, label, part, errors, laws, channel, room)
                 if died == ALIVE:
                     tau = time_to_go(label, done.elapsed, law)
                     state = v[channel, look, b], z[channel, look, b]
-                    margins[channel, look, b] = margin_in(origins, rings, marks, PROBE, tau, *state)
+                    margins[channel, look, b] = margin_in(origins, rings, marks, row, tau, *state)
                 else:
                     margins[channel, look, b] = room.overlaps[channel, died]
 

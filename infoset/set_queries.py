@@ -207,18 +207,17 @@ class SetQueries:
         # Empty or unused slots may have any range, and so may the sections of stopped engagements.
         living = self.living & (ranges != 0.0)
         least, greatest = (self._by_axis(values) for values in self._state.stack.heights)
-        living, ranges = np.broadcast_to(living, least.shape), np.broadcast_to(ranges, least.shape)
-        alphas_least = np.divide(least, ranges, out=np.full(ranges.shape, np.inf), where=living)
-        alphas_greatest = np.divide(greatest, ranges, out=np.full(ranges.shape, -np.inf), where=living)
-        least_at, greatest_at = alphas_least.argmin(axis=-1)[..., None], alphas_greatest.argmax(axis=-1)[..., None]
-        tracked = living.any(axis=-1)
+        alphas_least = np.divide(least, ranges, out=np.full(least.shape, np.inf), where=living)
+        alphas_greatest = np.divide(greatest, ranges, out=np.full(least.shape, -np.inf), where=living)
+        tracked, rows = living.any(axis=-1), np.arange(len(ranges))
+        least_at, greatest_at = alphas_least.argmin(axis=-1), alphas_greatest.argmax(axis=-1)
         found = (
-            np.take_along_axis(alphas_least, least_at, axis=-1),
-            np.take_along_axis(alphas_greatest, greatest_at, axis=-1),
-            np.take_along_axis(ranges, least_at, axis=-1),
-            np.take_along_axis(ranges, greatest_at, axis=-1),
+            alphas_least.min(axis=-1),
+            alphas_greatest.max(axis=-1),
+            ranges[rows, least_at],
+            ranges[rows, greatest_at],
         )
-        alpha_least, alpha_greatest, of_least, of_greatest = (np.where(tracked, each[..., 0], 0.0) for each in found)
+        alpha_least, alpha_greatest, of_least, of_greatest = (np.where(tracked, values, 0.0) for values in found)
         return alpha_least, alpha_greatest, of_least, of_greatest
 
     def predicted_miss(self) -> PredictedMiss:

@@ -125,7 +125,7 @@ def corners(box: StateBox) -> tuple[Floats, Floats]:
 
 def generator(seed: int, run: int, stream: int) -> np.random.Generator:
     """Return the random generator of one stream of one run."""
-    return np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(run, stream)))
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(entropy=seed, spawn_key=(run, stream))))
 
 
 def greatest_number_of_steps(scenario: Scenario) -> int:

@@ -147,8 +147,11 @@ class Engagements:
         miss = self._information.predicted_miss()
         tracking = self._tracking = self._tracking & self._information.tracking
         wanted = np.where(tracking, self._decide(miss, measured), 0.0)
-        self._spent |= (self._budget < thruster.least_impulse_m_s) & (modulus(wanted) >= thruster.least_impulse_m_s)
+        spent = self._budget < thruster.least_impulse_m_s
+        if spent.any():
+            self._spent |= spent & (modulus(wanted) >= thruster.least_impulse_m_s)
         self._impulse = thruster.give(wanted, self._budget)
+        given = modulus(self._impulse)
         if observe is not None:
             observe(
                 Step(
@@ -163,19 +166,20 @@ class Engagements:
                     self._view,
                 )
             )
-        self._budget = np.maximum(self._budget - modulus(self._impulse), 0.0)
+        self._budget = np.maximum(self._budget - given, 0.0)
         self._truth.fire(self._executed(self._impulse))
         self._information.shift(self._impulse, tracking)
-        self._truth_section.shift(self._impulse)
+        self._truth_section.shift(self._impulse, given > 0.0)
         self._finish_labels()
         self._information.predict()
         self._truth_section.predict()
         passage = self._truth.advance(model.step_s, self._manoeuvre(sight))
-        np.minimum(self._miss, passage.least_distance_m, out=self._miss, where=self._flying)
         passing = self._flying & passage.passed
-        self._lateral_miss = np.where(passing, passage.lateral_m, self._lateral_miss)
-        self._arrival_s = np.where(passing, self.step * model.step_s + passage.arrival_s, self._arrival_s)
-        self._flying &= ~passage.passed
+        if passing.any():
+            self._miss = np.where(passing, passage.least_distance_m, self._miss)
+            self._lateral_miss = np.where(passing, passage.lateral_m, self._lateral_miss)
+            self._arrival_s = np.where(passing, self.step * model.step_s + passage.arrival_s, self._arrival_s)
+            self._flying &= ~passage.passed
         self.step += 1
         # The label leaves at x = 0, which may come after the closest approach.
         self._arrived |= ~self._flying & (self._arrival_s <= self.step * model.step_s)

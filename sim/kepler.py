@@ -285,7 +285,7 @@ def closest_position(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2
 
 def _ratio(over: Floats, under: Floats) -> Floats:
     """Return the quotient; zero where the divisor is zero, where no section exists."""
-    return np.divide(over, under, out=np.zeros_like(over), where=under != 0.0)
+    return np.divide(over, under, out=np.zeros(over.shape), where=under != 0.0)
 
 
 def _dot(first: Floats, second: Floats) -> Floats:

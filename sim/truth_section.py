@@ -72,9 +72,9 @@ class TruthSection:
         """Store a measured rate."""
         self._history.record(RATE, omega_rad_s, where, error_rad_s * (1.0 + BOUND_SLACK))
 
-    def shift(self, impulse_m_s: Floats) -> None:
+    def shift(self, impulse_m_s: Floats, where: Flags) -> None:
         """Store the impulse of this step, m/s, shape (B,), in space (2, B)."""
-        self._history.record(IMPULSE, impulse_m_s, np.any(np.atleast_2d(impulse_m_s) != 0.0, axis=0))
+        self._history.record(IMPULSE, impulse_m_s, where)
 
     def predict(self) -> None:
         """End the step."""
