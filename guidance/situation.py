@@ -13,6 +13,7 @@ from infoset import InformationSetView, PredictedMiss
 from infoset.sensors import AngleSensor, Measurements, Sensor
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -36,13 +37,15 @@ class Situation:
         The nominal closing speed e, m/s.
     measured : mapping of str to ndarray, shape (B,)
         Last measured values by sensor, "angle" (rad), "range" (m) and "rate" (rad/s); a sensor that has not measured
-        yet is missing.
+        yet is missing, and NaN is the value of an engagement without a measurement so far.
     last_impulse_m_s : ndarray, shape (B,)
         Impulses of the previous step, m/s.
     information : InformationSetView
         The information set itself, read-only.
     new : frozenset of str
-        Sensors that measured in this step.
+        Sensors that measured in this step, in one engagement of the batch at least.
+    seen : mapping of str to ndarray of bool, shape (B,)
+        Engagements in which each sensor of `new` measured: images can be lost. `is_new` reads it.
     sensors : mapping of str to Sensor
         All sensors on board by name, with their error bounds.
     """
@@ -59,6 +62,12 @@ class Situation:
     information: InformationSetView
     new: frozenset[str] = frozenset()
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
+    seen: Mapping[str, Flags] = field(default_factory=dict)
+
+    def is_new(self, name: str) -> Flags:
+        """Return the engagements in which a sensor measured in this step, shape (B,)."""
+        all_or_none = np.full(self.budget_left_m_s.shape, name in self.new)
+        return self.seen.get(name, all_or_none)
 
     @property
     def axes(self) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from infoset.convex_polygons import ConvexPolygons
 from infoset.information_set import InformationSet, InformationSetView
 from infoset.model import InitialSet, Model, Recovery, SetModel, StateBox
 from infoset.predicted_miss import ExtremePoints, PredictedMiss
-from infoset.sensors import AngleSensor, Convention, ErrorShape, RangeSensor, RateSensor, Sensor
+from infoset.sensors import AngleSensor, Bias, Convention, ErrorShape, RangeSensor, RateSensor, Sensor
 from infoset.set_queries import Section, to_omega_alpha
 from infoset.set_state import SetStatus
 from infoset.shapes import from_shapely, to_shapely
@@ -19,6 +19,7 @@ __version__ = version("infoset")
 
 __all__ = [
     "AngleSensor",
+    "Bias",
     "Convention",
     "ConvexPolygons",
     "ErrorShape",

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import lru_cache
-from typing import ClassVar, Protocol, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from infoset.limits import ADDED_LATER, Fraction, Part, Positive, check_fields
+from infoset.limits import ADDED_LATER, Fraction, NotNegative, Part, Positive, check_fields
 
 Floats = NDArray[np.float64]
 RangeOrRanges = TypeVar("RangeOrRanges", float, NDArray[np.float64])
@@ -43,6 +43,17 @@ class ErrorShape(Enum):
 
     BOX = "box"
     DISC = "disc"
+
+
+class Bias(Enum):
+    """How the random error of a camera is drawn.
+
+    RANDOM: a new error within the whole bound for each image. CONSTANT: the centroid part is drawn once a run, the
+    pixel part for each image.
+    """
+
+    RANDOM = "random"
+    CONSTANT = "constant"
 
 
 class Geometry(Protocol):
@@ -167,7 +178,7 @@ class Sensor(ABC):
 
 @dataclass(frozen=True)
 class AngleSensor(Sensor):
-    """A line-of-sight angle sensor whose error bound is linear in the range.
+    """A line-of-sight angle sensor. Its error bound is linear in the range, or that of a camera.
 
     Parameters
     ----------
@@ -184,6 +195,16 @@ class AngleSensor(Sensor):
     error_shape : ErrorShape or None
         Shape of the set of errors in space; None is DISC for the convention CONE and BOX for the others. The
         information set takes a disc as the box around it.
+    centroid_error_m : float or None
+        A number makes the sensor a camera. Its bound at the distance d is pixel + centroid_error_m / d, the same for
+        both axes; `error_at_nominal_range_rad` and `error_at_zero_range_rad` are both the pixel error. The centroid
+        error is the greatest distance between the measured point of the body and its centre, m.
+    bias : Bias
+        How the random error of a camera is drawn.
+    first_image_s, last_image_s : float
+        Times before the nominal arrival of the first and the last image, s; None has images from the start.
+    miss_probability : float
+        Probability that an image is lost, in [0, 1).
 
     Raises
     ------
@@ -192,7 +213,7 @@ class AngleSensor(Sensor):
 
     References
     ----------
-    Kumkov and Patsko (1997), equations (4) and (10).
+    Kumkov and Patsko (1997), equations (4) and (10), for the linear bound.
     """
 
     name: ClassVar[str] = "angle"
@@ -207,9 +228,31 @@ class AngleSensor(Sensor):
     error_at_zero_range_y_rad: Part | None = field(default=None, metadata=ADDED_LATER)
     convention: Convention = field(default=Convention.PLANE, metadata=ADDED_LATER)
     error_shape: ErrorShape | None = field(default=None, metadata=ADDED_LATER)
+    centroid_error_m: NotNegative | None = field(default=None, metadata=ADDED_LATER)
+    bias: Bias = field(default=Bias.RANDOM, metadata=ADDED_LATER)
+    first_image_s: Positive | None = field(default=None, metadata=ADDED_LATER)
+    last_image_s: NotNegative = field(default=0.0, metadata=ADDED_LATER)
+    miss_probability: Part = field(default=0.0, metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         check_fields(self)
+        if self.is_camera and not (
+            self.error_at_nominal_range_rad == self.error_at_zero_range_rad
+            and self.error_at_nominal_range_y_rad is None
+            and self.error_at_zero_range_y_rad is None
+        ):
+            raise ValueError(
+                "AngleSensor: with centroid_error_m, error_at_nominal_range_rad and error_at_zero_range_rad must both "
+                "be the pixel error, and error_at_nominal_range_y_rad and error_at_zero_range_y_rad must be left out: "
+                f"got {self.error_at_nominal_range_rad!r} and {self.error_at_zero_range_rad!r}"
+            )
+        if self.bias is Bias.CONSTANT and not self.is_camera:
+            raise ValueError("AngleSensor: bias can be constant only with centroid_error_m, whose part is constant")
+        if self.first_image_s is not None and self.first_image_s < self.last_image_s:
+            raise ValueError(
+                "AngleSensor: first_image_s must be at least last_image_s, because both are times before the arrival: "
+                f"got {self.first_image_s!r} and {self.last_image_s!r}"
+            )
         if self.convention is Convention.CONE and self.error_shape is ErrorShape.BOX:
             raise ValueError(
                 "AngleSensor: error_shape must be disc for the convention cone, whose bound is that of one angle: "
@@ -220,6 +263,24 @@ class AngleSensor(Sensor):
                 "AngleSensor: an error in a disc or a cone has one bound: leave error_at_nominal_range_y_rad and "
                 "error_at_zero_range_y_rad out"
             )
+
+    @classmethod
+    def camera(
+        cls, period_s: float, pixel_error_rad: float, centroid_error_m: float = 0.0, **others: Any
+    ) -> AngleSensor:
+        """Return a camera, with the error bound pixel + centroid_error_m / d at the distance d; `others` are fields."""
+        law = {"nominal_range_m": 1.0, "centroid_error_m": centroid_error_m}
+        return cls(period_s, pixel_error_rad, pixel_error_rad, **law | others)
+
+    @property
+    def is_camera(self) -> bool:
+        """Whether the error bound is that of a camera."""
+        return self.centroid_error_m is not None
+
+    @property
+    def pixel_error_rad(self) -> float:
+        """The part of a camera's error bound that does not depend on the distance, rad."""
+        return self.error_at_zero_range_rad
 
     @property
     def is_disc(self) -> bool:
@@ -238,10 +299,7 @@ class AngleSensor(Sensor):
 
     def axis(self, name: str) -> AngleSensor:
         """Return the sensor of one plane angle, "y" or "z"; an error bound of zero becomes negligible."""
-        at_nominal, at_zero = self.error_at_nominal_range_rad, self.error_at_zero_range_rad
-        if name == "y":
-            at_nominal, at_zero = (max(bound, NEGLIGIBLE_ERROR_RAD) for bound in self._bounds_of_y)
-        return _planar_sensor(self.period_s, at_nominal, at_zero, self.nominal_range_m)
+        return _planar_sensor(self, name)
 
     @property
     def _bounds_of_y(self) -> tuple[float, float]:
@@ -258,8 +316,17 @@ class AngleSensor(Sensor):
         return (self.error_at_nominal_range_rad - self.error_at_zero_range_rad) / self.nominal_range_m
 
     def error_bound(self, range_m: RangeOrRanges) -> RangeOrRanges:
-        """Return the greatest size of the error at a range (m), rad."""
-        return self.error_at_zero_range_rad + self.error_slope_rad_per_m * range_m
+        """Return the greatest size of the error at a range (m), rad.
+
+        Notes
+        -----
+        The bound of a camera is constant at distances below its centroid error.
+        """
+        bound = self.error_at_zero_range_rad + self.error_slope_rad_per_m * range_m
+        if self.centroid_error_m:
+            distance: RangeOrRanges = np.maximum(range_m, self.centroid_error_m)
+            bound = bound + self.centroid_error_m / distance
+        return bound
 
     def error_bounds(self, range_m: Floats) -> Floats:
         """Return the greatest size of the error of each angle, rad, at ranges (m) of shape (..., B).
@@ -358,9 +425,20 @@ class AngleSensor(Sensor):
 
 
 @lru_cache(maxsize=64)
-def _planar_sensor(period_s: float, at_nominal_rad: float, at_zero_rad: float, nominal_range_m: float) -> AngleSensor:
-    """Return a sensor of one angle; strategies ask for it at every step."""
-    return AngleSensor(period_s, at_nominal_rad, at_zero_rad, nominal_range_m)
+def _planar_sensor(sensor: AngleSensor, name: str) -> AngleSensor:
+    """Return `AngleSensor.axis` of a sensor; strategies ask for it at every step."""
+    at_nominal, at_zero = sensor.error_at_nominal_range_rad, sensor.error_at_zero_range_rad
+    if name == "y":
+        at_nominal, at_zero = (max(bound, NEGLIGIBLE_ERROR_RAD) for bound in sensor._bounds_of_y)
+    return replace(
+        sensor,
+        error_at_nominal_range_rad=at_nominal,
+        error_at_zero_range_rad=at_zero,
+        error_at_nominal_range_y_rad=None,
+        error_at_zero_range_y_rad=None,
+        convention=Convention.PLANE,
+        error_shape=None,
+    )
 
 
 def _direction(alpha_rad: Floats) -> Floats:

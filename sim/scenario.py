@@ -195,6 +195,11 @@ class Scenario:
                 )
 
     @property
+    def nominal_arrival_s(self) -> float:
+        """Nominal time of arrival, s."""
+        return self.nominal_range_m / self.set_model.closing_speed_m_s
+
+    @property
     def is_spatial(self) -> bool:
         """Whether the engagement is in space, with two lateral axes."""
         return len(self.set_model.axes) > 1

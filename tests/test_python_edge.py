@@ -36,6 +36,7 @@ from guidance import (
 )
 from infoset import (
     AngleSensor,
+    Bias,
     Convention,
     ConvexPolygons,
     ErrorShape,
@@ -126,6 +127,11 @@ SPACE_SENSOR: dict[str, Any] = {
     "error_at_zero_range_y_rad": 2e-4,
     "convention": Convention.GIMBAL,
     "error_shape": ErrorShape.BOX,
+    "centroid_error_m": None,
+    "bias": Bias.RANDOM,
+    "first_image_s": 80.0,
+    "last_image_s": 2.0,
+    "miss_probability": 0.1,
 }
 SPACE_MODEL: dict[str, Any] = {
     **MODEL,
@@ -184,16 +190,19 @@ ZERO_IS_SOUND = {
     "direction_rad",
     "elevation_rad",
     "pointing_error_rad",
+    "last_image_s",
+    "miss_probability",
 }
 NONE_IS_SOUND = {
     "error_at_nominal_range_y_rad",
     "error_at_zero_range_y_rad",
     "error_shape",
+    "first_image_s",
     "disturbance_y_m_s2",
     "gravity_y_m_s2",
     "acceleration_y_m_s2",
 }
-"""Values of y that may be left to those of z, of which zero is one."""
+"""Values that may be None."""
 FIELDS = [(kind, field) for kind, values in SOUND.items() for field in values]
 
 
@@ -245,6 +254,13 @@ def test_what_is_no_value_of_a_field(kind: Any, field: str) -> None:
     [
         (lambda: AngleSensor(0.5, -1, 0.00023, 5.8e6), "error_at_nominal_range_rad"),
         (lambda: AngleSensor(0.5, 0.00015, 1.0, 5.8e6), "error_at_zero_range_rad"),
+        (lambda: AngleSensor(**SENSOR, centroid_error_m=5.0), "error_at_nominal_range_rad"),
+        (lambda: AngleSensor.camera(0.5, 1e-6, 5.0, error_at_zero_range_y_rad=1e-6), "error_at_zero_range_y_rad"),
+        (lambda: AngleSensor.camera(0.5, 1e-6, -5.0), "centroid_error_m"),
+        (lambda: AngleSensor(**SENSOR, bias=Bias.CONSTANT), "bias"),
+        (lambda: AngleSensor(**SENSOR, first_image_s=1.0, last_image_s=2.0), "first_image_s"),
+        (lambda: AngleSensor(**SENSOR, first_image_s=0.0), "first_image_s"),
+        (lambda: AngleSensor(**SENSOR, miss_probability=1.0), "miss_probability"),
         (lambda: Thruster(1e3, 8.0, 7.5), "least_impulse_m_s"),
         (lambda: Thruster(1e3, 0.0, 7.5, 1.0), "execution_error_relative"),
         (lambda: SetModel(**{**MODEL, "sections": 2}), "sections"),
