@@ -24,6 +24,9 @@ MOST_RUNS_NEEDED = 1_000_000
 """Greatest number of runs that `Verdict.runs_needed` names."""
 _TAIL = 0.5 * (1.0 - CONFIDENCE)
 _HIT = re.compile(rf"\s*hit\s*>=?{NUMBER}")
+DEFAULT_QUANTILE = "p99"
+"""Quantile of a requirement that names none."""
+_WITHOUT_QUANTILE = re.compile(r"^\s*(?P<quantity>\w+)\s*<")
 _STEPS = 50
 """Steps of bisection for an end of an interval."""
 
@@ -70,9 +73,10 @@ class Requirement:
 
     @classmethod
     def parse(cls, text: str) -> Requirement:
-        """Read `miss_m p99<10`; raise ValueError for any other text."""
+        """Read `miss_m p99<10`, or `miss_m<10`, which is the same; raise ValueError for any other text."""
         example = 'a quantity, a quantile and a bound, for example "miss_m p99<10", or "hit>=0.95"'
-        return cls(*parse_quantile(text, f"<{NUMBER}", example, "the bound"))
+        named = _WITHOUT_QUANTILE.sub(rf"\g<quantity> {DEFAULT_QUANTILE}<", text[:100])
+        return cls(*parse_quantile(named, f"<{NUMBER}", example, "the bound"))
 
     @property
     def name(self) -> str:

@@ -19,9 +19,10 @@ Required = Annotated[
     typer.Option(
         "--require",
         metavar="RULE",
-        help='Requirement: the upper bound of a quantile, "miss_m p99<10", or the least probability of a hit, '
-        '"hit>=0.95". Each cell meets it, does not meet it, or is undecided, with 95 % confidence. Default: in a '
-        "report, that of the sweep; otherwise hit>=0.95 if the body has a size, else miss_m p99<10.",
+        help='Requirement: the upper bound of a quantile, "miss_m p99<10" (without a quantile p99: "miss_m<10"), or '
+        'the least probability of a hit, "hit>=0.95". Each cell meets it, does not meet it, or is undecided, with 95 % '
+        "confidence. Default: in a report, that of the sweep; otherwise hit>=0.95 if the body has a size, else "
+        "miss_m p99<10.",
     ),
 ]
 Shown = Annotated[
@@ -48,9 +49,7 @@ class Flight:
 
     scenario: ScenarioName = "asteroid-1997"
     settings: Settings = None
-    runs: Annotated[
-        int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs; in a sweep, of each cell.")
-    ]
+    runs: Annotated[int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs.")]
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the runs; created if needed.")]
     noise: Annotated[
         Literal["random", "game", "mixed"] | None,
@@ -135,6 +134,8 @@ class Sweep(Flight):
     thruster.greatest_impulse_m_s=2.5:20:8.
     """
 
+    runs: Annotated[int, typer.Option(metavar="N", min=1, max=MOST_RUNS, help="Number of runs of each cell.")] = 400
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the runs; created if needed.")] = Path("sweep")
     vary: Annotated[
         list[str],
         typer.Option(

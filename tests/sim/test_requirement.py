@@ -121,6 +121,13 @@ def test_hits_decide() -> None:
     assert judge(0.0 * hit[:20], required, watched=True).decision is Decision.NOT_MET
 
 
+@pytest.mark.parametrize("text", ["guaranteed_miss_m<25", " guaranteed_miss_m < 25 ", "guaranteed_miss_m p99<25"])
+def test_a_requirement_without_a_quantile_is_that_of_p99(text: str) -> None:
+    required = parse_requirement(text)
+    assert required == Requirement(QuantileName("guaranteed_miss_m", 0.99), 25.0)
+    assert str(required) == "guaranteed_miss_m p99<25"
+
+
 @pytest.mark.parametrize(
     "text", ["hit", "hit<0.95", "hit>=1", "hit>=0", "hit>=95", "hit>=nan", "hit p50>=0.9", "hit=>0.9"]
 )

@@ -178,7 +178,7 @@ def test_three_keys_are_a_table_only(infoset: Infoset, file: Path, tmp_path: Pat
         (["--vary", "thruster.budget=1:2:2"], ["did you mean thruster.budget_m_s?"]),
         (["--vary", "thruster.greatest_impulse_m_s=0.01:5:3"], ["brief with thruster.greatest_impulse_m_s = 0.01"]),
         (["--runs", 0], ["--runs", "must be from 1 to "]),
-        (["--require", "miss_m<10"], ["--require: must be a quantity, a quantile and a bound"]),
+        (["--require", "miss_m 10"], ["--require: must be a quantity, a quantile and a bound"]),
         (
             ["--require", "hit>=1"],
             ["--require: the share of hits must be between 0 and 1, found 1; for example hit>=0"],
