@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -48,6 +49,17 @@ class Situation:
         Engagements in which each sensor of `new` measured: images can be lost. `is_new` reads it.
     sensors : mapping of str to Sensor
         All sensors on board by name, with their error bounds.
+    may_fire : bool
+        Whether an impulse can be decided in this step; what a strategy returns is ignored if not.
+    lead_s : float
+        Time from a decision to its impulse, s.
+    arrival_s : float
+        Time from now to the nominal arrival, s.
+    later_times_s : ndarray, shape (n,), or None
+        Times since the start at which impulses of later decisions can be given, s; None is every later step.
+    pending : tuple of (float, ndarray)
+        Impulses that are decided and not given yet: time from now, s, and impulse, m/s, shape (B,). `predicted_miss`
+        contains their effect, and `information` does not.
     """
 
     time_s: float
@@ -63,11 +75,41 @@ class Situation:
     new: frozenset[str] = frozenset()
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
     seen: Mapping[str, Flags] = field(default_factory=dict)
+    may_fire: bool = True
+    lead_s: float = 0.0
+    arrival_s: float = math.inf
+    later_times_s: Floats | None = None
+    pending: tuple[tuple[float, Floats], ...] = ()
 
     def is_new(self, name: str) -> Flags:
         """Return the engagements in which a sensor measured in this step, shape (B,)."""
         all_or_none = np.full(self.budget_left_m_s.shape, name in self.new)
         return self.seen.get(name, all_or_none)
+
+    @property
+    def next_s(self) -> float | None:
+        """Time from now to the next decision after this step, s; None without one."""
+        if self.later_times_s is None:
+            return self.step_s
+        return float(self.later_times_s[0]) - self.lead_s - self.time_s if self.later_times_s.size else None
+
+    @property
+    def last_s(self) -> float:
+        """Time from now to the last impulse that can be given, s; infinite if there is no last one."""
+        if self.later_times_s is None:
+            return math.inf
+        return float(self.later_times_s[-1]) - self.time_s if self.later_times_s.size else self.lead_s
+
+    def pending_m(self, time_to_go_s: Floats) -> Floats:
+        """Return the changes of a predicted miss by the pending impulses, m, which are to be subtracted from it.
+
+        Parameters
+        ----------
+        time_to_go_s : ndarray, shape (B,) or (2, B)
+            Time to x = 0 of the predicted misses.
+        """
+        changes = [impulse * np.maximum(time_to_go_s - time_s, 0.0) for time_s, impulse in self.pending]
+        return sum(changes, np.zeros(np.shape(time_to_go_s)))
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -98,4 +140,5 @@ class Situation:
                 key: sensor.axis(name) if isinstance(sensor, AngleSensor) else sensor
                 for key, sensor in self.sensors.items()
             },
+            pending=tuple((time_s, impulse[number]) for time_s, impulse in self.pending),
         )

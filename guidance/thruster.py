@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from infoset.limits import ADDED_LATER, NotNegative, Part, Positive, check_fields
+from infoset.limits import ADDED_LATER, POSITIVE, WHOLE, NotNegative, Part, Positive, check_fields
 
 Floats = NDArray[np.float64]
+
+STEP_TOLERANCE = 1e-9
+"""Part of a step by which a time may be after a step and still belong to it, for times that are rounded decimals."""
 
 
 @dataclass(frozen=True)
@@ -26,11 +33,18 @@ class Thruster:
         Bound delta of |given / commanded - 1|: a commanded impulse k is executed as k (1 + error).
     pointing_error_rad : float
         Bound psi of the angle between the given and the commanded impulse, across the x axis. For space only.
+    last_impulse_s : float or None
+        Time before the nominal arrival after which no impulse is given, s (cut-off); None is no cut-off.
+    impulses_s : tuple of float
+        Times before the nominal arrival at which impulses can be given, s, decreasing; an impulse is given at the step
+        at that time or just before it. Without times, impulses can be given at every step.
+    delay_steps : int
+        Number of steps from the decision to the impulse. The budget is reserved at the decision.
 
     Raises
     ------
     TypeError, ValueError
-        If a value is not a number within its limits, or mu1 exceeds mu2.
+        If a value is not a number within its limits, mu1 exceeds mu2, or the times do not decrease.
 
     References
     ----------
@@ -42,6 +56,9 @@ class Thruster:
     greatest_impulse_m_s: Positive
     execution_error_relative: Part = 0.0
     pointing_error_rad: Part = field(default=0.0, metadata=ADDED_LATER)
+    last_impulse_s: NotNegative | None = field(default=None, metadata=ADDED_LATER)
+    impulses_s: Annotated[tuple[float, ...], POSITIVE] = field(default=(), metadata=ADDED_LATER)
+    delay_steps: Annotated[int, WHOLE] = field(default=0, metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -50,6 +67,48 @@ class Thruster:
                 f"Thruster: least_impulse_m_s must not exceed greatest_impulse_m_s, {self.greatest_impulse_m_s:g}: "
                 f"got {self.least_impulse_m_s!r}"
             )
+        for time_s, next_s in pairwise(self.impulses_s):
+            if next_s >= time_s:
+                raise ValueError(
+                    f"Thruster: impulses_s, times before the arrival, must decrease: got {next_s!r} after {time_s!r}"
+                )
+
+    def impulse_steps(self, arrival_s: float, step_s: float) -> Sequence[int] | None:
+        """Return the steps in which impulses can be given, increasing; None is every step from `delay_steps`.
+
+        Parameters
+        ----------
+        arrival_s, step_s : float
+            Time from the start to the nominal arrival, and length of a step.
+
+        Raises
+        ------
+        ValueError
+            If there is no such step, or one of `impulses_s` is before the first step in which an impulse can be given,
+            or in the same step as the one before it.
+        """
+        if self.last_impulse_s is None and not self.impulses_s:
+            return None
+        times_s = (*self.impulses_s, self.last_impulse_s or 0.0)
+        *of_times, last = (math.floor((arrival_s - time_s) / step_s + STEP_TOLERANCE) for time_s in times_s)
+        for i, step in enumerate(of_times):
+            if step < self.delay_steps:
+                raise ValueError(
+                    f"thruster.impulses_s: the first impulse can be given {arrival_s - self.delay_steps * step_s:g} s "
+                    f"before the nominal arrival: got {self.impulses_s[i]!r}"
+                )
+            if i > 0 and step == of_times[i - 1]:
+                raise ValueError(
+                    f"thruster.impulses_s: two impulses in one step of {step_s:g} s: got {self.impulses_s[i - 1]!r} "
+                    f"and {self.impulses_s[i]!r}"
+                )
+        steps = [step for step in of_times if step <= last] if of_times else range(self.delay_steps, last + 1)
+        if not steps:
+            raise ValueError(
+                f"thruster.last_impulse_s excludes all impulses: got {self.last_impulse_s!r}; the nominal arrival is "
+                f"{arrival_s:g} s after the start"
+            )
+        return steps
 
     def give(self, wanted_m_s: Floats, budget_left_m_s: Floats) -> Floats:
         """Return the impulses that the engine gives, m/s.

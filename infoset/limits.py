@@ -96,6 +96,7 @@ class _Rule:
     name: str
     limits: Limits | None
     pair: bool
+    many: bool
     kind: type | None
     optional: bool
 
@@ -105,6 +106,11 @@ class _Rule:
         if self.limits is None:
             if self.kind is not None and not isinstance(value, self.kind):
                 raise TypeError(f"{self.name} must be of the type {self.kind.__name__}: got {shown(value)}")
+        elif self.many:
+            if not isinstance(value, tuple):
+                raise TypeError(f"{self.name} must be a tuple of numbers: got {shown(value)}")
+            for number in value:
+                self.limits.need(self.name, number)
         elif not self.pair:
             self.limits.need(self.name, value)
         else:
@@ -128,8 +134,8 @@ def limits_of(owner: type, field: str) -> Limits:
 def check_fields(owner: object) -> None:
     """Check the values of a dataclass against the annotations of its fields.
 
-    Numbers are annotated with `Limits`, intervals are pairs (least, greatest) of such numbers; enumerations, other
-    dataclasses and text are checked by type.
+    Numbers are annotated with `Limits`, intervals are pairs (least, greatest) of such numbers, ``tuple[float, ...]`` is
+    any number of them; enumerations, other dataclasses and text are checked by type.
 
     Raises
     ------
@@ -153,7 +159,9 @@ def _rule(field: str, name: str, hint: Any) -> _Rule:
         (hint,) = (kind for kind in get_args(hint) if kind is not types.NoneType)
     inner, *more = get_args(hint) if get_origin(hint) is Annotated else (hint,)
     limits = next((note for note in more if isinstance(note, Limits)), None)
-    return _Rule(field, name, limits, get_origin(inner) is tuple, inner if isinstance(inner, type) else None, optional)
+    many = get_args(inner)[1:] == (...,)
+    kind = inner if isinstance(inner, type) else None
+    return _Rule(field, name, limits, get_origin(inner) is tuple, many, kind, optional)
 
 
 def need_pair(name: str, value: object, limits: Limits = NUMBER) -> None:

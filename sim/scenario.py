@@ -161,6 +161,7 @@ class Scenario:
             if sensor is not None:
                 self.set_model.check_period(name, sensor)
         self._check_axes()
+        self.thruster.impulse_steps(self.nominal_arrival_s, self.set_model.step_s)
         self.set_model.check_start("dispersion", self.dispersion)
         greatest = max(self.dispersion.x_m[1], self.set_model.bounds.x_m[1])
         if self.sun is not None and self.sun.distance_m <= greatest:
@@ -196,7 +197,7 @@ class Scenario:
 
     @property
     def nominal_arrival_s(self) -> float:
-        """Nominal time of arrival, s."""
+        """Time from the start to x = 0 at the nominal range and closing speed, s."""
         return self.nominal_range_m / self.set_model.closing_speed_m_s
 
     @property

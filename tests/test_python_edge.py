@@ -119,6 +119,9 @@ THRUSTER: dict[str, Any] = {
     "greatest_impulse_m_s": 7.5,
     "execution_error_relative": 0.0,
     "pointing_error_rad": 0.0,
+    "last_impulse_s": 20.0,
+    "impulses_s": (60.0, 30.0),
+    "delay_steps": 2,
 }
 SPACE_BOX: dict[str, Any] = {**BOX, "y_m": (-2e3, 1e3), "vy_m_s": (-20.0, 10.0)}
 SPACE_SENSOR: dict[str, Any] = {
@@ -201,6 +204,7 @@ NONE_IS_SOUND = {
     "disturbance_y_m_s2",
     "gravity_y_m_s2",
     "acceleration_y_m_s2",
+    "last_impulse_s",
 }
 """Values that may be None."""
 FIELDS = [(kind, field) for kind, values in SOUND.items() for field in values]
@@ -230,10 +234,11 @@ def test_what_is_no_value_of_a_field(kind: Any, field: str) -> None:
     none = () if field in NONE_IS_SOUND else (None,)
     bad: list[Any]
     if isinstance(sound, tuple):
-        bad = [None, 1.0, "ab", (), (sound[0],), (*sound, 1.0), sound[::-1]]
+        bad = [None, 1.0, "ab", sound[::-1]]
+        bad += [] if field == "impulses_s" else [(), (sound[0],), (*sound, 1.0)]
         bad += [ends for each in NO_NUMBERS for ends in ((each, sound[1]), (sound[0], each))]
     elif isinstance(sound, int):
-        bad = [None, 0, *NO_COUNTS]
+        bad = [None, *([] if field == "delay_steps" else [0]), *NO_COUNTS]
     elif isinstance(sound, float):
         bad = [
             *none,
@@ -263,6 +268,16 @@ def test_what_is_no_value_of_a_field(kind: Any, field: str) -> None:
         (lambda: AngleSensor(**SENSOR, miss_probability=1.0), "miss_probability"),
         (lambda: Thruster(1e3, 8.0, 7.5), "least_impulse_m_s"),
         (lambda: Thruster(1e3, 0.0, 7.5, 1.0), "execution_error_relative"),
+        (lambda: Thruster(1e3, 0.0, 7.5, impulses_s=(30.0, 30.0)), "impulses_s"),
+        (
+            lambda: Scenario(**{**SCENARIO, "thruster": Thruster(**{**THRUSTER, "last_impulse_s": 61.0})}),
+            "last_impulse_s",
+        ),
+        (lambda: Scenario(**{**SCENARIO, "thruster": Thruster(**{**THRUSTER, "impulses_s": (99.5,)})}), "impulses_s"),
+        (
+            lambda: Scenario(**{**SCENARIO, "thruster": Thruster(**{**THRUSTER, "impulses_s": (30.0, 29.7)})}),
+            "impulses_s",
+        ),
         (lambda: SetModel(**{**MODEL, "sections": 2}), "sections"),
         (lambda: SetModel(**{**MODEL, "sections": 10_001}), "sections"),
         (lambda: SetModel(**{**MODEL, "range_threshold_m": 5e6}), "range_threshold_m"),
@@ -622,6 +637,7 @@ NUMBERS = [
     and field not in ("gravity_m_s2", "gravity_y_m_s2", "gravity_speed_change")
     and field not in ("first_image_s", "last_image_s", "miss_probability")  # until scenario files have these keys
     and (kind, field) not in ((SetModel, "execution_error_relative"), (SetModel, "pointing_error_rad"))
+    and field not in ("last_impulse_s", "impulses_s")
 ]
 
 
