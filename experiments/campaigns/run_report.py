@@ -35,7 +35,7 @@ from experiments.common.errors import InputError
 from experiments.common.file_kinds import use_of_file
 from experiments.common.output import Output, output, to_json
 from experiments.common.screen import BeginProgress, Part, figure_files, number, number_table, progress_bar, say, show
-from experiments.interception.figures.b_plane import Cloud, draw_b_plane
+from experiments.interception.figures.b_plane import Cloud, draw_b_plane, greatest_guarantee
 from experiments.interception.scenario_file import scenario_to_toml
 from sim.results import ending
 from sim.storage import CampaignFolder, need_arrow
@@ -173,8 +173,13 @@ def _clouds(folder: CampaignFolder) -> list[Cloud]:
     """Return the misses across the approach of each noise with rows."""
     miss_m = folder.numbers("miss_m").data
     across_m = np.column_stack([folder.numbers(name).data for name in ("miss_y_m", "miss_z_m")])
-    clouds = [(noise, across_m[rows], miss_m[rows]) for noise, rows in noise_flags(folder).items()]
-    return [Cloud(f"{noise} noise, {len(miss)} runs", across, miss) for noise, across, miss in clouds if len(miss)]
+    bounds_m = folder.numbers("guaranteed_miss_m").filled(np.inf)
+    guaranteed = folder.manifest.scenario.set_model.is_guaranteed
+    clouds = []
+    for noise, rows in noise_flags(folder).items():
+        bound_m = greatest_guarantee(bounds_m[rows].tolist()) if guaranteed else None
+        clouds.append(Cloud(f"{noise} noise, {len(miss_m[rows])} runs", across_m[rows], miss_m[rows], bound_m))
+    return [each for each in clouds if len(each.miss_m)]
 
 
 def _parts(

@@ -11,12 +11,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Ellipse, Patch
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from experiments.common.figure_style import INK, SET_EDGE, WIDTH_MM, new_figure, place_axes, plain, style
+from experiments.common.figure_style import INK, SET_EDGE, TRUTH, WIDTH_MM, new_figure, place_axes, plain, style
 from experiments.common.screen import number
 from experiments.interception.figures.distributions import RADIUS_LOOK, axis_limit
 from guidance import NoiseKind
@@ -48,6 +48,12 @@ _CIRCLES: tuple[tuple[float, str, Any], ...] = (
     (0.9, "90 % of the misses", (0, (4, 1.5))),
 )
 _CIRCLE_COLOUR = "#7f2704"
+_ELLIPSES: tuple[tuple[float, Any], ...] = ((0.5, "-"), (0.99, (0, (4, 1.5))))
+"""Level and line of the ellipses that contain a share of the runs."""
+BODY_FILL = "#f0e6d8"
+"""Colour of the disc of the body."""
+GUARANTEE_LOOK: dict[str, Any] = {"color": "#2f6b3a", "linestyle": (0, (7, 1.5)), "linewidth": 1.4}
+"""Line of the guaranteed miss."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +66,14 @@ class Cloud:
         Positions (y, z) at the closest approach, m.
     miss_m : ndarray, shape (N,)
         Distances at the closest approach, m.
+    guaranteed_m : float or None
+        Greatest guaranteed miss of the runs, m; None if a run has no guarantee.
     """
 
     title: str
     across_m: Floats
     miss_m: Floats
+    guaranteed_m: float | None = None
 
 
 def cloud(title: str, samples: Sequence[Results]) -> Cloud:
@@ -72,21 +81,52 @@ def cloud(title: str, samples: Sequence[Results]) -> Cloud:
     misses = np.array([results.miss_m for results in samples])
     across = np.array([results.lateral_miss.data for results in samples])
     worst, runs = misses.argmax(axis=0), np.arange(misses.shape[1])
-    return Cloud(title, across[worst, runs], misses[worst, runs])
+    bounds = [
+        float(bound) for results in samples if results.guarantees for bound in results.guaranteed_miss_m.filled(np.inf)
+    ]
+    return Cloud(title, across[worst, runs], misses[worst, runs], greatest_guarantee(bounds))
+
+
+def greatest_guarantee(bounds_m: Sequence[float]) -> float | None:
+    """Return the greatest of the guaranteed misses of runs; infinity stands for a run without a guarantee."""
+    greatest = max(bounds_m, default=np.inf)
+    return greatest if np.isfinite(greatest) else None
+
+
+def ellipse(across_m: Floats, level: float) -> tuple[Floats, Floats, float] | None:
+    """Return the ellipse that contains a share of the points.
+
+    It has the centre and the axes of the covariance of the points; its size is the quantile of the Mahalanobis radii of
+    the points.
+
+    Returns
+    -------
+    tuple of (ndarray, ndarray, float), or None
+        Centre (y, z) and semi-axes, m, and the angle of the first semi-axis from y toward z, rad. None if the points
+        are on a line.
+    """
+    centre = across_m.mean(axis=0)
+    variances, axes = np.linalg.eigh(np.cov(across_m.T)) if len(across_m) > 2 else (np.zeros(2), np.eye(2))
+    if variances[0] <= 1e-12 * variances[1]:
+        return None
+    radii = np.sqrt(np.sum(((across_m - centre) @ axes) ** 2 / variances, axis=1))
+    angle_rad = float(np.arctan2(axes[1, 0], axes[0, 0]))
+    return centre, float(np.quantile(radii, level)) * np.sqrt(variances), angle_rad
 
 
 @style()
 def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figure:
-    """Draw the miss of each run as a point in the plane across the approach, with circles of two quantiles.
+    """Draw the miss of each run as a point in the plane across the approach.
 
-    All panels have the same limits, unless the median misses differ much.
+    Ellipses contain 50 % and 99 % of the runs. The radii of the circles are the median and the 90 % quantile of the
+    miss, and the greatest guaranteed miss. All panels have the same limits, unless the median misses differ much.
 
     Parameters
     ----------
     clouds : sequence of Cloud
         One panel each, at least one.
     radius_m : float or None
-        Radius of the body, m, drawn as a circle; None draws none.
+        Radius of the body, m, drawn as a disc; None draws none.
     """
     if not clouds:
         raise ValueError("at least one cloud is needed")
@@ -96,10 +136,11 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
     rows = -(-len(clouds) // columns)
     gap = 11.0 if alone else 6.0
     side = min(_WIDEST_MM, (WIDTH_MM - _LEFT_MM - _RIGHT_MM - gap * (columns - 1)) / columns)
-    lines = 2 + max(each.title.count("\n") for each in clouds)
+    guaranteed = any(each.guaranteed_m is not None for each in clouds)
+    lines = 2 + guaranteed + max(each.title.count("\n") for each in clouds)
     top, between = 3.0 + 4.0 * lines, 11.5 + 4.0 * lines
     halves = [_half_width([each] if alone else clouds, radius_m) for each in clouds]
-    handles = _handles({len(each.miss_m) for each in clouds}, radius_m, max(halves))
+    handles = _handles(clouds, radius_m, halves)
     legend_columns = min(2, columns)
     bottom = 16.0 + 4.5 * -(-len(handles) // legend_columns)
     figure = new_figure(
@@ -113,6 +154,9 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
         unused.remove()
     for index, (axes, each, half) in enumerate(zip(places, clouds, halves, strict=False)):
         quantiles = _draw_cloud(axes, each, half, radius_m)
+        if guaranteed:
+            bound = "no guarantee" if each.guaranteed_m is None else f"greatest Φ: {number(each.guaranteed_m)} m"
+            quantiles += f"\n{bound}"
         letter = f"({ascii_lowercase[index]}) " if 1 < len(clouds) <= len(ascii_lowercase) else ""
         axes.set_title(f"{letter}{plain(each.title)}\n{quantiles}", linespacing=1.3, pad=4.0)
         axes.set_xlabel("miss along y, m", labelpad=2.0)
@@ -125,9 +169,10 @@ def draw_b_plane(clouds: Sequence[Cloud], radius_m: float | None = None) -> Figu
 
 
 def _half_width(clouds: Sequence[Cloud], radius_m: float | None) -> float:
-    """Return half the length of the axes: the misses and, if it is not much greater, the radius of the body."""
+    """Return half the length of the axes: the misses and, if not much greater, the radius of the body and Φ."""
     greatest = axis_limit([each.miss_m for each in clouds]) or 1.0
-    return 1.08 * max(greatest, radius_m if radius_m is not None and radius_m <= _RADIUS_SHOWN * greatest else 0.0)
+    sizes = [size for size in (radius_m, *(each.guaranteed_m for each in clouds)) if size is not None]
+    return 1.08 * max([greatest, *(size for size in sizes if size <= _RADIUS_SHOWN * greatest)])
 
 
 def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) -> str:
@@ -148,12 +193,19 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
         if not shows(count, level):
             continue
         quantile = float(np.quantile(each.miss_m, level))
-        look: dict[str, Any] = {"edgecolor": _CIRCLE_COLOUR, "linestyle": dashes, "linewidth": 1.2, "fill": False}
+        look: dict[str, Any] = {"edgecolor": _CIRCLE_COLOUR, "linestyle": dashes, "linewidth": 0.9, "fill": False}
         axes.add_patch(Circle((0.0, 0.0), quantile, zorder=3.0, path_effects=halo, label=f"_{level:g}", **look))
         quantiles.append(f"{'median' if level == 0.5 else f'{100 * level:g} %'}: {number(quantile)} m")
-    if radius_m is not None and radius_m <= half:
-        look = {"edgecolor": RADIUS_LOOK["color"], **{key: RADIUS_LOOK[key] for key in ("linestyle", "linewidth")}}
-        axes.add_patch(Circle((0.0, 0.0), radius_m, fill=False, zorder=3.2, label="_radius", **look))
+    for level, dashes in _ELLIPSES:
+        if shows(count, level) and (drawn := ellipse(each.across_m, level)) is not None:
+            centre, (width, height), angle_rad = drawn
+            look = {"edgecolor": TRUTH, "linestyle": dashes, "linewidth": 1.2, "fill": False, "path_effects": halo}
+            shape = Ellipse(
+                (centre[0], centre[1]), 2 * width, 2 * height, angle=np.degrees(angle_rad), zorder=3.0, **look
+            )
+            shape.set_label(f"_ellipse {level:g}")
+            axes.add_patch(shape)
+    draw_discs(axes, half, radius_m, each.guaranteed_m)
     axes.plot(0.0, 0.0, marker="+", color=INK, markersize=7.0, markeredgewidth=1.1, linestyle="none", zorder=4.0)
     beyond = int((np.abs(each.across_m) > half).any(axis=1).sum())
     if beyond:
@@ -173,18 +225,58 @@ def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) ->
     return ", ".join(quantiles)
 
 
-def _handles(runs: set[int], radius_m: float | None, half: float) -> list[Line2D]:
+def draw_discs(axes: Axes, half: float, radius_m: float | None, guaranteed_m: float | None) -> None:
+    """Draw the disc of the body and the circle of the guaranteed miss, if they are known and within the axes."""
+    if radius_m is not None and radius_m <= half:
+        look = {"edgecolor": RADIUS_LOOK["color"], **{key: RADIUS_LOOK[key] for key in ("linestyle", "linewidth")}}
+        axes.add_patch(Circle((0.0, 0.0), radius_m, facecolor=BODY_FILL, edgecolor="none", zorder=0.5))
+        axes.add_patch(Circle((0.0, 0.0), radius_m, fill=False, zorder=3.2, label="_radius", **look))
+    if guaranteed_m is not None and guaranteed_m <= half:
+        look = {**GUARANTEE_LOOK, "edgecolor": GUARANTEE_LOOK["color"]}
+        del look["color"]
+        axes.add_patch(Circle((0.0, 0.0), guaranteed_m, fill=False, zorder=3.1, label="_guarantee", **look))
+
+
+def disc_handles(radius_m: float | None, guaranteed: Sequence[bool], half: float, of: str) -> list[Line2D | Patch]:
+    """Return the entries of the legend for the discs.
+
+    Parameters
+    ----------
+    guaranteed : sequence of bool
+        For each guaranteed miss, whether it is within the axes.
+    of : str
+        What the guaranteed miss belongs to: ``of the run``.
+    """
+    handles: list[Line2D | Patch] = []
+    if guaranteed:
+        where = "" if all(guaranteed) else ", if within the axes" if any(guaranteed) else ": beyond the axes"
+        handles.append(Line2D([], [], label=f"circle: guaranteed miss Φ, {of}{where}", **GUARANTEE_LOOK))
+    if radius_m is not None:
+        where = "a smaller miss is a hit" if radius_m <= half else "beyond the axes"
+        look = {key: RADIUS_LOOK[key] for key in ("linestyle", "linewidth")}
+        label = f"body radius, {radius_m:g} m: {where}"
+        handles.append(Patch(facecolor=BODY_FILL, edgecolor=RADIUS_LOOK["color"], label=label, **look))
+    return handles
+
+
+def _handles(clouds: Sequence[Cloud], radius_m: float | None, halves: Sequence[float]) -> list[Line2D | Patch]:
+    runs = {len(each.miss_m) for each in clouds}
     runs_per_panel = f", {max(runs)} runs per panel" if len(runs) == 1 else ""
-    handles = [
+    handles: list[Line2D | Patch] = [
         Line2D([], [], markersize=4.0, label=f"miss of one run{runs_per_panel}", **_POINT),
         Line2D([], [], color=INK, marker="+", linestyle="none", markersize=7.0, label="centre of the body"),
     ]
     handles += [
-        Line2D([], [], color=_CIRCLE_COLOUR, linestyle=dashes, label=f"circle: {name}")
+        Line2D([], [], color=_CIRCLE_COLOUR, linestyle=dashes, linewidth=0.9, label=f"circle: {name}")
         for level, name, dashes in _CIRCLES
         if shows(max(runs), level)
     ]
-    if radius_m is not None:
-        where = "a smaller miss is a hit" if radius_m <= half else "beyond the axes"
-        handles.append(Line2D([], [], label=f"body radius, {radius_m:g} m: {where}", **RADIUS_LOOK))
-    return handles
+    handles += [
+        Line2D([], [], color=TRUTH, linestyle=dashes, label=f"ellipse: {100 * level:g} % of the runs")
+        for level, dashes in _ELLIPSES
+        if shows(max(runs), level)
+    ]
+    within = [
+        each.guaranteed_m <= half for each, half in zip(clouds, halves, strict=True) if each.guaranteed_m is not None
+    ]
+    return handles + disc_handles(radius_m, within, max(halves), "greatest of the runs")

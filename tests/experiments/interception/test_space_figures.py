@@ -15,7 +15,7 @@ from matplotlib.patches import Circle, Polygon
 from PIL import Image, ImageSequence
 
 from experiments.interception.figures.animation import GIF, animate
-from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane
+from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane, ellipse, greatest_guarantee
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import TRUTH_MARK, choose_sections, draw_sets
 from experiments.interception.page import interception_page
@@ -100,6 +100,38 @@ def test_the_page_names_the_measured_angles(convention: Convention, names: list[
     scenario = load_scenario("asteroid-1997-space", [f"angle_sensor.convention={convention.value}"])
     text = interception_page([fly_one(scenario)])
     assert re.findall(r'"measured_name": ?"([^"]*)"', text) == names
+
+
+def test_ellipses_contain_their_share_of_the_runs() -> None:
+    numbers = np.random.default_rng(3)
+    across = numbers.normal(size=(400, 2)) @ np.array([[3.0, 1.0], [0.0, 0.5]]) + [4.0, -2.0]
+    for level in (0.5, 0.99):
+        shape = ellipse(across, level)
+        assert shape is not None
+        centre, axes, angle = shape
+        turned = (across - centre) @ np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        assert np.mean(np.sum((turned / axes) ** 2, axis=1) <= 1.0 + 1e-9) == pytest.approx(level, abs=0.003)
+    assert ellipse(across[:2], 0.5) is None
+    assert ellipse(np.outer(np.arange(9.0), [1.0, 2.0]), 0.5) is None
+    figure = draw_b_plane([Cloud("many", across, np.hypot(*across.T))])
+    drawn = {str(patch.get_label()) for patch in figure.axes[0].patches}
+    assert {"_ellipse 0.5", "_ellipse 0.99"} <= drawn
+    assert {"ellipse: 50 % of the runs", "ellipse: 99 % of the runs"} <= set(legend(figure))
+
+
+def test_the_greatest_guaranteed_miss_of_the_runs_is_a_circle(results: Results) -> None:
+    bound = float(results.guaranteed_miss_m.max())
+    assert cloud("paper model", [results]).guaranteed_m is None
+    sound = cloud("guaranteed", [replace(results, guarantees=True)])
+    assert sound.guaranteed_m == bound
+    figure = draw_b_plane([replace(sound, guaranteed_m=1.5 * float(results.miss_m.max()))])
+    assert circles(figure.axes[0])["_guarantee"] == 1.5 * float(results.miss_m.max())
+    assert "circle: guaranteed miss Φ, greatest of the runs" in legend(figure)
+    far = draw_b_plane([replace(sound, guaranteed_m=1e5)])
+    assert "_guarantee" not in circles(far.axes[0])
+    assert far.axes[0].get_title().endswith("greatest Φ: 100000.0 m")
+    assert "circle: guaranteed miss Φ, greatest of the runs: beyond the axes" in legend(far)
+    assert greatest_guarantee([3.0, np.inf]) is None
 
 
 def test_samples_that_differ_much_have_limits_for_each_panel(results: Results) -> None:
