@@ -22,8 +22,8 @@ from guidance import (
     ZeroEffortMiss,
     strategy_names,
 )
-from guidance.kalman import KalmanState
-from guidance.least_squares import LeastSquaresState
+from guidance.kalman import KalmanBank
+from guidance.least_squares import LeastSquaresFit
 from guidance.patient import correctable_later_m
 from guidance.predicted_miss import impulse_beyond_dead_zone
 from infoset import AngleSensor, ExtremePoints, InformationSet, PredictedMiss, RangeSensor, SetModel, StateBox
@@ -216,11 +216,11 @@ def test_estimators_find_the_motion_without_noise(make: Callable[[], Strategy]) 
         z, vz, x, speed = truth.z, truth.vz, truth.x, truth.speed
         truth.fire(last)
         truth.advance(0.5)
-    if isinstance(state, KalmanState):
+    if isinstance(state, KalmanBank):
         best = state.mean[0, int(state.log_weight[0].argmax())]
         found = (best[0], best[1], best[2], best[3])
     else:
-        assert isinstance(state, LeastSquaresState)
+        assert isinstance(state, LeastSquaresFit)
         start, moved, fired = state.start[0], state.offset_given_m[0], state.speed_given_m_s[0]
         found = (start[0] + start[1] * 94.5 - moved, start[1] - fired, start[2] - start[3] * 94.5, start[3])
     # Angles do not see the scale: it is known as well as the ranges and the impulses show it.
@@ -245,13 +245,13 @@ def test_an_angle_that_is_not_new_tells_nothing(make: Callable[[], Strategy]) ->
     first = replace(situation(0.0, 0.0), measured={"angle": np.array([1e-3])}, new=frozenset({"angle"}))
     strategy.decide(first, state)
     again = replace(first, step=1, time_s=0.5, new=frozenset())
-    if isinstance(state, KalmanState):
+    if isinstance(state, KalmanBank):
         before = state.covariance[0, :, 0, 0].copy()
         strategy.decide(again, state)
         assert (state.covariance[0, :, 0, 0] >= before).all()
     else:
         strategy.decide(again, state)
-        assert len(state.angles.times_s) == 1
+        assert len(state.measurements["angle"].times_s) == 1
 
 
 @pytest.mark.parametrize(

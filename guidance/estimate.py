@@ -1,0 +1,92 @@
+"""Estimates of the motion along one lateral axis, as guidance uses them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guidance.predicted_miss import impulse_beyond_dead_zone
+from guidance.situation import Situation
+from infoset import Bias
+from infoset.sensors import AngleSensor
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Zero-effort miss of a batch of engagements: the miss without further impulses.
+
+    Parameters
+    ----------
+    miss_m, deviation_m : ndarray, shape (B,)
+        Signed miss and its standard deviation, m. Pending impulses count as given.
+    to_go_s : ndarray, shape (B,)
+        Time from the impulse that is decided now to the closest approach, s; not negative.
+
+    Notes
+    -----
+    The rate of the line of sight at the impulse is miss / (c tau^2), with the closing speed c and the time to go tau.
+    """
+
+    miss_m: Floats
+    deviation_m: Floats
+    to_go_s: Floats
+
+    @property
+    def correction_m_s(self) -> Floats:
+        """Impulse that makes the miss zero, m/s, shape (B,); zero at the closest approach."""
+        return np.divide(self.miss_m, self.to_go_s, out=np.zeros_like(self.miss_m), where=self.to_go_s > 0.0)
+
+
+class Estimator(Protocol):
+    """A filter or a fit for a batch of engagements along one lateral axis."""
+
+    def update(self, situation: Situation) -> None:
+        """Use the impulse of the previous step and the measurements of this one; call it once a step."""
+
+    def estimate(self, situation: Situation) -> Estimate:
+        """Return the estimate after `update` of the same step."""
+
+
+EstimatorKind = Callable[[int, bool], Estimator]
+"""Makes an estimator from the number of engagements and whether it estimates the acceleration of the target."""
+
+
+def independent_error_rad(sensor: AngleSensor, range_m: Floats) -> Floats:
+    """Return the bound of the part of an angle error that is independent between measurements, rad."""
+    if sensor.bias is Bias.CONSTANT:
+        return np.full_like(range_m, sensor.pixel_error_rad)
+    return sensor.error_bound(range_m)
+
+
+def constant_error_m(sensor: AngleSensor) -> float:
+    """Return the bound of the part of the errors that is constant in a flight, m.
+
+    The angles then show a point at this lateral distance from the centre, which no measurement can tell from the
+    centre: the error of an estimated miss contains it unchanged.
+    """
+    return sensor.centroid_error_m or 0.0 if sensor.bias is Bias.CONSTANT else 0.0
+
+
+def correct_outside_dead_zone(situation: Situation, estimator: Estimator, dead_zone: float, last_s: float) -> Floats:
+    """Update an estimator, and return the impulses (m/s) that correct the part of the miss outside a dead zone.
+
+    Parameters
+    ----------
+    dead_zone : float
+        Half-width of the dead zone, in standard deviations of the miss.
+    last_s : float
+        Time before the closest approach, and before the last impulse that the engine allows, without a dead zone, s.
+    """
+    estimator.update(situation)
+    if not situation.may_fire:
+        return np.zeros_like(situation.last_impulse_m_s)
+    estimate = estimator.estimate(situation)
+    if situation.last_s - situation.lead_s <= last_s:
+        dead_zone = 0.0
+    return impulse_beyond_dead_zone(estimate.miss_m, estimate.deviation_m, estimate.to_go_s, dead_zone, last_s)
