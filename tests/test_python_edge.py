@@ -635,7 +635,6 @@ NUMBERS = [
     for field, value in SOUND[kind].items()
     if isinstance(value, float | tuple)
     and field not in ("gravity_m_s2", "gravity_y_m_s2", "gravity_speed_change")
-    and field not in ("first_image_s", "last_image_s", "miss_probability")  # until scenario files have these keys
     and (kind, field) not in ((SetModel, "execution_error_relative"), (SetModel, "pointing_error_rad"))
     and field not in ("last_impulse_s", "impulses_s")
 ]

@@ -19,7 +19,7 @@ from experiments.common.errors import InputError, shown
 from experiments.common.toml_form import ENDS, similar_key
 from experiments.common.toml_values import LARGEST, SMALLEST, number_text
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
-from experiments.interception.scenario_tables import OPTIONAL_SENSORS, SPACE_KEYS
+from experiments.interception.scenario_tables import LATER_KEYS, OPTIONAL_SENSORS, SPACE_KEYS
 from sim.scenario import Scenario
 from sim.storage import MOST_CELLS, Axis
 
@@ -31,6 +31,10 @@ _PLACES = Context(prec=12)
 """Values between the ends are rounded to 12 digits."""
 
 _OPTIONAL = ("sun", *OPTIONAL_SENSORS, "target", "body")
+
+
+_LATER_NUMBERS = sorted(LATER_KEYS - {("angle_sensor", "bias"), ("thruster", "impulses_s")})
+_WHOLE = (("thruster", "delay_steps"),)
 
 
 def sweep_axes(text: str, scenario: Scenario) -> tuple[Axis, ...]:
@@ -98,7 +102,7 @@ def _known_keys(scenario: Scenario) -> dict[str, bool]:
     for table, keys in _tables(scenario).items():
         for name, value in keys.items():
             path = f"{table}.{name}"
-            if isinstance(value, list) or table == "dispersion":
+            if (isinstance(value, list) and name != "impulses_s") or table == "dispersion":
                 known |= {f"{path}.{end}": False for end in ENDS}
             if table == "dispersion":  # a start that is fixed
                 known[path] = False
@@ -106,7 +110,12 @@ def _known_keys(scenario: Scenario) -> dict[str, bool]:
                 known[path] = isinstance(value, int)
         if scenario.is_spatial:  # bounds of y that the file takes from z
             known |= {f"{home}.{name}": False for home, name in sorted(SPACE_KEYS) if home == table and "_y_" in name}
-    return {"body.radius_m": False} | known | dict.fromkeys(_error_bounds(scenario), False)
+    return (
+        {"body.radius_m": False}
+        | {".".join(path): path in _WHOLE for path in _LATER_NUMBERS}
+        | known
+        | dict.fromkeys(_error_bounds(scenario), False)
+    )
 
 
 def _error_bounds(scenario: Scenario) -> dict[str, dict[str, float]]:

@@ -204,19 +204,20 @@ class Pair:
 
 @dataclass(frozen=True)
 class Numbers:
-    """An array of `count` numbers within limits, or one number for all of them if `one_for_all`."""
+    """An array of `count` numbers within limits (None: of any length), or one number for all if `one_for_all`."""
 
-    count: int
+    count: int | None
     number: Number
     one_for_all: bool = False
 
     def __call__(self, value: object) -> tuple[Decimal, ...]:
         """Check and return them."""
-        if self.one_for_all and isinstance(value, int | Decimal) and not isinstance(value, bool):
+        if self.one_for_all and self.count and isinstance(value, int | Decimal) and not isinstance(value, bool):
             return (self.number(value),) * self.count
         if not isinstance(value, list):
-            raise wrong(f"must be {'a number or ' if self.one_for_all else ''}an array of {self.count} numbers")
-        if len(value) != self.count:
+            numbers = "numbers" if self.count is None else f"{self.count} numbers"
+            raise wrong(f"must be {'a number or ' if self.one_for_all else ''}an array of {numbers}")
+        if self.count is not None and len(value) != self.count:
             raise wrong(f"must be an array of {self.count} numbers, not {len(value)}")
         for place, each in enumerate(value, start=1):
             problem = self.number.problem(each)
@@ -227,16 +228,17 @@ class Numbers:
 
 @dataclass(frozen=True)
 class Whole:
-    """A whole number from 1."""
+    """A whole number from `least` to `most`."""
 
     most: int
+    least: int = 1
 
     def __call__(self, value: object) -> int:
         """Check and return it."""
         if isinstance(value, bool) or not isinstance(value, int):
             raise wrong("must be a whole number")
-        if not 1 <= value <= self.most:
-            raise wrong(f"must be from 1 to {self.most}")
+        if not self.least <= value <= self.most:
+            raise wrong(f"must be from {self.least} to {self.most}")
         return value
 
 

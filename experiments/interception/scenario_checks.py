@@ -14,7 +14,7 @@ from experiments.interception.scenario_tables import OPTIONAL_SENSORS, SPACE_KEY
 from guidance import Thruster
 from infoset import AngleSensor, Model, SetModel, StateBox
 from infoset.model import WHOLE_STEPS_TOLERANCE
-from infoset.sensors import NEGLIGIBLE_ERROR_RAD, Convention, ErrorShape
+from infoset.sensors import NEGLIGIBLE_ERROR_RAD, Bias, Convention, ErrorShape
 from sim.draws import MOST_STEPS
 from sim.gravity import greatest_impulses_m_s, with_gravity
 from sim.kepler import LONGEST_SUBSTEP_S
@@ -26,6 +26,16 @@ BOXES = ("uncertainty", "dispersion")
 """Tables of the possible and the true starts."""
 AXIS_KEYS = ("y_km", "vy_km_s")
 """Keys of the boxes that make a scenario spatial."""
+LINEAR_KEYS = (
+    "error_at_nominal_range_rad",
+    "error_at_zero_range_rad",
+    "error_at_nominal_range_y_rad",
+    "error_at_zero_range_y_rad",
+)
+"""Keys of the linear bound of the angle sensor; a camera has `CAMERA_KEYS` in their place."""
+CAMERA_KEYS = ("pixel_error_rad", "centroid_error_m")
+LEAST_DISTANCE = 10
+"""Least range threshold in units of the centroid error."""
 AGREE, OTHER_UNIT = 10, 100
 """Ratio of two values below which they are in the same unit, and from which they are in different units."""
 
@@ -33,7 +43,10 @@ AGREE, OTHER_UNIT = 10, 100
 def cross_problems(known: Known) -> Iterator[Problem]:
     """Yield the problems between valid values."""
     yield from _space(known)
+    yield from _error_keys(known)
+    yield from _images(known)
     yield from _impulses(known)
+    yield from _schedule(known)
     yield from _periods(known)
     yield from _sections(known)
     geometric = [*_ranges(known), *_error_law(known), *_sun(known), *_body(known), *_closing_speeds(known)]
@@ -113,6 +126,78 @@ def _error_shape(known: Known) -> Iterator[Problem]:
                 f"must be equal to {key}_rad for errors in a disc or a cone, found {shown(along_y)}",
                 f"remove {key}_y_rad",
             )
+
+
+def _error_keys(known: Known) -> Iterator[Problem]:
+    """An angle sensor has the keys of one error law: the linear bound, or the camera."""
+    table = "angle_sensor"
+    if known.value(table) is None:
+        return
+    camera = [key for key in CAMERA_KEYS if _has(known, table, key)]
+    line = [key for key in LINEAR_KEYS if _has(known, table, key)]
+    if known.value(table, "bias") == Bias.CONSTANT.value and not camera:
+        yield Problem(
+            (table, "bias"),
+            'must be "random" without pixel_error_rad, found "constant": only a camera has an error of the centre',
+            "remove it, or write pixel_error_rad and centroid_error_m in place of the two errors of the linear bound",
+        )
+    if camera and line:
+        yield Problem(
+            (table, line[0]),
+            f"must not be set together with {camera[0]}, found {shown(known.value(table, line[0]))}",
+            f"remove {' and '.join(line)} for a camera, or {' and '.join(camera)} for the linear bound",
+        )
+        return
+    for key in ("pixel_error_rad",) if camera else LINEAR_KEYS[:2]:
+        if not _has(known, table, key):
+            example = keys_of(ScenarioTables, (table,))[key].examples[0]
+            other = "" if camera else ", or pixel_error_rad and centroid_error_m of a camera"
+            yield Problem((table, key), MISSING, f"add it under [{table}], for example {key} = {example}{other}")
+    centroid, threshold = known.number(table, "centroid_error_m"), known.number("guidance", "range_threshold_km")
+    if centroid is not None and threshold is not None and threshold * 1000 < LEAST_DISTANCE * centroid:
+        yield Problem(
+            ("guidance", "range_threshold_km"),
+            f"must be at least {LEAST_DISTANCE} times angle_sensor.centroid_error_m, {shown(centroid)} m, "
+            f"found {shown(threshold)}",
+            f"write range_threshold_km = {(LEAST_DISTANCE * centroid / 1000).normalize():f}",
+        )
+
+
+def _images(known: Known) -> Iterator[Problem]:
+    first, last = (known.number("angle_sensor", key) for key in ("first_image_s", "last_image_s"))
+    if first is not None and last is not None and first < last:
+        yield Problem(
+            ("angle_sensor", "first_image_s"),
+            f"must be at least angle_sensor.last_image_s, {shown(last)}, found {shown(first)}",
+            "exchange them: both are times before the nominal arrival",
+        )
+
+
+def _schedule(known: Known) -> Iterator[Problem]:
+    """At least one impulse must be possible, and each of `impulses_s` must have its own step after the start."""
+    nominal_range, speed = known.number("nominal", "range_km"), known.number("nominal", "closing_speed_km_s")
+    last, times = known.number("thruster", "last_impulse_s"), known.value("thruster", "impulses_s")
+    step, delay = known.number("guidance", "step_s"), known.value("thruster", "delay_steps")
+    impulses_s = tuple(si(Decimal(time)) for time in times) if isinstance(times, list) else ()
+    if nominal_range is None or speed is None or step is None or (last is None and not impulses_s):
+        return
+    try:
+        thruster = Thruster(
+            *(1.0, 0.0, 1.0),
+            last_impulse_s=None if last is None else si(last),
+            impulses_s=impulses_s,
+            delay_steps=delay if isinstance(delay, int) else 0,
+        )
+        thruster.impulse_steps(si(nominal_range / speed), si(step))
+    except ValueError as error:
+        key = "last_impulse_s" if str(error).startswith("thruster.last_impulse_s ") else "impulses_s"
+        text = str(error).removeprefix("Thruster: ").removeprefix("thruster.").removeprefix(key).lstrip(":, ")
+        text = text.removeprefix("times before the arrival, ")
+        yield Problem(
+            ("thruster", key),
+            text,
+            "write times before the nominal arrival, the earliest first, after the start and before the cut-off",
+        )
 
 
 def _impulses(known: Known) -> Iterator[Problem]:

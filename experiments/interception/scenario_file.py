@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
@@ -19,7 +19,7 @@ from experiments.common.toml_file import load_tables, read_tables
 from experiments.common.toml_form import Form, keys_of
 from experiments.common.toml_values import si_name, si_values, value_text
 from experiments.interception.scenario_checks import cross_problems
-from experiments.interception.scenario_tables import OPTIONAL_SENSORS, SCHEMA, SPACE_KEYS, ScenarioTables
+from experiments.interception.scenario_tables import LATER_KEYS, OPTIONAL_SENSORS, SCHEMA, SPACE_KEYS, ScenarioTables
 from guidance.thruster import Thruster
 from infoset.model import InitialSet, Interval, Model, SetModel, StateBox
 from infoset.sensors import AngleSensor
@@ -38,7 +38,12 @@ FORM = Form(
     begun_by="infoset scenarios new FILE",
     tables=ScenarioTables,
     checks=cross_problems,
-    written=("sun", "range_sensor"),
+    written=(
+        "sun",
+        "range_sensor",
+        "angle_sensor.error_at_nominal_range_rad",
+        "angle_sensor.error_at_zero_range_rad",
+    ),
     schema=SCHEMA,
 )
 
@@ -151,6 +156,12 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
             "vy_km_s are not both [0, 0]: a measurement leaves a single range, and the set may become empty; write "
             "positive bounds"
         )
+    last_s = max(min(thruster.impulses_s, default=0.0), thruster.last_impulse_s or 0.0)
+    if sensor.first_image_s is not None and sensor.first_image_s < last_s:
+        lines.append(
+            f"angle_sensor.first_image_s is {sensor.first_image_s:g} s, and the last impulse is {last_s:g} s before "
+            "the nominal arrival: no impulse follows a measurement"
+        )
     if thruster.budget_m_s < thruster.least_impulse_m_s:
         lines.append(
             f"thruster.budget_m_s, {thruster.budget_m_s:g}, is less than thruster.least_impulse_m_s, "
@@ -187,7 +198,8 @@ def scenario_template() -> str:
 def scenario_to_toml(scenario: Scenario) -> str:
     """Return the TOML of a scenario; it is read back as the same scenario, bit for bit.
 
-    It has every key; a scenario in a plane lacks the keys of space.
+    It has every key, except the keys of space in a plane, the keys of the other error law of the angle sensor, and keys
+    of `LATER_KEYS` that have their default.
 
     Raises
     ------
@@ -206,7 +218,7 @@ def scenario_to_toml(scenario: Scenario) -> str:
         "nominal": {"range_m": scenario.nominal_range_m, "closing_speed_m_s": model.closing_speed_m_s},
         "uncertainty": vars(model.bounds),
         "dispersion": {name: pair[0] if pair and pair[0] == pair[1] else pair for name, pair in start},
-        "angle_sensor": vars(sensor),
+        "angle_sensor": vars(sensor) | _error_keys(sensor),
         **{table: _values(getattr(scenario, table)) for table in (*OPTIONAL_SENSORS, "target", "body")},
         "thruster": vars(scenario.thruster),
         "guidance": {**vars(model), "strategy": scenario.strategy},
@@ -222,9 +234,22 @@ def scenario_to_toml(scenario: Scenario) -> str:
             lines += [
                 f"{key} = {value_text(key, value)}"
                 for key, value in written.items()
-                if (table, key) not in SPACE_KEYS or (scenario.is_spatial and value is not None)
+                if value is not None and _is_written(table, key, value, is_spatial=scenario.is_spatial)
             ]
     return "\n".join(lines) + "\n"
+
+
+def _error_keys(sensor: AngleSensor) -> dict[str, object]:
+    """Return the keys of the error law of an angle sensor; those of the other law are None."""
+    line = dict.fromkeys(("error_at_nominal_range_rad", "error_at_zero_range_rad"))
+    return {"pixel_error_rad": sensor.pixel_error_rad, **line} if sensor.is_camera else {"pixel_error_rad": None}
+
+
+def _is_written(table: str, key: str, value: object, *, is_spatial: bool) -> bool:
+    """Whether a written file has a key."""
+    if (table, key) in LATER_KEYS:
+        return bool(value != keys_of(ScenarioTables, (table,))[key].default)
+    return is_spatial or (table, key) not in SPACE_KEYS
 
 
 def _values(part: object | None) -> dict[str, object] | None:
@@ -255,7 +280,7 @@ def _composed(tables: ScenarioTables) -> Scenario:
             closing_speed_m_s=nominal["closing_speed_m_s"],
             step_s=step["step_s"],
             bounds=StateBox(**si_values(tables.uncertainty)),
-            angle_sensor=AngleSensor(**si_values(tables.angle_sensor), nominal_range_m=nominal["range_m"]),
+            angle_sensor=_angle_sensor(si_values(tables.angle_sensor), nominal["range_m"]),
             range_threshold_m=step["range_threshold_m"],
             fewest_sections=min(DEFAULT_FEWEST_SECTIONS, chosen["sections"]) if fewest is None else fewest,
             initial_set=chosen.pop("initial_set") or default_initial_set(chosen["model"]),
@@ -270,6 +295,15 @@ def _composed(tables: ScenarioTables) -> Scenario:
         tie=tables.noise.tie,
         **{table: _fitted(kind, getattr(tables, table)) for table, kind in OPTIONAL_SENSORS.items()},
     )
+
+
+def _angle_sensor(values: dict[str, Any], nominal_range_m: float) -> AngleSensor:
+    """Return the angle sensor of a table: with the pixel error a camera, otherwise with a linear bound."""
+    pixel_error_rad = values.pop("pixel_error_rad")
+    if pixel_error_rad is not None:
+        values |= dict.fromkeys(("error_at_nominal_range_rad", "error_at_zero_range_rad"), pixel_error_rad)
+        values["centroid_error_m"] = values["centroid_error_m"] or 0.0
+    return AngleSensor(**values, nominal_range_m=nominal_range_m)
 
 
 def _fitted(owner: type[Part], table: BaseModel | None) -> Part | None:

@@ -22,6 +22,7 @@ from experiments.common.toml_values import (
     Description,
     Name,
     Number,
+    Numbers,
     Pair,
     Positive,
     Table,
@@ -32,9 +33,10 @@ from experiments.common.toml_values import (
 )
 from guidance.noise import NoiseKind, TieRule
 from guidance.thruster import Thruster
-from infoset.limits import limits_of
+from infoset.limits import POSITIVE, limits_of
 from infoset.model import MOST_SECTIONS, InitialSet, Model, Recovery, SetModel, StateBox
-from infoset.sensors import AngleSensor, Convention, ErrorShape, RangeSensor, RateSensor
+from infoset.sensors import AngleSensor, Bias, Convention, ErrorShape, RangeSensor, RateSensor
+from sim.draws import MOST_STEPS
 from sim.scenario import Body, Manoeuvre, Scenario, Sun, Target
 
 SCHEMA = 1
@@ -52,6 +54,7 @@ _APPROACH = Number(below=Decimal(0), least=-SPEED_OF_LIGHT_KM_S)
 Elevation = Annotated[Decimal, PlainValidator(Number(least=Decimal(-90), most=Decimal(90)))]
 ClosingSpeed = Annotated[Decimal, PlainValidator(Number(above=Decimal(0), most=SPEED_OF_LIGHT_KM_S))]
 
+_PIXEL = limited_by(AngleSensor, "error_at_zero_range_rad")
 OfSun = Annotated[Decimal, limited_by(Sun)]
 OfAngleSensor = Annotated[Decimal, limited_by(AngleSensor)]
 OfRangeSensor = Annotated[Decimal, limited_by(RangeSensor)]
@@ -125,8 +128,24 @@ class AngleSensorTable(Table):
     """[angle_sensor]."""
 
     period_s: OfAngleSensor = key("time between measurements, a multiple of guidance.step_s", "0.5")
-    error_at_nominal_range_rad: OfAngleSensor = key("greatest error at nominal.range_km", "0.00015")
-    error_at_zero_range_rad: OfAngleSensor = key("greatest error at range zero; a straight line joins both", "0.00023")
+    error_at_nominal_range_rad: OfAngleSensor | None = key(
+        "greatest error at nominal.range_km", "0.00015", default=None
+    )
+    error_at_zero_range_rad: OfAngleSensor | None = key(
+        "greatest error at range zero; a straight line joins both", "0.00023", default=None
+    )
+    pixel_error_rad: Annotated[Decimal, _PIXEL] | None = key(
+        "a camera, in place of both errors above: error of an image", "5e-6", default=None
+    )
+    centroid_error_m: OfAngleSensor | None = key(
+        "error of the body's centre: a camera adds it divided by the distance", "0.0", default=None
+    )
+    bias: Bias = key('centroid error of a camera: "random", or "constant" in a run', '"random"', default=Bias.RANDOM)
+    first_image_s: OfAngleSensor | None = key(
+        "first measurement, before the nominal arrival; without it: the start", "90.0", default=None
+    )
+    last_image_s: OfAngleSensor = key("last measurement, before the nominal arrival", "0.0", default=ZERO)
+    miss_probability: OfAngleSensor = key("probability that a measurement is lost", "0.0", default=ZERO)
     error_at_nominal_range_y_rad: OfAngleSensor | None = _space_key(
         "the same for the angle of y; without it: as for z", "0.00015"
     )
@@ -182,6 +201,17 @@ class ThrusterTable(Table):
     greatest_impulse_m_s: OfThruster = key("greater impulses are reduced to this one", "7.5")
     execution_error_relative: OfThruster = key("greatest relative error of an executed impulse", "0.0", default=ZERO)
     pointing_error_rad: OfThruster = _space_key("greatest error of the direction of an impulse", "0.0", ZERO)
+    last_impulse_s: OfThruster | None = key(
+        "last impulse, before the nominal arrival; without it: no cut-off", "2.0", default=None
+    )
+    impulses_s: Annotated[tuple[Decimal, ...], PlainValidator(Numbers(None, Number.of(POSITIVE)))] = key(
+        "times of the impulses, before the nominal arrival; without it: every step",
+        "[60.0, 20.0, 7.5]",
+        default=(),
+    )
+    delay_steps: Annotated[int, PlainValidator(Whole(MOST_STEPS, least=0))] = key(
+        "number of steps from the decision to the impulse", "0", default=0
+    )
 
 
 class GuidanceTable(Table):
@@ -257,3 +287,8 @@ SPACE_KEYS = frozenset(
     if field.json_schema_extra == _SPACE
 )
 """Tables and keys that only a scenario in space has."""
+LATER_KEYS = frozenset(
+    [("angle_sensor", name) for name in ("bias", "first_image_s", "last_image_s", "miss_probability")]
+    + [("thruster", name) for name in ("last_impulse_s", "impulses_s", "delay_steps")]
+)
+"""Tables and keys that a written file leaves out if they have their default, so that older files stay as they are."""
