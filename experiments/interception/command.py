@@ -150,7 +150,7 @@ class Adversary(FileOptions):
 
 @dataclass(frozen=True)
 class Replay:
-    """Show records of `infoset engage --record` without simulating again: page, animations, figures 2 and 3."""
+    """Show records of `infoset engage --record` without simulating again: page, animations, figures."""
 
     records: Annotated[
         list[Path], typer.Argument(metavar="A.npz [B.npz]", help="One record, or two records to show side by side.")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sim import Outcome, Record
+from infoset import Convention
+from sim import Outcome, Record, Scenario
 from sim.adversary import WORST_FOUND
 from sim.results import ending
 
@@ -34,6 +35,13 @@ def record_titles(records: Sequence[Record]) -> list[str]:
     if len(records) == 1:
         return titles
     return [f"({chr(ord('a') + index)}) {title}" for index, title in enumerate(titles)]
+
+
+def angle_name(scenario: Scenario, axis: str) -> str:
+    """Return the name of the angle of an axis: a gimbal measures azimuth and elevation."""
+    if scenario.set_model.angle_sensor.convention is Convention.GIMBAL:
+        return {"y": "azimuth α", "z": "elevation α"}[axis]
+    return "line-of-sight angle α"
 
 
 def outcome_title(record: Record) -> str:

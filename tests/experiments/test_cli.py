@@ -282,6 +282,8 @@ def test_engage_under_both_noises(infoset: Command, tmp_path: Path) -> None:
         "figure-2-process.png",
         "figure-3-sets.pdf",
         "figure-3-sets.png",
+        "figure-approach.pdf",
+        "figure-approach.png",
         "record-game.npz",
         "record-random.npz",
         "results.json",

@@ -11,14 +11,19 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
 from experiments.common.errors import InputError
 from experiments.common.figure_style import INK, new_figure, place_axes, plain, style
+from experiments.interception.course import Clock, evenly
+from experiments.interception.figures.approach import count_down
 from experiments.interception.figures.process import draw_predicted_miss, level_predicted_miss, traces_of
 from experiments.interception.figures.sets import Plane, draw_plane, level_planes, planes_at
-from experiments.interception.record_titles import record_titles
+from experiments.interception.record_titles import angle_name, record_titles
 from sim import Record
+
+Floats = NDArray[np.float64]
 
 GIF, MP4 = ".gif", ".mp4"
 DURATION_S = 8.0
@@ -70,9 +75,8 @@ def animate(
     width_px : int or None
         Width of a frame; None is 425, or 640 for two records.
     """
-    times = np.unique([step.time_s for record in records for step in record.steps])
-    count = min(len(times), most_frames)
-    chosen = times[np.unique(np.linspace(0, len(times) - 1, count).round().astype(int))]
+    clock = Clock.of(records)
+    chosen = _frame_times(records, clock, most_frames)
     fps = max(1, round(most_frames / DURATION_S))
     writer: AbstractMovieWriter = PillowWriter(fps=fps) if ending == GIF else FFMpegWriter(fps=fps)
     traces = traces_of(records)
@@ -87,8 +91,11 @@ def animate(
         above, below = place_axes(figure, 2, len(traces), margins_mm=margins, gaps_mm=(gap, 15.0))
         titles = [plain(each) for each in record_titles(records)]
         for axes, trace in zip(below, traces, strict=True):
-            draw_predicted_miss(axes, trace)
-            axes.set_xlabel("time t, s")
+            draw_predicted_miss(axes, trace, clock)
+            if clock.counts_down:
+                count_down(axes, trace[0])
+            else:
+                axes.set_xlabel("time t, s")
             along = f" along {trace[1]}" if in_space else ""
             axes.set_ylabel(f"predicted miss π{along}, m" if in_space or axes is below[0] else "")
             axes.tick_params(labelleft=in_space or axes is below[0])
@@ -96,12 +103,22 @@ def animate(
         lines = [axes.axvline(float(chosen[0]), color=INK, linewidth=1.0) for axes in below]
         with writer.saving(figure, str(file), width / figure.get_figwidth()):
             for index, time in enumerate(chosen.tolist()):
-                _draw_planes(above, planes_at(records, titles, time, _SECTIONS))
-                for line in lines:
-                    line.set_xdata([time, time])
+                _draw_planes(above, planes_at(records, titles, time, _SECTIONS), clock)
+                for line, (record, _) in zip(lines, traces, strict=True):
+                    line.set_xdata(clock.at(record, [time, time]))
                 writer.grab_frame()
                 progress((index + 1) / len(chosen))
         return _few_colours(file) if ending == GIF else file.read_bytes()
+
+
+def _frame_times(records: Sequence[Record], clock: Clock, most: int) -> Floats:
+    """Return at most `most` times of steps, evenly distributed over the time axis or over the steps."""
+    times = np.unique([step.time_s for record in records for step in record.steps])
+    count = min(len(times), most)
+    if not clock.counts_down:
+        return np.asarray(times[np.unique(np.linspace(0, len(times) - 1, count).round().astype(int))])
+    last = max(records, key=lambda record: record.scenario.nominal_arrival_s)
+    return np.asarray(times[evenly(-np.log(clock.at(last, times)), count)])
 
 
 def _few_colours(file: Path) -> bytes:
@@ -115,7 +132,7 @@ def _few_colours(file: Path) -> bytes:
     return content.getvalue()
 
 
-def _draw_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
+def _draw_planes(row: Sequence[Axes], planes: Sequence[Plane], clock: Clock) -> None:
     """Draw the sets of one time."""
     for axes in row:
         axes.clear()
@@ -125,7 +142,11 @@ def _draw_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
         in_space = plane.record.scenario.is_spatial
         along = f" along {plane.axis}" if in_space else ""
         title = f"{plane.title}\nalong {plane.axis}" if in_space else plane.title
-        axes.set_title(f"{title}, t = {plane.step.time_s:.1f} s")
+        time_s = plane.step.time_s
+        time = clock.text(plane.record, time_s) if clock.counts_down else f"t = {time_s:.1f} s"
+        axes.set_title(f"{title}, {time}")
         axes.set_xlabel(f"line-of-sight rate ω{along}, µrad/s")
-        axes.set_ylabel(f"angle α{along}, mrad" if in_space or axes is row[0] else "")
+        axes.set_ylabel(
+            f"{angle_name(plane.record.scenario, plane.axis)}{along}, mrad" if in_space or axes is row[0] else ""
+        )
         axes.tick_params(labelleft=in_space or axes is row[0])

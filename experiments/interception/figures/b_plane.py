@@ -34,7 +34,7 @@ _WIDEST_MM = 62.0
 _LEFT_MM, _RIGHT_MM = 17.0, 5.0
 _OWN_LIMITS_FROM = 3.0
 """Ratio of the greatest and the least median above which each panel has its own limits."""
-_RADIUS_SHOWN = 3.0
+RADIUS_SHOWN = 3.0
 """The axes extend to the radius of the body if it is at most this multiple of the greatest miss shown."""
 _VECTOR_POINTS = 2000
 """Number of points of a panel above which they are pixels in the PDF file."""
@@ -172,7 +172,7 @@ def _half_width(clouds: Sequence[Cloud], radius_m: float | None) -> float:
     """Return half the length of the axes: the misses and, if not much greater, the radius of the body and Φ."""
     greatest = axis_limit([each.miss_m for each in clouds]) or 1.0
     sizes = [size for size in (radius_m, *(each.guaranteed_m for each in clouds)) if size is not None]
-    return 1.08 * max([greatest, *(size for size in sizes if size <= _RADIUS_SHOWN * greatest)])
+    return 1.08 * max([greatest, *(size for size in sizes if size <= RADIUS_SHOWN * greatest)])
 
 
 def _draw_cloud(axes: Axes, each: Cloud, half: float, radius_m: float | None) -> str:

@@ -28,7 +28,9 @@ from experiments.common.figure_style import (
     style,
     width_mm,
 )
-from experiments.interception.record_titles import outcome_title, record_titles
+from experiments.interception.course import Clock, duration_text, marks
+from experiments.interception.figures.approach import MARK_LOOK, MOST_VECTORS, count_down
+from experiments.interception.record_titles import angle_name, outcome_title, record_titles
 from sim import Record
 
 Floats = NDArray[np.float64]
@@ -47,6 +49,9 @@ _LETTER_MM, _LINE_MM = 1.8, 4.0
 _MOST_DECADES = 4
 """Number of decades up to which each decade has a label."""
 
+_SMALL_IMPULSES = 0.2
+"""Share of the greatest impulse: if no impulse is greater, the axis extends to the impulses."""
+
 _NARROW_MM = 50.0
 """Width of axes up to which notes are short, or have two lines."""
 
@@ -54,7 +59,9 @@ Trace = tuple[Record, str]
 """An engagement and one of its lateral axes."""
 
 _MODULUS = "#c9c9c9"
-_RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+_LINEAR_SHARE = 0.05
+"""Share of the values in the linear part of a bent axis."""
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def draw_process(records: Sequence[Record]) -> Figure:
@@ -64,7 +71,7 @@ def draw_process(records: Sequence[Record]) -> Figure:
     """
     if not records:
         raise ValueError("at least one record is needed")
-    traces = traces_of(records)
+    traces, clock = traces_of(records), Clock.of(records)
     gap = 7.0 if len(traces) > 1 else 0.0
     column_mm = (WIDTH_MM - 25.0 - gap * (len(traces) - 1)) / len(traces)
     titles = []
@@ -72,26 +79,32 @@ def draw_process(records: Sequence[Record]) -> Figure:
         letters = int((column_mm + record.scenario.is_spatial * (gap + column_mm)) / _LETTER_MM)
         titles.append("\n".join([*textwrap.wrap(title, letters), *textwrap.wrap(outcome_title(record), letters)]))
     in_space = any(record.scenario.is_spatial for record in records)
+    span_m_s = _impulse_span_m_s(records)
     top = 4.0 + _LINE_MM * (max(title.count("\n") for title in titles) + 1 + in_space)
     with style():
         figure = new_figure(height_mm=184.0 + top)
         grid = place_axes(figure, _ROWS, len(traces), margins_mm=(21.0, 4.0, 24.0, top), gaps_mm=(gap, 4.0))
         for trace, column in zip(traces, zip(*grid, strict=True), strict=True):
-            _draw_sight(column[0], trace, "angle", "true_angle_rad", 1e3)
+            _draw_sight(column[0], trace, clock, "angle", "true_angle_rad", 1e3)
             column[1].axhline(0.0, color=LIMIT, linewidth=0.6)
-            _draw_sight(column[1], trace, "rate", "true_rate_rad_s", 1e6)
-            _draw_impulse(column[2], trace)
-            draw_predicted_miss(column[3], trace)
-            column[-1].set_xlabel("time t, s")
+            _draw_sight(column[1], trace, clock, "rate", "true_rate_rad_s", 1e6)
+            _draw_impulse(column[2], trace, clock, span_m_s)
+            draw_predicted_miss(column[3], trace, clock)
         _write_titles(grid[0], records, titles)
-        _level(grid[0], [_extent(each, "angle", "true_angle_rad", ANGLE_RANGE_SHARE) for each in traces], scale=1e3)
-        _level(grid[1], [_extent(each, "rate", "true_rate_rad_s", RATE_RANGE_SHARE) for each in traces], scale=1e6)
-        _level_impulse(grid[2], records)
+        if clock.counts_down:
+            _level_decades(grid[0], [_course(each, "true_angle_rad") * 1e3 for each in traces])
+            _level_decades(grid[1], [_course(each, "true_rate_rad_s") * 1e6 for each in traces])
+        else:
+            _level(grid[0], [_extent(each, "angle", "true_angle_rad", ANGLE_RANGE_SHARE) for each in traces], scale=1e3)
+            _level(grid[1], [_extent(each, "rate", "true_rate_rad_s", RATE_RANGE_SHARE) for each in traces], scale=1e6)
+        for axes in grid[2]:
+            axes.set_ylim(-1.2 * span_m_s, 1.35 * span_m_s)
         level_predicted_miss(grid[3], traces)
         for trace, column in zip(traces, zip(*grid, strict=True), strict=True):
-            _note_exit(column[0], _course(trace, "true_angle_rad") * 1e3, trace, 1.0, "mrad")
-            _note_exit(column[1], _course(trace, "true_rate_rad_s") * 1e6, trace, 1e-3, "mrad/s")
-        _finish(figure, grid, records)
+            if not clock.counts_down:
+                _note_exit(column[0], _course(trace, "true_angle_rad") * 1e3, trace, 1.0, "mrad")
+                _note_exit(column[1], _course(trace, "true_rate_rad_s") * 1e6, trace, 1e-3, "mrad/s")
+        _finish(figure, grid, traces, clock)
     return figure
 
 
@@ -110,7 +123,8 @@ def _write_titles(row: Sequence[Axes], records: Sequence[Record], titles: Sequen
             continue
         last = next(columns)
         for axes, name in ((first, "y"), (last, "z")):
-            axes.set_title(f"along {name}")
+            angle = angle_name(record.scenario, name).removesuffix(" α")
+            axes.set_title(f"along {name} ({angle})" if " " not in angle else f"along {name}")
         boxes = [axes.get_position() for axes in (first, last)]
         middle = 0.5 * (boxes[1].x1 - boxes[0].x0) / boxes[0].width
         look: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": first.title.get_fontsize()}
@@ -118,30 +132,33 @@ def _write_titles(row: Sequence[Axes], records: Sequence[Record], titles: Sequen
         first.annotate(title, (middle, 1.0), linespacing=1.3, **place, **look)
 
 
-def _draw_sight(axes: Axes, trace: Trace, sensor: str, field: str, scale: float) -> None:
+def _draw_sight(axes: Axes, trace: Trace, clock: Clock, sensor: str, field: str, scale: float) -> None:
     """Draw a quantity of the line of sight, and its measurements as dots."""
     record, axis = trace
-    steps = [(step.time_s, step.axes[axis].measured) for step in record.steps]
+    times = clock.at(record)
+    steps = zip(times, [step.axes[axis].measured for step in record.steps], strict=True)
     measured = [(time_s, values[sensor]) for time_s, values in steps if sensor in values]
     if measured:
-        times, values = np.array(measured).T
+        measured_at, values = np.array(measured).T
         size = 6.0 if _marker(record) and sensor == "angle" else 3.0
-        axes.plot(times, values * scale, ".", color=MEASURED, markersize=size, markeredgewidth=0.0)
-    times, true = _times(record), _course(trace, field)
+        look: dict[str, Any] = {"markersize": size, "rasterized": len(values) > MOST_VECTORS}
+        axes.plot(measured_at, values * scale, ".", color=MEASURED, markeredgewidth=0.0, **look)
+    true = _course(trace, field)
     axes.plot(times, true * scale, color=TRUTH, marker=_marker(record), markersize=3.0)
 
 
-def _draw_impulse(axes: Axes, trace: Trace) -> None:
+def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, span_m_s: float) -> None:
     """Draw the impulses along an axis; in space, behind them, their moduli, all upward."""
     record, _ = trace
-    times, impulses = _times(record), _course(trace, "impulse_m_s")
+    times, impulses = clock.at(record), _course(trace, "impulse_m_s")
     greatest = record.scenario.thruster.greatest_impulse_m_s
     axes.axhline(0.0, color=LIMIT, linewidth=0.6)
     for limit in (-greatest, greatest):
         axes.axhline(limit, color=LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
+    beyond = ", beyond the axis" if greatest > span_m_s else ""
     axes.annotate(
-        f"{'greatest impulse' if width_mm(axes) > _NARROW_MM else 'limit'} ±{greatest:g} m/s",
-        (0.985, greatest),
+        f"{'greatest impulse' if width_mm(axes) > _NARROW_MM else 'limit'} ±{greatest:g} m/s{beyond}",
+        (0.985, min(greatest, 1.05 * span_m_s)),
         xycoords=axes.get_yaxis_transform(),
         xytext=(0.0, 2.5),
         textcoords="offset points",
@@ -150,15 +167,18 @@ def _draw_impulse(axes: Axes, trace: Trace) -> None:
     )
     if record.scenario.is_spatial:
         moduli = np.array([step.impulse_m_s for step in record.steps])
-        axes.vlines(times[moduli > 0.0], 0.0, moduli[moduli > 0.0], color=_MODULUS, linewidth=0.9)
+        many = np.count_nonzero(moduli) > MOST_VECTORS
+        axes.vlines(times[moduli > 0.0], 0.0, moduli[moduli > 0.0], color=_MODULUS, linewidth=0.9, rasterized=many)
     given = impulses != 0.0
-    axes.vlines(times[given], 0.0, impulses[given], color=IMPULSE, linewidth=0.9)
+    many = given.sum() > MOST_VECTORS
+    axes.vlines(times[given], 0.0, impulses[given], color=IMPULSE, linewidth=0.9, rasterized=many)
     axes.plot(times[given], impulses[given], ".", color=IMPULSE, markersize=2.2, markeredgewidth=0.0)
 
 
-def draw_predicted_miss(axes: Axes, trace: Trace) -> None:
+def draw_predicted_miss(axes: Axes, trace: Trace, clock: Clock) -> None:
     """Draw the predicted-miss interval over time."""
-    times, lower, upper = _predicted_miss(trace)
+    times_s, lower, upper = _predicted_miss(trace)
+    times = clock.at(trace[0], times_s)
     axes.axhline(0.0, color=LIMIT, linewidth=0.6)
     axes.fill_between(times, lower, upper, color=SET_FILL, linewidth=0.0)
     for bound in (lower, upper):
@@ -173,23 +193,35 @@ def _level(row: Sequence[Axes], extents: Sequence[tuple[float, float]], scale: f
         axes.set_ylim(least - margin, greatest + 1.8 * margin)
 
 
-def _level_impulse(row: Sequence[Axes], records: Sequence[Record]) -> None:
+def _impulse_span_m_s(records: Sequence[Record]) -> float:
+    """Return the greatest impulse that the axis shows: the limit of the engine unless all are small."""
     greatest = max(record.scenario.thruster.greatest_impulse_m_s for record in records)
-    for axes in row:
-        axes.set_ylim(-1.2 * greatest, 1.35 * greatest)
+    given = max(abs(step.impulse_m_s) for record in records for step in record.steps)
+    return given if 0.0 < given < _SMALL_IMPULSES * greatest else greatest
 
 
 def level_predicted_miss(row: Sequence[Axes], traces: Sequence[Trace]) -> None:
     """Give axes of predicted misses the same limits: linear to ten metres, logarithmic beyond."""
     bounds = np.concatenate([np.concatenate(_predicted_miss(trace)[1:]) for trace in traces])
-    greatest = float(np.abs(bounds).max(initial=10.0))
-    decades = int(np.log10(greatest) + 1e-9)
-    powers = range(1, decades + 1) if decades <= _MOST_DECADES else range(1, decades + 1, 2)
-    names = ["10" + (str(power).translate(_RAISED) if power > 1 else "") for power in powers]
+    _bend(row, 1, float(np.abs(bounds).max(initial=10.0)))
+
+
+def _level_decades(row: Sequence[Axes], courses: Sequence[Floats]) -> None:
+    """Give axes the same limits: linear below the size that most values exceed, logarithmic beyond."""
+    sizes = np.abs(np.concatenate(courses))
+    least = float(np.quantile(sizes, _LINEAR_SHARE))
+    _bend(row, int(np.floor(np.log10(least))) if least > 0.0 else 0, float(sizes.max()) or 1.0)
+
+
+def _bend(row: Sequence[Axes], first: int, greatest: float) -> None:
+    """Make vertical axes linear to 10**first, logarithmic beyond, with symmetric limits."""
+    last = int(np.floor(np.log10(greatest) + 1e-9))
+    powers = range(first, last + 1, 1 if last - first < _MOST_DECADES else 2)
+    names = ["1" if power == 0 else "10" + (str(power).translate(_RAISED) if power != 1 else "") for power in powers]
     sizes = [10.0**power for power in powers]
-    between = [10.0**power for power in range(decades + 1) if power not in powers]
+    between = [10.0**power for power in range(first - 1, last + 1) if power not in powers]
     for axes in row:
-        axes.set_yscale("symlog", linthresh=10.0, linscale=1.0)
+        axes.set_yscale("symlog", linthresh=10.0**first, linscale=1.0)
         axes.set_yticks(
             [*(-size for size in reversed(sizes)), 0.0, *sizes],
             [*("\N{MINUS SIGN}" + name for name in reversed(names)), "0", *names],
@@ -211,7 +243,7 @@ def _note_exit(axes: Axes, values: Floats, trace: Trace, scale: float, unit: str
     space = " " if width_mm(axes) > _NARROW_MM else "\n"
     text = f"reaches {_signed(value)} {unit}{space}at {trace[0].steps[worst].time_s:g} s"
     # The four corners of the part before the curve leaves the axes: the one with the fewest values.
-    across = np.interp(_times(trace[0]), axes.get_xlim(), (0.0, 1.0))
+    across = np.interp([step.time_s for step in trace[0].steps], axes.get_xlim(), (0.0, 1.0))
     up = (values - low) / (high - low)
     last = float(across[max(int((beyond > 0.0).argmax()) - 1, 0)])
     note_width = 1.7 * max(map(len, text.splitlines())) / width_mm(axes)
@@ -239,7 +271,8 @@ def _note_exit(axes: Axes, values: Floats, trace: Trace, scale: float, unit: str
     )
 
 
-def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], records: Sequence[Record]) -> None:
+def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], traces: Sequence[Trace], clock: Clock) -> None:
+    records = [record for record, _ in traces]
     in_space = any(record.scenario.is_spatial for record in records)
     labels = (
         "line-of-sight angle α, mrad",
@@ -251,8 +284,13 @@ def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], records: Sequence[Re
     start = min(record.steps[0].time_s for record in records)
     margin = 0.015 * (end - start) or 0.5
     for row, label in zip(grid, labels, strict=True):
-        for axes in row:
-            axes.set_xlim(start - margin, end + margin)
+        for axes, (record, _) in zip(row, traces, strict=True):
+            if clock.counts_down:
+                count_down(axes, record)
+            else:
+                axes.set_xlim(start - margin, end + margin)
+                axes.set_xlabel("time t, s")
+            axes.xaxis.label.set_visible(row is grid[-1])
             axes.tick_params(labelbottom=row is grid[-1], labelleft=axes is row[0])
             axes.set_ylabel(label)
             axes.yaxis.label.set_visible(axes is row[0])
@@ -269,11 +307,12 @@ def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], records: Sequence[Re
     if in_space:
         modulus = "modulus of the impulse vector, upward"
         handles.insert(3, Line2D([], [], color=_MODULUS, linewidth=1.8, label=modulus))
+    if clock.counts_down:
+        times = {name: duration_text(time) for record in records for name, time in marks(record.scenario).items()}
+        if times:
+            label = ", ".join(f"{name} {time}" for name, time in times.items())
+            handles.append(Line2D([], [], label=label, **MARK_LOOK))
     figure.legend(handles=handles, loc="lower center", ncols=3, columnspacing=2.5, labelcolor=INK)
-
-
-def _times(record: Record) -> Floats:
-    return np.array([step.time_s for step in record.steps])
 
 
 def _course(trace: Trace, field: str) -> Floats:

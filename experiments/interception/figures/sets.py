@@ -18,7 +18,8 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from experiments.common.figure_style import INK, MEASURED, WIDTH_MM, new_figure, place_axes, plain, style, width_mm
-from experiments.interception.record_titles import record_titles
+from experiments.interception.course import Clock
+from experiments.interception.record_titles import angle_name, record_titles
 from infoset import Section
 from sim import AxisStep, Record, StepRecord
 
@@ -52,6 +53,7 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
     if sections < 1:
         raise ValueError(f"at least one section must be shown: got {sections}")
     in_space = any(record.scenario.is_spatial for record in records)
+    clock = Clock.of(records)
     titles = [plain(each) for each in record_titles(records)]
     if len(records) > 1:
         titles = [title.removeprefix(f"({letter}) ") for title, letter in zip(titles, ascii_lowercase, strict=False)]
@@ -76,10 +78,10 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
                 _shade_allowed(axes, plane)
                 draw_plane(axes, plane)
                 title = f"{plane.title}\nalong {plane.axis}" if in_space else plane.title
-                axes.set_title(f"{next(letters)}{title}, t = {plane.step.time_s:g} s")
+                axes.set_title(f"{next(letters)}{title}, {clock.text(plane.record, plane.step.time_s)}")
                 along = f" along {plane.axis}" if in_space else ""
                 axes.set_xlabel(f"line-of-sight rate ω{along}, µrad/s", labelpad=2.0)
-                axes.set_ylabel(f"line-of-sight angle α{along}, mrad")
+                axes.set_ylabel(f"{angle_name(plane.record.scenario, plane.axis)}{along}, mrad")
                 axes.yaxis.label.set_visible(in_space or axes is row[0])
                 axes.tick_params(labelleft=in_space or axes is row[0])
         measured = any("angle" in plane.along.measured for planes in rows for plane in planes)

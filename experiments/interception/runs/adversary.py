@@ -16,7 +16,7 @@ from experiments.interception.choices import own_strategy, study_scenario
 from experiments.interception.command import Adversary
 from experiments.interception.record_file import record_path, write_record
 from experiments.interception.runs.engage import steps_csv
-from experiments.interception.runs.engagement_table import FIGURE_2, FIGURE_3, draw_engagements, need_times, read_times
+from experiments.interception.runs.engagement_table import FIGURES, draw_engagements, need_times, read_times
 from experiments.interception.runs.shared import summary_head
 from experiments.interception.runs.worst_misses import WorstMisses, find_worst_misses
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
@@ -33,7 +33,7 @@ def run(options: Adversary) -> None:
     scenario, notes = study_scenario(options)
     own = own_strategy(options.strategy, scenario)
     times_s = read_times(options.times, options.out)
-    names = ("scenario.toml", "results.json", "steps.csv", RECORD, *figure_files(FIGURE_2, FIGURE_3))
+    names = ("scenario.toml", "results.json", "steps.csv", RECORD, *figure_files(*FIGURES))
     with (
         output_of(options, names, {"--record": options.record}) as written,
         progress_bar(options.quiet) as begin,

@@ -12,8 +12,7 @@ from experiments.interception.choices import own_strategy, scenario_with
 from experiments.interception.command import Engage
 from experiments.interception.record_file import record_path, write_record
 from experiments.interception.runs.engagement_table import (
-    FIGURE_2,
-    FIGURE_3,
+    FIGURES,
     draw_engagements,
     engagement_parts,
     need_times,
@@ -41,7 +40,7 @@ def run(options: Engage) -> None:
             noise: file.with_name(f"{file.stem}-{noise.value}{file.suffix}") if both else file for noise in noises
         }
     folder_records = [f"record-{noise.value}.npz" for noise in noises]
-    names = ["scenario.toml", "results.json", "steps.csv", *folder_records, *figure_files(FIGURE_2, FIGURE_3)]
+    names = ["scenario.toml", "results.json", "steps.csv", *folder_records, *figure_files(*FIGURES)]
     with (
         output_of(options, names, {f"--record ({file.name})": file for file in record_files.values()}) as written,
         progress_bar(options.quiet) as begin,

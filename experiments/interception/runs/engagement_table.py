@@ -1,14 +1,18 @@
-"""Table and figures 2 and 3 of single engagements, for `engage` and `replay`."""
+"""Table and figures of single engagements, for `engage` and `replay`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from experiments.common.errors import InputError
 from experiments.common.options import read_number
 from experiments.common.output import Output
 from experiments.common.screen import BeginProgress, Part, number, number_table
+from experiments.interception.course import Clock
+from experiments.interception.figures.approach import draw_approach
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import draw_sets
 from experiments.interception.published import PRINTED_SINGLE_RUN, SINGLE
@@ -18,7 +22,9 @@ from sim.results import ending
 
 FIGURE_2 = "figure-2-process"
 FIGURE_3 = "figure-3-sets"
-DEFAULT_TIMES = ("0.5", "4", "8")
+APPROACH = "figure-approach"
+FIGURES = (FIGURE_2, FIGURE_3, APPROACH)
+DEFAULT_TIMES = (0.5, 4.0, 8.0)
 MOST_TIMES = 12
 
 
@@ -89,7 +95,7 @@ def _both_failures(record: Record) -> str:
 
 
 def read_times(text: str | None, folder: Path | None) -> tuple[float, ...]:
-    """Return the times of figure 3 that ``--times`` gives, s.
+    """Return the times of figure 3 that ``--times`` gives, s; none without the option.
 
     `InputError` if one is not a time, or no folder is given for the figure.
     """
@@ -97,7 +103,9 @@ def read_times(text: str | None, folder: Path | None) -> tuple[float, ...]:
         raise InputError(
             "--times: chooses the sets of figure 3, which only --out DIR writes; add --out, or omit --times"
         )
-    parts = DEFAULT_TIMES if text is None else text.split(",")
+    if text is None:
+        return ()
+    parts = text.split(",")
     if len(parts) > MOST_TIMES:
         raise InputError(f"--times: at most {MOST_TIMES} times fit in a figure, found {len(parts)}; omit some")
     example = "--times 0.5,40,90"
@@ -112,10 +120,22 @@ def need_times(text: str | None, times_s: Sequence[float], records: Sequence[Rec
         raise InputError(f"--times: {late_s[0]:g} s is after the last step, at {last_s:g} s; give earlier times")
 
 
+def _default_times(records: Sequence[Record]) -> tuple[float, ...]:
+    """Return the times of figure 3, s: those of the paper, or in a long flight evenly over the logarithm of time."""
+    if not Clock.of(records).counts_down:
+        return DEFAULT_TIMES
+    arrival_s, step_s = records[0].scenario.nominal_arrival_s, records[0].scenario.set_model.step_s
+    return tuple((arrival_s - np.geomspace(arrival_s, step_s, 5)[1:4]).tolist())
+
+
 def draw_engagements(
     records: Sequence[Record], times_s: Sequence[float], written: Output, begin: BeginProgress
 ) -> None:
-    """Draw figures 2 and 3 of one or two engagements into the folder, if there is one."""
+    """Draw the figures of one or two engagements into the folder, if there is one."""
     if written.folder is not None:
-        drawings = {FIGURE_2: lambda: draw_process(records), FIGURE_3: lambda: draw_sets(records, times_s)}
+        drawings = {
+            FIGURE_2: lambda: draw_process(records),
+            FIGURE_3: lambda: draw_sets(records, times_s or _default_times(records)),
+            APPROACH: lambda: draw_approach(records),
+        }
         written.draw(drawings, begin("figures"))

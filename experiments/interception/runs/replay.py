@@ -10,8 +10,7 @@ from experiments.interception.figures.animation import GIF, MP4, animate, animat
 from experiments.interception.page import MOST_RECORDS, interception_page
 from experiments.interception.record_file import load_record
 from experiments.interception.runs.engagement_table import (
-    FIGURE_2,
-    FIGURE_3,
+    FIGURES,
     draw_engagements,
     engagement_parts,
     need_times,
@@ -31,7 +30,7 @@ def run(options: Replay) -> None:
     with (
         output(
             folder=options.out,
-            names=figure_files(FIGURE_2, FIGURE_3),
+            names=figure_files(*FIGURES),
             files=files,
             overwrite=options.overwrite,
             quiet=options.quiet,

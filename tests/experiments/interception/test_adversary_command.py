@@ -82,6 +82,8 @@ def test_the_worst_as_json_and_as_a_record_that_replays(infoset: Command, tmp_pa
         "figure-2-process.png",
         "figure-3-sets.pdf",
         "figure-3-sets.png",
+        "figure-approach.pdf",
+        "figure-approach.png",
     ]
 
 
@@ -151,7 +153,9 @@ def test_the_worst_in_a_folder_as_engage_writes_it(infoset: Command, tmp_path: P
     code, _, err = infoset("adversary", *options)
     assert code == 0
     files = sorted(each.name for each in (tmp_path / "worst").iterdir())
-    figures = [f"{name}.{kind}" for name in ("figure-2-process", "figure-3-sets") for kind in ("pdf", "png")]
+    figures = [
+        f"{name}.{kind}" for name in ("figure-2-process", "figure-3-sets", "figure-approach") for kind in ("pdf", "png")
+    ]
     assert files == [*figures, "record-worst.npz", "results.json", "scenario.toml", "steps.csv"]
     assert all(name in err for name in files)
     found = json.loads((tmp_path / "worst" / "results.json").read_text())

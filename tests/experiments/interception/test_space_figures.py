@@ -14,7 +14,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 from PIL import Image, ImageSequence
 
+from experiments.interception.course import Clock, duration_text, true_predicted_misses
 from experiments.interception.figures.animation import GIF, animate
+from experiments.interception.figures.approach import draw_approach
 from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane, ellipse, greatest_guarantee
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import TRUTH_MARK, choose_sections, draw_sets
@@ -248,3 +250,71 @@ def test_commands_write_a_b_plane_of_each_noise_in_space_only(
     )
     written = {file.stem for file in tmp_path.glob("figure-b-plane-*.png")}
     assert written == ({"figure-b-plane-random", "figure-b-plane-game"} if scenario.endswith("space") else set())
+
+
+def scheduled(record: Record) -> Record:
+    """The same record with a cut-off and a last image."""
+    scenario = record.scenario
+    sensor = replace(scenario.set_model.angle_sensor, last_image_s=4.0)
+    thruster = replace(scenario.thruster, last_impulse_s=10.0)
+    model = replace(scenario.set_model, angle_sensor=sensor)
+    return replace(record, scenario=replace(scenario, set_model=model, thruster=thruster))
+
+
+def test_approach_shows_possible_misses_and_the_schedule(records: list[Record]) -> None:
+    record = scheduled(records[0])
+    figure = draw_approach([record])
+    possible, moduli, b_plane = figure.axes
+    lines = {str(line.get_label()): np.asarray(line.get_xydata(), dtype=np.float64) for line in possible.lines}
+    intervals = np.array([[step.axes[axis].predicted_miss_m for axis in AXES] for step in record.steps])
+    np.testing.assert_allclose(lines["_possible"][:, 1], np.hypot(*np.abs(intervals).max(axis=2).T))
+    np.testing.assert_allclose(lines["_centred"][:, 1], np.hypot(*(0.5 * np.diff(intervals, axis=2)[:, :, 0].T)))
+    before = record.scenario.nominal_arrival_s - np.array([step.time_s for step in record.steps])
+    np.testing.assert_allclose(lines["_possible"][:, 0], np.maximum(before, 0.25))
+    last = record.steps[-1]
+    seconds = last.true_range_m / record.scenario.set_model.closing_speed_m_s
+    end = [miss[-1] - seconds * last.axes[axis].impulse_m_s for axis, miss in true_predicted_misses(record).items()]
+    np.testing.assert_allclose(end, record.result.lateral_miss[0].data, atol=0.01)
+    assert (lines["_true"][:, 1] < 1.001 * lines["_possible"][:, 1]).all()
+    assert possible.get_xlim()[0] > possible.get_xlim()[1]
+    assert [text.get_text() for text in possible.texts] == ["cut-off, 10 s", "last image, 4 s"]
+    assert moduli.get_xlabel() == "time before the nominal arrival"
+    assert b_plane.get_xlim() == b_plane.get_ylim()
+    assert "times of the schedule" in legend(figure)
+    assert len(draw_approach(records).axes) == 6
+
+
+def test_long_flights_and_schedules_have_a_logarithmic_time_axis(records: list[Record]) -> None:
+    assert not Clock.of(records).counts_down
+    record = scheduled(records[0])
+    assert Clock.of([record]).counts_down
+    assert Clock.of([replace(records[0], steps=2 * records[0].steps)]).counts_down
+    figure = draw_process([record])
+    assert {axes.get_xscale() for axes in figure.axes} == {"log"}
+    assert legend(figure)[-1] == "last image 4 s, cut-off 10 s"
+    titles = [axes.get_title() for axes in draw_sets([record], (90.0,)).axes]
+    assert titles == [
+        f"({k}) random noise, range meter\nalong {axis}, 10 s before arrival"
+        for k, axis in zip("ab", AXES, strict=True)
+    ]
+    times = [duration_text(each) for each in (0.5, 59.0, 150.0, 14400.0, 86400.0)]
+    assert times == ["0.5 s", "59 s", "2.5 min", "4 h", "1 d"]
+
+
+def test_the_axis_of_impulses_extends_to_small_impulses(records: list[Record]) -> None:
+    scenario = records[0].scenario
+    strong = replace(scenario, thruster=replace(scenario.thruster, greatest_impulse_m_s=1e3))
+    axes = draw_process([replace(records[0], scenario=strong)]).axes[4]
+    greatest = max(step.impulse_m_s for step in records[0].steps)
+    assert axes.get_ylim() == pytest.approx((-1.2 * greatest, 1.35 * greatest))
+    assert axes.texts[0].get_text() == "greatest impulse ±1000 m/s, beyond the axis"
+
+
+def test_figures_name_the_angles_of_a_gimbal() -> None:
+    record = fly_one(load_scenario("asteroid-1997-space", ["angle_sensor.convention=gimbal"]))
+    labels = [axes.get_ylabel() for axes in draw_sets([record], (8.0,)).axes]
+    assert labels == ["azimuth α along y, mrad", "elevation α along z, mrad"]
+    assert [axes.get_title() for axes in draw_process([record]).axes[:2]] == [
+        "along y (azimuth)",
+        "along z (elevation)",
+    ]

@@ -1,0 +1,110 @@
+"""The course of recorded engagements over time: time axis, predicted misses of the true state, and the schedule."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim import Record, Scenario
+
+Floats = NDArray[np.float64]
+
+MOST_LINEAR_STEPS = 400
+"""Number of steps above which the time axis is logarithmic in the time before the arrival."""
+
+UNITS = (("d", 86400.0), ("h", 3600.0), ("min", 60.0), ("s", 1.0))
+"""Units of times before the arrival."""
+
+TICKS_S = (0.01, 0.1, 1.0, 10.0, 60.0, 600.0, 3600.0, 21600.0, 86400.0, 864000.0)
+FEW_TICKS_S = (0.1, 1.0, 60.0, 3600.0, 86400.0, 864000.0)
+"""Ticks of a logarithmic time axis, s; few of them for a narrow axis."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The time axis of pictures of engagements.
+
+    Parameters
+    ----------
+    counts_down : bool
+        Whether the axis is logarithmic in the time before the nominal arrival; otherwise it is linear in the time.
+    """
+
+    counts_down: bool
+
+    @classmethod
+    def of(cls, records: Sequence[Record]) -> Clock:
+        """Return the time axis for records: logarithmic for long flights, and if times before arrival are scheduled."""
+        scheduled = (marks(record.scenario) or record.scenario.thruster.impulses_s for record in records)
+        return cls(any(len(record.steps) > MOST_LINEAR_STEPS for record in records) or any(scheduled))
+
+    def at(self, record: Record, times_s: ArrayLike | None = None) -> Floats:
+        """Return the positions of times on the axis, s; None is the times of the steps.
+
+        Times before the arrival are at least half a step, because a logarithmic axis has no zero.
+        """
+        times = np.asarray([step.time_s for step in record.steps] if times_s is None else times_s, dtype=np.float64)
+        if not self.counts_down:
+            return times
+        return np.maximum(record.scenario.nominal_arrival_s - times, least_to_go_s(record.scenario))
+
+    def text(self, record: Record, time_s: float) -> str:
+        """Return a time of a step as text."""
+        if not self.counts_down:
+            return f"t = {time_s:g} s"
+        left_s = record.scenario.nominal_arrival_s - time_s
+        return (
+            f"{duration_text(left_s)} before arrival" if left_s > 0.0 else f"{-left_s:.3g} s after the nominal arrival"
+        )
+
+
+def least_to_go_s(scenario: Scenario) -> float:
+    """Return the least time before the arrival of a logarithmic axis, s."""
+    return 0.5 * scenario.set_model.step_s
+
+
+def evenly(places: Floats, count: int) -> NDArray[np.int64]:
+    """Return at most `count` indices of rising values, evenly distributed over them, with the first and the last."""
+    wanted = np.linspace(places[0], places[-1], count)
+    return np.unique(np.abs(places - wanted[:, None]).argmin(axis=1))
+
+
+def marks(scenario: Scenario) -> dict[str, float]:
+    """Return the times before the nominal arrival, s, of the first and the last image and of the last impulse."""
+    sensor, cut_off_s = scenario.set_model.angle_sensor, scenario.thruster.last_impulse_s
+    times = {"first image": sensor.first_image_s, "last image": sensor.last_image_s or None, "cut-off": cut_off_s}
+    return {name: time for name, time in times.items() if time is not None and time < scenario.nominal_arrival_s}
+
+
+def duration_text(seconds: float) -> str:
+    """Return a time in the greatest unit of which it has at least one: ``2.5 min``."""
+    name, unit = next(((name, unit) for name, unit in UNITS if seconds >= unit), UNITS[-1])
+    return f"{seconds / unit:.3g} {name}"
+
+
+def true_predicted_misses(record: Record) -> dict[str, Floats]:
+    """Return the miss of the true state without further impulses at each step, m, by lateral axis.
+
+    Notes
+    -----
+    omega (x^2 + a^2) = V_a x - V_x a for the coordinate a of an axis, and a + V_a x / |V_x| is the miss.
+    """
+    slopes = {name: np.tan([step.axes[name].true_angle_rad for step in record.steps]) for name in record.steps[0].axes}
+    ranges = np.array([step.true_range_m for step in record.steps])
+    x_squared = ranges**2 / (1.0 + sum(slope**2 for slope in slopes.values()))
+    speed = -float(record.result.velocity_m_s[0, 1])
+    rates = {name: np.array([step.axes[name].true_rate_rad_s for step in record.steps]) for name in slopes}
+    return {name: rates[name] * x_squared * (1.0 + slope**2) / speed for name, slope in slopes.items()}
+
+
+def possible_misses(record: Record) -> tuple[Floats, Mapping[str, Floats]]:
+    """Return the indices of the steps with a set, and the predicted-miss interval of each axis, m, shape (n, 2)."""
+    known = [index for index, step in enumerate(record.steps) if step.predicted_miss_m is not None]
+    axes = record.scenario.set_model.axes
+    return np.array(known, dtype=np.int64), {
+        axis: np.array([record.steps[index].axes[axis].predicted_miss_m for index in known]).reshape(-1, 2)
+        for axis in axes
+    }
