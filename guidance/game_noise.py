@@ -57,7 +57,7 @@ class GameNoise:
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
         """Choose the measurements of a step; the true values where the set is empty."""
-        miss = predicted.predicted_miss()
+        miss = predicted.predicted_miss(sight.pending)
         upper_is_worse = self._upper_is_worse(miss, sight.step)
         measured = {}
         for name, sensor in sight.sensors.items():

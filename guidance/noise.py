@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
@@ -46,6 +46,8 @@ class LineOfSight:
         True distance, m.
     sensors : mapping of str to Sensor
         Sensors that measure in this step, by name: "angle", "range", "rate".
+    pending : sequence of (float, ndarray)
+        Impulses that are decided and not given yet: time from now, s, and impulse, m/s.
     """
 
     step: int
@@ -53,6 +55,7 @@ class LineOfSight:
     omega_rad_s: Floats
     range_m: Floats
     sensors: Mapping[str, Sensor]
+    pending: Sequence[tuple[float, Floats]] = ()
 
     def shape(self, sensor: Sensor) -> tuple[int, ...]:
         """Return the shape of the measurements of a sensor."""

@@ -105,11 +105,13 @@ class Situation:
 
         Parameters
         ----------
-        time_to_go_s : ndarray, shape (B,) or (2, B)
+        time_to_go_s : ndarray, shape (B,) or (B, S)
             Time to x = 0 of the predicted misses.
         """
-        changes = [impulse * np.maximum(time_to_go_s - time_s, 0.0) for time_s, impulse in self.pending]
-        return sum(changes, np.zeros(np.shape(time_to_go_s)))
+        change = np.zeros(time_to_go_s.shape)
+        for time_s, impulse in self.pending:
+            change += (impulse.T * np.maximum(time_to_go_s - time_s, 0.0).T).T
+        return change
 
     @property
     def axes(self) -> tuple[str, ...]:

@@ -26,4 +26,4 @@ class SymmetricMiss:
 
     def decide(self, situation: Situation, state: None) -> NDArray[np.float64]:
         """Return k_s of equation (15), m/s."""
-        return symmetric_impulse(situation.predicted_miss, situation.closing_speed_m_s)
+        return symmetric_impulse(situation.predicted_miss, situation.closing_speed_m_s, situation.lead_s)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from guidance.predicted_miss import range_at_impulse
 from guidance.situation import Situation
 
 Floats = NDArray[np.float64]
@@ -36,11 +37,16 @@ class ZeroEffortMiss:
     def decide(self, situation: Situation, state: None) -> Floats:
         """Return the impulse that makes the miss of the middle zero, m/s."""
         lower, upper = situation.information.predicted_miss_by_section_m()
-        living, ranges = situation.information.living, situation.information.ranges_m
+        living, e = situation.information.living, situation.closing_speed_m_s
+        ranges = situation.information.ranges_m
         # The addition keeps the weights positive if every section is a single point.
         width = upper - lower + np.finfo(np.float64).tiny
         weight = np.where(living, width, 0.0)
         weight = weight / np.maximum(weight.max(axis=1, keepdims=True), np.finfo(np.float64).tiny)
-        wanted = (weight * 0.5 * (lower + upper) * ranges).sum(axis=1) * situation.closing_speed_m_s
+        middle = 0.5 * (lower + upper)
+        if situation.pending:
+            middle = middle - situation.pending_m(ranges / e)
+        ranges = range_at_impulse(ranges, e, situation.lead_s)
+        wanted = (weight * middle * ranges).sum(axis=1) * e
         square = (weight * ranges**2).sum(axis=1)
         return np.asarray(np.divide(wanted, square, out=np.zeros_like(wanted), where=square > 0.0))

@@ -21,7 +21,7 @@ from infoset.replays import LOWER, PROBE, ROWS, UPPER, ReplayRoom, Workspace, ke
 from infoset.section_law import SectionLaw, law_of
 from infoset.section_life import ALIVE, Flags, Floats, Integers, Tape
 from infoset.section_passes import Sections, tape_of
-from infoset.section_stack import SectionStack
+from infoset.section_stack import SectionStack, impulse_doubts
 
 LABELS = 4
 """Labels replayed for one step; one more on each side serves for extrapolation."""
@@ -347,7 +347,7 @@ class GuaranteedMiss:
         """Apply impulses, m/s, shape (C, B), to the labels that have left but not arrived."""
         e = self._law.closing_speed
         travelled = e * (self._law.step * elapsed)
-        doubt = np.stack([self._doubt(impulse_m_s, law) for law in self._laws])
+        doubt = np.stack([impulse_doubts(impulse_m_s, law) for law in self._laws])
         still = []
         for pieces, real in self._pending:
             near = np.maximum(pieces[..., NEAREST] - travelled, 0.0) / e
@@ -361,14 +361,6 @@ class GuaranteedMiss:
             pieces[..., GREATEST] -= moves.min(axis=0)
             still.append((pieces, real))
         self._pending = still
-
-    @staticmethod
-    def _doubt(impulse_m_s: Floats, law: SectionLaw) -> Floats:
-        along = np.abs(impulse_m_s[law.channel])
-        if law.pointing_across == 0.0:
-            return np.asarray(law.impulse_error * along)
-        size = np.hypot.reduce(impulse_m_s, axis=0)
-        return np.asarray(law.impulse_error * along + (law.pointing_along * along + law.pointing_across * size))
 
     def leave(self, active: Flags, lower: Floats, upper: Floats, stack: SectionStack, history: History) -> None:
         """Add the bound of the labels that leave now: the living ones from `lower` to `upper`."""

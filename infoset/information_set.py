@@ -266,8 +266,9 @@ class InformationSet(InformationSetView):
         active = self._computes_phi & flags("where", where, (self.batch,)) & (impulse != 0.0).any(axis=0)
         if state.phi is not None:
             state.phi.fire(np.where(active, impulse, 0.0), elapsed)
-        state.history.record(section_life.IMPULSE, impulse, active)
-        state.stack.shift(active, impulse, elapsed)
+        if active.any():
+            state.history.record(section_life.IMPULSE, impulse, active)
+            state.stack.shift(active, impulse, elapsed)
 
     def drop_below_threshold(self) -> Flags:
         """Remove the sections whose range will be below the threshold after the next step.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from enum import IntEnum
 
 import numpy as np
@@ -218,12 +219,31 @@ class SectionStack:
         sections.living[removed] = False
         return removed, int(np.count_nonzero(removed))
 
-    def widest(self, elapsed: int) -> tuple[Flags, Floats]:
-        """Return the predicted-miss interval of each engagement in the format of `section_passes.widest_all`."""
+    def widest(self, elapsed: int, pending: Sequence[tuple[float, Floats]] = ()) -> tuple[Flags, Floats]:
+        """Return the predicted-miss interval of each engagement in the format of `section_passes.widest_all`.
+
+        Parameters
+        ----------
+        pending : sequence of (float, ndarray)
+            Later impulses that count as given: time from now, s, and impulse, m/s, shape (C, B).
+        """
         self._summarise(Freshness.SUMMARISED)
         exists, ends = np.zeros(self.batch, dtype=bool), np.zeros((len(self.laws), self.batch, 2, 4))
-        section_passes.widest_all(elapsed, self.sections, self.table, exists, ends)
+        sections = self.sections
+        if pending:
+            sections = sections._replace(summaries=self._summaries_after(pending, elapsed))
+        section_passes.widest_all(elapsed, sections, self.table, exists, ends)
         return exists, ends
+
+    def _summaries_after(self, pending: Sequence[tuple[float, Floats]], elapsed: int) -> Floats:
+        """Return the summaries with the predicted misses after later impulses, as `shift` would change them."""
+        summaries, to_go = self.sections.summaries.copy(), self.ranges(elapsed) / self.law.closing_speed
+        for time_s, impulse in pending:
+            lever = np.maximum(to_go - time_s, 0.0)
+            doubt = np.stack([impulse_doubts(impulse, law) for law in self.laws])
+            summaries[..., section_life.UPPER_MISS] += (doubt - impulse)[..., None] * lever
+            summaries[..., section_life.LOWER_MISS] -= (doubt + impulse)[..., None] * lever
+        return summaries
 
     def polygon(self, channel: int, engagement: int, slot: int, elapsed: int) -> Floats:
         """Return the vertices (V, z) of a living section, counter-clockwise, shape (n, 2)."""
@@ -238,6 +258,15 @@ class SectionStack:
         arrays = {name: array.copy() for name, array in self.sections._asdict().items() if name != "rings"}
         twin.sections = Sections(**arrays, rings=chains.copy_of_rings(self.sections.rings, self.sections.rings.size))
         return twin
+
+
+def impulse_doubts(impulse: Floats, law: SectionLaw) -> Floats:
+    """Return the error bounds of impulses of shape (C, B) along an axis, m/s, shape (B,), as `impulse_doubt` does."""
+    along = np.abs(impulse[law.channel])
+    if law.pointing_across == 0.0:
+        return np.asarray(law.impulse_error * along)
+    size = np.hypot.reduce(impulse, axis=0)
+    return np.asarray(law.impulse_error * along + (law.pointing_along * along + law.pointing_across * size))
 
 
 def outline(section: Chains, row: int, label: float, elapsed: int, law: SectionLaw) -> Floats:

@@ -220,14 +220,21 @@ class SetQueries:
         alpha_least, alpha_greatest, of_least, of_greatest = (np.where(tracked, values, 0.0) for values in found)
         return alpha_least, alpha_greatest, of_least, of_greatest
 
-    def predicted_miss(self) -> PredictedMiss:
+    def predicted_miss(self, pending: Sequence[tuple[float, Floats]] = ()) -> PredictedMiss:
         """Return the predicted-miss interval of each engagement and the states that reach its ends.
+
+        Parameters
+        ----------
+        pending : sequence of (float, ndarray)
+            Later impulses that count as given: time from now, s, and impulse, m/s, shape (B,), in space (2, B).
 
         References
         ----------
         Kumkov and Patsko (1997), equations (13) and (14).
         """
-        exists, ends = self._state.stack.widest(self._state.history.elapsed)
+        shape = (len(self._state.model.axes), self.batch)
+        impulses = [(time_s, np.reshape(impulse, shape)) for time_s, impulse in pending]
+        exists, ends = self._state.stack.widest(self._state.history.elapsed, impulses)
         ends = self._by_axis(ends)
         lower, upper = ([ends[..., end, column] for column in range(4)] for end in (0, 1))
         return PredictedMiss(exists, lower[0], upper[0], ExtremePoints(*lower[1:]), ExtremePoints(*upper[1:]))

@@ -125,6 +125,12 @@ class Engagements:
         self._budget = np.full(batch, float(scenario.thruster.budget_m_s))
         self._impulse = np.zeros(lateral)
         self._spent = np.zeros(batch, dtype=bool)
+        steps = scenario.thruster.impulse_steps(scenario.nominal_arrival_s, model.step_s)
+        self._impulse_times_s = None if steps is None else np.array(steps) * model.step_s
+        # Impulses that are decided and not given yet, one for each of the next steps.
+        self._queue = [self._impulse] * scenario.thruster.delay_steps
+        self._lead_s = scenario.thruster.delay_steps * model.step_s
+        self._not_given = np.zeros(batch)
         self._guaranteed = np.zeros(batch)
         self._finished_label = np.zeros(batch, dtype=bool)
 
@@ -144,14 +150,18 @@ class Engagements:
         sight = self._truth.sight()
         self._tracking = self._flying & self._information.tracking
         measured = self._measure(sight)
-        miss = self._information.predicted_miss()
+        pending = self._pending()
+        miss = self._information.predicted_miss(pending)
         tracking = self._tracking = self._tracking & self._information.tracking
-        wanted = np.where(tracking, self._decide(miss, measured), 0.0)
+        situation = self._situation(miss, measured, pending)
+        wanted = decide(self._strategy, situation, self._states, tracking)
+        wanted = np.where(tracking & situation.may_fire, wanted, 0.0)
         spent = self._budget < thruster.least_impulse_m_s
         if spent.any():
             self._spent |= spent & (modulus(wanted) >= thruster.least_impulse_m_s)
-        self._impulse = thruster.give(wanted, self._budget)
-        given = modulus(self._impulse)
+        self._queue.append(thruster.give(wanted, self._budget))
+        self._budget = np.maximum(self._budget - modulus(self._queue[-1]), 0.0)
+        self._impulse = self._give()
         if observe is not None:
             observe(
                 Step(
@@ -166,10 +176,9 @@ class Engagements:
                     self._view,
                 )
             )
-        self._budget = np.maximum(self._budget - given, 0.0)
         self._truth.fire(self._executed(self._impulse))
-        self._information.shift(self._impulse, tracking)
-        self._truth_section.shift(self._impulse, given > 0.0)
+        self._information.shift(self._impulse, self._flying)
+        self._truth_section.shift(self._impulse, modulus(self._impulse) > 0.0)
         self._finish_labels()
         self._information.predict()
         self._truth_section.predict()
@@ -205,13 +214,13 @@ class Engagements:
         due = {name: sensor for name, sensor in self._sensors.items() if self.step % self._every[name] == 0}
         if not due or not self._tracking.any():
             return {}
-        asked = LineOfSight(self.step, sight.alpha_rad, sight.omega_rad_s, sight.range_m, due)
+        asked = LineOfSight(self.step, sight.alpha_rad, sight.omega_rad_s, sight.range_m, due, self._pending())
         measured = checked_measurements(self._noise.measure(asked, self._view), asked, self._noise)
-        self._truth_section.look(self._tracking, sight)
         for name, sensor in due.items():
             if name in measured:
                 sensor.cut(self._information, measured, self._tracking)
                 sensor.cut(self._truth_section, measured, self._tracking)
+        self._truth_section.look(self._tracking, sight)
         self._measured = self._measured | measured
         return measured
 
@@ -232,9 +241,31 @@ class Engagements:
         predicted = (sight.omega_rad_s * sight.range_m - self._impulse) * left
         return acceleration_m_s2(target, self._draws.target, self.step, step_s, predicted)
 
-    def _decide(self, miss: PredictedMiss, measured: Measurements) -> Floats:
-        situation = Situation(
-            time_s=self.step * self.scenario.set_model.step_s,
+    def _pending(self) -> tuple[tuple[float, Floats], ...]:
+        """Return the impulses that are decided and not given yet, with the times from now to them, s."""
+        step_s = self.scenario.set_model.step_s
+        return tuple((step * step_s, impulse) for step, impulse in enumerate(self._queue) if impulse.any())
+
+    def _give(self) -> Floats:
+        """Return the impulses that are due, m/s; those of engagements after their closest approach are not given."""
+        due = self._queue.pop(0)
+        if self._lead_s == 0.0:
+            return due
+        self._not_given += np.where(self._flying, 0.0, modulus(due))
+        return np.where(self._flying, due, 0.0)
+
+    def _situation(
+        self, miss: PredictedMiss, measured: Measurements, pending: tuple[tuple[float, Floats], ...]
+    ) -> Situation:
+        time_s, lead_s, later_times_s = self.step * self.scenario.set_model.step_s, self._lead_s, self._impulse_times_s
+        may_fire = True
+        if later_times_s is not None:
+            # Half a step separates the times of different steps, whatever their rounding errors are.
+            half_s = 0.5 * self.scenario.set_model.step_s
+            first, after = np.searchsorted(later_times_s, (time_s + lead_s - half_s, time_s + lead_s + half_s)).tolist()
+            may_fire, later_times_s = after > first, later_times_s[after:]
+        return Situation(
+            time_s=time_s,
             step=self.step,
             step_s=self.scenario.set_model.step_s,
             predicted_miss=miss,
@@ -246,8 +277,12 @@ class Engagements:
             information=self._view,
             new=frozenset(measured),
             sensors=self._sensors,
+            may_fire=may_fire,
+            lead_s=lead_s,
+            arrival_s=self.scenario.nominal_arrival_s - time_s,
+            later_times_s=later_times_s,
+            pending=pending,
         )
-        return decide(self._strategy, situation, self._states, self._tracking)
 
     def _finish_labels(self) -> None:
         """Drop labels below the threshold, and store the predicted miss of those that leave."""
@@ -273,6 +308,7 @@ class Engagements:
         miss = np.where(np.isfinite(self._miss), self._miss, self._truth.sight().range_m)
         radius_m = self.scenario.radius_m
         start, lateral_miss = np.zeros((2, len(runs), 2))
+        not_given = self._not_given + sum(map(modulus, self._queue))
         if self.scenario.is_spatial:
             start = np.stack([self._draws.position_m[:, 0], self._draws.velocity_m_s[:, 0]], axis=1)
             present = self._truth.position_m[:, :-1].T
@@ -280,7 +316,7 @@ class Engagements:
         return Results(
             runs=runs,
             miss_m=miss,
-            impulse_m_s=self.scenario.thruster.budget_m_s - self._budget,
+            impulse_m_s=np.maximum(self.scenario.thruster.budget_m_s - self._budget - not_given, 0.0),
             guaranteed_miss_m=np.ma.MaskedArray(payoff, mask=~known),
             outcomes=tuple(
                 _outcome(*flags) for flags in zip(miss > self.scenario.nominal_range_m, lost, self._spent, strict=True)

@@ -27,9 +27,16 @@ LABEL_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
 
 @dataclass(frozen=True)
 class _Look:
-    """True states of the flights that measure in a step; in space slopes have the shape (2, B)."""
+    """True states of the flights that measure in a step; in space slopes have the shape (2, B).
+
+    Parameters
+    ----------
+    events : int
+        Number of events of the history up to the measurements of the step.
+    """
 
     step: int
+    events: int
     where: Flags
     slope: Floats
     slope_rate_per_s: Floats
@@ -53,11 +60,11 @@ class TruthSection:
         self._looks: list[_Look] = []
 
     def look(self, where: Flags, sight: Sight) -> None:
-        """Store which flights measure in this step, and the true states."""
+        """Store which flights measured in this step, after the measurements, and the true states."""
         slope, rate = sight.alpha_rad, sight.omega_rad_s
         if self._exact_angles:
             slope, rate = sight.slope, sight.slope_rate_per_s
-        self._looks.append(_Look(self._history.elapsed, where, slope, rate))
+        self._looks.append(_Look(self._history.elapsed, self._history.events, where, slope, rate))
 
     def measure_angle(self, alpha_rad: Floats, where: Flags) -> None:
         """Store a measured angle."""
@@ -74,7 +81,8 @@ class TruthSection:
 
     def shift(self, impulse_m_s: Floats, where: Flags) -> None:
         """Store the impulse of this step, m/s, shape (B,), in space (2, B)."""
-        self._history.record(IMPULSE, impulse_m_s, where)
+        if where.any():
+            self._history.record(IMPULSE, impulse_m_s, where)
 
     def predict(self) -> None:
         """End the step."""
@@ -110,8 +118,7 @@ class TruthSection:
         each = (len(looks), len(self._laws), len(labels))
         slope = np.reshape([look.slope for look in looks], each).swapaxes(0, 1)
         rate = np.reshape([look.slope_rate_per_s for look in looks], each).swapaxes(0, 1)
-        # A look is after the measurements of its step and before the impulse.
-        ends = np.append(np.flatnonzero(kinds == IMPULSE), history.events)[at]
+        ends = np.array([look.events for look in looks], dtype=np.int64)
         v, z = np.ascontiguousarray(rate * ranges - law.closing_speed * slope), np.ascontiguousarray(slope * ranges)
         margins = margins_along(labels, ends, v, z, history, self._laws)
         # The label of the true state has an error of half an ulp, and so have its z and V.
