@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.predicted_miss import symmetric_impulse
+from guidance.predicted_miss import range_at_impulse, symmetric_impulse
 from guidance.situation import Situation
 
 Floats = NDArray[np.float64]
@@ -14,7 +14,7 @@ LAST_SECONDS_S = 3.0
 
 
 class Patient:
-    """Correct only what is certain, and what could not be corrected later; in the last 3 s, act as U_s.
+    """Correct only what is certain, and what could not be corrected later; at the last impulses, act as U_s.
 
     Parameters
     ----------
@@ -34,6 +34,8 @@ class Patient:
     hypothesis needs the correction of the far end. Later measurements usually refute it, so the strategy waits as long
     as a share of the correction that later impulses can give covers it: the sum of mu2 x_j/e over the remaining steps,
     limited by the budget. The excess over that is corrected now; if both ends have an excess, the two are balanced.
+
+    It acts as U_s in the last 3 s before the arrival, and in the last 3 s in which the engine can give impulses.
 
     Waiting saves the correction of noise, but the same correction costs more later, in proportion to 1/x. The larger
     the share, the later a worst case is corrected, with more impulses at their limit.
@@ -58,14 +60,17 @@ class Patient:
 
     def decide(self, situation: Situation, state: None) -> Floats:
         """Return the certain part of the correction, or the urgent part if it is larger, m/s."""
-        miss, e = situation.predicted_miss, situation.closing_speed_m_s
-        upper_range, lower_range = miss.upper_point.range_m, miss.lower_point.range_m
-        symmetric = symmetric_impulse(miss, e)
+        miss, e, lead_s = situation.predicted_miss, situation.closing_speed_m_s, situation.lead_s
+        symmetric = symmetric_impulse(miss, e, lead_s)
+        if situation.last_s <= lead_s + LAST_SECONDS_S:
+            return symmetric
+        above = np.maximum(miss.upper_m - self.share * correctable_later_m(situation, miss.upper_point.range_m), 0.0)
+        below = np.minimum(miss.lower_m + self.share * correctable_later_m(situation, miss.lower_point.range_m), 0.0)
+        upper_range = range_at_impulse(miss.upper_point.range_m, e, lead_s)
+        lower_range = range_at_impulse(miss.lower_point.range_m, e, lead_s)
         certain = _impulse(np.maximum(miss.lower_m, 0.0), lower_range, e) + _impulse(
             np.minimum(miss.upper_m, 0.0), upper_range, e
         )
-        above = np.maximum(miss.upper_m - self.share * correctable_later_m(situation, upper_range), 0.0)
-        below = np.minimum(miss.lower_m + self.share * correctable_later_m(situation, lower_range), 0.0)
         both = (above > 0.0) & (below < 0.0)
         alone = _impulse(above, upper_range, e) + _impulse(below, lower_range, e)
         urgent = np.where(both, _impulse(above + below, upper_range + lower_range, e), alone)
@@ -77,13 +82,28 @@ class Patient:
 def correctable_later_m(situation: Situation, range_m: Floats) -> Floats:
     """Return the miss (m) that impulses after this step can still correct, if the object is now at `range_m`.
 
-    It is the sum of mu2 x_j/e over the next steps with x_j > 0, as many as the budget allows.
+    It is the sum of mu2 x_j/e over the later impulses with x_j > 0, as many as the budget allows.
     """
     thruster, e, step_s = situation.thruster, situation.closing_speed_m_s, situation.step_s
-    to_go_s = range_m / e
+    if situation.later_times_s is not None:
+        return _correctable_at_m(situation.later_times_s - situation.time_s, situation, range_m / e)
+    to_go_s = range_at_impulse(range_m, e, situation.lead_s) / e
     steps = np.ceil(to_go_s / step_s) - 1.0
     full = np.clip(np.floor(situation.budget_left_m_s / thruster.greatest_impulse_m_s), 0.0, np.maximum(steps, 0.0))
     return np.asarray(thruster.greatest_impulse_m_s * (full * to_go_s - step_s * 0.5 * full * (full + 1.0)))
+
+
+def _correctable_at_m(times_s: Floats, situation: Situation, to_go_s: Floats) -> Floats:
+    """Return the miss (m) that impulses at some times from now can correct; the last one has the rest of the budget."""
+    thruster, budget = situation.thruster, situation.budget_left_m_s
+    number = np.searchsorted(times_s, to_go_s)
+    full = np.minimum(budget // thruster.greatest_impulse_m_s, number).astype(np.int64)
+    rest = np.minimum(budget - full * thruster.greatest_impulse_m_s, thruster.greatest_impulse_m_s)
+    rest = np.where((full < number) & (rest >= thruster.least_impulse_m_s), rest, 0.0)
+    times_s = times_s[: full.max(initial=0) + 1]
+    sums_s = np.append(0.0, np.cumsum(times_s))
+    next_s = np.append(times_s, 0.0)[full]
+    return np.asarray(thruster.greatest_impulse_m_s * (full * to_go_s - sums_s[full]) + rest * (to_go_s - next_s))
 
 
 def _impulse(miss_m: Floats, range_m: Floats, closing_speed_m_s: float) -> Floats:

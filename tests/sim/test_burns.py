@@ -1,0 +1,305 @@
+"""Impulses at scheduled times, before a cut-off and after a delay, in engagements computed by hand and in flight."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from guidance import NoiseKind, Patient, Situation, Strategy, SymmetricMiss, Thruster, TieRule
+from infoset import AngleSensor, ExtremePoints, InformationSet, InitialSet, Model, PredictedMiss, SetModel, StateBox
+from sim import Results, Scenario, fly_one, simulate
+from sim.draws import draw
+from sim.engagement import Engagements, Step
+from tests.space import in_space
+
+Floats = NDArray[np.float64]
+
+E, RANGE = 58e3, 5800e3
+
+
+@pytest.fixture
+def known(asteroid: Scenario) -> Scenario:
+    """A straight flight of 100 s at a miss of 900 m, known on board, with a strong engine."""
+    box = StateBox((700.0, 700.0), (RANGE, RANGE), (2.0, 2.0), (-E, -E))
+    sensor = AngleSensor(0.5, 1e-10, 1e-10, RANGE)
+    model = replace(asteroid.set_model, bounds=box, angle_sensor=sensor, disturbance_m_s2=0.0)
+    return replace(
+        asteroid,
+        sun=None,
+        nominal_range_m=RANGE,
+        dispersion=box,
+        set_model=replace(model, initial_set=InitialSet.BOX, range_threshold_m=1e3, sections=1, fewest_sections=1),
+        thruster=Thruster(1000.0, 0.0, 500.0),
+    )
+
+
+def with_thruster(scenario: Scenario, **fields: Any) -> Scenario:
+    return replace(scenario, thruster=replace(scenario.thruster, **fields))
+
+
+def guaranteed(scenario: Scenario) -> Scenario:
+    return replace(scenario, set_model=replace(scenario.set_model, kind=Model.GUARANTEED, initial_set=InitialSet.BOX))
+
+
+def impulses(scenario: Scenario, seed: int = 0, strategy: Strategy | None = None) -> dict[float, float]:
+    """Return the impulses of one planar flight by time."""
+    given: dict[float, float] = {}
+    flight = Engagements(scenario, draw(scenario, [0], seed), strategy, guarantee=False)
+    while flight.flying:
+        flight.advance(lambda step: given.update({step.time_s: float(step.impulse_m_s[0])}))
+    return {time_s: impulse for time_s, impulse in given.items() if impulse != 0.0}
+
+
+STRATEGIES = ["symmetric-miss", "zero-effort-miss", "patient"]
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+@pytest.mark.parametrize("delay_steps", [0, 1, 7])
+def test_a_single_impulse_without_noise_hits(known: Scenario, strategy: str, delay_steps: int) -> None:
+    """The impulse corrects 900 m in the 40 s that are left when it is given, whenever it was decided."""
+    scenario = replace(with_thruster(known, impulses_s=(40.0,), delay_steps=delay_steps), strategy=strategy)
+    given = impulses(scenario)
+    assert list(given) == [60.0]
+    assert given[60.0] == pytest.approx(900.0 / 40.0, rel=1e-6)
+    result = simulate(scenario, 1)
+    assert result.miss_m[0] < 1e-4
+    assert result.impulse_m_s[0] == pytest.approx(900.0 / 40.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_a_later_impulse_corrects_the_rest(known: Scenario, strategy: str) -> None:
+    """An engine of 10 m/s corrects 500 m of 900 m with 50 s left; 400 m need 20 m/s with 20 s left and get 10."""
+    scenario = replace(
+        with_thruster(known, impulses_s=(50.0, 20.0), greatest_impulse_m_s=10.0, delay_steps=3), strategy=strategy
+    )
+    assert impulses(scenario) == pytest.approx({50.0: 10.0, 80.0: 10.0}, rel=1e-6)
+    assert simulate(scenario, 1).miss_m[0] == pytest.approx(900.0 - 500.0 - 200.0, rel=1e-6)
+
+
+def test_an_impulse_is_given_at_the_step_at_or_before_its_time(known: Scenario) -> None:
+    assert list(impulses(with_thruster(known, impulses_s=(40.2,)))) == [59.5]
+    assert known.thruster.impulse_steps(100.0, 0.1) is None
+    tenths = replace(known.thruster, impulses_s=(99.7, 0.3))
+    assert tenths.impulse_steps(100.0, 0.1) == [3, 997]
+    assert tenths.impulse_steps(100.0 * (1.0 + 1e-15), 0.1) == [3, 997]
+
+
+@pytest.mark.parametrize("delay_steps", [0, 3])
+@pytest.mark.parametrize("strategy", [*STRATEGIES, "kalman", "least-squares"])
+def test_no_impulse_after_the_cut_off(asteroid: Scenario, strategy: str, delay_steps: int) -> None:
+    scenario = replace(with_thruster(asteroid, last_impulse_s=30.0, delay_steps=delay_steps), strategy=strategy)
+    given = impulses(scenario, seed=1)
+    assert min(given) >= 0.5 * delay_steps
+    assert max(given) <= scenario.nominal_arrival_s - 30.0
+    later = with_thruster(scenario, last_impulse_s=10.0)
+    assert max(impulses(later, seed=1)) > scenario.nominal_arrival_s - 30.0
+
+
+@pytest.mark.parametrize("strategy", [*STRATEGIES, "kalman", "least-squares"])
+def test_scheduled_impulses_only(asteroid: Scenario, strategy: str) -> None:
+    scenario = replace(with_thruster(asteroid, impulses_s=(80.0, 45.0, 5.0), last_impulse_s=20.0), strategy=strategy)
+    assert set(impulses(scenario, seed=2)) <= {20.0, 55.0}
+
+
+class Wasteful(SymmetricMiss):
+    """Always wants the greatest impulse."""
+
+    def decide(self, situation: Situation, state: None) -> Floats:
+        assert (situation.budget_left_m_s >= 0.0).all()
+        return np.full(situation.budget_left_m_s.shape, situation.thruster.greatest_impulse_m_s)
+
+
+@pytest.mark.parametrize("strategy", [SymmetricMiss(), Wasteful()], ids=["symmetric", "wasteful"])
+@pytest.mark.parametrize("budget", [0.0, 7.5, 31.0])
+def test_pending_impulses_count_in_the_budget(asteroid: Scenario, budget: float, strategy: Strategy) -> None:
+    scenario = with_thruster(asteroid, budget_m_s=budget, delay_steps=9)
+    record = fly_one(replace(scenario, noise=NoiseKind.GAME), strategy=strategy)
+    given = [abs(step.impulse_m_s) for step in record.steps]
+    assert sum(given) <= budget * (1.0 + 1e-12)
+    assert record.result.impulse_m_s[0] == pytest.approx(sum(given), abs=1e-9)
+    if isinstance(strategy, Wasteful) and budget == 31.0:
+        assert sum(given) == pytest.approx(31.0)
+        assert given[:9] == [0.0] * 9
+
+
+def test_an_impulse_after_the_closest_approach_is_not_given(asteroid: Scenario) -> None:
+    """An impulse that is pending at the closest approach is neither given nor counted."""
+    scenario = with_thruster(asteroid, delay_steps=10)
+    results = simulate(scenario, 20, strategy=Wasteful())
+    flights = [fly_one(scenario, run, strategy=Wasteful()) for run in range(3)]
+    for run, flight in enumerate(flights):
+        given = sum(abs(step.impulse_m_s) for step in flight.steps)
+        assert flight.result.impulse_m_s[0] == pytest.approx(given, abs=1e-9)
+        assert flight.result.impulse_m_s[0] == results.impulse_m_s[run]
+        reserved = 7.5 * len([step for step in flight.steps if step.predicted_miss_m is not None])
+        assert given < reserved
+
+
+def situation(lower: float, upper: float, **fields: Any) -> Situation:
+    """One planar engagement, 50 s before the arrival, with a predicted-miss interval and a strong engine."""
+    point = ExtremePoints(np.zeros(1), np.zeros(1), np.array([E * 50.0]))
+    box = StateBox((-1e3, 1e3), (RANGE, RANGE), (-10.0, 10.0), (-E, -E))
+    information = InformationSet(
+        SetModel(E, 0.5, box, AngleSensor(0.5, 1e-4, 1e-4, RANGE), sections=1, fewest_sections=1)
+    )
+    values: dict[str, Any] = {
+        "time_s": 50.0,
+        "step": 100,
+        "step_s": 0.5,
+        "predicted_miss": PredictedMiss(np.array([True]), np.array([lower]), np.array([upper]), point, point),
+        "budget_left_m_s": np.array([1000.0]),
+        "thruster": Thruster(1000.0, 0.0, 10.0),
+        "closing_speed_m_s": E,
+        "measured": {},
+        "last_impulse_m_s": np.zeros(1),
+        "information": information.view(),
+    }
+    return Situation(**{**values, **fields})
+
+
+@pytest.mark.parametrize(
+    ("later", "budget", "expected"),
+    [
+        ([], 1000.0, 0.0),
+        ([70.0], 1000.0, 10.0 * 30.0),
+        ([70.0, 90.0], 1000.0, 10.0 * 30.0 + 10.0 * 10.0),
+        ([70.0, 90.0, 100.0, 120.0], 1000.0, 10.0 * 30.0 + 10.0 * 10.0),
+        ([70.0, 90.0], 14.0, 10.0 * 30.0 + 4.0 * 10.0),
+        ([70.0, 90.0], 4.0, 4.0 * 30.0),
+        ([70.0, 90.0], 0.0, 0.0),
+    ],
+)
+def test_patient_relies_on_the_later_impulses_of_the_schedule(
+    later: list[float], budget: float, expected: float
+) -> None:
+    """The excess over what later impulses can correct is corrected with 50 s left; the last impulse acts as U_s."""
+    now = situation(
+        0.0,
+        1000.0,
+        later_times_s=np.array(later),
+        budget_left_m_s=np.array([budget]),
+        thruster=Thruster(1e3, 0.0, 10.0),
+    )
+    wanted = Patient(1.0).decide(now, None)[0]
+    symmetric = 500.0 / 50.0
+    assert wanted == pytest.approx(symmetric if not later else (1000.0 - expected) / 50.0, rel=1e-6)
+
+
+def test_patient_gives_at_the_last_time_what_cannot_be_corrected_later(known: Scenario) -> None:
+    """It waits for the second impulse, unless the second one is too weak for the whole miss that is possible."""
+    box = StateBox((-100.0, 500.0), (RANGE, RANGE), (0.0, 0.0), (-E, -E))
+    model = replace(known.set_model, bounds=box, angle_sensor=AngleSensor(0.5, 0.9, 0.9, RANGE))
+    wide = replace(known, set_model=model, dispersion=replace(box, z_m=(500.0, 500.0)))
+    strategy = Patient(1.0)
+    strong = impulses(with_thruster(wide, impulses_s=(80.0, 40.0)), strategy=strategy)
+    assert strong == pytest.approx({60.0: 200.0 / 40.0})
+    weak = impulses(with_thruster(wide, impulses_s=(80.0, 40.0), greatest_impulse_m_s=8.0), strategy=strategy)
+    # At most 320 m can be corrected later: 180 m are given now, and the middle of what is left, 20 m, at the end.
+    assert weak == pytest.approx({20.0: 180.0 / 80.0, 60.0: 20.0 / 40.0})
+
+
+def test_a_strategy_sees_the_schedule(known: Scenario) -> None:
+    seen: list[Situation] = []
+
+    class Looking(SymmetricMiss):
+        def decide(self, situation: Situation, state: None) -> Floats:
+            seen.append(situation)
+            return super().decide(situation, state)
+
+    scenario = with_thruster(known, impulses_s=(80.0, 40.0), delay_steps=4, least_impulse_m_s=0.1)
+    fly_one(scenario, strategy=Looking())
+    assert [now.step for now in seen if now.may_fire] == [36, 116]
+    assert {now.lead_s for now in seen} == {2.0}
+    assert [now.next_s for now in seen[:3]] == [18.0, 17.5, 17.0]
+    assert (seen[36].next_s, seen[37].next_s, seen[116].next_s) == (40.0, 39.5, None)
+    assert (seen[0].last_s, seen[116].last_s) == (60.0, 2.0)
+    assert seen[10].arrival_s == 95.0
+    given = 900.0 / 80.0
+    assert [len(now.pending) for now in seen[36:43]] == [0, 1, 1, 1, 1, 0, 0]
+    ((time_s, impulse),) = seen[38].pending
+    assert (time_s, impulse[0]) == (1.0, pytest.approx(given, rel=1e-6))
+    assert seen[38].pending_m(np.array([81.0, 0.5])) == pytest.approx(np.array([80.0 * given, 0.0]), rel=1e-6)
+    # The predicted miss counts the pending impulse, the set does not until it is given.
+    middle = [0.5 * (now.predicted_miss.lower_m[0] + now.predicted_miss.upper_m[0]) for now in seen[36:43]]
+    assert middle == pytest.approx([900.0, *[0.0] * 6], abs=1e-3)
+
+
+@pytest.mark.parametrize("spatial", [False, True])
+def test_the_predicted_miss_after_pending_impulses_is_that_of_the_shifted_set(
+    asteroid: Scenario, spatial: bool
+) -> None:
+    """Without measurements and disturbances, the interval is the same before and after the impulses are given."""
+    scenario = in_space(guaranteed(asteroid)) if spatial else guaranteed(asteroid)
+    model = replace(scenario.set_model, disturbance_m_s2=0.0, execution_error_relative=0.02)
+    model = replace(model, pointing_error_rad=0.01 if spatial else 0.0)
+    information = InformationSet(model, 2)
+    shape = (2, 2) if spatial else (2,)
+    information.measure_angle(np.full(shape, 1e-4))
+    random = np.random.default_rng(1)
+    first, second = random.uniform(-5.0, 5.0, (2, *shape))
+    early = information.predicted_miss([(1.0, first), (2.5, second)])
+    for step in range(5):
+        if step == 2:
+            information.shift(first)
+        information.predict()
+    information.shift(second)
+    late = information.predicted_miss()
+    for name in ("lower_m", "upper_m"):
+        np.testing.assert_allclose(getattr(early, name), getattr(late, name), rtol=1e-9)
+    now = InformationSet(model, 2)
+    now.measure_angle(np.full(shape, 1e-4))
+    np.testing.assert_array_equal(now.predicted_miss([(1e6, first)]).upper_m, now.predicted_miss().upper_m)
+
+
+def sound(results: Results) -> bool:
+    return bool(results.truth_kept.all() and results.phi_held.filled(False).all() and not results.set_emptied.any())
+
+
+SCHEDULES: list[dict[str, Any]] = [
+    {"delay_steps": 1},
+    {"delay_steps": 12},
+    {"last_impulse_s": 15.0, "delay_steps": 3},
+    {"impulses_s": (80.0, 50.0, 30.0, 10.0, 1.0), "delay_steps": 5},
+]
+
+
+@pytest.mark.parametrize("fields", SCHEDULES, ids=["one-step", "twelve-steps", "cut-off", "times"])
+@pytest.mark.parametrize("strategy", STRATEGIES)
+@pytest.mark.parametrize("spatial", [False, True], ids=["plane", "space"])
+def test_the_guarantee_holds_with_errors_of_the_engine_and_a_delay(
+    asteroid: Scenario, fields: dict[str, Any], strategy: str, spatial: bool
+) -> None:
+    """Measurements between decision and impulse keep the truth in the set, and the miss is at most Phi."""
+    scenario = replace(guaranteed(asteroid), strategy=strategy)
+    scenario = with_thruster(in_space(scenario) if spatial else scenario, execution_error_relative=0.05, **fields)
+    if spatial:
+        scenario = with_thruster(scenario, pointing_error_rad=0.02)
+    for noise in NoiseKind:
+        assert sound(simulate(replace(scenario, noise=noise, tie=TieRule.RANDOM), 6, seed=4))
+
+
+def test_a_run_is_the_same_in_any_batch(asteroid: Scenario) -> None:
+    scenario = with_thruster(replace(guaranteed(asteroid), noise=NoiseKind.GAME), delay_steps=4, budget_m_s=20.0)
+    together, alone = simulate(scenario, 5, seed=3), simulate(scenario, [3], seed=3)
+    for name in ("miss_m", "impulse_m_s", "guaranteed_miss_m", "truth_margin_m"):
+        assert getattr(together, name)[3] == getattr(alone, name)[0]
+
+
+def test_an_impulse_at_a_finished_set_moves_phi(asteroid: Scenario) -> None:
+    """Impulses that are given after the last label has left still move the pieces of Phi."""
+    far = replace(asteroid, set_model=replace(asteroid.set_model, range_threshold_m=300e3))
+    scenario = with_thruster(guaranteed(far), delay_steps=8, budget_m_s=1e4)
+    late: list[bool] = []
+
+    def look(step: Step) -> None:
+        late.extend((~step.tracking & step.flying & (step.impulse_m_s != 0.0)).tolist())
+
+    flight = Engagements(scenario, draw(scenario, range(12), 5), Wasteful())
+    while flight.flying:
+        flight.advance(look)
+    assert any(late)
+    assert sound(flight.results(np.arange(12)))
