@@ -176,7 +176,7 @@ class Misses:
     def stored_range_interval_m(self) -> tuple[Floats, Floats]:
         return self.ranges_m.min(axis=1), self.ranges_m.max(axis=1)
 
-    def predicted_miss(self) -> PredictedMiss:
+    def predicted_miss(self, pending: object = ()) -> PredictedMiss:
         none, exists = np.zeros(self.lower.shape[:-1]), np.ones(len(self.ranges_m), dtype=bool)
         lower, upper = self.lower.argmin(axis=-1), self.upper.argmax(axis=-1)
         points = (ExtremePoints(none, none, self.ranges_m[0, which]) for which in (lower, upper))
