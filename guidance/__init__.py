@@ -1,11 +1,14 @@
 """Guidance: strategies that turn an information set into impulses, the thruster, and measurement noise."""
 
+from guidance.estimate import Estimate, Estimator
 from guidance.game_noise import GameNoise
-from guidance.kalman import Kalman
-from guidance.least_squares import LeastSquares
+from guidance.kalman import Kalman, KalmanBank
+from guidance.least_squares import LeastSquares, LeastSquaresFit
 from guidance.noise import LineOfSight, MeasurementNoise, NoiseKind, TieRule
 from guidance.patient import Patient
 from guidance.predicted_miss import symmetric_impulse, zero_effort_miss
+from guidance.predictive import Predictive
+from guidance.proportional_navigation import ProportionalNavigation
 from guidance.registry import make_strategy, strategy_names
 from guidance.scripted_noise import RandomNoise, ScriptedNoise
 from guidance.situation import Situation
@@ -15,13 +18,19 @@ from guidance.thruster import Thruster
 from guidance.zero_effort import ZeroEffortMiss
 
 __all__ = [
+    "Estimate",
+    "Estimator",
     "GameNoise",
     "Kalman",
+    "KalmanBank",
     "LeastSquares",
+    "LeastSquaresFit",
     "LineOfSight",
     "MeasurementNoise",
     "NoiseKind",
     "Patient",
+    "Predictive",
+    "ProportionalNavigation",
     "RandomNoise",
     "ScriptedNoise",
     "Situation",

@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from types import MappingProxyType
 
-from guidance.kalman import Kalman
-from guidance.least_squares import LeastSquares
+from guidance.kalman import Kalman, KalmanBank
+from guidance.least_squares import LeastSquares, LeastSquaresFit
 from guidance.patient import Patient
+from guidance.predictive import Predictive
+from guidance.proportional_navigation import ProportionalNavigation
 from guidance.strategy import Strategy
 from guidance.symmetric_miss import SymmetricMiss
 from guidance.zero_effort import ZeroEffortMiss
 
 _STRATEGIES: Mapping[str, Callable[[], Strategy]] = MappingProxyType(
     {kind.name: kind for kind in (SymmetricMiss, Patient, ZeroEffortMiss, Kalman, LeastSquares)}
+    | {f"pn-{kind.name}": partial(ProportionalNavigation, kind) for kind in (KalmanBank, LeastSquaresFit)}
+    | {f"apn-{kind.name}": partial(ProportionalNavigation, kind, True) for kind in (KalmanBank, LeastSquaresFit)}
+    | {f"predictive-{kind.name}": partial(Predictive, kind) for kind in (KalmanBank, LeastSquaresFit)}
 )
+
+COMPARED = (
+    *("symmetric-miss", "patient", "zero-effort-miss"),
+    *("kalman", "least-squares"),
+    *("pn-kalman", "apn-kalman", "predictive-kalman"),
+)
+"""Names that commands compare by default: those on the set, both estimators, and each law on one of the estimators."""
 
 
 def strategy_names() -> list[str]:

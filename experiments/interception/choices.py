@@ -16,6 +16,7 @@ from experiments.interception.scenario_file import (
     scenario_to_toml,
 )
 from guidance import Strategy, TieRule, strategy_names
+from guidance.registry import COMPARED
 from guidance.strategy import check_axes
 from infoset import Model
 from infoset.model import MOST_SECTIONS
@@ -134,7 +135,8 @@ def chosen_strategies(scenario: Scenario, names: str | None) -> Mapping[str, Str
     Parameters
     ----------
     names : str or None
-        Built-in names and ``FILE.py:CLASS``, separated by commas; None chooses all built-in strategies.
+        Built-in names and ``FILE.py:CLASS``, separated by commas; "all" is all built-in names, None those of
+        `COMPARED`.
 
     Raises
     ------
@@ -142,8 +144,10 @@ def chosen_strategies(scenario: Scenario, names: str | None) -> Mapping[str, Str
         If there is no such strategy, or one is named twice.
     """
     valid = strategy_names()
+    if names == "all":
+        names = ",".join(valid)
     chosen: dict[str, Strategy | None] = {}
-    for text in valid if names is None else [part.strip() for part in names.split(",")]:
+    for text in COMPARED if names is None else [part.strip() for part in names.split(",")]:
         own = own_strategy(text, scenario, "--strategies")
         name = choice("--strategies", text, valid) if own is None else strategy_name(scenario, own)
         if name in chosen:

@@ -20,6 +20,7 @@ from experiments.interception.comparison import Comparison, flights, gather, sum
 from experiments.interception.figures.comparison import draw_comparison
 from experiments.interception.scenario_file import load_scenario, scenario_hash
 from guidance import NoiseKind, TieRule, strategy_names
+from guidance.registry import COMPARED
 from infoset import Model
 from sim import Scenario, simulate
 from tests.experiments.command_line import Command
@@ -160,6 +161,15 @@ def test_what_is_wrong_is_said_before_the_work(
 def test_an_unknown_strategy_is_told_all_there_are(infoset: Infoset) -> None:
     err = infoset("--strategies", "none-such")[2]
     assert all(name in err for name in strategy_names())
+
+
+def test_the_strategies_of_a_comparison(infoset: Infoset, brief_file: Path) -> None:
+    for arguments, names in (([], [*COMPARED]), (["--strategies", "all"], strategy_names())):
+        found = as_json(infoset, brief_file, *arguments, "--runs", 1)["strategies"]
+        assert [each["name"] for each in found[::2]] == names
+    assert set(COMPARED) < set(strategy_names())
+    _, help_text, _ = infoset("--help")
+    assert all(name in help_text for name in COMPARED)
 
 
 def test_help_has_an_example(infoset: Infoset) -> None:

@@ -1,0 +1,437 @@
+"""Proportional navigation, augmented proportional navigation and predictive guidance against their closed forms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import guidance.least_squares
+from guidance import (
+    Estimate,
+    Estimator,
+    KalmanBank,
+    LeastSquaresFit,
+    Predictive,
+    ProportionalNavigation,
+    Situation,
+    Strategy,
+    Thruster,
+    make_strategy,
+    strategy_names,
+)
+from infoset import AngleSensor, Bias, InformationSet, RangeSensor, SetModel, StateBox
+from infoset.sensors import Sensor
+
+Floats = NDArray[np.float64]
+
+E = 6e3
+"""Closing speed, m/s."""
+T = 1000.0
+"""Time of flight, s."""
+ENGINE = Thruster(budget_m_s=1e9, least_impulse_m_s=0.0, greatest_impulse_m_s=1e9)
+KINDS = [KalmanBank, LeastSquaresFit]
+
+
+def set_model(sensor: AngleSensor, nu: float = 0.0, width_m: float = 1e5, range_error_m: float = 0.0) -> SetModel:
+    box = StateBox(
+        (-width_m, width_m), (E * T - range_error_m, E * T + range_error_m), (-width_m / T, width_m / T), (-E, -E)
+    )
+    return SetModel(E, 10.0, box, sensor, disturbance_m_s2=nu)
+
+
+MODEL = set_model(AngleSensor.camera(10.0, 1e-5))
+
+
+def situation(model: SetModel = MODEL, batch: int = 1, step: int = 0, step_s: float = 10.0) -> Situation:
+    view = InformationSet(model, batch).view()
+    return Situation(
+        time_s=step * step_s,
+        step=step,
+        step_s=step_s,
+        predicted_miss=view.predicted_miss(),
+        budget_left_m_s=np.full(batch, 1e9),
+        thruster=ENGINE,
+        closing_speed_m_s=E,
+        measured={},
+        last_impulse_m_s=np.zeros(batch),
+        information=view,
+    )
+
+
+@dataclass
+class Truth:
+    """Motion of an impactor toward a target with a constant lateral acceleration."""
+
+    z: float
+    v: float
+    a: float = 0.0
+    to_go_s: float = T
+
+    @property
+    def miss_m(self) -> float:
+        return self.z + self.v * self.to_go_s + 0.5 * self.a * self.to_go_s**2
+
+    def advance(self, step_s: float) -> None:
+        self.z += self.v * step_s + 0.5 * self.a * step_s**2
+        self.v += self.a * step_s
+        self.to_go_s -= step_s
+
+    def estimator(self, errors_m: Callable[[float], float] = lambda to_go_s: 0.0) -> Callable[[int, bool], Estimator]:
+        """An estimator that knows the motion, but for an error of the miss; only if augmented it knows `a`."""
+        truth = self
+
+        class Known:
+            def __init__(self, batch: int, is_augmented: bool) -> None:
+                self.a = truth.a if is_augmented else 0.0
+
+            def update(self, situation: Situation) -> None:
+                pass
+
+            def estimate(self, situation: Situation) -> Estimate:
+                to_go = truth.to_go_s
+                miss = truth.z + truth.v * to_go + 0.5 * self.a * to_go**2 + errors_m(to_go)
+                one = np.ones(1)
+                return Estimate(miss * one, 0.0 * one, max(to_go - situation.lead_s, 0.0) * one)
+
+        return Known
+
+
+@dataclass
+class Flight:
+    """Times to go, impulses, and misses before each impulse of a flight; the miss at the end is the last one."""
+
+    to_go_s: Floats
+    impulses_m_s: Floats
+    misses_m: Floats
+
+
+def fly(strategy: Strategy, truth: Truth, steps: int, burns: Sequence[int] | None = None) -> Flight:
+    """Fly to the arrival with an engine that gives all that is wanted, at all steps or at some."""
+    state, rows = strategy.start(1), []
+    schedule = () if burns is None else tuple(T - burn * T / steps for burn in burns)
+    now = replace(situation(step_s=T / steps), thruster=replace(ENGINE, impulses_s=schedule))
+    for step in range(steps):
+        times = None if burns is None else np.array([burn * T / steps for burn in burns if burn > step])
+        now = replace(
+            now,
+            time_s=step * T / steps,
+            step=step,
+            may_fire=burns is None or step in burns,
+            later_times_s=times,
+        )
+        (impulse,) = strategy.decide(now, state)
+        rows.append((truth.to_go_s, impulse, truth.miss_m))
+        truth.v -= impulse
+        truth.advance(T / steps)
+    to_go, impulses, misses = np.array(rows).T
+    return Flight(to_go, impulses, np.append(misses, truth.z))
+
+
+@pytest.mark.parametrize("ratio", [2.5, 3.0, 4.0, 5.0])
+@pytest.mark.parametrize("steps", [10, 1000])
+def test_proportional_navigation_makes_the_miss_zero_along_its_closed_form(ratio: float, steps: int) -> None:
+    """m = m_0 (tau/T)^N, the rate of the line of sight is q_0 (tau/T)^(N - 2), and the impulses are their changes."""
+    truth = Truth(z=0.0, v=2.0)
+    flight = fly(ProportionalNavigation(truth.estimator(), ratio=ratio), truth, steps)
+    share = flight.to_go_s / T
+    expected = 2000.0 * share**ratio
+    np.testing.assert_allclose(flight.misses_m[:-1], expected, rtol=1e-9, atol=1e-9)
+    rate = flight.misses_m[:-1] / (E * flight.to_go_s**2)
+    np.testing.assert_allclose(rate, 2000.0 / (E * T**2) * share ** (ratio - 2.0), rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(flight.impulses_m_s, -np.diff(expected, append=0.0) / flight.to_go_s, atol=1e-9)
+    assert abs(flight.misses_m[-1]) < 1e-6
+
+
+@pytest.mark.parametrize("ratio", [3.0, 4.0, 5.0])
+def test_the_impulse_of_proportional_navigation_is_that_of_the_textbook(ratio: float) -> None:
+    """Acceleration N V/T (tau/T)^(N - 2) for a velocity V across the line of sight: N/(N - 1) V in all."""
+    truth, steps = Truth(z=0.0, v=2.0), 4000
+    flight = fly(ProportionalNavigation(truth.estimator(), ratio=ratio), truth, steps)
+    acceleration = flight.impulses_m_s / (T / steps)
+    middle = 0.5 * (flight.to_go_s + np.append(flight.to_go_s[1:], 0.0)) / T
+    np.testing.assert_allclose(acceleration, ratio * 2.0 / T * middle ** (ratio - 2.0), rtol=1e-2, atol=1e-6)
+    assert flight.impulses_m_s.sum() == pytest.approx(2.0 * ratio / (ratio - 1.0), rel=1e-3)
+
+
+@pytest.mark.parametrize("ratio", [3.0, 4.0, 5.0])
+def test_a_constant_acceleration_of_the_target_with_and_without_augmentation(ratio: float) -> None:
+    """a N/2 (tau/T)^(N - 2) with augmentation, a N/(N - 2) (1 - (tau/T)^(N - 2)) without (Zarchan, chapter 8)."""
+    a, steps = 1e-3, 4000
+    middle = (np.arange(steps, 0.0, -1.0) - 0.5) / steps
+    early = middle > 0.05
+    for is_augmented, expected in (
+        (True, 0.5 * ratio * a * middle ** (ratio - 2.0)),
+        (False, ratio / (ratio - 2.0) * a * (1.0 - middle ** (ratio - 2.0))),
+    ):
+        truth = Truth(z=0.0, v=0.0, a=a)
+        flight = fly(ProportionalNavigation(truth.estimator(), is_augmented, ratio), truth, steps)
+        acceleration = flight.impulses_m_s / (T / steps)
+        np.testing.assert_allclose(acceleration[early], expected[early], rtol=1e-2, atol=1e-2 * a)
+        # In the last step the target accelerates after the last impulse.
+        assert abs(flight.misses_m[-1]) < (1e-6 if is_augmented else a * (T / steps) ** 2)
+        if is_augmented:
+            np.testing.assert_allclose(flight.misses_m[:-1], 500.0 * (flight.to_go_s / T) ** ratio, atol=1e-9)
+
+
+def test_pulses_are_no_smaller_than_the_dead_band_and_follow_the_commands() -> None:
+    plain, pulsed = Truth(0.0, 2.0), Truth(0.0, 2.0)
+    all_commands = fly(ProportionalNavigation(plain.estimator()), plain, 1000).impulses_m_s
+    flight = fly(ProportionalNavigation(pulsed.estimator(), dead_band_m_s=0.1), pulsed, 1000)
+    pulses = flight.impulses_m_s[:-1][flight.impulses_m_s[:-1] != 0.0]
+    assert (pulses >= 0.1).all()
+    assert 15 <= len(pulses) <= 30
+    assert np.abs(np.cumsum(flight.impulses_m_s) - np.cumsum(all_commands))[:-1].max() < 0.2
+    assert abs(flight.misses_m[-1]) < 1e-6
+    least = fly(ProportionalNavigation(pulsed.estimator()), Truth(0.0, 0.0), 10)
+    assert (least.impulses_m_s == 0.0).all()
+
+
+def test_the_dead_band_is_the_least_impulse_by_default_and_old_commands_are_not_given() -> None:
+    truth = Truth(0.0, 1.0)
+    strategy = ProportionalNavigation(truth.estimator())
+    state, engine = strategy.start(1), Thruster(1e9, 0.05, 1e9)
+    now = replace(situation(), thruster=engine)
+    assert strategy.decide(now, state)[0] == 0.0  # 1 (1 - 0.99^3) = 0.0297
+    assert state.accumulated_m_s[0] == pytest.approx(1.0 - 0.99**3)
+    assert strategy.decide(now, state)[0] == pytest.approx(2.0 * (1.0 - 0.99**3))
+    strategy.decide(now, state)
+    truth.v = 0.0
+    assert strategy.decide(now, state)[0] == 0.0
+    assert state.accumulated_m_s[0] == 0.0
+
+
+@pytest.mark.parametrize("is_augmented", [False, True])
+def test_scheduled_impulses_of_proportional_navigation(is_augmented: bool) -> None:
+    """After each burn the miss is what continuous acceleration leaves at the next; the last burn corrects all."""
+    truth, burns = Truth(0.0, 2.0), [100, 650, 880]
+    flight = fly(ProportionalNavigation(truth.estimator(), is_augmented), truth, 1000, burns)
+    assert np.flatnonzero(flight.impulses_m_s).tolist() == burns
+    left = 2000.0
+    for to_go, later in ((900.0, 350.0), (350.0, 120.0)):
+        left *= (later / to_go) ** 3
+        assert flight.misses_m[round(T - later)] == pytest.approx(left)
+    assert abs(flight.misses_m[-1]) < 1e-6
+
+
+def test_predictive_guidance_leaves_the_error_of_its_last_estimate() -> None:
+    """k_i = (e_i - e_(i-1))/tau_i after the first burn, and the miss is -e_i."""
+    errors = {900.0: 300.0, 350.0: -40.0, 120.0: 5.0}
+    truth, burns = Truth(0.0, 2.0), [100, 650, 880]
+    flight = fly(Predictive(truth.estimator(lambda to_go: errors.get(round(to_go, 6), 1e9))), truth, 1000, burns)
+    expected = [2300.0 / 900.0, -340.0 / 350.0, 45.0 / 120.0]
+    np.testing.assert_allclose(flight.impulses_m_s[burns], expected, rtol=1e-9)
+    assert np.flatnonzero(flight.impulses_m_s).tolist() == burns
+    assert flight.misses_m[-1] == pytest.approx(-5.0)
+
+
+def test_predictive_guidance_corrects_an_exact_estimate_at_once() -> None:
+    truth = Truth(100.0, 2.0)
+    flight = fly(Predictive(truth.estimator(), spacing=2.0), truth, 1000)
+    assert np.flatnonzero(np.abs(flight.impulses_m_s) > 1e-9).tolist() == [500]
+    assert flight.impulses_m_s[500] == pytest.approx(2100.0 / 500.0)
+    assert abs(flight.misses_m[-1]) < 1e-6
+
+
+def test_predictive_guidance_without_a_schedule_has_geometric_times() -> None:
+    truth = Truth(0.0, 2.0)
+    # Each estimate errs by its time to go, so each manoeuvre is the half of it or more.
+    flight = fly(Predictive(truth.estimator(lambda to_go: to_go), spacing=2.0), truth, 1000)
+    times = flight.to_go_s[np.abs(flight.impulses_m_s) > 1e-6]
+    np.testing.assert_allclose(times, [500.0, 250.0, 125.0, 62.0, 31.0, 15.0, 7.0, 3.0, 1.0], atol=1e-6)
+    np.testing.assert_allclose(flight.misses_m[-1], -1.0, atol=1e-6)
+
+
+def test_a_manoeuvre_beyond_the_greatest_impulse_continues() -> None:
+    truth = Truth(0.0, 2.0)
+    strategy = Predictive(truth.estimator(), spacing=2.0)
+    state, engine, given = strategy.start(1), Thruster(1e9, 0.0, 1.5), []
+    for step in range(1000):
+        now = replace(situation(step_s=1.0), thruster=engine, step=step, time_s=1.0 * step)
+        given.append(float(engine.give(strategy.decide(now, state), np.array([1e9]))[0]))
+        truth.v -= given[-1]
+        truth.advance(1.0)
+    assert np.flatnonzero(np.abs(given) > 1e-9).tolist() == [500, 501, 502]
+    assert given[500:502] == [1.5, 1.5]
+    assert abs(truth.z) < 1e-6
+
+
+@pytest.mark.parametrize("make", [ProportionalNavigation, Predictive])
+def test_the_divisor_is_the_time_from_the_impulse(make: Callable[..., Strategy]) -> None:
+    """The last decision, 300 s before the arrival, gives its impulse 100 s later."""
+    truth = Truth(0.0, 2.0, to_go_s=300.0)
+    strategy = make(truth.estimator())
+    now = replace(situation(), lead_s=100.0, later_times_s=np.empty(0))
+    assert strategy.decide(now, strategy.start(1))[0] == pytest.approx(600.0 / 200.0)
+    assert strategy.decide(replace(now, may_fire=False), strategy.start(1))[0] == 0.0
+
+
+def measured(
+    kind: Callable[[int, bool], Estimator],
+    model: SetModel,
+    truth: Truth,
+    steps: int,
+    seen: NDArray[np.bool_] | None = None,
+    errors_rad: Floats | None = None,
+    **others: Any,
+) -> tuple[Any, Situation]:
+    """Return an estimator after angles along a motion with no impulse, and its last situation."""
+    estimator, (batch, _) = kind(1 if seen is None else len(seen), False), (1, 0) if seen is None else seen.shape
+    sensors = others.pop("sensors", {})
+    for step in range(steps):
+        angle = np.full(batch, np.arctan2(truth.z, E * truth.to_go_s))
+        values = {"angle": angle + (0.0 if errors_rad is None else errors_rad[step])}
+        if "range" in sensors:
+            values["range"] = np.full(batch, np.hypot(truth.z, E * truth.to_go_s))
+        flags = {} if seen is None else {"angle": seen[:, step]}
+        now = replace(
+            situation(model, batch, step), measured=values, new=frozenset(values), seen=flags, sensors=sensors
+        )
+        now = replace(now, **others)
+        estimator.update(now)
+        if step < steps - 1:
+            truth.advance(10.0)
+    return estimator, now
+
+
+def deviation_m(bounds_rad: Callable[[Floats], Floats], steps: Floats, width_m: float = 1e5) -> float:
+    """Standard deviation of the miss of a line through positions with known range, by its normal equations."""
+    to_go = T - 10.0 * steps
+    weight = 3.0 / (bounds_rad(E * to_go) * E * to_go) ** 2
+    # Unknowns are the miss and V.
+    normal = np.array([[weight.sum(), -(weight * to_go).sum()], [-(weight * to_go).sum(), (weight * to_go**2).sum()]])
+    prior = np.linalg.inv(
+        np.array([[1.0, T], [0.0, 1.0]])
+        @ np.diag([width_m**2, (width_m / T) ** 2])
+        / 3.0
+        @ np.array([[1.0, 0.0], [T, 1.0]])
+    )
+    return float(np.sqrt(np.linalg.inv(normal + prior)[0, 0]))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("centroid_m", [0.0, 30.0])
+@pytest.mark.parametrize("bias", list(Bias))
+def test_deviations_with_a_camera_are_those_of_a_line_through_the_positions(
+    kind: Callable[[int, bool], Estimator], centroid_m: float, bias: Bias
+) -> None:
+    """Range and speed are known; a constant centroid error adds c^2/3 to the variance of the miss."""
+    model = set_model(AngleSensor.camera(10.0, 1e-5, centroid_m, bias=bias))
+    estimator, now = measured(kind, model, Truth(0.0, 0.0), 60)
+    independent = centroid_m if bias is Bias.RANDOM else 0.0
+    expected = deviation_m(lambda x: 1e-5 + independent / x, np.arange(60.0))
+    if bias is Bias.CONSTANT:
+        expected = float(np.hypot(expected, centroid_m / np.sqrt(3.0)))
+    estimate = estimator.estimate(now)
+    assert estimate.deviation_m[0] == pytest.approx(expected, rel=1e-4)
+    assert estimate.miss_m[0] == pytest.approx(0.0, abs=1e-9)
+    assert estimate.to_go_s[0] == pytest.approx(T - 590.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_lost_images_change_nothing_in_the_engagement_that_lost_them(kind: Callable[[int, bool], Estimator]) -> None:
+    generator = np.random.default_rng(1)
+    seen = generator.random((3, 60)) < 0.5
+    seen[2] = True
+    errors = generator.uniform(-1e-5, 1e-5, 60)
+    estimator, now = measured(kind, MODEL, Truth(500.0, -2.0), 60, seen, errors)
+    estimate = estimator.estimate(now)
+    for number in range(3):
+        steps = np.flatnonzero(seen[number]).astype(float)
+        assert estimate.deviation_m[number] == pytest.approx(deviation_m(lambda x: 0.0 * x + 1e-5, steps), rel=1e-3)
+        single, last = measured(kind, MODEL, Truth(500.0, -2.0), 60, seen[number : number + 1], errors)
+        np.testing.assert_allclose(single.estimate(last).miss_m, estimate.miss_m[number], rtol=1e-9)
+    assert len(set(estimate.miss_m.tolist())) == 3
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_measurement_so_far_is_not_a_measurement(kind: Callable[[int, bool], Estimator]) -> None:
+    """The measured value of an engagement without an image so far is NaN."""
+    estimator = kind(2, False)
+    flags = {"angle": np.array([False, True])}
+    now = replace(
+        situation(batch=2), measured={"angle": np.array([np.nan, 1e-4])}, new=frozenset({"angle"}), seen=flags
+    )
+    estimator.update(now)
+    estimate = estimator.estimate(now)
+    assert np.isfinite(estimate.miss_m).all()
+    prior, after = estimate.deviation_m
+    assert prior == pytest.approx(1e5 * np.sqrt(2.0 / 3.0), rel=1e-6)
+    assert after < prior
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_pending_impulses_count_as_given(kind: Callable[[int, bool], Estimator]) -> None:
+    estimator, now = measured(kind, MODEL, Truth(500.0, -2.0), 60)
+    plain = estimator.estimate(now)
+    pending = ((50.0, np.array([0.5])), (1e4, np.array([9.0])))
+    later = estimator.estimate(replace(now, pending=pending, lead_s=100.0))
+    assert later.miss_m[0] == pytest.approx(plain.miss_m[0] - 0.5 * (T - 590.0 - 50.0))
+    assert later.to_go_s[0] == pytest.approx(plain.to_go_s[0] - 100.0)
+
+
+@pytest.mark.parametrize("name", ["kalman", "least-squares"])
+def test_the_dead_zone_ends_at_the_last_allowed_time(name: str) -> None:
+    now = replace(situation(), measured={"angle": np.array([1e-4])}, new=frozenset({"angle"}))
+    strategy = make_strategy(name)
+    assert strategy.decide(now, strategy.start(1))[0] == 0.0
+    for others in ({"later_times_s": np.empty(0)}, {"later_times_s": np.array([2.0])}):
+        assert strategy.decide(replace(now, **others), strategy.start(1))[0] != 0.0
+    assert strategy.decide(replace(now, later_times_s=np.array([20.0])), strategy.start(1))[0] == 0.0
+    assert strategy.decide(replace(now, later_times_s=np.empty(0), may_fire=False), strategy.start(1))[0] == 0.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_augmented_estimators_find_the_acceleration_of_the_target(kind: Callable[[int, bool], Estimator]) -> None:
+    model = set_model(AngleSensor.camera(10.0, 1e-6), nu=0.01)
+    truth = Truth(500.0, -2.0, a=0.006)
+    estimator, now = measured(lambda batch, _: kind(batch, True), model, truth, 60)
+    assert estimator.estimate(now).miss_m[0] == pytest.approx(truth.miss_m, rel=0.02)
+    acceleration = estimator.mean[0, 0, 4] if isinstance(estimator, KalmanBank) else estimator.start[0, 4]
+    assert acceleration == pytest.approx(0.006, rel=0.02)
+
+
+def test_a_long_fit_stores_old_measurements_and_stays_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    generator = np.random.default_rng(3)
+    errors, seen = generator.uniform(-1e-5, 1e-5, 90), generator.random((4, 90)) < 0.9
+    model = set_model(AngleSensor.camera(10.0, 1e-5), range_error_m=1e5)
+    meter = {"range": RangeSensor(10.0, 0.01)}
+
+    def fit(most_kept: int, sensors: Mapping[str, Sensor]) -> tuple[LeastSquaresFit, Estimate]:
+        monkeypatch.setattr(guidance.least_squares, "MOST_KEPT", most_kept)
+        made, now = measured(LeastSquaresFit, model, Truth(2000.0, -1.0), 90, seen, errors, sensors=sensors)
+        return made, made.estimate(now)
+
+    for sensors in (meter, {}):
+        expected, (stored, estimate) = fit(1000, sensors)[1], fit(20, sensors)
+        assert max(len(kept.times_s) for kept in stored.measurements.values()) <= 20
+        np.testing.assert_allclose(estimate.miss_m, expected.miss_m, atol=0.02 * expected.deviation_m.min())
+        np.testing.assert_allclose(estimate.deviation_m, expected.deviation_m, rtol=5e-3)
+
+
+def test_names_of_the_strategies() -> None:
+    laws = {f"{law}-{kind}" for law in ("pn", "apn", "predictive") for kind in ("kalman", "least-squares")}
+    assert laws < set(strategy_names())
+    assert make_strategy("apn-kalman") == ProportionalNavigation(KalmanBank, is_augmented=True)
+    assert make_strategy("predictive-least-squares") == Predictive(LeastSquaresFit)
+
+
+@pytest.mark.parametrize("ratio", [2.0, -3.0, float("nan"), float("inf")])
+def test_a_navigation_ratio_is_greater_than_two(ratio: float) -> None:
+    with pytest.raises(ValueError, match="ratio"):
+        ProportionalNavigation(ratio=ratio)
+
+
+@pytest.mark.parametrize("spacing", [1.0, 0.5, float("nan")])
+def test_the_spacing_of_manoeuvres_is_greater_than_one(spacing: float) -> None:
+    with pytest.raises(ValueError, match="spacing"):
+        Predictive(spacing=spacing)
+
+
+def test_a_dead_band_is_not_negative() -> None:
+    with pytest.raises(ValueError, match="dead_band_m_s"):
+        ProportionalNavigation(dead_band_m_s=-1.0)
