@@ -1,10 +1,12 @@
 """Set-membership estimation with polygon information sets: the set engine, usable on its own.
 
-Start with `InformationSet` (a batch of sets carried through measurements, impulses and time) or
-`ConvexPolygons` (operations on batches of convex polygons).
+Start with `InformationSet` (a batch of sets carried through measurements, impulses and time), `LinearObserver` (the
+same for a linear system of your own) or `ConvexPolygons` (operations on batches of convex polygons).
 """
 
+from importlib import import_module
 from importlib.metadata import version
+from typing import TYPE_CHECKING
 
 from infoset.convex_polygons import ConvexPolygons
 from infoset.information_set import InformationSet, InformationSetView
@@ -14,6 +16,13 @@ from infoset.sensors import AngleSensor, Bias, Convention, ErrorShape, RangeSens
 from infoset.set_queries import Section, to_omega_alpha
 from infoset.set_state import SetStatus
 from infoset.shapes import from_shapely, to_shapely
+from infoset.zonotope import Zonotope
+
+if TYPE_CHECKING:
+    from infoset.linear_observer import Estimate, Inconsistency, LinearObserver
+
+_LATE = dict.fromkeys(("Estimate", "Inconsistency", "LinearObserver"), "infoset.linear_observer")
+"""Modules that import scipy, which takes longer than all others: imported when their names are used."""
 
 __version__ = version("infoset")
 
@@ -23,10 +32,13 @@ __all__ = [
     "Convention",
     "ConvexPolygons",
     "ErrorShape",
+    "Estimate",
     "ExtremePoints",
+    "Inconsistency",
     "InformationSet",
     "InformationSetView",
     "InitialSet",
+    "LinearObserver",
     "Model",
     "PredictedMiss",
     "RangeSensor",
@@ -37,7 +49,15 @@ __all__ = [
     "SetModel",
     "SetStatus",
     "StateBox",
+    "Zonotope",
     "from_shapely",
     "to_omega_alpha",
     "to_shapely",
 ]
+
+
+def __getattr__(name: str) -> object:
+    """Import a module of `_LATE` when its name is first used."""
+    if name not in _LATE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_LATE[name]), name)

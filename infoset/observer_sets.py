@@ -1,0 +1,317 @@
+"""The sets of a `LinearObserver`: batches of polygons for two states, polytopes for other numbers of states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infoset import observer_steps
+from infoset.convex_polygons import ConvexPolygons
+from infoset.observer_steps import CUT_SLACK, SUM_SLACK
+from infoset.polytope import Polytope, minkowski_sum
+from infoset.polytope._affine_hull import chebyshev_ball
+from infoset.polytope.double_description import FacetsAndVertices
+from infoset.zonotope import Zonotope
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+Set = ConvexPolygons | Polytope | Zonotope
+
+POLYTOPE_SLACK = 1e-12
+"""Enlargement of the bounds of a measurement of a polytope, relative to the terms of normal . x."""
+_SCALE_ULP = 16.0
+
+
+@dataclass(frozen=True, eq=False)
+class Strips:
+    """The sets {x: lower <= normal . x <= upper} of a batch of runs.
+
+    Parameters
+    ----------
+    normals : ndarray, shape (r, n)
+        Normals of any length; a zero one bounds nothing.
+    lower, upper : ndarray, shape (B, r)
+        Infinite for a strip that does not exist in this run.
+    """
+
+    normals: Floats
+    lower: Floats
+    upper: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A step x+ = matrix x + shift + w.
+
+    Parameters
+    ----------
+    shifts : ndarray, shape (B, n) or (1, n)
+        B u + c.
+    terms : ndarray, shape (B, n) or (1, n)
+        Sums of the sizes of the terms of the shifts, which determine rounding errors.
+    disturbance : ConvexPolygons, Polytope or Zonotope
+        Set of w.
+    """
+
+    matrix: Floats
+    shifts: Floats
+    terms: Floats
+    disturbance: Set
+
+    @property
+    def reversed_sum(self) -> Motion:
+        """The step x - shift - w."""
+        return Motion(np.eye(len(self.matrix)), -self.shifts, self.terms, _negative(self.disturbance))
+
+
+class Sets(Protocol):
+    """The sets of B runs; methods return new sets."""
+
+    @property
+    def is_empty(self) -> Flags:
+        """Whether each set is empty, shape (B,)."""
+        ...
+
+    def predicted(self, motion: Motion) -> Sets:
+        """Return the sets after a step."""
+        ...
+
+    def cut(self, strips: Strips, excess: Floats) -> Sets:
+        """Return the sets within the strips; `excess`, shape (B, r), receives the distance of a strip from the set."""
+        ...
+
+    def preimage_cut(self, later: Sets, motion: Motion) -> Sets:
+        """Return the states that lead to a state of the later set for some disturbance."""
+        ...
+
+    def support(self, direction: Floats) -> Floats:
+        """Return max direction . x of each set, shape (B,); -inf for the empty set."""
+        ...
+
+    def center(self, run: int) -> Floats:
+        """Return the Chebyshev centre of a set that is not empty, shape (n,)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Polygons:
+    """Sets of two states: exact polygons, compiled."""
+
+    vertices: Floats
+    counts: Integers
+
+    @classmethod
+    def of(cls, start: Set, runs: int) -> Polygons:
+        """Return the same set for all runs, or the members of a batch of `runs` polygons."""
+        polygons = polygon_of(start)
+        room = polygons.vertices.shape[-2]
+        vertices = np.broadcast_to(polygons.vertices, (runs, room, 2))
+        exact = cls(np.ascontiguousarray(vertices), np.broadcast_to(polygons.counts, (runs,)).copy())
+        still = np.zeros((1, 2))
+        # Sums of generators are rounded, as a true state on the boundary is.
+        return exact.predicted(Motion(np.eye(2), still, still, Zonotope(np.zeros(2), [])))
+
+    @property
+    def is_empty(self) -> Flags:
+        """Whether each set is empty, shape (B,)."""
+        return np.asarray(self.counts == 0)
+
+    def predicted(self, motion: Motion) -> Polygons:
+        """Return the sets after a step."""
+        none = np.zeros((0, 2))
+        if isinstance(motion.disturbance, Zonotope):
+            generators, other, center = motion.disturbance.generators, none, motion.disturbance.center
+        else:
+            generators, other, center = none, polygon_of(motion.disturbance).polygon(), np.zeros(2)
+        result = self._room(2 * len(generators) + len(other) + 4)
+        observer_steps.predict_all(
+            self.vertices,
+            self.counts,
+            np.ascontiguousarray(motion.matrix),
+            motion.shifts + center,
+            motion.terms + np.abs(center),
+            np.ascontiguousarray(generators),
+            np.ascontiguousarray(other),
+            SUM_SLACK,
+            result.vertices,
+            result.counts,
+        )
+        return result
+
+    def cut(self, strips: Strips, excess: Floats) -> Polygons:
+        """Return the sets within the strips."""
+        result = self._room(2 * len(strips.normals))
+        observer_steps.update_all(
+            self.vertices,
+            self.counts,
+            np.ascontiguousarray(strips.normals),
+            np.ascontiguousarray(strips.lower),
+            np.ascontiguousarray(strips.upper),
+            CUT_SLACK,
+            result.vertices,
+            result.counts,
+            excess,
+        )
+        return result
+
+    def preimage_cut(self, later: Sets, motion: Motion) -> Polygons:
+        """Return the states that lead to a state of the later set for some disturbance."""
+        assert isinstance(later, Polygons)
+        backward = later.predicted(motion.reversed_sum)
+        result = self._room(int(backward.counts.max(initial=0)) + 4)
+        observer_steps.cut_to_preimage(
+            self.vertices,
+            self.counts,
+            backward.vertices,
+            backward.counts,
+            np.ascontiguousarray(motion.matrix),
+            CUT_SLACK,
+            result.vertices,
+            result.counts,
+        )
+        return result
+
+    def support(self, direction: Floats) -> Floats:
+        """Return max direction . x of each set, shape (B,)."""
+        return observer_steps.support_all(self.vertices, self.counts, direction)
+
+    def center(self, run: int) -> Floats:
+        """Return the Chebyshev centre of a set that is not empty."""
+        points = self.vertices[run, : self.counts[run]]
+        edges = np.roll(points, -1, axis=0) - points
+        normals = np.column_stack([edges[:, 1], -edges[:, 0]])
+        lengths = np.linalg.norm(normals, axis=1)
+        long = lengths > 1e-9 * lengths.max(initial=0.0)
+        if long.sum() < 3:
+            return np.asarray(points.mean(axis=0))
+        return _center_of_ball(points, normals[long] / lengths[long][:, None])
+
+    def _room(self, more: int) -> Polygons:
+        """Return polygons to write, with room for `more` vertices more."""
+        room = int(self.counts.max(initial=0)) + more
+        return Polygons(np.empty((len(self.counts), room, 2)), np.empty_like(self.counts))
+
+
+@dataclass(frozen=True, eq=False)
+class Polytopes:
+    """Sets of any number of states; None is the empty set."""
+
+    members: tuple[FacetsAndVertices | None, ...]
+
+    @classmethod
+    def of(cls, start: Set, runs: int) -> Polytopes:
+        """Return the same set for all runs."""
+        return cls((FacetsAndVertices.of(polytope_of(start)).enlarged(_SCALE_ULP),) * runs)
+
+    @property
+    def is_empty(self) -> Flags:
+        """Whether each set is empty, shape (B,)."""
+        return np.array([member is None for member in self.members])
+
+    def predicted(self, motion: Motion) -> Polytopes:
+        """Return the sets after a step."""
+        w, states = motion.disturbance, len(motion.matrix)
+        center = w.center if isinstance(w, Zonotope) else np.zeros(states)
+        shifts, terms = (
+            np.broadcast_to(values, (len(self.members), states))
+            for values in (motion.shifts + center, motion.terms + np.abs(center))
+        )
+        results: list[FacetsAndVertices | None] = []
+        for member, shift, term in zip(self.members, shifts, terms, strict=True):
+            if member is None:
+                results.append(None)
+                continue
+            moved = member.affine_image(motion.matrix, shift)
+            if isinstance(w, Zonotope):
+                for half in w.generators:
+                    moved = moved.plus_segment(half)
+            else:
+                moved = FacetsAndVertices.of(minkowski_sum(moved.polytope, polytope_of(w)))
+            results.append(moved.enlarged(_SCALE_ULP, float(term.max())))
+        return Polytopes(tuple(results))
+
+    def cut(self, strips: Strips, excess: Floats) -> Polytopes:
+        """Return the sets within the strips."""
+        results: list[FacetsAndVertices | None] = []
+        for b, start in enumerate(self.members):
+            member = start
+            for r, normal in enumerate(strips.normals):
+                for sign, level in ((1.0, strips.upper[b, r]), (-1.0, -strips.lower[b, r])):
+                    if member is None or not np.isfinite(level):
+                        continue
+                    terms = float(np.abs(normal) @ np.abs(member.vertices).max(axis=0)) + abs(level)
+                    slack = POLYTOPE_SLACK * terms
+                    if not normal.any():
+                        member, lowest = (member if level >= 0.0 else None), -level
+                    else:
+                        member, lowest = member.cut(sign * normal, level + slack)
+                    if member is None:
+                        excess[b, r] = lowest
+            results.append(member)
+        return Polytopes(tuple(results))
+
+    def preimage_cut(self, later: Sets, motion: Motion) -> Polytopes:
+        """Return the states that lead to a state of the later set for some disturbance."""
+        assert isinstance(later, Polytopes)
+        backward = later.predicted(motion.reversed_sum)
+        results: list[FacetsAndVertices | None] = []
+        for start, target in zip(self.members, backward.members, strict=True):
+            if start is None or target is None:
+                results.append(None)
+                continue
+            levels = (target.vertices @ target.normals.T).max(axis=0)
+            strips = Strips(target.normals @ motion.matrix, np.full((1, len(levels)), -np.inf), levels[None])
+            (member,) = Polytopes((start,)).cut(strips, np.zeros((1, len(levels)))).members
+            results.append(member)
+        return Polytopes(tuple(results))
+
+    def support(self, direction: Floats) -> Floats:
+        """Return max direction . x of each set, shape (B,)."""
+        return np.array([-np.inf if member is None else (member.vertices @ direction).max() for member in self.members])
+
+    def center(self, run: int) -> Floats:
+        """Return the Chebyshev centre of a set that is not empty."""
+        member = self.members[run]
+        assert member is not None
+        return _center_of_ball(member.vertices, member.normals)
+
+
+def _center_of_ball(points: Floats, normals: Floats) -> Floats:
+    """Return the centre of a largest ball in a hull of points with these normals, of unit length: a linear program."""
+    origin = points.mean(axis=0)
+    limits = ((points - origin) @ normals.T).max(axis=0)
+    scale = float(limits.max())
+    return np.asarray(origin + scale * chebyshev_ball(normals, limits / scale)[0])
+
+
+def polygon_of(shape: Set) -> ConvexPolygons:
+    """Return a set of two coordinates as polygons."""
+    if isinstance(shape, ConvexPolygons):
+        return shape
+    if isinstance(shape, Polytope):
+        return ConvexPolygons.from_points(shape.vertices)
+    polygon = ConvexPolygons.from_points(shape.center[None])
+    for half in shape.generators:
+        polygon = polygon.add_segment(half)
+    return polygon
+
+
+def polytope_of(shape: Set) -> Polytope:
+    """Return a single set that is not empty as a polytope."""
+    if isinstance(shape, Polytope):
+        return shape
+    return Polytope.from_vertices(shape.points() if isinstance(shape, Zonotope) else shape.polygon())
+
+
+def _negative(disturbance: Set) -> Set:
+    """Return {-w: w in the set}."""
+    if isinstance(disturbance, Zonotope):
+        return Zonotope(-disturbance.center, disturbance.generators)
+    if isinstance(disturbance, ConvexPolygons):
+        return disturbance.linear_map(-np.eye(2))
+    return Polytope.from_vertices(-disturbance.vertices)

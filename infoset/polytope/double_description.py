@@ -1,0 +1,172 @@
+"""Polytopes of full dimension by vertices, facets and their incidence: cuts and sums without a hull.
+
+A cut makes new vertices on edges, and the Minkowski sum with a segment makes new facets on ridges; edges and ridges
+follow from the incidence. Each new vertex is an interpolation between two others, so that the result is exact to a few
+ulp, where a hull merges points that are nearer than 1e-10.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infoset.polytope.polytope import Polytope
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+EPSILON = float(np.finfo(np.float64).eps)
+_ON = 64.0 * EPSILON
+"""Distance of a vertex from a plane that contains it, relative to the terms of the distance."""
+_THIN = 1e-10
+"""Least thickness of a set, relative to its coordinates."""
+_PARALLEL = 1e-14
+_INCIDENT = 1e-8
+_SINGULAR = 1e8
+"""Condition number of a matrix above which its image is computed as a hull."""
+
+
+@dataclass(frozen=True, eq=False)
+class FacetsAndVertices:
+    """A polytope of full dimension n that is not empty.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (v, n)
+        Vertices, without redundant points.
+    normals, offsets : ndarray, shape (f, n) and (f,)
+        Facets normal . x <= offset, normals of unit length.
+    incidence : ndarray of bool, shape (v, f)
+        Whether a vertex lies on a facet.
+    """
+
+    vertices: Floats
+    normals: Floats
+    offsets: Floats
+    incidence: Flags
+
+    @classmethod
+    def of(cls, polytope: Polytope) -> FacetsAndVertices:
+        """Return a polytope; a flat one is widened by 1e-10 of its size."""
+        vertices, normals = polytope.vertices, polytope.normals
+        depth = (heights := vertices @ normals.T).max(axis=0) - heights
+        incidence, offsets = depth <= _INCIDENT * depth.max(axis=0), heights.max(axis=0)
+        half = _THIN * max(float(np.abs(vertices).max()), np.finfo(np.float64).tiny)
+        for row, level in zip(polytope.across, polytope.levels, strict=True):
+            above = np.repeat([False, True], len(vertices))
+            vertices = np.vstack([vertices - half * row, vertices + half * row])
+            normals, offsets = np.vstack([normals, row, -row]), np.append(offsets, [level + half, half - level])
+            incidence = np.column_stack([np.vstack([incidence, incidence]), above, ~above])
+        return cls(vertices, normals, offsets, incidence)
+
+    @property
+    def polytope(self) -> Polytope:
+        """The same set as a `Polytope`."""
+        size = self.vertices.shape[1]
+        return Polytope(self.vertices, self.normals, self.offsets, np.zeros((0, size)), np.zeros(0))
+
+    def enlarged(self, slack: float, size: float = 0.0) -> FacetsAndVertices:
+        """Return the set scaled about its centre, so that each facet moves outward by at least `slack` ulp.
+
+        The ulp is that of the greatest coordinate, or of `size` if that is greater.
+        """
+        centre = self.vertices.mean(axis=0)
+        depths = self.offsets - self.normals @ centre
+        least = float(depths.min())
+        factor = 1.0 + slack * EPSILON * (1.0 + max(size, float(np.abs(self.vertices).max())) / max(least, 1e-300))
+        offsets = self.normals @ centre + factor * depths
+        return FacetsAndVertices(centre + factor * (self.vertices - centre), self.normals, offsets, self.incidence)
+
+    def affine_image(self, matrix: Floats, shift: Floats) -> FacetsAndVertices:
+        """Return {matrix x + shift}; a singular matrix gives a flat set, which is widened by 1e-10 of its size."""
+        vertices = self.vertices @ matrix.T + shift
+        if np.linalg.cond(matrix) > _SINGULAR:
+            return FacetsAndVertices.of(Polytope.from_vertices(vertices))
+        normals = np.array(np.linalg.solve(matrix.T, self.normals.T).T, dtype=np.float64)
+        normals /= np.sqrt((normals**2).sum(axis=1))[:, None]
+        # The offsets follow from the vertices, so that rounding errors of both do not add up over many steps.
+        return FacetsAndVertices(vertices, normals, (vertices @ normals.T).max(axis=0), self.incidence)
+
+    def plus_segment(self, half: Floats) -> FacetsAndVertices:
+        """Return the Minkowski sum with the segment from -half to +half.
+
+        Each facet moves, and each ridge between two facets that face opposite ends of the segment becomes a facet.
+        """
+        length = float(np.linalg.norm(half))
+        if length == 0.0:
+            return self
+        along = self.normals @ half
+        ahead, behind = along > _PARALLEL * length, along < -_PARALLEL * length
+        opposite = np.flatnonzero(behind) if len(half) > 1 else np.zeros(0, dtype=np.int64)  # an interval has no ridges
+        first, second, common = _adjacent(self.incidence.T, np.flatnonzero(ahead), opposite, len(half))
+        weight, other = -along[second], along[first]
+        normals = weight[:, None] * self.normals[first] + other[:, None] * self.normals[second]
+        lengths = np.linalg.norm(normals, axis=1)
+        offsets = (weight * self.offsets[first] + other * self.offsets[second]) / lengths
+        upper, lower = self.incidence[:, ahead].any(axis=1), self.incidence[:, behind].any(axis=1)
+        incidence = np.hstack([self.incidence, common.T])
+        new = np.zeros(len(first), dtype=bool)
+        on_upper, on_lower = np.concatenate([~behind, ~new]), np.concatenate([~ahead, ~new])
+        return FacetsAndVertices(
+            np.vstack([self.vertices[upper] + half, self.vertices[lower] - half]),
+            np.vstack([self.normals, normals / lengths[:, None]]),
+            np.concatenate([self.offsets + np.abs(along), offsets]),
+            np.vstack([incidence[upper] & on_upper, incidence[lower] & on_lower]),
+        )
+
+    def cut(self, normal: Floats, offset: float) -> tuple[FacetsAndVertices | None, float]:
+        """Return the part with normal . x <= offset, None if it is empty, and the excess of the lowest vertex."""
+        height = self.vertices @ normal - offset
+        lowest = float(height.min())
+        on = _ON * (np.abs(self.vertices) @ np.abs(normal) + abs(offset))
+        above, below = height > on, height < -on
+        if not above.any():
+            return self, lowest
+        if lowest > 0.0:
+            return None, lowest
+        thin = _THIN * float(on.max()) / _ON
+        if lowest > -0.5 * thin:  # the plane touches the set: keep a layer that is thicker than rounding errors
+            return self.cut(normal, offset + lowest + thin)[0], lowest
+        first, second, common = _adjacent(self.incidence, np.flatnonzero(above), np.flatnonzero(below), len(normal))
+        share = height[first] / (height[first] - height[second])
+        new = self.vertices[first] + share[:, None] * (self.vertices[second] - self.vertices[first])
+        kept = ~above
+        vertices = np.vstack([self.vertices[kept], new])
+        on_new = np.concatenate([~below[kept], np.ones(len(new), dtype=bool)])
+        incidence = np.column_stack([np.vstack([self.incidence[kept], common]), on_new])
+        length = float(np.linalg.norm(normal))
+        normals = np.vstack([self.normals, normal / length])
+        offsets = np.append(self.offsets, offset / length)
+        facets = _facets(incidence, self.vertices.shape[1])
+        return FacetsAndVertices(vertices, normals[facets], offsets[facets], incidence[:, facets]), lowest
+
+
+def _adjacent(
+    incidence: Flags, first: NDArray[np.int64], second: NDArray[np.int64], size: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Flags]:
+    """Return the pairs of rows, one of each list, that span an edge, and what both lie on.
+
+    Two vertices span an edge if no third vertex lies on all facets on which both lie. With rows and columns exchanged,
+    two facets meet in a ridge. In `size` dimensions both lie on size - 1 facets at least.
+    """
+    numbers = incidence.astype(np.float32)
+    i, j = np.nonzero(numbers[first] @ numbers[second].T >= size - 1)
+    common = incidence[first[i]] & incidence[second[j]]
+    holders = common.astype(np.float32) @ numbers.T >= common.sum(axis=1)[:, None]
+    edge = holders.sum(axis=1) == 2
+    return first[i[edge]], second[j[edge]], common[edge]
+
+
+def _facets(incidence: Flags, size: int) -> NDArray[np.int64]:
+    """Return the columns that are facets: with at least `size` vertices that do not all lie on another column."""
+    counts = incidence.sum(axis=0)
+    wide = np.flatnonzero(counts >= size)
+    columns = incidence[:, wide].astype(np.float32)
+    shared = columns.T @ columns
+    within = (shared >= counts[wide][:, None]) & ~np.eye(len(wide), dtype=bool)
+    # Of equal columns the last one, which is the newest, is kept.
+    same = within & within.T
+    within &= ~same | np.triu(np.ones_like(same))
+    return np.asarray(wide[~within.any(axis=1)])

@@ -1,0 +1,467 @@
+"""Observers of linear systems: exact sets, linear programs, and true states whose errors are at their bounds."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+from infoset import ConvexPolygons, Estimate, LinearObserver, Zonotope
+from infoset.observer_sets import Polytopes
+from infoset.observer_steps import SUM_SLACK, enlarge
+from infoset.polytope import HIGHS, Polytope
+
+Floats = NDArray[np.float64]
+Exact = tuple[Fraction, Fraction]
+
+PUBLISHED: dict[str, Any] = json.loads(
+    (Path(__file__).parents[1] / "data" / "observer" / "alamo-2005.json").read_text(encoding="utf-8")
+)
+"""Alamo, Bravo and Camacho (2005), with the measurements of the unit tests of CORA."""
+
+
+def published(runs: int | None = None) -> LinearObserver:
+    return LinearObserver(
+        PUBLISHED["A"],
+        PUBLISHED["C"],
+        Zonotope([0.0, 0.0], PUBLISHED["initial_generators"]),
+        noise=PUBLISHED["noise_half_width"],
+        disturbance=Zonotope([0.0, 0.0], PUBLISHED["disturbance_generators"]),
+        runs=runs,
+    )
+
+
+def measurements() -> Floats:
+    return np.array(PUBLISHED["y"]).T
+
+
+# Exact rational sets --------------------------------------------------------------------------------------------
+
+
+def hull(points: list[Exact]) -> list[Exact]:
+    """Strictly convex hull, counter-clockwise."""
+    ordered = sorted(set(points))
+    if len(ordered) < 3:
+        return ordered
+    chains: list[list[Exact]] = []
+    for run in (ordered, ordered[::-1]):
+        chain: list[Exact] = []
+        for point in run:
+            while len(chain) > 1 and turn(chain[-2], chain[-1], point) <= 0:
+                chain.pop()
+            chain.append(point)
+        chains.append(chain[:-1])
+    return chains[0] + chains[1]
+
+
+def turn(a: Exact, b: Exact, c: Exact) -> Fraction:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def cut(points: list[Exact], normal: Exact, level: Fraction) -> list[Exact]:
+    """Vertices with normal . p <= level, and where edges cross the level."""
+    heights = [normal[0] * x + normal[1] * y - level for x, y in points]
+    kept = [point for point, above in zip(points, heights, strict=True) if above <= 0]
+    for i, (a, above) in enumerate(zip(points, heights, strict=True)):
+        j = (i + 1) % len(points)
+        if above * heights[j] < 0:
+            share = above / (above - heights[j])
+            kept.append((a[0] + share * (points[j][0] - a[0]), a[1] + share * (points[j][1] - a[1])))
+    return hull(kept)
+
+
+def exact_sets() -> list[list[Exact]]:
+    (a, b), (c, d) = [[Fraction(value) for value in row] for row in PUBLISHED["A"]]
+    row = tuple(Fraction(value) for value in PUBLISHED["C"][0])
+    normal: Exact = (row[0], row[1])
+    opposite: Exact = (-row[0], -row[1])
+    half = Fraction(PUBLISHED["noise_half_width"])
+    w = [Fraction(value) for value in PUBLISHED["disturbance_generators"][0]]
+    points = [(Fraction(x), Fraction(y)) for x, y in ((-3, -3), (3, -3), (3, 3), (-3, 3))]
+    sets = []
+    for k, y in enumerate(Fraction(value) for value in PUBLISHED["y"][0]):
+        if k:
+            moved = [(a * x + b * z, c * x + d * z) for x, z in points]
+            points = hull([(x + sign * w[0], z + sign * w[1]) for x, z in moved for sign in (-1, 1)])
+        points = cut(cut(points, normal, y + half), opposite, half - y)
+        sets.append(points)
+    return sets
+
+
+def test_the_sets_of_the_published_example_equal_the_exact_ones() -> None:
+    estimates = published().run(measurements())
+    assert len(estimates) == 20
+    exact = exact_sets()
+    assert [len(points) for points in exact] == PUBLISHED["exact_rational"]["counts"]
+    for estimate, points, interval_hull in zip(
+        estimates, exact, PUBLISHED["exact_rational"]["hull_of_each_step"], strict=True
+    ):
+        wanted = np.array([[float(x), float(y)] for x, y in points])
+        ours = estimate.polygons.polygon()
+        assert ours.shape == wanted.shape
+        first = int(np.abs(ours - wanted[0]).max(axis=1).argmin())
+        np.testing.assert_allclose(np.roll(ours, -first, axis=0), wanted, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose([estimate.lower, estimate.upper], interval_hull, rtol=0.0, atol=1e-12)
+        assert (estimate.lower <= wanted.min(axis=0)).all()
+        assert (estimate.upper >= wanted.max(axis=0)).all()
+
+
+def test_interval_hulls_of_enclosing_methods_contain_the_published_example() -> None:
+    last = published().run(measurements())[-1]
+    enclosing = {
+        name: ends
+        for name, ends in PUBLISHED["interval_hulls_of_other_methods"].items()
+        if not name.startswith("ESO")  # start from ellipsoids inside the given sets
+    }
+    assert len(enclosing) == 13
+    for ends in enclosing.values():
+        assert (np.array(ends["lower"]) <= last.lower + 1e-12).all()
+        assert (np.array(ends["upper"]) >= last.upper - 1e-12).all()
+
+
+def test_polytopes_give_the_published_example_too() -> None:
+    estimates = published().run(measurements())
+    observer = published()
+    observer._sets = Polytopes.of(Zonotope([0.0, 0.0], PUBLISHED["initial_generators"]), 1)
+    for ours, other in zip(estimates, observer.run(measurements()), strict=True):
+        np.testing.assert_allclose([ours.lower, ours.upper], [other.lower, other.upper], rtol=0.0, atol=1e-9)
+
+
+# Linear programs ------------------------------------------------------------------------------------------------
+
+
+class Programs:
+    """Bounds of the states of a system with A, B = 0, C and box disturbance generators, by linear programs."""
+
+    def __init__(self, a: Floats, c: Floats, generators: Floats, half: Floats, noise: Floats, y: Floats) -> None:
+        states, steps = len(a), len(y)
+        unknowns = states + len(generators) * (steps - 1)
+        state = np.zeros((states, unknowns))
+        state[:, :states] = np.diag(half)
+        self.states, rows, limits = [state], [], []
+        for k in range(1, steps):
+            state = a @ state
+            first = states + len(generators) * (k - 1)
+            state[:, first : first + len(generators)] += generators.T
+            self.states.append(state)
+        for state, measured in zip(self.states, y, strict=True):
+            for row, value, width in zip(c @ state, measured, noise, strict=True):
+                if not np.isnan(value):
+                    rows += [row, -row]
+                    limits += [value + width, width - value]
+        self.rows, self.limits = np.array(rows), np.array(limits)
+
+    def hull(self, step: int) -> tuple[list[float], list[float]]:
+        ends = []
+        for row in self.states[step]:
+            for sign in (1.0, -1.0):
+                optimum = linprog(sign * row, self.rows, self.limits, bounds=(-1.0, 1.0), method="highs", options=HIGHS)
+                assert optimum.status == 0
+                ends.append(sign * optimum.fun)
+        return ends[::2], ends[1::2]
+
+
+def chain(axes: int, order: int) -> tuple[Floats, Floats, Floats]:
+    """A, C and disturbance generators of coupled chains of integrators, each measured at its first state."""
+    step = 0.5
+    block = np.eye(order) + step * np.eye(order, k=1)
+    block[-1, -1] = 0.9
+    a = np.kron(np.eye(axes), block)
+    a[0, -1] += 0.1
+    c = np.kron(np.eye(axes), np.eye(1, order))
+    generators = 0.1 * np.kron(np.eye(axes), np.eye(order)[-1:])
+    return np.asarray(a, np.float64), np.asarray(c, np.float64), np.asarray(generators, np.float64)
+
+
+def simulated(
+    a: Floats, c: Floats, generators: Floats, noise: Floats, steps: int, generator: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """States and measurements whose errors are at their bounds, from a corner of the unit box."""
+    states, measured = [generator.choice([-1.0, 1.0], len(a))], []
+    for k in range(steps):
+        if k:
+            states.append(a @ states[-1] + generator.choice([-1.0, 1.0], len(generators)) @ generators)
+        measured.append(c @ states[-1] + generator.choice([-1.0, 1.0], len(c)) * noise)
+    return np.array(states), np.array(measured)
+
+
+@pytest.mark.parametrize(("axes", "order", "steps"), [(2, 3, 4), (1, 3, 8), (2, 2, 7), (1, 1, 6)])
+def test_hulls_equal_linear_programs(axes: int, order: int, steps: int) -> None:
+    a, c, generators = chain(axes, order)
+    noise = np.full(axes, 0.2)
+    rng = np.random.default_rng(6)
+    states, _ = simulated(a, c, generators, noise, steps, rng)
+    y = states @ c.T + rng.uniform(-0.15, 0.15, (steps, axes))
+    y[2, 0] = np.nan
+    size = len(a)
+    observer = LinearObserver(
+        a, c, Zonotope.box(-np.ones(size), np.ones(size)), noise=noise, disturbance=Zonotope(np.zeros(size), generators)
+    )
+    estimates = observer.run(y)
+    for step in (steps - 1, steps // 2):
+        wanted = Programs(a, c, generators, np.ones(size), noise, y[: step + 1]).hull(step)
+        np.testing.assert_allclose([estimates[step].lower, estimates[step].upper], wanted, rtol=0.0, atol=1e-9)
+    if size < 6:
+        programs = Programs(a, c, generators, np.ones(size), noise, y)
+        for estimate in observer.smooth(estimates)[:2]:
+            hulls = [estimate.lower, estimate.upper]
+            np.testing.assert_allclose(hulls, programs.hull(estimate.step), rtol=0.0, atol=1e-9)
+
+
+def test_smoothed_sets_of_two_states_equal_linear_programs() -> None:
+    y = measurements()
+    observer = published()
+    estimates = observer.run(y)
+    smoothed = observer.smooth(estimates)
+    programs = Programs(
+        np.array(PUBLISHED["A"]),
+        np.array(PUBLISHED["C"]),
+        np.array(PUBLISHED["disturbance_generators"]),
+        np.full(2, 3.0),
+        np.array([0.2]),
+        y,
+    )
+    for estimate in smoothed:
+        hulls = [estimate.lower, estimate.upper]
+        np.testing.assert_allclose(hulls, programs.hull(estimate.step), rtol=0.0, atol=1e-9)
+    np.testing.assert_array_equal(smoothed[-1].polygons.polygon(), estimates[-1].polygons.polygon())
+
+
+# The true state -------------------------------------------------------------------------------------------------
+
+
+def kept_of_two_states(runs: int, seed: int, steps: int = 20) -> Floats:
+    """Share of the runs of the published system whose true state is inside at every step; errors at their bounds."""
+    rng = np.random.default_rng(seed)
+    a, c, w = np.array(PUBLISHED["A"]), np.array(PUBLISHED["C"]), np.array(PUBLISHED["disturbance_generators"])
+    observer = published(runs)
+    x = rng.choice([-3.0, 3.0], (runs, 2))
+    inside = np.ones(runs, dtype=bool)
+    for k in range(steps):
+        if k:
+            observer.predict()
+            x = x @ a.T + rng.choice([-1.0, 1.0], (runs, 1)) * w
+        observer.update(x @ c.T + rng.choice([-0.2, 0.2], (runs, 1)))
+        inside &= observer.estimate().polygons.contains(x)
+    return np.asarray(inside.mean())
+
+
+def test_the_true_state_is_inside_with_errors_at_their_bounds() -> None:
+    assert kept_of_two_states(3000, 1) == 1.0
+
+
+@pytest.mark.slow
+def test_the_true_state_is_inside_in_100_000_runs() -> None:
+    assert kept_of_two_states(100_000, 2) == 1.0
+
+
+@pytest.mark.parametrize("matrix", ["rotation", "shear", "singular", "mirror", "zero", "growing"])
+def test_the_true_state_is_inside_for_other_systems(matrix: str) -> None:
+    a = {
+        "rotation": [[0.8, -0.6], [0.6, 0.8]],
+        "shear": [[1.0, 0.1], [0.0, 1.0]],
+        "singular": [[0.5, 0.25], [1.0, 0.5]],
+        "mirror": [[0.0, 1.0], [1.0, 0.0]],
+        "zero": [[0.0, 0.0], [0.0, 0.0]],
+        "growing": [[1.1, 0.3], [-0.2, 1.2]],
+    }[matrix]
+    rng, runs, steps = np.random.default_rng(3), 300, 40
+    c, b, offset = np.array([[1.0, 0.0], [0.3, -1.0]]), np.array([[0.1], [1e3]]), np.array([1.0, -1e3])
+    corners = np.array([[0.0, 0.0], [0.2, -0.1], [0.1, 0.3]])
+    observer = LinearObserver(
+        a,
+        c,
+        Zonotope.box([-1.0, 9e3], [1.0, 1e4]),
+        noise=[0.1, 0.2],
+        disturbance=ConvexPolygons.from_points(corners),
+        input_matrix=b,
+        offset=offset,
+        runs=runs,
+    )
+    x = np.column_stack([rng.choice([-1.0, 1.0], runs), rng.choice([9e3, 1e4], runs)])
+    for k in range(steps):
+        if k:
+            u = rng.choice([-1.0, 1.0], (runs, 1))
+            observer.predict(u)
+            x = x @ np.array(a).T + u @ b.T + offset + corners[rng.integers(0, 3, runs)]
+        y = x @ c.T + rng.choice([-1.0, 1.0], (runs, 2)) * [0.1, 0.2]
+        y[rng.random((runs, 2)) < 0.3] = np.nan
+        observer.update(y)
+        assert observer.estimate().polygons.contains(x).all(), k
+    assert (observer.inconsistency.step == -1).all()
+
+
+def test_the_true_state_is_inside_smoothed_sets() -> None:
+    rng = np.random.default_rng(4)
+    a, c, w = np.array(PUBLISHED["A"]), np.array(PUBLISHED["C"]), np.array(PUBLISHED["disturbance_generators"])
+    runs, observer = 500, published(500)
+    states = [rng.choice([-3.0, 3.0], (runs, 2))]
+    for _ in range(14):
+        states.append(states[-1] @ a.T + rng.choice([-1.0, 1.0], (runs, 1)) * w)
+    y = np.array([x @ c.T + rng.choice([-0.2, 0.2], (runs, 1)) for x in states])
+    for estimate, x in zip(observer.smooth(observer.run(y)), states, strict=True):
+        assert estimate.polygons.contains(x).all()
+
+
+def kept_of_four_states(runs: int, steps: int) -> int:
+    a, c, generators = chain(2, 2)
+    kept = 0
+    for run in range(runs):
+        rng = np.random.default_rng([7, run])
+        states, y = simulated(a, c, generators, np.full(2, 0.2), steps, rng)
+        observer = LinearObserver(
+            a, c, Zonotope.box(-np.ones(4), np.ones(4)), noise=0.2, disturbance=Zonotope(np.zeros(4), generators)
+        )
+        pairs = zip(observer.run(y), states, strict=True)
+        kept += all(shape is not None and shape.excess(x) <= 0.0 for e, x in pairs for shape in e.polytopes)
+    return kept
+
+
+def test_the_true_state_of_four_states_is_inside() -> None:
+    assert kept_of_four_states(20, 10) == 20
+
+
+@pytest.mark.slow
+def test_the_true_state_of_four_states_is_inside_in_2000_runs() -> None:
+    assert kept_of_four_states(2000, 10) == 2000
+
+
+# Interface ------------------------------------------------------------------------------------------------------
+
+
+def test_a_batch_equals_single_runs() -> None:
+    y = measurements()
+    shifted = np.stack([y, y + 0.01, y], axis=1)
+    shifted[4, 2] = np.nan
+    batch = published(3).run(shifted)
+    for run in range(3):
+        for ours, other in zip(published().run(shifted[:, run]), batch, strict=True):
+            np.testing.assert_array_equal(ours.polygons.polygon(), other.polygons[run].polygon())
+            np.testing.assert_array_equal(ours.center, other.center[run])
+
+
+def test_an_estimate_has_hulls_a_centre_and_outputs() -> None:
+    observer = LinearObserver(np.eye(2), [[1.0, 1.0]], Zonotope.box([0.0, 0.0], [4.0, 2.0]), noise=1.0)
+    estimate = observer.estimate()
+    np.testing.assert_allclose(estimate.center[1], 1.0)
+    lower, upper = estimate.output_hull([[1.0, 1.0], [1.0, -2.0]])
+    np.testing.assert_allclose(lower, [0.0, -4.0], atol=1e-13)
+    np.testing.assert_allclose(upper, [6.0, 4.0])
+    with pytest.raises(ValueError, match=r"matrix must have the shape \(m, 2\)"):
+        estimate.output_hull([1.0, 1.0])
+
+
+@pytest.mark.parametrize("states", [2, 3])
+def test_a_contradiction_is_located(states: int) -> None:
+    c = np.eye(2, states)
+    observer = LinearObserver(np.eye(states), c, Zonotope.box(-np.ones(states), np.ones(states)), noise=[0.25, 0.5])
+    estimates = observer.run([[0.5, 0.0], [0.5, 2.0], [0.0, 0.0]])
+    assert [bool(estimate.is_empty) for estimate in estimates] == [False, True, True]
+    where = observer.inconsistency
+    assert [int(where.step), int(where.output)] == [1, 1]
+    np.testing.assert_allclose(where.excess, 1.0)
+    assert np.isnan(estimates[-1].lower).all()
+    assert np.isnan(estimates[-1].center).all()
+    assert observer.smooth(estimates)[0].is_empty
+
+
+def test_matrices_may_change_with_the_step() -> None:
+    a, y = np.array(PUBLISHED["A"]), measurements()[:5]
+    constant = published().run(y)
+    observer = LinearObserver(
+        np.repeat(a[None], 4, axis=0),
+        np.repeat(np.array(PUBLISHED["C"])[None], 5, axis=0),
+        Zonotope([0.0, 0.0], PUBLISHED["initial_generators"]),
+        noise=0.2,
+        disturbance=Zonotope([0.0, 0.0], PUBLISHED["disturbance_generators"]),
+        offset=np.zeros((4, 2)),
+    )
+    estimates = observer.run(y)
+    for ours, other in zip(estimates, constant, strict=True):
+        np.testing.assert_array_equal(ours.polygons.polygon(), other.polygons.polygon())
+    with pytest.raises(ValueError, match="state_matrix has 4 steps, and step 4 is wanted"):
+        observer.predict()
+
+
+@pytest.mark.parametrize("missing", [None, 0, 1])
+def test_noise_in_a_polytope_keeps_its_projection_if_an_output_is_missing(missing: int | None) -> None:
+    diamond = Polytope.from_vertices([[1.0, 0.0], [0.0, 0.5], [-1.0, 0.0], [0.0, -0.5]])
+    observer = LinearObserver(np.eye(2), np.eye(2), Zonotope.box([-9.0, -9.0], [9.0, 9.0]), noise=diamond)
+    y = np.array([1.0, 2.0])
+    wanted = {None: 1.0, 0: 18.0, 1: 2.0 * 18.0}[missing]
+    if missing is not None:
+        y[missing] = np.nan
+    observer.update(y)
+    np.testing.assert_allclose(observer.estimate().polygons.area(), wanted)
+
+
+def test_nothing_measured_changes_nothing() -> None:
+    observer = published()
+    observer.update([np.nan])
+    np.testing.assert_allclose(observer.estimate().upper, 3.0, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: LinearObserver([[1.0]], [[1.0, 0.0]], Zonotope([0.0], []), noise=1.0), "output_matrix must have 1"),
+        (lambda: LinearObserver(np.eye(7), np.eye(7), Zonotope(np.zeros(7), []), noise=1.0), "n from 1 to 6"),
+        (lambda: LinearObserver(np.eye(2), np.eye(2), Zonotope([0.0], []), noise=1.0), "initial must have 2 coord"),
+        (lambda: LinearObserver(np.eye(2), np.eye(2), ConvexPolygons.empty(), noise=1.0), "and not empty"),
+        (lambda: LinearObserver(np.eye(2), np.eye(2), Zonotope([0.0, 0.0], []), noise=-1.0), "at least 0"),
+        (lambda: published().update([0.0, 0.0]), r"measurement must have the shape \(1,\)"),
+        (lambda: published().update([np.inf]), "finite or NaN"),
+        (lambda: published().predict([1.0]), r"inputs must have the shape \(0,\)"),
+        (lambda: Zonotope([0.0], [[1.0, 2.0]]), "one a row"),
+        (lambda: Zonotope([np.inf], []), "finite"),
+        (lambda: Zonotope.box([1.0], [0.0]), "must not exceed"),
+        (lambda: Zonotope(np.zeros(2), np.ones((13, 2))).points(), "at most 12"),
+    ],
+)
+def test_wrong_values_are_refused(wrong: Callable[[], object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        wrong()
+
+
+def test_estimates_of_steps_with_gaps_are_not_smoothed() -> None:
+    observer = published()
+    estimates: list[Estimate] = observer.run(measurements()[:3])
+    with pytest.raises(ValueError, match="successive"):
+        observer.smooth(estimates[::2])
+
+
+# The enlargement of a prediction --------------------------------------------------------------------------------
+
+coordinates = st.integers(-4, 4).map(float) | st.floats(-1.0, 1.0, width=32)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(st.tuples(coordinates, coordinates), min_size=1, max_size=9), st.sampled_from([1e-3, 1.0, 40.0]))
+def test_an_enlarged_polygon_contains_the_sum_with_the_box(points: list[tuple[float, float]], ratio: float) -> None:
+    polygon = ConvexPolygons.from_points(points).polygon()
+    half = 2.0**-30, 2.0**-30 * ratio
+    out = np.zeros((len(polygon) + 4, 2))
+    count = enlarge(polygon, len(polygon), 0.0, 0.0, *half, out)
+    ring = [(Fraction(x), Fraction(y)) for x, y in out[:count].tolist()]
+    assert hull(ring)
+    for x, y in polygon:
+        for sign_x, sign_y in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+            # Coordinates are rounded by much less than half a box.
+            corner = (Fraction(x) + sign_x * Fraction(half[0]) / 2, Fraction(y) + sign_y * Fraction(half[1]) / 2)
+            assert len(hull([*ring, corner])) == len(hull(ring))
+    assert np.abs(out[:count].max(axis=0) - polygon.max(axis=0)).max() <= 6.0 * max(half)
+
+
+def test_a_polygon_of_an_observer_gains_no_vertices_from_slack() -> None:
+    out = np.zeros((12, 2))
+    ring = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    assert enlarge(ring, 4, 0.0, 0.0, SUM_SLACK, SUM_SLACK, out) == 4
