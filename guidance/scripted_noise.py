@@ -52,7 +52,11 @@ class ScriptedNoise:
             raise ValueError(f"errors must have one shape (B, steps) for all sensors: got {sorted(shapes)}")
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
-        """Return the measurements of a step.
+        """Return the measurements of a step; `errors_of_step` describes the errors that it raises."""
+        return measure_with_errors(sight, self.errors_of_step(sight))
+
+    def errors_of_step(self, sight: LineOfSight) -> dict[str, Floats]:
+        """Return the errors of a step by sensor, in units of their bounds.
 
         Raises
         ------
@@ -72,7 +76,7 @@ class ScriptedNoise:
                     f"step {sight.step} the root of the sum of squares is {np.hypot(*now).max():.6g}"
                 )
             errors[name] = now
-        return measure_with_errors(sight, errors)
+        return errors
 
 
 @dataclass(frozen=True)
@@ -84,13 +88,36 @@ class RandomNoise(ScriptedNoise):
     errors : mapping of str to ndarray, shape (B, steps)
         Draws by sensor, uniform in [-1, 1]; the error is the draw times the bound. In space, draws of angles and rates
         have shape (2, B, steps); those of an angle sensor with errors in a disc are uniform in the unit disc.
+    bias : ndarray, shape (B,), or (2, B) in space, or None
+        Constant errors of the centroid part of a camera's bound, in units of that part; `errors` are then those of the
+        pixel part. None draws errors of the whole bound.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an error or a bias is not within [-1, 1].
 
     References
     ----------
     Kumkov and Patsko (1997), section 7.
     """
 
+    bias: Floats | None = None
+
     name: ClassVar[str] = "random"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.bias is not None:
+            need_draws("bias", self.bias[..., None])
+
+    def errors_of_step(self, sight: LineOfSight) -> dict[str, Floats]:
+        """Return the errors of a step by sensor, in units of their bounds."""
+        errors = super().errors_of_step(sight)
+        camera = sight.sensors.get(AngleSensor.name)
+        if self.bias is not None and isinstance(camera, AngleSensor):
+            errors[camera.name] = camera.with_bias(sight, errors[camera.name], self.bias)
+        return errors
 
 
 def measure_with_errors(sight: LineOfSight, errors: Mapping[str, Floats]) -> dict[str, Floats]:

@@ -14,6 +14,8 @@ from infoset.sensors import AngleSensor, Sensor
 Interval = tuple[float, float]
 
 MOST_SECTIONS = 10_000
+CENTROID_ERRORS_AT_THRESHOLD = 10.0
+"""Least range threshold in centroid errors of the camera; at shorter ranges its error bound is not a small angle."""
 
 _APPROACH = Limits(below=0.0)
 _SECTIONS = Limits(least=1, most=MOST_SECTIONS, whole=True)
@@ -220,6 +222,12 @@ class SetModel:
                     )
         self.check_period("angle_sensor", self.angle_sensor)
         self.check_start("bounds", self.bounds)
+        nearest_m = CENTROID_ERRORS_AT_THRESHOLD * (self.angle_sensor.centroid_error_m or 0.0)
+        if self.range_threshold_m < nearest_m:
+            raise ValueError(
+                f"SetModel: range_threshold_m must be at least {CENTROID_ERRORS_AT_THRESHOLD:g} times "
+                f"angle_sensor.centroid_error_m, {nearest_m:g} m: got {self.range_threshold_m!r}"
+            )
 
     @property
     def axes(self) -> tuple[str, ...]:

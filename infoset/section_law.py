@@ -16,9 +16,9 @@ from infoset.sensors import Convention
 BOUND_SLACK = 1e-9
 """Relative enlargement of the bounds of the guaranteed model; rounding errors are far smaller."""
 ROUNDING = 16.0 * sys.float_info.epsilon
-PLANE, RISING, ELEVATION, CONE = range(4)
-"""How a measured angle bounds the slope of its axis: alone; alone, with a bound that rises with range; as elevation of
-a gimbal; within a cone."""
+PLANE, LINEAR, ELEVATION, CONE = range(4)
+"""How a measured angle bounds the slope of its axis: alone; alone, with a band that is made linear in the range because
+the exact one is not concave; as elevation of a gimbal; within a cone."""
 
 
 class SectionLaw(NamedTuple):
@@ -53,13 +53,17 @@ class SectionLaw(NamedTuple):
     rectangle : bool
         Whether the initial set is the paper's rectangle in (omega, alpha). Otherwise it is the box.
     angles : int
-        How a measured angle bounds the slope z/x: `PLANE`, `RISING`, `ELEVATION` or `CONE`.
+        How a measured angle bounds the slope z/x: `PLANE`, `LINEAR`, `ELEVATION` or `CONE`.
     other_error_at_zero_range, other_error_slope : float
         Error bound of the angle of the other axis; zero in a plane.
     pointing_along, pointing_across : float
         Error of an impulse by the engine's direction, as shares of its component along the axis and of its modulus.
     channel, other : int
         Number of this axis and of the other one in arrays with an axis of channels; `other` is -1 in a plane.
+    centroid_error : float
+        Part of the error bound of both angles that falls with the range x: centroid_error / x, m.
+    least_range : float
+        Least range of a label in the set, m.
     """
 
     closing_speed: float
@@ -88,6 +92,8 @@ class SectionLaw(NamedTuple):
     pointing_across: float
     channel: int
     other: int
+    centroid_error: float
+    least_range: float
 
 
 def section_laws(model: SetModel) -> tuple[SectionLaw, ...]:
@@ -151,6 +157,8 @@ def law_of(table: NDArray[np.float64], channel: int) -> SectionLaw:
         table[row, 23],  # pointing_across
         int(table[row, 24]),  # channel
         int(table[row, 25]),  # other
+        table[row, 26],  # centroid_error
+        table[row, 27],  # least_range
     )
 
 
@@ -173,6 +181,8 @@ def _law(model: SetModel) -> SectionLaw:
         error *= 1.0 + BOUND_SLACK
     z_least, z_greatest = _scaled_outward(box.z_m, eta)
     vz_least, vz_greatest = _scaled_outward(box.vz_m_s, eta)
+    # The true distance of a label is at least (1 - eta) x.
+    centroid = (sensor.centroid_error_m or 0.0) * (1.0 + BOUND_SLACK) / (1.0 - eta)
     least_label, greatest_label = model.label_limits_m
     if guaranteed:
         offset, speed = max(abs(z) for z in box.z_m), max(abs(v) for v in box.vz_m_s)
@@ -205,13 +215,15 @@ def _law(model: SetModel) -> SectionLaw:
         vx_least=float(box.vx_m_s[0]),
         vx_greatest=float(box.vx_m_s[1]),
         rectangle=model.initial_set is InitialSet.RECTANGLE,
-        angles=RISING if guaranteed and slope > 0.0 else PLANE,
+        angles=LINEAR if centroid > 0.0 or (guaranteed and slope > 0.0) else PLANE,
         other_error_at_zero_range=0.0,
         other_error_slope=0.0,
         pointing_along=0.0,
         pointing_across=0.0,
         channel=0,
         other=-1,
+        centroid_error=centroid,
+        least_range=float(model.least_range_m),
     )
 
 

@@ -140,6 +140,12 @@ def start_section(origins: Floats, rings: Floats, marks: Integers, n: int, label
         chain_steps.spread(origins, n, tau, law.half_v_at_start)
 
 
+@inlined
+def nearest_range(travelled: float, law: SectionLaw) -> float:
+    """Return the least range of a label in the set after the range has decreased by `travelled`, m."""
+    return max(law.label_least - travelled, law.least_range)
+
+
 @allocation_free
 def steepest_angles(alpha: float, across: float, range_m: float, law: SectionLaw) -> tuple[float, float]:
     """Return the greatest sizes of two measured angles, rad, that agree with the measurements up to a range.
@@ -156,13 +162,17 @@ def steepest_angles(alpha: float, across: float, range_m: float, law: SectionLaw
 
     Notes
     -----
-    An error bound that grows with the distance r grows with the angles. In a plane r = x/cos(alpha), in space it is at
-    most x/(cos(alpha_y) cos(alpha_z)). The greatest angles are the least solution of s = |alpha_m| + a + h(r(s)). Three
+    The bound of a camera is greatest at the least distance, that of the nearest label. Another error bound that grows
+    with the distance r grows with the angles: in a plane r = x/cos(alpha), in space r is at most
+    x/(cos(alpha_y) cos(alpha_z)). The greatest angles are the least solution of s = |alpha_m| + a + h(r(s)). Three
     fixed-point iterations approach it from below; a fourth step of the length of the third passes it if the right-hand
     side does not exceed s there.
     """
     growth, other_growth = max(law.error_slope, 0.0) * range_m, max(law.other_error_slope, 0.0) * range_m
-    constant, other_constant = law.error_at_zero_range, law.other_error_at_zero_range
+    centroid = 0.0
+    if law.centroid_error > 0.0:
+        centroid = law.centroid_error / nearest_range(law.label_greatest - range_m, law)
+    constant, other_constant = law.error_at_zero_range + centroid, law.other_error_at_zero_range + centroid
     if law.angles == CONE:
         if max(abs(alpha), abs(across)) >= RIGHT_ANGLE:
             return RIGHT_ANGLE, 0.0
@@ -216,9 +226,17 @@ def wide_slope_band(alpha: float, across: float, label: float, x: float, law: Se
     Notes
     -----
     Bounds over all labels need an upper bound whose product with x is a concave function of x. Therefore the factors by
-    which the angle of the other axis widens the band are the same for all labels, and an error bound that rises with
-    range is replaced by a greater one: x h(x) is convex then, and a chord and a tangent are above it.
+    which the angle of the other axis widens the band are the same for all labels, and two error bounds have a wider
+    band, whose product with x is linear. If the bound h(x) rises with range, x h(x) is convex: a chord and a tangent
+    are above it. With the bound p + c/x of a camera, x tan(alpha + p + c/x) is convex: a tangent in the angle, with the
+    slope at the steepest angle of all labels, is above it.
     """
+    falling, rising = law.centroid_error > 0.0, law.error_slope > 0.0
+    bound = law.error_at_zero_range + law.error_slope * x
+    if falling and x > 0.0:
+        bound += law.centroid_error / x
+    if not law.exact_angles:
+        return alpha - bound, alpha + bound
     travelled = label - x
     near, far = max(law.label_least - travelled, 0.0), law.label_greatest - travelled
     own, other = steepest_angles(alpha, across, far, law)
@@ -227,15 +245,18 @@ def wide_slope_band(alpha: float, across: float, label: float, x: float, law: Se
     cosine, other_cosine = math.cos(own), math.cos(other)
     # The error bound depends on the true distance, in a plane x/cos(alpha).
     farthest = far / cosine / other_cosine
-    rising = law.error_slope > 0.0
-    bound = law.error_at_zero_range + law.error_slope * x
+    greatest = law.error_at_zero_range + max(law.error_slope, 0.0) * farthest
+    other_greatest = law.other_error_at_zero_range + max(law.other_error_slope, 0.0) * farthest
+    if falling:
+        centroid = law.centroid_error / nearest_range(travelled, law)
+        greatest += centroid
+        other_greatest += centroid
     if rising:
         bound = law.error_at_zero_range + law.error_slope * ((near + far - near * far / x) / cosine / other_cosine)
     if law.angles == CONE:
         # asin(sin(b)/cos(across)) is at most its secant k b.
-        greatest = law.error_at_zero_range + max(law.error_slope, 0.0) * farthest
         bound *= math.asin(math.sin(greatest) / math.cos(across)) / greatest
-    if rising:
+    if rising or falling:
         bound = bound / cosine**2
         lower, upper = math.tan(alpha) - bound, math.tan(alpha) + bound
     else:
@@ -244,9 +265,8 @@ def wide_slope_band(alpha: float, across: float, label: float, x: float, law: Se
         upper = math.tan(upper) if upper < RIGHT_ANGLE else np.inf
     if law.angles == ELEVATION:
         # z/x is tan(elevation)/cos(azimuth), with the factor 1/cos(azimuth) between two bounds.
-        greatest = law.other_error_at_zero_range + max(law.other_error_slope, 0.0) * farthest
-        least_factor = 1.0 / math.cos(max(abs(across) - greatest, 0.0))
-        greatest_factor = 1.0 / math.cos(abs(across) + greatest)
+        least_factor = 1.0 / math.cos(max(abs(across) - other_greatest, 0.0))
+        greatest_factor = 1.0 / math.cos(abs(across) + other_greatest)
         factor = 0.5 * (least_factor + greatest_factor)
         doubt = 0.5 * (greatest_factor - least_factor) * math.tan(own)
         lower, upper = factor * lower - doubt, factor * upper + doubt
@@ -453,7 +473,7 @@ def measure_rate_section(
 def widen_section(origins: Floats, n: int, label: float, elapsed: int, law: SectionLaw) -> None:
     """Enlarge a section by the error bound b of one angle measurement: by e b in V, or x b in the predicted miss."""
     x = range_of(label, elapsed, law)
-    bound = law.error_at_zero_range + law.error_slope * x
+    bound = law.error_at_zero_range + law.error_slope * x + law.centroid_error / x
     chain_steps.spread(origins, n, x / law.closing_speed, law.closing_speed * bound)
 
 

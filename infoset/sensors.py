@@ -91,6 +91,8 @@ class Cuttable(Protocol):
         """Cut by a rate of the line of sight."""
 
 
+TIME_TOLERANCE = 1e-6
+"""Rounding of the first and the last image, as a share of the time between two images."""
 NEGLIGIBLE_ERROR_RAD = 1e-60
 """Error bound of an axis that is measured without error."""
 
@@ -137,6 +139,10 @@ class Sensor(ABC):
         where : ndarray of bool, shape (B,)
             Engagements that have measured.
         """
+
+    def measures_at(self, before_arrival_s: float) -> bool:
+        """Return whether the sensor measures at a time before the nominal arrival, s."""
+        return True
 
     def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats] | None:
         """Return the band of (V, z) that a measurement leaves, for the lower bound of the miss (`sim.lower_bound`).
@@ -320,7 +326,7 @@ class AngleSensor(Sensor):
 
         Notes
         -----
-        The bound of a camera is constant at distances below its centroid error.
+        The bound of a camera does not increase at distances below its centroid error, where c/d is greater than 1 rad.
         """
         bound = self.error_at_zero_range_rad + self.error_slope_rad_per_m * range_m
         if self.centroid_error_m:
@@ -363,6 +369,23 @@ class AngleSensor(Sensor):
     def bound(self, sight: Geometry) -> Floats:
         """Return the error bound at the true range, rad."""
         return self.error_bounds(sight.range_m)
+
+    def measures_at(self, before_arrival_s: float) -> bool:
+        """Return whether there are images at a time before the nominal arrival, s."""
+        room_s = TIME_TOLERANCE * self.period_s
+        first_s = np.inf if self.first_image_s is None else self.first_image_s + room_s
+        return self.last_image_s - room_s <= before_arrival_s <= first_s
+
+    def with_bias(self, sight: Geometry, error: Floats, bias: Floats) -> Floats:
+        """Return the error of a camera in units of its bound, from those of the pixel and of the centroid part.
+
+        Parameters
+        ----------
+        error, bias : ndarray, shape (..., B)
+            Errors in units of the bounds of the two parts, within [-1, 1] or the unit disc.
+        """
+        share = self.pixel_error_rad / self.error_bound(sight.range_m)
+        return share * error + (1.0 - share) * bias
 
     def measured(self, sight: Geometry, error: Floats | float) -> Floats:
         """Return the measured angles for an error in units of the bound, rad.
@@ -420,8 +443,17 @@ class AngleSensor(Sensor):
         sets.measure_angle(measured[self.name], where)
 
     def band(self, range_m: Floats, closing_speed_m_s: float, errors: float = 1.0) -> tuple[bool, Floats]:
-        """Return a band of z."""
-        return False, errors * self.error_bound(range_m) * range_m
+        """Return a band of z.
+
+        Notes
+        -----
+        With a camera the bound of a point off the axis, which is farther away, is less: h/x = b/(1 + b^2) allows for
+        this, along both axes at once.
+        """
+        bound = self.error_bound(range_m)
+        if self.centroid_error_m:
+            bound = bound / (1.0 + bound * bound)
+        return False, errors * bound * range_m
 
 
 @lru_cache(maxsize=64)

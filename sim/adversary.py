@@ -236,12 +236,12 @@ class _Search:
     def _fly(self, plans: Plans, tie: TieRule | None) -> Flown:
         size = len(plans)
         position_m, velocity_m_s = (part.copy() for part in np.split(plans.start, 2, axis=1))
-        execution, target, pointing = (
-            None if drawn is None else np.repeat(drawn, size, axis=-2)
-            for drawn in (self._draws.execution, self._draws.target, self._draws.pointing)
+        of_draws = self._draws.execution, self._draws.target, self._draws.pointing, self._draws.images
+        execution, target, pointing, images = (
+            None if drawn is None else np.repeat(drawn, size, axis=-2) for drawn in of_draws
         )
         tie_draws = np.repeat(self._draws.tie, size, axis=-2)
-        draws = Draws(position_m, velocity_m_s, {}, tie_draws, execution, target, pointing)
+        draws = Draws(position_m, velocity_m_s, {}, tie_draws, execution, target, pointing, images=images)
         noise = PlannedNoise(plans, tie, self._names)
         flight = Engagements(self.scenario, draws, self._strategy, noise=noise, guarantee=False)
         while flight.flying:

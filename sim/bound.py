@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset import AngleSensor, Convention, SetModel
-from infoset.sensors import Sensor
 from sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -310,7 +309,7 @@ class _Approach:
             slope = model.bounds.offset_m / model.bounds.x_m[0] + model.bounds.lateral_speed_m_s / -vx_m_s
             margin += slope * slope
         self._programs = {
-            planar: _Program(planar, scenario.sensors, times_s, self.ranges_m, vx_m_s, margin)
+            planar: _Program(planar, scenario, times_s, self.ranges_m, vx_m_s, margin)
             for planar in dict.fromkeys(self._models.values())
         }
         single = {planar: (name,) for name, planar in self._models.items()}
@@ -365,7 +364,7 @@ class _Program:
     def __init__(
         self,
         model: SetModel,
-        sensors: Mapping[str, Sensor],
+        scenario: Scenario,
         times_s: Floats,
         ranges_m: Floats,
         vx_m_s: float,
@@ -376,8 +375,9 @@ class _Program:
         self.steps = len(ranges_m)
         self.limits_m = np.full(self.steps, np.inf)
         self.miss_limits_m = np.full(self.steps, np.inf)
-        for sensor in {**sensors, AngleSensor.name: model.angle_sensor}.values():
+        for sensor in {**scenario.sensors, AngleSensor.name: model.angle_sensor}.values():
             due = np.arange(0, self.steps, model.steps_in(sensor.period_s))
+            due = due[[sensor.measures_at(scenario.nominal_arrival_s - at_s) for at_s in times_s[due]]]
             band = sensor.band(self.ranges_m[due], -vx_m_s, 2.0 * (1.0 - margin))
             if band is not None:
                 limits = self.miss_limits_m if band[0] else self.limits_m

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guidance import NoiseKind, TieRule
-from infoset import AngleSensor, StateBox
+from infoset import AngleSensor, Bias, StateBox
 from sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-START, TIE, EXECUTION, TARGET, POINTING = 0, 3, 5, 6, 7
+START, TIE, EXECUTION, TARGET, POINTING, BIAS, IMAGES = 0, 3, 5, 6, 7, 8, 9
 """Streams of a run; each kind of sensor has its own as well (`Sensor.stream`)."""
 Y = 16
 """Difference between the streams of the y axis and those of the z axis, which are also those of a plane."""
@@ -40,6 +40,10 @@ class Draws:
         Errors of the impulses and of their directions in units of their bounds, uniform in [-1, 1]; None is zero.
     target : ndarray, shape (B, steps), or (2, B, steps) in space, or None
         Changes of side of the target, uniform in [-1, 1]; None is zero.
+    bias : ndarray, shape (B,), or (2, B) in space, or None
+        Constant errors of the centroid of a camera in units of their bound; None for a camera with random errors.
+    images : ndarray, shape (B, steps), or None
+        Uniform in [0, 1); an image is lost if its number is less than the probability of that. None loses no image.
     """
 
     position_m: Floats
@@ -49,6 +53,8 @@ class Draws:
     execution: Floats | None = None
     target: Floats | None = None
     pointing: Floats | None = None
+    bias: Floats | None = None
+    images: Floats | None = None
 
     @property
     def steps(self) -> int:
@@ -72,18 +78,23 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
         starts = np.insert(starts, [0, 2], along_y, axis=1)
     position_m, velocity_m_s = np.split(lower + (upper - lower) * starts, 2, axis=1)
 
-    def uniform(stream: int) -> Floats:
-        return np.stack([generator(seed, run, stream).uniform(-1.0, 1.0, size=steps) for run in runs])
+    def uniform(stream: int, size: int = steps) -> Floats:
+        return np.stack([generator(seed, run, stream).uniform(-1.0, 1.0, size=size) for run in runs])
 
-    def lateral(stream: int) -> Floats:
-        return np.stack([uniform(stream + Y), uniform(stream)]) if scenario.is_spatial else uniform(stream)
+    def lateral(stream: int, size: int = steps) -> Floats:
+        if not scenario.is_spatial:
+            return uniform(stream, size)
+        return np.stack([uniform(stream + Y, size), uniform(stream, size)])
 
     nothing = np.broadcast_to(0.0, (*([2] if scenario.is_spatial else []), len(runs), steps))
     errors = {
         name: (lateral if sensor.is_lateral else uniform)(sensor.stream) for name, sensor in scenario.sensors.items()
     }
-    if scenario.set_model.angle_sensor.is_disc:
+    camera = scenario.set_model.angle_sensor
+    bias = lateral(BIAS, 1)[..., 0] if camera.bias is Bias.CONSTANT else None
+    if camera.is_disc:
         errors[AngleSensor.name] = in_disc(errors[AngleSensor.name])
+        bias = None if bias is None else in_disc(bias)
     return Draws(
         position_m,
         velocity_m_s,
@@ -92,6 +103,12 @@ def draw(scenario: Scenario, runs: Sequence[int], seed: int) -> Draws:
         execution=uniform(EXECUTION) if scenario.thruster.execution_error_relative > 0.0 else None,
         target=lateral(TARGET) if scenario.target is not None else None,
         pointing=uniform(POINTING) if scenario.thruster.pointing_error_rad > 0.0 else None,
+        bias=bias,
+        images=(
+            np.stack([generator(seed, run, IMAGES).uniform(size=steps) for run in runs])
+            if camera.miss_probability > 0.0
+            else None
+        ),
     )
 
 

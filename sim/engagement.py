@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,8 +21,8 @@ from guidance import (
 from guidance.noise import checked_measurements
 from guidance.strategy import decide, start
 from guidance.thruster import modulus
-from infoset import InformationSet, InformationSetView, PredictedMiss
-from infoset.sensors import Measurements
+from infoset import AngleSensor, InformationSet, InformationSetView, PredictedMiss
+from infoset.sensors import Measurements, Sensor
 from infoset.set_queries import MaskedFloats, MaskedIntegers
 from sim.draws import Draws
 from sim.gravity import on_board_model
@@ -49,7 +49,7 @@ class Step:
     flying : ndarray of bool, shape (B,)
         Engagements before their closest approach.
     measured : mapping of str to ndarray, shape (B,)
-        Values measured in this step, by sensor.
+        Values measured in this step, by sensor; without the sensors that measured in no engagement.
     predicted_miss : PredictedMiss
         After the measurement, before the impulse.
     impulse_m_s : ndarray, shape (B,)
@@ -116,6 +116,7 @@ class Engagements:
         self._sensors = scenario.sensors
         self._every = {name: model.steps_in(sensor.period_s) for name, sensor in self._sensors.items()}
         self._measured: dict[str, Floats] = {}
+        self._seen: dict[str, Flags] = {}
         self._flying = np.ones(batch, dtype=bool)
         self._arrived = np.zeros(batch, dtype=bool)
         self._tracking = np.ones(batch, dtype=bool)
@@ -211,18 +212,45 @@ class Engagements:
 
     def _measure(self, sight: Sight) -> Measurements:
         """Measure with the sensors that are due, cut the sets, and return the measured values."""
-        due = {name: sensor for name, sensor in self._sensors.items() if self.step % self._every[name] == 0}
+        before_s = self.scenario.nominal_arrival_s - self.step * self.scenario.set_model.step_s
+        due = {
+            name: sensor
+            for name, sensor in self._sensors.items()
+            if self.step % self._every[name] == 0 and sensor.measures_at(before_s)
+        }
+        self._seen = {}
         if not due or not self._tracking.any():
             return {}
         asked = LineOfSight(self.step, sight.alpha_rad, sight.omega_rad_s, sight.range_m, due, self._pending())
         measured = checked_measurements(self._noise.measure(asked, self._view), asked, self._noise)
-        for name, sensor in due.items():
-            if name in measured:
-                sensor.cut(self._information, measured, self._tracking)
-                sensor.cut(self._truth_section, measured, self._tracking)
-        self._truth_section.look(self._tracking, sight)
+        if self._draws.images is not None and AngleSensor.name in measured:
+            return self._measure_some(sight, due, measured, self._draws.images[:, self.step])
+        self._cut(sight, due, measured, self._tracking)
         self._measured = self._measured | measured
         return measured
+
+    def _cut(self, sight: Sight, due: Mapping[str, Sensor], measured: Measurements, where: Flags) -> None:
+        """Cut the sets of some engagements by all measurements."""
+        for name, sensor in due.items():
+            if name in measured:
+                sensor.cut(self._information, measured, where)
+                sensor.cut(self._truth_section, measured, where)
+        self._truth_section.look(where, sight)
+
+    def _measure_some(
+        self, sight: Sight, due: Mapping[str, Sensor], measured: Measurements, images: Floats
+    ) -> Measurements:
+        """Cut the sets by measurements of which some images are lost; return the values of sensors that measured."""
+        camera = AngleSensor.name
+        seen = images >= self.scenario.set_model.angle_sensor.miss_probability
+        self._seen = {name: seen if name == camera else np.ones_like(seen) for name in measured}
+        self._cut(sight, due, measured, self._tracking & seen)
+        others = {name: values for name, values in measured.items() if name != camera}
+        if others:
+            self._cut(sight, due, others, self._tracking & ~seen)
+        kept = np.where(seen, measured[camera], self._measured.get(camera, np.nan))
+        self._measured = self._measured | others | {camera: kept}
+        return measured if (seen & self._tracking).any() else others
 
     def _executed(self, impulse: Floats) -> Floats:
         """Return the executed impulses."""
@@ -282,6 +310,7 @@ class Engagements:
             arrival_s=self.scenario.nominal_arrival_s - time_s,
             later_times_s=later_times_s,
             pending=pending,
+            seen={name: seen for name, seen in self._seen.items() if name in measured},
         )
 
     def _finish_labels(self) -> None:
@@ -343,4 +372,4 @@ def _outcome(diverged: bool, lost: bool, spent: bool) -> Outcome:
 def _make_noise(scenario: Scenario, draws: Draws) -> MeasurementNoise:
     if scenario.noise is NoiseKind.GAME:
         return GameNoise(scenario.tie, draws.tie)
-    return RandomNoise(draws.errors)
+    return RandomNoise(draws.errors, draws.bias)
