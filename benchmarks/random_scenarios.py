@@ -1,7 +1,8 @@
 """Random scenarios of the guaranteed model: every sensor, fast and slow, near and far, with and without a Sun.
 
-    from benchmarks.random_scenarios import random_scenario
+    from benchmarks.random_scenarios import camera_scenario, random_scenario
     scenario = random_scenario(7, rate_sensor=True)
+    scenario = camera_scenario(7)
 
 The same number gives the same scenario. Every scenario is valid: it is written as a scenario file and read again.
 """
@@ -15,7 +16,18 @@ import numpy as np
 from experiments.common.errors import InputError
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
 from guidance import NoiseKind, Thruster, TieRule
-from infoset import AngleSensor, InitialSet, Model, RangeSensor, RateSensor, SetModel, StateBox
+from infoset import (
+    AngleSensor,
+    Bias,
+    Convention,
+    ErrorShape,
+    InitialSet,
+    Model,
+    RangeSensor,
+    RateSensor,
+    SetModel,
+    StateBox,
+)
 from sim import Manoeuvre, Scenario, Sun, Target
 
 SOLAR_PARAMETER_M3_S2 = 1.324948e20
@@ -35,6 +47,52 @@ def random_scenario(number: int, *, rate_sensor: bool) -> Scenario:
             return read_scenario(scenario_to_toml(scenario), f"random scenario {number}")
         except InputError:
             continue  # an invalid scenario is drawn again
+
+
+def camera_scenario(number: int) -> Scenario:
+    """Return the random scenario with a number, with a camera; two of three are in space, one in eight has rates.
+
+    The centroid error is a tenth of the range threshold, or less. The convention, the shape of the errors, the bias,
+    the first and the last image, and the probability of a lost image are random.
+    """
+    generator = np.random.default_rng(np.random.SeedSequence(entropy=22, spawn_key=(number,)))
+    scenario = random_scenario(number, rate_sensor=number % 8 == 5)
+
+    def often(share: float) -> bool:
+        return bool(generator.uniform() < share)
+
+    model, arrival_s = scenario.set_model, scenario.nominal_arrival_s
+    centroid_m = 0.1 * model.range_threshold_m * float(10.0 ** -abs(generator.normal(0.0, 1.0)))
+    last_s = arrival_s * float(10.0 ** generator.uniform(-2.5, -0.7)) if often(0.5) else 0.0
+    first_s = last_s + (arrival_s - last_s) * float(generator.uniform(0.3, 1.1))
+    convention = list(Convention)[number // 3 % 3] if number % 3 else Convention.PLANE
+    sensor = AngleSensor.camera(
+        model.angle_sensor.period_s,
+        model.angle_sensor.error_at_zero_range_rad * float(10.0 ** generator.uniform(-2.0, 0.0)),
+        0.0 if often(0.1) else centroid_m * (1.0 - 1e-12),
+        nominal_range_m=scenario.nominal_range_m,
+        convention=convention,
+        error_shape=ErrorShape.DISC if number % 3 and (convention is Convention.CONE or often(0.3)) else None,
+        bias=Bias.CONSTANT if often(0.5) else Bias.RANDOM,
+        first_image_s=first_s if often(0.5) else None,
+        last_image_s=last_s,
+        miss_probability=float(generator.uniform(0.0, 0.8)) if often(0.5) else 0.0,
+    )
+    if number % 3 == 0:
+        return replace(scenario, set_model=replace(model, angle_sensor=sensor))
+    scale = float(10.0 ** generator.uniform(-1.5, 0.5))
+
+    def in_space(box: StateBox) -> StateBox:
+        (_, z_m), (_, vz_m_s) = box.z_m, box.vz_m_s
+        return replace(box, y_m=(-z_m * scale, 0.7 * z_m), vy_m_s=(-vz_m_s, vz_m_s * scale))
+
+    dispersion = in_space(scenario.dispersion)
+    # The box contains the dispersion, which is smaller than the box of z in some scenarios.
+    known = replace(in_space(model.bounds), y_m=(-model.bounds.z_m[1] * max(scale, 1.0), model.bounds.z_m[1]))
+    known = replace(known, vy_m_s=(-model.bounds.vz_m_s[1], model.bounds.vz_m_s[1] * max(scale, 1.0)))
+    thruster = replace(scenario.thruster, pointing_error_rad=float(generator.choice([0.0, 0.02])))
+    spatial = replace(model, bounds=known, angle_sensor=sensor)
+    return replace(scenario, set_model=spatial, dispersion=dispersion, thruster=thruster)
 
 
 def _drawn(generator: np.random.Generator, number: int, rate_sensor: bool) -> Scenario:

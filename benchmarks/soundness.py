@@ -5,6 +5,7 @@
     python -m benchmarks.soundness --engagements 200000 --random rate  # random scenarios, each with a rate sensor
     python -m benchmarks.soundness --engagements 100000 --random       # random scenarios without one
     python -m benchmarks.soundness --engagements 200000 --space        # out of the plane, all conventions, Sun anywhere
+    python -m benchmarks.soundness --engagements 40000 --camera        # random scenarios with a camera
 
 Counted are engagements whose true state left its section (by any amount), whose set was lost, whose true miss exceeded
 Phi, and those without a Phi. All counts must be zero; a warning ends the run. A batch has all kinds of noise, the true
@@ -23,7 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.random_scenarios import random_scenario
+from benchmarks.random_scenarios import camera_scenario, random_scenario
 from experiments.interception.scenario_file import load_scenario
 from guidance import GameNoise, LineOfSight, MeasurementNoise, NoiseKind, RandomNoise, TieRule
 from guidance.pair_noise import middle
@@ -84,7 +85,7 @@ def every_noise(draws: Draws, sensor: AngleSensor) -> MixedNoise:
         constant = constant / np.maximum(1.0, np.hypot(*constant) * (1.0 + 1e-15))
     return MixedNoise(
         (
-            RandomNoise(draws.errors),
+            RandomNoise(draws.errors, draws.bias),
             *(GameNoise(tie, draws.tie) for tie in (TieRule.UPPER, TieRule.LOWER, TieRule.ALTERNATE, TieRule.RANDOM)),
             RandomNoise({**extremal, "angle": signs}),
             RandomNoise({**constants, "angle": constant}),
@@ -210,6 +211,11 @@ def fly_random_batch(number: int, rate_sensor: bool, seed: int) -> Count:
     return fly(random_scenario(seed * 1_000_000 + number, rate_sensor=rate_sensor), number * BATCH, BATCH, seed)
 
 
+def fly_camera_batch(number: int, seed: int) -> Count:
+    """Simulate batch `number`, which has a random scenario with a camera."""
+    return fly(camera_scenario(seed * 1_000_000 + number), number * BATCH, BATCH, seed)
+
+
 def main() -> None:
     """Simulate, count and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -218,6 +224,7 @@ def main() -> None:
     parser.add_argument("--hostile", action="store_true", help="execution errors of 2 %% and a manoeuvring target")
     parser.add_argument("--random", nargs="?", const="plain", choices=("plain", "rate"), help="random scenarios")
     parser.add_argument("--space", action="store_true", help="out of the plane")
+    parser.add_argument("--camera", action="store_true", help="random scenarios with a camera")
     parser.add_argument("--first", type=int, default=0, metavar="BATCH", help="number of the first batch")
     parser.add_argument("--workers", type=int, default=1)
     options = parser.parse_args()
@@ -227,7 +234,9 @@ def main() -> None:
     with ThreadPoolExecutor(options.workers) as pool:
         batch = SPACE_BATCH if options.space else BATCH
         numbers = range(options.first, options.first - (-options.engagements // batch))
-        if options.random is None:
+        if options.camera:
+            jobs = [pool.submit(fly_camera_batch, number, options.seed) for number in numbers]
+        elif options.random is None:
             fly_one_batch = fly_space_batch if options.space else fly_batch
             jobs = [pool.submit(fly_one_batch, number, options.hostile, options.seed) for number in numbers]
         else:

@@ -208,7 +208,8 @@ class AngleSensor(Sensor):
     bias : Bias
         How the random error of a camera is drawn.
     first_image_s, last_image_s : float
-        Times before the nominal arrival of the first and the last image, s; None has images from the start.
+        Times before the nominal arrival of the first and the last image, s. Images begin at the start for None, and
+        continue until the true arrival for 0.
     miss_probability : float
         Probability that an image is lost, in [0, 1).
 
@@ -373,8 +374,9 @@ class AngleSensor(Sensor):
     def measures_at(self, before_arrival_s: float) -> bool:
         """Return whether there are images at a time before the nominal arrival, s."""
         room_s = TIME_TOLERANCE * self.period_s
-        first_s = np.inf if self.first_image_s is None else self.first_image_s + room_s
-        return self.last_image_s - room_s <= before_arrival_s <= first_s
+        too_early = self.first_image_s is not None and before_arrival_s > self.first_image_s + room_s
+        too_late = self.last_image_s > 0.0 and before_arrival_s < self.last_image_s - room_s
+        return not (too_early or too_late)
 
     def with_bias(self, sight: Geometry, error: Floats, bias: Floats) -> Floats:
         """Return the error of a camera in units of its bound, from those of the pixel and of the centroid part.

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from infoset import AngleSensor, Convention, InitialSet, Model, SetModel, StateBox
+from infoset import AngleSensor, Convention, ErrorShape, InitialSet, Model, SetModel, StateBox
 from infoset.section_law import section_laws
 from infoset.section_life import slope_band
 
@@ -81,15 +81,64 @@ def test_bands_contain_the_truth_and_are_convex(
     label, elapsed_m = least + label_share * (greatest - least), 0.999 * flown * least
     x = label - elapsed_m
     true = sight(x * (1.0 + speed * model.speed_error), angles)
+    contain_and_are_convex(model, true, errors_of(sensor, error, extremal), label, elapsed_m)
+
+
+@settings(deadline=None, max_examples=300)
+@given(
+    st.sampled_from(Convention), st.booleans(), st.floats(-9.0, -1.0), st.floats(-2.0, 5.0), st.floats(0.0, 2.0),
+    st.tuples(signed, signed), st.tuples(signed, signed), st.booleans(), signed, st.floats(0.0, 0.5), shares,
+    st.floats(-3.0, 0.0), shares,
+)  # fmt: skip
+def test_bands_of_a_camera_contain_the_truth_and_are_convex(
+    convention: Convention,
+    disc: bool,
+    pixel: float,
+    centroid: float,
+    threshold: float,
+    angles: tuple[float, float],
+    error: tuple[float, float],
+    extremal: bool,
+    speed: float,
+    speed_error: float,
+    label_share: float,
+    far: float,
+    near: float,
+) -> None:
+    """At all ranges from ten centroid errors up, with the bounds of both axes reached, and a closing speed of 50 %."""
+    shape = ErrorShape.DISC if disc else None
+    sensor = AngleSensor.camera(0.5, 10.0**pixel, 10.0**centroid, convention=convention, error_shape=shape)
+    threshold_m = 10.0 ** (centroid + 1.0 + threshold) * (1.0 + 1e-12)
+    known = replace(KNOWN, vx_m_s=(-58e3 * (1.0 + speed_error), -58e3 * (1.0 - speed_error)))
+    if threshold_m >= 5e6:
+        return
+    model = SetModel(
+        58e3, 0.5, known, sensor, range_threshold_m=threshold_m, initial_set=InitialSet.BOX, kind=Model.GUARANTEED
+    )
+    least, greatest = model.label_limits_m
+    label = least + label_share * (greatest - least)
+    # From the threshold to the start, many of them near the threshold.
+    x = threshold_m + (label - threshold_m) * (10.0**far if near < 0.5 else 1e-9 * near)
+    true = sight(x * (1.0 + speed * model.speed_error), angles)
+    contain_and_are_convex(model, true, errors_of(sensor, error, extremal), label, label - x)
+
+
+def errors_of(sensor: AngleSensor, error: tuple[float, float], extremal: bool) -> Floats:
+    """Return errors in units of the bound; extremal ones are corners of the box or points of the disc's rim."""
     errors = np.array(error)[:, None]
     if extremal:
         errors = np.where(errors < 0.0, -1.0, 1.0) * (np.sqrt(0.5) if sensor.is_disc else 1.0)
-    measured = sensor.measured(true, sensor.limited(errors))
-    band = bands(model, measured, elapsed_m)
-    for (lower, upper), slope in zip(band(label), np.tan(angles), strict=True):
+    return sensor.limited(errors)
+
+
+def contain_and_are_convex(model: SetModel, true: Sight, errors: Floats, label: float, elapsed_m: float) -> None:
+    """Check the bands of a measurement: that of the label contains the truth, those of all labels are convex."""
+    x, (least, greatest) = label - elapsed_m, model.label_limits_m
+    band = bands(model, model.angle_sensor.measured(true, errors), elapsed_m)
+    for (lower, upper), slope in zip(band(label), np.tan(true.alpha_rad[:, 0]), strict=True):
         rounding = 64.0 * EPS * (1.0 + slope**2) * label / x
         assert lower - rounding <= slope <= upper + rounding
-    labels = np.linspace(least, greatest, 7)
+    labels = np.linspace(max(least, elapsed_m + model.least_range_m), greatest, 7)
     ranges = labels - elapsed_m
     heights = np.array([band(each) for each in labels.tolist()]) * ranges[:, None, None]
     if np.isfinite(heights).all():
