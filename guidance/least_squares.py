@@ -30,6 +30,7 @@ class Measurements:
     Parameters
     ----------
     times_s : ndarray, shape (n,)
+        Times of the measurements, s.
     values, offsets_m : ndarray, shape (B, n)
         Measured values, rad or m, and the change of z by the impulses until then, m.
     seen : ndarray of bool, shape (B, n)

@@ -21,6 +21,9 @@ from sim.statistics import shows
 Floats = NDArray[np.float64]
 
 _ROW_MM = 9.0
+_LETTER_MM = 1.4
+"""Width of a letter of a name."""
+
 _BINS = 48
 _HILL = 0.62
 """Height of a histogram, in rows."""
@@ -52,7 +55,8 @@ def draw_comparison(compared: Sequence[Comparison], radius_m: float | None = Non
     height = _ROW_MM * len(names)
     with style():
         figure = new_figure(height_mm=2.0 * height + 46.0)
-        rows = place_axes(figure, 2, 2, margins_mm=(30.0, 4.0, 20.0, 7.0), gaps_mm=(6.0, 19.0))
+        left = min(max(30.0, 4.0 + _LETTER_MM * max(len(name) for name in names)), 60.0)
+        rows = place_axes(figure, 2, 2, margins_mm=(left, 4.0, 20.0, 7.0), gaps_mm=(6.0, 19.0))
         _draw_row(rows[0], compared, names, lambda each: each.miss_m, logarithmic=True)
         _draw_row(rows[1], compared, names, lambda each: each.impulse_m_s, logarithmic=False)
         for row, label in zip(rows, ("miss, m", "impulse spent, m/s"), strict=True):
