@@ -70,6 +70,18 @@ def test_nothing_breaks_the_guarantee(
     assert vars(total) == {"engagements": engagements, "outside": 0, "lost": 0, "above": 0, "unknown": 0}
 
 
+@pytest.mark.parametrize("batches", [12, pytest.param(60, marks=pytest.mark.slow)])
+def test_nothing_breaks_the_guarantee_of_a_camera(
+    soundness: ModuleType, batches: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Random scenarios, two thirds in space, with every noise; benchmarks/soundness.py flies 24 000."""
+    monkeypatch.setattr(soundness, "BATCH", 16)
+    total = soundness.Count()
+    for number in range(batches):
+        total += soundness.fly_camera_batch(number, seed=3)
+    assert vars(total) == {"engagements": 16 * batches, "outside": 0, "lost": 0, "above": 0, "unknown": 0}
+
+
 def test_the_test_can_fail(soundness: ModuleType, asteroid: Scenario) -> None:
     """A target that manoeuvres harder than its bound, and a truth faster than D, are caught."""
     scenario = guaranteed(asteroid)

@@ -1,0 +1,395 @@
+"""A camera: misses that its images leave possible, constant bias, first and last image, lost images."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+from guidance import NoiseKind, Situation, Thruster, TieRule
+from infoset import (
+    AngleSensor,
+    Bias,
+    Convention,
+    ErrorShape,
+    InformationSet,
+    InitialSet,
+    Model,
+    RangeSensor,
+    RateSensor,
+    SetModel,
+    StateBox,
+)
+from infoset.section_law import section_laws
+from infoset.section_life import slope_band
+from sim import Record, Results, Scenario, fly_one, simulate
+from sim.adversary import find_worst
+from sim.bound import lower_bound
+from sim.closed_form import images_s, possible_miss_m, possible_miss_of
+from sim.draws import draw
+from sim.engagement import Engagements, Step
+from sim.pair import fly_pair
+
+Floats = NDArray[np.float64]
+
+SPEED_M_S, PIXEL_RAD, CENTROID_M = 6140.0, 5e-6, 12.0
+FIRST_S, LAST_S, EVERY_S = 3600.0, 300.0, 30.0
+
+
+def camera_scenario(**fields: Any) -> Scenario:
+    """Return an engagement of one hour in a plane, with a camera; `fields` are those of the angle sensor."""
+    law = {"centroid_error_m": CENTROID_M, "nominal_range_m": 3600.0 * SPEED_M_S, **fields}
+    camera = AngleSensor.camera(EVERY_S, PIXEL_RAD, **law)
+    box = StateBox((-1e4, 1e4), (3590.0 * SPEED_M_S, 3610.0 * SPEED_M_S), (-2.0, 2.0), (-6141.0, -6139.0))
+    model = SetModel(
+        SPEED_M_S,
+        EVERY_S / 2,
+        box,
+        camera,
+        range_threshold_m=1e3,
+        sections=5,
+        fewest_sections=3,
+        initial_set=InitialSet.BOX,
+        kind=Model.GUARANTEED,
+    )
+    return Scenario("camera", "", None, 3600.0 * SPEED_M_S, box, model, None, Thruster(20.0, 0.001, 0.5))
+
+
+def in_space(scenario: Scenario, **fields: Any) -> Scenario:
+    """Return the scenario in space, with fields of the angle sensor."""
+    model, box = scenario.set_model, replace(scenario.dispersion, y_m=(-8e3, 9e3), vy_m_s=(-1.0, 2.0))
+    model = replace(model, bounds=box, angle_sensor=replace(model.angle_sensor, **fields))
+    return replace(scenario, dispersion=box, set_model=model)
+
+
+def widest_m(measured: Floats, times_s: Floats, pixel: float, centroid_m: float, constant: bool) -> float:
+    """Return half the width of the interval of misses m that agree with measured z/x, by two linear programs.
+
+    z = m + s t at the time t before the arrival; with a constant bias, its share of the centroid error is a variable.
+    """
+    x = SPEED_M_S * times_s
+    bound = pixel * x + (0.0 if constant else centroid_m)
+    # Variables: m, s FIRST_S and the bias, m.
+    rows = np.stack([np.ones_like(x), times_s / FIRST_S, np.full_like(x, float(constant))], axis=1)
+    matrix, most = np.concatenate([rows, -rows]), np.concatenate([measured * x + bound, bound - measured * x])
+    scale = 1.0 / np.abs(np.concatenate([x, x]))
+    ends = []
+    for sign in (1.0, -1.0):
+        solved = linprog(
+            [sign, 0.0, 0.0],
+            A_ub=matrix * scale[:, None] * 1e6,
+            b_ub=most * scale * 1e6,
+            bounds=[(None, None), (None, None), (-centroid_m, centroid_m)],
+        )
+        assert solved.status == 0, solved.message
+        ends.append(solved.x[0])
+    return 0.5 * float(ends[1] - ends[0])
+
+
+@pytest.mark.parametrize("constant", [False, True])
+@pytest.mark.parametrize("last_s", [30.0, 300.0, 1200.0, 3000.0])
+@pytest.mark.parametrize("centroid_m", [0.0, 3.0, 50.0])
+def test_possible_miss_is_that_of_linear_programs(last_s: float, centroid_m: float, constant: bool) -> None:
+    """Exact measurements reach the closed form, and no admissible ones exceed it."""
+    times_s = np.linspace(FIRST_S, last_s, 40)
+    expected = possible_miss_m(SPEED_M_S, PIXEL_RAD, centroid_m, FIRST_S, last_s, constant_bias=constant)
+    exact = widest_m(np.zeros(40), times_s, PIXEL_RAD, centroid_m, constant)
+    assert exact == pytest.approx(expected, rel=1e-6)
+    random = np.random.default_rng(7)
+    for _ in range(5):
+        share = random.uniform(-1.0, 1.0, 40) * (1.0 if random.uniform() < 0.5 else 0.0)
+        bias = random.uniform(-1.0, 1.0) if constant else random.uniform(-1.0, 1.0, 40)
+        errors = share * PIXEL_RAD + bias * centroid_m / (SPEED_M_S * times_s)
+        assert widest_m(errors, times_s, PIXEL_RAD, centroid_m, constant) <= expected * (1.0 + 1e-6)
+
+
+def test_centroid_error_adds_itself_for_a_long_arc_and_less_than_twice_itself_above_three_cut_offs() -> None:
+    def added(share: float, *, constant: bool = False) -> float:
+        one, none = (
+            possible_miss_m(SPEED_M_S, PIXEL_RAD, centroid_m, 1e4, 1e4 * share, constant_bias=constant)
+            for centroid_m in (1.0, 0.0)
+        )
+        return one - none
+
+    assert added(1e-5) == pytest.approx(1.0, rel=1e-4)
+    assert added(1.0 / 3.0) == pytest.approx(2.0)
+    assert added(0.2) < 2.0 < added(0.5)
+    for share in (1e-5, 0.3, 0.9):
+        assert added(share, constant=True) == pytest.approx(1.0)
+
+
+def measured_set(centroid_m: float, alpha_rad: Callable[[float], float]) -> InformationSet:
+    """Return the set after images from `FIRST_S` to `LAST_S`, with known range and speed and no disturbance."""
+    camera = AngleSensor.camera(EVERY_S, PIXEL_RAD, centroid_m)
+    at_start = (FIRST_S * SPEED_M_S, FIRST_S * SPEED_M_S)
+    box = StateBox((-1e6, 1e6), at_start, (-1e3, 1e3), (-SPEED_M_S, -SPEED_M_S))
+    threshold_m = max(1e3, 10.0 * centroid_m)
+    model = SetModel(SPEED_M_S, EVERY_S, box, camera, 0.0, threshold_m, 1, 1, InitialSet.BOX, Model.GUARANTEED)
+    information = InformationSet(model)
+    while True:
+        before_s = FIRST_S - information.time_s
+        information.measure_angle(alpha_rad(before_s))
+        if before_s <= LAST_S:
+            return information
+        information.predict()
+
+
+@pytest.mark.parametrize("centroid_m", [0.0, 12.0, 100.0])
+def test_the_set_has_the_possible_misses(centroid_m: float) -> None:
+    """Exact images reach the closed form within 2 %; random ones and those at a bound do not exceed it by more."""
+    expected = possible_miss_m(SPEED_M_S, PIXEL_RAD, centroid_m, FIRST_S, LAST_S)
+
+    def interval(alpha_rad: Callable[[float], float]) -> tuple[float, float]:
+        miss = measured_set(centroid_m, alpha_rad).predicted_miss()
+        return float(miss.lower_m[0]), float(miss.upper_m[0])
+
+    lower, upper = interval(lambda before_s: 0.0)
+    assert upper == pytest.approx(-lower)
+    assert expected * (1.0 - 1e-9) <= upper <= 1.02 * expected
+    bound, random = AngleSensor.camera(EVERY_S, PIXEL_RAD, centroid_m).error_bound, np.random.default_rng(3)
+    for _ in range(5):
+        lower, upper = interval(lambda before_s: random.choice([-1.0, 1.0]) * bound(before_s * SPEED_M_S))
+        assert 0.5 * (upper - lower) <= 1.02 * expected
+        assert lower <= 0.0 <= upper
+
+
+@pytest.mark.parametrize("centroid_m", [0.0, 12.0, 100.0])
+def test_a_truth_at_the_end_of_the_possible_misses_agrees_with_exact_images_of_its_mirror(centroid_m: float) -> None:
+    """Its errors go from one bound to the other, linearly in the inverse of the time before the arrival."""
+    miss = possible_miss_m(SPEED_M_S, PIXEL_RAD, centroid_m, FIRST_S, LAST_S)
+    # |z| reaches the bound at the first image on one side and at the last one on the other.
+    first = -(PIXEL_RAD * SPEED_M_S + centroid_m / FIRST_S)
+    last = PIXEL_RAD * SPEED_M_S + centroid_m / LAST_S
+    inverse = np.array([1.0 / FIRST_S, 1.0 / LAST_S])
+    slope, rate = np.polyfit(inverse, [first, last], 1)
+    assert slope == pytest.approx(miss)
+    camera = AngleSensor.camera(EVERY_S, PIXEL_RAD, centroid_m)
+    for before_s in np.arange(LAST_S, FIRST_S + 1.0, EVERY_S).tolist():
+        alpha = math.atan((slope / before_s + rate) / SPEED_M_S)
+        assert abs(alpha) <= camera.error_bound(before_s * SPEED_M_S) * (1.0 + 1e-6)
+    information = measured_set(centroid_m, lambda before_s: 0.0)
+    assert float(information.predicted_miss().upper_m[0]) >= miss * (1.0 - 1e-9)
+
+
+def test_closed_form_of_a_scenario_knows_schedule_delay_and_images() -> None:
+    scenario = camera_scenario(first_image_s=2400.0, last_image_s=60.0)
+    assert images_s(scenario) == pytest.approx((2400.0, 60.0))
+    late = replace(scenario, thruster=replace(scenario.thruster, last_impulse_s=300.0, delay_steps=3))
+    assert images_s(late) == pytest.approx((2400.0, 360.0))
+    expected = possible_miss_m(SPEED_M_S, PIXEL_RAD, CENTROID_M, 2400.0, 360.0)
+    assert possible_miss_of(late) == pytest.approx(expected)
+    assert possible_miss_of(in_space(late)) == pytest.approx(math.sqrt(2.0) * expected)
+    with pytest.raises(ValueError, match="two images"):
+        images_s(replace(late, thruster=replace(late.thruster, last_impulse_s=2400.0)))
+    line = replace(late.set_model, angle_sensor=AngleSensor(EVERY_S, 1e-5, 2e-5, 3e7))
+    with pytest.raises(ValueError, match="camera"):
+        possible_miss_of(replace(late, set_model=line))
+
+
+def sound(results: Results) -> bool:
+    return bool(results.truth_kept.all() and results.phi_held.all() and not results.phi_held.mask.any())
+
+
+@pytest.mark.parametrize("noise", NoiseKind)
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {},
+        {"bias": Bias.CONSTANT},
+        {"miss_probability": 0.5, "first_image_s": 2400.0, "last_image_s": 90.0},
+        {"convention": Convention.GIMBAL},
+        {"convention": Convention.CONE, "bias": Bias.CONSTANT, "miss_probability": 0.2},
+        {"error_shape": ErrorShape.DISC},
+    ],
+)
+def test_engagements_with_a_camera_keep_the_truth_and_the_bound(noise: NoiseKind, fields: dict[str, Any]) -> None:
+    plane = replace(camera_scenario(), noise=noise, tie=TieRule.RANDOM)
+    if not {"convention", "error_shape"} & set(fields):
+        model = replace(plane.set_model, angle_sensor=replace(plane.set_model.angle_sensor, **fields))
+        assert sound(simulate(replace(plane, set_model=model), 16))
+    assert sound(simulate(in_space(plane, **fields), 16))
+
+
+@pytest.mark.parametrize("last_s", [300.0, 900.0])
+@pytest.mark.parametrize("spatial", [False, True])
+def test_phi_with_the_last_impulse_at_the_last_image_is_the_possible_miss(last_s: float, spatial: bool) -> None:
+    """Images reach from the start to the cut-off, so Phi is at most the closed form, up to the range's uncertainty."""
+    scenario = camera_scenario(last_image_s=last_s)
+    thruster = Thruster(20.0, 0.0, 5.0, last_impulse_s=last_s)
+    scenario = replace(scenario, thruster=thruster, noise=NoiseKind.GAME)
+    scenario = in_space(scenario) if spatial else scenario
+    results = simulate(scenario, 8)
+    assert sound(results)
+    phi = results.guaranteed_miss_m.compressed()
+    # A label may arrive 10 s later than the nominal one, and the bands are up to 1 % wider at the threshold.
+    assert phi.max() <= 1.08 * possible_miss_of(scenario)
+    assert phi.max() >= 0.5 * possible_miss_of(scenario)
+
+
+def test_a_camera_without_centroid_error_is_the_line_with_equal_errors(asteroid: Scenario) -> None:
+    """Bit for bit, in both models."""
+    for kind in Model:
+        initial = InitialSet.BOX if kind is Model.GUARANTEED else InitialSet.RECTANGLE
+        model = replace(asteroid.set_model, kind=kind, initial_set=initial)
+        line = AngleSensor(0.5, 2e-4, 2e-4, 5801.3e3)
+        camera = AngleSensor.camera(0.5, 2e-4, nominal_range_m=5801.3e3)
+        first, second = (
+            simulate(replace(asteroid, noise=NoiseKind.GAME, set_model=replace(model, angle_sensor=sensor)), 5)
+            for sensor in (line, camera)
+        )
+        assert first.miss_m.tolist() == second.miss_m.tolist()
+        assert first.guaranteed_miss_m.tolist() == second.guaranteed_miss_m.tolist()
+
+
+def steps_of(scenario: Scenario, runs: int = 6, seed: int = 2) -> list[Step]:
+    draws = draw(scenario, range(runs), seed)
+    flight, steps = Engagements(scenario, draws), list[Step]()
+    while flight.flying:
+        flight.advance(steps.append)
+    return steps
+
+
+@pytest.mark.parametrize("shape", [None, ErrorShape.BOX, ErrorShape.DISC])
+def test_a_constant_bias_is_a_constant_length(shape: ErrorShape | None) -> None:
+    """The error at the distance d is pixel times a draw of the image plus centroid/d times the draw of the run."""
+    scenario = camera_scenario(bias=Bias.CONSTANT)
+    if shape is not None:
+        scenario = in_space(scenario, error_shape=shape)
+    steps = steps_of(scenario)
+    draws = draw(scenario, range(6), 2)
+    assert draws.bias is not None
+    assert np.unique(draws.bias).size == draws.bias.size
+    assert (np.hypot(*draws.bias) if shape is ErrorShape.DISC else np.abs(draws.bias)).max() <= 1.0
+    for step in steps[:-10]:
+        if "angle" in step.measured:
+            error = step.measured["angle"] - step.sight.alpha_rad
+            pixel = PIXEL_RAD * draws.errors["angle"][..., step.step]
+            assert error == pytest.approx(pixel + CENTROID_M / step.sight.range_m * draws.bias, rel=1e-6, abs=1e-15)
+
+
+def test_images_are_taken_from_the_first_to_the_last_and_measured_from_then_on() -> None:
+    scenario = camera_scenario(first_image_s=1800.0, last_image_s=600.0)
+    record = fly_one(scenario)
+    times_s = [step.time_s for step in record.steps if "angle" in step.measured]
+    assert times_s == np.arange(1800.0, 3000.1, EVERY_S).tolist()
+    assert record.steps[0].truth_margin_m is None
+    # The period begins at t = 0, whatever the first image is.
+    odd = fly_one(camera_scenario(first_image_s=1799.0, last_image_s=601.0))
+    assert [step.time_s for step in odd.steps if "angle" in step.measured] == times_s[1:-1]
+
+
+class Witness:
+    """A strategy that fires nothing and stores what it sees."""
+
+    name = "witness"
+
+    def __init__(self) -> None:
+        self.situations: list[Situation] = []
+
+    def start(self, batch: int) -> None:
+        pass
+
+    def decide(self, situation: Situation, state: None) -> Floats:
+        self.situations.append(situation)
+        return np.zeros_like(situation.last_impulse_m_s)
+
+
+def test_lost_images_are_the_same_for_all_noises_and_known_to_strategies() -> None:
+    scenario = camera_scenario(miss_probability=0.4)
+    seen = []
+    for noise in NoiseKind:
+        witness = Witness()
+        simulate(replace(scenario, noise=noise), 8, strategy=witness)
+        angles = [situation for situation in witness.situations if situation.step % 2 == 0]
+        seen.append(np.array([situation.is_new("angle") for situation in angles[:200]]))
+        before: Floats | None = None
+        for situation in angles[:200]:
+            now, new = situation.measured["angle"], situation.is_new("angle")
+            assert situation.new == ({"angle"} if new.any() else set())
+            if before is not None:
+                assert np.array_equal(now[~new], before[~new], equal_nan=True)
+            assert np.isfinite(now[new]).all()
+            before = now
+        assert not witness.situations[1].is_new("angle").any()
+    assert np.array_equal(seen[0], seen[1])
+    assert 0.35 < 1.0 - seen[0].mean() < 0.45
+
+
+def test_a_lost_image_is_no_value_of_the_record_and_no_cut() -> None:
+    scenario = camera_scenario(miss_probability=0.4)
+    record: Record = fly_one(scenario, 3)
+    images = draw(scenario, [3], 0).images
+    assert images is not None
+    taken = [step for step in record.steps[:230] if "angle" in step.measured]
+    assert [step.time_s for step in taken] == [
+        step * EVERY_S / 2 for step in range(0, 230, 2) if images[0, step] >= 0.4
+    ]
+
+
+@pytest.mark.parametrize("spatial", [False, True])
+def test_a_run_with_lost_images_does_not_depend_on_its_batch(spatial: bool) -> None:
+    """Ranges and rates of a step whose image is lost cut without the angle."""
+    scenario = camera_scenario(miss_probability=0.5, bias=Bias.CONSTANT)
+    scenario = in_space(scenario, convention=Convention.GIMBAL) if spatial else scenario
+    scenario = replace(scenario, range_sensor=RangeSensor(EVERY_S, 0.01), rate_sensor=RateSensor(EVERY_S, 1e-8))
+    together = simulate(scenario, 5)
+    assert sound(together)
+    for run in (1, 4):
+        alone = simulate(scenario, [run])
+        assert alone.miss_m[0] == together.miss_m[run]
+        assert alone.guaranteed_miss_m[0] == together.guaranteed_miss_m[run]
+        assert alone.truth_margin_m[0] == together.truth_margin_m[run]
+
+
+def test_bands_are_mirrored_for_a_negative_angle_and_empty_behind_the_target() -> None:
+    model = camera_scenario().set_model
+    (law,) = section_laws(model)
+    label = 3600.0 * SPEED_M_S
+    for alpha in (1e-5, 0.02, 1.2):
+        lower, upper = slope_band(alpha, 0.0, label, 2e3, law)
+        assert slope_band(-alpha, 0.0, label, 2e3, law) == (-upper, -lower)
+        # Labels below the threshold extend the band in the range; behind the target, its limits are reversed there.
+        heights = [np.multiply(x, slope_band(alpha, 0.0, label, x, law)) for x in (500.0, 1000.0, 1500.0)]
+        assert np.diff(heights, n=2, axis=0) == pytest.approx(0.0, abs=1e-9)
+        for x in (0.0, -1e4):
+            lower, upper = np.multiply(x, slope_band(alpha, 0.0, label, x, law))
+            assert upper <= lower
+
+
+def test_the_published_model_takes_the_angle_itself() -> None:
+    model = replace(camera_scenario().set_model, kind=Model.PAPER)
+    (law,) = section_laws(model)
+    for x in (1e3, 2e4, 1e7):
+        bound = PIXEL_RAD + CENTROID_M / x
+        assert slope_band(0.01, 0.0, 2e7, x, law) == pytest.approx((0.01 - bound, 0.01 + bound), rel=1e-8)
+    results = simulate(replace(camera_scenario(), set_model=model, noise=NoiseKind.GAME), 4)
+    assert np.isfinite(results.miss_m).all()
+
+
+@pytest.mark.parametrize("centroid_m", [CENTROID_M, 60.0])
+def test_pairs_of_the_lower_bound_stay_within_the_bounds_of_a_camera(centroid_m: float) -> None:
+    """The two motions have the same images until the cut-off of the images, and at least one misses by the bound."""
+    scenario = camera_scenario(centroid_error_m=centroid_m, last_image_s=300.0)
+    bound = lower_bound(scenario)
+    assert bound.bound_m > 0.0
+    flown = fly_pair(scenario, bound.pair)
+    assert flown.greatest_error_share <= 1.0
+    assert flown.results.miss_m.max() >= bound.bound_m * (1.0 - 1e-6)
+    if centroid_m == CENTROID_M:
+        # Images beyond the last one tell no more: the bound is not less without the limit of time.
+        assert bound.bound_m >= lower_bound(camera_scenario()).bound_m * (1.0 - 1e-6)
+
+
+def test_the_adversary_keeps_the_bounds_of_a_camera() -> None:
+    scenario = camera_scenario(miss_probability=0.3, last_image_s=120.0)
+    worst = find_worst(scenario, budget=64)
+    record = worst.record()
+    assert record.result.miss_m[0] == pytest.approx(worst.miss_m)
+    assert record.result.truth_kept.all()
+    assert any("angle" not in step.measured for step in record.steps[:200:2])
