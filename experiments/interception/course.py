@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -66,7 +67,7 @@ def least_to_go_s(scenario: Scenario) -> float:
     return 0.5 * scenario.set_model.step_s
 
 
-def evenly(places: Floats, count: int) -> NDArray[np.int64]:
+def evenly(places: NDArray[Any], count: int) -> NDArray[np.int64]:
     """Return at most `count` indices of rising values, evenly distributed over them, with the first and the last."""
     wanted = np.linspace(places[0], places[-1], count)
     return np.unique(np.abs(places - wanted[:, None]).argmin(axis=1))

@@ -11,15 +11,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from experiments.common.errors import InputError, shown
 from experiments.common.page_document import page
-from experiments.interception.record_titles import outcome_title, record_titles
+from experiments.interception.course import Clock, duration_text, evenly, least_to_go_s, marks, true_predicted_misses
+from experiments.interception.record_titles import angle_name, outcome_title, record_titles
 from infoset import Convention, InformationSet, Section
 from infoset.sensors import SENSORS
-from sim import Record, Scenario
+from sim import Record, Scenario, StepRecord
 from sim.gravity import on_board_model
 
 Floats = NDArray[np.float64]
 
 MOST_RECORDS = 2
+MOST_STEPS = 400
+"""Most steps of a record in the page; a longer flight is thinned."""
+TOLERANCE = 5e-4
+"""Tolerance of outlines in a page of a long flight, as a part of their box: about 0.2 pixels on a screen."""
+_PASSES = (1, 0) * 4
+_FEWEST_VERTICES = 5
 STEPS_OF_A_BOX = 65535
 """Steps of the vertex grid across the box of a polygon: about 0.01 pixels on a screen."""
 
@@ -33,12 +40,13 @@ def interception_page(records: Sequence[Record]) -> str:
         One or two.
     """
     names = list(dict.fromkeys(record.scenario.name for record in records))
+    clock = Clock.of(records)
     titles = record_titles(records)
     return page(
         f"Replay of {' and '.join(names)}",
         [
             "sets.js",
-            *(["b-plane.js"] if any(record.scenario.is_spatial for record in records) else []),
+            *(["b-plane.js", "projection.js"] if any(record.scenario.is_spatial for record in records) else []),
             "interception.js",
         ],
         {
@@ -46,22 +54,39 @@ def interception_page(records: Sequence[Record]) -> str:
             "about": list(
                 dict.fromkeys(record.scenario.description for record in records if record.scenario.description)
             ),
+            "counts_down": clock.counts_down,
             "records": [_data(record, title) for record, title in zip(records, titles, strict=True)],
         },
     )
 
 
 def _data(record: Record, title: str) -> dict[str, object]:
-    scenario, steps = record.scenario, record.steps
+    scenario, kept = record.scenario, kept_steps(record)
+    steps = [record.steps[index] for index in kept]
     thruster, model = scenario.thruster, scenario.set_model
-    spent = np.cumsum([abs(step.impulse_m_s) for step in steps])
-    stages = list(replayed(record))
-    states = [state for each in stages for state in (each.before, each.measured)]
+    moduli = np.abs([step.impulse_m_s for step in record.steps])
+    stages = list(replayed(record, kept))
+    states: list[tuple[Section, ...]] = []
+    numbers: list[tuple[int, int, int]] = []
+    for previous, index in zip([-2, *kept], kept, strict=False):
+        if index != previous + 1:
+            states.append(stages[index].before)
+        states += [stages[index].measured, stages[index + 1].before]
+        numbers.append((len(states) - 3, len(states) - 2, len(states) - 1))
     sections = [section for state in states for section in state]
+    thinned = ""
+    if len(kept) < len(record.steps):
+        fired = np.count_nonzero(moduli)
+        impulses = f" and {np.count_nonzero(moduli[kept])} of {fired} impulses" if fired else ""
+        thinned = f"; the page has {len(kept)} of {len(record.steps)} steps{impulses}"
     return {
         "title": title,
         "outcome": outcome_title(record),
-        "facts": f"{record.strategy} strategy, {model.kind.value} model, seed {record.seed}, run {record.run}",
+        "facts": f"{record.strategy} strategy, {model.kind.value} model, seed {record.seed}, run {record.run}{thinned}",
+        "arrival_s": scenario.nominal_arrival_s,
+        "least_to_go_s": least_to_go_s(scenario),
+        "marks": [[name, duration_text(time), time] for name, time in marks(scenario).items()],
+        "guaranteed_miss_m": record.result.guaranteed_miss_m.tolist()[0] if record.result.guarantees else None,
         "closing_speed_m_s": model.closing_speed_m_s,
         "range_error_relative": scenario.range_sensor.relative_error if scenario.range_sensor is not None else None,
         "rate_error_rad_s": scenario.rate_sensor.error_rad_s if scenario.rate_sensor is not None else None,
@@ -71,9 +96,11 @@ def _data(record: Record, title: str) -> dict[str, object]:
         "time_s": [step.time_s for step in steps],
         "measured_range_m": [step.measured.get("range") for step in steps],
         "true_range_m": [step.true_range_m for step in steps],
-        "modulus_m_s": [abs(step.impulse_m_s) for step in steps],
-        "budget_left_m_s": np.maximum(thruster.budget_m_s - spent, 0.0).tolist(),
+        "next_range_m": [step.true_range_m for step in _next(record, kept)],
+        "modulus_m_s": moduli[kept].tolist(),
+        "budget_left_m_s": np.maximum(thruster.budget_m_s - np.cumsum(moduli), 0.0)[kept].tolist(),
         "sections": {
+            "states": _packed(numbers, "<u4"),
             "starts": _packed(np.concatenate([[0], np.cumsum([len(state) for state in states])]), "<u4"),
             "labels_m": _packed([section.label_m for section in sections], "<f8"),
             "ranges_m": _packed([section.range_m for section in sections], "<f8"),
@@ -82,10 +109,13 @@ def _data(record: Record, title: str) -> dict[str, object]:
             {
                 "along": f" along {axis}" if scenario.is_spatial else "",
                 "measured_name": _measured_name(scenario, axis),
-                **_axis_data(record, axis),
+                "angle_name": angle_name(scenario, axis),
+                **_axis_data(record, axis, kept),
                 "outlines": {
-                    "predicted_miss_m": _packed(np.concatenate([each.miss_m[axis] for each in stages]), "<f8"),
-                    **packed_outlines([_omega_alpha(section, axis) for section in sections]),
+                    "predicted_miss_m": _packed(np.concatenate([stages[k].miss_m[axis] for k in kept]), "<f8"),
+                    **packed_outlines(
+                        [_omega_alpha(section, axis) for section in sections], TOLERANCE if thinned else 0.0
+                    ),
                 },
             }
             for axis in model.axes
@@ -100,20 +130,41 @@ def _measured_name(scenario: Scenario, axis: str) -> str:
     return f"measured angle along {axis}" if scenario.is_spatial else "measured angle"
 
 
-def _axis_data(record: Record, axis: str) -> dict[str, object]:
+def kept_steps(record: Record) -> list[int]:
+    """Return the steps that the page has: all, or of a long flight at most `MOST_STEPS`.
+
+    The first and the last step, the first and the last image, and up to half of `MOST_STEPS` impulses are among them.
+    The others are evenly distributed: half of them over the steps, half over the logarithm of the time before arrival.
+    """
+    count = len(record.steps)
+    if count <= MOST_STEPS:
+        return list(range(count))
+    fired = np.flatnonzero([step.impulse_m_s for step in record.steps])
+    fired = fired[evenly(np.arange(len(fired)), MOST_STEPS // 2)] if len(fired) > MOST_STEPS // 2 else fired
+    seen = np.flatnonzero(["angle" in step.measured for step in record.steps])
+    kept = {0, count - 1, *fired.tolist(), *seen[[0, -1] if len(seen) else []].tolist()}
+    places = -np.log(Clock(counts_down=True).at(record))
+    half = (MOST_STEPS - len(kept)) // 2
+    return sorted(kept.union(evenly(places, half).tolist(), evenly(np.arange(count), half).tolist()))
+
+
+def _next(record: Record, kept: Sequence[int]) -> list[StepRecord]:
+    """Return the steps after some steps; the last step follows itself."""
+    return [record.steps[min(index + 1, len(record.steps) - 1)] for index in kept]
+
+
+def _axis_data(record: Record, axis: str, kept: Sequence[int]) -> dict[str, object]:
     """Return what belongs to one lateral axis: the line of sight in its plane with x, impulses and predicted misses."""
-    steps = [step.axes[axis] for step in record.steps]
+    steps = [record.steps[index].axes[axis] for index in kept]
+    after = [step.axes[axis] for step in _next(record, kept)]
     model = on_board_model(record.scenario).axis(axis)
-    # omega (x^2 + a^2) = V_a x - V_x a, and a + V_a x / |V_x| is the miss of the true state without further impulses.
-    slopes = np.tan([[step.axes[name].true_angle_rad for name in step.axes] for step in record.steps])
-    own = np.tan([step.true_angle_rad for step in steps])
-    share = (1.0 + own**2) / (1.0 + np.sum(slopes**2, axis=1))
-    rates, ranges = np.array([(step.axes[axis].true_rate_rad_s, step.true_range_m) for step in record.steps]).T
-    misses = -rates * ranges**2 / float(record.result.velocity_m_s[0, 1]) * share
+    misses = true_predicted_misses(record)[axis]
+    next_misses = misses[np.minimum(np.array(kept) + 1, len(misses) - 1)]
     return {
         "axis": axis,
         "angle_error_rad": model.angle_sensor.error_at_zero_range_rad,
         "angle_error_slope_rad_m": model.angle_sensor.error_slope_rad_per_m,
+        "centroid_error_m": model.angle_sensor.centroid_error_m or 0.0,
         "disturbance_m_s2": model.disturbance_m_s2,
         **{
             f"measured_{kind.quantity}": [step.measured.get(kind.name) for step in steps]
@@ -122,7 +173,10 @@ def _axis_data(record: Record, axis: str) -> dict[str, object]:
         },
         "true_angle_rad": [step.true_angle_rad for step in steps],
         "true_rate_rad_s": [step.true_rate_rad_s for step in steps],
-        "true_predicted_miss_m": misses.tolist(),
+        "true_predicted_miss_m": misses[kept].tolist(),
+        "next_angle_rad": [step.true_angle_rad for step in after],
+        "next_rate_rad_s": [step.true_rate_rad_s for step in after],
+        "next_predicted_miss_m": next_misses.tolist(),
         "predicted_miss_m": [step.predicted_miss_m for step in steps],
         "impulse_m_s": [step.impulse_m_s for step in steps],
     }
@@ -155,10 +209,11 @@ class Stages:
     miss_m: Mapping[str, Floats]
 
 
-def replayed(record: Record) -> Iterator[Stages]:
+def replayed(record: Record, kept: Sequence[int] | None = None) -> Iterator[Stages]:
     """Yield the stages of each step of a record, computed again from its measurements.
 
-    The last stages have an empty `measured`: the set predicted from the last step.
+    The last stages have an empty `measured`: the set predicted from the last step. With `kept`, the sections are those
+    of these steps and of the predictions from them; the other stages are empty.
 
     Raises
     ------
@@ -172,9 +227,11 @@ def replayed(record: Record) -> Iterator[Stages]:
     """
     scenario, axes = record.scenario, record.scenario.set_model.axes
     information = InformationSet(on_board_model(scenario))
+    wanted = set(range(len(record.steps)) if kept is None else kept)
+    empty = dict.fromkeys(axes, np.empty((0, 2)))
     for number, step in enumerate(record.steps):
         along = [step.axes[axis] for axis in axes]
-        before = tuple(information.sections())
+        before = tuple(information.sections()) if {number - 1, number} & wanted else ()
         values = {
             name: _of_batch([each.measured[name] for each in along[: len(axes) if sensor.is_lateral else 1]])
             for name, sensor in scenario.sensors.items()
@@ -183,19 +240,22 @@ def replayed(record: Record) -> Iterator[Stages]:
         for name, sensor in scenario.sensors.items():
             if name in values:
                 sensor.cut(information, values, np.array([True]))
-        measured = tuple(information.sections())
-        if [section.label_m for section in measured] != [section.label_m for section in step.sections]:
-            raise InputError(
-                f"the record of {shown(scenario.name)}: replaying it gives different sets at step {number}; "
-                "another version of infoset wrote it: create it again with `infoset engage --record FILE.npz`"
-            )
-        intervals = np.stack(information.predicted_miss_by_section_m(), axis=-1)[..., information.living[0], :]
-        by_axis = intervals.reshape(len(axes), -1, 2)
-        yield Stages(before, measured, dict(zip(axes, by_axis, strict=True)))
+        if number in wanted:
+            measured = tuple(information.sections())
+            if [section.label_m for section in measured] != [section.label_m for section in step.sections]:
+                raise InputError(
+                    f"the record of {shown(scenario.name)}: replaying it gives different sets at step {number}; "
+                    "another version of infoset wrote it: create it again with `infoset engage --record FILE.npz`"
+                )
+            intervals = np.stack(information.predicted_miss_by_section_m(), axis=-1)[..., information.living[0], :]
+            by_axis = intervals.reshape(len(axes), -1, 2)
+            yield Stages(before, measured, dict(zip(axes, by_axis, strict=True)))
+        else:
+            yield Stages(before, (), empty)
         information.shift(_of_batch([each.impulse_m_s for each in along]))
         information.drop_below_threshold()
         information.predict()
-    yield Stages(tuple(information.sections()), (), dict.fromkeys(axes, np.empty((0, 2))))
+    yield Stages(tuple(information.sections()), (), empty)
 
 
 def _of_batch(values: Sequence[float]) -> Floats:
@@ -203,10 +263,15 @@ def _of_batch(values: Sequence[float]) -> Floats:
     return np.array(values).reshape((-1, 1) if len(values) > 1 else -1)
 
 
-def packed_outlines(outlines: Sequence[Floats]) -> dict[str, str]:
+def packed_outlines(outlines: Sequence[Floats], tolerance: float = 0.0) -> dict[str, str]:
     """Return outlines with their boxes exactly and their vertices on a grid of `STEPS_OF_A_BOX` across the box.
 
     An outline has at least one vertex. A box is the least of each coordinate, then the greatest.
+
+    Parameters
+    ----------
+    tolerance : float
+        Vertices are left out that are nearer to the line through their neighbours, as a part of the box.
     """
     counts = np.array([len(outline) for outline in outlines], dtype=np.int64)
     if not len(counts):
@@ -216,11 +281,31 @@ def packed_outlines(outlines: Sequence[Floats]) -> dict[str, str]:
     least, greatest = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
     width = np.where(greatest > least, greatest - least, 1.0)
     share = (points - np.repeat(least, counts, axis=0)) / np.repeat(width, counts, axis=0)
+    if tolerance > 0.0:
+        share, counts = _simplified(share, counts, tolerance)
     return {
         "boxes": _packed(np.concatenate([least, greatest], axis=1), "<f8"),
         "counts": _packed(counts, "<u4"),
         "vertices": _packed(np.rint(share * STEPS_OF_A_BOX), "<u2"),
     }
+
+
+def _simplified(points: Floats, counts: NDArray[np.int64], tolerance: float) -> tuple[Floats, NDArray[np.int64]]:
+    """Return outlines without the vertices near the line through their neighbours, and their numbers of vertices.
+
+    Every second vertex is looked at in each pass, so that neighbours are not removed at once.
+    """
+    for parity in _PASSES:
+        ends = np.cumsum(counts)
+        first, size = np.repeat(ends - counts, counts), np.repeat(counts, counts)
+        number = np.arange(len(points)) - first
+        before, after = (points[first + (number + step) % size] for step in (-1, 1))
+        chord = after - before
+        area = np.abs(chord[:, 0] * (points - before)[:, 1] - chord[:, 1] * (points - before)[:, 0])
+        is_near = area < tolerance * np.hypot(*chord.T)
+        kept = ~is_near | (number % 2 != parity) | (number == 0) | (size < _FEWEST_VERTICES)
+        points, counts = points[kept], np.add.reduceat(kept, ends - counts, dtype=np.int64)
+    return points, counts
 
 
 def _packed(values: ArrayLike, kind: str) -> str:

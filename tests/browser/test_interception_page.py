@@ -310,6 +310,7 @@ def test_odd_engagements_are_drawn_to_their_end(open_page: Open, kind: str) -> N
     for frame in sorted({*range(0, last, 37), *range(max(0, last - 8), last + 1)}):
         opened.page.evaluate(f"player.show({frame})")
     assert opened.page.evaluate("player.frame") == last
+    opened.page.evaluate(f"player.show({last - 2})")  # after the last measurement
     said = rows_of(opened)
     assert said["sections"] == opened.page.evaluate("String(columns[0].sections.length)")
     assert (said["predicted miss"] == "no set is left") == (record.steps[-1].predicted_miss_m is None)

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.interception.page import interception_page
+from experiments.interception.page import MOST_STEPS, interception_page, kept_steps
 from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind
+from infoset import InitialSet, Model
 from sim import Body, Record, fly_one
 from tests.browser.conftest import Opened, numbers
 
@@ -95,13 +96,21 @@ def test_numbers_name_the_axes(open_page: Open, page: str, space: list[Record]) 
         along = step.axes[axis]
         assert along.predicted_miss_m is not None
         assert numbers(rows[f"predicted miss along {axis}"]) == pytest.approx(along.predicted_miss_m, rel=SIX_DIGITS)
-        assert numbers(rows[f"impulse along {axis}"]) == pytest.approx([along.impulse_m_s], rel=SIX_DIGITS)
         assert numbers(rows[f"measured angle along {axis}"]) == pytest.approx(
             [along.measured["angle"] * 1e3], rel=SIX_DIGITS
         )
+    assert {rows[name] for name in ("impulse along y", "impulse along z", "impulse modulus")} == {"not yet"}
+    spent = sum(each.impulse_m_s for each in space[1].steps[:STEP])
+    budget = space[1].scenario.thruster.budget_m_s
+    assert numbers(rows["budget left"]) == pytest.approx([budget - spent], rel=SIX_DIGITS)
+    opened.page.evaluate(f"player.show({IMPULSE})")
+    cells = opened.page.locator("table").first.locator("th, td").all_inner_texts()
+    rows = dict(zip(*[iter(cells)] * 2, strict=True))
+    for axis in AXES:
+        impulse = step.axes[axis].impulse_m_s
+        assert numbers(rows[f"impulse along {axis}"]) == pytest.approx([impulse], rel=SIX_DIGITS)
     assert numbers(rows["impulse modulus"]) == pytest.approx([step.impulse_m_s], rel=SIX_DIGITS)
     spent = sum(each.impulse_m_s for each in space[1].steps[: STEP + 1])
-    budget = space[1].scenario.thruster.budget_m_s
     assert numbers(rows["budget left"]) == pytest.approx([budget - spent], rel=SIX_DIGITS)
 
 
@@ -157,3 +166,98 @@ def test_two_engagements_in_space_share_their_limits(open_page: Open, space: lis
     assert page.evaluate(limits)
     page.get_by_label("Axes").select_option("each its own")
     assert not page.evaluate(limits)
+
+
+@pytest.fixture(scope="module")
+def long_flight() -> Record:
+    """A flight of 1200 steps with four impulses, a cut-off and images in a window."""
+    scenario = load_scenario("asteroid-1997-space", ["angle_sensor.period_s=1.0"])
+    scenario = replace(scenario, body=Body(40.0), set_model=replace(scenario.set_model, step_s=1.0 / 12.0, sections=5))
+    sensor = replace(scenario.set_model.angle_sensor, period_s=1.0 / 12.0, first_image_s=90.0, last_image_s=2.0)
+    model = replace(scenario.set_model, angle_sensor=sensor, kind=Model.GUARANTEED, initial_set=InitialSet.BOX)
+    thruster = replace(scenario.thruster, impulses_s=(60.0, 30.0, 15.0, 8.0), last_impulse_s=8.0)
+    return fly_one(replace(scenario, set_model=model, thruster=thruster, range_sensor=None))
+
+
+def test_a_long_flight_is_thinned(open_page: Open, long_flight: Record, screenshots: Path) -> None:
+    record = long_flight
+    html = interception_page([record])
+    kept = kept_steps(record)
+    fired = [index for index, step in enumerate(record.steps) if step.impulse_m_s != 0.0]
+    assert len(record.steps) > 1000
+    assert len(kept) <= MOST_STEPS
+    assert {0, len(record.steps) - 1, *fired} <= set(kept)
+    assert 1 <= len(fired) <= 4
+    assert len(html.encode()) < 4_000_000
+    opened = open_page(html)
+    page = opened.page
+    facts = page.locator("h2 ~ p").nth(1).inner_text()
+    assert f"the page has {len(kept)} of {len(record.steps)} steps and {len(fired)} of {len(fired)} impulses" in facts
+    assert page.evaluate("player.frames") == 4 * len(kept)
+    for frame in (*range(0, 4 * len(kept), 97), 4 * len(kept) - 1):
+        page.evaluate(f"player.show({frame})")
+    number = kept.index(fired[1])
+    step, after = record.steps[fired[1]], record.steps[fired[1] + 1]
+    page.evaluate(f"player.show({4 * number + 2})")
+    assert opened.shown_at().endswith("before arrival), after the impulse")
+    said = rows_of(opened)
+    assert numbers(said["impulse modulus"]) == pytest.approx([step.impulse_m_s], rel=SIX_DIGITS)
+    page.wait_for_timeout(50)
+    page.screenshot(path=screenshots / "space-long.png", full_page=True)
+    page.evaluate(f"player.show({4 * number + 3})")
+    labels = page.evaluate("columns[0].sections.map(({ label }) => label)")
+    assert {section.label_m for section in after.sections} <= set(labels)
+    truth = [page.evaluate(f"columns[{k}].truth.angle") for k in (0, 1)]
+    assert truth == [after.axes[axis].true_angle_rad for axis in AXES]
+
+
+def test_an_image_outside_the_window_is_none(open_page: Open, long_flight: Record) -> None:
+    record = long_flight
+    opened = open_page(interception_page([record]))
+    kept = kept_steps(record)
+    for index in (0, len(record.steps) - 1):
+        assert "angle" not in record.steps[index].measured
+        opened.page.evaluate(f"player.show({4 * kept.index(index)})")
+        assert rows_of(opened)["measured angle along y"] == "not yet"
+        opened.page.evaluate(f"player.show({4 * kept.index(index) + 1})")
+        assert rows_of(opened)["measured angle along y"] == "none"
+
+
+def test_the_possible_miss_and_the_projections(open_page: Open, long_flight: Record) -> None:
+    record = long_flight
+    opened = open_page(interception_page([record]))
+    steps = [record.steps[index] for index in kept_steps(record)]
+    known = [number for number, step in enumerate(steps) if step.predicted_miss_m is not None]
+    kept = [steps[number] for number in known]
+    assert len(kept) > 0.9 * len(steps)
+    found = opened.page.evaluate("engagements[0].corridor")
+    intervals = np.array([[step.axes[axis].predicted_miss_m for axis in AXES] for step in kept])
+    assert len(found["greatest"]) == len(steps)
+    assert [number for number, value in enumerate(found["greatest"]) if value is not None] == known
+    found["greatest"], found["centred"] = (
+        [found[name][number] for number in known] for name in ("greatest", "centred")
+    )
+    np.testing.assert_allclose(found["greatest"], np.hypot(*np.abs(intervals).max(axis=2).T))
+    np.testing.assert_allclose(found["centred"], np.hypot(*(0.5 * np.diff(intervals, axis=2)[:, :, 0].T)))
+    np.testing.assert_allclose(found["truth"][-1], float(record.result.miss_m[0]), atol=0.05)
+    for number, axis in enumerate(AXES):
+        places, truth, extents = (
+            opened.page.evaluate(f"engagements[0].projections[{number}].{name}")
+            for name in ("places", "truth", "extents")
+        )
+        np.testing.assert_allclose(10.0 ** -np.array(places), [step.true_range_m for step in steps])
+        truth, extents = ([values[number] for number in known] for values in (truth, extents))
+        sections = [
+            [section.polygon if axis == "z" else section.polygon_y for section in step.sections] for step in kept
+        ]
+        heights = [[polygon.polygon()[:, 1] for polygon in polygons if polygon is not None] for polygons in sections]
+        ends = [(min(map(np.min, each)), max(map(np.max, each))) for each in heights]
+        np.testing.assert_allclose(extents, ends, rtol=1e-6)
+        inside = [low <= value <= high for value, (low, high) in zip(truth, ends, strict=True)]
+        assert all(inside)
+
+
+def rows_of(opened: Opened) -> dict[str, str]:
+    """The numbers of the record."""
+    cells = opened.page.locator("table").first.locator("th, td").all_inner_texts()
+    return dict(zip(*[iter(cells)] * 2, strict=True))

@@ -21,7 +21,12 @@ class BPlane {
         [`path of its centre after each measurement (dark: last ${RECENT} steps)`, stroke("extra")],
         ["true predicted miss", mark("cross", "ink")],
         ["centre of the body", mark("plus", "quiet")],
-        ...(record.radius_m === null ? [] : [["radius of the body", stroke("quiet", { dash: [2, 2] })]]),
+        ["impulse", mark("dot", "impulse")],
+        ...(record.radius_m === null ? [] : [["disc of the body", (context) => {
+          swatches.fill("quiet", 0.15)(context);
+          stroke("quiet", { dash: [2, 2] })(context);
+        }]]),
+        ...(record.guaranteed_miss_m === null ? [] : [["circle: guaranteed miss \u03a6", stroke("extra", { dash: [8, 3] })]]),
       ],
       draw: () => this.draw(),
       tell: (x, y) => this.tell(x, y),
@@ -48,7 +53,11 @@ class BPlane {
       const [y, z] = panel.columns.map((column) => column.truth.miss);
       return [[0, 0, y, z], ...stages.flatMap((each) => panel.rectangles(each, true))];
     });
-    const [x, y] = [0, 1].map((k) => all.flatMap((box) => [box[k], box[k + 2]]));
+    let [x, y] = [0, 1].map((k) => all.flatMap((box) => [box[k], box[k + 2]]));
+    // The circles of the body and of the guarantee are shown if they are not much greater than the rectangles.
+    const size = Math.max(...x.map(Math.abs), ...y.map(Math.abs));
+    const radii = panels.flatMap(({ record }) => [record.radius_m, record.guaranteed_miss_m]).filter((radius) => radius && radius < 3 * size);
+    [x, y] = [x, y].map((values) => [...values, ...radii.flatMap((radius) => [-radius, radius])]);
     this.unit = unitFor(Math.max(...x, ...y) - Math.min(...x, ...y), LENGTHS);
     this.limits = [x, y].map((values) => limitsOf(values.map((value) => value * this.unit[1])));
   }
@@ -61,6 +70,11 @@ class BPlane {
     });
     const corners = ([left, low, right, high]) =>
       [[left, low], [right, low], [right, high], [left, high]].map((point) => this.place(point));
+    if (record.radius_m !== null) {
+      const disc = polygon(72, 0, record.radius_m).map((point) => this.place(point));
+      chart.curve(disc, { fill: theme.colours.quiet, opacity: 0.15, closed: true });
+      chart.curve(disc, { stroke: theme.colours.quiet, width: 1.3, dash: [2, 2] });
+    }
     const all = this.rectangles(stage, true);
     for (const box of all) chart.curve(corners(box), { fill: theme.colours.set, opacity: 0.06, closed: true });
     const drawn = this.rectangles(stage, false);
@@ -72,13 +86,15 @@ class BPlane {
       const box = [0, 1, 2, 3].map((k) => Math[k < 2 ? "min" : "max"](...all.map((each) => each[k])));
       chart.curve(corners(box), { stroke: theme.colours.set, width: 1.6, dash: [6, 3], closed: true });
     }
-    if (record.radius_m !== null) {
-      const circle = polygon(72, 0, record.radius_m).map((point) => this.place(point));
-      chart.curve(circle, { stroke: theme.colours.quiet, width: 1.3, dash: [2, 2] });
-    }
-    const path = this.path.slice(0, stage === BEFORE ? step : step + 1).filter((point) => point).map((point) => this.place(point));
+    const circle = (radius) => polygon(72, 0, radius).map((point) => this.place(point));
+    if (record.guaranteed_miss_m) chart.curve(circle(record.guaranteed_miss_m), { stroke: theme.colours.extra, width: 1.6, dash: [8, 3] });
+    const last = stage === BEFORE ? step : step + 1;
+    const path = this.path.slice(0, last).filter((point) => point).map((point) => this.place(point));
     chart.curve(path, { stroke: theme.colours.grid, width: 1.8 });
     chart.curve(path.slice(-RECENT), { stroke: theme.colours.extra, width: 1.8 });
+    record.modulus_m_s.slice(0, last).forEach((modulus, index) => {
+      if (modulus > 0 && this.path[index]) chart.point(...this.place(this.path[index]), "dot", theme.colours.impulse, 2.5);
+    });
     if (path.length) chart.point(...path[path.length - 1], "dot", theme.colours.extra);
     chart.point(0, 0, "plus", theme.colours.quiet);
     chart.point(...this.place(columns.map((column) => column.truth.miss)), "cross", theme.colours.ink);

@@ -42,6 +42,16 @@ const symlog = (threshold) => ({
   },
 });
 
+/** Positive values, a decade a step. */
+const LOGARITHMIC = {
+  forward: (value) => Math.log10(Math.max(value, 1e-12)),
+  ticks(low, high) {
+    const [first, last] = [Math.ceil(low), Math.floor(high)];
+    return Array.from({ length: Math.max(0, last - first + 1) }, (_, index) => 10 ** (first + index))
+      .filter((_, index) => index % Math.ceil((last - first + 1) / 5) === 0);
+  },
+};
+
 /** A canvas in a figure: sized to its place, redrawn when that changes, with a tip under the pointer. */
 class Canvas {
   constructor(host, { caption, label, ratio = 0.62, legend = [], draw, tell }) {
@@ -117,8 +127,8 @@ class Canvas {
     drawPath(this.context, points, { stroke, fill, width, dash, closed, opacity });
   }
 
-  mark(x, y, kind, colour, filled = false) {
-    drawMark(this.context, x, y, kind, colour, 5, filled);
+  mark(x, y, kind, colour, filled = false, size = 5) {
+    drawMark(this.context, x, y, kind, colour, size, filled);
   }
 }
 
@@ -165,8 +175,8 @@ function drawMark(context, x, y, kind, colour, size = 5, filled = false) {
 
 /** A plane with axes: a drawing begins with `begin` and ends with `end`; between them all is in the axes' units. */
 class Chart extends Canvas {
-  /** Begin a drawing: limits of both axes, their titles, whether one unit is as long across as up. */
-  begin({ x, y, xTitle, yTitle, yScale = null, equal = false }) {
+  /** Begin a drawing: limits of both axes, their titles, ticks across (pairs of value and text), whether one unit is as long across as up. */
+  begin({ x, y, xTitle, yTitle, yScale = null, xTicks = null, equal = false }) {
     const { context } = this;
     Object.assign(this, { left: 62, right: this.width - 12, top: 10, bottom: this.height - 40, yScale });
     if (equal) [x, y] = this.evened(x, y);
@@ -176,10 +186,13 @@ class Chart extends Canvas {
     const { left, right, top, bottom } = this;
     context.fillStyle = theme.colours.paper;
     context.fillRect(left, top, right - left, bottom - top);
-    for (const value of ticks(...x, (right - left) / 75)) {
+    let clear = -Infinity;
+    for (const [value, text] of xTicks ?? ticks(...x, (right - left) / 75).map((each) => [each, tickText(each)])) {
       const at = this.across(value);
       this.path([[at, top], [at, bottom]], { stroke: theme.colours.grid, width: 1 });
-      this.text(tickText(value), at, bottom + 13);
+      if (xTicks && (at < clear || at > right - 14)) continue;
+      this.text(text, at, bottom + 13);
+      clear = at + 48;
     }
     const levels = yScale ? yScale.ticks(low, high) : ticks(...y, (bottom - top) / 45);
     for (const value of levels) {
@@ -257,8 +270,8 @@ class Chart extends Canvas {
     this.path([[this.left, this.up(y)], [this.right, this.up(y)]], look);
   }
 
-  point(x, y, kind, colour) {
-    this.mark(this.across(x), this.up(y), kind, colour);
+  point(x, y, kind, colour, size = 5) {
+    this.mark(this.across(x), this.up(y), kind, colour, false, size);
   }
 }
 

@@ -27,11 +27,50 @@ function moment(record, frame) {
 
 /** Values of the truth at a moment, SI: after the impulse its rate is less by k/x. */
 function truthAt(record, { step, stage }) {
-  const at = stage === PREDICTED ? Math.min(step + 1, record.time_s.length - 1) : step;
-  const range = record.true_range_m[at];
-  const impulse = stage === IMPULSE ? record.impulse_m_s[at] : 0;
-  const miss = record.true_predicted_miss_m[at] - (impulse * range) / record.closing_speed_m_s;
-  return { rate: record.true_rate_rad_s[at] - impulse / range, angle: record.true_angle_rad[at], range, miss };
+  if (stage === PREDICTED) {
+    return { rate: record.next_rate_rad_s[step], angle: record.next_angle_rad[step], range: record.next_range_m[step],
+      miss: record.next_predicted_miss_m[step] };
+  }
+  const range = record.true_range_m[step];
+  const impulse = stage === IMPULSE ? record.impulse_m_s[step] : 0;
+  const miss = record.true_predicted_miss_m[step] - (impulse * range) / record.closing_speed_m_s;
+  return { rate: record.true_rate_rad_s[step] - impulse / range, angle: record.true_angle_rad[step], range, miss };
+}
+
+const DURATIONS = [["d", 86400], ["h", 3600], ["min", 60], ["s", 1]];
+const TICKS_S = [864000, 86400, 21600, 3600, 600, 60, 10, 1, 0.1];
+
+/** A time in the greatest unit of which it has at least one. */
+function durationText(seconds) {
+  const [name, unit] = DURATIONS.find(([, size]) => seconds >= size) ?? ["s", 1];
+  return shown(seconds / unit, name, 3);
+}
+
+/** The position of a time on a time axis: linear, or logarithmic in the time before the nominal arrival. */
+function timePlace(record, time) {
+  return DATA.counts_down ? -Math.log10(Math.max(record.arrival_s - time, record.least_to_go_s)) : time;
+}
+for (const record of DATA.records) record.places = record.time_s.map((time) => timePlace(record, time));
+
+/** What time axes have in common. */
+const timeAxis = () => (DATA.counts_down
+  ? { x: span, xTitle: "time before the nominal arrival", xTicks: spanTicks }
+  : { x: span, xTitle: "time t, s" });
+
+/** A time of a record as text. */
+function timeText(record, time) {
+  const text = `t = ${shown(time, "s")}`;
+  const left = record.arrival_s - time;
+  return DATA.counts_down && left > 0 ? `${text} (${durationText(left)} before arrival)` : text;
+}
+
+/** Lines at the times of the schedule: images and cut-off. */
+function drawMarks(chart, record) {
+  for (const [name, text, before] of record.marks) {
+    const at = timePlace(record, record.arrival_s - before);
+    chart.upright(at, at, { stroke: theme.colours.line, width: 1, dash: [2, 3] });
+    chart.text(`${name}, ${text}`, chart.across(at) - 7, chart.top + 4, { align: "right", turn: -Math.PI / 2 });
+  }
 }
 
 const swatches = {
@@ -105,8 +144,9 @@ class Column {
 
   /** All sections at a stage of the present step. */
   sectionsAt(stage) {
-    if (stage === IMPULSE) return shifted(this.sets.state(2 * this.step + 1), this.record.impulse_m_s[this.step]);
-    return this.sets.state(2 * this.step + { [BEFORE]: 0, [MEASURED]: 1, [PREDICTED]: 2 }[stage]);
+    const states = this.sets.states.subarray(3 * this.step, 3 * this.step + 3);
+    if (stage === IMPULSE) return shifted(this.sets.state(states[1]), this.record.impulse_m_s[this.step]);
+    return this.sets.state(states[{ [BEFORE]: 0, [MEASURED]: 1, [PREDICTED]: 2 }[stage]]);
   }
 
   /** The sections that are drawn, or the one singled out. */
@@ -132,7 +172,7 @@ class Column {
       x: rates,
       y: angles,
       xTitle: `line-of-sight rate \u03c9${this.along}, ${rateUnit[0]}`,
-      yTitle: `line-of-sight angle \u03b1${this.along}, ${angleUnit[0]}`,
+      yTitle: `${record.angle_name}${this.along}, ${angleUnit[0]}`,
     });
     const place = ([rate, angle]) => [rate * rateUnit[1], angle * angleUnit[1]];
     const drawn = this.chosen(this.sections);
@@ -194,45 +234,58 @@ class Column {
 
   drawMiss() {
     const { miss, record } = this;
-    const known = record.time_s.map((time, index) => [time, record.predicted_miss_m[index], index]).filter(([, ends]) => ends);
-    miss.begin({ x: span, y: missLimits, xTitle: "time t, s", yTitle: `predicted miss${this.along}, m`, yScale: symlog(10) });
+    const known = record.places.map((place, index) => [place, record.predicted_miss_m[index], index]).filter(([, ends]) => ends);
+    miss.begin({ ...timeAxis(), y: missLimits, yTitle: `predicted miss${this.along}, m`, yScale: symlog(10) });
+    drawMarks(miss, record);
     for (const [points, opacity] of [[known, 0.12], [known.filter(([, , index]) => index <= this.step), 0.35]]) {
       const [lower, upper] = [0, 1].map((end) => points.map(([time, ends]) => [time, ends[end]]));
       miss.area(lower, upper, { fill: theme.colours.set, opacity });
       if (opacity > 0.2) [lower, upper].forEach((bound) => miss.curve(bound, { stroke: theme.colours.set, width: 1.3 }));
     }
     miss.level(0, { stroke: theme.colours.line, width: 1 });
-    miss.curve(record.time_s.map((time, index) => [time, record.true_predicted_miss_m[index]]).slice(0, this.step + 1),
+    miss.curve(record.places.map((place, index) => [place, record.true_predicted_miss_m[index]]).slice(0, this.step + 1),
       { stroke: theme.colours.ink, width: 1.4, dash: [6, 3] });
-    markNow(miss, record.time_s[this.step]);
+    markNow(miss, record.places[this.step]);
     miss.describe(this.missLines(this.step).join(", "));
   }
 
   drawImpulses() {
     const { impulses, record } = this;
     const limit = record.greatest_impulse_m_s;
-    impulses.begin({ x: span, y: [-1.15 * limit, 1.15 * limit], xTitle: "time t, s", yTitle: `k${this.along}, m/s` });
+    const shownTo = impulseSpan(record);
+    impulses.begin({ ...timeAxis(), y: [-1.15 * shownTo, 1.15 * shownTo], yTitle: `k${this.along}, m/s` });
+    drawMarks(impulses, record);
     impulses.level(0, { stroke: theme.colours.line, width: 1 });
     for (const side of [-limit, limit]) impulses.level(side, { stroke: theme.colours.line, width: 1, dash: [5, 3] });
-    drawStems(impulses, record.time_s, record.impulse_m_s, this.step);
-    markNow(impulses, record.time_s[this.step]);
+    drawStems(impulses, record, record.impulse_m_s, this.step);
+    markNow(impulses, record.places[this.step]);
     impulses.describe(this.impulseLines(this.step).join(", "));
   }
 
   missLines(step) {
     const { record } = this;
-    const ends = record.predicted_miss_m[step];
     return [
-      `t = ${shown(record.time_s[step], "s")}`,
-      ends ? `predicted miss${this.along} from ${shown(ends[0], "m")} to ${shown(ends[1], "m")}` : "no set is left",
+      timeText(record, record.time_s[step]),
+      this.missText(record.predicted_miss_m[step]),
       `true predicted miss${this.along} ${shown(record.true_predicted_miss_m[step], "m")}`,
     ];
+  }
+
+  missText(ends) {
+    return ends ? `predicted miss${this.along} from ${shown(ends[0], "m")} to ${shown(ends[1], "m")}` : "no set is left";
+  }
+
+  /** The predicted-miss interval at the present stage. */
+  missNow() {
+    if (this.stage === MEASURED) return this.record.predicted_miss_m[this.step];
+    const intervals = this.missIntervals(this.sections);
+    return intervals.length ? [Math.min(...intervals.map(([low]) => low)), Math.max(...intervals.map(([, high]) => high))] : null;
   }
 
   impulseLines(step) {
     const { record } = this;
     return [
-      `t = ${shown(record.time_s[step], "s")}`,
+      timeText(record, record.time_s[step]),
       `impulse${this.along} ${shown(record.impulse_m_s[step], "m/s")}`,
       `budget left ${shown(record.budget_left_m_s[step], "m/s")}`,
     ];
@@ -255,7 +308,8 @@ class Column {
   }
 
   errorAt(range) {
-    return this.record.angle_error_rad + this.record.angle_error_slope_rad_m * range;
+    const { angle_error_rad: atZero, angle_error_slope_rad_m: slope, centroid_error_m: centroid } = this.record;
+    return atZero + slope * range + (centroid && centroid / Math.max(range, centroid));
   }
 
   tellScene(px, py) {
@@ -302,25 +356,36 @@ class Column {
   }
 }
 
+/** Greatest number of impulses that have a dot at their end. */
+const MOST_DOTS = 60;
+
 /** Impulses as lines from zero; those after the present step are pale. */
-function drawStems(chart, times, impulses, step) {
+function drawStems(chart, record, impulses, step) {
+  const few = record.modulus_m_s.filter((modulus) => modulus > 0).length <= MOST_DOTS;
   impulses.forEach((impulse, index) => {
     if (impulse === 0) return;
     const look = { stroke: index <= step ? theme.colours.impulse : theme.colours.grid, width: 1.6 };
-    chart.curve([[times[index], 0], [times[index], impulse]], look);
+    chart.curve([[record.places[index], 0], [record.places[index], impulse]], look);
+    if (few) chart.point(record.places[index], impulse, "dot", look.stroke, 2);
   });
 }
 
+/** The greatest impulse of an axis: the limit of the engine, unless all impulses are much smaller. */
+function impulseSpan({ modulus_m_s: moduli, greatest_impulse_m_s: limit }) {
+  const greatest = Math.max(...moduli);
+  return greatest > 0 && greatest < 0.2 * limit ? greatest : limit;
+}
+
 /** The line of the present time; ends the drawing of a chart over time. */
-function markNow(chart, time) {
-  chart.upright(time, time, { stroke: theme.colours.quiet, width: 1, dash: [2, 2] });
+function markNow(chart, place) {
+  chart.upright(place, place, { stroke: theme.colours.quiet, width: 1, dash: [2, 2] });
   chart.end();
 }
 
 /** Lines about the step under the pointer in a chart over time. */
 function stepUnder(chart, record, x, lines) {
   if (x < chart.left - 5 || x > chart.right + 5) return null;
-  return lines(nearest(record.time_s, chart.under(x, 0)[0]));
+  return lines(nearest(record.places, chart.under(x, 0)[0]));
 }
 
 /** One record: the panels of its lateral axes, what they have in common, and its table of numbers. */
@@ -349,15 +414,23 @@ class Engagement {
       const [plane, scene, course] = [planes[k], scenes[k], courses[k] ?? low];
       return new Column({ ...record, ...axis }, { plane, scene, miss: course, impulses: course });
     });
+    this.projections = courses.map((course, k) => new Projection(this.columns[k], course));
     this.joint = spatial ? [new BPlane(record, this.columns, across)] : [];
-    const overTime = (caption, label, legend, draw) => {
+    const overTime = (caption, label, legend, draw, lines = (step) => this.impulseLines(step), ratio = 0.2) => {
       const chart = new Chart(low, {
-        caption, label, ratio: 0.2, legend, draw: () => draw(chart),
-        tell: (x) => stepUnder(chart, record, x, (step) => this.impulseLines(step)),
+        caption, label, ratio, legend, draw: () => draw(chart), tell: (x) => stepUnder(chart, record, x, lines),
       });
       return chart;
     };
+    this.corridor = corridorOf(this.columns);
     this.courses = [
+      overTime("Possible miss", "Possible miss against time", [
+        ["possible miss without further impulses", swatches.fill("set", 0.35)],
+        ["after an impulse that centres the set", stroke("set", { dash: [6, 3] })],
+        ["miss of the true state", stroke("ink", { width: 1.2 })],
+        ...(record.guaranteed_miss_m === null ? [] : [["guaranteed miss \u03a6", stroke("extra", { dash: [8, 3] })]]),
+        ...(record.radius_m === null ? [] : [["radius of the body", stroke("quiet", { dash: [2, 2] })]]),
+      ], (chart) => this.drawCorridor(chart), (step) => this.corridorLines(step), 0.3),
       ...(spatial ? [overTime("Impulse modulus", "Modulus of the impulse against time",
         [["modulus of the impulse vector", stroke("impulse")], ["limit of an impulse", stroke("line", { dash: [5, 3] })]],
         (chart) => this.drawModulus(chart))] : []),
@@ -369,6 +442,7 @@ class Engagement {
   show(frame) {
     for (const column of this.columns) column.show(frame);
     this.step = this.columns[0].step;
+    this.stage = this.columns[0].stage;
   }
 
   draw() {
@@ -379,34 +453,69 @@ class Engagement {
     for (const panel of this.joint) panel.chart.draw();
     // What is drawn over time does not change with the stage.
     if (this.step !== this.drawnStep) {
-      for (const panel of [...this.columns.flatMap(({ miss, impulses }) => [miss, impulses]), ...this.courses]) panel.draw();
+      const columns = this.columns.flatMap(({ miss, impulses }) => [miss, impulses]);
+      for (const panel of [...columns, ...this.projections.map(({ chart }) => chart), ...this.courses]) panel.draw();
     }
     this.drawnStep = this.step;
     fillTable(this.numbers, this.rows());
   }
 
+  /** The possible miss of the set, that after an impulse that centres it, and that of the true state. */
+  drawCorridor(chart) {
+    const { record, step, corridor: { greatest, centred, truth } } = this;
+    const levels = [record.guaranteed_miss_m, record.radius_m].filter((level) => level);
+    const values = [...greatest, ...truth, ...levels].filter((value) => value);
+    const floor = Math.max(Math.min(...values, ...centred.filter((value) => value)), 1e-3 * Math.min(...levels, ...centred.filter((value) => value)), 1e-3);
+    chart.begin({ ...timeAxis(), y: [0.5 * floor, 2 * Math.max(...values, floor)], yTitle: "miss, m", yScale: LOGARITHMIC });
+    const at = (course, last) => course.map((value, index) => [record.places[index], value]).slice(0, last).filter(([, value]) => value !== null);
+    for (const [last, opacity] of [[greatest.length, 0.12], [step + 1, 0.35]]) {
+      const upper = at(greatest, last);
+      chart.area(upper.map(([place]) => [place, 0.1 * floor]), upper, { fill: theme.colours.set, opacity });
+    }
+    chart.curve(at(greatest), { stroke: theme.colours.set, width: 1.3 });
+    chart.curve(at(centred), { stroke: theme.colours.set, width: 1.3, dash: [6, 3] });
+    chart.curve(at(truth), { stroke: theme.colours.ink, width: 1.2 });
+    if (record.guaranteed_miss_m !== null) chart.level(record.guaranteed_miss_m, { stroke: theme.colours.extra, width: 1.6, dash: [8, 3] });
+    if (record.radius_m !== null) chart.level(record.radius_m, { stroke: theme.colours.quiet, width: 1.3, dash: [2, 2] });
+    drawMarks(chart, record);
+    markNow(chart, record.places[step]);
+    chart.describe(this.corridorLines(step).join(", "));
+  }
+
+  corridorLines(step) {
+    const { record, corridor: { greatest, centred, truth } } = this;
+    return [
+      timeText(record, record.time_s[step]),
+      `possible miss ${shown(greatest[step], "m")}`,
+      `after an impulse that centres the set ${shown(centred[step], "m")}`,
+      `true predicted miss ${shown(truth[step], "m")}`,
+    ];
+  }
+
   drawModulus(chart) {
     const { record } = this;
     const limit = record.greatest_impulse_m_s;
-    chart.begin({ x: span, y: [0, 1.15 * limit], xTitle: "time t, s", yTitle: "|k|, m/s" });
+    chart.begin({ ...timeAxis(), y: [0, 1.15 * impulseSpan(record)], yTitle: "|k|, m/s" });
+    drawMarks(chart, record);
     chart.level(limit, { stroke: theme.colours.line, width: 1, dash: [5, 3] });
-    drawStems(chart, record.time_s, record.modulus_m_s, this.step);
-    markNow(chart, record.time_s[this.step]);
+    drawStems(chart, record, record.modulus_m_s, this.step);
+    markNow(chart, record.places[this.step]);
     chart.describe(this.impulseLines(this.step).join(", "));
   }
 
   drawBudget(chart) {
     const { record } = this;
-    chart.begin({ x: span, y: [0, 1.06 * record.budget_m_s], xTitle: "time t, s", yTitle: "left, m/s" });
+    chart.begin({ ...timeAxis(), y: [0, 1.06 * record.budget_m_s], yTitle: "left, m/s" });
+    drawMarks(chart, record);
     let left = record.budget_m_s;
-    const stairs = record.time_s.flatMap((time, index) => {
+    const stairs = record.places.flatMap((place, index) => {
       const before = left;
       left = record.budget_left_m_s[index];
-      return [[time, before, index], [time, left, index]];
+      return [[place, before, index], [place, left, index]];
     });
     chart.curve(stairs, { stroke: theme.colours.grid, width: 2 });
     chart.curve(stairs.filter(([, , index]) => index <= this.step), { stroke: theme.colours.extra, width: 2 });
-    markNow(chart, record.time_s[this.step]);
+    markNow(chart, record.places[this.step]);
     chart.describe(this.impulseLines(this.step).join(", "));
   }
 
@@ -417,13 +526,16 @@ class Engagement {
     return [time, ...impulses, ...modulus, `budget left ${shown(record.budget_left_m_s[step], "m/s")}`];
   }
 
-  /** The numbers of the moment, for those who read rather than look. */
+  /** The numbers of the present stage. Values of a later stage are "not yet". */
   rows() {
-    const { record, step, columns } = this;
+    const { record, step, stage, columns } = this;
     const along = (name, text) => columns.map((column) => [`${name}${column.along}`, text(column)]);
-    const scaled = (value, factor, unit) => shown(value && value * factor, unit);
+    const scaled = (value, factor, unit) => (stage === BEFORE ? "not yet" : shown(value && value * factor, unit));
+    const given = (value) => (stage < IMPULSE ? "not yet" : shown(value, "m/s"));
+    const left = record.budget_left_m_s[step] + (stage < IMPULSE ? record.modulus_m_s[step] : 0);
     return [
       ["time", shown(record.time_s[step], "s")],
+      ...(DATA.counts_down ? [["time before the nominal arrival", shown(record.arrival_s - record.time_s[step], "s")]] : []),
       ...columns.map(({ record: of }) => [of.measured_name, scaled(of.measured_angle_rad[step], 1e3, "mrad")]),
       ...(record.range_error_relative === null ? [] : [["measured range", scaled(record.measured_range_m[step], 1e-3, "km")]]),
       ...(record.rate_error_rad_s === null ? [] : along("measured rate",
@@ -431,11 +543,11 @@ class Engagement {
       ...along("true angle", ({ truth }) => shown(truth.angle * 1e3, "mrad")),
       ...along("true rate", ({ truth }) => shown(truth.rate * 1e6, "µrad/s")),
       ["true range", shown(columns[0].truth.range / 1e3, "km")],
-      ...along("predicted miss", (column) => column.missLines(step)[1].replace(`predicted miss${column.along} `, "")),
-      ...along("true predicted miss", (column) => shown(column.record.true_predicted_miss_m[step], "m")),
-      ...along("impulse", (column) => shown(column.record.impulse_m_s[step], "m/s")),
-      ...(columns.length > 1 ? [["impulse modulus", shown(record.modulus_m_s[step], "m/s")]] : []),
-      ["budget left", shown(record.budget_left_m_s[step], "m/s")],
+      ...along("predicted miss", (column) => column.missText(column.missNow()).replace(`predicted miss${column.along} `, "")),
+      ...along("true predicted miss", ({ truth }) => shown(truth.miss, "m")),
+      ...along("impulse", (column) => given(column.record.impulse_m_s[step])),
+      ...(columns.length > 1 ? [["impulse modulus", given(record.modulus_m_s[step])]] : []),
+      ["budget left", shown(left, "m/s")],
       ["sections", String(columns[0].sections.length)],
     ];
   }
@@ -458,7 +570,20 @@ function levelled(columns) {
   };
 }
 
-const span = limitsOf(times, 0.015);
+/** Over the steps: the greatest possible miss, that after an impulse that centres the set, and that of the true state, m. */
+function corridorOf(columns) {
+  const across = (values) => (values.includes(null) ? null : Math.hypot(...values));
+  const course = (of) => columns[0].record.time_s.map((_, step) => across(columns.map(({ record }) => of(record, step))));
+  const interval = (of) => ({ predicted_miss_m: misses }, step) => misses[step] && of(misses[step]);
+  return {
+    greatest: course(interval(([low, high]) => Math.max(Math.abs(low), Math.abs(high)))),
+    centred: course(interval(([low, high]) => (high - low) / 2)),
+    truth: course(({ true_predicted_miss_m: misses }, step) => misses[step]),
+  };
+}
+
+const span = limitsOf(DATA.records.flatMap(({ places }) => places), 0.015);
+const spanTicks = TICKS_S.map((tick) => [-Math.log10(tick), durationText(tick)]).filter(([at]) => at >= span[0] && at <= span[1]);
 const missLimits = (() => {
   const ends = DATA.records.flatMap((record) => record.axes.flatMap((axis) => axis.predicted_miss_m.filter((each) => each).flat()));
   const greatest = Math.max(10, ...ends.map(Math.abs));
@@ -477,7 +602,11 @@ const columns = engagements.flatMap((engagement) => engagement.columns);
 const player = new Player({
   frames: 4 * times.length,
   coarse: 4,
-  name: (frame) => `t = ${timeAndStage(frame)[0]} s, ${STAGES[timeAndStage(frame)[1]]}`,
+  name: (frame) => {
+    const [time, stage] = timeAndStage(frame);
+    const left = DATA.counts_down && DATA.records[0].arrival_s - time;
+    return `t = ${time} s${left > 0 ? ` (${durationText(left)} before arrival)` : ""}, ${STAGES[stage]}`;
+  },
   draw: (frame) => {
     for (const engagement of engagements) engagement.show(frame);
     for (const axis of new Set(columns.map((column) => column.record.axis))) {

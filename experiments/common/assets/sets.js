@@ -4,7 +4,7 @@
 
 const STEPS_OF_A_BOX = 65535;
 
-/** The sets of a record. State 2 i is the set before the measurement of step i, 2 i + 1 the one after it. */
+/** The sets of a record. A set predicted from a step is that before the measurement of the next step, if the page has both. */
 class Sets {
   constructor(packed) {
     this.starts = counts(packed.starts);
@@ -16,11 +16,27 @@ class Sets {
     this.vertices = new Uint16Array(bytes(packed.vertices).buffer);
     this.first = new Uint32Array(this.counts.length + 1);
     this.counts.forEach((count, index) => { this.first[index + 1] = this.first[index] + count; });
+    // The states of step i: 3 i before its measurement, 3 i + 1 after it, 3 i + 2 predicted from it.
+    this.states = counts(packed.states);
     // Intervals of the predicted miss are those of measured sections alone.
     this.missOf = new Map();
-    for (let state = 1, next = 0; state + 1 < this.starts.length; state += 2) {
+    for (let step = 0, next = 0; 3 * step < this.states.length; step++) {
+      const state = this.states[3 * step + 1];
       for (let index = this.starts[state]; index < this.starts[state + 1]; index++) this.missOf.set(index, next++);
     }
+  }
+
+  /** The least and the greatest lateral coordinate alpha x of the measured set of each step, m; null without sections. */
+  extents() {
+    return Array.from({ length: this.states.length / 3 }, (_, step) => {
+      const state = this.states[3 * step + 1];
+      let ends = null;
+      for (let index = this.starts[state]; index < this.starts[state + 1]; index++) {
+        const [low, high] = [1, 3].map((k) => this.boxes[4 * index + k] * this.ranges[index]);
+        ends = ends ? [Math.min(ends[0], low), Math.max(ends[1], high)] : [low, high];
+      }
+      return ends;
+    });
   }
 
   /** The sections of a state, in rising order of range; box and points are (omega, alpha) in SI units. */

@@ -53,6 +53,8 @@ _NARROW_MM = 60.0
 MARK_LOOK: dict[str, Any] = {"color": LIMIT, "linewidth": 0.8, "linestyle": (0, (1.5, 1.5))}
 _CENTRED_LOOK: dict[str, Any] = {"color": SET_EDGE, "linewidth": 1.1, "linestyle": (0, (4, 1.5))}
 _TRUE_LOOK: dict[str, Any] = {"color": INK, "linewidth": 0.9}
+_LOGARITHMIC_FROM = 10.0
+"""Ratio of the greatest and the least impulse above which their axis is logarithmic."""
 _LEAST_SHOWN = 1e-3
 """Least miss of a logarithmic axis, as a multiple of the least possible miss."""
 
@@ -178,10 +180,16 @@ def _draw_moduli(axes: Axes, record: Record) -> None:
     moduli = np.abs([step.impulse_m_s for step in record.steps])
     times, given = Clock(counts_down=True).at(record), moduli > 0.0
     many = given.sum() > MOST_VECTORS
-    axes.vlines(times[given], 0.0, moduli[given], color=IMPULSE, linewidth=0.9, rasterized=many)
+    axes.vlines(times[given], 1e-9, moduli[given], color=IMPULSE, linewidth=0.9, rasterized=many)
     axes.plot(times[given], moduli[given], ".", color=IMPULSE, markersize=3.0, markeredgewidth=0.0, rasterized=many)
-    axes.set_ylim(0.0, 1.15 * float(moduli.max()) or 1.0)
-    axes.yaxis.set_major_locator(MaxNLocator(3))
+    if given.any() and moduli.max() > _LOGARITHMIC_FROM * moduli[given].min():
+        axes.set_yscale("log")
+        axes.set_ylim(0.4 * float(moduli[given].min()), 2.5 * float(moduli.max()))
+        axes.yaxis.set_major_locator(LogLocator(numticks=4))
+        axes.yaxis.set_minor_formatter(NullFormatter())
+    else:
+        axes.set_ylim(0.0, 1.15 * float(moduli.max()) or 1.0)
+        axes.yaxis.set_major_locator(MaxNLocator(3))
     axes.set_ylabel("impulse, m/s")
 
 
