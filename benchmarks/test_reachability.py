@@ -18,7 +18,7 @@ from benchmarks.conftest import LINES
 from experiments.reachability.file import load_rendezvous
 from experiments.reachability.printed_tables import compare_published
 from experiments.reachability.report import SINGLE, Request, make_report, report_json
-from infoset.polytope import Polytope, cut
+from infoset.polytope import Polytope
 from rendezvous.reachability import (
     Budget,
     MotionModel,
@@ -95,7 +95,7 @@ def test_the_exact_route_is_refused_in_time(under: Check, periods: int) -> None:
 
 def own_step(block: Block, vertices: Floats, period: int) -> Floats:
     hull = Polytope.from_vertices(_moved(block, vertices, period))
-    return cut(hull, block.normals, block.offsets[period + 1]).vertices
+    return hull.cut(block.normals, upper=block.offsets[period + 1]).vertices
 
 
 def cdd_step(block: Block, vertices: Floats, period: int) -> Floats:
@@ -125,7 +125,7 @@ def polytope_step(block: Block, vertices: Floats, period: int) -> Floats:
 
 
 def _moved(block: Block, vertices: Floats, period: int) -> Floats:
-    corners = Polytope.box(-np.ones(len(block.controls)), np.ones(len(block.controls))).vertices
+    corners = Polytope.from_box(-np.ones(len(block.controls)), np.ones(len(block.controls))).vertices
     sums = (vertices @ block.transition[period].T)[:, None] + (corners @ block.control[period].T)[None]
     return np.asarray(sums.reshape(-1, block.size))
 

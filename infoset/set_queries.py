@@ -265,7 +265,7 @@ class SetQueries:
 
     def _section(self, label_m: float, range_m: float, outlines: list[Floats]) -> Section:
         """Return a section from the vertices along each axis."""
-        polygons = [ConvexPolygons(vertices, np.asarray(len(vertices))) for vertices in outlines]
+        polygons = [ConvexPolygons.unchecked(vertices, np.array(len(vertices))) for vertices in outlines]
         return Section(label_m, range_m, self.model.closing_speed_m_s, *polygons[::-1])
 
     def section_at(self, label_m: float, engagement: int = 0) -> Section:

@@ -329,7 +329,7 @@ def _keep_in_problems(known: Known) -> Iterator[Problem]:
             continue
         size = max(float(np.abs(limits).max()), 1e-300)
         try:
-            Polytope.from_halfspaces(rows, limits / size)
+            Polytope.from_constraints(rows, limits / size).needed()
         except EmptyPolytopeError as error:
             remedy = f"increase its offsets by at least {error.relaxation * size:.6g} m"
             yield Problem(path, "is empty: no position lies in all its half-spaces", remedy)

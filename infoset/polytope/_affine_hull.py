@@ -166,7 +166,7 @@ def relative_interior(
             return RelativeInterior(point, basis, rows[:0], limits[:0], used[:0], np.zeros(0), 0.0)
         rows, limits = rows[kept] / lengths[kept, None], limits[kept] / lengths[kept]
         if not bounded:
-            _need_bounded(rows, basis)
+            _need_bounded(rows, limits, slack, basis)
         centre, radius = chebyshev_ball(rows, limits)
         width = max(float(np.abs(limits - rows @ centre).max()), float(np.abs(centre).max()))
         flat = max(FLAT * width, ROUNDING * size, 1e-300)
@@ -225,13 +225,23 @@ def null_space_basis(across: Floats) -> Floats:
     return np.asarray(null_space(across, rcond=FLAT))
 
 
-def _need_bounded(rows: Floats, basis: Floats) -> None:
-    """Raise an error if the set has a direction of recession d: rows d <= 0 and d not zero."""
+def _need_bounded(rows: Floats, limits: Floats, slack: float, basis: Floats) -> None:
+    """Raise an error if the set is empty, or has a direction of recession d: rows d <= 0 and d not zero."""
     if np.linalg.matrix_rank(rows, tol=FLAT) < rows.shape[1]:
-        raise UnboundedPolytopeError(basis @ null_space(rows, rcond=FLAT)[:, 0])
-    optimum = linprog(rows.sum(axis=0), A_ub=rows, b_ub=np.zeros(len(rows)), bounds=(-1.0, 1.0), method="highs")
-    if optimum.status == 0 and optimum.fun < -1e-6:
-        raise UnboundedPolytopeError(basis @ optimum.x / np.linalg.norm(optimum.x))
+        direction = null_space(rows, rcond=FLAT)[:, 0]
+    else:
+        optimum = linprog(rows.sum(axis=0), A_ub=rows, b_ub=np.zeros(len(rows)), bounds=(-1.0, 1.0), method="highs")
+        if optimum.status != 0 or optimum.fun >= -1e-6:
+            return
+        direction = optimum.x / np.linalg.norm(optimum.x)
+    # The least relaxation of the rows with which a point satisfies all.
+    matrix = np.column_stack([rows, -np.ones(len(rows))])
+    cost = np.append(np.zeros(rows.shape[1]), 1.0)
+    bounds = [(None, None)] * rows.shape[1] + [(0.0, None)]
+    optimum = linprog(cost, A_ub=matrix, b_ub=limits, bounds=bounds, method="highs", options=HIGHS)
+    if optimum.status == 0 and optimum.fun > slack:
+        raise EmptyPolytopeError(float(optimum.fun))
+    raise UnboundedPolytopeError(basis @ direction)
 
 
 def _always_tight(rows: Floats, limits: Floats, tolerance: float) -> Places:

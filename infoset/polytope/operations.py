@@ -1,12 +1,12 @@
-"""Operations on polytopes that make new ones, and polytopes in few dimensions from their support vectors alone."""
+"""Polytopes in few dimensions from their support vectors alone, and functions that have become methods."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import block_diag
 
 from infoset.polytope.polytope import Polytope
 
@@ -17,65 +17,40 @@ _FLAT = 1e-7
 
 
 def linear_image(polytope: Polytope, matrix: ArrayLike, shift: ArrayLike = 0.0) -> Polytope:
-    """Return {matrix x + shift: x in the polytope}, the hull of the image of the vertices.
-
-    `matrix`, shape (m, n), may be singular: the image of the `polytope` is then flat. `shift` has shape (m,).
-    """
-    return Polytope.from_vertices(polytope.vertices @ np.asarray(matrix, dtype=float).T + np.asarray(shift, float))
+    """Return `polytope.affine_map(matrix, shift)`. Deprecated."""
+    _warn("linear_image", "affine_map")
+    return polytope.affine_map(matrix, shift)
 
 
 def minkowski_sum(first: Polytope, second: Polytope) -> Polytope:
-    """Return {x + y: x in the first, y in the second}, the hull of all v1 v2 sums of two vertices."""
-    sums = first.vertices[:, None, :] + second.vertices[None, :, :]
-    return Polytope.from_vertices(sums.reshape(-1, first.space))
+    """Return `first.minkowski_sum(second)`. Deprecated."""
+    _warn("minkowski_sum", "minkowski_sum")
+    return first.minkowski_sum(second)
 
 
 def intersection(*polytopes: Polytope) -> Polytope:
-    """Return the intersection of `polytopes`, at least one; `EmptyPolytopeError` is raised where it is empty."""
-    return Polytope.from_halfspaces(
-        np.vstack([polytope.normals for polytope in polytopes]),
-        np.concatenate([polytope.offsets for polytope in polytopes]),
-        np.vstack([polytope.across for polytope in polytopes]),
-        np.concatenate([polytope.levels for polytope in polytopes]),
-        bounded=True,
-    )
+    """Return the intersection; an empty one raises an EmptyPolytopeError. Deprecated."""
+    _warn("intersection", "intersection")
+    return polytopes[0].intersection(*polytopes[1:]).needed()
 
 
 def cut(polytope: Polytope, normals: ArrayLike, offsets: ArrayLike) -> Polytope:
-    """Return {x in the polytope: normals x <= offsets}, or the `polytope` itself where nothing is cut off.
-
-    `normals` have shape (m, n), `offsets` shape (m,); `EmptyPolytopeError` is raised where the set is empty.
-    """
-    rows, limits = np.asarray(normals, dtype=float), np.asarray(offsets, dtype=float)
-    cuts = polytope.support(rows) > limits
-    if not cuts.any():
-        return polytope
-    return Polytope.from_halfspaces(
-        np.vstack([polytope.normals, rows[cuts]]),
-        np.concatenate([polytope.offsets, limits[cuts]]),
-        polytope.across,
-        polytope.levels,
-        bounded=True,
-    )
+    """Return `polytope.cut(normals, upper=offsets)`; an empty set raises an EmptyPolytopeError. Deprecated."""
+    _warn("cut", "cut")
+    return polytope.cut(normals, upper=offsets).needed()
 
 
 def projection(polytope: Polytope, axes: Sequence[int]) -> Polytope:
-    """Return the projection of a `polytope` on some `axes`, in a space of as many dimensions."""
-    return Polytope.from_vertices(polytope.vertices[:, list(axes)])
+    """Return `polytope.project(axes)`. Deprecated."""
+    _warn("projection", "project")
+    return polytope.project(axes)
 
 
-def product(*polytopes: Polytope) -> Polytope:
-    """Return the Cartesian product of `polytopes`, at least one, with v1 v2 ... vertices and f1 + f2 + ... facets."""
-    vertices = polytopes[0].vertices
-    for factor in polytopes[1:]:
-        left = np.repeat(vertices, len(factor.vertices), axis=0)
-        vertices = np.hstack([left, np.tile(factor.vertices, (len(vertices), 1))])
-    return Polytope(
-        vertices,
-        block_diag(*[factor.normals for factor in polytopes]),
-        np.concatenate([factor.offsets for factor in polytopes]),
-        block_diag(*[factor.across for factor in polytopes]),
-        np.concatenate([factor.levels for factor in polytopes]),
+def _warn(old: str, new: str) -> None:
+    warnings.warn(
+        f"the function {old} is deprecated and will be removed: use the method {new} of Polytope",
+        DeprecationWarning,
+        stacklevel=3,
     )
 
 

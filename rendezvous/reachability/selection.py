@@ -189,7 +189,8 @@ def vertices(optimal: OptimalControls, most: int = MOST_VERTICES) -> Floats:
             corners.append(np.zeros((1, 0)))
             continue
         try:
-            corners.append(Polytope.from_halfspaces(part.optimal.rows, part.optimal.limits, bounded=True).vertices)
+            inside = Polytope.from_constraints(part.optimal.rows, part.optimal.limits, bounded=True)
+            corners.append(inside.needed().vertices)
         except EmptyPolytopeError as error:  # the centre is inside
             raise UncertainHullError(
                 "the set of optimal controls of a block is too thin: it is empty by rounding"

@@ -9,7 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
-from infoset.polytope import Polytope, cut, intersection, linear_image, shadow
+from infoset.polytope import Polytope, shadow
 from rendezvous._arrays import Floats
 from rendezvous.reachability.admissible import Lifted, Maximiser, lift, lift_with_states
 from rendezvous.reachability.optimum import BlockOptimum
@@ -173,26 +173,27 @@ class ExactSets:
             )
         self._optimum, self._meter = optimum, meter
         reach = np.ones(len(block.controls))
-        corners = Polytope.box(-reach, reach).vertices if len(reach) else np.zeros((1, 0))
+        corners = Polytope.from_box(-reach, reach).vertices if len(reach) else np.zeros((1, 0))
         forward = [Polytope.from_vertices(block.initial[None, :])]
         for t in range(block.periods):
             moved = forward[-1].vertices @ block.transition[t].T
             reached = meter.hull(_sums(moved, corners @ block.control[t].T))
-            forward.append(cut(reached, *_finite(block.normals, block.offsets[t + 1])))
+            rows, ends = _finite(block.normals, block.offsets[t + 1])
+            forward.append(reached.cut(rows, upper=ends).needed())
         tube = self._both_ways(corners, forward) if optimum.reached else self._of_controls()
         self._sets = {SetKind.FORWARD: forward, SetKind.TUBE: tube}
 
     def support(self, kind: SetKind, time: int, directions: Floats) -> Floats:
         """Return the support function along directions, shape (k, n), as an array of shape (k,)."""
-        return self.polytope(kind, time).support(directions)
+        return self.polytope(kind, time).support_function(directions)
 
     def bounds(self, kind: SetKind) -> Floats:
         """Return the least and greatest value of each state at each time, shape (T + 1, n, 2)."""
-        return np.array([np.stack(polytope.bounds, axis=-1) for polytope in self._sets[kind]])
+        return np.array([np.stack(polytope.bounding_box(), axis=-1) for polytope in self._sets[kind]])
 
     def shadow(self, kind: SetKind, time: int, rows: Floats, tolerance: float = 1e-9) -> Polytope:
         """Return the image of a set under a matrix, shape (d, n), of few rows."""
-        return linear_image(self.polytope(kind, time), rows, np.zeros(len(rows)))
+        return self.polytope(kind, time).linear_map(rows)
 
     def polytope(self, kind: SetKind, time: int) -> Polytope:
         """Return the set itself."""
@@ -205,21 +206,21 @@ class ExactSets:
         for t in range(block.periods - 1, 0, -1):
             before = self._meter.hull(_sums(backward.vertices, -corners @ block.control[t].T))
             rows, ends = _finite(block.normals, block.offsets[t])
-            backward = Polytope.from_halfspaces(
+            backward = Polytope.from_constraints(
                 np.vstack([before.normals @ block.transition[t], rows]),
                 np.concatenate([before.offsets, ends]),
                 before.across @ block.transition[t],
                 before.levels,
                 bounded=True,
-            )
-            tube.append(intersection(forward[t], backward))
+            ).needed()
+            tube.append(forward[t].intersection(backward).needed())
         return [forward[0], *reversed(tube)]
 
     def _of_controls(self) -> list[Polytope]:
         optimal = self._optimum.optimal
         corners = np.zeros((1, 0))
         if optimal.size:
-            corners = Polytope.from_halfspaces(optimal.rows, optimal.limits, bounded=True).vertices
+            corners = Polytope.from_constraints(optimal.rows, optimal.limits, bounded=True).needed().vertices
         return [
             self._meter.hull(free + corners @ response.T)
             for free, response in zip(optimal.free, optimal.response, strict=True)

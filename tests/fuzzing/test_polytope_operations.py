@@ -23,14 +23,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from infoset.polytope import (
-    EmptyPolytopeError,
     Polytope,
-    cut,
-    intersection,
-    linear_image,
-    minkowski_sum,
     product,
-    projection,
     shadow,
 )
 from rendezvous.reachability import EmptyTubeError, ReachabilityProblem, Route, SetKind, Solution, solve
@@ -81,17 +75,17 @@ def test_hulls_cuts_intersections_and_projections_are_idempotent(seed: int, spac
     one = solid(seed, space)
     again = Polytope.from_vertices(one.vertices)
     assert (len(again.vertices), len(again.normals)) == (len(one.vertices), len(one.normals))
-    assert same(one, Polytope.from_halfspaces(one.normals, one.offsets))
-    assert same(one, intersection(one, one))
-    assert same(one, projection(one, range(space)))
+    assert same(one, Polytope.from_constraints(one.normals, one.offsets))
+    assert same(one, one.intersection(one))
+    assert same(one, one.project(range(space)))
     normal = np.random.default_rng(seed).standard_normal((1, space))
-    level = 0.5 * one.support(normal)
-    once = cut(one, normal, level)
-    assert same(once, cut(once, normal, level))
-    box = Polytope.box(*one.bounds)
-    np.testing.assert_allclose(box.bounds, one.bounds, atol=ROUNDING)
+    level = 0.5 * one.support_function(normal)
+    once = one.cut(normal, upper=level)
+    assert same(once, once.cut(normal, upper=level))
+    box = Polytope.from_box(*one.bounding_box())
+    np.testing.assert_allclose(box.bounding_box(), one.bounding_box(), atol=ROUNDING)
     assert lies_in(one, box)
-    assert same(box, Polytope.box(*box.bounds))
+    assert same(box, Polytope.from_box(*box.bounding_box()))
     assert same(one, shadow(one.support_vector, space), 1e-7 * SIZE)
 
 
@@ -102,25 +96,25 @@ def test_operations_commute_with_linear_maps(seed: int, space: int, kind: str) -
     shift = np.random.default_rng(seed).uniform(-SIZE, SIZE, space)
 
     def moved(polytope: Polytope) -> Polytope:
-        return linear_image(polytope, matrix, shift)
+        return polytope.affine_map(matrix, shift)
 
     inverse = np.linalg.inv(matrix)
     normals = np.random.default_rng(seed + 2).standard_normal((2, space))
     middle = one.vertices.mean(axis=0)
-    offsets = normals @ middle + 0.4 * (one.support(normals) - normals @ middle)
+    offsets = normals @ middle + 0.4 * (one.support_function(normals) - normals @ middle)
     images = normals @ inverse
-    assert same(moved(cut(one, normals, offsets)), cut(moved(one), images, offsets + images @ shift), 1e-7 * SIZE)
-    together = minkowski_sum(one, other)
-    assert same(moved(together), minkowski_sum(moved(one), linear_image(other, matrix)), 1e-7 * SIZE)
-    try:
-        common = intersection(one, other)
-    except EmptyPolytopeError:
-        with pytest.raises(EmptyPolytopeError):
-            intersection(moved(one), moved(other))
+    assert same(
+        moved(one.cut(normals, upper=offsets)), moved(one).cut(images, upper=offsets + images @ shift), 1e-7 * SIZE
+    )
+    together = one.minkowski_sum(other)
+    assert same(moved(together), moved(one).minkowski_sum(other.affine_map(matrix)), 1e-7 * SIZE)
+    common = one.intersection(other)
+    if common.is_empty:
+        assert moved(one).intersection(moved(other)).is_empty
     else:
         assume(common.volume() > 1e-3 and common.dimension == space)
-        assert same(moved(common), intersection(moved(one), moved(other)), 1e-7 * SIZE)
-    assert same(linear_image(moved(one), inverse, -inverse @ shift), one, 1e-7 * SIZE)
+        assert same(moved(common), moved(one).intersection(moved(other)), 1e-7 * SIZE)
+    assert same(moved(one).affine_map(inverse, -inverse @ shift), one, 1e-7 * SIZE)
 
 
 @some
@@ -128,18 +122,18 @@ def test_operations_commute_with_linear_maps(seed: int, space: int, kind: str) -
 def test_operations_are_monotone_and_include_what_they_must(seed: int, space: int, part: float) -> None:
     outer, other = solid(seed, space), solid(seed + 1, space)
     middle = outer.vertices.mean(axis=0)
-    inner = linear_image(outer, part * np.eye(space), (1.0 - part) * middle)
+    inner = outer.affine_map(part * np.eye(space), (1.0 - part) * middle)
     matrix, normal = map_of("shear", seed, space), np.ones((1, space))
     level = normal @ middle
     assert lies_in(inner, outer)
-    assert lies_in(linear_image(inner, matrix), linear_image(outer, matrix))
-    assert lies_in(minkowski_sum(inner, other), minkowski_sum(outer, other))
-    assert lies_in(cut(inner, normal, level), cut(outer, normal, level))
-    assert lies_in(cut(outer, normal, level), outer)
-    assert lies_in(intersection(inner, outer), inner)
-    assert lies_in(projection(inner, [0, 1]), projection(outer, [0, 1]))
+    assert lies_in(inner.affine_map(matrix), outer.affine_map(matrix))
+    assert lies_in(inner.minkowski_sum(other), outer.minkowski_sum(other))
+    assert lies_in(inner.cut(normal, upper=level), outer.cut(normal, upper=level))
+    assert lies_in(outer.cut(normal, upper=level), outer)
+    assert lies_in(inner.intersection(outer), inner)
+    assert lies_in(inner.project([0, 1]), outer.project([0, 1]))
     assert lies_in(product(inner, other), product(outer, other))
-    assert (inner.support(np.eye(space)) <= outer.support(np.eye(space)) + ROUNDING).all()
+    assert (inner.support_function(np.eye(space)) <= outer.support_function(np.eye(space)) + ROUNDING).all()
     assert inner.volume() <= outer.volume() * (1.0 + 1e-9)
     hull = Polytope.from_vertices(np.vstack([outer.vertices, other.vertices]))
     assert lies_in(outer, hull)
@@ -151,19 +145,19 @@ def test_operations_are_monotone_and_include_what_they_must(seed: int, space: in
 def test_volumes(seed: int, space: int, kind: str, part: float) -> None:
     one, other, matrix = solid(seed, space), solid(seed + 1, space), map_of(kind, seed, space)
     volume = one.volume()
-    assert linear_image(one, matrix, np.ones(space)).volume() == pytest.approx(
+    assert one.affine_map(matrix, np.ones(space)).volume() == pytest.approx(
         abs(float(np.linalg.det(matrix))) * volume, rel=1e-9
     )
-    assert minkowski_sum(one, one).volume() == pytest.approx(2.0**space * volume, rel=1e-9)
+    assert one.minkowski_sum(one).volume() == pytest.approx(2.0**space * volume, rel=1e-9)
     least = volume ** (1.0 / space) + other.volume() ** (1.0 / space)
-    assert minkowski_sum(one, other).volume() ** (1.0 / space) >= least * (1.0 - 1e-9)
-    assert volume <= float(np.prod(np.subtract(*one.bounds[::-1])))
-    line = Polytope.box([-1.0], [2.0])
+    assert one.minkowski_sum(other).volume() ** (1.0 / space) >= least * (1.0 - 1e-9)
+    assert volume <= float(np.prod(np.subtract(*one.bounding_box()[::-1])))
+    line = Polytope.from_box([-1.0], [2.0])
     assert product(one, line).volume() == pytest.approx(3.0 * volume, rel=1e-9)
     normal = np.random.default_rng(seed).standard_normal((1, space))
-    low, high = -float(one.support(-normal)[0]), float(one.support(normal)[0])
+    low, high = -float(one.support_function(-normal)[0]), float(one.support_function(normal)[0])
     level = np.array([low + (0.05 + 0.9 * part) * (high - low)])
-    pieces = cut(one, normal, level).volume() + cut(one, -normal, -level).volume()
+    pieces = one.cut(normal, upper=level).volume() + one.cut(-normal, upper=-level).volume()
     assert pieces == pytest.approx(volume, rel=1e-7)
 
 
@@ -239,12 +233,14 @@ def test_a_step_is_the_image_the_sum_and_the_cut(seed: int) -> None:
     sets = solved(asked).sets
     seen = probes(seed, asked.states)
     reached = Polytope.from_vertices(asked.initial[None, :])
-    thrust = Polytope.box(-asked.control_bounds, asked.control_bounds)
-    limits = Polytope.box(-asked.state_bounds, asked.state_bounds)
+    thrust = Polytope.from_box(-asked.control_bounds, asked.control_bounds)
+    limits = Polytope.from_box(-asked.state_bounds, asked.state_bounds)
     for time in range(asked.periods):
-        pushed = linear_image(thrust, asked.control[time])
-        reached = intersection(minkowski_sum(linear_image(reached, asked.transition[time]), pushed), limits)
-        np.testing.assert_allclose(sets.support(SetKind.FORWARD, time + 1, seen), reached.support(seen), atol=1e-7)
+        pushed = thrust.affine_map(asked.control[time])
+        reached = reached.affine_map(asked.transition[time]).minkowski_sum(pushed).intersection(limits)
+        np.testing.assert_allclose(
+            sets.support(SetKind.FORWARD, time + 1, seen), reached.support_function(seen), atol=1e-7
+        )
 
 
 @few

@@ -84,10 +84,10 @@ def test_a_cut_commutes_with_shears_mirrors_and_shifts(
     moved = polygon.linear_map(matrix).translate(shifted)
 
     def cut_then_moved(by: float) -> ConvexPolygons:
-        return polygon.clip(normal, band[0] - by, band[1] + by).linear_map(matrix).translate(shifted)
+        return polygon.cut(normal, band[0] - by, band[1] + by).linear_map(matrix).translate(shifted)
 
     def moved_then_cut(by: float) -> ConvexPolygons:
-        return moved.clip(other, band[0] + level - by, band[1] + level + by)
+        return moved.cut(other, band[0] + level - by, band[1] + level + by)
 
     wider = 1e-12 * 13 * 13 * 10 * REACH
     assert lies_in(cut_then_moved(0.0), moved_then_cut(wider))
@@ -99,8 +99,8 @@ def test_a_cut_commutes_with_shears_mirrors_and_shifts(
 def test_scaling_by_powers_of_two_is_exact_in_a_cut(
     polygon: ConvexPolygons, normal: tuple[float, float], band: tuple[float, float], scaling: Floats
 ) -> None:
-    scaled = polygon.linear_map(scaling).clip(normal / np.diag(scaling), *band)
-    assert scaled.polygon().tolist() == polygon.clip(normal, *band).linear_map(scaling).polygon().tolist()
+    scaled = polygon.linear_map(scaling).cut(normal / np.diag(scaling), *band)
+    assert scaled.polygon().tolist() == polygon.cut(normal, *band).linear_map(scaling).polygon().tolist()
 
 
 @some
@@ -121,7 +121,7 @@ def test_mirrors_are_exact(
     stretched = polygon.add_segment(half)
     assert same(image.add_segment(mirror @ half), stretched.linear_map(mirror))
     assert float(image.area()) == pytest.approx(float(polygon.area()), rel=1e-12)
-    assert float(image.support(mirror @ np.asarray(normal))) == float(polygon.support(normal))
+    assert float(image.support_function(mirror @ np.asarray(normal))) == float(polygon.support_function(normal))
 
 
 @some
@@ -141,13 +141,13 @@ def test_every_operation_is_monotone(
     shrunk = middle + (corners - middle) * np.resize(parts, len(corners))[:, None]
     inner = ConvexPolygons.from_points(shrunk)
     assert lies_in(inner, outer)
-    assert lies_in(inner.clip(normal, *band), outer.clip(normal, band[0] - 1e-9, band[1] + 1e-9))
+    assert lies_in(inner.cut(normal, *band), outer.cut(normal, band[0] - 1e-9, band[1] + 1e-9))
     assert lies_in(inner.linear_map(matrix), outer.linear_map(matrix))
     assert lies_in(inner.translate(normal), outer.translate(normal))
     assert lies_in(inner.add_segment(normal), outer.add_segment(normal))
     assert lies_in(inner.minkowski_sum(other), outer.minkowski_sum(other))
     assert lies_in(inner, outer.reduce_outward(cap))
-    assert float(inner.support(normal)) <= float(outer.support(normal)) + ROUNDING
+    assert float(inner.support_function(normal)) <= float(outer.support_function(normal)) + ROUNDING
     assert float(inner.area()) <= float(outer.area()) * (1.0 + 1e-12)
 
 
@@ -162,12 +162,12 @@ def test_hulls_boxes_and_reductions_are_idempotent_and_outward(
     assert reduced.reduce_outward(cap).polygon().tolist() == reduced.polygon().tolist()
     assert lies_in(polygon, reduced)
     least, greatest = polygon.bounding_box()
-    box = ConvexPolygons.box((least[0], greatest[0]), (least[1], greatest[1]))
+    box = ConvexPolygons.from_box((least[0], least[1]), (greatest[0], greatest[1]))
     again = box.bounding_box()
     np.testing.assert_array_equal(again, (least, greatest))
     assert lies_in(polygon, box, 0.0)
     assert lies_in(polygon, polygon.add_segment(normal))
-    assert lies_in(polygon.clip(normal, *band), polygon)
+    assert lies_in(polygon.cut(normal, *band), polygon)
     assert vertices(from_shapely(to_shapely(polygon))) == vertices(polygon)
     assert float(polygon.margin(polygon.centroid())) >= -ROUNDING
 
@@ -178,15 +178,15 @@ def test_areas_add_scale_and_obey_brunn_and_minkowski(
     first: ConvexPolygons, second: ConvexPolygons, normal: tuple[float, float], part: float, matrix: Floats, cap: int
 ) -> None:
     area, other = float(first.area()), float(second.area())
-    low, high = -float(first.support(np.negative(normal))), float(first.support(normal))
+    low, high = -float(first.support_function(np.negative(normal))), float(first.support_function(normal))
     level = low + part * (high - low)
-    pieces = float(first.clip(normal, upper=level).area()) + float(first.clip(normal, lower=level).area())
+    pieces = float(first.cut(normal, upper=level).area()) + float(first.cut(normal, lower=level).area())
     assert pieces == pytest.approx(area, rel=1e-9)
     assert float(first.linear_map(matrix).area()) == pytest.approx(area, rel=1e-12)
     assert float(first.linear_map(3.0 * matrix).area()) == pytest.approx(9.0 * area, rel=1e-12)
     # A segment sweeps the width across it; a sum is at least as large as Brunn and Minkowski say.
     across = np.array([-normal[1], normal[0]])
-    width = float(first.support(across)) + float(first.support(-across))
+    width = float(first.support_function(across)) + float(first.support_function(-across))
     assert float(first.add_segment(normal).area()) == pytest.approx(area + 2.0 * width, rel=1e-12)
     total = float(first.minkowski_sum(second).area())
     assert math.sqrt(total) >= (math.sqrt(area) + math.sqrt(other)) * (1.0 - 1e-12)
@@ -347,7 +347,7 @@ def test_prediction_is_a_shear_and_a_segment(events: list[tuple[float, float, fl
     wanted = before.linear_map([[1.0, 0.0], [STEP, 1.0]]).add_segment(half)
     assert lies_in(after.polygon, wanted, HAIR)
     assert lies_in(wanted, after.polygon, HAIR)
-    width = float(wanted.support((-half[1], half[0]))) + float(wanted.support((half[1], -half[0])))
+    width = float(wanted.support_function((-half[1], half[0]))) + float(wanted.support_function((half[1], -half[0])))
     area = float(before.area()) + 2.0 * width
     assert float(after.polygon.area()) == pytest.approx(area, rel=1e-9, abs=HAIR)
     assert float(after.omega_alpha.area()) * after.range_m**2 == pytest.approx(float(after.polygon.area()), rel=1e-9)

@@ -195,7 +195,7 @@ def test_inconsistent_measurements_are_told_and_the_set_goes_on_from_the_last_co
     x, slack = 5801.3e3, 1e-9
     bound = MODEL.angle_sensor.error_bound(x)
     old, new = before.section_at(x, 1).polygon, information.section_at(x, 1).polygon
-    grown = old.minkowski_sum(ConvexPolygons.box((-E * bound, E * bound), (0.0, 0.0)))
+    grown = old.minkowski_sum(ConvexPolygons.from_box((-E * bound, 0.0), (E * bound, 0.0)))
     for direction in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.01), (-1.0, 0.02)):
         assert new.support(direction) == pytest.approx(float(grown.support(direction)), rel=slack)
     information.predict()

@@ -73,14 +73,14 @@ def test_exact_route_has_the_vertices_of_exact_rationals(random_problem: Random,
         for t, expected in enumerate(forward):
             found = part.polytope(SetKind.FORWARD, t)
             assert found is not None
-            bounds = np.stack(found.bounds, axis=-1)
+            bounds = np.stack(found.bounding_box(), axis=-1)
             assert np.abs(bounds - expected.bounds).max() < 1e-9
             assert found.dimension == expected.dimension
             assert found.essential_vertices() <= len(expected.vertices)
         if optimum.reached:
             found = part.polytope(SetKind.TUBE, 1)
             assert found is not None
-            assert np.abs(np.stack(found.bounds, axis=-1) - tube[1].bounds).max() < 1e-9
+            assert np.abs(np.stack(found.bounding_box(), axis=-1) - tube[1].bounds).max() < 1e-9
 
 
 @pytest.mark.parametrize("seed", [0, 4, 8, 12])
