@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from infoset import polygon_batches as kernels
 from infoset.limits import LARGEST, Limits, need_pair, real_values, shown
 from infoset.pictures import outlines_svg
-from infoset.polytope import Polytope
 from infoset.renamed import renamed
 
 if TYPE_CHECKING:
+    from infoset.polytope import Polytope
     from shapely.geometry.base import BaseGeometry
 
 Floats = NDArray[np.float64]
@@ -396,6 +396,8 @@ class ConvexPolygons:
 
     def polytope(self) -> Polytope:
         """Return a single polygon as a `Polytope`; for operations in more dimensions."""
+        from infoset.polytope import Polytope
+
         return Polytope.from_vertices(self.polygon()) if self.counts else Polytope.empty(2)
 
     def broadcast_to(self, shape: tuple[int, ...]) -> ConvexPolygons:
