@@ -17,8 +17,9 @@ from infoset.pictures import outlines_svg
 from infoset.renamed import renamed
 
 if TYPE_CHECKING:
-    from infoset.polytope import Polytope
     from shapely.geometry.base import BaseGeometry
+
+    from infoset.polytope import Polytope
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
