@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from infoset.convex_polygons import ConvexPolygons
 from infoset.limits import COUNT, real_values, shown
 from infoset.observer_sets import Motion, Polygons, Polytopes, Set, Sets, Strips, polytope_of
-from infoset.polytope import Polytope, projection
+from infoset.polytope import Polytope
 from infoset.zonotope import Zonotope
 
 Floats = NDArray[np.float64]
@@ -80,7 +80,7 @@ class Estimate:
         """
         if not isinstance(self.sets, Polygons):
             raise ValueError(f"the set has {self.states} states; its runs are .polytopes")
-        polygons = ConvexPolygons(self.sets.vertices, self.sets.counts)
+        polygons = ConvexPolygons.unchecked(self.sets.vertices, self.sets.counts)
         return polygons[0] if self.single else polygons
 
     @property
@@ -399,7 +399,7 @@ class _Noise:
             if pattern.all():
                 rows, lower, upper = self.rows, self.lower, self.upper
             elif pattern.any():  # the errors of the measured outputs alone
-                rows, lower, upper = _half_spaces(projection(self.polytope, list(np.flatnonzero(pattern))))
+                rows, lower, upper = _half_spaces(self.polytope.project(np.flatnonzero(pattern).tolist()))
             else:
                 continue
             heights = y[:, pattern] @ rows.T

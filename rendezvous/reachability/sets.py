@@ -172,8 +172,10 @@ class ExactSets:
                 f"a block has {block.size} states, more than the limit of {meter.budget.dimension} for exact sets"
             )
         self._optimum, self._meter = optimum, meter
-        reach = np.ones(len(block.controls))
-        corners = Polytope.from_box(-reach, reach).vertices if len(reach) else np.zeros((1, 0))
+        rows = np.vstack([np.eye(len(block.controls)), -np.eye(len(block.controls))])
+        corners = np.zeros((1, 0))
+        if len(rows):  # not `from_box`: the last digits of results depend on the order of these corners
+            corners = Polytope.from_constraints(rows, np.ones(len(rows)), bounded=True).vertices
         forward = [Polytope.from_vertices(block.initial[None, :])]
         for t in range(block.periods):
             moved = forward[-1].vertices @ block.transition[t].T
