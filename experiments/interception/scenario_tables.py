@@ -205,7 +205,7 @@ class ThrusterTable(Table):
         "last impulse, before the nominal arrival; without it: no cut-off", "2.0", default=None
     )
     impulses_s: Annotated[tuple[Decimal, ...], PlainValidator(Numbers(None, Number.of(POSITIVE)))] = key(
-        "times of the impulses, before the nominal arrival; without it: every step",
+        "impulses, before the nominal arrival; without it: at every step",
         "[60.0, 20.0, 7.5]",
         default=(),
     )

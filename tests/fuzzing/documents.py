@@ -10,11 +10,12 @@ from hypothesis import strategies as st
 from experiments.pareto.file import COMPONENTS
 from guidance import NoiseKind, TieRule, strategy_names
 from infoset.model import InitialSet, Model, Recovery
-from infoset.sensors import Convention, ErrorShape
+from infoset.sensors import Bias, Convention, ErrorShape
 from sim import Manoeuvre
 
 Draw = Callable[[st.SearchStrategy[float]], float]
 Values = Mapping[str, object]
+NOTHING: Values = {}
 
 
 def sizes(least: float, greatest: float) -> st.SearchStrategy[float]:
@@ -75,6 +76,37 @@ def _angles_in_space(draw: st.DrawFn, error: float) -> Values:
 
 
 @st.composite
+def _cameras(draw: st.DrawFn, error: float, threshold_m: float) -> Values:
+    """Keys of a camera in place of the linear bound."""
+    return {
+        "error_at_nominal_range_rad": None,
+        "error_at_zero_range_rad": None,
+        "error_at_nominal_range_y_rad": None,
+        "error_at_zero_range_y_rad": None,
+        "pixel_error_rad": error,
+        "centroid_error_m": draw(st.sampled_from([None, 0.0, 0.01 * threshold_m])),
+        "bias": draw(st.sampled_from(Bias)).value,
+    }
+
+
+@st.composite
+def _times(draw: st.DrawFn, duration_s: float) -> tuple[Values, Values]:
+    """Keys of the window of measurements, and of the times of impulses."""
+    last_s = draw(st.sampled_from([0.0, 0.2 * duration_s]))
+    measured = {
+        "first_image_s": draw(st.sampled_from([None, 0.5 * duration_s, 2.0 * duration_s])),
+        "last_image_s": last_s,
+        "miss_probability": draw(st.sampled_from([0.0, 0.1, 0.9])),
+    }
+    given = {
+        "last_impulse_s": draw(st.sampled_from([None, 0.0, 0.1 * duration_s])),
+        "impulses_s": draw(st.sampled_from([None, [], [0.6 * duration_s], [0.6 * duration_s, 0.2 * duration_s]])),
+        "delay_steps": draw(st.sampled_from([None, 0, 1])),
+    }
+    return measured, given
+
+
+@st.composite
 def scenarios(draw: st.DrawFn) -> str:
     """Flights of 3 to 25 steps in a millisecond to a thousand seconds, at 1 m/s to 100 km/s, with every option."""
     speed, duration_s = draw(sizes(1e-3, 1e2)), draw(sizes(1e-3, 1e3))
@@ -92,6 +124,8 @@ def scenarios(draw: st.DrawFn) -> str:
     is_spatial = draw(st.booleans())
     if is_spatial:
         box |= {"y_km": [-across, 0.5 * across], "vy_km_s": [-slow, 0.5 * slow]}
+    threshold_km = range_km * draw(sizes(1e-6, 0.3))
+    measured, given = draw(st.just((NOTHING, NOTHING)) | _times(duration_s))
     period_s, sun_km = step_s * draw(st.integers(1, 3)), range_km * draw(sizes(10.0, 1e4))
     impulse = slow * 1e3 * draw(sizes(1e-3, 10.0))
     optional = draw(st.lists(st.sampled_from(["sun", "range_sensor", "rate_sensor", "target", "body"]), unique=True))
@@ -121,6 +155,8 @@ def scenarios(draw: st.DrawFn) -> str:
             "error_at_nominal_range_rad": error,
             "error_at_zero_range_rad": min(error * slope, 0.9),
             **(draw(_angles_in_space(error)) if is_spatial else {}),
+            **draw(st.just(NOTHING) | _cameras(error, threshold_km * 1e3)),
+            **measured,
         },
         "thruster": {
             "budget_m_s": impulse * draw(sizes(0.1, 1e3)),
@@ -128,11 +164,12 @@ def scenarios(draw: st.DrawFn) -> str:
             "greatest_impulse_m_s": impulse,
             "execution_error_relative": draw(st.sampled_from([0.0, 0.1])),
             "pointing_error_rad": draw(st.sampled_from([0.0, 0.01])) if is_spatial else None,
+            **given,
         },
         "guidance": {
             "step_s": step_s,
             "strategy": draw(st.sampled_from(strategy_names())),
-            "range_threshold_km": range_km * draw(sizes(1e-6, 0.3)),
+            "range_threshold_km": threshold_km,
         },
         "information_set": {
             "model": (Model.GUARANTEED if guaranteed else Model.PAPER).value,

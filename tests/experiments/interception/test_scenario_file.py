@@ -34,7 +34,15 @@ from infoset.sensors import AngleSensor, Convention, ErrorShape, RangeSensor
 from sim.gravity import on_board_model
 from sim.scenario import Body, Manoeuvre, Scenario, Sun, Target
 
-BUILT_IN = ("asteroid-1997", "asteroid-1997-single", "asteroid-1997-space", "comet-fast")
+BUILT_IN = (
+    "asteroid-1997",
+    "asteroid-1997-single",
+    "asteroid-1997-space",
+    "comet-fast",
+    "dart-2022",
+    "deep-impact-2005",
+    "haiv-2013",
+)
 PAPER = scenario_text("asteroid-1997")
 
 
