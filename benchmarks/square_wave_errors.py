@@ -48,12 +48,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     scenario, runs, seed = asked_scenario(__doc__, arguments, runs=50, seed=0)
     sys.stdout.write(f"{title(scenario)}, {runs} starts, ")
     sys.stdout.write(f"seed {seed}: the worst of {2 * len(HALF_PERIODS)} square waves\n")
-    sys.stdout.write(f"{'':18}{'miss, m':^20}{'impulse, m/s':^20}\n")
-    sys.stdout.write(f"{'strategy':18}{'median':>10}{'worst':>10}{'median':>10}{'worst':>10}\n")
+    sys.stdout.write(f"{'':26}{'miss, m':^20}{'impulse, m/s':^20}\n")
+    sys.stdout.write(f"{'strategy':26}{'median':>10}{'worst':>10}{'median':>10}{'worst':>10}\n")
     for name in strategy_names():
         miss, impulse = worst(scenario, name, runs, seed)
         values = (np.median(miss), miss.max(), np.median(impulse), impulse.max())
-        sys.stdout.write(f"{name:18}{''.join(f'{value:10.1f}' for value in values)}\n")
+        sys.stdout.write(f"{name:26}{''.join(f'{value:10.1f}' for value in values)}\n")
         sys.stdout.flush()
 
 

@@ -34,7 +34,17 @@ from numpy.typing import NDArray
 from experiments import load_scenario
 from experiments.common.errors import InputError
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
-from guidance import Kalman, LeastSquares, NoiseKind, Strategy, SymmetricMiss, TieRule, ZeroEffortMiss
+from guidance import (
+    Kalman,
+    LeastSquares,
+    NoiseKind,
+    Predictive,
+    ProportionalNavigation,
+    Strategy,
+    SymmetricMiss,
+    TieRule,
+    ZeroEffortMiss,
+)
 from infoset import Model, RangeSensor, RateSensor
 from infoset.sensors import Convention
 from sim import Manoeuvre, Outcome, Scenario, Sun, Target, simulate
@@ -225,7 +235,7 @@ def engagements(draw_value: st.DrawFn) -> Scenario:
     )
 
 
-STRATEGIES = st.sampled_from([SymmetricMiss, ZeroEffortMiss, Kalman, LeastSquares])
+STRATEGIES = st.sampled_from([SymmetricMiss, ZeroEffortMiss, Kalman, LeastSquares, ProportionalNavigation, Predictive])
 STEADY = st.sampled_from([ZeroEffortMiss, Kalman, LeastSquares])
 POWERS = st.integers(-20, 20)
 
@@ -236,8 +246,9 @@ def strategy_of(kind: type[Strategy], time: float) -> Strategy:
 
 
 def digits(scenario: Scenario, kind: type[Strategy]) -> float:
-    """What a power of two may change: nothing, but for Kalman's logarithm of a range's variance."""
-    return TOLERANCE if kind is Kalman and scenario.range_sensor is not None else 0.0
+    """What a power of two may change: nothing, but for the logarithm of a range's variance in the filters."""
+    uses_filters = kind in (Kalman, ProportionalNavigation, Predictive)
+    return TOLERANCE if uses_filters and scenario.range_sensor is not None else 0.0
 
 
 def assert_scales(
