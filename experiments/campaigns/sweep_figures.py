@@ -10,12 +10,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from contourpy import contour_generator
 from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, LinearSegmentedColormap, ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.markers import CARETUPBASE
 from matplotlib.patches import Patch, Rectangle
+from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
@@ -80,6 +82,10 @@ _MOST_TICKS = 8
 _HEAD_ROOM = 1.06
 """Factor by which an axis is extended, so that the arrow above the topmost point is visible."""
 _DIAMOND: dict[str, Any] = {"marker": "D", "markersize": 4.0, "color": IMPULSE, "mec": "white", "mew": 0.6}
+_LINE: dict[str, Any] = {"color": INK, "linewidth": 1.3}
+_CLOSED_FORM: dict[str, Any] = {"color": "#2f6b3a", "linewidth": 1.3, "linestyle": (0, (5, 1.5))}
+"""Lines on which the estimate and the closed form equal the bound."""
+_MOST_LEGEND_COLUMNS = 5
 _STRIP = 0.045
 """Height of the strip of decisions above a panel, as a fraction of the panel."""
 _BAR_AT, _NUMBER_AT = 0.2, 0.6
@@ -188,7 +194,7 @@ def _decision_patches(table: SweepTable, noise: str) -> list[Patch]:
 def _limit_handles(table: SweepTable, noise: str, extent: Line2D | Patch) -> list[Any]:
     """Return the marks of the limits that are drawn: `extent` for their ranges, and one for interpolated limits."""
     drawn = [limit for answer in answers(table, noise) for limit in answer.limits]
-    if all(limit.value is None for limit in drawn):
+    if len(table.axes) > 1 or all(limit.value is None for limit in drawn):
         return [extent] if drawn else []
     return [extent, Line2D([], [], linestyle="none", label="limit by interpolation", **_DIAMOND)]
 
@@ -298,10 +304,13 @@ def _maps(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figur
         *_decision_patches(table, noise),
         *_limit_handles(table, noise, Line2D([], [], color=IMPULSE, linewidth=1.5, label="range of the limit")),
     ]
+    drawn = {line.get_color() for line in first.lines}
+    names = ((_LINE, "limit by interpolation of the estimates"), (_CLOSED_FORM, "closed form of a camera"))
+    handles += [Line2D([], [], label=name, **look) for look, name in names if look["color"] in drawn]
     figure.legend(
         handles=handles,
         loc="lower center",
-        ncols=max(1, len(handles)),
+        ncols=max(1, len(handles) if len(handles) < _MOST_LEGEND_COLUMNS else -(-len(handles) // 2)),
         title=_map_notes(table, shown, noise),
         title_fontsize=7.0,
     )
@@ -326,7 +335,7 @@ def _map_notes(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> 
 
 
 def _decision_panel(axes: Axes, table: SweepTable, noise: str) -> None:
-    """Draw the decision and the estimate of each cell, and the limit of each row with its interval."""
+    """Draw decision and estimate of each cell, the interval of the limit of each row, and the limit as a line."""
     across, up = table.axes
     shape = len(across.values), len(up.values)
     verdicts = [table.verdict(cell, noise) for cell in range(len(table.cells))]
@@ -352,15 +361,50 @@ def _decision_panel(axes: Axes, table: SweepTable, noise: str) -> None:
         mask=[verdict is None or verdict.value is None for verdict in verdicts],
     ).reshape(shape)
     _write_numbers(axes, across, up, values.T, lambda row, column: shown[column, row] == 0, _NUMBER_AT)
+    for text, decision in zip(axes.texts, shown.T.flat, strict=False):  # readable on the lines
+        ground = "white" if decision is np.ma.masked else DECISION_COLOURS[decisions[int(decision)]]
+        text.set_path_effects([Stroke(linewidth=1.4, foreground=ground), Normal()])
     for row, height in enumerate(_heights(up, _BAR_AT)):
         cells = [verdicts[column * shape[1] + row] for column in range(shape[0])]
         for limit in limits(across, cells, table.required):
             ends = [limit.lower, limit.upper]
             axes.plot(ends, [height, height], color="white", linewidth=3.2, solid_capstyle="butt", zorder=4.0)
             axes.plot(ends, [height, height], color=IMPULSE, linewidth=1.5, solid_capstyle="butt", zorder=4.5)
-            if limit.value is not None:
-                axes.plot([limit.value], [height], zorder=5.0, **_DIAMOND)
+    known = [verdict.value for verdict in verdicts if verdict is not None and verdict.value is not None]
+    for grid, look in ((values, _LINE), (_closed_form(table), _CLOSED_FORM)):
+        for line in bound_lines(across, up, grid, table.required, spans_decades(known)):
+            axes.plot(*line.T, zorder=3.5, **look)
     separate_labels(axes)
+
+
+def _closed_form(table: SweepTable) -> Grid:
+    """Return the closed form of the cells of a map; masked where it is not known."""
+    shape = [len(axis.values) for axis in table.axes]
+    values = [math.nan if value is None else value for value in table.closed_form_m] or np.full(shape, math.nan)
+    return np.ma.masked_invalid(np.reshape(values, shape))
+
+
+def bound_lines(across: Axis, up: Axis, values: Grid, required: AnyRequirement, log_values: bool) -> list[Floats]:
+    """Return the lines on which interpolated values of a map equal the bound of the requirement.
+
+    The interpolation is linear on the scales of both axes, and with `log_values` that of the logarithms of the values,
+    as in `sweep_table.limits`.
+
+    Parameters
+    ----------
+    values : masked array, shape (columns, rows)
+        Values of the cells.
+    """
+    x, y = (np.log(axis.values) if axis.scale == "log" else np.array(axis.values) for axis in (across, up))
+    logarithmic = log_values and isinstance(required, Requirement)
+    heights, bound = (np.ma.log(values), math.log(required.bound)) if logarithmic else (values, required.bound)
+    lines: list[Floats] = contour_generator(x=x, y=y, z=np.ma.MaskedArray(heights).T).lines(bound)  # type: ignore[assignment]
+    return [
+        np.stack(
+            [np.exp(line[:, k]) if axis.scale == "log" else line[:, k] for k, axis in enumerate((across, up))], axis=1
+        )
+        for line in lines
+    ]
 
 
 def _map_panel(figure: Figure, axes: Axes, table: SweepTable, noise: str, quantile: QuantileName) -> None:
@@ -471,9 +515,12 @@ def _scale(axes: Axes, axis: Axis, which: str) -> None:
 
 
 def _power(axis: Axis) -> int:
-    """Return the power of ten of the labels of an axis."""
-    greatest = max(abs(value) for value in axis.values)
-    return 0 if 0.01 <= greatest < 1e5 else math.floor(math.log10(greatest))
+    """Return the power of ten of the labels of an axis: that of the least value if the values span a decade."""
+    sizes = [abs(value) for value in axis.values]
+    greatest, least = max(sizes), min(sizes)
+    if 0.01 <= greatest < 1e5:
+        return 0
+    return math.floor(math.log10(least if 10.0 * least < greatest < 1000.0 * least else greatest))
 
 
 def _look(levels: Sequence[float], level: float) -> Any:

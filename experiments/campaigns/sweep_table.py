@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from experiments.campaigns.axis_names import tied_keys, unit_of
 from experiments.campaigns.samples import LEVELS, OUTCOMES, Sample, noises_of, samples, shown_value
+from experiments.campaigns.sweep_axes import sweep_cells
 from experiments.interception.study import SetCounts
-from sim import HitEstimate, QuantileEstimate, QuantileName, Requirement
+from sim import HitEstimate, QuantileEstimate, QuantileName, Requirement, Scenario
+from sim.closed_form import possible_miss_of
 from sim.requirement import AnyRequirement, Decision, Verdict, judge
 from sim.statistics import level_name
 from sim.stopping_rule import QUANTITIES
@@ -48,6 +50,9 @@ class SweepTable:
         Probability of a hit in each cell, for the noise with the fewest hits; None if the body has no size.
     radius_m : float or None
         Radius of the body; None if it has no size, or different sizes.
+    closed_form_m : tuple of float or None
+        Guaranteed miss of each cell by the closed form of a camera, m (`sim.closed_form`); empty if the requirement is
+        about another quantity or the sensor is no camera.
     """
 
     axes: tuple[Axis, ...]
@@ -58,6 +63,7 @@ class SweepTable:
     verdicts: tuple[Mapping[str, Verdict], ...]
     hits: tuple[HitEstimate | None, ...]
     radius_m: float | None
+    closed_form_m: tuple[float | None, ...] = ()
 
     def verdict(self, cell: int, noise: str) -> Verdict | None:
         """Return the verdict of a cell and a noise; None without runs."""
@@ -157,7 +163,21 @@ def sweep_table(folder: CampaignFolder, required: AnyRequirement, quantiles: Seq
     axes, body = folder.manifest.axes, folder.manifest.scenario.body
     is_varied = any("body.radius_m" in tied_keys(axis.key) for axis in axes)
     radius_m = None if body is None or is_varied else body.radius_m
-    return SweepTable(axes, noises, levels, cells, required, verdicts, hits, radius_m)
+    form = _closed_forms(folder.manifest.scenario, axes) if required.quantity == "guaranteed_miss_m" else ()
+    return SweepTable(axes, noises, levels, cells, required, verdicts, hits, radius_m, form)
+
+
+def _closed_forms(scenario: Scenario, axes: Sequence[Axis]) -> tuple[float | None, ...]:
+    """Return the closed form of the guaranteed miss of each cell, m; None in cells with fewer than two images."""
+    if not scenario.set_model.angle_sensor.is_camera:
+        return ()
+    values: list[float | None] = []
+    for cell in sweep_cells(scenario, axes):
+        try:
+            values.append(possible_miss_of(cell))
+        except ValueError:
+            values.append(None)
+    return tuple(values)
 
 
 def _of_cell(verdict: Verdict, noises: int) -> Verdict:

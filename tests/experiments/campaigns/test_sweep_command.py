@@ -20,7 +20,17 @@ from experiments.campaigns.axis_names import key_label, unit_of
 from experiments.campaigns.samples import Sample
 from experiments.campaigns.sweep_axes import sweep_axes, sweep_cells
 from experiments.campaigns.sweep_figures import draw_sweep, requirement_words
-from experiments.campaigns.sweep_table import SHOWN, Limit, SweepTable, answer, limits, spans_decades, sweep_table
+from experiments.campaigns.sweep_table import (
+    SHOWN,
+    Limit,
+    SweepTable,
+    answer,
+    answers,
+    limits,
+    spans_decades,
+    sweep_table,
+)
+from experiments.common.figure_style import INK
 from experiments.interception.scenario_file import load_scenario, scenario_hash, scenario_to_toml
 from experiments.interception.study import SetCounts
 from sim import (
@@ -724,6 +734,38 @@ def test_interpolated_limits_are_marked_on_the_drawn_line(
     for mark in marks:
         ((x, y),) = axes.transData.transform(np.column_stack(mark.get_data()))
         assert np.interp(x, *on_paper.T) == pytest.approx(y, abs=1e-6)
+
+
+@pytest.mark.parametrize("scale", ["linear", "log"])
+def test_the_limit_of_two_keys_is_a_line(scale: Literal["linear", "log"]) -> None:
+    space = np.geomspace if scale == "log" else np.linspace
+    axes = (
+        Axis("angle_sensor.pixel_error_rad", tuple(space(1e-6, 5e-5, 8).tolist()), scale),
+        Axis("thruster.last_impulse_s", tuple(space(30.0, 900.0, 8).tolist()), scale),
+    )
+    required = Requirement(QuantileName("guaranteed_miss_m", 0.99), 25.0)
+    table = made_table(axes, required, lambda error_rad, time_s: 2e4 * error_rad * time_s)
+    figure = draw_sweep(table, SHOWN, "game")
+    need_room(figure)
+    first = figure.axes[0]
+    assert first.get_xlabel() == "angle sensor: pixel error, $10^{-6}$ rad"
+    (drawn,) = [line for line in first.lines if line.get_color() == INK]
+    error_rad, time_s = np.asarray(drawn.get_xydata(), dtype=np.float64).T
+    if scale == "log":  # products are planes on logarithmic scales
+        np.testing.assert_allclose(2e4 * error_rad * time_s, 25.0, rtol=1e-9)
+    for row, at in zip(answers(table, "game"), axes[1].values, strict=True):
+        for limit in row.limits:
+            crossing = np.interp(-at, -time_s, error_rad)
+            assert limit.lower <= crossing <= limit.upper
+            assert limit.value is None or crossing == pytest.approx(limit.value, rel=1e-6)
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names[-1] == "limit by interpolation of the estimates"
+    combinations = itertools.product(*(axis.values for axis in axes))
+    form = replace(table, closed_form_m=tuple(3e4 * error_rad * time_s for error_rad, time_s in combinations))
+    figure = draw_sweep(form, SHOWN, "game")
+    assert figure.legends[0].get_texts()[-1].get_text() == "closed form of a camera"
+    one_known = replace(table, closed_form_m=(None,) * 63 + (3.0,))
+    assert len(draw_sweep(one_known, SHOWN, "game").axes[0].lines) == len(first.lines)
 
 
 def test_an_unfinished_sweep_is_reported_as_far_as_it_is(infoset: Infoset, swept: Path, tmp_path: Path) -> None:
