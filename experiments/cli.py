@@ -18,6 +18,7 @@ from experiments.common.errors import INTERRUPTED, InputError, on_a_screen
 from experiments.interception.command import Adversary, Bound, Compare, Engage, Experiment, Replay
 from experiments.interception.scenarios_command import app as scenarios
 from experiments.multipoint.command import Multipoint
+from experiments.observer.command import Observe
 from experiments.pareto.command import Pareto
 from experiments.problems_command import app as problems
 from experiments.pursuit.command import Pursuit, PursuitMap
@@ -62,6 +63,9 @@ COMMANDS: Mapping[str, Sequence[tuple[type, str, str]]] = {
         (Reach, "reachability.run", "reach rendezvous-2021 --select energy,vertices --replan --out reach"),
         (Pareto, "pareto.run", "pareto pareto-2008 --prefer y_m=0,z_m=50 --out figures"),
         (Multipoint, "multipoint.run", "multipoint service-3 --order best --times best --out figures"),
+    ],
+    "Set-membership estimation": [
+        (Observe, "observer.run", "observe vehicle --smooth --out results"),
     ],
     TOOLS: [
         (Reproduce, "reproduced_numbers", "reproduce --paper pareto --json numbers.json"),

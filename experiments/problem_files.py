@@ -18,6 +18,7 @@ from experiments.common.template import template
 from experiments.common.toml_file import document_of
 from experiments.common.toml_form import Form
 from experiments.multipoint import file as multipoint
+from experiments.observer import file as observer
 from experiments.pareto import file as pareto
 from experiments.pursuit import file as pursuit
 from experiments.reachability import file as reachability
@@ -27,6 +28,7 @@ FILES: Mapping[str, tuple[Form[Any], Callable[[str], Any]]] = {
     multipoint.KIND: (multipoint.FORM, multipoint.load_multipoint),
     reachability.KIND: (reachability.FORM, reachability.load_rendezvous),
     pursuit.KIND: (pursuit.FORM, pursuit.load_pursuit),
+    observer.KIND: (observer.FORM, observer.load_observer),
 }
 """Form and loader of each kind of problem."""
 

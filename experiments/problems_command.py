@@ -17,7 +17,7 @@ app = file_commands(
     "problem",
     MODULE,
     "pareto-2008",
-    "List, show and check problems of rendezvous and pursuit, and create a problem file.\n\n"
+    "List, show and check problems of rendezvous, pursuit and estimation, and create a problem file.\n\n"
     "Without a command, list the built-in problems.",
     "problems new multipoint mine.toml",
 )
@@ -29,8 +29,8 @@ def new(
         str,
         typer.Argument(
             metavar="KIND",
-            help="Kind of the problem: pareto-encounter, multipoint, reachable-rendezvous or pursuit-evasion; or the "
-            "command that takes it, for example reach.",
+            help="Kind of the problem: pareto-encounter, multipoint, reachable-rendezvous, pursuit-evasion or "
+            "observer; or the command that takes it, for example reach.",
         ),
     ],
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The file to write.")],

@@ -18,6 +18,7 @@ PROBLEM_COMMANDS = {
     "multipoint": "multipoint",
     "reachable-rendezvous": "reach",
     "pursuit-evasion": "pursuit",
+    "observer": "observe",
 }
 """Command of each kind of problem."""
 LARGEST_FILE_BYTES = 100_000

@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 TARGETS = (
-    *("scenario", "pareto-encounter", "multipoint", "pursuit-evasion", "reachable-rendezvous"),
+    *("scenario", "pareto-encounter", "multipoint", "pursuit-evasion", "reachable-rendezvous", "observer"),
     *("record", "campaign", "expressions"),
 )
 MOST_SECONDS_AN_INPUT = 2.0

@@ -314,11 +314,39 @@ def rendezvous(draw: st.DrawFn) -> str:
     return toml(top, tables)
 
 
+@st.composite
+def observers(draw: st.DrawFn) -> str:
+    """One to three states of any size, one or two outputs, in boxes, zonotopes or triangles."""
+    states, outputs = draw(st.integers(1, 3)), draw(st.integers(1, 2))
+    size = draw(sizes(1e-6, 1e6))
+
+    def rows(count: int, width: int, scale: float) -> list[list[float]]:
+        return [[scale * draw(st.integers(-64, 64)) / 64 for _ in range(width)] for _ in range(count)]
+
+    box = {"lower": [-size] * states, "upper": [size] * states}
+    zonotope = {"center": [0.0] * states, "generators": rows(draw(st.integers(1, 3)), states, 0.1 * size)}
+    triangle = {"vertices": rows(states + 1, states, size)}
+    system: Values = {
+        "A": rows(states, states, 1.5),
+        "B": rows(states, 1, size),
+        "C": rows(outputs, states, 2.0),
+    }
+    tables: dict[str, Values] = {
+        "system": system,
+        "initial": draw(st.sampled_from([box, triangle])),
+        "disturbance": draw(st.sampled_from([box, zonotope, triangle])),
+        "noise": {"half_width": [size * draw(st.sampled_from([0.0, 0.1, 3.0]))] * outputs},
+        "simulation": {"steps": draw(st.integers(1, 4)), "missing": [1]},
+    }
+    return toml({"schema": 1, "kind": "observer", "name": "any"}, tables)
+
+
 KINDS: Mapping[str, tuple[str, st.SearchStrategy[str]]] = {
     "scenario": ("engage", scenarios()),
     "pareto-encounter": ("pareto", encounters()),
     "multipoint": ("multipoint", tours()),
     "pursuit-evasion": ("pursuit", pursuits()),
     "reachable-rendezvous": ("reach", rendezvous()),
+    "observer": ("observe", observers()),
 }
 """Kinds of files: the command that runs one, and sound ones."""

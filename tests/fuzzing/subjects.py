@@ -26,6 +26,7 @@ from experiments.interception.scenario_file import (
     scenario_warnings,
 )
 from experiments.multipoint.file import load_multipoint
+from experiments.observer.file import load_observer
 from experiments.pareto.file import load_pareto
 from experiments.pursuit.file import FORM as PURSUIT
 from experiments.pursuit.file import load_pursuit
@@ -70,6 +71,7 @@ def text_files() -> Mapping[str, TextFile]:
     readers: dict[str, Callable[[str], object]] = {
         "pareto-encounter": load_pareto,
         "multipoint": lambda path: load_multipoint(path).tour,
+        "observer": lambda path: load_observer(path).observer(),
         "pursuit-evasion": _read_pursuit,
         "reachable-rendezvous": load_rendezvous,
     }

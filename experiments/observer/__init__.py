@@ -1,0 +1,1 @@
+"""Observers of linear systems: file, command, figures and page."""

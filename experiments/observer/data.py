@@ -1,0 +1,153 @@
+"""Measurements of an observer: from a CSV file, from the problem file, or simulated."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.common.errors import InputError, shown
+from experiments.common.toml_values import LARGEST
+from experiments.observer.command import MOST_STEPS, Errors
+from experiments.observer.file import ObserverProblem
+from infoset import Zonotope
+from infoset.observer_sets import Set, polytope_of
+
+Floats = NDArray[np.float64]
+
+LARGEST_CSV_BYTES = 10_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """Measurements and inputs of N steps.
+
+    Parameters
+    ----------
+    measured : ndarray, shape (N, q)
+        y; NaN for a missing measurement.
+    inputs : ndarray, shape (N, p)
+        u after each measurement.
+    states : ndarray, shape (N, n), or None
+        True states of a simulation.
+    origin : str
+        Origin of the measurements, for texts.
+    """
+
+    measured: Floats
+    inputs: Floats
+    states: Floats | None
+    origin: str
+
+
+def data_of(problem: ObserverProblem, file: Path | None, errors: Errors, seed: int) -> Data:
+    """Return the measurements of a CSV file, else those of the problem, else simulated ones.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or does not fit the system.
+    """
+    if file is not None:
+        return read_csv(file, len(problem.c), problem.b.shape[1])
+    if problem.measured is not None:
+        inputs = _padded(problem.inputs, len(problem.measured), problem.b.shape[1])
+        return Data(problem.measured, inputs, None, f"measurements of {problem.name}")
+    return simulate(problem, errors, seed)
+
+
+def simulate(problem: ObserverProblem, errors: Errors, seed: int) -> Data:
+    """Return measurements of a random motion, with errors at their bounds or within them."""
+    generator = np.random.default_rng(seed)
+    inputs = _padded(problem.inputs, problem.steps, problem.b.shape[1])
+    states = [_point(problem.initial, errors, generator)]
+    for u in inputs[:-1]:
+        w = _point(problem.disturbance, errors, generator)
+        states.append(problem.a @ states[-1] + problem.b @ u + problem.offset + w)
+    true = np.array(states)
+    measured = true @ problem.c.T + _signs(errors, (len(true), len(problem.c)), generator) * problem.half_width
+    measured[[step for step in problem.missing if step < len(measured)]] = np.nan
+    return Data(measured, inputs, true, f"simulated, {errors.value} errors, seed {seed}")
+
+
+def _signs(errors: Errors, shape: tuple[int, ...], generator: np.random.Generator) -> Floats:
+    """Return random numbers from -1 to 1, only both ends for extremal errors."""
+    if errors is Errors.EXTREMAL:
+        return generator.choice([-1.0, 1.0], shape)
+    return generator.uniform(-1.0, 1.0, shape)
+
+
+def _point(shape: Set, errors: Errors, generator: np.random.Generator) -> Floats:
+    """Return a random point of a set: an extreme one for extremal errors."""
+    if isinstance(shape, Zonotope):
+        return np.asarray(shape.center + _signs(errors, (len(shape.generators),), generator) @ shape.generators)
+    vertices = polytope_of(shape).vertices
+    if errors is Errors.EXTREMAL:
+        return np.asarray(vertices[generator.integers(len(vertices))])
+    return np.asarray(generator.dirichlet(np.ones(len(vertices))) @ vertices)
+
+
+def _padded(inputs: Floats | None, steps: int, size: int) -> Floats:
+    """Return inputs for a number of steps; zero where there are none."""
+    padded = np.zeros((steps, size))
+    if inputs is not None:
+        padded[: len(inputs)] = inputs[:steps]
+    return padded
+
+
+def read_csv(file: Path, outputs: int, inputs: int) -> Data:
+    """Read measurements and inputs from a CSV file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a column is missing or unknown, or a cell is not a number.
+    """
+    try:
+        with file.open("rb") as opened:
+            content = opened.read(LARGEST_CSV_BYTES + 1)
+        if len(content) > LARGEST_CSV_BYTES:
+            raise InputError(f"--data: {file}: is larger than {LARGEST_CSV_BYTES} bytes; divide it")
+        rows = list(csv.reader(io.StringIO(content.decode("utf-8-sig"), newline="")))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = error.strerror if isinstance(error, OSError) else "is not a CSV file in UTF-8"
+        raise InputError(f"--data: {file}: {reason}; give a CSV file with a header") from None
+    wanted = [f"y{number}" for number in range(1, outputs + 1)] + [f"u{number}" for number in range(1, inputs + 1)]
+    header = [cell.strip() for cell in rows[0]] if rows else []
+    unknown = [name for name in header if name not in (*wanted, "k")]
+    missing = [name for name in wanted if name not in header]
+    if unknown or missing or len(set(header)) < len(header):
+        problem = f"has no column {missing[0]}" if missing else f"has a wrong column {shown((unknown or header)[0])}"
+        raise InputError(f"--data: {file}: {problem}; the header is {','.join(wanted)} (and k, optionally)")
+    body = [(line, row) for line, row in enumerate(rows[1:], start=2) if row]
+    if not 1 <= len(body) <= MOST_STEPS:
+        raise InputError(f"--data: {file}: has {len(body)} steps; 1 to {MOST_STEPS} are possible")
+    values = np.array([_numbers(file, line, row, header, wanted) for line, row in body])
+    return Data(values[:, :outputs], values[:, outputs:], None, f"measurements of {file.name}")
+
+
+def _numbers(file: Path, line: int, row: list[str], header: list[str], wanted: list[str]) -> list[float]:
+    """Return the numbers of a row in the order of the columns that are wanted."""
+    if len(row) != len(header):
+        raise InputError(f"--data: {file}: line {line} has {len(row)} cells, and the header has {len(header)}")
+    cells = dict(zip(header, row, strict=True))
+    numbers = []
+    for name in wanted:
+        text = cells[name].strip()
+        try:
+            number = float(text) if text else math.nan
+        except ValueError:
+            number = math.inf
+        is_missing = not text and name.startswith("y")
+        if not is_missing and not abs(number) <= float(LARGEST):
+            raise InputError(
+                f"--data: {file}: line {line}, {name}: must be a number of at most {LARGEST:g} in size, found "
+                f"{shown(text)}; an empty cell of y is a missing measurement"
+            )
+        numbers.append(number)
+    return numbers

@@ -1,0 +1,46 @@
+"""Page of an observer: the set of each step, and the bounds of the states against time."""
+
+from __future__ import annotations
+
+from importlib import resources
+
+import numpy as np
+
+from experiments.common.page_document import page
+from experiments.observer.figures import times
+from experiments.observer.report import Report
+
+
+def observer_page(report: Report) -> str:
+    """Return the page as HTML."""
+    time, title = times(report)
+    problem, data = report.problem, report.data
+    about = [problem.description] if problem.description else []
+    about.append(f"{len(report.estimates)} steps; {data.origin}. Step with the arrow keys or the slider.")
+    if report.contradicted:
+        about.append(f"The measurements contradict the model at step {int(report.inconsistency.step)}.")
+    content = {
+        "heading": f"Possible states of {problem.name}",
+        "about": about,
+        "names": problem.names,
+        "time": time,
+        "time_title": title,
+        "steps": [
+            {
+                "k": estimate.step,
+                "lower": None if estimate.is_empty else estimate.lower,
+                "upper": None if estimate.is_empty else estimate.upper,
+                "center": None if estimate.is_empty else estimate.center,
+                "vertices": estimate.polygons.polygon() if estimate.states == 2 else [],
+                "smoothed": []
+                if report.smoothed is None or estimate.states != 2
+                else report.smoothed[index].polygons.polygon(),
+                "measured": [None if np.isnan(value) else value for value in data.measured[index].tolist()],
+                "inputs": data.inputs[index],
+                "state": None if data.states is None else data.states[index],
+            }
+            for index, estimate in enumerate(report.estimates)
+        ],
+    }
+    script = (resources.files("experiments.observer") / "page.js").read_text(encoding="utf-8")
+    return page(f"Observer {problem.name}", [], content, script)

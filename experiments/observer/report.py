@@ -1,0 +1,136 @@
+"""Results of `infoset observe`, as JSON, CSV and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.common.output import Cell, library_version, to_csv
+from experiments.common.screen import Part, number_table
+from experiments.observer.data import Data
+from experiments.observer.file import ObserverProblem
+from infoset import Estimate, Inconsistency
+
+Floats = NDArray[np.float64]
+
+_SHOWN_STEPS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """Results of one command.
+
+    Parameters
+    ----------
+    smoothed : sequence of Estimate, or None
+        Sets that use later measurements too; None if they are not wanted.
+    """
+
+    problem: ObserverProblem
+    data: Data
+    estimates: Sequence[Estimate]
+    smoothed: Sequence[Estimate] | None
+    inconsistency: Inconsistency
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether the measurements contradict the model."""
+        return bool(self.inconsistency.step >= 0)
+
+    def inside(self) -> int | None:
+        """Return the number of steps at which the true state is inside; None without a true state."""
+        if self.data.states is None:
+            return None
+        return sum(map(contains, self.estimates, self.data.states))
+
+
+def contains(estimate: Estimate, state: Floats) -> bool:
+    """Whether a state is in a set."""
+    if estimate.is_empty:
+        return False
+    if estimate.states == 2:
+        return bool(estimate.polygons.contains(state))
+    (polytope,) = estimate.polytopes
+    return polytope is not None and bool(polytope.excess(state) <= 0.0)
+
+
+def report_json(report: Report) -> dict[str, object]:
+    """Return the results for `experiments.common.output.to_json`."""
+    problem, where = report.problem, report.inconsistency
+    steps = [_step_json(estimate) for estimate in report.estimates]
+    for step, estimate in zip(steps, report.smoothed or (), strict=False):
+        step["smoothed"] = _bounds(estimate)
+    for step, state in zip(steps, () if report.data.states is None else report.data.states, strict=False):
+        step["state"] = state
+    return {
+        "version": library_version(),
+        "problem": problem.name,
+        "problem_hash": problem.hash,
+        "data": report.data.origin,
+        "states": problem.names,
+        "steps": steps,
+        "final": _bounds(report.estimates[-1]),
+        "inconsistency": None
+        if not report.contradicted
+        else {"k": int(where.step), "output": int(where.output) + 1, "excess": float(where.excess)},
+    }
+
+
+def _bounds(estimate: Estimate) -> dict[str, object]:
+    """Return the bounds of the states; null for the empty set."""
+    if estimate.is_empty:
+        return {"lower": None, "upper": None}
+    return {"lower": estimate.lower, "upper": estimate.upper}
+
+
+def _step_json(estimate: Estimate) -> dict[str, object]:
+    step: dict[str, object] = {"k": estimate.step, **_bounds(estimate), "empty": bool(estimate.is_empty)}
+    if estimate.states == 2:
+        step["vertices"] = estimate.polygons.polygon()
+    return step
+
+
+def report_csv(report: Report) -> str:
+    """Return the bounds of each step as CSV."""
+    states = range(1, len(report.problem.a) + 1)
+    kinds = ["", "smoothed_"] if report.smoothed is not None else [""]
+    ends = [f"x{state}_{kind}{end}" for kind in kinds for state in states for end in ("lower", "upper")]
+    true = [] if report.data.states is None else [f"x{state}" for state in states]
+    rows: list[list[Cell]] = []
+    for index, estimate in enumerate(report.estimates):
+        row: list[Cell] = [estimate.step, bool(estimate.is_empty)]
+        for sets in (report.estimates, *([report.smoothed] if report.smoothed is not None else [])):
+            pairs = np.column_stack([sets[index].lower, sets[index].upper]).ravel()
+            row += [None if np.isnan(value) else float(value) for value in pairs]
+        if report.data.states is not None:
+            row += report.data.states[index].tolist()
+        rows.append(row)
+    return to_csv(["k", "empty", *ends, *true], rows)
+
+
+def report_parts(report: Report) -> Iterator[Part]:
+    """Yield the bounds of the last steps and a contradiction, for the screen."""
+    problem, count = report.problem, len(report.estimates)
+    missing = int(np.isnan(report.data.measured).any(axis=1).sum())
+    gaps = f", {missing} with missing measurements" if missing else ""
+    yield f"{problem.name}: {len(problem.a)} states, {count} steps{gaps}; {report.data.origin}"
+    table = number_table("step", *(f"{name}\n{end}" for name in problem.names for end in ("from", "to")))
+    first = max(0, count - _SHOWN_STEPS)
+    for estimate in report.estimates[first:]:
+        ends = np.column_stack([estimate.lower, estimate.upper]).ravel()
+        table.add_row(str(estimate.step), *("empty" if np.isnan(end) else f"{end:.6g}" for end in ends))
+    if first:
+        yield f"bounds of the last {_SHOWN_STEPS} steps:"
+    yield table
+    inside = report.inside()
+    if inside is not None:
+        yield f"true state inside the set: {inside} of {count} steps"
+    if report.contradicted:
+        where = report.inconsistency
+        yield (
+            f"the measurements contradict the model at step {int(where.step)}: no state is possible; the bound of "
+            f"output {int(where.output) + 1} is exceeded by at least {float(where.excess):.6g}"
+        )

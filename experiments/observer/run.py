@@ -1,0 +1,57 @@
+"""`infoset observe`: computation, files and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from matplotlib.figure import Figure
+
+from experiments.common.errors import InputError
+from experiments.common.output import output_of, to_json
+from experiments.common.screen import figure_files, progress_bar, show
+from experiments.observer.command import Observe
+from experiments.observer.data import Data, data_of
+from experiments.observer.figures import draw_bounds, draw_sets
+from experiments.observer.file import ObserverProblem, load_observer
+from experiments.observer.page import observer_page
+from experiments.observer.report import Report, report_csv, report_json, report_parts
+
+
+def run(options: Observe) -> None:
+    """Compute the sets, write the files and print the tables."""
+    problem = load_observer(options.problem, options.settings)
+    data = data_of(problem, options.data, options.errors, options.seed)
+    names = ["figure-bounds", *(["figure-sets"] if len(problem.a) == 2 else [])]
+    with (
+        output_of(options, ("problem.toml", "results.json", "bounds.csv", *figure_files(*names))) as written,
+        progress_bar(options.quiet) as begin,
+    ):
+        report = _observed(problem, data, options.smooth, begin("sets"))
+        written.save("problem.toml", problem.toml)
+        written.save("results.json", to_json(report_json(report)), "--json")
+        written.save("bounds.csv", report_csv(report), "--csv")
+        if options.html is not None:
+            written.deliver("--html", observer_page(report))
+        written.draw({name: _drawings(report)[name] for name in names}, begin("figures"))
+    show(report_parts(report), options.quiet, stdout_taken=written.stdout_taken)
+
+
+def _observed(problem: ObserverProblem, data: Data, smooth: bool, progress: Callable[[float], None]) -> Report:
+    observer = problem.observer()
+    estimates = []
+    try:
+        for k, measurement in enumerate(data.measured):
+            if k:
+                observer.predict(data.inputs[k - 1])
+            observer.update(measurement)
+            estimates.append(observer.estimate())
+            progress((k + 1) / len(data.measured))
+        smoothed = observer.smooth(estimates, data.inputs) if smooth else None
+    except (ArithmeticError, ValueError) as error:
+        raise InputError(f"{problem.source}: step {observer.step}: {error}") from None
+    return Report(problem, data, estimates, smoothed, observer.inconsistency)
+
+
+def _drawings(report: Report) -> Mapping[str, Callable[[], Figure]]:
+    return {"figure-bounds": partial(draw_bounds, report), "figure-sets": partial(draw_sets, report)}

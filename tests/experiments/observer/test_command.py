@@ -1,0 +1,215 @@
+"""`infoset observe`: published numbers, files, data of CSV files, simulations and contradictions."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.common.file_kinds import built_in_files
+from experiments.observer.command import Errors
+from experiments.observer.data import simulate
+from experiments.observer.file import load_observer
+from tests.experiments.command_line import Command, strict
+
+PUBLISHED = json.loads((Path(__file__).parents[2] / "data" / "observer" / "alamo-2005.json").read_text())
+SIX_STATES = """schema = 1
+kind = "observer"
+name = "six"
+[system]
+A = [[1, 0.5, 0, 0, 0, 0], [0, 1, 0.5, 0, 0, 0], [0, 0, 0.9, 0, 0, 0], [0, 0, 0, 1, 0.5, 0], [0, 0, 0, 0, 1, 0.5],
+     [0, 0, 0, 0, 0, 0.9]]
+C = [[1, 0, 0, 0, 0, 0], [0, 0, 0, 1, 0, 0]]
+[initial]
+lower = [-1, -1, -1, -1, -1, -1]
+upper = [1, 1, 1, 1, 1, 1]
+[disturbance]
+center = [0, 0, 0, 0, 0, 0]
+generators = [[0, 0, 0.1, 0, 0, 0], [0, 0, 0, 0, 0, 0.1]]
+[noise]
+half_width = [0.2, 0.2]
+[simulation]
+steps = 3
+"""
+
+
+@pytest.fixture
+def infoset(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
+    monkeypatch.chdir(tmp_path)
+    return Command(capsys)
+
+
+def test_the_published_example_has_the_exact_bounds(infoset: Command) -> None:
+    results = infoset.json("observe", "observer-2005")
+    assert [step["k"] for step in results["steps"]] == list(range(20))
+    for step, hull in zip(results["steps"], PUBLISHED["exact_rational"]["hull_of_each_step"], strict=True):
+        assert step["empty"] is False
+        np.testing.assert_allclose([step["lower"], step["upper"]], hull, rtol=0.0, atol=1e-12)
+    assert [len(step["vertices"]) for step in results["steps"]] == PUBLISHED["exact_rational"]["counts"]
+    assert results["final"] == {"lower": results["steps"][-1]["lower"], "upper": results["steps"][-1]["upper"]}
+    assert results["inconsistency"] is None
+
+
+def test_all_files_are_written(infoset: Command) -> None:
+    code, out, err = infoset("observe", "vehicle", "--smooth", "--out", "o", "--html", "page.html", "--csv", "b.csv")
+    assert code == 0
+    assert "true state inside the set: 40 of 40 steps" in out
+    names = ["figure-bounds", "figure-sets"]
+    wanted = [
+        "problem.toml",
+        "results.json",
+        "bounds.csv",
+        *(f"{name}.{kind}" for name in names for kind in ("pdf", "png")),
+    ]
+    assert sorted(path.name for path in Path("o").iterdir()) == sorted(wanted)
+    assert "figure-sets.png" in err
+    page = Path("page.html").read_text(encoding="utf-8")
+    assert page.startswith("<!doctype html>")
+    assert "Possible states of vehicle" in page
+    assert Path("b.csv").read_text() == Path("o/bounds.csv").read_text()
+    rows = list(csv.DictReader(io.StringIO(Path("b.csv").read_text())))
+    results = strict(Path("o/results.json").read_text())
+    assert len(rows) == len(results["steps"]) == 40
+    for row, step in zip(rows, results["steps"], strict=True):
+        assert float(row["x2_lower"]) == step["lower"][1]
+        assert float(row["x1_smoothed_upper"]) == step["smoothed"]["upper"][0]
+        assert step["lower"][0] <= step["smoothed"]["lower"][0] <= step["state"][0] <= step["upper"][0]
+    again = infoset.json("observe", "o/problem.toml", "--smooth")
+    assert again["steps"] == results["steps"]
+    assert again["problem_hash"] == results["problem_hash"]
+
+
+def test_a_csv_file_gives_the_same_as_the_problem_file(infoset: Command) -> None:
+    lines = ["k,y1", *(f"{k},{y!r}" for k, y in enumerate(PUBLISHED["y"][0]))]
+    Path("data.csv").write_text("\n".join(lines) + "\n", encoding="utf-8-sig")
+    own = infoset.json("observe", "observer-2005", "--data", "data.csv")
+    assert own["steps"] == infoset.json("observe", "observer-2005")["steps"]
+    assert own["data"] == "measurements of data.csv"
+
+
+def test_an_empty_cell_is_a_missing_measurement(infoset: Command) -> None:
+    Path("data.csv").write_text("y1,u1\n0.0,1.0\n ,0.5\n12.0,0\n")
+    results = infoset.json("observe", "vehicle", "--data", "data.csv")
+    first, second, third = results["steps"]
+    assert first["upper"][0] == pytest.approx(3.0)
+    # Without a measurement: from 0 to 20 m/s, 1 m/s^2 and the disturbance.
+    assert second["lower"] == pytest.approx([-3.0 + 0.125 - 0.05, 0.5 - 0.2])
+    assert second["upper"] == pytest.approx([3.0 + 10.0 + 0.125 + 0.05, 20.5 + 0.2])
+    assert third["lower"][0] == pytest.approx(9.0)
+
+
+@pytest.mark.parametrize(
+    ("content", "parts"),
+    [
+        ("y1,u1\n", ["has 0 steps"]),
+        ("", ["has no column y1", "the header is y1,u1"]),
+        ("y1\n1\n", ["has no column u1"]),
+        ("y1,u1,y2\n1,1,1\n", ['has a wrong column "y2"']),
+        ("y1,u1,u1\n1,1,1\n", ["has a wrong column"]),
+        ("y1,u1\n1,1,1\n", ["line 2 has 3 cells, and the header has 2"]),
+        ("y1,u1\n1,1\nfast,1\n", ["line 3, y1", 'found "fast"']),
+        ("y1,u1\n1,\n", ["line 2, u1: must be a number"]),
+        ("y1,u1\nnan,1\n", ["line 2, y1"]),
+        ("y1,u1\n1e16,1\n", ["at most 1e+15"]),
+    ],
+)
+def test_wrong_data_are_refused(content: str, parts: list[str], infoset: Command) -> None:
+    Path("data.csv").write_text(content)
+    err = infoset.refused("observe", "vehicle", "--data", "data.csv")
+    assert [part for part in parts if part not in err] == []
+    assert "data.csv" in err
+
+
+def test_missing_and_unreadable_data_are_refused(infoset: Command) -> None:
+    assert "No such file" in infoset.refused("observe", "vehicle", "--data", "none.csv")
+    Path("data.csv").write_bytes(b"\xff\xfe\x00")
+    assert "is not a CSV file in UTF-8" in infoset.refused("observe", "vehicle", "--data", "data.csv")
+
+
+def changed(old: str, new: str, name: str = "vehicle") -> str:
+    text = built_in_files()[name].text
+    assert old in text
+    return text.replace(old, new)
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        (changed("C = [[1.0, 0.0]]", "C = [[1.0]]"), ["system.C", "has 1 numbers a row, and A has 2 columns"]),
+        (changed("[[1.0, 0.5], [0.0, 1.0]]", "[[1.0, 0.5]]"), ["system.A", "has 1 rows, and A has 2 columns"]),
+        (changed("[[1.0, 0.5], [0.0, 1.0]]", "[[1.0, 0.5], [0.0]]"), ["rows of one length"]),
+        (changed("[[0.125], [0.5]]", "[[0.125]]"), ["system.B", "has 1 rows"]),
+        (changed("half_width = [3.0]", "half_width = [3.0, 1.0]"), ["noise.half_width", "C has 1 rows"]),
+        (changed("half_width = [3.0]", "half_width = [-3.0]"), ["at least 0"]),
+        (changed("upper = [10.0, 20.0]", ""), ["initial", "does not describe one set"]),
+        (changed("upper = [10.0, 20.0]", "upper = [-11.0, 20.0]"), ["initial.lower", "number 1 exceeds"]),
+        (changed("upper = [10.0, 20.0]", "upper = [10.0, 20.0]\ncenter = [0, 0]"), ["does not describe one set"]),
+        (changed("upper = [10.0, 20.0]", "upper = [10.0]"), ["initial.upper", "has 1 numbers"]),
+        (changed("steps = 40", "steps = 0"), ["simulation.steps"]),
+        (changed("[14,", "[-14,"), ["simulation.missing"]),
+        (changed('"speed, m/s"]', '"speed, m/s", "c"]'), ["system.states", "has 3 numbers"]),
+        (changed("[-0.109466733731803]", "[0, 1]", "observer-2005"), ["measurements.y", "rows of one length"]),
+        (changed("half_width = [0.2]", 'half_width = "0.2"', "observer-2005"), ["noise.half_width"]),
+    ],
+)
+def test_wrong_problems_are_refused(text: str, parts: list[str], infoset: Command) -> None:
+    Path("bad.toml").write_text(text)
+    err = infoset.refused("observe", "bad.toml")
+    assert [part for part in parts if part not in err] == []
+
+
+def test_a_contradiction_is_reported(infoset: Command) -> None:
+    Path("odd.toml").write_text(changed("[-0.1292621672249405]", "[-1.5]", "observer-2005"))
+    code, out, _ = infoset("observe", "odd.toml", "--out", "o", "--html", "page.html", "--smooth")
+    assert code == 0
+    assert "the measurements contradict the model at step 10: no state is possible; the bound of output 1" in out
+    results = strict(Path("o/results.json").read_text())
+    assert [step["empty"] for step in results["steps"]] == [False] * 10 + [True] * 10
+    assert results["final"] == {"lower": None, "upper": None}
+    assert results["inconsistency"]["k"] == 10
+    # With the bound enlarged by the excess a state is possible.
+    width = 0.2 + results["inconsistency"]["excess"]
+    alone = Path("odd.toml").read_text().replace("half_width = [0.2]", f"half_width = [{width + 1e-9!r}]")
+    Path("wide.toml").write_text(alone)
+    assert infoset.json("observe", "wide.toml")["steps"][10]["empty"] is False
+
+
+@pytest.mark.parametrize("errors", list(Errors))
+def test_simulated_errors_are_within_their_bounds(errors: Errors) -> None:
+    problem = load_observer("vehicle")
+    data = simulate(problem, errors, 5)
+    assert data.states is not None
+    off = np.abs(data.measured - data.states @ problem.c.T).ravel()
+    assert np.isnan(off).sum() == 9
+    known = off[~np.isnan(off)]
+    assert known.max() <= 3.0 + 1e-12
+    assert np.allclose(known, 3.0) == (errors is Errors.EXTREMAL)
+    again = simulate(problem, errors, 5)
+    np.testing.assert_array_equal(again.measured, data.measured)
+
+
+def test_six_states_are_polytopes_without_a_figure_of_sets(infoset: Command) -> None:
+    Path("six.toml").write_text(SIX_STATES)
+    assert infoset("observe", "six.toml", "--out", "o", "--html", "page.html", "-q")[0] == 0
+    assert not Path("o/figure-sets.png").exists()
+    results = strict(Path("o/results.json").read_text())
+    assert "vertices" not in results["steps"][0]
+    for step in results["steps"]:
+        assert (np.array(step["lower"]) <= step["state"]).all()
+        assert (np.array(step["upper"]) >= step["state"]).all()
+
+
+def test_values_can_be_set(infoset: Command) -> None:
+    wide = infoset.json("observe", "observer-2005", "--set", "noise.half_width=[0.4]")
+    narrow = infoset.json("observe", "observer-2005")
+    assert wide["final"]["upper"][0] > narrow["final"]["upper"][0]
+
+
+def test_a_new_file_is_sound(infoset: Command) -> None:
+    assert infoset("problems", "new", "observe", "mine.toml", "-q")[0] == 0
+    assert infoset("problems", "check", "mine.toml", "-q")[0] == 0
+    assert infoset("observe", "mine.toml", "-q")[0] == 0
