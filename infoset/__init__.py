@@ -20,8 +20,12 @@ from infoset.zonotope import Zonotope
 
 if TYPE_CHECKING:
     from infoset.linear_observer import Estimate, Inconsistency, LinearObserver
+    from infoset.polytope import Polytope
 
-_LATE = dict.fromkeys(("Estimate", "Inconsistency", "LinearObserver"), "infoset.linear_observer")
+_LATE = {
+    **dict.fromkeys(("Estimate", "Inconsistency", "LinearObserver"), "infoset.linear_observer"),
+    "Polytope": "infoset.polytope",
+}
 """Modules that import scipy, which takes longer than all others: imported when their names are used."""
 
 __version__ = version("infoset")
@@ -40,6 +44,7 @@ __all__ = [
     "InitialSet",
     "LinearObserver",
     "Model",
+    "Polytope",
     "PredictedMiss",
     "RangeSensor",
     "RateSensor",

@@ -84,13 +84,14 @@ class Estimate:
         return polygons[0] if self.single else polygons
 
     @property
-    def polytopes(self) -> tuple[Polytope | None, ...]:
-        """The set of each run; None if it is empty."""
+    def polytopes(self) -> tuple[Polytope, ...]:
+        """The set of each run."""
         if isinstance(self.sets, Polytopes):
-            return tuple(None if member is None else member.polytope for member in self.sets.members)
+            empty = Polytope.empty(self.states)
+            return tuple(empty if member is None else member.polytope for member in self.sets.members)
         assert isinstance(self.sets, Polygons)
         pairs = zip(self.sets.vertices, self.sets.counts, strict=True)
-        return tuple(Polytope.from_vertices(points[:count]) if count else None for points, count in pairs)
+        return tuple(Polytope.from_vertices(points[:count]) if count else Polytope.empty(2) for points, count in pairs)
 
     @property
     def lower(self) -> Floats:
@@ -102,15 +103,9 @@ class Estimate:
         """Greatest value of each state, shape (n,) or (B, n); NaN for the empty set."""
         return self._hull[1]
 
-    @property
-    def center(self) -> Floats:
-        """Chebyshev centre, the centre of a largest ball in the set, shape (n,) or (B, n); NaN for the empty set.
-
-        A linear program for each run.
-        """
-        empty = self.sets.is_empty
-        nowhere = np.full(self.states, np.nan)
-        return self._runs(np.array([nowhere if empty[run] else self.sets.center(run) for run in range(len(empty))]))
+    def chebyshev_centre(self) -> Floats:
+        """Return the centre of a largest ball in the set, shape (n,) or (B, n); NaN for the empty set."""
+        return self._runs(self.sets.chebyshev_centres(self.states))
 
     def output_hull(self, matrix: ArrayLike) -> tuple[Floats, Floats]:
         """Return the least and the greatest values of matrix x, each of shape (m,) or (B, m); NaN for the empty set.
@@ -231,8 +226,10 @@ class LinearObserver:
         space = 2 if isinstance(value, ConvexPolygons) else value.space
         if space != self.states:
             raise ValueError(f"{name} must have {self.states} coordinates, one a state: got {space}")
-        if isinstance(value, ConvexPolygons) and (value.shape not in ((), shape) or value.is_empty.any()):
-            raise ValueError(f"{name} must be a single polygon, or a batch of shape (runs,), and not empty")
+        if isinstance(value, ConvexPolygons) and value.shape not in ((), shape):
+            raise ValueError(f"{name} must be a single polygon, or a batch of shape (runs,): got {value.shape}")
+        if not isinstance(value, Zonotope) and np.any(value.is_empty):
+            raise ValueError(f"{name} must not be empty")
 
     def predict(self, inputs: ArrayLike | None = None) -> None:
         """Move the sets to the next step.

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from infoset import observer_steps
 from infoset.convex_polygons import ConvexPolygons
 from infoset.observer_steps import CUT_SLACK, SUM_SLACK
-from infoset.polytope import Polytope, minkowski_sum
-from infoset.polytope._affine_hull import chebyshev_ball
+from infoset.polytope import Polytope
 from infoset.polytope.double_description import FacetsAndVertices
 from infoset.zonotope import Zonotope
 
@@ -93,8 +92,8 @@ class Sets(Protocol):
         """Return max direction . x of each set, shape (B,); -inf for the empty set."""
         ...
 
-    def center(self, run: int) -> Floats:
-        """Return the Chebyshev centre of a set that is not empty, shape (n,)."""
+    def chebyshev_centres(self, states: int) -> Floats:
+        """Return the centres of largest balls, shape (B, n); NaN for the empty set."""
         ...
 
 
@@ -125,16 +124,16 @@ class Polygons:
         """Return the sets after a step."""
         none = np.zeros((0, 2))
         if isinstance(motion.disturbance, Zonotope):
-            generators, other, center = motion.disturbance.generators, none, motion.disturbance.center
+            generators, other, centre = motion.disturbance.generators, none, motion.disturbance.centre
         else:
-            generators, other, center = none, polygon_of(motion.disturbance).polygon(), np.zeros(2)
+            generators, other, centre = none, polygon_of(motion.disturbance).polygon(), np.zeros(2)
         result = self._room(2 * len(generators) + len(other) + 4)
         observer_steps.predict_all(
             self.vertices,
             self.counts,
             np.ascontiguousarray(motion.matrix),
-            motion.shifts + center,
-            motion.terms + np.abs(center),
+            motion.shifts + centre,
+            motion.terms + np.abs(centre),
             np.ascontiguousarray(generators),
             np.ascontiguousarray(other),
             SUM_SLACK,
@@ -180,16 +179,10 @@ class Polygons:
         """Return max direction . x of each set, shape (B,)."""
         return observer_steps.support_all(self.vertices, self.counts, direction)
 
-    def center(self, run: int) -> Floats:
-        """Return the Chebyshev centre of a set that is not empty."""
-        points = self.vertices[run, : self.counts[run]]
-        edges = np.roll(points, -1, axis=0) - points
-        normals = np.column_stack([edges[:, 1], -edges[:, 0]])
-        lengths = np.linalg.norm(normals, axis=1)
-        long = lengths > 1e-9 * lengths.max(initial=0.0)
-        if long.sum() < 3:
-            return np.asarray(points.mean(axis=0))
-        return _center_of_ball(points, normals[long] / lengths[long][:, None])
+    def chebyshev_centres(self, states: int) -> Floats:
+        """Return the centres of largest discs."""
+        centres, _ = ConvexPolygons.unchecked(self.vertices, self.counts).chebyshev_centre()
+        return np.ma.filled(centres, np.nan)
 
     def _room(self, more: int) -> Polygons:
         """Return polygons to write, with room for `more` vertices more."""
@@ -216,10 +209,10 @@ class Polytopes:
     def predicted(self, motion: Motion) -> Polytopes:
         """Return the sets after a step."""
         w, states = motion.disturbance, len(motion.matrix)
-        center = w.center if isinstance(w, Zonotope) else np.zeros(states)
+        centre = w.centre if isinstance(w, Zonotope) else np.zeros(states)
         shifts, terms = (
             np.broadcast_to(values, (len(self.members), states))
-            for values in (motion.shifts + center, motion.terms + np.abs(center))
+            for values in (motion.shifts + centre, motion.terms + np.abs(centre))
         )
         results: list[FacetsAndVertices | None] = []
         for member, shift, term in zip(self.members, shifts, terms, strict=True):
@@ -231,7 +224,7 @@ class Polytopes:
                 for half in w.generators:
                     moved = moved.plus_segment(half)
             else:
-                moved = FacetsAndVertices.of(minkowski_sum(moved.polytope, polytope_of(w)))
+                moved = FacetsAndVertices.of(moved.polytope + polytope_of(w))
             results.append(moved.enlarged(_SCALE_ULP, float(term.max())))
         return Polytopes(tuple(results))
 
@@ -274,19 +267,12 @@ class Polytopes:
         """Return max direction . x of each set, shape (B,)."""
         return np.array([-np.inf if member is None else (member.vertices @ direction).max() for member in self.members])
 
-    def center(self, run: int) -> Floats:
-        """Return the Chebyshev centre of a set that is not empty."""
-        member = self.members[run]
-        assert member is not None
-        return _center_of_ball(member.vertices, member.normals)
-
-
-def _center_of_ball(points: Floats, normals: Floats) -> Floats:
-    """Return the centre of a largest ball in a hull of points with these normals, of unit length: a linear program."""
-    origin = points.mean(axis=0)
-    limits = ((points - origin) @ normals.T).max(axis=0)
-    scale = float(limits.max())
-    return np.asarray(origin + scale * chebyshev_ball(normals, limits / scale)[0])
+    def chebyshev_centres(self, states: int) -> Floats:
+        """Return the centres of largest balls: a linear program for each run."""
+        nowhere = np.full(states, np.nan)
+        return np.array(
+            [nowhere if member is None else member.polytope.chebyshev_centre()[0] for member in self.members]
+        )
 
 
 def polygon_of(shape: Set) -> ConvexPolygons:
@@ -295,23 +281,22 @@ def polygon_of(shape: Set) -> ConvexPolygons:
         return shape
     if isinstance(shape, Polytope):
         return ConvexPolygons.from_points(shape.vertices)
-    polygon = ConvexPolygons.from_points(shape.center[None])
-    for half in shape.generators:
-        polygon = polygon.add_segment(half)
-    return polygon
+    return ConvexPolygons.from_zonotope(shape.centre, shape.generators)
 
 
 def polytope_of(shape: Set) -> Polytope:
     """Return a single set that is not empty as a polytope."""
     if isinstance(shape, Polytope):
         return shape
-    return Polytope.from_vertices(shape.points() if isinstance(shape, Zonotope) else shape.polygon())
+    if isinstance(shape, Zonotope):
+        return Polytope.from_zonotope(shape.centre, shape.generators)
+    return Polytope.from_vertices(shape.polygon())
 
 
 def _negative(disturbance: Set) -> Set:
     """Return {-w: w in the set}."""
     if isinstance(disturbance, Zonotope):
-        return Zonotope(-disturbance.center, disturbance.generators)
+        return Zonotope(-disturbance.centre, disturbance.generators)
     if isinstance(disturbance, ConvexPolygons):
-        return disturbance.linear_map(-np.eye(2))
-    return Polytope.from_vertices(-disturbance.vertices)
+        return -np.eye(2) @ disturbance
+    return -np.eye(disturbance.space) @ disturbance

@@ -85,7 +85,7 @@ def _signs(errors: Errors, shape: tuple[int, ...], generator: np.random.Generato
 def _point(shape: Set, errors: Errors, generator: np.random.Generator) -> Floats:
     """Return a random point of a set: an extreme one for extremal errors."""
     if isinstance(shape, Zonotope):
-        return np.asarray(shape.center + _signs(errors, (len(shape.generators),), generator) @ shape.generators)
+        return np.asarray(shape.centre + _signs(errors, (len(shape.generators),), generator) @ shape.generators)
     vertices = polytope_of(shape).vertices
     if errors is Errors.EXTREMAL:
         return np.asarray(vertices[generator.integers(len(vertices))])

@@ -33,7 +33,6 @@ from infoset import ConvexPolygons, LinearObserver, Zonotope
 from infoset.linear_observer import MOST_STATES
 from infoset.observer_sets import Set
 from infoset.polytope import Polytope
-from infoset.zonotope import MOST_GENERATORS
 
 Floats = NDArray[np.float64]
 Row = tuple[Decimal, ...]
@@ -41,6 +40,7 @@ Row = tuple[Decimal, ...]
 KIND = "observer"
 MOST_OUTPUTS = 12
 MOST_VERTICES = 100
+MOST_GENERATORS = 12
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ function rows(step) {
     ["step", String(step.k)],
     ...DATA.names.map((name, index) => [name,
       step.lower ? `${shown(step.lower[index])} to ${shown(step.upper[index])}` : "no state is possible"]),
-    ...DATA.names.map((name, index) => [`center: ${name}`, step.center ? shown(step.center[index]) : "none"]),
+    ...DATA.names.map((name, index) => [`centre: ${name}`, step.centre ? shown(step.centre[index]) : "none"]),
     ...(step.state ? DATA.names.map((name, index) => [`true state: ${name}`, shown(step.state[index])]) : []),
     ...step.measured.map((value, index) => [`y${index + 1}`, value === null ? "missing" : shown(value)]),
     ...step.inputs.map((value, index) => [`u${index + 1}`, shown(value)]),

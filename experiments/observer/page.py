@@ -30,7 +30,7 @@ def observer_page(report: Report) -> str:
                 "k": estimate.step,
                 "lower": None if estimate.is_empty else estimate.lower,
                 "upper": None if estimate.is_empty else estimate.upper,
-                "center": None if estimate.is_empty else estimate.center,
+                "centre": None if estimate.is_empty else estimate.chebyshev_centre(),
                 "vertices": estimate.polygons.polygon() if estimate.states == 2 else [],
                 "smoothed": []
                 if report.smoothed is None or estimate.states != 2

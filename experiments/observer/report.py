@@ -54,7 +54,7 @@ def contains(estimate: Estimate, state: Floats) -> bool:
     if estimate.states == 2:
         return bool(estimate.polygons.contains(state))
     (polytope,) = estimate.polytopes
-    return polytope is not None and bool(polytope.excess(state) <= 0.0)
+    return bool(polytope.contains(state))
 
 
 def report_json(report: Report) -> dict[str, object]:

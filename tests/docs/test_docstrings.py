@@ -23,7 +23,8 @@ RAISES_CHECKED = ("infoset", "guidance", "sim", "rendezvous")
 """Packages in which public functions document the exceptions that they raise."""
 
 WITHOUT_UNITS = (
-    *("infoset.ConvexPolygons", "infoset.polytope."),  # geometry in any unit
+    *("infoset.ConvexPolygons", "infoset.polytope.", "infoset.Polytope.", "infoset.Zonotope"),
+    "infoset.LinearObserver",  # geometry and systems in any unit
     *(
         "sim.Distribution",
         "sim.HitEstimate",

@@ -322,7 +322,7 @@ def kept_of_four_states(runs: int, steps: int) -> int:
             a, c, Zonotope.box(-np.ones(4), np.ones(4)), noise=0.2, disturbance=Zonotope(np.zeros(4), generators)
         )
         pairs = zip(observer.run(y), states, strict=True)
-        kept += all(shape is not None and shape.excess(x) <= 0.0 for e, x in pairs for shape in e.polytopes)
+        kept += all(bool(shape.contains(x)) for e, x in pairs for shape in e.polytopes)
     return kept
 
 
@@ -346,13 +346,13 @@ def test_a_batch_equals_single_runs() -> None:
     for run in range(3):
         for ours, other in zip(published().run(shifted[:, run]), batch, strict=True):
             np.testing.assert_array_equal(ours.polygons.polygon(), other.polygons[run].polygon())
-            np.testing.assert_array_equal(ours.center, other.center[run])
+            np.testing.assert_array_equal(ours.chebyshev_centre(), other.chebyshev_centre()[run])
 
 
 def test_an_estimate_has_hulls_a_centre_and_outputs() -> None:
     observer = LinearObserver(np.eye(2), [[1.0, 1.0]], Zonotope.box([0.0, 0.0], [4.0, 2.0]), noise=1.0)
     estimate = observer.estimate()
-    np.testing.assert_allclose(estimate.center[1], 1.0)
+    np.testing.assert_allclose(estimate.chebyshev_centre()[1], 1.0)
     lower, upper = estimate.output_hull([[1.0, 1.0], [1.0, -2.0]])
     np.testing.assert_allclose(lower, [0.0, -4.0], atol=1e-13)
     np.testing.assert_allclose(upper, [6.0, 4.0])
@@ -370,7 +370,7 @@ def test_a_contradiction_is_located(states: int) -> None:
     assert [int(where.step), int(where.output)] == [1, 1]
     np.testing.assert_allclose(where.excess, 1.0)
     assert np.isnan(estimates[-1].lower).all()
-    assert np.isnan(estimates[-1].center).all()
+    assert np.isnan(estimates[-1].chebyshev_centre()).all()
     assert observer.smooth(estimates)[0].is_empty
 
 
@@ -416,7 +416,7 @@ def test_nothing_measured_changes_nothing() -> None:
         (lambda: LinearObserver([[1.0]], [[1.0, 0.0]], Zonotope([0.0], []), noise=1.0), "output_matrix must have 1"),
         (lambda: LinearObserver(np.eye(7), np.eye(7), Zonotope(np.zeros(7), []), noise=1.0), "n from 1 to 6"),
         (lambda: LinearObserver(np.eye(2), np.eye(2), Zonotope([0.0], []), noise=1.0), "initial must have 2 coord"),
-        (lambda: LinearObserver(np.eye(2), np.eye(2), ConvexPolygons.empty(), noise=1.0), "and not empty"),
+        (lambda: LinearObserver(np.eye(2), np.eye(2), ConvexPolygons.empty(), noise=1.0), "must not be empty"),
         (lambda: LinearObserver(np.eye(2), np.eye(2), Zonotope([0.0, 0.0], []), noise=-1.0), "at least 0"),
         (lambda: published().update([0.0, 0.0]), r"measurement must have the shape \(1,\)"),
         (lambda: published().update([np.inf]), "finite or NaN"),
@@ -424,7 +424,6 @@ def test_nothing_measured_changes_nothing() -> None:
         (lambda: Zonotope([0.0], [[1.0, 2.0]]), "one a row"),
         (lambda: Zonotope([np.inf], []), "finite"),
         (lambda: Zonotope.box([1.0], [0.0]), "must not exceed"),
-        (lambda: Zonotope(np.zeros(2), np.ones((13, 2))).points(), "at most 12"),
     ],
 )
 def test_wrong_values_are_refused(wrong: Callable[[], object], message: str) -> None:
