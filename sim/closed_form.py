@@ -31,14 +31,14 @@ def possible_miss_m(
     closing_speed_m_s, pixel_error_rad, centroid_error_m : float
         Closing speed e, pixel error beta and centroid error c.
     first_image_s, last_image_s : float
-        Times T and t of the first and the last image before the arrival, s.
+        Times t_f and t_c before the arrival of the first and the last image, s.
     constant_bias : bool
         Whether the interval is that of a set that knows that the centroid error is constant. The information set does
         not know it.
 
     Notes
     -----
-    2 beta e t/(1 - t/T) + c (1 + t/T)/(1 - t/T), and 2 beta e t/(1 - t/T) + c with a constant centroid error.
+    2 beta e t_c/(1 - t_c/t_f) + c (1 + t_c/t_f)/(1 - t_c/t_f); with a known constant bias the second term is c.
     docs/guarantee.md contains the proof (Lemma 17).
     """
     share = last_image_s / first_image_s

@@ -142,7 +142,7 @@ def measured_set(centroid_m: float, alpha_rad: Callable[[float], float]) -> Info
 
 @pytest.mark.parametrize("centroid_m", [0.0, 12.0, 100.0])
 def test_the_set_has_the_possible_misses(centroid_m: float) -> None:
-    """Exact images reach the closed form within 2 %; random ones and those at a bound do not exceed it by more."""
+    """Exact images reach the closed form; images with errors at their bounds do not exceed it."""
     expected = possible_miss_m(SPEED_M_S, PIXEL_RAD, centroid_m, FIRST_S, LAST_S)
 
     def interval(alpha_rad: Callable[[float], float]) -> tuple[float, float]:
@@ -151,11 +151,11 @@ def test_the_set_has_the_possible_misses(centroid_m: float) -> None:
 
     lower, upper = interval(lambda before_s: 0.0)
     assert upper == pytest.approx(-lower)
-    assert expected * (1.0 - 1e-9) <= upper <= 1.02 * expected
+    assert expected * (1.0 - 1e-9) <= upper <= (1.0 + 1e-5) * expected
     bound, random = AngleSensor.camera(EVERY_S, PIXEL_RAD, centroid_m).error_bound, np.random.default_rng(3)
     for _ in range(5):
         lower, upper = interval(lambda before_s: random.choice([-1.0, 1.0]) * bound(before_s * SPEED_M_S))
-        assert 0.5 * (upper - lower) <= 1.02 * expected
+        assert 0.5 * (upper - lower) <= (1.0 + 1e-5) * expected
         assert lower <= 0.0 <= upper
 
 
