@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from infoset._compile import allocation_free, compiled
+from infoset._compile import allocation_free, compiled, inlined
 from infoset.polygon import ROUNDING, Points, append, close, cross
 
 
@@ -113,7 +113,7 @@ def reduce_outward(points: Points, count: int, cap: int) -> int:
     """
     is_hull = False
     while count > cap:
-        chosen, x, y = cheapest_edge(points, count, 0, count - 1)
+        chosen, x, y = cheapest_edge(points, count)
         if chosen >= 0:
             points[chosen, 0] = x
             points[chosen, 1] = y
@@ -132,44 +132,86 @@ def reduce_outward(points: Points, count: int, cap: int) -> int:
 
 
 @allocation_free
-def cheapest_edge(points: Points, count: int, first: int, last: int) -> tuple[int, float, float]:
-    """Return the edge whose removal adds the least area, and where its neighbours meet; -1 if not convex.
-
-    Notes
-    -----
-    Only the edges whose first vertex is one of first .. last are considered: all edges, or those inside a chain.
-    """
+def cheapest_edge(points: Points, count: int) -> tuple[int, float, float]:
+    """Return the edge whose removal adds the least area, and where its neighbours meet; -1 if not convex."""
     least = np.inf
     chosen = -1
     chosen_x = chosen_y = 0.0
-    before = first - 1 if first > 0 else count - 1
-    for i in range(first, last + 1):
+    before = count - 1
+    for i in range(count):
         j = i + 1 if i + 1 < count else 0
-        after = j + 1 if j + 1 < count else 0
-        from_x = points[i, 0] - points[before, 0]
-        from_y = points[i, 1] - points[before, 1]
-        edge_x = points[j, 0] - points[i, 0]
-        edge_y = points[j, 1] - points[i, 1]
-        to_x = points[after, 0] - points[j, 0]
-        to_y = points[after, 1] - points[j, 1]
+        added, x, y = removed_edge(points, before, i, j, j + 1 if j + 1 < count else 0)
         before = i
-        bend = cross(from_x, from_y, edge_x, edge_y)
-        if bend <= 0.0:
+        if added < 0.0:
             return -1, 0.0, 0.0
-        turn = cross(from_x, from_y, to_x, to_y)
-        if turn <= ROUNDING * (abs(from_x * to_y) + abs(from_y * to_x)):
-            continue
-        reach = cross(edge_x, edge_y, to_x, to_y) / turn
-        added = reach * bend
-        x = points[i, 0] + reach * from_x
-        y = points[i, 1] + reach * from_y
-        # The new vertex must not be before the far end of the edge: that would cut off a sharp tip.
-        if added < least and (points[j, 0] - x) * to_x + (points[j, 1] - y) * to_y >= 0.0:
+        if added < least:
             least = added
             chosen = i
             chosen_x = x
             chosen_y = y
     return chosen, chosen_x, chosen_y
+
+
+@inlined
+def removed_edge(points: Points, before: int, i: int, j: int, after: int) -> tuple[float, float, float]:
+    """Return twice the area that the removal of the edge from vertex i to j adds, and where its neighbours meet.
+
+    The area is infinite if the edge cannot be removed, and -1 if the path is not convex there.
+    """
+    from_x = points[i, 0] - points[before, 0]
+    from_y = points[i, 1] - points[before, 1]
+    edge_x = points[j, 0] - points[i, 0]
+    edge_y = points[j, 1] - points[i, 1]
+    to_x = points[after, 0] - points[j, 0]
+    to_y = points[after, 1] - points[j, 1]
+    bend = cross(from_x, from_y, edge_x, edge_y)
+    if bend <= 0.0:
+        return -1.0, 0.0, 0.0
+    turn = cross(from_x, from_y, to_x, to_y)
+    if turn <= ROUNDING * (abs(from_x * to_y) + abs(from_y * to_x)):
+        return np.inf, 0.0, 0.0
+    reach = cross(edge_x, edge_y, to_x, to_y) / turn
+    x = points[i, 0] + reach * from_x
+    y = points[i, 1] + reach * from_y
+    # The new vertex must not be before the far end of the edge: that would cut off a sharp tip.
+    beyond = (points[j, 0] - x) * to_x + (points[j, 1] - y) * to_y >= 0.0
+    return reach * bend if beyond else np.inf, x, y
+
+
+@allocation_free
+def drop_inner_edges(points: Points, count: int, fewest: int, added: Points) -> tuple[int, bool]:
+    """Remove edges inside a path, in place, until `fewest` vertices are left; the path moves outward only.
+
+    Parameters
+    ----------
+    added : ndarray, shape (>= count, 2)
+        Working array: its first column holds the area that the removal of each edge adds. A removal changes four of
+        these areas.
+
+    Returns
+    -------
+    count : int
+        New number of vertices.
+    done : bool
+        False if no edge can be removed before that.
+    """
+    first, last = 1, count - 3
+    while count > fewest:
+        for i in range(first, last + 1):
+            added[i, 0] = removed_edge(points, i - 1, i, i + 1, i + 2)[0]
+        least, chosen = np.inf, 0
+        for i in range(1, count - 2):
+            if added[i, 0] < least:
+                least, chosen = added[i, 0], i
+        if chosen == 0 or least < 0.0:
+            return count, False
+        _, points[chosen, 0], points[chosen, 1] = removed_edge(points, chosen - 1, chosen, chosen + 1, chosen + 2)
+        count -= 1
+        for i in range(chosen + 1, count):
+            points[i, 0], points[i, 1] = points[i + 1, 0], points[i + 1, 1]
+            added[i, 0] = added[i + 1, 0]
+        first, last = max(chosen - 2, 1), min(chosen + 1, count - 3)
+    return count, True
 
 
 @compiled

@@ -42,7 +42,7 @@ def reduce_outward(origins: Floats, rings: Floats, marks: Integers, n: int, tau:
     ----------
     tau : float
         Time to go, s.
-    points : ndarray, shape (CAPACITY, 2)
+    points : ndarray, shape (2 CAPACITY + 4, 2)
         Working array.
 
     Notes
@@ -58,17 +58,9 @@ def reduce_outward(origins: Floats, rings: Floats, marks: Integers, n: int, tau:
     for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
         v, m = read(rings, offset_of(marks, n, side, i))
         count = polygon.append(points, polygon_hull.drop_turned(points, count, 1, v, m), v, m)
-    while count > REDUCED - other:
-        chosen, v, m = polygon_hull.cheapest_edge(points, count, 1, count - 3)
-        if chosen < 0:
-            count = box_around(points, count, sign_of(side), tau)
-            break
-        points[chosen, 0] = v
-        points[chosen, 1] = m
-        for i in range(chosen + 1, count - 1):
-            points[i, 0] = points[i + 1, 0]
-            points[i, 1] = points[i + 1, 1]
-        count -= 1
+    count, done = polygon_hull.drop_inner_edges(points, count, REDUCED - other, points[CAPACITY + 2 :])
+    if not done:
+        count = box_around(points, count, sign_of(side), tau)
     for i in range(count):
         put(rings, marks, n, side, i, points[i, 0], points[i, 1])
         # |V| of a new vertex may exceed the previous bound.
