@@ -364,6 +364,8 @@ class GuaranteedMiss:
 
     def leave(self, active: Flags, lower: Floats, upper: Floats, stack: SectionStack, history: History) -> None:
         """Add the bound of the labels that leave now: the living ones from `lower` to `upper`."""
+        if not (active & (lower < upper)).any():
+            return
         channels, batch = len(self._laws), len(active)
         errors = history.errors_if_any
         most = PIECES if errors is None else PIECES * MOST_LEAVING_WINDOWS

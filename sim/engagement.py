@@ -26,7 +26,7 @@ from infoset.sensors import Measurements, Sensor
 from infoset.set_queries import MaskedFloats, MaskedIntegers
 from sim.draws import Draws
 from sim.gravity import on_board_model
-from sim.kepler import KeplerMotion, Sight
+from sim.kepler import KeplerMotion, Sight, longest_substep_s
 from sim.results import Outcome, Results
 from sim.scenario import Scenario
 from sim.target import acceleration_m_s2
@@ -103,7 +103,9 @@ class Engagements:
         self.step = 0
         self._draws = draws
         self._batch = batch = len(draws.position_m)
-        self._truth = truth or KeplerMotion(draws.position_m, draws.velocity_m_s, scenario.sun)
+        self._truth = truth or KeplerMotion(
+            draws.position_m, draws.velocity_m_s, scenario.sun, longest_substep_s(scenario)
+        )
         self._noise = noise or _make_noise(scenario, draws)
         self._strategy = strategy or make_strategy(scenario.strategy)
         self._model = model = on_board_model(scenario)

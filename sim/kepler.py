@@ -10,11 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infoset._compile import entry, inlined
-from sim.scenario import Sun
+from sim.scenario import Scenario, Sun
 
 Floats = NDArray[np.float64]
 
 LONGEST_SUBSTEP_S = 0.5
+"""Greatest length of a substep, s, if longer ones are not accurate enough for a scenario (`longest_substep_s`)."""
+POSITION_ERROR_M = 1e-3
+"""Error of the position over a flight that allows longer substeps."""
 ARRIVAL_LEAPS = 64
 PASSAGE_LEAPS = 8
 X = -1
@@ -77,6 +80,8 @@ class KeplerMotion:
         Relative (z, x) and (V_z, V_x) at t = 0; in space (y, z, x) and (V_y, V_z, V_x).
     sun : Sun or None
         None is free space.
+    substep_s : float
+        Greatest length of a substep, s.
 
     Notes
     -----
@@ -89,7 +94,10 @@ class KeplerMotion:
     Kumkov and Patsko (1997), equations (1) to (3).
     """
 
-    def __init__(self, position_m: Floats, velocity_m_s: Floats, sun: Sun | None) -> None:
+    def __init__(
+        self, position_m: Floats, velocity_m_s: Floats, sun: Sun | None, substep_s: float = LONGEST_SUBSTEP_S
+    ) -> None:
+        self._substep_s = substep_s
         batch, axes = position_m.shape
         # For each axis the relative motion and that of the spacecraft.
         self._motion = np.zeros((4, axes, 2, batch))
@@ -165,7 +173,7 @@ class KeplerMotion:
             accelerate_all(self._motion, self._manoeuvre, self._gravitational_parameter)
         # In free space one leap gives the exact motion over a step, a parabola.
         free_space = self._gravitational_parameter == 0.0
-        substeps = 1 if free_space else max(1, int(np.ceil(step_s / LONGEST_SUBSTEP_S * (1.0 - 1e-12))))
+        substeps = 1 if free_space else max(1, int(np.ceil(step_s / self._substep_s * (1.0 - 1e-12))))
         duration = np.full(self._motion.shape[-1], step_s / substeps)
         passed = np.zeros(self._motion.shape[-1], dtype=bool)
         least, arrival = np.full(passed.shape, np.inf), np.zeros(passed.shape)
@@ -191,6 +199,31 @@ class KeplerMotion:
         after = np.empty_like(motion)
         leap_all(motion, duration_s, manoeuvre_m_s2, self._gravitational_parameter, after)
         return after
+
+
+def longest_substep_s(scenario: Scenario) -> float:
+    """Return the length of substeps for which the position has an error of at most 1 mm at arrival, at least 0.5 s.
+
+    Notes
+    -----
+    Velocity Verlet with substeps h neglects a' h^3/6 of the position in each substep, where a' is the derivative of the
+    acceleration: h^2 T a'/6 over a flight of T, and T^2 h^2 a''/24 by later derivatives. With the distance r of the two
+    bodies, which changes at the speed v, and the velocity w of both around the Sun at the distance R,
+
+        a' <= (K/R^3) (2 v + 6 r w/R).
+
+    The bound is twice that, which covers the second term while the Sun turns by less than a radian.
+    """
+    box, sun = scenario.dispersion, scenario.sun
+    if sun is None:
+        return LONGEST_SUBSTEP_S
+    slowest, fastest = -box.vx_m_s[1], math.hypot(box.vx_m_s[0], box.lateral_speed_m_s)
+    flight_s, reach_m = box.x_m[1] / slowest, math.hypot(box.x_m[1], box.offset_m)
+    orbital = math.sqrt(sun.gravitational_parameter_m3_s2 / sun.distance_m)
+    nearest = max(sun.distance_m - reach_m, 0.1 * sun.distance_m)
+    turned = (orbital + fastest) / nearest
+    jerk = sun.gravitational_parameter_m3_s2 / nearest**3 * (2.0 * fastest + 6.0 * reach_m * turned)
+    return max(LONGEST_SUBSTEP_S, math.sqrt(POSITION_ERROR_M / (flight_s * jerk / 3.0)))
 
 
 def sun_and_orbit(sun: Sun) -> tuple[Floats, Floats]:

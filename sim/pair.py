@@ -12,7 +12,7 @@ from guidance.pair_noise import PairNoise
 from sim.bound import TruthPair
 from sim.draws import Draws
 from sim.engagement import Engagements
-from sim.kepler import KeplerMotion, Passage
+from sim.kepler import KeplerMotion, Passage, longest_substep_s
 from sim.results import Results
 from sim.scenario import Scenario, Sun
 
@@ -33,10 +33,14 @@ class ScheduledMotion(KeplerMotion):
         None is free space.
     acceleration_m_s2 : ndarray, shape (B, steps) or (2, B, steps)
         Acceleration along z, or along y and z, over each step; zero after the last.
+    substep_s : float
+        Greatest length of a substep, s.
     """
 
-    def __init__(self, position_m: Floats, velocity_m_s: Floats, sun: Sun | None, acceleration_m_s2: Floats) -> None:
-        super().__init__(position_m, velocity_m_s, sun)
+    def __init__(
+        self, position_m: Floats, velocity_m_s: Floats, sun: Sun | None, acceleration_m_s2: Floats, substep_s: float
+    ) -> None:
+        super().__init__(position_m, velocity_m_s, sun, substep_s)
         self._schedule = acceleration_m_s2
         self._step = 0
 
@@ -93,7 +97,8 @@ def fly_pair(
     nothing = np.zeros((*shape, steps + STEPS_BEYOND))
     draws = Draws(pair.position_m, pair.velocity_m_s, {}, nothing)
     noise = PairNoise(pair.last_common_step)
-    truth = ScheduledMotion(pair.position_m, pair.velocity_m_s, scenario.sun, pair.acceleration_m_s2)
+    substep_s = longest_substep_s(scenario)
+    truth = ScheduledMotion(pair.position_m, pair.velocity_m_s, scenario.sun, pair.acceleration_m_s2, substep_s)
     flight = Engagements(scenario, draws, strategy, truth, noise)
     impulses: list[Floats] = []
     while flight.flying:

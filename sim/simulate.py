@@ -8,13 +8,15 @@ import numpy as np
 
 from guidance import Strategy
 from infoset.limits import WHOLE, shown
-from sim.draws import draw
+from sim.draws import draw, greatest_number_of_steps
 from sim.engagement import Engagements
 from sim.results import Results, join
 from sim.scenario import Scenario, with_strategy
 
 ENGAGEMENTS_AT_ONCE = 200
 SECTIONS_AT_ONCE = 6000
+STEPS_AT_ONCE = 1_000_000
+"""Greatest number of engagements of a batch times their steps; each takes about 200 bytes."""
 
 
 def simulate(
@@ -63,8 +65,10 @@ def simulate(
     if numbers.size == 0 or numbers.min() < 0:
         raise ValueError(f"need at least one run, and no negative run numbers: got runs={runs}")
     parts = []
-    # Small batches fit into the processor's cache; with very many sections, larger ones would not fit into memory.
-    at_once = max(1, min(ENGAGEMENTS_AT_ONCE, SECTIONS_AT_ONCE // scenario.set_model.sections))
+    # Small batches fit into the processor's cache; with very many sections or steps, larger ones would not fit into
+    # memory.
+    by_steps = STEPS_AT_ONCE // greatest_number_of_steps(scenario)
+    at_once = max(1, min(ENGAGEMENTS_AT_ONCE, SECTIONS_AT_ONCE // scenario.set_model.sections, by_steps))
     for first in range(0, numbers.size, at_once):
         chunk = numbers[first : first + at_once]
         draws = draw(scenario, chunk.tolist(), seed)
