@@ -12,7 +12,7 @@ from guidance.pair_noise import PairNoise
 from sim.bound import TruthPair
 from sim.draws import Draws
 from sim.engagement import Engagements
-from sim.kepler import KeplerMotion, Passage, longest_substep_s
+from sim.kepler import LONGEST_SUBSTEP_S, KeplerMotion, Passage, longest_substep_s
 from sim.results import Results
 from sim.scenario import Scenario, Sun
 
@@ -38,7 +38,12 @@ class ScheduledMotion(KeplerMotion):
     """
 
     def __init__(
-        self, position_m: Floats, velocity_m_s: Floats, sun: Sun | None, acceleration_m_s2: Floats, substep_s: float
+        self,
+        position_m: Floats,
+        velocity_m_s: Floats,
+        sun: Sun | None,
+        acceleration_m_s2: Floats,
+        substep_s: float = LONGEST_SUBSTEP_S,
     ) -> None:
         super().__init__(position_m, velocity_m_s, sun, substep_s)
         self._schedule = acceleration_m_s2
