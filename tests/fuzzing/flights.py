@@ -50,10 +50,11 @@ def engagement(
     error: float = 0.1,
     speed_error: float = 1e-3,
     convention: Convention | None = None,
+    camera: bool = False,
 ) -> Scenario:
     """An engagement whose numbers are all in proportion to an angle, a range, a speed and a step.
 
-    With a convention of its two angles it is in space.
+    With a convention of its two angles it is in space. The centroid error of a camera is the greatest one.
     """
     slope = math.tan(angle_rad)
     z, v = range_m * slope, 0.2 * speed_m_s * slope
@@ -64,6 +65,8 @@ def engagement(
         (-speed_m_s * (1.0 + speed_error), -speed_m_s * (1.0 - speed_error)),
     )
     sensor = AngleSensor(step_s, error * angle_rad, 1.5 * error * angle_rad, range_m)
+    if camera:
+        sensor = AngleSensor.camera(step_s, error * angle_rad, 0.001999 * range_m, nominal_range_m=range_m)
     thruster, disturbance = Thruster(10.0 * v, 1e-3 * v, 0.2 * v), 0.01 * slope * speed_m_s**2 / range_m
     along_y = None
     if convention is not None:
@@ -200,7 +203,10 @@ def scaled(scenario: Scenario, draws: Draws, length: float, time: float) -> tupl
             step_s=time * model.step_s,
             bounds=box(model.bounds),
             angle_sensor=replace(
-                sensor, period_s=time * sensor.period_s, nominal_range_m=length * sensor.nominal_range_m
+                sensor,
+                period_s=time * sensor.period_s,
+                nominal_range_m=length * sensor.nominal_range_m,
+                centroid_error_m=None if sensor.centroid_error_m is None else length * sensor.centroid_error_m,
             ),
             disturbance_m_s2=acceleration * model.disturbance_m_s2,
             disturbance_y_m_s2=in_units(model.disturbance_y_m_s2),

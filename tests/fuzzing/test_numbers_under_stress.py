@@ -164,16 +164,24 @@ WHOLE_FLIGHTS = [
 ]
 
 
-def assert_whole_flight_works(combination: Combination, model: Model, convention: Convention | None = None) -> None:
-    scenario = engagement(*combination, model, convention=convention)
+def assert_whole_flight_works(
+    combination: Combination, model: Model, convention: Convention | None = None, *, camera: bool = False
+) -> None:
+    scenario = engagement(*combination, model, convention=convention, camera=camera)
     there = assert_works(scenario, numbers(scenario, 1, batch=2))
     assert there.ended
 
 
 @EXAMPLES
-@given(st.sampled_from([flight for flight in WHOLE_FLIGHTS if flight[-1] <= 30.0 and flight[3] < 500]), CONVENTIONS)
-def test_whole_flights_work_however_few_their_steps(combination: Combination, convention: Convention | None) -> None:
-    assert_whole_flight_works(combination, Model.GUARANTEED, convention)
+@given(
+    st.sampled_from([flight for flight in WHOLE_FLIGHTS if flight[-1] <= 30.0 and flight[3] < 500]),
+    CONVENTIONS,
+    st.booleans(),
+)
+def test_whole_flights_work_however_few_their_steps(
+    combination: Combination, convention: Convention | None, camera: bool
+) -> None:
+    assert_whole_flight_works(combination, Model.GUARANTEED, convention, camera=camera)
 
 
 @pytest.mark.slow
