@@ -130,6 +130,8 @@ class Engagements:
         self._spent = np.zeros(batch, dtype=bool)
         steps = scenario.thruster.impulse_steps(scenario.nominal_arrival_s, model.step_s)
         self._impulse_times_s = None if steps is None else np.array(steps) * model.step_s
+        self._number_of_burn = {step: i for i, step in enumerate(steps or ()) if scenario.thruster.impulses_s}
+        self._burns_m_s = np.zeros((batch, len(self._number_of_burn)))
         # Impulses that are decided and not given yet, one for each of the next steps.
         self._queue = [self._impulse] * scenario.thruster.delay_steps
         self._lead_s = scenario.thruster.delay_steps * model.step_s
@@ -165,6 +167,8 @@ class Engagements:
         self._queue.append(thruster.give(wanted, self._budget))
         self._budget = np.maximum(self._budget - modulus(self._queue[-1]), 0.0)
         self._impulse = self._give()
+        if self.step in self._number_of_burn:
+            self._burns_m_s[:, self._number_of_burn[self.step]] = modulus(self._impulse)
         if observe is not None:
             observe(
                 Step(
@@ -360,6 +364,7 @@ class Engagements:
             lateral_start=np.ma.MaskedArray(start, mask=not self.scenario.is_spatial),
             lateral_miss=np.ma.MaskedArray(lateral_miss, mask=not self.scenario.is_spatial),
             guarantees=self._model.is_guaranteed,
+            burns_m_s=self._burns_m_s if self._number_of_burn else None,
         )
 
 

@@ -72,6 +72,8 @@ class Results:
     ----------
     guarantees : bool
         Whether `guaranteed_miss_m` is a bound: the set's model is the guaranteed one.
+    burns_m_s : ndarray, shape (B, n), or None
+        Moduli of the impulses at the times of the schedule, m/s; None without a schedule, and for results from files.
     """
 
     runs: NDArray[np.int64] = field(metadata=columns(Column("run", "", "Run number", int)))
@@ -113,6 +115,7 @@ class Results:
         )
     )
     guarantees: bool = False
+    burns_m_s: Floats | None = None
 
     def __post_init__(self) -> None:
         unknown = np.ma.getmaskarray(self.guaranteed_miss_m) | (not self.guarantees)
@@ -158,7 +161,7 @@ class Results:
         """Return the results at some indices, in the order of the indices."""
 
         def taken(values: Any) -> Any:
-            if isinstance(values, bool):
+            if isinstance(values, bool) or values is None:
                 return values
             return tuple(values[index] for index in indices) if isinstance(values, tuple) else values[indices]
 
@@ -197,6 +200,8 @@ def join(parts: Sequence[Results]) -> Results:
 def _joined(parts: Sequence[Any]) -> Any:
     if isinstance(parts[0], bool):
         return all(parts)
+    if parts[0] is None:
+        return None
     if isinstance(parts[0], tuple):
         return tuple(value for part in parts for value in part)
     if isinstance(parts[0], np.ma.MaskedArray):

@@ -20,6 +20,7 @@ from experiments.common.screen import (
     say_warnings,
     show,
 )
+from experiments.interception.burns import burn_table, burns_key
 from experiments.interception.choices import own_strategy, scenario_with
 from experiments.interception.command import Experiment
 from experiments.interception.curves import Curve, curve_scenarios
@@ -76,7 +77,13 @@ def run(options: Experiment) -> None:
             "runs": options.runs,
             "elapsed_s": elapsed_s,
             "curves": [
-                {**_key(curve), **hit_key(curve.results.hits), **outcome_columns(curve.results)} for curve in curves
+                {
+                    **_key(curve),
+                    **hit_key(curve.results.hits),
+                    **burns_key(scenario, curve.results),
+                    **outcome_columns(curve.results),
+                }
+                for curve in curves
             ],
         }
         written.save("scenario.toml", scenario_to_toml(scenario))
@@ -153,4 +160,5 @@ def _parts(scenario: Scenario, curves: Sequence[Curve]) -> list[Part]:
         notes.append(f"paper (one run from z = -8 km, no range meter): {figures}")
     runs = len(curves[0].results)
     notes += quantile_notes(runs, levels)
-    return [f"{scenario.name}: quantiles of {runs} runs per curve", table, *notes]
+    burns = [burn_table(scenario, curves)] if scenario.thruster.impulses_s else []
+    return [f"{scenario.name}: quantiles of {runs} runs per curve", table, *burns, *notes]

@@ -1,0 +1,55 @@
+"""The report of the burns of a schedule."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from experiments import load_scenario
+from experiments.interception.burns import burns_key
+from sim import simulate
+from sim.results import join
+from tests.experiments.command_line import Command
+
+SETTINGS = ("thruster.impulses_s=[80.0, 40.0, 10.0]", "thruster.last_impulse_s=20.0")
+
+
+def test_the_burns_of_a_schedule(infoset: Command) -> None:
+    """Their shares add up to one, and no time after the cut-off is a burn."""
+    options = [option for setting in SETTINGS for option in ("--set", setting)]
+    arguments = ["experiment", "asteroid-1997", "--runs", 10, *options]
+    code, out, _ = infoset(*arguments)
+    assert code == 0
+    assert "burn, s before arrival" in out
+    curves = infoset.json(*arguments)["curves"]
+    assert len(curves) == 4
+    for curve in curves:
+        first, second = curve["burns"]
+        assert (first["before_arrival_s"], second["before_arrival_s"]) == (80.0, 40.0)
+        assert first["share"] + second["share"] == pytest.approx(1.0)
+        assert first["p99_m_s"] is None  # ten runs do not show it
+    results = simulate(load_scenario("asteroid-1997", SETTINGS), 10)
+    assert curves[2]["burns"] != curves[0]["burns"]
+    assert burns_key(load_scenario("asteroid-1997", SETTINGS), results)["burns"] in [curve["burns"] for curve in curves]
+
+
+def test_without_a_schedule_there_are_no_burns(infoset: Command) -> None:
+    arguments = ["experiment", "asteroid-1997", "--runs", 2, "--set", "thruster.last_impulse_s=20.0"]
+    assert "burn" not in infoset(*arguments)[1]
+    assert not any("burns" in curve for curve in infoset.json(*arguments)["curves"])
+
+
+def test_burns_are_columns_of_the_results() -> None:
+    scenario = load_scenario("asteroid-1997", SETTINGS)
+    results = simulate(scenario, 4)
+    assert results.burns_m_s is not None
+    np.testing.assert_allclose(results.burns_m_s.sum(axis=1), results.impulse_m_s, rtol=1e-12)
+    halves = join([simulate(scenario, [0, 1]), simulate(scenario, [2, 3])])
+    assert halves.burns_m_s is not None
+    np.testing.assert_array_equal(halves.burns_m_s, results.burns_m_s)
+    assert halves.take(np.array([3])).burns_m_s.tolist() == results.burns_m_s[3:].tolist()  # type: ignore[union-attr]
+    without = simulate(load_scenario("asteroid-1997"), 2)
+    assert without.burns_m_s is None
+    assert join([without, without]).take(np.array([1])).burns_m_s is None
+    idle = simulate(load_scenario("asteroid-1997", [*SETTINGS, "thruster.budget_m_s=0.0"]), 2)
+    assert [burn["share"] for burn in burns_key(scenario, idle)["burns"]] == [None, None]
