@@ -39,8 +39,7 @@ class Clock:
     @classmethod
     def of(cls, records: Sequence[Record]) -> Clock:
         """Return the time axis for records: logarithmic for long flights, and if times before arrival are scheduled."""
-        scheduled = (marks(record.scenario) or record.scenario.thruster.impulses_s for record in records)
-        return cls(any(len(record.steps) > MOST_LINEAR_STEPS for record in records) or any(scheduled))
+        return cls(any(len(record.steps) > MOST_LINEAR_STEPS or marks(record.scenario) for record in records))
 
     def at(self, record: Record, times_s: ArrayLike | None = None) -> Floats:
         """Return the positions of times on the axis, s; None is the times of the steps.
@@ -75,8 +74,14 @@ def evenly(places: NDArray[Any], count: int) -> NDArray[np.int64]:
 
 def marks(scenario: Scenario) -> dict[str, float]:
     """Return the times before the nominal arrival, s, of the first and the last image and of the last impulse."""
-    sensor, cut_off_s = scenario.set_model.angle_sensor, scenario.thruster.last_impulse_s
-    times = {"first image": sensor.first_image_s, "last image": sensor.last_image_s or None, "cut-off": cut_off_s}
+    sensor, thruster = scenario.set_model.angle_sensor, scenario.thruster
+    times = {
+        "first image": sensor.first_image_s,
+        "last image": sensor.last_image_s or None,
+        "cut-off": thruster.last_impulse_s,
+    }
+    if thruster.impulses_s and thruster.last_impulse_s is None:
+        times["last impulse"] = thruster.impulses_s[-1]
     return {name: time for name, time in times.items() if time is not None and time < scenario.nominal_arrival_s}
 
 
@@ -102,8 +107,18 @@ def true_predicted_misses(record: Record) -> dict[str, Floats]:
 
 
 def possible_misses(record: Record) -> tuple[Floats, Mapping[str, Floats]]:
-    """Return the indices of the steps with a set, and the predicted-miss interval of each axis, m, shape (n, 2)."""
-    known = [index for index, step in enumerate(record.steps) if step.predicted_miss_m is not None]
+    """Return the indices of steps with a complete set, and the predicted-miss interval of each axis, m, shape (n, 2).
+
+    A set is complete until its nearest section reaches the range threshold and leaves.
+    """
+    known = []
+    model = record.scenario.set_model
+    least_range_m = model.range_threshold_m + model.closing_speed_m_s * model.step_s
+    for index, step in enumerate(record.steps):
+        if step.predicted_miss_m is not None:
+            known.append(index)
+        if step.sections and step.sections[0].range_m < least_range_m:
+            break
     axes = record.scenario.set_model.axes
     return np.array(known, dtype=np.int64), {
         axis: np.array([record.steps[index].axes[axis].predicted_miss_m for index in known]).reshape(-1, 2)

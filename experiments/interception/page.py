@@ -11,7 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from experiments.common.errors import InputError, shown
 from experiments.common.page_document import page
-from experiments.interception.course import Clock, duration_text, evenly, least_to_go_s, marks, true_predicted_misses
+from experiments.interception.course import (
+    Clock,
+    duration_text,
+    evenly,
+    least_to_go_s,
+    marks,
+    possible_misses,
+    true_predicted_misses,
+)
 from experiments.interception.record_titles import angle_name, outcome_title, record_titles
 from infoset import Convention, InformationSet, Section
 from infoset.sensors import SENSORS
@@ -55,13 +63,25 @@ def interception_page(records: Sequence[Record]) -> str:
                 dict.fromkeys(record.scenario.description for record in records if record.scenario.description)
             ),
             "counts_down": clock.counts_down,
-            "records": [_data(record, title) for record, title in zip(records, titles, strict=True)],
+            "records": [
+                _data(record, title, kept)
+                for record, title, kept in zip(records, titles, _kept_steps_of(records), strict=True)
+            ],
         },
     )
 
 
-def _data(record: Record, title: str) -> dict[str, object]:
-    scenario, kept = record.scenario, kept_steps(record)
+def _kept_steps_of(records: Sequence[Record]) -> list[list[int]]:
+    """Return the steps of each record that the page has: the same ones if the records have steps at the same times."""
+    kept = [kept_steps(record) for record in records]
+    if len({record.scenario.set_model.step_s for record in records}) > 1:
+        return kept
+    together = sorted(set().union(*kept))
+    return [[index for index in together if index < len(record.steps)] for record in records]
+
+
+def _data(record: Record, title: str, kept: Sequence[int]) -> dict[str, object]:
+    scenario = record.scenario
     steps = [record.steps[index] for index in kept]
     thruster, model = scenario.thruster, scenario.set_model
     moduli = np.abs([step.impulse_m_s for step in record.steps])
@@ -74,11 +94,8 @@ def _data(record: Record, title: str) -> dict[str, object]:
         states += [stages[index].measured, stages[index + 1].before]
         numbers.append((len(states) - 3, len(states) - 2, len(states) - 1))
     sections = [section for state in states for section in state]
-    thinned = ""
-    if len(kept) < len(record.steps):
-        fired = np.count_nonzero(moduli)
-        impulses = f" and {np.count_nonzero(moduli[kept])} of {fired} impulses" if fired else ""
-        thinned = f"; the page has {len(kept)} of {len(record.steps)} steps{impulses}"
+    thinned = f"; the page has {len(kept)} of {len(record.steps)} steps" if len(kept) < len(record.steps) else ""
+    fired = np.flatnonzero(moduli)
     return {
         "title": title,
         "outcome": outcome_title(record),
@@ -95,9 +112,12 @@ def _data(record: Record, title: str) -> dict[str, object]:
         "radius_m": scenario.radius_m,
         "time_s": [step.time_s for step in steps],
         "measured_range_m": [step.measured.get("range") for step in steps],
+        "complete_steps": int(np.searchsorted(kept, possible_misses(record)[0].max(initial=-1), side="right")),
         "true_range_m": [step.true_range_m for step in steps],
         "next_range_m": [step.true_range_m for step in _next(record, kept)],
         "modulus_m_s": moduli[kept].tolist(),
+        "fired_s": [record.steps[index].time_s for index in fired],
+        "fired_modulus_m_s": moduli[fired].tolist(),
         "budget_left_m_s": np.maximum(thruster.budget_m_s - np.cumsum(moduli), 0.0)[kept].tolist(),
         "sections": {
             "states": _packed(numbers, "<u4"),
@@ -111,6 +131,7 @@ def _data(record: Record, title: str) -> dict[str, object]:
                 "measured_name": _measured_name(scenario, axis),
                 "angle_name": angle_name(scenario, axis),
                 **_axis_data(record, axis, kept),
+                "fired_m_s": [record.steps[index].axes[axis].impulse_m_s for index in fired],
                 "outlines": {
                     "predicted_miss_m": _packed(np.concatenate([stages[k].miss_m[axis] for k in kept]), "<f8"),
                     **packed_outlines(
@@ -133,14 +154,15 @@ def _measured_name(scenario: Scenario, axis: str) -> str:
 def kept_steps(record: Record) -> list[int]:
     """Return the steps that the page has: all, or of a long flight at most `MOST_STEPS`.
 
-    The first and the last step, the first and the last image, and up to half of `MOST_STEPS` impulses are among them.
-    The others are evenly distributed: half of them over the steps, half over the logarithm of the time before arrival.
+    The first and last step and image, and up to a quarter of `MOST_STEPS` impulses are among them. The
+    others are evenly distributed, half over the steps and half over the logarithm of the time before arrival.
     """
     count = len(record.steps)
     if count <= MOST_STEPS:
         return list(range(count))
     fired = np.flatnonzero([step.impulse_m_s for step in record.steps])
-    fired = fired[evenly(np.arange(len(fired)), MOST_STEPS // 2)] if len(fired) > MOST_STEPS // 2 else fired
+    if len(fired) > MOST_STEPS // 4:
+        fired = fired[evenly(np.arange(len(fired)), MOST_STEPS // 4)]
     seen = np.flatnonzero(["angle" in step.measured for step in record.steps])
     kept = {0, count - 1, *fired.tolist(), *seen[[0, -1] if len(seen) else []].tolist()}
     places = -np.log(Clock(counts_down=True).at(record))

@@ -257,7 +257,7 @@ class Column {
     drawMarks(impulses, record);
     impulses.level(0, { stroke: theme.colours.line, width: 1 });
     for (const side of [-limit, limit]) impulses.level(side, { stroke: theme.colours.line, width: 1, dash: [5, 3] });
-    drawStems(impulses, record, record.impulse_m_s, this.step);
+    drawStems(impulses, record, record.fired_m_s, this.step);
     markNow(impulses, record.places[this.step]);
     impulses.describe(this.impulseLines(this.step).join(", "));
   }
@@ -359,20 +359,20 @@ class Column {
 /** Greatest number of impulses that have a dot at their end. */
 const MOST_DOTS = 60;
 
-/** Impulses as lines from zero; those after the present step are pale. */
+/** All impulses of the flight as lines from zero; those after the present step are pale. */
 function drawStems(chart, record, impulses, step) {
-  const few = record.modulus_m_s.filter((modulus) => modulus > 0).length <= MOST_DOTS;
+  const places = record.fired_s.map((time) => timePlace(record, time));
   impulses.forEach((impulse, index) => {
     if (impulse === 0) return;
-    const look = { stroke: index <= step ? theme.colours.impulse : theme.colours.grid, width: 1.6 };
-    chart.curve([[record.places[index], 0], [record.places[index], impulse]], look);
-    if (few) chart.point(record.places[index], impulse, "dot", look.stroke, 2);
+    const look = { stroke: record.fired_s[index] <= record.time_s[step] ? theme.colours.impulse : theme.colours.grid, width: 1.6 };
+    chart.curve([[places[index], 0], [places[index], impulse]], look);
+    if (impulses.length <= MOST_DOTS) chart.point(places[index], impulse, "dot", look.stroke, 2);
   });
 }
 
 /** The greatest impulse of an axis: the limit of the engine, unless all impulses are much smaller. */
-function impulseSpan({ modulus_m_s: moduli, greatest_impulse_m_s: limit }) {
-  const greatest = Math.max(...moduli);
+function impulseSpan({ fired_modulus_m_s: moduli, greatest_impulse_m_s: limit }) {
+  const greatest = Math.max(0, ...moduli);
   return greatest > 0 && greatest < 0.2 * limit ? greatest : limit;
 }
 
@@ -498,7 +498,7 @@ class Engagement {
     chart.begin({ ...timeAxis(), y: [0, 1.15 * impulseSpan(record)], yTitle: "|k|, m/s" });
     drawMarks(chart, record);
     chart.level(limit, { stroke: theme.colours.line, width: 1, dash: [5, 3] });
-    drawStems(chart, record, record.modulus_m_s, this.step);
+    drawStems(chart, record, record.fired_modulus_m_s, this.step);
     markNow(chart, record.places[this.step]);
     chart.describe(this.impulseLines(this.step).join(", "));
   }
@@ -574,7 +574,9 @@ function levelled(columns) {
 function corridorOf(columns) {
   const across = (values) => (values.includes(null) ? null : Math.hypot(...values));
   const course = (of) => columns[0].record.time_s.map((_, step) => across(columns.map(({ record }) => of(record, step))));
-  const interval = (of) => ({ predicted_miss_m: misses }, step) => misses[step] && of(misses[step]);
+  // The set is complete until its nearest section leaves at the range threshold.
+  const interval = (of) => ({ predicted_miss_m: misses, complete_steps: last }, step) =>
+    (step < last && misses[step] ? of(misses[step]) : null);
   return {
     greatest: course(interval(([low, high]) => Math.max(Math.abs(low), Math.abs(high)))),
     centred: course(interval(([low, high]) => (high - low) / 2)),

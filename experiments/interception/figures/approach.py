@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
@@ -63,7 +64,8 @@ def draw_approach(records: Sequence[Record]) -> Figure:
     """Draw possible misses and impulses against the time before the nominal arrival, and in space the B-plane.
 
     Each record has a row. The possible miss is the greatest distance of a point of the box of predicted misses, which
-    contains those of all sections. After an impulse that centres the box it is half the diagonal of the box.
+    contains those of all sections. After an impulse that centres the box it is half the diagonal of the box. Both end
+    when the first section leaves at the range threshold.
     """
     if not records:
         raise ValueError("at least one record is needed")
@@ -138,6 +140,7 @@ def name_marks(axes: Axes, record: Record) -> None:
             rotation=90.0,
             fontsize=6.5,
             color=INK,
+            path_effects=[withStroke(linewidth=2.0, foreground="white")],
             ha=side,
             va="top",
             zorder=5.0,

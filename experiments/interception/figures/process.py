@@ -155,9 +155,10 @@ def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, span_m_s: float) -> No
     axes.axhline(0.0, color=LIMIT, linewidth=0.6)
     for limit in (-greatest, greatest):
         axes.axhline(limit, color=LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
-    beyond = ", beyond the axis" if greatest > span_m_s else ""
+    wide = width_mm(axes) > _NARROW_MM
     axes.annotate(
-        f"{'greatest impulse' if width_mm(axes) > _NARROW_MM else 'limit'} ±{greatest:g} m/s{beyond}",
+        f"{'greatest impulse' if wide else 'limit'} ±{greatest:g} m/s"
+        + (", beyond the axis" if wide and greatest > span_m_s else ""),
         (0.985, min(greatest, 1.05 * span_m_s)),
         xycoords=axes.get_yaxis_transform(),
         xytext=(0.0, 2.5),

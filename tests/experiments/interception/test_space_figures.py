@@ -266,16 +266,22 @@ def test_approach_shows_possible_misses_and_the_schedule(records: list[Record]) 
     figure = draw_approach([record])
     possible, moduli, b_plane = figure.axes
     lines = {str(line.get_label()): np.asarray(line.get_xydata(), dtype=np.float64) for line in possible.lines}
-    intervals = np.array([[step.axes[axis].predicted_miss_m for axis in AXES] for step in record.steps])
+    model = record.scenario.set_model
+    near_m = model.range_threshold_m + model.closing_speed_m_s * model.step_s
+    last = next(number for number, step in enumerate(record.steps) if step.sections[0].range_m < near_m)
+    steps = record.steps[: last + 1]
+    assert 0.8 * len(record.steps) < len(steps) < len(record.steps)
+    intervals = np.array([[step.axes[axis].predicted_miss_m for axis in AXES] for step in steps])
     np.testing.assert_allclose(lines["_possible"][:, 1], np.hypot(*np.abs(intervals).max(axis=2).T))
     np.testing.assert_allclose(lines["_centred"][:, 1], np.hypot(*(0.5 * np.diff(intervals, axis=2)[:, :, 0].T)))
     before = record.scenario.nominal_arrival_s - np.array([step.time_s for step in record.steps])
-    np.testing.assert_allclose(lines["_possible"][:, 0], np.maximum(before, 0.25))
-    last = record.steps[-1]
-    seconds = last.true_range_m / record.scenario.set_model.closing_speed_m_s
-    end = [miss[-1] - seconds * last.axes[axis].impulse_m_s for axis, miss in true_predicted_misses(record).items()]
+    np.testing.assert_allclose(lines["_possible"][:, 0], np.maximum(before[: len(steps)], 0.25))
+    np.testing.assert_allclose(lines["_true"][:, 0], np.maximum(before, 0.25))
+    end_step = record.steps[-1]
+    seconds = end_step.true_range_m / model.closing_speed_m_s
+    end = [miss[-1] - seconds * end_step.axes[axis].impulse_m_s for axis, miss in true_predicted_misses(record).items()]
     np.testing.assert_allclose(end, record.result.lateral_miss[0].data, atol=0.01)
-    assert (lines["_true"][:, 1] < 1.001 * lines["_possible"][:, 1]).all()
+    assert (lines["_true"][: len(steps), 1] < 1.001 * lines["_possible"][:, 1]).all()
     assert possible.get_xlim()[0] > possible.get_xlim()[1]
     assert [text.get_text() for text in possible.texts] == ["cut-off, 10 s", "last image, 4 s"]
     assert moduli.get_xlabel() == "time before the nominal arrival"
