@@ -271,8 +271,8 @@ class ObserverProblem:
     step_s: float | None
     names: tuple[str, ...]
 
-    def observer(self) -> LinearObserver:
-        """Return the observer at its initial set."""
+    def observer(self, runs: int | None = None) -> LinearObserver:
+        """Return the observer at its initial set; `runs` as in `LinearObserver`."""
         return LinearObserver(
             self.a,
             self.c,
@@ -281,6 +281,7 @@ class ObserverProblem:
             disturbance=self.disturbance,
             input_matrix=self.b,
             offset=self.offset,
+            runs=runs,
         )
 
 

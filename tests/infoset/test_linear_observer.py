@@ -15,7 +15,16 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from infoset import ConvexPolygons, Estimate, LinearObserver, Zonotope
+from infoset import (
+    AngleSensor,
+    ConvexPolygons,
+    Estimate,
+    InformationSet,
+    LinearObserver,
+    SetModel,
+    StateBox,
+    Zonotope,
+)
 from infoset.observer_sets import Polytopes
 from infoset.observer_steps import SUM_SLACK, enlarge
 from infoset.polytope import HIGHS, Polytope
@@ -333,6 +342,40 @@ def test_the_true_state_of_four_states_is_inside() -> None:
 @pytest.mark.slow
 def test_the_true_state_of_four_states_is_inside_in_2000_runs() -> None:
     assert kept_of_four_states(2000, 10) == 2000
+
+
+def test_a_section_of_the_interception_is_an_observer() -> None:
+    step_s, limit = 0.5, 0.005
+    box = StateBox(z_m=(-2e3, 2e3), x_m=(5.5e6, 6.1e6), vz_m_s=(-100.0, 100.0), vx_m_s=(-59e3, -57e3))
+    sensor = AngleSensor(
+        period_s=step_s,
+        error_at_nominal_range_rad=1.5e-4,
+        error_at_zero_range_rad=2.3e-4,
+        nominal_range_m=5.8e6,
+    )
+    information = InformationSet(SetModel(58e3, step_s, box, sensor, disturbance_m_s2=limit, sections=5))
+    rng = np.random.default_rng(1)
+    angles = (300.0 + 20.0 * step_s * np.arange(15)) / (5.8e6 - 58e3 * step_s * np.arange(15))
+    angles += rng.uniform(-1.5e-4, 1.5e-4, 15)
+    information.measure_angle(angles[0])
+    start = information.sections()[2]
+    ranges = start.range_m - 58e3 * step_s * np.arange(15)
+    widths = np.array([float(sensor.error_bound(x)) * x for x in ranges])
+    observer = LinearObserver(
+        [[1.0, 0.0], [step_s, 1.0]],
+        np.array([[[0.0, 1.0 / width]] for width in widths]),
+        start.polygon,
+        noise=1.0,
+        disturbance=Zonotope([0.0, 0.0], [[limit * step_s, 0.5 * limit * step_s**2]]),
+    )
+    for k in range(1, 15):
+        information.predict()
+        information.measure_angle(angles[k])
+        observer.predict()
+        observer.update([angles[k] * ranges[k] / widths[k]])
+    section = information.sections()[2]
+    assert section.range_m == pytest.approx(ranges[-1])
+    assert section.polygon.hausdorff_distance(observer.estimate().polygons) < 1e-9
 
 
 # Interface ------------------------------------------------------------------------------------------------------

@@ -1,0 +1,121 @@
+"""Set-steps of the published observer: ours in a batch and alone, shapely's objects, and zonoopt if it is installed.
+
+``python -m benchmarks.observer_numbers``. A set-step is a prediction and a measurement of one set. The errors are those
+of the bounds of the last set, against exact rational arithmetic.
+"""
+
+from __future__ import annotations
+
+import importlib
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from experiments.observer.file import ObserverProblem, load_observer
+from infoset import Zonotope
+
+Floats = NDArray[np.float64]
+
+RUNS = 10_000
+ROUNDS = 7
+EXACT = np.array(
+    [
+        [-0.10623093461203588, -0.2540037859300611],
+        [0.14112566964187895, 0.21278460555195491],
+    ]
+)
+"""Bounds of the last set, rounded from rational numbers."""
+TARGET_BATCH_US = 0.5
+
+
+def main() -> None:
+    """Print the times and errors."""
+    problem = load_observer("observer-2005")
+    measured = problem.measured
+    assert measured is not None
+    rows: list[tuple[str, float, float]] = []
+    notes = [f"target of the batch: at most {TARGET_BATCH_US} us; one run: at most the time of shapely"]
+    for name, count, run in (
+        (f"LinearObserver, batch of {RUNS}", RUNS, lambda: ours(problem, measured, RUNS)),
+        ("LinearObserver, one run", 1, lambda: ours(problem, measured, None)),
+        ("shapely objects, one run", 1, lambda: with_shapely(problem, measured)),
+    ):
+        rows.append((name, *timed(run, count * len(measured))))
+    try:
+        zonoopt = importlib.import_module("zonoopt")
+    except ImportError:
+        notes.append("zonoopt is not installed; install it in a separate environment to compare")
+    else:
+        for name, bounds in (
+            ("zonoopt, sets alone", False),
+            ("zonoopt, sets and bounds", True),
+        ):
+            rows.append((name, *timed(partial(with_zonoopt, zonoopt, problem, measured, bounds), len(measured))))
+    lines = [f"{name:36} {us:10.3f} us a set-step   error of the bounds {error:.2g}" for name, us, error in rows]
+    print("\n".join([*lines, *notes]))  # noqa: T201
+
+
+def timed(run: Callable[[], Floats], steps: int) -> tuple[float, float]:
+    """Return the shortest processor time, us a step, and the greatest error of the bounds."""
+    best, bounds = np.inf, run()
+    for _ in range(ROUNDS):
+        start = time.process_time()
+        bounds = run()
+        best = min(best, time.process_time() - start)
+    return 1e6 * best / steps, float(np.abs(bounds - EXACT).max())
+
+
+def ours(problem: ObserverProblem, measured: Floats, runs: int | None) -> Floats:
+    """Return the bounds of the last set of an observer."""
+    observer = problem.observer(runs)
+    y = measured if runs is None else np.broadcast_to(measured[:, None], (len(measured), runs, 1))
+    last = observer.run(y)[-1]
+    bounds = np.array([last.lower, last.upper])
+    return bounds if runs is None else bounds[:, -1]
+
+
+def with_shapely(problem: ObserverProblem, measured: Floats) -> Floats:
+    """Return the same with one shapely object a step: hulls of points, and intersections with strips."""
+    assert isinstance(problem.disturbance, Zonotope)
+    w, (normal,), half = problem.disturbance.generators[0], problem.c, problem.half_width[0]
+    along = 100.0 * np.array([-normal[1], normal[0]])
+    polygon = shapely.box(-3.0, -3.0, 3.0, 3.0)
+    for k, (y,) in enumerate(measured):
+        if k:
+            points = shapely.get_coordinates(polygon)[:-1] @ problem.a.T
+            polygon = shapely.convex_hull(shapely.multipoints(np.vstack([points + w, points - w])))
+        low, high = ((y + side * half) * normal / (normal @ normal) for side in (-1.0, 1.0))
+        strip = shapely.polygons([low - along, low + along, high + along, high - along])
+        polygon = shapely.intersection(polygon, strip)
+    left, bottom, right, top = polygon.bounds
+    return np.array([[left, bottom], [right, top]])
+
+
+def with_zonoopt(zonoopt: Any, problem: ObserverProblem, measured: Floats, bounds: bool) -> Floats:
+    """Return the same with constrained zonotopes; with their bounds at every step, or at the last one alone."""
+    sparse = importlib.import_module("scipy.sparse").csc_matrix
+    assert isinstance(problem.disturbance, Zonotope)
+
+    def zonotope(centre: Sequence[float], generators: Floats) -> Any:
+        return zonoopt.Zono(sparse(generators.T), np.array(centre))
+
+    w = zonotope([0.0, 0.0], problem.disturbance.generators)
+    shape, a, c = zonotope([0.0, 0.0], 3.0 * np.eye(2)), sparse(problem.a), sparse(problem.c)
+    box = None
+    for k, y in enumerate(measured):
+        if k:
+            shape = zonoopt.minkowski_sum(zonoopt.affine_map(shape, a), w)
+        shape = zonoopt.intersection(shape, zonotope(y, problem.half_width[None]), c)
+        if bounds or k == len(measured) - 1:
+            box = shape.bounding_box()
+    assert box is not None
+    return np.array([np.ravel(box.lower()), np.ravel(box.upper())])
+
+
+if __name__ == "__main__":
+    main()
