@@ -322,9 +322,12 @@ class _Approach:
         return np.append(np.flatnonzero(measured) - 1, len(self.ranges_m) - 1).astype(np.int64)
 
     def correction_m(self, last_common_step: int) -> float:
-        """Return the greatest change of the miss by impulses after a step, within the budget, m."""
-        thruster = self.scenario.thruster
-        arms_s = self.ranges_m[last_common_step + 1 :] / -self.vx_m_s
+        """Return the greatest change of the miss by impulses that are decided after a step, within the budget, m."""
+        thruster, step_s = self.scenario.thruster, self.scenario.set_model.step_s
+        steps = thruster.impulse_steps(self.scenario.nominal_arrival_s, step_s)
+        given = np.arange(thruster.delay_steps, len(self.ranges_m)) if steps is None else np.array(steps)
+        later = (given > last_common_step + thruster.delay_steps) & (given < len(self.ranges_m))
+        arms_s = self.ranges_m[given[later]] / -self.vx_m_s
         spent = thruster.greatest_impulse_m_s * np.arange(len(arms_s))
         sizes = np.clip(thruster.budget_m_s - spent, 0.0, thruster.greatest_impulse_m_s)
         return float(sizes @ arms_s)

@@ -386,6 +386,28 @@ def test_pairs_of_the_lower_bound_stay_within_the_bounds_of_a_camera(centroid_m:
         assert bound.bound_m >= lower_bound(camera_scenario()).bound_m * (1.0 - 1e-6)
 
 
+@pytest.mark.parametrize("centroid_m", [0.0, CENTROID_M, 60.0])
+@pytest.mark.parametrize("delay_steps", [0, 2])
+def test_extremal_errors_reach_the_possible_miss_with_any_strategy(centroid_m: float, delay_steps: int) -> None:
+    """With a cut-off, two motions with the same images until the last decision miss by the closed form and by Phi."""
+    scenario = camera_scenario(centroid_error_m=centroid_m)
+    at_start = (3600.0 * SPEED_M_S,) * 2
+    box = replace(scenario.dispersion, x_m=at_start, vx_m_s=(-SPEED_M_S, -SPEED_M_S))
+    scenario = replace(
+        scenario,
+        dispersion=box,
+        set_model=replace(scenario.set_model, bounds=box),
+        thruster=Thruster(20.0, 0.0, 5.0, last_impulse_s=300.0, delay_steps=delay_steps),
+    )
+    expected = possible_miss_of(scenario)
+    bound = lower_bound(scenario)
+    assert bound.bound_m == pytest.approx(expected, rel=1e-4)
+    flown = fly_pair(scenario, bound.pair)
+    assert flown.greatest_error_share <= 1.0
+    phi = flown.results.guaranteed_miss_m.max()
+    assert expected * (1.0 - 1e-4) <= flown.results.miss_m.max() <= phi <= expected * (1.0 + 1e-4)
+
+
 def test_the_adversary_keeps_the_bounds_of_a_camera() -> None:
     scenario = camera_scenario(miss_probability=0.3, last_image_s=120.0)
     worst = find_worst(scenario, budget=64)
