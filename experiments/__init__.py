@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from experiments.interception.record_file import load_record
     from experiments.interception.scenario_file import load_scenario
     from experiments.multipoint.file import load_multipoint
+    from experiments.observer.file import load_observer
     from experiments.pareto.figures import draw_trajectories
     from experiments.pareto.file import load_pareto
     from experiments.pursuit.figures import draw_distance
@@ -28,6 +29,7 @@ _NAMES = {
     "interception.figures.bound": ("draw_bound",),
     "interception.figures.process": ("draw_process",),
     "interception.figures.sets": ("draw_sets",),
+    "observer.file": ("load_observer",),
     "pareto.file": ("load_pareto",),
     "pareto.figures": ("draw_trajectories",),
     "multipoint.file": ("load_multipoint",),
@@ -48,6 +50,7 @@ __all__ = [
     "find_worst",
     "fly_one",
     "load_multipoint",
+    "load_observer",
     "load_pareto",
     "load_pursuit",
     "load_record",

@@ -243,6 +243,8 @@ class LinearObserver:
         ------
         ValueError
             If the inputs have another shape or are not finite, or a matrix for this step is missing.
+        ArithmeticError
+            If a polytope has more than 5000 vertices.
         """
         self._sets = self._sets.predicted(self._motion(self.step, inputs))
         self.step += 1
@@ -270,7 +272,7 @@ class LinearObserver:
         lower, upper = np.where(exists, strips.lower, -np.inf), np.where(exists, strips.upper, np.inf)
         excess = np.zeros((self._runs, len(strips.normals)))
         before = self._sets.is_empty
-        self._sets = self._sets.cut(Strips(strips.normals, lower, upper), excess)
+        self._sets = self._sets.cut(Strips(strips.normals, lower, upper, np.where(exists, strips.terms, 0.0)), excess)
         lost = np.flatnonzero(self._sets.is_empty & ~before)
         if len(lost):
             step, output, amount = self._empty
@@ -389,7 +391,8 @@ class _Noise:
         """Return the strips of C x = y - v for groups of runs in which the same outputs are measured."""
         known = ~np.isnan(y)
         if self.polytope is None:
-            return [(np.ones(len(y), dtype=bool), Strips(matrix, y - self.upper, y - self.lower))]
+            strips = Strips(matrix, y - self.upper, y - self.lower, np.abs(y) + self.upper)
+            return [(np.ones(len(y), dtype=bool), strips)]
         groups = []
         for pattern in np.unique(known, axis=0):
             runs = (known == pattern).all(axis=1)
@@ -400,7 +403,8 @@ class _Noise:
             else:
                 continue
             heights = y[:, pattern] @ rows.T
-            groups.append((runs, Strips(rows @ matrix[pattern], heights - upper, heights - lower)))
+            terms = np.abs(np.nan_to_num(y[:, pattern])) @ np.abs(rows).T + np.abs(upper)
+            groups.append((runs, Strips(rows @ matrix[pattern], heights - upper, heights - lower, terms)))
         return groups
 
 

@@ -24,6 +24,8 @@ Set = ConvexPolygons | Polytope | Zonotope
 POLYTOPE_SLACK = 1e-12
 """Enlargement of the bounds of a measurement of a polytope, relative to the terms of normal . x."""
 _SCALE_ULP = 16.0
+MOST_POLYTOPE_VERTICES = 5000
+"""A polytope with more vertices takes minutes a step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,11 +38,14 @@ class Strips:
         Normals of any length; a zero one bounds nothing.
     lower, upper : ndarray, shape (B, r)
         Infinite for a strip that does not exist in this run.
+    terms : ndarray, shape (B, r)
+        Sums of the sizes of the terms of the bounds, which determine rounding errors.
     """
 
     normals: Floats
     lower: Floats
     upper: Floats
+    terms: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +156,7 @@ class Polygons:
             np.ascontiguousarray(strips.normals),
             np.ascontiguousarray(strips.lower),
             np.ascontiguousarray(strips.upper),
+            np.ascontiguousarray(strips.terms),
             CUT_SLACK,
             result.vertices,
             result.counts,
@@ -225,6 +231,11 @@ class Polytopes:
                     moved = moved.plus_segment(half)
             else:
                 moved = FacetsAndVertices.of(moved.polytope + polytope_of(w))
+            if len(moved.vertices) > MOST_POLYTOPE_VERTICES:
+                raise ArithmeticError(
+                    f"the exact set has {len(moved.vertices)} vertices, and at most {MOST_POLYTOPE_VERTICES} are "
+                    "possible; use fewer states, fewer steps, or zonotopes of another library"
+                )
             results.append(moved.enlarged(_SCALE_ULP, float(term.max())))
         return Polytopes(tuple(results))
 
@@ -237,7 +248,7 @@ class Polytopes:
                 for sign, level in ((1.0, strips.upper[b, r]), (-1.0, -strips.lower[b, r])):
                     if member is None or not np.isfinite(level):
                         continue
-                    terms = float(np.abs(normal) @ np.abs(member.vertices).max(axis=0)) + abs(level)
+                    terms = float(np.abs(normal) @ np.abs(member.vertices).max(axis=0)) + strips.terms[b, r]
                     slack = POLYTOPE_SLACK * terms
                     if not normal.any():
                         member, lowest = (member if level >= 0.0 else None), -level
@@ -258,7 +269,8 @@ class Polytopes:
                 results.append(None)
                 continue
             levels = (target.vertices @ target.normals.T).max(axis=0)
-            strips = Strips(target.normals @ motion.matrix, np.full((1, len(levels)), -np.inf), levels[None])
+            open_ends = np.full((1, len(levels)), -np.inf)
+            strips = Strips(target.normals @ motion.matrix, open_ends, levels[None], np.abs(levels)[None])
             (member,) = Polytopes((start,)).cut(strips, np.zeros((1, len(levels)))).members
             results.append(member)
         return Polytopes(tuple(results))

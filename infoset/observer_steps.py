@@ -250,6 +250,7 @@ def update_all(
     normals: Floats,
     lower: Floats,
     upper: Floats,
+    terms: Floats,
     slack: float,
     out: Floats,
     made: Integers,
@@ -265,8 +266,10 @@ def update_all(
         Normals of the strips.
     lower, upper : ndarray, shape (B, r)
         Bounds of normal . x, infinite for a missing measurement.
+    terms : ndarray, shape (B, r)
+        Sums of the sizes of the terms of the bounds.
     slack : float
-        Enlargement of the bounds, relative to the terms of normal . x.
+        Enlargement of the bounds, relative to their terms and those of normal . x.
     out : ndarray, shape (B, larger room, 2)
         Receives the polygons, with at most 2 r vertices more.
     made : ndarray of int, shape (B,)
@@ -283,9 +286,8 @@ def update_all(
             least, greatest = lower[b, r], upper[b, r]
             if count == 0:
                 break
-            terms = abs(normals[r, 0]) * x + abs(normals[r, 1]) * y
-            least -= slack * (terms + abs(least))
-            greatest += slack * (terms + abs(greatest))
+            more = slack * (abs(normals[r, 0]) * x + abs(normals[r, 1]) * y + terms[b, r])
+            least, greatest = least - more, greatest + more
             if normals[r, 0] == 0.0 and normals[r, 1] == 0.0:
                 overlap = min(greatest, -least)
                 count = count if overlap >= 0.0 else 0

@@ -22,6 +22,8 @@ _ON = 64.0 * EPSILON
 """Distance of a vertex from a plane that contains it, relative to the terms of the distance."""
 _THIN = 1e-10
 """Least thickness of a set, relative to its coordinates."""
+_ENTRIES = 20_000_000
+"""Greatest size of a working array."""
 _PARALLEL = 1e-14
 _INCIDENT = 1e-8
 _SINGULAR = 1e8
@@ -154,8 +156,12 @@ def _adjacent(
     numbers = incidence.astype(np.float32)
     i, j = np.nonzero(numbers[first] @ numbers[second].T >= size - 1)
     common = incidence[first[i]] & incidence[second[j]]
-    holders = common.astype(np.float32) @ numbers.T >= common.sum(axis=1)[:, None]
-    edge = holders.sum(axis=1) == 2
+    edge = np.zeros(len(i), dtype=bool)
+    rows = max(1, _ENTRIES // len(incidence))
+    for start in range(0, len(i), rows):
+        part = common[start : start + rows]
+        holders = part.astype(np.float32) @ numbers.T >= part.sum(axis=1)[:, None]
+        edge[start : start + rows] = holders.sum(axis=1) == 2
     return first[i[edge]], second[j[edge]], common[edge]
 
 

@@ -17,7 +17,12 @@ def run(*arguments: object) -> int:
 
 @pytest.mark.parametrize(
     "command",
-    [["pareto", "pareto-2008"], ["multipoint", "service-3"], ["reach", "rendezvous-2021", "--select", "energy"]],
+    [
+        ["pareto", "pareto-2008"],
+        ["multipoint", "service-3"],
+        ["reach", "rendezvous-2021", "--select", "energy"],
+        ["observe", "vehicle"],
+    ],
 )
 def test_a_page_is_written(command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "page.html"
@@ -31,7 +36,7 @@ def test_a_page_is_written(command: list[str], tmp_path: Path, capsys: pytest.Ca
     assert "--overwrite" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", ["pareto", "multipoint", "reach", "pursuit"])
+@pytest.mark.parametrize("command", ["pareto", "multipoint", "reach", "pursuit", "observe"])
 def test_other_endings_are_refused_before_the_work(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -309,6 +309,68 @@ def test_the_true_state_is_inside_for_other_systems(matrix: str) -> None:
     assert (observer.inconsistency.step == -1).all()
 
 
+TURN = [[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]]
+DRIFT = [[1.0, 0.5], [0.0, 1.0]]
+
+
+@pytest.mark.parametrize(
+    ("a", "half", "noise", "w", "steps"),
+    [
+        (TURN, [1.0, 1.0], 0.0, [0.1, 0.0], 200),
+        (TURN, [1.0, 1.0], 0.1, [0.0, 0.0], 300),
+        (TURN, [1.0, 1.0], 0.0, [0.0, 0.0], 300),
+        (DRIFT, [1e6, 1e-3], 10.0, [1e-3, 1e-5], 200),
+        (DRIFT, [0.0, 0.0], 1.0, [1e-3, 1e-2], 200),
+        ([[1.3, 0.5], [0.0, 0.7]], [1.0, 1.0], 1.0, [0.1, 0.01], 60),
+    ],
+    ids=["exact measurements", "no disturbance", "no errors", "unlike scales", "known start", "unstable"],
+)
+def test_the_true_state_is_inside_thin_sets_of_many_steps(
+    a: list[list[float]], half: list[float], noise: float, w: list[float], steps: int
+) -> None:
+    rng, runs, matrix = np.random.default_rng(8), 100, np.array(a)
+    observer = LinearObserver(
+        a,
+        [[1.0, 0.0]],
+        Zonotope([0.0, 0.0], np.diag(half)),
+        noise=noise,
+        disturbance=Zonotope([0.0, 0.0], [w]),
+        runs=runs,
+    )
+    x = rng.choice([-1.0, 1.0], (runs, 2)) * half
+    for k in range(steps):
+        if k:
+            observer.predict()
+            x = x @ matrix.T + rng.choice([-1.0, 1.0], (runs, 1)) * w
+        observer.update(x[:, :1] + rng.choice([-1.0, 1.0], (runs, 1)) * noise)
+        polygons = observer.estimate().polygons
+        assert polygons.contains(x).all(), k
+        assert polygons.counts.max() <= 60
+
+
+def test_polygons_of_many_vertices_contain_the_exact_set() -> None:
+    observer = LinearObserver(
+        [[1.0, 0.1], [0.0, 1.0]],
+        [[1.0, 0.0]],
+        Zonotope([0.0, 0.0], np.eye(2)),
+        noise=1.0,
+        disturbance=Zonotope([0.0, 0.0], [[1e-3, 1e-2]]),
+    )
+    for _ in range(400):
+        observer.predict()
+    estimate = observer.estimate()
+    assert estimate.polygons.counts == 512
+    # The support of a sum is the sum of supports.
+    for direction in ([1.0, 0.0], [0.3, -1.0], [-1.0, 2.0]):
+        wanted, d = 0.0, np.array(direction)
+        for _ in range(400):
+            wanted += float(abs(d @ [1e-3, 1e-2]))
+            d = d @ [[1.0, 0.1], [0.0, 1.0]]
+        wanted += np.abs(d).sum()
+        ours = float(estimate.polygons.support_function(direction))
+        assert wanted <= ours <= wanted * (1.0 + 1e-4)
+
+
 def test_the_true_state_is_inside_smoothed_sets() -> None:
     rng = np.random.default_rng(4)
     a, c, w = np.array(PUBLISHED["A"]), np.array(PUBLISHED["C"]), np.array(PUBLISHED["disturbance_generators"])

@@ -1,0 +1,129 @@
+"""Cuts and sums by incidence against hulls of all candidate points, on polytopes with many coincidences."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from infoset.polytope import Polytope
+from infoset.polytope.double_description import FacetsAndVertices
+
+Floats = NDArray[np.float64]
+
+small = st.integers(-3, 3).map(float)
+SOME = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+
+
+def vectors(size: int) -> st.SearchStrategy[list[float]]:
+    return st.lists(small, min_size=size, max_size=size)
+
+
+def supports(points: Floats, directions: Floats) -> Floats:
+    return np.asarray((points @ directions.T).max(axis=0))
+
+
+def directions(size: int) -> Floats:
+    grid = np.array(np.meshgrid(*[[-1.0, 0.0, 0.5, 2.0]] * size)).reshape(size, -1).T
+    return np.asarray(grid[np.any(grid, axis=1)])
+
+
+def is_consistent(shape: FacetsAndVertices) -> bool:
+    heights = shape.vertices @ shape.normals.T - shape.offsets
+    return bool((heights <= 1e-12).all() and (np.abs(heights[shape.incidence]) <= 1e-12).all())
+
+
+@SOME
+@given(st.data(), st.sampled_from([1, 2, 3, 4]))
+def test_a_sum_with_segments_has_the_supports_of_its_terms(data: st.DataObject, size: int) -> None:
+    shape = FacetsAndVertices.of(Polytope.from_box(-np.ones(size), np.ones(size)))
+    segments = data.draw(st.lists(vectors(size), min_size=1, max_size=4))
+    wanted = np.abs(directions(size)).sum(axis=1)
+    for half in segments:
+        shape = shape.plus_segment(np.array(half))
+        wanted = wanted + np.abs(directions(size) @ half)
+        assert is_consistent(shape)
+    np.testing.assert_allclose(supports(shape.vertices, directions(size)), wanted, rtol=0.0, atol=1e-12)
+
+
+@SOME
+@given(st.data(), st.sampled_from([2, 3, 4]))
+def test_cuts_have_the_vertices_of_exact_rational_arithmetic(data: st.DataObject, size: int) -> None:
+    rows = [[float(i == j) * sign for j in range(size)] for i in range(size) for sign in (1, -1)]
+    limits = [3.0] * (2 * size)
+    shape: FacetsAndVertices | None = FacetsAndVertices.of(Polytope.from_box([-3.0] * size, [3.0] * size))
+    for normal in data.draw(st.lists(vectors(size).filter(any), min_size=1, max_size=4)):
+        # The center stays inside, so that the set has full dimension.
+        level = data.draw(st.sampled_from([0.5, 1.0, 2.0, 3.0, 6.0]))
+        assert shape is not None
+        shape, _ = shape.cut(np.array(normal), level)
+        rows.append(normal)
+        limits.append(level)
+    assert shape is not None
+    assert is_consistent(shape)
+    exact = sorted(exact_vertices(rows, limits))
+    ours = sorted({tuple(round(value, 9) + 0.0 for value in vertex) for vertex in shape.vertices.tolist()})
+    np.testing.assert_allclose(ours, exact, rtol=0.0, atol=2e-9)
+    assert len(ours) == len(exact)
+
+
+def exact_vertices(rows: list[list[float]], limits: list[float]) -> set[tuple[float, ...]]:
+    """Vertices of {x: rows x <= limits}: solutions of n of the equations that satisfy all rows."""
+    size, vertices = len(rows[0]), set()
+    exact = [[Fraction(value) for value in (*row, limit)] for row, limit in zip(rows, limits, strict=True)]
+    for chosen in combinations(exact, size):
+        point = solution([row[:] for row in chosen])
+        if point is not None and all(
+            sum(a * x for a, x in zip(row[:-1], point, strict=True)) <= row[-1] for row in exact
+        ):
+            vertices.add(tuple(round(float(value), 9) + 0.0 for value in point))
+    return vertices
+
+
+def solution(system: list[list[Fraction]]) -> list[Fraction] | None:
+    """Solution of equations in rationals, by elimination; None if they are dependent."""
+    size = len(system)
+    for column in range(size):
+        pivot = next((row for row in range(column, size) if system[row][column]), None)
+        if pivot is None:
+            return None
+        system[column], system[pivot] = system[pivot], system[column]
+        lead = system[column][column]
+        system[column] = [value / lead for value in system[column]]
+        for row in range(size):
+            factor = system[row][column]
+            if row != column and factor:
+                system[row] = [a - factor * b for a, b in zip(system[row], system[column], strict=True)]
+    return [row[-1] for row in system]
+
+
+def test_an_empty_cut_tells_its_excess() -> None:
+    shape = FacetsAndVertices.of(Polytope.from_box([0.0, 0.0, 0.0], [1.0, 1.0, 1.0]))
+    nothing, lowest = shape.cut(np.array([1.0, 1.0, 0.0]), -0.5)
+    assert nothing is None
+    assert lowest == pytest.approx(0.5)
+    everything, _ = shape.cut(np.array([1.0, 1.0, 0.0]), 2.0)
+    assert everything is shape
+
+
+def test_a_plane_that_touches_the_set_keeps_a_layer() -> None:
+    shape = FacetsAndVertices.of(Polytope.from_box([0.0, 0.0, 0.0], [1.0, 1.0, 1.0]))
+    layer, _ = shape.cut(np.array([1.0, 0.0, 0.0]), 0.0)
+    assert layer is not None
+    assert 0.0 < float(layer.vertices[:, 0].max()) <= 2e-10
+    assert is_consistent(layer)
+
+
+def test_flat_sets_and_singular_images_get_a_thickness() -> None:
+    flat = FacetsAndVertices.of(Polytope.from_box([1.0, 0.0, 0.0], [1.0, 1.0, 1.0]))
+    assert flat.vertices.shape == (8, 3)
+    assert is_consistent(flat)
+    assert 1e-10 <= float(np.ptp(flat.vertices[:, 0])) <= 1e-9
+    image = flat.affine_image(np.diag([1.0, 1.0, 0.0]), np.zeros(3))
+    assert is_consistent(image)
+    np.testing.assert_allclose(image.vertices[:, 2], 0.0, atol=1e-9)
