@@ -138,7 +138,7 @@ class ConvexPolygons:
         vertices = real_values("rings", np.zeros((0, 2)) if isinstance(rings, Sequence) and not rings else rings)
         plain = cls.unchecked(vertices, np.zeros(vertices.shape[:-2], dtype=np.int64))
         polygons = cls._checked(vertices, plain.counts + vertices.shape[-2] if counts is None else counts)
-        kernels.drop_repeats(polygons.vertices.reshape(-1, *polygons.vertices.shape[-2:]), polygons.counts.reshape(-1))
+        kernels.drop_repeats(*polygons._flat())
         return polygons._turned(0.0)._make(0, kernels.exact_hull)
 
     @classmethod
@@ -274,7 +274,7 @@ class ConvexPolygons:
         _finite(centre=middle, generators=rows)
         shape = np.broadcast_shapes(middle.shape[:-1], rows.shape[:-2])
         points = cls.unchecked(middle[..., None, :], np.ones(middle.shape[:-1], dtype=np.int64)).broadcast_to(shape)
-        halves = np.broadcast_to(rows, (*shape, *rows.shape[-2:])).reshape(-1, *rows.shape[-2:])
+        halves = np.broadcast_to(rows, (*shape, *rows.shape[-2:])).reshape(points.counts.size, *rows.shape[-2:])
         return points._make(2 * rows.shape[-2], kernels.add_segments, np.ascontiguousarray(halves))
 
     @classmethod
@@ -456,7 +456,7 @@ class ConvexPolygons:
         _finite(matrix=matrices)
         return self._make(0, kernels.linear_map, np.ascontiguousarray(matrices))
 
-    def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> ConvexPolygons | Polytope:
+    def affine_map(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Any:
         """Return {matrix p + offset}; a matrix of shape (m, 2), m not 2, maps a single polygon to a `Polytope` in R^m.
 
         `offset` has the shape (2,), (..., 2) or (m,), or is 0. O(n), as `linear_map`.
@@ -475,7 +475,7 @@ class ConvexPolygons:
         moved = self.vertices + np.reshape(self._vectors(offset, "offset"), (*self.shape, 1, 2))
         return ConvexPolygons.unchecked(moved, self.counts)
 
-    def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> ConvexPolygons | Polytope:
+    def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Any:
         """Return {p: matrix p + offset in the set}; a matrix of shape (2, m), m not 2, gives a `Polytope` in R^m.
 
         Raises
@@ -485,17 +485,19 @@ class ConvexPolygons:
 
         Notes
         -----
-        O(n^2). The matrix is not inverted: normals and offsets of the sides are rounded a few times each, and the
-        vertices of these sides are exact within a few ulp.
+        O(n). The vertices are mapped by the inverse matrix, whose entries are within a few ulp of themselves.
         """
         if np.shape(matrix)[-1:] != (2,):
             return self.polytope().preimage(matrix, offset)
-        matrices = self._spread(real_values("matrix", matrix), "matrix", (2, 2))
-        normals, limits = self.constraints()
-        moved = self._spread(
-            real_values("offset", np.broadcast_to(offset, (2,)) if np.ndim(offset) == 0 else offset), "offset", (2,)
-        )
-        return ConvexPolygons.from_constraints(normals @ matrices, limits - (normals @ moved[..., None])[..., 0])
+        matrices = np.ascontiguousarray(self._spread(real_values("matrix", matrix), "matrix", (2, 2))).reshape(-1, 2, 2)
+        _finite(matrix=matrices)
+        moved = self.translate(np.negative(np.broadcast_to(offset, (2,)) if np.ndim(offset) == 0 else offset))
+        inverse = np.zeros(matrices.shape)
+        kernels.invert(matrices, inverse)
+        if inverse.any(axis=(1, 2)).all():
+            return moved.linear_map(inverse.reshape(*self.shape, 2, 2))
+        normals, limits = moved.constraints()
+        return ConvexPolygons.from_constraints(normals @ matrices.reshape(*self.shape, 2, 2), limits)
 
     def add_segment(self, half: ArrayLike) -> ConvexPolygons:
         """Return the Minkowski sum with the segment from -half to +half, shape (2,) or (..., 2).
@@ -525,7 +527,7 @@ class ConvexPolygons:
         one, two = self._with(other)
         if (two.is_empty & ~one.is_empty).any():
             raise ValueError("the difference with an empty set is unbounded")
-        return one._make(4, kernels.difference, *two._flat())
+        return one._make(6, kernels.difference, *two._flat())
 
     def intersection(self, other: ConvexPolygons) -> ConvexPolygons:
         """Return the intersection.
@@ -589,9 +591,11 @@ class ConvexPolygons:
         set has the row 0 p <= -1. O(n^2); directions and offsets are rounded.
         """
         vertices, counts = self._flat()
-        room = max(1, vertices.shape[1], 4 * bool(((counts > 0) & (counts < 3)).any()))
+        room = max(4, vertices.shape[1])
         normals, offsets = np.zeros((counts.size, room, 2)), np.zeros((counts.size, room))
         kernels.constraints(vertices, counts, normals, offsets)
+        room = 1 + int(np.flatnonzero(np.any(normals.any(axis=-1) | (offsets < 0.0), axis=0)).max(initial=0))
+        normals, offsets = normals[:, :room], offsets[:, :room]
         return normals.reshape(*self.shape, room, 2), offsets.reshape(*self.shape, room)
 
     def support_function(self, direction: ArrayLike) -> Floats:
@@ -740,7 +744,7 @@ class ConvexPolygons:
 
     __radd__ = __add__
 
-    def __rmatmul__(self, matrix: ArrayLike) -> ConvexPolygons | Polytope:
+    def __rmatmul__(self, matrix: ArrayLike) -> Any:
         return self.affine_map(matrix)
 
     def __contains__(self, point: ArrayLike) -> bool:

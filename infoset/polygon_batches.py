@@ -101,6 +101,17 @@ def linear_map(vertices: Floats, counts: Integers, out: Floats, made: Integers, 
 
 
 @compiled
+def invert(matrix: Floats, out: Floats) -> None:
+    """Inverse matrices, shape (B, 2, 2); zero for a singular matrix."""
+    for i in range(len(matrix)):
+        m = matrix[i]
+        determinant = polygon_lines.minor(m[0, 0], m[0, 1], m[1, 0], m[1, 1])
+        if determinant != 0.0:
+            out[i, 0, 0], out[i, 0, 1] = m[1, 1] / determinant, -m[0, 1] / determinant
+            out[i, 1, 0], out[i, 1, 1] = -m[1, 0] / determinant, m[0, 0] / determinant
+
+
+@compiled
 def add_segments(vertices: Floats, counts: Integers, out: Floats, made: Integers, halves: Floats) -> None:
     """Minkowski sums with segments from -half to +half, any number for each polygon: `halves` has shape (B, g, 2)."""
     for i in range(counts.size):
@@ -157,20 +168,20 @@ def reduce_outward(vertices: Floats, counts: Integers, out: Floats, made: Intege
 def constraints(vertices: Floats, counts: Integers, normals: Floats, offsets: Floats) -> None:
     """Half-planes with unit normals, shape (B, k, 2): one for each side; four for a segment and a point."""
     for i in range(counts.size):
-        n = counts[i]
+        points, n = polygon_exact.tidy(vertices[i], counts[i])
         if n == 0:
             offsets[i, 0] = -1.0
         for j in range(n if n > 2 else min(4 * n, 4)):
             x, y = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[j] if n < 3 else (0.0, 0.0)
             if n > 1:
-                first, last = vertices[i, j if n > 2 else 0], vertices[i, (j + 1) % n if n > 2 else 1]
+                first, last = points[j if n > 2 else 0], points[(j + 1) % n if n > 2 else 1]
                 along_x, along_y = last[0] - first[0], last[1] - first[1]
                 length = math.hypot(along_x, along_y)
                 along_x, along_y = along_x / max(length, 1e-300), along_y / max(length, 1e-300)
                 x, y = (along_y, -along_x) if n > 2 else (x * along_y + y * along_x, y * along_y - x * along_x)
             normals[i, j, 0], normals[i, j, 1] = x, y
-            at = polygon.support_index(vertices[i], n, x, y)
-            offsets[i, j] = x * vertices[i, at, 0] + y * vertices[i, at, 1]
+            at = polygon.support_index(points, n, x, y)
+            offsets[i, j] = x * points[at, 0] + y * points[at, 1]
 
 
 @compiled

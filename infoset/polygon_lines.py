@@ -123,30 +123,41 @@ def intersect_rows(rows: Points, out: Points) -> int:
 def difference(points: Points, count: int, other: Points, other_count: int, out: Points) -> int:
     """Write the Minkowski (Pontryagin) difference {p: p + q in the polygon for all q in the other one}, neither empty.
 
-    O(count * (count + other_count)); exact for sides that are moved by rounding, a few ulp of the coordinates.
+    Notes
+    -----
+    O(count * (count + other_count)), in coordinates about a vertex of each polygon. The sides are moved by rounded
+    support functions. The bounding box, whose sides need no direction, holds the tips of needles in place.
     """
-    rows = np.empty((max(2 * count, 4), 3))
-    o_x, o_y, q_x, q_y = points[0, 0], points[0, 1], other[0, 0], other[0, 1]
+    rows = np.empty((count + 6, 3))
+    from_x, from_y, to_x, to_y = points[0, 0], points[0, 1], other[0, 0], other[0, 1]
     made = 0
-    for i in range(count if count > 2 else 4):
-        j = i + 1 if i + 1 < count else 0
-        if count > 2:
-            a, b = points[j, 1] - points[i, 1], points[i, 0] - points[j, 0]
-        elif count == 2:
-            a, b = points[1, 1] - points[0, 1], points[0, 0] - points[1, 0]
-            a, b = ((a, b), (-a, -b), (b, -a), (-b, a))[i]
-        else:
+    for i in range(count + 6):
+        if i < 4:
             a, b = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))[i]
+        else:  # the two sides of a segment; none of a point
+            j, k = (i - 4) % count, (i - 3) % count
+            a, b = points[k, 1] - points[j, 1], points[j, 0] - points[k, 0]
         reach = own = -np.inf
         for m in range(other_count):
-            reach = max(reach, a * (other[m, 0] - q_x) + b * (other[m, 1] - q_y))
+            reach = max(reach, a * (other[m, 0] - to_x) + b * (other[m, 1] - to_y))
         for m in range(count):
-            own = max(own, a * (points[m, 0] - o_x) + b * (points[m, 1] - o_y))
-        if a != 0.0 or b != 0.0:
+            own = max(own, a * (points[m, 0] - from_x) + b * (points[m, 1] - from_y))
+        if i < 4 or (a != 0.0 and b != 0.0):  # the box has the sides along the axes
             rows[made, 0], rows[made, 1], rows[made, 2] = a, b, own - reach
             made += 1
     work = np.empty((made + 4, 2))
     made = intersect_rows(rows[:made], work)
     for i in range(made):
-        put(out, i, work[i, 0] + (o_x - q_x), work[i, 1] + (o_y - q_y))
+        x, y = work[i, 0] + (from_x - to_x), work[i, 1] + (from_y - to_y)
+        # On the bounding box a coordinate is the difference of two coordinates.
+        for axis in range(2):
+            low, high = (
+                points[:count, axis].min() - other[:other_count, axis].min(),
+                (points[:count, axis].max() - other[:other_count, axis].max()),
+            )
+            if work[i, axis] == rows[2 * axis, 2]:
+                x, y = (high, y) if axis == 0 else (x, high)
+            elif work[i, axis] == -rows[2 * axis + 1, 2]:
+                x, y = (low, y) if axis == 0 else (x, low)
+        put(out, i, x, y)
     return made
