@@ -1,0 +1,66 @@
+"""Pairs of convex polygons from the tests of JTS (which GEOS runs too) and boost geometry, against exact rationals.
+
+`published_polygons.json` has their coordinates and where they were published.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+
+from infoset import ConvexPolygons
+from tests.infoset.test_polygon_oracle import Case, U, assert_same_set, exact, exact_sum, hull, outside_by
+from tests.infoset.test_set_library import exact_difference, exact_distance_between, exact_intersection, holds
+
+PAIRS: list[dict[str, Any]] = json.loads((Path(__file__).parent / "published_polygons.json").read_text())["pairs"]
+NAMES = [f"{pair['source']}: {pair['case']}" for pair in PAIRS]
+
+
+def cases(pair: dict[str, Any]) -> tuple[Case, Case]:
+    rings = [np.array(pair[key], dtype=float) for key in "ab"]
+    one, other = (Case(ConvexPolygons.from_vertices(ring), hull(exact(ring))) for ring in rings)
+    return one, other
+
+
+def test_there_are_many() -> None:
+    assert len(PAIRS) >= 100
+    assert {name.split(",")[0] for name in NAMES} == {"JTS", "boost geometry"}
+
+
+@pytest.mark.parametrize("pair", PAIRS, ids=NAMES)
+def test_sets_of_a_pair(pair: dict[str, Any]) -> None:
+    one, other = cases(pair)
+    for case, key in ((one, "a"), (other, "b")):
+        assert set(exact(case.polygon.polygon())) == set(case.exact)
+        assert ConvexPolygons.from_shapely(shapely.Polygon(pair[key])).equals(case.polygon)
+    size = (max(one.size[0], other.size[0]), max(one.size[1], other.size[1]))
+    box = (4 * U * size[0], 4 * U * size[1])
+    wanted = exact_intersection(one.exact, other.exact)
+    common = one.polygon & other.polygon
+    assert common.is_empty == (not wanted)
+    assert_same_set(common, wanted, box)
+    assert set(exact(one.polygon.convex_hull(other.polygon).polygon())) == set(hull(one.exact + other.exact))
+    assert_same_set(one.polygon + other.polygon, exact_sum(one.exact, other.exact), box)
+    assert (one.polygon <= other.polygon) == all(holds(other.exact, p) for p in one.exact)
+    distance = exact_distance_between(one.exact, other.exact)
+    assert float(one.polygon.distance(other.polygon)) == pytest.approx(distance, rel=1e-14, abs=0.0)
+    less = exact(one.polygon.minkowski_difference(other.polygon).polygon())
+    wide = exact_sum(one.exact, [(sx * 4 * box[0], sy * 4 * box[1]) for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+    assert outside_by(less, exact_difference(wide, other.exact), box) is None
+    assert (
+        outside_by(exact_difference(one.exact, other.exact), hull(less), (16 * box[0], 16 * box[1])) is None or not less
+    )
+
+
+def test_all_pairs_as_one_batch() -> None:
+    first, second = (ConvexPolygons.from_vertices([pair[key] for pair in PAIRS]) for key in "ab")
+    common = first & second
+    assert common.shape == (len(PAIRS),)
+    for i, pair in enumerate(PAIRS):
+        one, other = cases(pair)
+        assert common[i].polygon().tolist() == (one.polygon & other.polygon).polygon().tolist()
