@@ -310,5 +310,5 @@ def _negative(disturbance: Set) -> Set:
     if isinstance(disturbance, Zonotope):
         return Zonotope(-disturbance.centre, disturbance.generators)
     if isinstance(disturbance, ConvexPolygons):
-        return -np.eye(2) @ disturbance
-    return -np.eye(disturbance.space) @ disturbance
+        return disturbance.linear_map(-np.eye(2))
+    return disturbance.linear_map(-np.eye(disturbance.space))

@@ -516,7 +516,7 @@ def _polygons(arrays: Arrays) -> list[ConvexPolygons]:
     """Return the sections of one axis."""
     vertices = arrays["vertex_v_m_s_z_m"]
     return [
-        ConvexPolygons(vertices[first:last].copy(), np.asarray(last - first))
+        ConvexPolygons.unchecked(vertices[first:last].copy(), np.asarray(last - first))
         for first, last in pairwise(arrays["vertex_offsets"].tolist())
     ]
 
