@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from guidance.predicted_miss import impulse_beyond_dead_zone
 from guidance.situation import Situation
-from infoset import Bias
+from infoset import Bias, SetModel
 from infoset.sensors import AngleSensor
 
 Floats = NDArray[np.float64]
@@ -57,11 +57,18 @@ EstimatorKind = Callable[[int, bool], Estimator]
 """Makes an estimator from the number of engagements and whether it estimates the acceleration of the target."""
 
 
-def independent_error_rad(sensor: AngleSensor, range_m: Floats) -> Floats:
-    """Return the bound of the part of an angle error that is independent between measurements, rad."""
+def independent_error_rad(model: SetModel, range_m: Floats) -> Floats:
+    """Return the bound of the part of an angle error that is independent between measurements, rad.
+
+    Notes
+    -----
+    A line that falls with the range is positive up to the greatest possible distance, and an estimate can be beyond it.
+    The bound is therefore at least half of that at the greatest distance.
+    """
+    sensor = model.angle_sensor
     if sensor.bias is Bias.CONSTANT:
         return np.full_like(range_m, sensor.pixel_error_rad)
-    return sensor.error_bound(range_m)
+    return np.maximum(sensor.error_bound(range_m), 0.5 * sensor.error_bound(model.bounds.farthest_m))
 
 
 def constant_error_m(sensor: AngleSensor) -> float:

@@ -84,7 +84,7 @@ class KalmanBank:
             self._predict(situation)
         nearest = situation.closing_speed_m_s * situation.step_s * 0.1
         z, x = self.mean[..., Z], np.maximum(self.mean[..., X], nearest)
-        meter, angle_sensor = situation.sensors.get("range"), situation.information.model.angle_sensor
+        meter = situation.sensors.get("range")
         if "range" in situation.new and isinstance(meter, RangeSensor):
             gradient = np.zeros_like(self.mean)
             gradient[..., X] = 1.0
@@ -95,7 +95,7 @@ class KalmanBank:
             gradient = np.zeros_like(self.mean)
             square = z * z + x * x
             gradient[..., Z], gradient[..., X] = x / square, -z / square
-            variance = independent_error_rad(angle_sensor, x) ** 2 / 3.0
+            variance = independent_error_rad(situation.information.model, x) ** 2 / 3.0
             self._measure(situation, "angle", np.arctan2(z, x), gradient, variance)
 
     def estimate(self, situation: Situation) -> Estimate:

@@ -194,7 +194,7 @@ class LeastSquaresFit:
 
     def _equations(self, situation: Situation, name: str, measurements: Measurements) -> tuple[Floats, Floats]:
         """Return matrix and right side of the normal equations of measurements, linearised at the present fit."""
-        start, times, sensor = self.start, measurements.times_s, situation.information.model.angle_sensor
+        start, times = self.start, measurements.times_s
         z = start[:, Z, None] + start[:, VZ, None] * times - measurements.offsets_m
         if self._size > ACCELERATION:
             z = z + 0.5 * start[:, ACCELERATION, None] * times**2
@@ -202,7 +202,10 @@ class LeastSquaresFit:
         x = np.maximum(start[:, X, None] - start[:, SPEED, None] * times, nearest)
         square = z * z + x * x
         if name == "angle":
-            bound, residual = independent_error_rad(sensor, x), measurements.values - np.arctan2(z, x)
+            bound, residual = (
+                independent_error_rad(situation.information.model, x),
+                measurements.values - np.arctan2(z, x),
+            )
             by_z, by_x = x / square, -z / square
         else:
             meter = situation.sensors["range"]

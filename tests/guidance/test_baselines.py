@@ -25,6 +25,7 @@ from guidance import (
     make_strategy,
     strategy_names,
 )
+from guidance.estimate import independent_error_rad
 from guidance.scripted_noise import ScriptedNoise
 from infoset import AngleSensor, Bias, InformationSet, RangeSensor, SetModel, StateBox
 from infoset.sensors import Sensor
@@ -39,13 +40,14 @@ T = 1000.0
 """Time of flight, s."""
 ENGINE = Thruster(budget_m_s=1e9, least_impulse_m_s=0.0, greatest_impulse_m_s=1e9)
 KINDS = [KalmanBank, LeastSquaresFit]
+BASELINES = [name for name in strategy_names() if "kalman" in name or "least-squares" in name]
 
 
 def set_model(sensor: AngleSensor, nu: float = 0.0, width_m: float = 1e5, range_error_m: float = 0.0) -> SetModel:
     box = StateBox(
         (-width_m, width_m), (E * T - range_error_m, E * T + range_error_m), (-width_m / T, width_m / T), (-E, -E)
     )
-    return SetModel(E, 10.0, box, sensor, disturbance_m_s2=nu)
+    return SetModel(E, 10.0, box, sensor, nu, range_threshold_m=10.0 * (sensor.centroid_error_m or 0.0))
 
 
 MODEL = set_model(AngleSensor.camera(10.0, 1e-5))
@@ -417,6 +419,21 @@ def test_a_long_fit_stores_old_measurements_and_stays_the_same(monkeypatch: pyte
         np.testing.assert_allclose(estimate.deviation_m, expected.deviation_m, rtol=5e-3)
 
 
+@pytest.mark.parametrize("name", BASELINES)
+def test_an_error_bound_that_falls_to_zero_beyond_the_possible_ranges(name: str) -> None:
+    """Warnings are errors: an estimated range can be where the line of the bound is zero."""
+    sensor = AngleSensor(10.0, 1e-9, 1e-4, 1.05 * E * T)
+    model = set_model(sensor)
+    least_m = 1.05 * E * T / (1.0 - 1e-5)  # where the bound is zero
+    ranges_m = np.array([0.5 * E * T, E * T, least_m, 2.0 * least_m])
+    bounds = independent_error_rad(model, ranges_m)
+    np.testing.assert_array_equal(bounds[:2], sensor.error_bound(ranges_m[:2]))
+    assert (bounds[2:] == 0.5 * sensor.error_bound(model.bounds.farthest_m)).all()
+    strategy = make_strategy(name)
+    now = replace(situation(model), measured={"angle": np.array([2e-4])}, new=frozenset({"angle"}))
+    assert np.isfinite(strategy.decide(now, strategy.start(1))).all()
+
+
 def test_names_of_the_strategies() -> None:
     laws = {f"{law}-{kind}" for law in ("pn", "apn", "predictive") for kind in ("kalman", "least-squares")}
     assert laws < set(strategy_names())
@@ -439,9 +456,6 @@ def test_the_spacing_of_manoeuvres_is_greater_than_one(spacing: float) -> None:
 def test_a_dead_band_is_not_negative() -> None:
     with pytest.raises(ValueError, match="dead_band_m_s"):
         ProportionalNavigation(dead_band_m_s=-1.0)
-
-
-BASELINES = [name for name in strategy_names() if "kalman" in name or "least-squares" in name]
 
 
 @pytest.mark.parametrize("name", BASELINES)
