@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from infoset import observer_steps
 from infoset.convex_polygons import ConvexPolygons
-from infoset.observer_steps import CUT_SLACK, SUM_SLACK
 from infoset.polytope import Polytope
 from infoset.polytope.double_description import FacetsAndVertices
+from infoset.section_life import CUT_SLACK, SUM_SLACK
 from infoset.zonotope import Zonotope
 
 Floats = NDArray[np.float64]

@@ -16,11 +16,6 @@ from infoset.polygon import Points
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-EPSILON = float(np.finfo(np.float64).eps)
-CUT_SLACK = 16.0 * EPSILON
-"""Enlargement of the bounds of a measurement, relative to the terms of a height."""
-SUM_SLACK = 8.0 * EPSILON
-"""Half the width of the box that a prediction adds, relative to the terms of a coordinate."""
 MOST_VERTICES = 512
 """Polygons with more vertices are reduced outward."""
 _SHARP = 2.0

@@ -26,8 +26,9 @@ from infoset import (
     Zonotope,
 )
 from infoset.observer_sets import Polytopes
-from infoset.observer_steps import SUM_SLACK, enlarge
+from infoset.observer_steps import enlarge
 from infoset.polytope import HIGHS, Polytope
+from infoset.section_life import SUM_SLACK
 
 Floats = NDArray[np.float64]
 Exact = tuple[Fraction, Fraction]
