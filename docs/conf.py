@@ -57,6 +57,7 @@ nitpick_ignore = [
     ("py:class", f"{module}.{name}")
     for module, names in {
         "experiments.multipoint.file": ("MultipointProblem",),
+        "experiments.observer.file": ("ObserverProblem",),
         "experiments.pareto.file": ("ParetoProblem",),
         "experiments.pursuit.file": ("PursuitProblem",),
         "experiments.reachability.file": ("Rendezvous",),
