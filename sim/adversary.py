@@ -36,6 +36,8 @@ YOUNG_SHARE = 0.5
 """Share of the budget that is the first part of the search."""
 FIRST_SHARE = 0.25
 """Share of the budget for first plans."""
+MOST_ERRORS = 1e8
+"""Greatest number of errors in the first plans, of 8 bytes each."""
 MOST_CHANGES = 3
 """Greatest number of changes from a plan to the next."""
 LATE_STEPS = 12.0
@@ -46,6 +48,10 @@ UPPER, LOWER = 1.0, -1.0
 
 class NothingCountsError(ValueError):
     """In every engagement of a search the set became empty, or the miss was not finite."""
+
+
+class BudgetError(ValueError):
+    """The first plans of a search need too much memory."""
 
 
 @dataclass(frozen=True)
@@ -143,6 +149,8 @@ def find_worst(
     ------
     TypeError, ValueError
         If the budget or the number of threads is not an integer from 1, or the seed not one from 0.
+    BudgetError
+        If the first plans of so many steps need too much memory.
     NothingCountsError
         If in every simulated engagement the set became empty, or the miss was not finite.
 
@@ -163,6 +171,7 @@ def find_worst(
     COUNT.need("threads", threads)
     WHOLE.need("seed", seed)
     search = _Search(*with_strategy(scenario, strategy), seed, keep_set)
+    search.check_memory(budget)
     with ThreadPoolExecutor(threads) as pool:
         try:
             search.run(budget, pool, progress)
@@ -191,6 +200,21 @@ class _Search:
         self._axes = len(scenario.set_model.axes)
         self._constructions: list[str] = []
         self._elite: Flown | None = None
+
+    def check_memory(self, budget: int) -> None:
+        """Refuse a budget whose first plans have too many errors.
+
+        Raises
+        ------
+        BudgetError
+            If they have more than `MOST_ERRORS`.
+        """
+        most = int(MOST_ERRORS / (FIRST_SHARE * len(self._names) * self._axes * self._steps))
+        if budget > most:
+            raise BudgetError(
+                f"budget must be at most {most} for flights of {self._steps} steps, because the search keeps its first "
+                f"plans in memory: got {budget}"
+            )
 
     def run(self, budget: int, pool: ThreadPoolExecutor, progress: Callable[[float], None] | None) -> None:
         flights = self._first_plans(max(1, round(FIRST_SHARE * budget)))

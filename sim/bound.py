@@ -24,6 +24,8 @@ REFINEMENTS = 5
 MARGIN = 1e-6
 """Reserve as a share of each limit, for rounding and for the difference between an angle and its tangent."""
 
+FEW_CANDIDATES = 16
+"""Number of last common steps up to which all are tried: between few impulses, the bound has several maxima."""
 STEPS_A_BLOCK = 8
 """Acceleration is constant over blocks of an eighth of the time to the last common measurement."""
 
@@ -250,6 +252,9 @@ def pair_at(
         pairs = [approach.pair(last_common_step, axes) for axes in approach.choices]
         return max(pairs, key=_unlimited_bound_m)
     candidates = approach.candidates
+    if scenario.thruster.impulses_s and len(candidates) <= FEW_CANDIDATES:
+        every = [approach.pair(step, axes) for axes in approach.choices for step in candidates.tolist()]
+        return max(every, key=_unlimited_bound_m)
     start = len(candidates) - 1
     if try_first_before_s is not None:
         wanted = (approach.arrival_s - try_first_before_s) / scenario.set_model.step_s
@@ -319,7 +324,14 @@ class _Approach:
     def candidates(self) -> Integers:
         """Last common steps that may be the best: those before a measurement, and the end."""
         measured = np.logical_or.reduce([program.is_measured for program in self._programs.values()])
-        return np.append(np.flatnonzero(measured) - 1, len(self.ranges_m) - 1).astype(np.int64)
+        last = np.append(np.flatnonzero(measured) - 1, len(self.ranges_m) - 1).astype(np.int64)
+        thruster = self.scenario.thruster
+        steps = thruster.impulse_steps(self.scenario.nominal_arrival_s, self.scenario.set_model.step_s)
+        if steps is None:
+            return last
+        # Between two decisions, more common measurements only bring the motions nearer to each other.
+        after_decisions = np.searchsorted(last, np.array(steps) - thruster.delay_steps)
+        return np.asarray(last[np.unique(np.append(0, np.minimum(after_decisions, len(last) - 1)))])
 
     def correction_m(self, last_common_step: int) -> float:
         """Return the greatest change of the miss by impulses that are decided after a step, within the budget, m."""

@@ -15,8 +15,8 @@ from sim.scenario import Scenario, with_strategy
 
 ENGAGEMENTS_AT_ONCE = 200
 SECTIONS_AT_ONCE = 6000
-STEPS_AT_ONCE = 1_000_000
-"""Greatest number of engagements of a batch times their steps; each takes about 200 bytes."""
+STEPS_AT_ONCE = 500_000
+"""Greatest number of engagements of a batch times their steps; each takes about 600 bytes."""
 
 
 def simulate(

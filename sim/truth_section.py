@@ -94,10 +94,13 @@ class TruthSection:
         A margin is that of the last measurement; it is masked before the first one. `arrival_s` are the times from the
         start to x = 0.
         """
-        margins = np.full((self._history.elapsed + 1, len(arrival_s)), np.inf)
-        for look, margin in zip(self._looks, self._margins(arrival_s), strict=True):
-            margins[look.step :] = np.where(np.isinf(margin), margins[look.step], margin)
-        return [_if_measured(margin) for margin in margins]
+        latest, margins = np.full(len(arrival_s), np.inf), []
+        measured = dict(zip((look.step for look in self._looks), self._margins(arrival_s), strict=True))
+        for step in range(self._history.elapsed + 1):
+            margin = measured.get(step, latest)
+            latest = np.where(np.isinf(margin), latest, margin)
+            margins.append(_if_measured(latest))
+        return margins
 
     def least_margin_m(self, arrival_s: Floats) -> MaskedFloats:
         """Return the least signed margin of each true state, m; masked where nothing was measured."""

@@ -226,3 +226,9 @@ def test_symmetric_miss_in_space_misses_by_90_m_below_phi(asteroid: Scenario, se
     assert found.miss_m <= found.record().result.guaranteed_miss_m[0]
     assert_possible(found, scenario)
     assert_flies_again(found)
+
+
+def test_a_search_that_needs_too_much_memory_is_refused(asteroid: Scenario) -> None:
+    """A quarter of the budget is for first plans, each with the errors of three sensors at each step."""
+    with pytest.raises(ValueError, match=r"budget must be at most \d+ for flights of 2\d\d steps"):
+        find_worst(asteroid, budget=10_000_000)

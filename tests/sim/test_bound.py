@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -324,3 +325,19 @@ def test_an_idle_axis_leaves_the_planar_bound(asteroid: Scenario) -> None:
     assert np.array_equal(pair.position_m[:, 1:], planar.position_m)
     assert not pair.position_m[:, 0].any()
     assert not pair.acceleration_m_s2[0].any()
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [{"impulses_s": (80.0, 45.0, 5.0)}, {"last_impulse_s": 8.0, "delay_steps": 3}],
+    ids=["times", "cut-off"],
+)
+def test_with_a_schedule_the_best_last_common_step_is_found(asteroid: Scenario, fields: dict[str, Any]) -> None:
+    """The best of all steps, most of which are no candidates."""
+    scenario = replace(asteroid, thruster=replace(asteroid.thruster, **fields))
+    found = pair_at(scenario, NOMINAL_LABEL_M, -58e3)
+    steps = range(60, 200, 3) if "last_impulse_s" in fields else range(0, 200, 5)
+    every = [pair_at(scenario, NOMINAL_LABEL_M, -58e3, last_common_step=step).bound_m for step in steps]
+    assert found.bound_m >= max(every) * (1.0 - 1e-6)
+    assert found.bound_m > pair_at(asteroid, NOMINAL_LABEL_M, -58e3).bound_m
+    assert found.last_common_step <= 190

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 from dataclasses import dataclass
 
+from experiments.common.errors import InputError
 from experiments.common.screen import BeginProgress
 from guidance import Strategy
 from sim import Scenario
-from sim.adversary import NothingCountsError, WorstEngagement, find_worst
+from sim.adversary import BudgetError, NothingCountsError, WorstEngagement, find_worst
 from sim.scenario import strategy_name
 
 
@@ -46,10 +46,15 @@ def find_worst_misses(
     """Search for the greatest miss with the set never empty, and for the greatest miss of all engagements.
 
     The second search is simulated only if the set became empty in the first one. Otherwise both are the same.
+
+    Raises
+    ------
+    InputError
+        If the search needs too much memory.
     """
 
     def search(keep_set: bool, name: str) -> WorstEngagement | None:
-        with contextlib.suppress(NothingCountsError):
+        try:
             return find_worst(
                 scenario,
                 strategy=own,
@@ -59,7 +64,10 @@ def find_worst_misses(
                 threads=os.cpu_count() or 1,
                 progress=begin(f"worst against {strategy_name(scenario, own)}{name}"),
             )
-        return None
+        except NothingCountsError:
+            return None
+        except BudgetError as error:
+            raise InputError(f"--{error}") from None
 
     set_kept = search(True, "")
     if set_kept is not None and set_kept.sets_emptied == 0:
