@@ -20,6 +20,10 @@ from sim.scenario import Scenario, strategy_name, with_strategy
 Floats = NDArray[np.float64]
 
 
+_MOST_DRAWN = 1000
+"""Most steps of the predicted misses in a notebook."""
+
+
 @dataclass(frozen=True)
 class AxisStep:
     """One step of one engagement along one lateral axis.
@@ -154,7 +158,8 @@ class Record:
 
     def _repr_html_(self) -> str:
         result, thruster = self.result, self.scenario.thruster
-        known = [step for step in self.steps if step.predicted_miss_m is not None]
+        every = -(-len(self.steps) // _MOST_DRAWN)
+        known = [step for step in self.steps[::every] if step.predicted_miss_m is not None]
         axes = self.scenario.set_model.axes
         along = {axis: f" along {axis}" if len(axes) > 1 else "" for axis in axes}
         lateral = zip(result.lateral_miss[0].compressed(), along.values(), strict=False)  # no miss by axis in a plane

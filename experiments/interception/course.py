@@ -13,8 +13,8 @@ from sim import Record, Scenario
 
 Floats = NDArray[np.float64]
 
-MOST_LINEAR_STEPS = 400
-"""Number of steps above which the time axis is logarithmic in the time before the arrival."""
+MOST_STEPS = 400
+"""Number of steps above which a flight is long: its time axis is logarithmic in the time before the arrival."""
 
 UNITS = (("d", 86400.0), ("h", 3600.0), ("min", 60.0), ("s", 1.0))
 """Units of times before the arrival."""
@@ -39,7 +39,7 @@ class Clock:
     @classmethod
     def of(cls, records: Sequence[Record]) -> Clock:
         """Return the time axis for records: logarithmic for long flights, and if times before arrival are scheduled."""
-        return cls(any(len(record.steps) > MOST_LINEAR_STEPS or marks(record.scenario) for record in records))
+        return cls(any(len(record.steps) > MOST_STEPS or marks(record.scenario) for record in records))
 
     def at(self, record: Record, times_s: ArrayLike | None = None) -> Floats:
         """Return the positions of times on the axis, s; None is the times of the steps.
@@ -70,6 +70,25 @@ def evenly(places: NDArray[Any], count: int) -> NDArray[np.int64]:
     """Return at most `count` indices of rising values, evenly distributed over them, with the first and the last."""
     wanted = np.linspace(places[0], places[-1], count)
     return np.unique(np.abs(places - wanted[:, None]).argmin(axis=1))
+
+
+def kept_steps(record: Record) -> list[int]:
+    """Return the steps that pages and terminals show: all, or of a long flight at most `MOST_STEPS`.
+
+    The first and last step and image, and up to a quarter of `MOST_STEPS` impulses are among them. The others are
+    evenly distributed, half over the steps and half over the logarithm of the time before arrival.
+    """
+    count = len(record.steps)
+    if count <= MOST_STEPS:
+        return list(range(count))
+    fired = np.flatnonzero([step.impulse_m_s for step in record.steps])
+    if len(fired) > MOST_STEPS // 4:
+        fired = fired[evenly(np.arange(len(fired)), MOST_STEPS // 4)]
+    seen = np.flatnonzero(["angle" in step.measured for step in record.steps])
+    kept = {0, count - 1, *fired.tolist(), *seen[[0, -1] if len(seen) else []].tolist()}
+    places = -np.log(Clock(counts_down=True).at(record))
+    half = (MOST_STEPS - len(kept)) // 2
+    return sorted(kept.union(evenly(places, half).tolist(), evenly(np.arange(count), half).tolist()))
 
 
 def marks(scenario: Scenario) -> dict[str, float]:

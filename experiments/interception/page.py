@@ -14,7 +14,7 @@ from experiments.common.page_document import page
 from experiments.interception.course import (
     Clock,
     duration_text,
-    evenly,
+    kept_steps,
     least_to_go_s,
     marks,
     possible_misses,
@@ -29,8 +29,6 @@ from sim.gravity import on_board_model
 Floats = NDArray[np.float64]
 
 MOST_RECORDS = 2
-MOST_STEPS = 400
-"""Most steps of a record in the page; a longer flight is thinned."""
 TOLERANCE = 5e-4
 """Tolerance of outlines in a page of a long flight, as a part of their box: about 0.2 pixels on a screen."""
 _PASSES = (1, 0) * 4
@@ -149,25 +147,6 @@ def _measured_name(scenario: Scenario, axis: str) -> str:
     if scenario.set_model.angle_sensor.convention is Convention.GIMBAL:
         return {"y": "measured azimuth", "z": "measured elevation"}[axis]
     return f"measured angle along {axis}" if scenario.is_spatial else "measured angle"
-
-
-def kept_steps(record: Record) -> list[int]:
-    """Return the steps that the page has: all, or of a long flight at most `MOST_STEPS`.
-
-    The first and last step and image, and up to a quarter of `MOST_STEPS` impulses are among them. The
-    others are evenly distributed, half over the steps and half over the logarithm of the time before arrival.
-    """
-    count = len(record.steps)
-    if count <= MOST_STEPS:
-        return list(range(count))
-    fired = np.flatnonzero([step.impulse_m_s for step in record.steps])
-    if len(fired) > MOST_STEPS // 4:
-        fired = fired[evenly(np.arange(len(fired)), MOST_STEPS // 4)]
-    seen = np.flatnonzero(["angle" in step.measured for step in record.steps])
-    kept = {0, count - 1, *fired.tolist(), *seen[[0, -1] if len(seen) else []].tolist()}
-    places = -np.log(Clock(counts_down=True).at(record))
-    half = (MOST_STEPS - len(kept)) // 2
-    return sorted(kept.union(evenly(places, half).tolist(), evenly(np.arange(count), half).tolist()))
 
 
 def _next(record: Record, kept: Sequence[int]) -> list[StepRecord]:

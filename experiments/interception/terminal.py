@@ -14,6 +14,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from experiments.interception.course import kept_steps
 from experiments.interception.record_titles import outcome_title, record_titles
 from sim import Record, StepRecord
 
@@ -33,16 +34,18 @@ _BLANK_BRAILLE = 0x2800
 
 def play(records: Sequence[Record], console: Console, steps_per_s: float) -> None:
     """Play engagements in a terminal; print a few times of them if the output is no terminal."""
-    count = max(len(record.steps) for record in records)
+    longest = max(records, key=lambda record: len(record.steps))
+    steps = kept_steps(longest)
     if not console.is_terminal:
-        for step in np.unique(np.linspace(0, count - 1, MOMENTS_IN_PRINT).round().astype(int)).tolist():
-            console.print(frame(records, step, console))
+        chosen = np.unique(np.linspace(0, len(steps) - 1, MOMENTS_IN_PRINT).round().astype(int))
+        for number in chosen.tolist():
+            console.print(frame(records, steps[number], console))
         return
     with Live(frame(records, 0, console), console=console, auto_refresh=False) as live:
         began_s = time.monotonic()
-        for step in range(1, count):
+        for number, step in enumerate(steps[1:], 1):
             # A slow terminal delays one frame only: times are counted from the start.
-            time.sleep(max(0.0, began_s + step / steps_per_s - time.monotonic()))
+            time.sleep(max(0.0, began_s + number / steps_per_s - time.monotonic()))
             live.update(frame(records, step, console), refresh=True)
 
 

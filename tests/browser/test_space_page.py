@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.interception.course import possible_misses
-from experiments.interception.page import MOST_STEPS, interception_page, kept_steps
+from experiments.interception.course import MOST_STEPS, kept_steps, possible_misses
+from experiments.interception.page import interception_page
 from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind
 from infoset import InitialSet, Model

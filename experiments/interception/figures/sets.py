@@ -32,6 +32,7 @@ MEASUREMENT_MARK = "measured α, drawn at the true ω"
 _DARK, _LIGHT = (0.03, 0.14, 0.36), (0.36, 0.66, 0.86)
 _PLANE_MM = 90.0
 """Least width of a plane and its labels in space, mm."""
+_LETTER_MM = 1.8
 _LABEL_MM, _LABEL_ROOM_MM = 14.0, 19.0
 """Position of the labels, and width that the sets leave for them, from the right side of the axes."""
 
@@ -211,11 +212,11 @@ def _label(axes: Axes, chosen: Sequence[Section], outlines: Sequence[Floats]) ->
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     spacing = 0.085 * (high - low)
     heights = _spread(sorted(y for _, y, _ in anchors), spacing, low + 0.6 * spacing, high - 0.6 * spacing)
-    start = right - _LABEL_MM / width_mm(axes) * (right - left)
+    start = right - (_LABEL_MM + _extra_mm(chosen)) / width_mm(axes) * (right - left)
     anchors = min(anchors, anchors[::-1], key=lambda order: _crossings(order, heights, start))
     for (x, y, index), height in zip(anchors, heights, strict=True):
         axes.annotate(
-            f"{chosen[index].range_m / 1e3:.{0 if chosen[index].range_m >= 1e6 else 1}f} km",
+            _range_text(chosen[index]),
             (x, y),
             xytext=(start, height),
             ha="left",
@@ -230,6 +231,15 @@ def _label(axes: Axes, chosen: Sequence[Section], outlines: Sequence[Floats]) ->
                 "relpos": (0.0, 0.5),
             },
         )
+
+
+def _range_text(section: Section) -> str:
+    return f"{section.range_m / 1e3:.{0 if section.range_m >= 1e6 else 1}f} km"
+
+
+def _extra_mm(chosen: Sequence[Section]) -> float:
+    """Return the width that labels need beyond that of seven letters, mm."""
+    return _LETTER_MM * max(0, max((len(_range_text(section)) for section in chosen), default=0) - 7)
 
 
 def _crossings(anchors: Sequence[tuple[float, float, int]], heights: Floats, start: float) -> int:
@@ -269,7 +279,7 @@ def level_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
         margin = np.where(margin > 0.0, margin, np.maximum(0.05 * np.abs(greatest), 1e-6))
         least, greatest = least - margin, greatest + margin
         for axes, _ in same:
-            room = _LABEL_ROOM_MM / width_mm(axes)
+            room = (_LABEL_ROOM_MM + max(_extra_mm(plane.chosen) for _, plane in same)) / width_mm(axes)
             axes.set_xlim(float(least[0]), float(greatest[0] + room / (1.0 - room) * (greatest[0] - least[0])))
             axes.set_ylim(float(least[1]), float(greatest[1]))
             nbins = 6 if np.abs(least[0]) < 1e4 else 3
