@@ -181,8 +181,10 @@ def relative_interior(
     raise UncertainHullError("the affine hull was not found")  # pragma: no cover - each pass lowers the dimension
 
 
-def chebyshev_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
+def chebyshev_ball(rows: Floats, limits: Floats, sizes: Floats | float = 1.0) -> tuple[Floats, float]:
     """Return the centre, shape (d,), and radius of a largest ball in {z: rows z <= limits}, rows of unit length.
+
+    `sizes` are the lengths of the rows in the coordinates in which the ball is round, if these are others.
 
     The radius is negative if the set is empty; its absolute value is the least relaxation of the rows that has a point.
 
@@ -192,7 +194,7 @@ def chebyshev_ball(rows: Floats, limits: Floats) -> tuple[Floats, float]:
         If the linear program (HiGHS) was not solved, for example because the set has balls of any size.
     """
     size = rows.shape[1]
-    matrix = np.column_stack([rows, np.ones(len(rows))])
+    matrix = np.column_stack([rows, np.broadcast_to(sizes, len(rows))])
     cost = np.zeros(size + 1)
     cost[-1] = -1.0
     optimum = linprog(cost, A_ub=matrix, b_ub=limits, bounds=(None, None), method="highs", options=HIGHS)

@@ -31,6 +31,8 @@ _LEAST_ON, _MOST_ON = 1e-14, 1e-7
 _OTHERWISE_ON = (1e-11, 1e-10, 1e-12, 1e-13, 1e-9, 1e-8)
 _LEAST_RANK = 1e-11
 _ENTRIES = 4_000_000
+_APART_BY_ROUNDING = 1e-7
+_ON_PLANE = 1e-13
 
 
 def hull_of_points(points: Floats, flat: float = FLAT) -> Description:
@@ -110,7 +112,7 @@ def _corners(rows: Floats, limits: Floats, centre: Floats) -> tuple[Floats, Floa
         frame = Frame(frame.centre, np.eye(rows.shape[1]), np.full(rows.shape[1], scale), np.zeros((rows.shape[1], 0)))
         inner_rows, inner_limits = rows, (limits - rows @ frame.centre) / scale
         inner = frame.inward(first)
-    points, sides, ends = essential(inner, inner_rows, inner_limits)
+    points, sides, ends = essential(_met(inner, inner_rows, inner_limits), inner_rows, inner_limits)
     return (frame.outward(points), *frame.rows_outward(sides, ends))
 
 
@@ -122,6 +124,25 @@ def _intersect(rows: Floats, limits: Floats, centre: Floats) -> Floats:
     if not np.isfinite(points).all():
         raise UncertainHullError(f"rounding decides where {len(rows)} half-spaces meet: a vertex is at infinity")
     return np.asarray(points)
+
+
+def _met(points: Floats, rows: Floats, limits: Floats) -> Floats:
+    """Return vertices, shape (k, d), those replaced that rounding of nearly parallel planes has torn apart.
+
+    Points within 1e-7 of each other, but not within `MERGE`, become one point if there is a point on all their planes,
+    to rounding. Coordinates are those in which the width of the set is about one.
+    """
+    labels = together(points, _APART_BY_ROUNDING)
+    joined = points.copy()
+    for label in np.flatnonzero(np.bincount(labels) > 1):
+        members = np.flatnonzero(labels == label)
+        if np.ptp(points[members], axis=0).max() <= MERGE:
+            continue
+        on = (np.abs(limits - points[members] @ rows.T) <= _ON_PLANE).any(axis=0)
+        common = np.linalg.lstsq(rows[on], limits[on], rcond=_LEAST_RANK)[0]
+        if np.abs(rows[on] @ common - limits[on]).max() <= _ON_PLANE:
+            joined[members] = common
+    return joined
 
 
 def _outward(frame: Frame, vertices: Floats, normals: Floats, offsets: Floats) -> Description:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import warnings
 from collections.abc import Sequence
@@ -15,9 +16,17 @@ from scipy.linalg import block_diag
 from scipy.spatial import ConvexHull, Delaunay
 from scipy.spatial.distance import cdist
 
-from infoset.polytope._affine_hull import FLAT, EmptyPolytopeError, chebyshev_ball, frame_of
+from infoset.polytope._affine_hull import (
+    FLAT,
+    EmptyPolytopeError,
+    UnboundedPolytopeError,
+    UncertainHullError,
+    chebyshev_ball,
+    frame_of,
+)
 from infoset.polytope._nearest import nearest_difference
 from infoset.polytope._qhull import hull_of_points, intersection_of_halfspaces, together
+from infoset.polytope._scaling import scale_of, scale_of_constraints, stretched
 from infoset.renamed import renamed
 
 Floats = NDArray[np.float64]
@@ -78,7 +87,10 @@ class Polytope:
             raise ValueError("points must have the shape (k, n), with k and n at least 1")
         if not np.isfinite(array).all():
             raise ValueError("points must be finite")
-        return cls(*hull_of_points(array, flat))
+        scale = scale_of(array)
+        return cls(
+            *hull_of_points(array, flat) if scale is None else stretched(hull_of_points(array / scale, flat), scale)
+        )
 
     @classmethod
     def from_constraints(
@@ -114,10 +126,22 @@ class Polytope:
             raise ValueError("equations must have rows of shape (k, n) and levels of shape (k,)")
         if not all(np.isfinite(array).all() for array in (rows, limits, flat, heights)):
             raise ValueError("half-spaces and equations must be finite")
+        failure: ValueError | ArithmeticError | None = None
         try:
-            return cls(*intersection_of_halfspaces(rows, limits, flat, heights, bounded=bounded))
+            polytope = cls(*intersection_of_halfspaces(rows, limits, flat, heights, bounded=bounded))
         except EmptyPolytopeError as error:
-            return cls.empty(rows.shape[1], error.relaxation)
+            polytope = cls.empty(rows.shape[1], error.relaxation)
+        except (UnboundedPolytopeError, UncertainHullError) as error:
+            polytope, failure = cls.empty(rows.shape[1]), error
+        if polytope.dimension < polytope.space:
+            scale = scale_of_constraints(rows, limits, flat, heights)
+            with contextlib.suppress(EmptyPolytopeError, UncertainHullError):
+                if scale is not None:
+                    inner = intersection_of_halfspaces(rows * scale, limits, flat * scale, heights, bounded=bounded)
+                    return cls(*stretched(inner, scale))
+        if failure is not None:
+            raise failure
+        return polytope
 
     @classmethod
     def empty(cls, space: int, relaxation: float = 0.0) -> Polytope:
@@ -200,8 +224,8 @@ class Polytope:
 
     @property
     def dimension(self) -> int:
-        """Dimension of the affine hull."""
-        return int(self.space - len(self.across))
+        """Dimension of the affine hull; -1 for the empty set."""
+        return int(self.space - len(self.across)) if len(self.vertices) else -1
 
     @property
     def is_empty(self) -> bool:
@@ -443,6 +467,11 @@ class Polytope:
         away = np.abs(x @ self.across.T - self.levels).max(axis=0, initial=0.0)
         return beyond, away
 
+    @cached_property
+    def _stretch(self) -> Floats | None:
+        """Scales of the axes of a set with an interior if they differ much, shape (n,)."""
+        return scale_of(self.vertices) if self.dimension == self.space else None
+
     def excess(self, points: ArrayLike) -> Floats:
         """Return the greatest distance of `points`, shape (..., n), beyond a facet or from the affine hull.
 
@@ -488,6 +517,9 @@ class Polytope:
         """Return the volume within the affine hull, of its dimension; 1 for a point, 0 for the empty set."""
         if self.is_empty:
             return 0.0
+        stretch = self._stretch
+        if stretch is not None:
+            return float(np.prod(stretch)) * Polytope.from_vertices(self.vertices / stretch).volume()
         frame = frame_of(self.vertices)
         scale = float(np.prod(frame.extents))
         if frame.dimension < 2:
@@ -496,10 +528,10 @@ class Polytope:
 
     def _simplices(self) -> tuple[Floats, Floats]:
         """Return simplices that divide the set, shape (k, d + 1, n), and their shares of the volume, shape (k,)."""
-        frame = frame_of(self.needed().vertices)
+        frame = frame_of(self.needed().vertices / (1.0 if self._stretch is None else self._stretch))
         if frame.dimension < 2:
             return self.vertices[None], np.ones(1)
-        inner = frame.inward(self.vertices)
+        inner = frame.inward(self.vertices / (1.0 if self._stretch is None else self._stretch))
         corners = Delaunay(inner, qhull_options="QJ").simplices
         sizes = np.abs(np.linalg.det(inner[corners[:, 1:]] - inner[corners[:, :1]]))
         return self.vertices[corners], sizes / sizes.sum()
@@ -521,6 +553,13 @@ class Polytope:
 
         A linear program (HiGHS) in coordinates about the centre of the vertices.
         """
+        if self._stretch is not None:  # in units of the axes, and of the shortest axis for the radius
+            least = float(self._stretch.min())
+            middle, rows = self.vertices.mean(axis=0), self.normals * self._stretch
+            sizes = np.abs(rows).max(axis=1)
+            limits = (self.offsets - self.normals @ middle) / sizes
+            inner, radius = chebyshev_ball(rows / sizes[:, None], limits, least / sizes)
+            return middle + self._stretch * inner, least * max(0.0, radius)
         frame = frame_of(self.needed().vertices)
         if not frame.dimension:
             return frame.centre, 0.0

@@ -43,11 +43,32 @@ class RationalSet:
 
 def rational_hull(points: Floats) -> RationalSet:
     """Return the exact convex hull of points, shape (k, n), by the double description of the library PPL."""
+    return rounded(polyhedron_of([[Fraction(float(value)) for value in point] for point in points]))
+
+
+def polyhedron_of(points: list[Rationals]) -> ppl.C_Polyhedron:
+    """Return the exact convex hull of points, at least one, as a polyhedron of PPL."""
     system = ppl.Generator_System()
     for point in points:
-        numerators, divisor = _whole([Fraction(float(value)) for value in point])
+        numerators, divisor = _whole(point)
         system.insert(ppl.point(_expression(numerators), divisor))
-    return _rounded(ppl.C_Polyhedron(system), points.shape[1])
+    return ppl.C_Polyhedron(system)
+
+
+def vertices_of(polyhedron: ppl.C_Polyhedron) -> list[Rationals]:
+    """Return the exact vertices of a bounded polyhedron."""
+    return [
+        [
+            Fraction(int(point.coefficient(ppl.Variable(i))), int(point.divisor()))
+            for i in range(point.space_dimension())
+        ]
+        for point in polyhedron.minimized_generators()
+    ]
+
+
+def rounded(polyhedron: ppl.C_Polyhedron) -> RationalSet:
+    """Return a bounded polyhedron with its vertices rounded."""
+    return _rounded(polyhedron, polyhedron.space_dimension())
 
 
 def rational_intersection(normals: Floats, offsets: Floats) -> RationalSet:
