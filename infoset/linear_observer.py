@@ -216,7 +216,11 @@ class LinearObserver:
         self._need_set("disturbance", self._disturbance)
         self._need_set("initial", initial, (self._runs,) if runs else ())
         self._noise = _Noise.of(noise, self.outputs)
-        self._sets: Sets = (Polygons if self.states == 2 else Polytopes).of(initial, self._runs)
+        self._sets: Sets = (
+            Polygons.of(initial, self._runs)
+            if self.states == 2
+            else Polytopes.of(initial, self._runs, _size_of(self._disturbance))
+        )
         self.step = 0
         self._empty = np.full(self._runs, -1), np.zeros(self._runs, dtype=np.int64), np.zeros(self._runs)
 
@@ -416,6 +420,13 @@ def _half_spaces(polytope: Polytope) -> tuple[Floats, Floats, Floats]:
         np.concatenate([open_ends, polytope.levels]),
         np.concatenate([polytope.offsets, polytope.levels]),
     )
+
+
+def _size_of(shape: Set) -> float:
+    """Return the greatest coordinate of the vertices of a set, or a bound of it."""
+    if isinstance(shape, Zonotope):
+        return float((np.abs(shape.centre) + np.abs(shape.generators).sum(axis=0)).max())
+    return float(np.abs(shape.vertices).max())
 
 
 def _finite(name: str, value: object) -> Floats:

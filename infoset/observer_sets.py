@@ -203,9 +203,9 @@ class Polytopes:
     members: tuple[FacetsAndVertices | None, ...]
 
     @classmethod
-    def of(cls, start: Set, runs: int) -> Polytopes:
-        """Return the same set for all runs."""
-        return cls((FacetsAndVertices.of(polytope_of(start)).enlarged(_SCALE_ULP),) * runs)
+    def of(cls, start: Set, runs: int, size: float = 0.0) -> Polytopes:
+        """Return the same set for all runs; a flat one is widened by 3e-8 of its coordinates, or of `size`."""
+        return cls((FacetsAndVertices.of(polytope_of(start), size).enlarged(_SCALE_ULP),) * runs)
 
     @property
     def is_empty(self) -> Flags:
@@ -230,7 +230,7 @@ class Polytopes:
                 for half in w.generators:
                     moved = moved.plus_segment(half)
             else:
-                moved = FacetsAndVertices.of(moved.polytope + polytope_of(w))
+                moved = moved.plus(polytope_of(w))
             if len(moved.vertices) > MOST_POLYTOPE_VERTICES:
                 raise ArithmeticError(
                     f"the exact set has {len(moved.vertices)} vertices, and at most {MOST_POLYTOPE_VERTICES} are "

@@ -20,14 +20,16 @@ Flags = NDArray[np.bool_]
 EPSILON = float(np.finfo(np.float64).eps)
 _ON = 64.0 * EPSILON
 """Distance of a vertex from a plane that contains it, relative to the terms of the distance."""
-_THIN = 1e-10
+_THIN = 3e-8
 """Least thickness of a set, relative to its coordinates."""
 _ENTRIES = 20_000_000
 """Greatest size of a working array."""
 _PARALLEL = 1e-14
 _INCIDENT = 1e-8
-_SINGULAR = 1e8
-"""Condition number of a matrix above which its image is computed as a hull."""
+_SINGULAR = 1e-6
+"""Least singular value of a matrix, relative to the greatest one, with which facets are mapped."""
+_HULL = 1e-8
+"""Enlargement of a hull, relative to the size of the set along each axis: it may have merged points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,12 +52,12 @@ class FacetsAndVertices:
     incidence: Flags
 
     @classmethod
-    def of(cls, polytope: Polytope) -> FacetsAndVertices:
-        """Return a polytope; a flat one is widened by 1e-10 of its size."""
+    def of(cls, polytope: Polytope, size: float = 0.0) -> FacetsAndVertices:
+        """Return a polytope; a flat one is widened by 3e-8 of its greatest coordinate, or of `size`."""
         vertices, normals = polytope.vertices, polytope.normals
         depth = (heights := vertices @ normals.T).max(axis=0) - heights
         incidence, offsets = depth <= _INCIDENT * depth.max(axis=0), heights.max(axis=0)
-        half = _THIN * max(float(np.abs(vertices).max()), np.finfo(np.float64).tiny)
+        half = _THIN * (max(size, float(np.abs(vertices).max())) or 1.0)
         for row, level in zip(polytope.across, polytope.levels, strict=True):
             above = np.repeat([False, True], len(vertices))
             vertices = np.vstack([vertices - half * row, vertices + half * row])
@@ -74,22 +76,39 @@ class FacetsAndVertices:
 
         The ulp is that of the greatest coordinate, or of `size` if that is greater.
         """
+        least = float((self.offsets - self.normals @ self.vertices.mean(axis=0)).min())
+        size = max(size, float(np.abs(self.vertices).max()))
+        return self._scaled(1.0 + slack * EPSILON * (1.0 + size / max(least, 1e-300)))
+
+    def _scaled(self, factor: float) -> FacetsAndVertices:
+        """Return the set scaled about the mean of its vertices."""
         centre = self.vertices.mean(axis=0)
         depths = self.offsets - self.normals @ centre
-        least = float(depths.min())
-        factor = 1.0 + slack * EPSILON * (1.0 + max(size, float(np.abs(self.vertices).max())) / max(least, 1e-300))
         offsets = self.normals @ centre + factor * depths
         return FacetsAndVertices(centre + factor * (self.vertices - centre), self.normals, offsets, self.incidence)
 
     def affine_image(self, matrix: Floats, shift: Floats) -> FacetsAndVertices:
-        """Return {matrix x + shift}; a singular matrix gives a flat set, which is widened by 1e-10 of its size."""
+        """Return {matrix x + shift}; the image under a singular matrix is widened by 1e-6 of its size."""
+        left, sizes, right = np.linalg.svd(matrix)
+        size = float(np.abs(self.vertices).max())
+        floor = _SINGULAR * (float(sizes[0]) or 1.0)
+        small = sizes < floor
+        if small.any():
+            # A regular matrix, and segments that contain the difference of both images.
+            lengths = floor * np.maximum(np.abs(self.vertices @ right[small].T).max(axis=0), _THIN * (size or 1.0))
+            matrix = (left * np.maximum(sizes, floor)) @ right
         vertices = self.vertices @ matrix.T + shift
-        if np.linalg.cond(matrix) > _SINGULAR:
-            return FacetsAndVertices.of(Polytope.from_vertices(vertices))
         normals = np.array(np.linalg.solve(matrix.T, self.normals.T).T, dtype=np.float64)
         normals /= np.sqrt((normals**2).sum(axis=1))[:, None]
         # The offsets follow from the vertices, so that rounding errors of both do not add up over many steps.
-        return FacetsAndVertices(vertices, normals, (vertices @ normals.T).max(axis=0), self.incidence)
+        image = FacetsAndVertices(vertices, normals, (vertices @ normals.T).max(axis=0), self.incidence)
+        for axis, length in zip(left.T[small], lengths if small.any() else (), strict=True):
+            image = image.plus_segment(length * axis)
+        return image
+
+    def plus(self, other: Polytope) -> FacetsAndVertices:
+        """Return the Minkowski sum with a polytope: a hull, enlarged by 1e-8 of its size."""
+        return FacetsAndVertices.of(self.polytope + other)._scaled(1.0 + _HULL)
 
     def plus_segment(self, half: Floats) -> FacetsAndVertices:
         """Return the Minkowski sum with the segment from -half to +half.

@@ -441,6 +441,36 @@ def test_a_section_of_the_interception_is_an_observer() -> None:
     assert section.polygon.hausdorff_distance(observer.estimate().polygons) < 1e-9
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_the_true_state_is_inside_for_any_matrices_of_other_numbers_of_states(seed: int) -> None:
+    """Singular and regular matrices, flat initial sets, exact measurements, gaps."""
+    rng = np.random.default_rng(seed)
+    states, outputs = int(rng.choice([1, 3, 3, 4])), int(rng.integers(1, 3))
+    a = rng.normal(size=(states, states)) * rng.choice([0.3, 0.6])
+    if seed % 4 == 0:
+        a[-1] = 0.0
+    if seed % 5 == 0:
+        a = np.round(2.0 * a) / 2.0
+    c = np.eye(outputs, states) if seed % 3 == 0 else rng.normal(size=(outputs, states))
+    generators = 0.1 * rng.normal(size=(int(rng.integers(0, 3)), states))
+    half, noise = rng.choice([0.0, 0.5, 1.0], states), float(rng.choice([0.0, 0.05, 0.5]))
+    observer = LinearObserver(
+        a, c, Zonotope.box(-half, half), noise=noise, disturbance=Zonotope(np.zeros(states), generators)
+    )
+    x, true, estimates = rng.choice([-1.0, 1.0], states) * half, [], []
+    for k in range(6):
+        if k:
+            observer.predict()
+            x = a @ x + rng.choice([-1.0, 1.0], len(generators)) @ generators
+        if rng.random() < 0.8:
+            observer.update(c @ x + rng.choice([-1.0, 1.0], outputs) * noise)
+        estimates.append(observer.estimate())
+        true.append(x)
+    for sets in (estimates, observer.smooth(estimates)):
+        for estimate, state in zip(sets, true, strict=True):
+            assert estimate.polytopes[0].contains(state), estimate.step
+
+
 # Interface ------------------------------------------------------------------------------------------------------
 
 

@@ -115,7 +115,7 @@ def test_a_plane_that_touches_the_set_keeps_a_layer() -> None:
     shape = FacetsAndVertices.of(Polytope.from_box([0.0, 0.0, 0.0], [1.0, 1.0, 1.0]))
     layer, _ = shape.cut(np.array([1.0, 0.0, 0.0]), 0.0)
     assert layer is not None
-    assert 0.0 < float(layer.vertices[:, 0].max()) <= 2e-10
+    assert 0.0 < float(layer.vertices[:, 0].max()) <= 2e-7
     assert is_consistent(layer)
 
 
@@ -123,7 +123,7 @@ def test_flat_sets_and_singular_images_get_a_thickness() -> None:
     flat = FacetsAndVertices.of(Polytope.from_box([1.0, 0.0, 0.0], [1.0, 1.0, 1.0]))
     assert flat.vertices.shape == (8, 3)
     assert is_consistent(flat)
-    assert 1e-10 <= float(np.ptp(flat.vertices[:, 0])) <= 1e-9
+    assert 1e-8 <= float(np.ptp(flat.vertices[:, 0])) <= 1e-7
     image = flat.affine_image(np.diag([1.0, 1.0, 0.0]), np.zeros(3))
     assert is_consistent(image)
-    np.testing.assert_allclose(image.vertices[:, 2], 0.0, atol=1e-9)
+    np.testing.assert_allclose(image.vertices[:, 2], 0.0, atol=1e-5)
