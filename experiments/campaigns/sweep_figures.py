@@ -305,7 +305,10 @@ def _maps(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figur
         *_limit_handles(table, noise, Line2D([], [], color=IMPULSE, linewidth=1.5, label="range of the limit")),
     ]
     drawn = {line.get_color() for line in first.lines}
-    names = ((_LINE, "limit by interpolation of the estimates"), (_CLOSED_FORM, "closed form of a camera"))
+    names = (
+        (_LINE, "limit by interpolation of the estimates"),
+        (_CLOSED_FORM, "closed form: worst errors, no disturbance, no later images"),
+    )
     handles += [Line2D([], [], label=name, **look) for look, name in names if look["color"] in drawn]
     figure.legend(
         handles=handles,

@@ -56,7 +56,7 @@ class BPlane {
     let [x, y] = [0, 1].map((k) => all.flatMap((box) => [box[k], box[k + 2]]));
     // The circles of the body and of the guarantee are shown if they are not much greater than the rectangles.
     const size = Math.max(...x.map(Math.abs), ...y.map(Math.abs));
-    const radii = panels.flatMap(({ record }) => [record.radius_m, record.guaranteed_miss_m]).filter((radius) => radius && radius < 3 * size);
+    const radii = panels.flatMap(({ record }) => [record.radius_m, record.guaranteed_miss_m]).filter((radius) => radius && radius < 5 * size);
     [x, y] = [x, y].map((values) => [...values, ...radii.flatMap((radius) => [-radius, radius])]);
     this.unit = unitFor(Math.max(...x, ...y) - Math.min(...x, ...y), LENGTHS);
     this.limits = [x, y].map((values) => limitsOf(values.map((value) => value * this.unit[1])));

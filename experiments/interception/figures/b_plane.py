@@ -34,7 +34,7 @@ _WIDEST_MM = 62.0
 _LEFT_MM, _RIGHT_MM = 17.0, 5.0
 _OWN_LIMITS_FROM = 3.0
 """Ratio of the greatest and the least median above which each panel has its own limits."""
-RADIUS_SHOWN = 3.0
+RADIUS_SHOWN = 5.0
 """The axes extend to the radius of the body if it is at most this multiple of the greatest miss shown."""
 _VECTOR_POINTS = 2000
 """Number of points of a panel above which they are pixels in the PDF file."""

@@ -763,7 +763,7 @@ def test_the_limit_of_two_keys_is_a_line(scale: Literal["linear", "log"]) -> Non
     combinations = itertools.product(*(axis.values for axis in axes))
     form = replace(table, closed_form_m=tuple(3e4 * error_rad * time_s for error_rad, time_s in combinations))
     figure = draw_sweep(form, SHOWN, "game")
-    assert figure.legends[0].get_texts()[-1].get_text() == "closed form of a camera"
+    assert figure.legends[0].get_texts()[-1].get_text() == "closed form: worst errors, no disturbance, no later images"
     one_known = replace(table, closed_form_m=(None,) * 63 + (3.0,))
     assert len(draw_sweep(one_known, SHOWN, "game").axes[0].lines) == len(first.lines)
 
