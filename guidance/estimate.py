@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Estimate:
+class MissEstimate:
     """Zero-effort miss of a batch of engagements: the miss without further impulses.
 
     Parameters
@@ -49,7 +49,7 @@ class Estimator(Protocol):
     def update(self, situation: Situation) -> None:
         """Use the impulse of the previous step and the measurements of this one; call it once a step."""
 
-    def estimate(self, situation: Situation) -> Estimate:
+    def estimate(self, situation: Situation) -> MissEstimate:
         """Return the estimate after `update` of the same step."""
 
 

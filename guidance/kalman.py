@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.estimate import Estimate, constant_error_m, correct_outside_dead_zone, independent_error_rad
+from guidance.estimate import MissEstimate, constant_error_m, correct_outside_dead_zone, independent_error_rad
 from guidance.situation import Situation
 from infoset import RangeSensor
 from infoset.limits import COUNT, NotNegative, check_fields
@@ -98,7 +98,7 @@ class KalmanBank:
             variance = independent_error_rad(situation.information.model, x) ** 2 / 3.0
             self._measure(situation, "angle", np.arctan2(z, x), gradient, variance)
 
-    def estimate(self, situation: Situation) -> Estimate:
+    def estimate(self, situation: Situation) -> MissEstimate:
         """Return the estimated miss over the bank."""
         ahead = self.mean[..., X] > 0.0
         weight = np.where(ahead, np.exp(self.log_weight - self.log_weight.max(axis=1, keepdims=True)), 0.0)
@@ -127,7 +127,7 @@ class KalmanBank:
         square = (weight * lever**2).sum(axis=1)
         best = np.divide((weight * miss * lever).sum(axis=1), square, out=np.zeros_like(mean), where=square > 0.0)
         lever = (weight * lever).sum(axis=1)
-        return Estimate(best * lever, deviation, lever)
+        return MissEstimate(best * lever, deviation, lever)
 
     @property
     def _is_augmented(self) -> bool:

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from guidance.estimate import Estimate, constant_error_m, correct_outside_dead_zone, independent_error_rad
+from guidance.estimate import MissEstimate, constant_error_m, correct_outside_dead_zone, independent_error_rad
 from guidance.situation import Situation
 from infoset import RangeSensor
 from infoset.limits import COUNT, NotNegative, check_fields
@@ -123,7 +123,7 @@ class LeastSquaresFit:
             if len(kept.times_s) > MOST_KEPT:
                 self._store_older_half(situation, name)
 
-    def estimate(self, situation: Situation) -> Estimate:
+    def estimate(self, situation: Situation) -> MissEstimate:
         """Fit the motion again, and return the miss."""
         covariance = self._fit(situation)
         time, start = situation.time_s, self.start
@@ -141,7 +141,7 @@ class LeastSquaresFit:
         by_start = np.stack(gradient, axis=-1)
         variance = np.einsum("bi,bij,bj->b", by_start, covariance, by_start)
         constant = constant_error_m(situation.information.model.angle_sensor)
-        return Estimate(
+        return MissEstimate(
             miss - situation.pending_m(to_go),
             np.sqrt(variance + constant**2 / 3.0),
             np.maximum(to_go - situation.lead_s, 0.0),

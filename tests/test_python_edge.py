@@ -26,6 +26,8 @@ from guidance import (
     Kalman,
     LeastSquares,
     Patient,
+    Predictive,
+    ProportionalNavigation,
     RandomNoise,
     ScriptedNoise,
     SymmetricMiss,
@@ -406,6 +408,9 @@ def test_what_is_no_number(value: Any) -> None:
     refused(lambda: Kalman(dead_zone=value), "dead_zone")
     refused(lambda: Kalman(process_noise=value), "process_noise")
     refused(lambda: LeastSquares(last_s=value), "last_s")
+    refused(lambda: ProportionalNavigation(ratio=value), "ratio")
+    refused(lambda: ProportionalNavigation(dead_band_m_s=value), "dead_band_m_s")
+    refused(lambda: Predictive(spacing=value), "spacing")
     if np.ndim(value) == 0:
         refused(lambda: ConvexPolygons.from_box((0.0, 0.0), value), "upper")
 
@@ -581,7 +586,10 @@ NOT_CALLED = {
         *("Estimate", "ExtremePoints", "Inconsistency", "InformationSetView", "PredictedMiss", "Section", "Sensor"),
         *("SetStatus", "to_shapely"),
     },
-    "guidance": {"LineOfSight", "MeasurementNoise", "NoiseKind", "Situation", "Strategy", "ZeroEffortMiss"},
+    "guidance": {
+        *("Estimator", "KalmanBank", "LeastSquaresFit", "LineOfSight", "MeasurementNoise", "MissEstimate"),
+        *("NoiseKind", "Situation", "Strategy", "ZeroEffortMiss"),
+    },
     "sim": {
         *("BoundError", "CampaignResult", "Distribution", "Inconsistency", "LowerBound", "NothingCountsError"),
         *("HitEstimate", "Outcome", "QuantileEstimate", "Record", "Results", "WorstEngagement"),

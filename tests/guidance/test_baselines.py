@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 import guidance.least_squares
 from experiments import load_scenario
 from guidance import (
-    Estimate,
     Estimator,
     KalmanBank,
     LeastSquaresFit,
+    MissEstimate,
     Predictive,
     ProportionalNavigation,
     Situation,
@@ -98,11 +98,11 @@ class Truth:
             def update(self, situation: Situation) -> None:
                 pass
 
-            def estimate(self, situation: Situation) -> Estimate:
+            def estimate(self, situation: Situation) -> MissEstimate:
                 to_go = truth.to_go_s
                 miss = truth.z + truth.v * to_go + 0.5 * self.a * to_go**2 + errors_m(to_go)
                 one = np.ones(1)
-                return Estimate(miss * one, 0.0 * one, max(to_go - situation.lead_s, 0.0) * one)
+                return MissEstimate(miss * one, 0.0 * one, max(to_go - situation.lead_s, 0.0) * one)
 
         return Known
 
@@ -407,7 +407,7 @@ def test_a_long_fit_stores_old_measurements_and_stays_the_same(monkeypatch: pyte
     model = set_model(AngleSensor.camera(10.0, 1e-5), range_error_m=1e5)
     meter = {"range": RangeSensor(10.0, 0.01)}
 
-    def fit(most_kept: int, sensors: Mapping[str, Sensor]) -> tuple[LeastSquaresFit, Estimate]:
+    def fit(most_kept: int, sensors: Mapping[str, Sensor]) -> tuple[LeastSquaresFit, MissEstimate]:
         monkeypatch.setattr(guidance.least_squares, "MOST_KEPT", most_kept)
         made, now = measured(LeastSquaresFit, model, Truth(2000.0, -1.0), 90, seen, errors, sensors=sensors)
         return made, made.estimate(now)
