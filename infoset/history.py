@@ -56,6 +56,7 @@ class History:
         self.events = 0
         self.elapsed = 0
         self._has_rates = False
+        self._fired = np.zeros(batch)
 
     def record(self, kind: int, values: Floats | None = None, applies: Flags | bool = True, error: float = 0.0) -> int:
         """Append an event, with values of shape (C, B), and return its number."""
@@ -71,6 +72,9 @@ class History:
         if values is not None:
             self.values[event] = values
         self.applies[event] = applies
+        if kind == IMPULSE:
+            modulus = np.abs(np.hypot.reduce(self.values[event]))
+            self._fired = self._fired + np.where(self.applies[event], modulus, 0.0)
         self.events += 1
         self.elapsed += kind == PREDICTION
         return event
@@ -81,9 +85,7 @@ class History:
 
     def total_impulse(self) -> Floats:
         """Return the sum of the impulses' magnitudes in each engagement, m/s, shape (B,)."""
-        fired = self.applies[: self.events] & (self.kinds[: self.events] == IMPULSE)[:, None]
-        sizes = np.hypot.reduce(self.values[: self.events], axis=1)
-        return np.asarray(np.where(fired, np.abs(sizes), 0.0).sum(axis=0))
+        return self._fired
 
     @property
     def tapes(self) -> Tapes:
@@ -105,5 +107,6 @@ class History:
         twin = History.__new__(History)
         twin.kinds, twin.errors = self.kinds.copy(), self.errors.copy()
         twin.values, twin.applies = self.values.copy(), self.applies.copy()
-        twin.events, twin.elapsed, twin._has_rates = self.events, self.elapsed, self._has_rates
+        twin.events, twin.elapsed = self.events, self.elapsed
+        twin._has_rates, twin._fired = self._has_rates, self._fired
         return twin

@@ -6,6 +6,7 @@ Therefore measurements and impulses are stored during the flight and evaluated a
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -108,12 +109,13 @@ class TruthSection:
 
     def _margins(self, arrival_s: Floats) -> Floats:
         """Return the margin of each flight at each look, m, shape (L, B); infinite where it does not measure."""
-        law, history, looks = self._law, self._history.copy(), self._looks
+        law, history, looks = self._law, copy.copy(self._history), self._looks
         labels = law.closing_speed * arrival_s
         ranges = labels - law.closing_speed * (law.step * np.arange(history.elapsed + 1))[:, None]
         kinds = history.kinds[: history.events]
         measured, steps = np.isin(kinds, (ANGLE, RATE)), np.cumsum(kinds == PREDICTION)
-        history.applies[: history.events][measured] &= (ranges >= self._least_range_m)[steps[measured]]
+        history.applies = history.applies[: history.events].copy()
+        history.applies[measured] &= (ranges >= self._least_range_m)[steps[measured]]
         at = [look.step for look in looks]
         ranges = ranges[at]
         where = np.reshape([look.where for look in looks], ranges.shape) & (ranges >= self._least_range_m)

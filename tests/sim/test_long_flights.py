@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from infoset import AngleSensor, StateBox
-from sim import Scenario
+from infoset import AngleSensor, InitialSet, Model, StateBox
+from infoset.section_life import IMPULSE
+from sim import Scenario, simulate
+from sim.draws import Draws, draw
+from sim.engagement import Engagements
 from sim.kepler import LONGEST_SUBSTEP_S, KeplerMotion, longest_substep_s
 
 Floats = NDArray[np.float64]
@@ -42,3 +46,45 @@ def test_substeps_of_a_long_flight_are_exact_to_a_millimetre(
 def test_substeps_of_the_built_in_scenarios_are_their_steps(asteroid: Scenario) -> None:
     assert longest_substep_s(asteroid) > asteroid.set_model.step_s == LONGEST_SUBSTEP_S
     assert longest_substep_s(replace(asteroid, sun=None)) == LONGEST_SUBSTEP_S
+
+
+def test_the_history_of_a_long_flight_has_two_events_a_step(asteroid: Scenario) -> None:
+    """An impulse is an event only where it is given; sections stay small, and the guarantee holds."""
+    model = replace(
+        asteroid.set_model,
+        step_s=0.05,
+        angle_sensor=replace(asteroid.set_model.angle_sensor, period_s=0.05),
+        kind=Model.GUARANTEED,
+        initial_set=InitialSet.BOX,
+        sections=5,
+    )
+    thruster = replace(asteroid.thruster, impulses_s=(60.0, 20.0, 5.0))
+    scenario = replace(asteroid, set_model=model, thruster=thruster)
+    flight = Engagements(scenario, draw(scenario, range(2), 1))
+    while flight.flying:
+        flight.advance()
+    history = flight._information._state.history
+    impulses = int(np.count_nonzero(history.kinds[: history.events] == IMPULSE))
+    assert 1 <= impulses <= 3
+    assert history.elapsed > 1900
+    assert history.events <= 2 * history.elapsed + impulses
+    np.testing.assert_allclose(history.total_impulse(), flight.results(np.arange(2)).impulse_m_s)
+    results = flight.results(np.arange(2))
+    assert results.truth_kept.all()
+    assert results.phi_held.all()
+
+
+def test_a_batch_of_long_flights_is_smaller(asteroid: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The results do not depend on it."""
+    whole = simulate(asteroid, 5, guarantee=False)
+    batches: list[int] = []
+
+    def counted(scenario: Scenario, runs: list[int], seed: int) -> Draws:
+        batches.append(len(runs))
+        return draw(scenario, runs, seed)
+
+    module = import_module("sim.simulate")
+    monkeypatch.setattr(module, "draw", counted)
+    monkeypatch.setattr(module, "STEPS_AT_ONCE", 500)
+    assert simulate(asteroid, 5, guarantee=False).miss_m.tolist() == whole.miss_m.tolist()
+    assert batches == [2, 2, 1]
