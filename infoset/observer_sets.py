@@ -213,7 +213,13 @@ class Polytopes:
         return np.array([member is None for member in self.members])
 
     def predicted(self, motion: Motion) -> Polytopes:
-        """Return the sets after a step."""
+        """Return the sets after a step.
+
+        Raises
+        ------
+        ArithmeticError
+            If a set has more than `MOST_POLYTOPE_VERTICES` vertices.
+        """
         w, states = motion.disturbance, len(motion.matrix)
         centre = w.centre if isinstance(w, Zonotope) else np.zeros(states)
         shifts, terms = (
