@@ -535,7 +535,7 @@ class ConvexPolygons:
         Notes
         -----
         O(n m). Exact: which vertices are kept, which sides cross, and whether the sets touch, is decided without
-        rounding; crossings are within 3 ulp of the coordinates.
+        rounding; crossings are within 4 ulp of the coordinates.
         """
         one, two = self._with(other)
         return one._make(two.vertices.shape[-2], kernels.intersect, *two._flat())

@@ -159,7 +159,7 @@ def holds(points: Points, count: int, x: float, y: float) -> bool:
 
 @compiled
 def meeting(a: Points, i: int, j: int, b: Points, k: int, m: int) -> tuple[float, float]:
-    """Return the point in which the edge i-j of a crosses the edge k-m of b, within 3 ulp of the coordinates."""
+    """Return the point in which the edge i-j of a crosses the edge k-m of b, within 4 ulp of the coordinates."""
     ax, ay, bx, by = a[i, 0], a[i, 1], a[j, 0], a[j, 1]
     cx, cy, dx, dy = b[k, 0], b[k, 1], b[m, 0], b[m, 1]
     # The shorter edge is divided, from its nearer end.
@@ -181,7 +181,7 @@ def intersect(points: Points, count: int, other: Points, other_count: int, out: 
     Notes
     -----
     O(count * other_count) orientations. The vertices are the vertices of each polygon that are in the other one and the
-    crossings of edges. All are decided exactly, so that no sliver or contact is lost, and each vertex is within 3 ulp
+    crossings of edges. All are decided exactly, so that no sliver or contact is lost, and each vertex is within 4 ulp
     of the coordinates of the exact one.
     """
     if count == 0 or other_count == 0:

@@ -153,7 +153,7 @@ def test_one_step_by_hand() -> None:
         corners = [(v - 4.0, z + STEP * (v - 4.0)) for v in (-100.0, 100.0) for z in (lower[1], upper[1])]
         push = abs(direction[0] * nu * STEP + direction[1] * 0.5 * nu * STEP**2)
         expected = max(direction[0] * v + direction[1] * z for v, z in corners) + push
-        assert section.polygon.support(direction) == pytest.approx(expected, rel=1e-13)
+        assert section.polygon.support_function(direction) == pytest.approx(expected, rel=1e-13)
 
 
 def test_predicted_miss_by_hand() -> None:
@@ -197,7 +197,7 @@ def test_inconsistent_measurements_are_told_and_the_set_goes_on_from_the_last_co
     old, new = before.section_at(x, 1).polygon, information.section_at(x, 1).polygon
     grown = old.minkowski_sum(ConvexPolygons.from_box((-E * bound, 0.0), (E * bound, 0.0)))
     for direction in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.01), (-1.0, 0.02)):
-        assert new.support(direction) == pytest.approx(float(grown.support(direction)), rel=slack)
+        assert new.support_function(direction) == pytest.approx(float(grown.support_function(direction)), rel=slack)
     information.predict()
     information.shift(1.0)
     assert information.predicted_miss().exists.all()
@@ -347,6 +347,6 @@ def test_the_vertex_cap_is_kept_and_outward() -> None:
     assert int(exact.counts) > 256
     normals = np.column_stack((np.cos(np.linspace(0, 6.28, 60)), np.sin(np.linspace(0, 6.28, 60)))) * (50.0, 1.0)
     for normal in normals:
-        assert kept.support(normal) >= exact.support(normal) * (1.0 - 1e-13)
+        assert kept.support_function(normal) >= exact.support_function(normal) * (1.0 - 1e-13)
     assert kept.area() <= exact.area() * 1.001
     assert isinstance(exact, ConvexPolygons)

@@ -39,7 +39,7 @@ def test_sets_of_a_pair(pair: dict[str, Any]) -> None:
         assert set(exact(case.polygon.polygon())) == set(case.exact)
         assert ConvexPolygons.from_shapely(shapely.Polygon(pair[key])).equals(case.polygon)
     size = (max(one.size[0], other.size[0]), max(one.size[1], other.size[1]))
-    box = (4 * U * size[0], 4 * U * size[1])
+    box = (8 * U * size[0], 8 * U * size[1])
     wanted = exact_intersection(one.exact, other.exact)
     common = one.polygon & other.polygon
     assert common.is_empty == (not wanted)
@@ -50,10 +50,10 @@ def test_sets_of_a_pair(pair: dict[str, Any]) -> None:
     distance = exact_distance_between(one.exact, other.exact)
     assert float(one.polygon.distance(other.polygon)) == pytest.approx(distance, rel=1e-14, abs=0.0)
     less = exact(one.polygon.minkowski_difference(other.polygon).polygon())
-    wide = exact_sum(one.exact, [(sx * 4 * box[0], sy * 4 * box[1]) for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+    wide = exact_sum(one.exact, [(sx * 2 * box[0], sy * 2 * box[1]) for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
     assert outside_by(less, exact_difference(wide, other.exact), box) is None
     assert (
-        outside_by(exact_difference(one.exact, other.exact), hull(less), (16 * box[0], 16 * box[1])) is None or not less
+        outside_by(exact_difference(one.exact, other.exact), hull(less), (8 * box[0], 8 * box[1])) is None or not less
     )
 
 
