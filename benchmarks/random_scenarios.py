@@ -9,7 +9,9 @@ The same number gives the same scenario. Every scenario is valid: it is written 
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -93,6 +95,23 @@ def camera_scenario(number: int) -> Scenario:
     thruster = replace(scenario.thruster, pointing_error_rad=float(generator.choice([0.0, 0.02])))
     spatial = replace(model, bounds=known, angle_sensor=sensor)
     return replace(scenario, set_model=spatial, dispersion=dispersion, thruster=thruster)
+
+
+def scheduled(scenario: Scenario, number: int) -> Scenario:
+    """Return the scenario with a random delay of up to three steps, and a cut-off or up to five times of impulses."""
+    generator = np.random.default_rng(np.random.SeedSequence(entropy=23, spawn_key=(number,)))
+    arrival_s, step_s = scenario.nominal_arrival_s, scenario.set_model.step_s
+    delay = int(generator.integers(4))
+    times_s = tuple(sorted(generator.uniform(0.02, 0.8, int(generator.integers(6))) * arrival_s, reverse=True))
+    last_s = arrival_s * float(10.0 ** generator.uniform(-2.5, -0.5))
+    thruster = replace(scenario.thruster, delay_steps=delay)
+    schedules: tuple[dict[str, Any], ...] = {"impulses_s": times_s}, {"last_impulse_s": last_s}
+    for schedule in schedules:
+        changed = replace(thruster, **schedule)
+        with contextlib.suppress(ValueError):  # two times in one step, or none that can be given
+            changed.impulse_steps(arrival_s, step_s)
+            return replace(scenario, thruster=changed)
+    return scenario
 
 
 def _drawn(generator: np.random.Generator, number: int, rate_sensor: bool) -> Scenario:

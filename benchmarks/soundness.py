@@ -6,6 +6,7 @@
     python -m benchmarks.soundness --engagements 100000 --random       # random scenarios without one
     python -m benchmarks.soundness --engagements 200000 --space        # out of the plane, all conventions, Sun anywhere
     python -m benchmarks.soundness --engagements 40000 --camera        # random scenarios with a camera
+    python -m benchmarks.soundness --engagements 40000 --camera scheduled  # with a cut-off or times of impulses
 
 Counted are engagements whose true state left its section (by any amount), whose set was lost, whose true miss exceeded
 Phi, and those without a Phi. All counts must be zero; a warning ends the run. A batch has all kinds of noise, the true
@@ -24,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.random_scenarios import camera_scenario, random_scenario
+from benchmarks.random_scenarios import camera_scenario, random_scenario, scheduled
 from experiments.interception.scenario_file import load_scenario
 from guidance import GameNoise, LineOfSight, MeasurementNoise, NoiseKind, RandomNoise, TieRule
 from guidance.pair_noise import middle
@@ -211,9 +212,10 @@ def fly_random_batch(number: int, rate_sensor: bool, seed: int) -> Count:
     return fly(random_scenario(seed * 1_000_000 + number, rate_sensor=rate_sensor), number * BATCH, BATCH, seed)
 
 
-def fly_camera_batch(number: int, seed: int) -> Count:
-    """Simulate batch `number`, which has a random scenario with a camera."""
-    return fly(camera_scenario(seed * 1_000_000 + number), number * BATCH, BATCH, seed)
+def fly_camera_batch(number: int, seed: int, *, has_schedule: bool = False) -> Count:
+    """Simulate batch `number`, which has a random scenario with a camera, and a random schedule of impulses."""
+    scenario = camera_scenario(seed * 1_000_000 + number)
+    return fly(scheduled(scenario, number) if has_schedule else scenario, number * BATCH, BATCH, seed)
 
 
 def main() -> None:
@@ -224,7 +226,8 @@ def main() -> None:
     parser.add_argument("--hostile", action="store_true", help="execution errors of 2 %% and a manoeuvring target")
     parser.add_argument("--random", nargs="?", const="plain", choices=("plain", "rate"), help="random scenarios")
     parser.add_argument("--space", action="store_true", help="out of the plane")
-    parser.add_argument("--camera", action="store_true", help="random scenarios with a camera")
+    kinds = ("plain", "scheduled")
+    parser.add_argument("--camera", nargs="?", const="plain", choices=kinds, help="random scenarios with a camera")
     parser.add_argument("--first", type=int, default=0, metavar="BATCH", help="number of the first batch")
     parser.add_argument("--workers", type=int, default=1)
     options = parser.parse_args()
@@ -235,7 +238,10 @@ def main() -> None:
         batch = SPACE_BATCH if options.space else BATCH
         numbers = range(options.first, options.first - (-options.engagements // batch))
         if options.camera:
-            jobs = [pool.submit(fly_camera_batch, number, options.seed) for number in numbers]
+            has_schedule = options.camera == "scheduled"
+            jobs = [
+                pool.submit(fly_camera_batch, number, options.seed, has_schedule=has_schedule) for number in numbers
+            ]
         elif options.random is None:
             fly_one_batch = fly_space_batch if options.space else fly_batch
             jobs = [pool.submit(fly_one_batch, number, options.hostile, options.seed) for number in numbers]
