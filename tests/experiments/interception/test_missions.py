@@ -1,0 +1,41 @@
+"""The built-in missions of impactors: the guarantee holds, and they hit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments import load_scenario
+from guidance import NoiseKind
+from sim import simulate
+
+
+@pytest.mark.parametrize("noise", NoiseKind)
+@pytest.mark.parametrize("name", ["dart-2022", "haiv-2013"])
+def test_an_impactor_hits_and_its_guarantee_holds(name: str, noise: NoiseKind) -> None:
+    scenario = replace(load_scenario(name), noise=noise)
+    results = simulate(scenario, runs=3)
+    assert results.truth_kept.all()
+    assert not results.set_emptied.any()
+    assert (results.miss_m <= results.guaranteed_miss_m).all()
+    assert np.ma.getdata(results.hit).all()
+    assert scenario.body is not None
+    assert results.guaranteed_miss_m.max() < scenario.body.radius_m
+
+
+def test_three_impulses_meet_the_requirement_of_deep_impact() -> None:
+    results = simulate(load_scenario("deep-impact-2005"), runs=3)
+    assert results.truth_kept.all()
+    assert (results.miss_m <= results.guaranteed_miss_m).all()
+    assert results.miss_m.max() < 700.0
+    burns_m_s = results.burns_m_s
+    assert burns_m_s is not None
+    assert burns_m_s.shape == (3, 3)
+    assert burns_m_s.sum(axis=1) == pytest.approx(results.impulse_m_s)
+
+
+def test_the_closing_speed_and_range_of_the_missions_give_the_published_times() -> None:
+    for name, hours in (("dart-2022", 4.0), ("deep-impact-2005", 23.3), ("haiv-2013", 2.0)):
+        assert load_scenario(name).nominal_arrival_s / 3600.0 == pytest.approx(hours, rel=1e-3)
