@@ -96,7 +96,9 @@ class TruthSection:
         start to x = 0.
         """
         latest, margins = np.full(len(arrival_s), np.inf), []
-        measured = dict(zip((look.step for look in self._looks), self._margins(arrival_s), strict=True))
+        measured: dict[int, Floats] = {}
+        for look, margin in zip(self._looks, self._margins(arrival_s), strict=True):
+            measured[look.step] = np.minimum(margin, measured.get(look.step, np.inf))
         for step in range(self._history.elapsed + 1):
             margin = measured.get(step, latest)
             latest = np.where(np.isinf(margin), latest, margin)
@@ -110,6 +112,8 @@ class TruthSection:
     def _margins(self, arrival_s: Floats) -> Floats:
         """Return the margin of each flight at each look, m, shape (L, B); infinite where it does not measure."""
         law, history, looks = self._law, copy.copy(self._history), self._looks
+        if not looks:
+            return np.empty((0, len(arrival_s)))
         labels = law.closing_speed * arrival_s
         ranges = labels - law.closing_speed * (law.step * np.arange(history.elapsed + 1))[:, None]
         kinds = history.kinds[: history.events]

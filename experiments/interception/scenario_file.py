@@ -156,18 +156,42 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
             "vy_km_s are not both [0, 0]: a measurement leaves a single range, and the set may become empty; write "
             "positive bounds"
         )
-    last_s = max(min(thruster.impulses_s, default=0.0), thruster.last_impulse_s or 0.0)
-    if sensor.first_image_s is not None and sensor.first_image_s < last_s:
-        lines.append(
-            f"angle_sensor.first_image_s is {sensor.first_image_s:g} s, and the last impulse is {last_s:g} s before "
-            "the nominal arrival: no impulse follows a measurement"
-        )
+    lines += _timing_warnings(scenario)
     if thruster.budget_m_s < thruster.least_impulse_m_s:
         lines.append(
             f"thruster.budget_m_s, {thruster.budget_m_s:g}, is less than thruster.least_impulse_m_s, "
             f"{thruster.least_impulse_m_s:g}: no impulse can be given"
         )
     return lines
+
+
+def _timing_warnings(scenario: Scenario) -> list[str]:
+    """Return a line if the times before the nominal arrival leave no measured angle before the last decision."""
+    model, thruster, arrival_s = scenario.set_model, scenario.thruster, scenario.nominal_arrival_s
+    sensor, delay_s = model.angle_sensor, thruster.delay_steps * model.step_s
+    steps = thruster.impulse_steps(arrival_s, model.step_s)
+    last_step = int(arrival_s / model.step_s) if steps is None else steps[-1]
+    decided = last_step - thruster.delay_steps
+    if decided < 0:
+        return [
+            f"thruster.delay_steps is {thruster.delay_steps}, which is {delay_s:g} s, and the nominal arrival is "
+            f"{arrival_s:g} s after the start: no impulse is given before it"
+        ]
+    measured = range(0, decided + 1, model.steps_in(sensor.period_s))
+    if any(sensor.measures_at(arrival_s - step * model.step_s) for step in reversed(measured)):
+        return []
+    if sensor.last_image_s > arrival_s:
+        return [
+            f"angle_sensor.last_image_s is {sensor.last_image_s:g} s, and the nominal arrival is {arrival_s:g} s after "
+            "the start: no image is taken"
+        ]
+    last_s = arrival_s - last_step * model.step_s
+    lead = f", decided {last_s + delay_s:g} s before it" if delay_s > 0.0 else ""
+    first_s = arrival_s if sensor.first_image_s is None else sensor.first_image_s
+    return [
+        f"angle_sensor.first_image_s is {first_s:g} s, and the last impulse is {last_s:g} s before the nominal "
+        f"arrival{lead}: no impulse follows a measurement"
+    ]
 
 
 def _along(axis: str, owner: Target | SetModel | None, name: str) -> tuple[str, float]:

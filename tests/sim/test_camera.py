@@ -332,6 +332,21 @@ def test_a_lost_image_is_no_value_of_the_record_and_no_cut() -> None:
     ]
 
 
+def test_margins_of_the_truth_with_lost_images_and_a_range_meter() -> None:
+    """Engagements with and without an image in a step have their own cuts; a record has the margins of both."""
+    scenario = replace(camera_scenario(miss_probability=0.4), range_sensor=RangeSensor(EVERY_S, 0.01))
+    record = fly_one(scenario, 3)
+    margins = [step.truth_margin_m for step in record.steps if step.truth_margin_m is not None]
+    assert len(margins) == len(record.steps)
+    assert min(margins) == record.result.truth_margin_m[0]
+
+
+def test_a_flight_without_images_has_no_margin() -> None:
+    results = simulate(camera_scenario(last_image_s=4000.0), 2)
+    assert results.truth_margin_m.mask.all()
+    assert sound(results)
+
+
 @pytest.mark.parametrize("spatial", [False, True])
 def test_a_run_with_lost_images_does_not_depend_on_its_batch(spatial: bool) -> None:
     """Ranges and rates of a step whose image is lost cut without the angle."""

@@ -110,10 +110,27 @@ def test_only_a_camera_has_a_constant_error() -> None:
 def test_measurements_after_the_last_impulse_are_warned_of() -> None:
     blind = camera(angle_sensor__first_image_s="20", thruster__last_impulse_s="30")
     assert scenario_warnings(blind) == [
-        "angle_sensor.first_image_s is 20 s, and the last impulse is 30 s before the nominal arrival: "
+        "angle_sensor.first_image_s is 20 s, and the last impulse is 30.0224 s before the nominal arrival: "
         "no impulse follows a measurement"
     ]
-    assert not scenario_warnings(camera(angle_sensor__first_image_s="30", thruster__last_impulse_s="30"))
+    assert not scenario_warnings(camera(angle_sensor__first_image_s="30.1", thruster__last_impulse_s="30"))
+    schedule = {"thruster__impulses_s": "[60.0, 40.0, 20.0]", "thruster__last_impulse_s": "30"}
+    assert len(scenario_warnings(camera(angle_sensor__first_image_s="35", **schedule))) == 1
+    assert not scenario_warnings(camera(angle_sensor__first_image_s="40.1", **schedule))
+    assert (
+        len(scenario_warnings(camera(angle_sensor__first_image_s="40.1", thruster__delay_steps="2", **schedule))) == 1
+    )
+
+
+def test_a_camera_without_images_is_warned_of() -> None:
+    assert scenario_warnings(camera(angle_sensor__last_image_s="1e6")) == [
+        "angle_sensor.last_image_s is 1e+06 s, and the nominal arrival is 100.022 s after the start: no image is taken"
+    ]
+
+
+def test_a_delay_beyond_the_arrival_is_warned_of() -> None:
+    (warning,) = scenario_warnings(camera(thruster__delay_steps="100000"))
+    assert warning.startswith("thruster.delay_steps is 100000, which is 50000 s, and ")
 
 
 def test_sweeps_vary_the_camera_and_the_cut_off() -> None:
