@@ -191,6 +191,8 @@ class ConvexPolygons:
             )
         _finite(normals=rows, offsets=np.where(np.isinf(limits), 0.0, limits))
         shape = np.broadcast_shapes(rows.shape[:-1], limits.shape)
+        if not shape[-1]:
+            raise ValueError("a set without constraints is unbounded")
         table = np.concatenate(
             [np.broadcast_to(rows, (*shape, 2)), np.broadcast_to(limits, shape)[..., None]], axis=-1
         ).reshape(-1, shape[-1], 3)
@@ -399,7 +401,8 @@ class ConvexPolygons:
         """Return a single polygon as a `Polytope`; for operations in more dimensions."""
         from infoset.polytope import Polytope
 
-        return Polytope.from_vertices(self.polygon()) if self.counts else Polytope.empty(2)
+        vertices = self.polygon()
+        return Polytope.from_vertices(vertices) if len(vertices) else Polytope.empty(2)
 
     def broadcast_to(self, shape: tuple[int, ...]) -> ConvexPolygons:
         """Return the batch repeated along new axes to another shape; the vertices are shared, not copied."""
@@ -517,16 +520,19 @@ class ConvexPolygons:
         Raises
         ------
         ValueError
-            If a member of the other batch is empty and its partner is not: every point would satisfy the condition.
+            If the other set is empty and this one is not, both single: every point satisfies the condition.
 
         Notes
         -----
+        A member of a batch without a bounded difference, because only the other set is empty, gives the empty set.
+
         O(n (n + m)). The sides move inward by the support function of the other set, rounded a few times; their
         intersection is exact within a few ulp. For flat sets rounding decides whether the difference is empty.
         """
         one, two = self._with(other)
-        if (two.is_empty & ~one.is_empty).any():
+        if not one.shape and two.is_empty and not one.is_empty:
             raise ValueError("the difference with an empty set is unbounded")
+        one = ConvexPolygons.unchecked(one.vertices, np.where(two.is_empty, 0, one.counts))
         return one._make(6, kernels.difference, *two._flat())
 
     def intersection(self, other: ConvexPolygons) -> ConvexPolygons:
@@ -737,7 +743,7 @@ class ConvexPolygons:
     # Operators and old names --------------------------------------------------------------------------------------
 
     def __and__(self, other: ConvexPolygons) -> ConvexPolygons:
-        return self.intersection(other)
+        return self.intersection(other) if isinstance(other, ConvexPolygons) else NotImplemented
 
     def __add__(self, other: ConvexPolygons | ArrayLike) -> ConvexPolygons:
         return self.minkowski_sum(other) if isinstance(other, ConvexPolygons) else self.translate(other)
@@ -748,10 +754,12 @@ class ConvexPolygons:
         return self.affine_map(matrix)
 
     def __contains__(self, point: ArrayLike) -> bool:
+        if self.shape:
+            raise TypeError("'in' is for a single polygon; use contains for a batch")
         return bool(self.contains(point))
 
     def __le__(self, other: ConvexPolygons) -> Flags:
-        return self.is_subset(other)
+        return self.is_subset(other) if isinstance(other, ConvexPolygons) else NotImplemented
 
     clip, support = renamed("clip", "cut"), renamed("support", "support_function")
 

@@ -120,7 +120,7 @@ class Estimate:
             raise ValueError(f"matrix must have the shape (m, {self.states}): got {rows.shape}")
         ends = [np.stack([self.sets.support(sign * row) for row in rows], axis=-1) for sign in (-1.0, 1.0)]
         lower, upper = (np.where(np.isinf(end), np.nan, end) for end in ends)
-        return self._runs(-lower), self._runs(upper)
+        return self._runs(0.0 - lower), self._runs(upper)
 
     @cached_property
     def _hull(self) -> tuple[Floats, Floats]:
@@ -302,11 +302,18 @@ class LinearObserver:
             y of this step and of the next ones.
         inputs : array_like, shape (N, p) or (N, B, p), optional
             u after each measurement; one row less is enough.
+
+        Raises
+        ------
+        ValueError
+            As `predict` and `update`, or if there are too few inputs.
         """
         estimates = []
-        for k, measurement in enumerate(real_values("measurements", measurements)):
+        rows = real_values("measurements", measurements)
+        series = _series(inputs, len(rows) - 1)
+        for k, measurement in enumerate(rows):
             if k:
-                self.predict(None if inputs is None else real_values("inputs", inputs)[k - 1])
+                self.predict(None if series is None else series[k - 1])
             self.update(measurement)
             estimates.append(self.estimate())
         return estimates
@@ -327,12 +334,12 @@ class LinearObserver:
         Raises
         ------
         ValueError
-            If the steps are not successive.
+            If the steps are not successive, or there are too few inputs.
         """
         if any(after.step != before.step + 1 for before, after in pairwise(estimates)):
             raise ValueError("estimates must belong to successive steps")
         smoothed = list(estimates)
-        rows = None if inputs is None else real_values("inputs", inputs)
+        rows = _series(inputs, len(smoothed) - 1)
         for i in range(len(smoothed) - 2, -1, -1):
             step = smoothed[i].step
             motion = self._motion(step, None if rows is None else rows[i])
@@ -379,6 +386,8 @@ class _Noise:
     @classmethod
     def of(cls, noise: ArrayLike | Set, outputs: int) -> _Noise:
         if isinstance(noise, ConvexPolygons | Polytope | Zonotope):
+            if not isinstance(noise, Zonotope) and np.any(noise.is_empty):
+                raise ValueError("noise must not be empty")
             polytope = polytope_of(noise)
             if polytope.space != outputs:
                 raise ValueError(f"noise must have {outputs} coordinates, one an output: got {polytope.space}")
@@ -434,6 +443,14 @@ def _finite(name: str, value: object) -> Floats:
     if not np.isfinite(numbers).all():
         raise ValueError(f"{name} must be finite: got {shown(value)}")
     return numbers
+
+
+def _series(inputs: ArrayLike | None, steps: int) -> Floats | None:
+    """Return inputs of at least a number of steps."""
+    rows = None if inputs is None else real_values("inputs", inputs)
+    if rows is not None and (not rows.ndim or len(rows) < steps):
+        raise ValueError(f"inputs must have a row for each of {steps} steps: got the shape {rows.shape}")
+    return rows
 
 
 def _matrices(name: str, value: ArrayLike) -> Floats:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +23,7 @@ from infoset.observer_sets import Set, polytope_of
 Floats = NDArray[np.float64]
 
 LARGEST_CSV_BYTES = 10_000_000
+_STEP = re.compile(r"[0-9]{1,15}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,11 +127,27 @@ def read_csv(file: Path, outputs: int, inputs: int) -> Data:
     if unknown or missing or len(set(header)) < len(header):
         problem = f"has no column {missing[0]}" if missing else f"has a wrong column {shown((unknown or header)[0])}"
         raise InputError(f"--data: {file}: {problem}; the header is {','.join(wanted)} (and k, optionally)")
-    body = [(line, row) for line, row in enumerate(rows[1:], start=2) if row]
+    while rows and not rows[-1]:
+        rows.pop()
+    # In a file of one column an empty line is an empty cell.
+    body = [(line, row or [""]) for line, row in enumerate(rows[1:], start=2) if row or len(header) == 1]
     if not 1 <= len(body) <= MOST_STEPS:
         raise InputError(f"--data: {file}: has {len(body)} steps; 1 to {MOST_STEPS} are possible")
+    if "k" in header:
+        _need_successive(file, body, header.index("k"))
     values = np.array([_numbers(file, line, row, header, wanted) for line, row in body])
     return Data(values[:, :outputs], values[:, outputs:], None, f"measurements of {file.name}")
+
+
+def _need_successive(file: Path, body: list[tuple[int, list[str]]], column: int) -> None:
+    """Check that the steps in column k are successive whole numbers."""
+    texts = [(line, row[column].strip()) for line, row in body if column < len(row)]
+    for (_, before), (line, text) in pairwise([(0, ""), *texts]):
+        if not _STEP.fullmatch(text) or (before and int(text) != int(before) + 1):
+            raise InputError(
+                f"--data: {file}: line {line}, k: steps must be successive whole numbers, found {shown(text)}; "
+                "write a row for each step, with empty cells of y where there is no measurement"
+            )
 
 
 def _numbers(file: Path, line: int, row: list[str], header: list[str], wanted: list[str]) -> list[float]:

@@ -19,7 +19,12 @@ _LEAST = 3e-12
 
 def scale_of(points: Floats) -> Floats | None:
     """Return a power of two near the width along each axis, shape (n,); None if the widths do not differ much."""
-    return _scales(np.ptp(points, axis=0), np.abs(points).max(axis=0))
+    return scale_of_box(points.min(axis=0), points.max(axis=0))
+
+
+def scale_of_box(lower: Floats, upper: Floats) -> Floats | None:
+    """Return scales as `scale_of` for a set with these bounds."""
+    return _scales(upper - lower, np.maximum(np.abs(lower), np.abs(upper)))
 
 
 def _scales(widths: Floats, sizes: Floats) -> Floats | None:
@@ -58,6 +63,31 @@ def scale_of_constraints(normals: Floats, offsets: Floats, across: Floats, level
     # Widths that may be rounding of the linear programs count as zero.
     widths = np.where(ends[1] - ends[0] > 1e-8 * np.abs(ends).max(), ends[1] - ends[0], 0.0)
     return _scales(widths / columns, np.abs(ends).max(axis=0) / columns)
+
+
+def tightened(rows: Floats, limits: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
+    """Return bounds of {x: rows x <= limits, lower <= x <= upper}, from each row alone; they need not be the least."""
+    least = np.minimum(rows * lower, rows * upper)
+    ends = limits[:, None] - (least.sum(axis=1)[:, None] - least)
+    ends = np.divide(ends, rows, out=np.zeros_like(rows), where=rows != 0.0)
+    most = np.where(rows > 0.0, ends, np.inf).min(axis=0, initial=np.inf)
+    return np.where(rows < 0.0, ends, -np.inf).max(axis=0, initial=-np.inf).clip(lower), most.clip(max=upper)
+
+
+def without_far(rows: Floats, limits: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
+    """Return half-spaces without those 1e3 times farther away than a box that contains the set; a larger box if any.
+
+    Their offsets would hide the size of the set: it would count as flat.
+    """
+    if (lower > upper).any():
+        return rows, limits
+    size = float(np.maximum(np.abs(lower), np.abs(upper)).max())
+    middle, half = 0.5 * lower + 0.5 * upper, upper - lower + 1e-3 * size
+    near = limits - (rows @ middle + np.abs(rows) @ half) <= 1e3 * size * np.linalg.norm(rows, axis=1)
+    if near.all():
+        return rows, limits
+    unit = np.eye(len(lower))
+    return np.vstack([rows[near], unit, -unit]), np.concatenate([limits[near], middle + half, half - middle])
 
 
 def stretched(description: Description, scale: Floats) -> Description:

@@ -26,7 +26,7 @@ from infoset.polytope._affine_hull import (
 )
 from infoset.polytope._nearest import nearest_difference
 from infoset.polytope._qhull import hull_of_points, intersection_of_halfspaces, together
-from infoset.polytope._scaling import scale_of, scale_of_constraints, stretched
+from infoset.polytope._scaling import scale_of, scale_of_box, scale_of_constraints, stretched, tightened, without_far
 from infoset.renamed import renamed
 
 Floats = NDArray[np.float64]
@@ -211,7 +211,12 @@ class Polytope:
             If shapes do not fit or a number is not finite.
         """
         middle = np.asarray(centre, dtype=float)
-        rows = np.asarray(generators, dtype=float).reshape(-1, *middle.shape)
+        rows = np.asarray(generators, dtype=float)
+        rows = rows.reshape(0, *middle.shape) if not rows.size else rows
+        if middle.ndim != 1 or rows.ndim != 2 or rows.shape[1] != len(middle):
+            raise ValueError(
+                f"centre of shape (n,) and generators of shape (g, n) are needed: got {middle.shape} and {rows.shape}"
+            )
         zonotope = cls.from_vertices(middle[None, :])
         for row in rows:
             zonotope = cls.from_vertices(np.vstack([zonotope.vertices - row, zonotope.vertices + row]))
@@ -339,13 +344,29 @@ class Polytope:
         for one in sets:
             if one.is_empty:
                 return one
-        return self.from_constraints(
+        boxes = [one.bounding_box() for one in sets]
+        return self._in_box(
             np.vstack([one.normals for one in sets]),
             np.concatenate([one.offsets for one in sets]),
             np.vstack([one.across for one in sets]),
             np.concatenate([one.levels for one in sets]),
-            bounded=True,
+            np.max([lower for lower, _ in boxes], axis=0),
+            np.min([upper for _, upper in boxes], axis=0),
         )
+
+    @classmethod
+    def _in_box(
+        cls, rows: Floats, limits: Floats, across: Floats, levels: Floats, lower: Floats, upper: Floats
+    ) -> Polytope:
+        """Return {x: rows x <= limits, across x = levels}, which is known to lie between `lower` and `upper`."""
+        scale = None if (lower > upper).any() else scale_of_box(lower, upper)
+        if scale is None:
+            return cls.from_constraints(*without_far(rows, limits, lower, upper), across, levels, bounded=True)
+        rows, limits = without_far(rows * scale, limits, lower / scale, upper / scale)
+        inner = cls.from_constraints(rows, limits, across * scale, levels, bounded=True)
+        if inner.is_empty:
+            return cls.empty(len(lower))
+        return cls(*stretched((inner.vertices, inner.normals, inner.offsets, inner.across, inner.levels), scale))
 
     def convex_hull(self, *others: Polytope) -> Polytope:
         """Return the convex hull of the union with one or more polytopes."""
@@ -372,9 +393,18 @@ class Polytope:
         slack_ulp : float
             Each strip is wider on both sides by this number of ulp of the products in normals x: a point that
             satisfies the bounds up to rounding is not lost.
+
+        Raises
+        ------
+        ValueError
+            If a normal is not finite or of another length, or a bound is NaN.
         """
         rows = np.atleast_2d(np.asarray(normals, dtype=float))
         least, most = np.broadcast_to(lower, len(rows)), np.broadcast_to(upper, len(rows))
+        if rows.shape[1:] != (self.space,) or not np.isfinite(rows).all() or np.isnan([least, most]).any():
+            raise ValueError(
+                f"normals must be finite, of shape ({self.space},) or (m, {self.space}), and bounds not NaN"
+            )
         if self.is_empty:
             return self
         wider = slack_ulp * _EPS * (np.abs(rows) @ np.abs(self.vertices).max(axis=0))
@@ -384,12 +414,12 @@ class Polytope:
             return self
         if np.isneginf(limits).any() or (least > most).any():
             return self.empty(self.space, 0.5 * float(np.max(least - most)))
-        return self.from_constraints(
+        return self._in_box(
             np.vstack([self.normals, rows[cuts]]),
             np.concatenate([self.offsets, limits[cuts]]),
             self.across,
             self.levels,
-            bounded=True,
+            *tightened(rows[cuts], limits[cuts], *self.bounding_box()),
         )
 
     def project(self, axes: Sequence[int]) -> Polytope:
@@ -397,7 +427,15 @@ class Polytope:
         return self.affine_map(np.eye(self.space)[list(axes)])
 
     def slice(self, axes: Sequence[int], values: ArrayLike) -> Polytope:
-        """Return the set of the other coordinates where the coordinates `axes` have some `values`."""
+        """Return the set of the other coordinates where the coordinates `axes` have some `values`.
+
+        Raises
+        ------
+        ValueError
+            If an axis does not exist, or none is left.
+        """
+        if not set(axes) < set(range(self.space)):
+            raise ValueError(f"axes must be some of the numbers from 0 to {self.space - 1}, not all: got {list(axes)}")
         rest = [axis for axis in range(self.space) if axis not in axes]
         if self.is_empty:
             return self.empty(len(rest), self.relaxation)
@@ -614,7 +652,7 @@ class Polytope:
     # Operators and old names --------------------------------------------------------------------------------------
 
     def __and__(self, other: Polytope) -> Polytope:
-        return self.intersection(other)
+        return self.intersection(other) if isinstance(other, Polytope) else NotImplemented
 
     def __add__(self, other: Polytope | ArrayLike) -> Polytope:
         return self.minkowski_sum(other) if isinstance(other, Polytope) else self.translate(other)
@@ -628,7 +666,7 @@ class Polytope:
         return bool(self.contains(point))
 
     def __le__(self, other: Polytope) -> bool:
-        return self.is_subset(other)
+        return self.is_subset(other) if isinstance(other, Polytope) else NotImplemented
 
     support = renamed("support", "support_function")
 

@@ -600,3 +600,20 @@ def test_a_polygon_of_an_observer_gains_no_vertices_from_slack() -> None:
     out = np.zeros((12, 2))
     ring = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     assert enlarge(ring, 4, 0.0, 0.0, SUM_SLACK, SUM_SLACK, out) == 4
+
+
+def test_too_few_inputs_and_an_empty_set_of_errors_are_refused() -> None:
+    system: dict[str, Any] = {
+        "state_matrix": [[1, 1], [0, 1]],
+        "output_matrix": [[1, 0]],
+        "initial": Zonotope.box([0, -1], [0, 1]),
+    }
+    observer = LinearObserver(**system, noise=0.1, input_matrix=[[1], [0]])
+    with pytest.raises(ValueError, match="inputs must have a row for each of 2 steps"):
+        observer.run([[0.0], [0.5], [1.0]], [[0.0]])
+    estimates = observer.run([[0.0], [0.5], [1.0]], [[0.0], [0.0]])
+    with pytest.raises(ValueError, match="inputs must have a row for each of 2 steps"):
+        observer.smooth(estimates, [[0.0]])
+    with pytest.raises(ValueError, match="noise must not be empty"):
+        LinearObserver(**system, noise=Polytope.empty(1))
+    assert not np.signbit(LinearObserver(**system, noise=0.1).estimate().lower[0])

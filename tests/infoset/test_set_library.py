@@ -590,3 +590,29 @@ def test_unusable_arguments_are_refused() -> None:
         ConvexPolygons.from_points([(1e61, 0.0)])
     with pytest.raises(ValueError, match="broadcast"):
         square.broadcast_to((2,)).intersection(square.broadcast_to((3,)))
+
+
+def test_a_difference_with_an_empty_member_of_a_batch_is_empty_for_this_member_alone() -> None:
+    square = ConvexPolygons.from_box([0, 0], [2, 2])
+    others = ConvexPolygons.stack([ConvexPolygons.from_box([0, 0], [1, 1]), ConvexPolygons.empty()])
+    difference = square.minkowski_difference(others)
+    assert difference.is_empty.tolist() == [False, True]
+    assert difference.area().tolist() == [1.0, 0.0]
+    with pytest.raises(ValueError, match="the difference with an empty set is unbounded"):
+        square.minkowski_difference(ConvexPolygons.empty())
+
+
+def test_mistaken_operands_have_a_clear_message() -> None:
+    square = ConvexPolygons.from_box([0, 0], [1, 1])
+    batch = ConvexPolygons.stack([square, square])
+    with pytest.raises(ValueError, match="a set without constraints is unbounded"):
+        ConvexPolygons.from_constraints(np.zeros((0, 2)), [])
+    with pytest.raises(ValueError, match="this is a batch of shape"):
+        batch.affine_map(np.ones((3, 2)))
+    with pytest.raises(TypeError, match="'in' is for a single polygon"):
+        _ = [0.5, 0.5] in batch
+    for other in (None, square.polytope()):
+        with pytest.raises(TypeError, match="unsupported operand"):
+            _ = square & other  # type: ignore[operator]
+        with pytest.raises(TypeError, match="not supported"):
+            _ = square <= other  # type: ignore[operator]

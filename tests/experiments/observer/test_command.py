@@ -213,3 +213,22 @@ def test_a_new_file_is_sound(infoset: Command) -> None:
     assert infoset("problems", "new", "observe", "mine.toml", "-q")[0] == 0
     assert infoset("problems", "check", "mine.toml", "-q")[0] == 0
     assert infoset("observe", "mine.toml", "-q")[0] == 0
+
+
+def test_an_empty_line_of_a_file_of_one_column_is_a_missing_measurement(infoset: Command) -> None:
+    Path("data.csv").write_text("y1\n0.0\n\n0.1\n\n\n")
+    results = infoset.json("observe", "observer-2005", "--data", "data.csv")
+    assert [step["k"] for step in results["steps"]] == [0, 1, 2]
+
+
+@pytest.mark.parametrize(("steps", "line"), [("0,2", 3), ("0,0", 3), ("1,2.5", 3), ("x,1", 2), (",1", 2)])
+def test_steps_of_a_file_must_be_successive(infoset: Command, steps: str, line: int) -> None:
+    first, second = steps.split(",")
+    Path("data.csv").write_text(f"k,y1\n{first},0.0\n{second},0.1\n")
+    err = infoset.refused("observe", "observer-2005", "--data", "data.csv")
+    assert f"line {line}, k: steps must be successive whole numbers" in err
+
+
+def test_steps_of_a_file_may_begin_with_any_number(infoset: Command) -> None:
+    Path("data.csv").write_text("k,y1\n7,0.0\n8,0.1\n")
+    assert len(infoset.json("observe", "observer-2005", "--data", "data.csv")["steps"]) == 2

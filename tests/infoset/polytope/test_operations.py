@@ -347,3 +347,36 @@ def test_other_published_cases() -> None:
     cylinder = [[-1, 0, 0], [0, -1, 0], [1, 1, 0], [0, 0, 1], [0, 0, -1]]
     shade = Polytope.from_constraints(cylinder, [0, 0, 1, 1, 1]).project([0, 1])
     assert shade.equals(Polytope.from_vertices([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]]), 1e-12)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("large", [[1e9, 1.0, 1e-9], [1e9, 1.0, 1.0], [1e9, 1e9, 1e9], [1.0, 1.0, 1e-9]])
+def test_intersections_with_sets_that_are_a_billion_times_larger(large: list[float], size: float) -> None:
+    upper = np.array(large)
+    both = Polytope.from_box(np.zeros(3), upper) & Polytope.from_box(np.zeros(3), np.full(3, size))
+    lower, most = both.bounding_box()
+    np.testing.assert_allclose(most, np.minimum(upper, size), rtol=1e-9, atol=1e-12 * most.max())
+    np.testing.assert_allclose(lower, 0.0, rtol=0.0, atol=1e-12 * most.max())
+
+
+def test_cuts_that_leave_a_billionth_of_a_set() -> None:
+    box = Polytope.from_box([0, 0, 0], [1e9, 1, 1])
+    np.testing.assert_allclose(box.cut([1, 0, 0], upper=1.0).volume(), 1.0, rtol=1e-9)
+    np.testing.assert_allclose(box.cut([1, 1, 1], upper=1.0).volume(), 1.0 / 6.0, rtol=1e-9)
+
+
+def test_mistaken_arguments_of_polytopes_have_a_clear_message() -> None:
+    cube = Polytope.from_box([0, 0, 0], [1, 1, 1])
+    for axes in ([-1], [3], [0, 1, 2]):
+        with pytest.raises(ValueError, match="axes must be some of the numbers from 0 to 2"):
+            cube.slice(axes, 0.5)
+    for generators in (np.ones((3, 2)), [[1, 2]]):
+        with pytest.raises(ValueError, match="generators of shape"):
+            Polytope.from_zonotope([0, 0, 0], generators)
+    for normal, bound in (([1, 0, 0], np.nan), ([1, np.nan, 0], 1.0), ([1, 0], 1.0)):
+        with pytest.raises(ValueError, match="normals must be finite"):
+            cube.cut(normal, upper=bound)
+    with pytest.raises(TypeError, match="unsupported operand"):
+        _ = cube & None  # type: ignore[operator]
+    with pytest.raises(TypeError, match="not supported"):
+        _ = cube <= None  # type: ignore[operator]
