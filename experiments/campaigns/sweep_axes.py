@@ -18,6 +18,7 @@ from experiments.campaigns.axis_names import SCALE, tied_keys, unit_of
 from experiments.common.errors import InputError, shown
 from experiments.common.toml_form import ENDS, similar_key
 from experiments.common.toml_values import LARGEST, SMALLEST, number_text
+from experiments.interception.scenario_checks import LINEAR_KEYS
 from experiments.interception.scenario_file import read_scenario, scenario_to_toml
 from experiments.interception.scenario_tables import LATER_KEYS, OPTIONAL_SENSORS, SPACE_KEYS
 from sim.scenario import Scenario
@@ -99,6 +100,7 @@ def sweep_cells(scenario: Scenario, axes: Sequence[Axis]) -> tuple[Scenario, ...
 def _known_keys(scenario: Scenario) -> dict[str, bool]:
     """Return the keys of a scenario whose values are numbers, and whether a value must be a whole number."""
     known: dict[str, bool] = {}
+    is_camera = scenario.set_model.angle_sensor.is_camera
     for table, keys in _tables(scenario).items():
         for name, value in keys.items():
             path = f"{table}.{name}"
@@ -109,7 +111,11 @@ def _known_keys(scenario: Scenario) -> dict[str, bool]:
             elif isinstance(value, int | float) and not isinstance(value, bool):
                 known[path] = isinstance(value, int)
         if scenario.is_spatial:  # bounds of y that the file takes from z
-            known |= {f"{home}.{name}": False for home, name in sorted(SPACE_KEYS) if home == table and "_y_" in name}
+            known |= {
+                f"{home}.{name}": False
+                for home, name in sorted(SPACE_KEYS)
+                if home == table and "_y_" in name and not (is_camera and name in LINEAR_KEYS)
+            }
     return (
         {"body.radius_m": False}
         | {".".join(path): path in _WHOLE for path in _LATER_NUMBERS}

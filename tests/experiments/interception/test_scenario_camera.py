@@ -149,3 +149,5 @@ def test_sweeps_vary_the_camera_and_the_cut_off() -> None:
     timed = camera(thruster__impulses_s="[50.0, 20.0]")
     with pytest.raises(InputError, match="no numeric key"):
         sweep_axes("thruster.impulses_s.least=1:2:2", timed)
+    with pytest.raises(InputError, match=r"no numeric key \"angle_sensor\.error_at_zero_range_y_rad\""):
+        sweep_axes("angle_sensor.error_at_zero_range_y_rad=1e-6:1e-5:2", load_scenario("dart-2022"))
