@@ -23,6 +23,8 @@ from infoset.observer_sets import Set, polytope_of
 Floats = NDArray[np.float64]
 
 LARGEST_CSV_BYTES = 10_000_000
+LARGEST_STATE = 1e40
+"""Greatest state of which sets are computed."""
 _STEP = re.compile(r"[0-9]{1,15}")
 
 
@@ -69,13 +71,22 @@ def simulate(problem: ObserverProblem, errors: Errors, seed: int) -> Data:
     generator = np.random.default_rng(seed)
     inputs = _padded(problem.inputs, problem.steps, problem.b.shape[1])
     states = [_point(problem.initial, errors, generator)]
-    for u in inputs[:-1]:
+    for step, u in enumerate(inputs[:-1], start=1):
         w = _point(problem.disturbance, errors, generator)
         states.append(problem.a @ states[-1] + problem.b @ u + problem.offset + w)
+        need_size(f"{problem.source}: simulation, step {step}", states[-1])
     true = np.array(states)
     measured = true @ problem.c.T + _signs(errors, (len(true), len(problem.c)), generator) * problem.half_width
     measured[[step for step in problem.missing if step < len(measured)]] = np.nan
     return Data(measured, inputs, true, f"simulated, {errors.value} errors, seed {seed}")
+
+
+def need_size(where: str, *values: Floats) -> None:
+    """Raise an error if a state is too large; NaN is not."""
+    if any((np.abs(numbers) > LARGEST_STATE).any() for numbers in values):
+        raise InputError(
+            f"{where}: a state is larger than {LARGEST_STATE:g}; the system is unstable: correct A, or use fewer steps"
+        )
 
 
 def _signs(errors: Errors, shape: tuple[int, ...], generator: np.random.Generator) -> Floats:

@@ -11,7 +11,7 @@ from experiments.common.errors import InputError
 from experiments.common.output import output_of, to_json
 from experiments.common.screen import figure_files, progress_bar, show
 from experiments.observer.command import Observe
-from experiments.observer.data import Data, data_of
+from experiments.observer.data import Data, data_of, need_size
 from experiments.observer.figures import draw_bounds, draw_sets
 from experiments.observer.file import ObserverProblem, load_observer
 from experiments.observer.page import observer_page
@@ -46,6 +46,7 @@ def _observed(problem: ObserverProblem, data: Data, smooth: bool, progress: Call
                 observer.predict(data.inputs[k - 1])
             observer.update(measurement)
             estimates.append(observer.estimate())
+            need_size(f"{problem.source}: step {k}", estimates[-1].lower, estimates[-1].upper)
             progress((k + 1) / len(data.measured))
         smoothed = observer.smooth(estimates, data.inputs) if smooth else None
     except (ArithmeticError, ValueError) as error:

@@ -232,3 +232,16 @@ def test_steps_of_a_file_must_be_successive(infoset: Command, steps: str, line: 
 def test_steps_of_a_file_may_begin_with_any_number(infoset: Command) -> None:
     Path("data.csv").write_text("k,y1\n7,0.0\n8,0.1\n")
     assert len(infoset.json("observe", "observer-2005", "--data", "data.csv")["steps"]) == 2
+
+
+@pytest.mark.parametrize("states", [2, 3])
+@pytest.mark.parametrize("data", ["simulated", "measured"])
+def test_unstable_systems_are_refused_before_numbers_overflow(infoset: Command, data: str, states: int) -> None:
+    ones = [1.0] * states
+    Path("big.toml").write_text(
+        f'schema = 1\nkind = "observer"\n[system]\nA = {[[1e15] * states] * states}\nC = {[ones]}\n'
+        f"[initial]\nlower = {[0.5] * states}\nupper = {ones}\n[noise]\nhalf_width = [0.2]\n"
+    )
+    Path("data.csv").write_text("y1\n" + '""\n' * 30)
+    err = infoset.refused("observe", "big.toml", *(["--data", "data.csv"] if data == "measured" else []))
+    assert "a state is larger than 1e+40; the system is unstable" in err
