@@ -31,7 +31,7 @@ class KalmanBank:
     members : int
         Number M of filters.
     process_noise : float
-        As in `Kalman`.
+        As in `Kalman`, in units of the bound's standard deviation.
 
     Attributes
     ----------

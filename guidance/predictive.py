@@ -42,7 +42,7 @@ class Predictive:
         `KalmanBank`, `LeastSquaresFit`, or another function of the number of engagements and of whether it estimates
         the acceleration of the target; it returns an `Estimator`.
     spacing : float
-        Ratio of the times to go of two manoeuvres in a row, greater than 1, if the engine has no scheduled times.
+        The ratio of the times to go of two manoeuvres in a row, greater than 1, if the engine has no scheduled times.
 
     Raises
     ------

@@ -23,14 +23,16 @@ def burns_key(scenario: Scenario, results: Results) -> dict[str, list[dict[str, 
     if results.burns_m_s is None:
         return {}
     whole = float(results.burns_m_s.sum())
+    arrival_s, step_s = scenario.nominal_arrival_s, scenario.set_model.step_s
+    steps = scenario.thruster.impulse_steps(arrival_s, step_s) or []
     return {
         "burns": [
             {
-                "before_arrival_s": time_s,
+                "before_arrival_s": arrival_s - step * step_s,
                 **dict(zip(LEVELS, shown_quantiles(sizes, [*LEVELS.values()]), strict=True)),
                 "share": float(sizes.sum()) / whole if whole > 0.0 else None,
             }
-            for time_s, sizes in zip(scenario.thruster.impulses_s, results.burns_m_s.T, strict=False)
+            for step, sizes in zip(steps, results.burns_m_s.T, strict=True)
         ]
     }
 

@@ -157,6 +157,12 @@ def scenario_warnings(scenario: Scenario) -> list[str]:
             "positive bounds"
         )
     lines += _timing_warnings(scenario)
+    late = ", ".join(f"{time_s:g}" for time_s in thruster.impulses_s if time_s < (thruster.last_impulse_s or 0.0))
+    if late:
+        lines.append(
+            f"thruster.impulses_s: the impulses at {late} s before the arrival are after the cut-off "
+            f"thruster.last_impulse_s, {thruster.last_impulse_s:g} s: they are not given"
+        )
     if thruster.budget_m_s < thruster.least_impulse_m_s:
         lines.append(
             f"thruster.budget_m_s, {thruster.budget_m_s:g}, is less than thruster.least_impulse_m_s, "

@@ -143,7 +143,13 @@ def contain_and_are_convex(model: SetModel, true: Sight, errors: Floats, label: 
     heights = np.array([band(each) for each in labels.tolist()]) * ranges[:, None, None]
     if np.isfinite(heights).all():
         bend = np.diff(heights, n=2, axis=0)
-        rounding = 64.0 * EPS * greatest * (1.0 + np.abs(heights / ranges[:, None, None]).max())
+        steepest = np.abs(heights / ranges[:, None, None]).max()
+        rounding = 64.0 * EPS * greatest * (1.0 + steepest)
+        # The nearest range that a label can have is a difference of labels: its rounding error is that of a label. A
+        # camera's centroid error c widens the band by c/near, and the steepest slope amplifies it.
+        near = ranges[0]
+        centroid = model.angle_sensor.centroid_error_m or 0.0
+        rounding += ranges.max() * (centroid / near) * (EPS * greatest / near) * (1.0 + steepest**2) ** 2
         assert bend[..., 0].min() >= -rounding
         assert bend[..., 1].max() <= rounding
 

@@ -151,3 +151,8 @@ def test_sweeps_vary_the_camera_and_the_cut_off() -> None:
         sweep_axes("thruster.impulses_s.least=1:2:2", timed)
     with pytest.raises(InputError, match=r"no numeric key \"angle_sensor\.error_at_zero_range_y_rad\""):
         sweep_axes("angle_sensor.error_at_zero_range_y_rad=1e-6:1e-5:2", load_scenario("dart-2022"))
+
+
+def test_impulses_after_the_cut_off_are_named() -> None:
+    scenario = load_scenario("haiv-2013", ["thruster.last_impulse_s=800"])
+    assert [line for line in scenario_warnings(scenario) if "the impulses at 750, 180 s before the arrival" in line]
