@@ -115,11 +115,13 @@ def test_measurements_after_the_last_impulse_are_warned_of() -> None:
     ]
     assert not scenario_warnings(camera(angle_sensor__first_image_s="30.1", thruster__last_impulse_s="30"))
     schedule = {"thruster__impulses_s": "[60.0, 40.0, 20.0]", "thruster__last_impulse_s": "30"}
-    assert len(scenario_warnings(camera(angle_sensor__first_image_s="35", **schedule))) == 1
-    assert not scenario_warnings(camera(angle_sensor__first_image_s="40.1", **schedule))
-    assert (
-        len(scenario_warnings(camera(angle_sensor__first_image_s="40.1", thruster__delay_steps="2", **schedule))) == 1
-    )
+    after_cut_off = "the impulses at 20 s before the arrival are after the cut-off"
+    for first_image_s, delay_steps, number in (("35", "0", 2), ("40.1", "0", 1), ("40.1", "2", 2)):
+        lines = scenario_warnings(
+            camera(angle_sensor__first_image_s=first_image_s, thruster__delay_steps=delay_steps, **schedule)
+        )
+        assert len(lines) == number
+        assert [after_cut_off in line for line in lines].count(True) == 1
 
 
 def test_a_camera_without_images_is_warned_of() -> None:
