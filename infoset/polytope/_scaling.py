@@ -34,9 +34,10 @@ def _scales(widths: Floats, sizes: Floats) -> Floats | None:
     return np.asarray(np.exp2(np.rint(np.log2(np.where(wide, widths, np.where(sizes > 0.0, sizes, 1.0))))))
 
 
-def scale_of_constraints(normals: Floats, offsets: Floats, across: Floats, levels: Floats) -> Floats | None:
-    """Return scales as `scale_of` for {x: normals x <= offsets, across x = levels}, from linear programs for the
-    bounds.
+def scale_of_constraints(
+    normals: Floats, offsets: Floats, across: Floats, levels: Floats
+) -> tuple[Floats, Floats, Floats] | None:
+    """Return scales as `scale_of` for {x: normals x <= offsets, across x = levels}, and the bounds of x that give them.
 
     None without linear programs if neither the offsets of the rows, of unit length, nor the columns differ much.
     """
@@ -62,7 +63,9 @@ def scale_of_constraints(normals: Floats, offsets: Floats, across: Floats, level
             ends[side, axis] = sign * optimum.fun
     # Widths that may be rounding of the linear programs count as zero.
     widths = np.where(ends[1] - ends[0] > 1e-8 * np.abs(ends).max(), ends[1] - ends[0], 0.0)
-    return _scales(widths / columns, np.abs(ends).max(axis=0) / columns)
+    scale = _scales(widths / columns, np.abs(ends).max(axis=0) / columns)
+    lower, upper = ends / columns
+    return np.ones_like(lower) if scale is None else scale, lower, upper
 
 
 def tightened(rows: Floats, limits: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:

@@ -134,11 +134,19 @@ class Polytope:
         except (UnboundedPolytopeError, UncertainHullError) as error:
             polytope, failure = cls.empty(rows.shape[1]), error
         if polytope.dimension < polytope.space:
-            scale = scale_of_constraints(rows, limits, flat, heights)
+            known = scale_of_constraints(rows, limits, flat, heights)
             with contextlib.suppress(EmptyPolytopeError, UncertainHullError):
-                if scale is not None:
-                    inner = intersection_of_halfspaces(rows * scale, limits, flat * scale, heights, bounded=bounded)
+                if known is not None:
+                    scale, lower, upper = known
+                    near, ends = without_far(rows * scale, limits, lower / scale, upper / scale)
+                    inner = intersection_of_halfspaces(near, ends, flat * scale, heights, bounded=True)
                     return cls(*stretched(inner, scale))
+            # The bounds exist, so the set is not emptier than their rounding.
+            if known is not None and failure is None and polytope.relaxation > 1e-6 * np.abs(known[1:]).max():
+                failure = UncertainHullError(
+                    "the half-spaces have common points, but their sizes differ too much for a hull: scale the "
+                    "coordinates"
+                )
         if failure is not None:
             raise failure
         return polytope
@@ -567,7 +575,7 @@ class Polytope:
     def _simplices(self) -> tuple[Floats, Floats]:
         """Return simplices that divide the set, shape (k, d + 1, n), and their shares of the volume, shape (k,)."""
         frame = frame_of(self.needed().vertices / (1.0 if self._stretch is None else self._stretch))
-        if frame.dimension < 2:
+        if len(self.vertices) == frame.dimension + 1:
             return self.vertices[None], np.ones(1)
         inner = frame.inward(self.vertices / (1.0 if self._stretch is None else self._stretch))
         corners = Delaunay(inner, qhull_options="QJ").simplices

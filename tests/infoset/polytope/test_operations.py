@@ -380,3 +380,13 @@ def test_mistaken_arguments_of_polytopes_have_a_clear_message() -> None:
         _ = cube & None  # type: ignore[operator]
     with pytest.raises(TypeError, match="not supported"):
         _ = cube <= None  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("states", [2, 3, 4])
+def test_a_simplex_is_one_simplex(states: int) -> None:
+    """A triangulation by Qhull needs one point more; a flat triangle in R^3 is one too."""
+    corners = np.vstack([np.zeros(states), np.eye(states)])
+    for points in (corners, np.hstack([corners, np.full((states + 1, 1), 0.25)])):
+        simplex = Polytope.from_vertices(points)
+        assert simplex.centroid() == pytest.approx(points.mean(axis=0), rel=1e-14)
+        assert simplex.contains(simplex.sample(50), 1e-12).all()

@@ -13,6 +13,7 @@ from infoset.polytope import (
     EmptyPolytopeError,
     Polytope,
     UnboundedPolytopeError,
+    UncertainHullError,
     product,
     relative_interior,
     shadow,
@@ -280,3 +281,19 @@ def test_a_set_with_a_known_member_is_not_empty() -> None:
     found = relative_interior(rows, limits, np.zeros((0, 2)), np.zeros(0), bounded=True, member=member)
     assert found.dimension == 0
     np.testing.assert_allclose(found.point, member, atol=1e-15)
+
+
+@pytest.mark.parametrize("far", [1e3, 1e6, 1e9, 1e12, 1e15])
+def test_a_far_constraint_does_not_hide_a_set(far: float) -> None:
+    """It once made the unit cube count as flat, and then as empty."""
+    unit = np.eye(3)
+    rows = np.vstack([unit, -unit, [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]])
+    cube = Polytope.from_constraints(rows, [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, far, far])
+    assert len(cube.vertices) == 8
+    assert cube.volume() == pytest.approx(1.0, rel=1e-12)
+
+
+def test_a_set_whose_sizes_differ_too_much_is_not_called_empty() -> None:
+    unit = np.eye(3)
+    with pytest.raises(UncertainHullError, match="their sizes differ too much for a hull: scale the coordinates"):
+        Polytope.from_constraints(np.vstack([unit, -unit]), [1e9, 1.0, 1e-9, 0.0, 0.0, 0.0])
