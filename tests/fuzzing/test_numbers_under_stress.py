@@ -291,19 +291,11 @@ def assert_scales(
 
 
 @EXAMPLES
-@given(engagements(), STRATEGIES, POWERS, st.integers(0, 99))
-def test_lengths_a_power_of_two_as_long_give_the_same_digits(
-    scenario: Scenario, kind: type[Strategy], power: int, seed: int
-) -> None:
-    assert_scales(scenario, kind, 2.0**power, 1.0, digits(scenario, kind), seed)
-
-
-@EXAMPLES
-@given(engagements(), STRATEGIES, POWERS, POWERS, st.integers(0, 99))
-def test_times_a_power_of_two_as_long_give_the_same_digits(
+@given(engagements(), STRATEGIES, POWERS, st.just(0) | POWERS, st.integers(0, 99))
+def test_lengths_and_times_a_power_of_two_as_long_give_the_same_digits(
     scenario: Scenario, kind: type[Strategy], length: int, time: int, seed: int
 ) -> None:
-    """As long as the truth is integrated in one substep a step."""
+    """As long as the truth is integrated in one substep a step, whatever lengths are."""
     shortest = LONGEST_SUBSTEP_S / max(1.0, 2.0**time)
     halved = 2.0 ** min(0, math.floor(math.log2(shortest / scenario.set_model.step_s)))
     brief, _ = scaled(scenario, numbers(scenario, seed), 1.0, halved)
