@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
@@ -60,7 +60,7 @@ class Estimate:
     """
 
     step: int
-    sets: Sets
+    sets: Sets = field(repr=False)
     single: bool
     states: int
 

@@ -617,3 +617,8 @@ def test_too_few_inputs_and_an_empty_set_of_errors_are_refused() -> None:
     with pytest.raises(ValueError, match="noise must not be empty"):
         LinearObserver(**system, noise=Polytope.empty(1))
     assert not np.signbit(LinearObserver(**system, noise=0.1).estimate().lower[0])
+
+
+def test_an_estimate_is_shown_without_its_arrays() -> None:
+    estimate = LinearObserver(np.eye(2), np.eye(2), Zonotope.box([0, 0], [1, 1]), noise=1.0).estimate()
+    assert repr(estimate) == "Estimate(step=0, single=True, states=2)"
