@@ -1,4 +1,4 @@
-"""Number of examples of Hypothesis (more with the profile `thorough`), and fixtures that many tests use."""
+"""Profiles of Hypothesis (fixed examples; other and more ones: `thorough`), and fixtures that many tests use."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ collect_ignore = [] if IN_A_CHECKOUT else OF_THE_CHECKOUT
 PROFILE = os.environ.get("INFOSET_HYPOTHESIS_PROFILE", "default")
 TIMES = 32
 
-settings.register_profile("thorough", max_examples=TIMES * settings().max_examples, deadline=None)
+settings.register_profile("default", derandomize=True)
+settings.register_profile("thorough", derandomize=False, max_examples=TIMES * settings().max_examples, deadline=None)
 settings.load_profile(PROFILE)
 
 

@@ -20,6 +20,7 @@ Description = tuple[Floats, Floats, Floats, Floats, Floats]
 """Vertices; facets normals x <= offsets; the affine hull across x = levels: the fields of a `Polytope`."""
 
 _OPTIONS = ("Qt", "QJ Pp")
+"""Options of Qhull: merged facets, divided into simplices; if these fail, joggled points."""
 _ROUND = 30.0
 """Ratio of length to thickness above which sets are intersected again, in coordinates in which they are round."""
 MERGE = 1e-10
@@ -232,10 +233,7 @@ def _agreeing(points: Floats, normals: Floats, on: Flags, negligible: float) -> 
 
 def _need_agreement(points: Floats, corners: Places, on_facets: Flags) -> None:
     """Check that the hull of the vertices contains all points, and that each simplex of its surface is in a facet."""
-    try:
-        hull = ConvexHull(points[corners])
-    except QhullError as error:
-        raise UncertainHullError(f"rounding decides which of {len(corners)} points are vertices") from error
+    hull = _surface(points[corners])
     outside = float((points @ hull.equations[:, :-1].T + hull.equations[:, -1]).max())
     if outside > _APART:
         raise UncertainHullError(f"a point is {outside:.2g} outside the hull of its vertices")
@@ -244,6 +242,17 @@ def _need_agreement(points: Floats, corners: Places, on_facets: Flags) -> None:
         covered &= on_facets[corners[hull.simplices[:, corner]]]
     if not covered.any(axis=1).all():
         raise UncertainHullError("a part of the surface is in no facet")
+
+
+def _surface(vertices: Floats) -> ConvexHull:
+    """Return the hull of vertices, of joggled ones if rounding of the merged facets stops Qhull."""
+    try:
+        return ConvexHull(vertices)
+    except QhullError:
+        try:
+            return ConvexHull(vertices, qhull_options=_OPTIONS[1])
+        except QhullError as error:
+            raise UncertainHullError(f"rounding decides which of {len(vertices)} points are vertices") from error
 
 
 def _widest_gap(gaps: Floats) -> float:

@@ -5,7 +5,7 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -112,6 +112,9 @@ def test_flat_hull_is_the_exact_one(seed: int, size: int, rank: int, extra: int)
 @needs_ppl
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 10**6), size=st.integers(2, 5), count=st.integers(1, 8))
+@example(seed=1219, size=5, count=6)  # Qhull stops in the check of the facets unless vertices are joggled
+@example(seed=1374, size=5, count=2)
+@example(seed=1477, size=5, count=6)
 def test_intersection_is_the_exact_one(seed: int, size: int, count: int) -> None:
     generator = np.random.default_rng(seed)
     rows = np.vstack([np.eye(size), -np.eye(size), generator.standard_normal((count, size))])
