@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
 from guidance import Strategy
 from infoset.limits import WHOLE, shown
 from sim.draws import draw, greatest_number_of_steps
-from sim.engagement import Engagements
+from sim.engagement import Engagements, Step
 from sim.results import Results, join
 from sim.scenario import Scenario, with_strategy
 
@@ -27,6 +28,7 @@ def simulate(
     strategy: Strategy | str | None = None,
     guarantee: bool = True,
     progress: Callable[[float], None] | None = None,
+    observe: Callable[[int, Step], None] | None = None,
 ) -> Results:
     """Simulate engagements whose starts and measurement errors are drawn at random.
 
@@ -42,6 +44,9 @@ def simulate(
         Compute the bound Phi in the guaranteed model; it doubles the run time.
     progress : callable or None
         Called with the fraction done, from 0 to 1.
+    observe : callable or None
+        Called at each step of each batch, with the index in `runs` of the batch's first run, and the step
+        (`sim.engagement.Step`).
 
     Returns
     -------
@@ -73,9 +78,9 @@ def simulate(
         chunk = numbers[first : first + at_once]
         draws = draw(scenario, chunk.tolist(), seed)
         flight = Engagements(scenario, draws, own, guarantee=guarantee)
-        steps = draws.steps
+        steps, observe_batch = draws.steps, None if observe is None else partial(observe, first)
         while flight.flying:
-            flight.advance()
+            flight.advance(observe_batch)
             if progress is not None:
                 progress((first + chunk.size * min(1.0, flight.step / steps)) / numbers.size)
         parts.append(flight.results(chunk))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,12 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from guidance.thruster import modulus
 from sim import Record, Scenario
+from sim.engagement import Step
 
 Floats = NDArray[np.float64]
 
 MOST_STEPS = 400
 """Number of steps above which a flight is long: its time axis is logarithmic in the time before the arrival."""
+
+MOST_COURSES = 1000
+"""Greatest number of runs whose courses are kept."""
 
 UNITS = (("d", 86400.0), ("h", 3600.0), ("min", 60.0), ("s", 1.0))
 """Units of times before the arrival."""
@@ -143,3 +149,60 @@ def possible_misses(record: Record) -> tuple[Floats, Mapping[str, Floats]]:
         axis: np.array([record.steps[index].axes[axis].predicted_miss_m for index in known]).reshape(-1, 2)
         for axis in axes
     }
+
+
+class Courses:
+    """Possible misses and impulses of many runs of a scenario over time, an observer of `simulate`.
+
+    Parameters
+    ----------
+    runs : int
+        Number of runs; at most `MOST_COURSES` are kept.
+
+    Attributes
+    ----------
+    steps : ndarray of int, shape (n,)
+        Steps until the nominal arrival, of a long flight at most about `MOST_STEPS`, with those of scheduled impulses.
+    possible_m : ndarray, shape (runs, n)
+        Greatest possible miss without further impulses, m; NaN if the set is empty, or after its first section left.
+    impulse_m_s : ndarray, shape (runs, n)
+        Modulus of the greatest impulse since the step before, m/s.
+    """
+
+    def __init__(self, scenario: Scenario, runs: int) -> None:
+        self.scenario = scenario
+        every = np.arange(math.ceil(scenario.nominal_arrival_s / scenario.set_model.step_s))
+        self.steps = every
+        if len(every) > MOST_STEPS:
+            places = -np.log(len(every) - every)
+            fired = scenario.thruster.impulse_steps(scenario.nominal_arrival_s, scenario.set_model.step_s) or ()
+            scheduled = fired if scenario.thruster.impulses_s else ()
+            half = MOST_STEPS // 2
+            self.steps = np.unique([*evenly(places, half), *evenly(every, half), *scheduled]).astype(np.int64)
+        self.possible_m = np.full((min(runs, MOST_COURSES), len(self.steps)), np.nan)
+        self.impulse_m_s = np.zeros_like(self.possible_m)
+
+    @property
+    def before_arrival_s(self) -> Floats:
+        """Times of the steps before the nominal arrival, s, shape (n,)."""
+        return np.asarray(self.scenario.nominal_arrival_s - self.steps * self.scenario.set_model.step_s)
+
+    def observe(self, first: int, step: Step) -> None:
+        """Store a step of the batch whose first run has this index."""
+        column = int(np.searchsorted(self.steps, step.step))
+        batch = slice(first, first + len(step.tracking))
+        impulse, possible = self.impulse_m_s[batch], self.possible_m[batch]
+        if column == len(self.steps) or not len(impulse):
+            return
+        count = len(impulse)
+        np.maximum(impulse[:, column], modulus(step.impulse_m_s)[:count], out=impulse[:, column])
+        if self.steps[column] != step.step:
+            return
+        model, miss = self.scenario.set_model, step.predicted_miss
+        nearest_m, _ = step.information.stored_range_interval_m()
+        leaving = nearest_m < model.range_threshold_m + model.closing_speed_m_s * model.step_s
+        known = step.tracking & miss.exists & ~leaving
+        greatest = modulus(np.maximum(np.abs(miss.lower_m), np.abs(miss.upper_m)))
+        possible[:, column] = np.where(known, greatest, np.nan)[:count]
+        if column:
+            possible[np.isnan(possible[:, column - 1]), column] = np.nan

@@ -182,6 +182,8 @@ def test_experiment_into_a_folder(infoset: Command, tmp_path: Path) -> None:
     assert names_in(folder) == [
         "figure-4-distributions.pdf",
         "figure-4-distributions.png",
+        "figure-corridor.pdf",
+        "figure-corridor.png",
         "results.csv",
         "results.json",
         "scenario.toml",

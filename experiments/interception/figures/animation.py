@@ -93,7 +93,7 @@ def animate(
         for axes, trace in zip(below, traces, strict=True):
             draw_predicted_miss(axes, trace, clock)
             if clock.counts_down:
-                count_down(axes, trace[0])
+                count_down(axes, trace[0].scenario)
             else:
                 axes.set_xlabel("time t, s")
             along = f" along {trace[1]}" if in_space else ""

@@ -40,7 +40,7 @@ from experiments.interception.course import (
 from experiments.interception.figures.b_plane import GUARANTEE_LOOK, RADIUS_SHOWN, draw_discs
 from experiments.interception.figures.distributions import RADIUS_LOOK
 from experiments.interception.record_titles import outcome_title, record_titles
-from sim import Record
+from sim import Record, Scenario
 
 Floats = NDArray[np.float64]
 
@@ -51,6 +51,8 @@ _SIDE_MM, _IMPULSES_MM, _GAP_MM = 62.0, 17.0, 3.0
 _LEFT_MM, _RIGHT_MM, _BETWEEN_MM, _FOOT_MM = 17.0, 5.0, 21.0, 12.0
 _NARROW_MM = 60.0
 """Width of axes up to which the time axis has few ticks."""
+_TICK_LETTER_MM, _TICK_LETTERS, _TICK_GAP_MM = 1.4, 4, 1.5
+"""Width of a letter of a tick of the time axis, letters of a tick, and gap between ticks."""
 MARK_LOOK: dict[str, Any] = {"color": LIMIT, "linewidth": 0.8, "linestyle": (0, (1.5, 1.5))}
 _CENTRED_LOOK: dict[str, Any] = {"color": SET_EDGE, "linewidth": 1.1, "linestyle": (0, (4, 1.5))}
 _TRUE_LOOK: dict[str, Any] = {"color": INK, "linewidth": 0.9}
@@ -94,8 +96,8 @@ def draw_approach(records: Sequence[Record]) -> Figure:
             _draw_possible(above, record)
             _draw_moduli(below, record)
             for axes in (above, below):
-                count_down(axes, record)
-            name_marks(above, record)
+                count_down(axes, record.scenario)
+            name_marks(above, record.scenario)
             above.tick_params(labelbottom=False)
             above.xaxis.label.set_visible(False)
             if record.scenario.is_spatial:
@@ -104,18 +106,17 @@ def draw_approach(records: Sequence[Record]) -> Figure:
     return figure
 
 
-def count_down(axes: Axes, record: Record) -> None:
+def count_down(axes: Axes, scenario: Scenario) -> None:
     """Make the time axis logarithmic in the time before the arrival, and draw the times of the schedule."""
-    scenario = record.scenario
-    begin, end = scenario.nominal_arrival_s - record.steps[0].time_s, least_to_go_s(scenario)
+    begin, end = scenario.nominal_arrival_s, least_to_go_s(scenario)
     axes.set_xscale("log")
     axes.set_xlim(1.1 * begin, end)
     wide = width_mm(axes) > _NARROW_MM
-    ticks = [
-        *(tick for tick in (TICKS_S if wide else FEW_TICKS_S) if end <= tick <= (0.6 if wide else 0.2) * begin),
-        begin,
-    ]
-    axes.xaxis.set_major_locator(FixedLocator(ticks))
+    decades_mm = width_mm(axes) / np.log10(1.1 * begin / end)
+    letters = len(duration_text(begin)) + _TICK_LETTERS
+    apart = 10.0 ** ((0.5 * _TICK_LETTER_MM * letters + _TICK_GAP_MM) / decades_mm)
+    ticks = [tick for tick in (TICKS_S if wide else FEW_TICKS_S) if end <= tick <= begin / apart]
+    axes.xaxis.set_major_locator(FixedLocator([*ticks, begin]))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda tick, _: duration_text(tick)))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xlabel(f"time before {'the nominal ' if wide else ''}arrival")
@@ -123,11 +124,11 @@ def count_down(axes: Axes, record: Record) -> None:
         axes.axvline(time, zorder=1.5, **MARK_LOOK)
 
 
-def name_marks(axes: Axes, record: Record) -> None:
+def name_marks(axes: Axes, scenario: Scenario) -> None:
     """Write the names of the times of the schedule along their lines, at the top of the axes."""
     low, high = np.log(axes.get_xlim()[::-1])
     taken = -1.0
-    for name, time in sorted(marks(record.scenario).items(), key=lambda item: -item[1]):
+    for name, time in sorted(marks(scenario).items(), key=lambda item: -item[1]):
         share = (high - np.log(time)) / (high - low)
         side = "left" if abs(share - taken) < 0.05 else "right"
         taken = share

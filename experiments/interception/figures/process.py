@@ -287,7 +287,7 @@ def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], traces: Sequence[Tra
     for row, label in zip(grid, labels, strict=True):
         for axes, (record, _) in zip(row, traces, strict=True):
             if clock.counts_down:
-                count_down(axes, record)
+                count_down(axes, record.scenario)
             else:
                 axes.set_xlim(start - margin, end + margin)
                 axes.set_xlabel("time t, s")

@@ -23,8 +23,10 @@ from experiments.common.screen import (
 from experiments.interception.burns import burn_table, burns_key
 from experiments.interception.choices import own_strategy, scenario_with
 from experiments.interception.command import Experiment
+from experiments.interception.course import Courses
 from experiments.interception.curves import Curve, curve_scenarios
 from experiments.interception.figures.b_plane import B_PLANE, cloud, draw_b_plane
+from experiments.interception.figures.corridor import draw_corridor
 from experiments.interception.figures.distributions import draw_distributions
 from experiments.interception.published import MANY, PRINTED_SINGLE_RUN, SINGLE
 from experiments.interception.runs.shared import (
@@ -42,6 +44,7 @@ from sim import Outcome, Scenario
 from sim.statistics import shown_quantiles
 
 FIGURE = "figure-4-distributions"
+CORRIDOR = "figure-corridor"
 
 
 def run(options: Experiment) -> None:
@@ -51,7 +54,8 @@ def run(options: Experiment) -> None:
     b_planes = B_PLANE if scenario.is_spatial else {}
     with (
         output_of(
-            options, ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE, *b_planes.values()))
+            options,
+            ("scenario.toml", "results.json", "results.csv", *figure_files(FIGURE, CORRIDOR, *b_planes.values())),
         ) as written,
         progress_bar(options.quiet) as begin,
     ):
@@ -63,9 +67,9 @@ def run(options: Experiment) -> None:
             (curve, flown, f"curve {curve}: {flown.noise.value}{' + range meter' if flown.range_sensor else ''}")
             for curve, flown in reversed(curve_scenarios(scenario))
         ]
-        results = simulate_in_threads(
-            [(flown, own, begin(title)) for _, flown, title in slowest_first], options.runs, options.seed
-        )
+        jobs = [(flown, own, begin(title)) for _, flown, title in slowest_first]
+        courses = [Courses(flown, options.runs) for _, flown, _ in slowest_first] if options.out is not None else []
+        results = simulate_in_threads(jobs, options.runs, options.seed, courses)
         elapsed_s = perf_counter() - began_s
         curves = [
             Curve(curve, flown.noise, flown.range_sensor is not None, result)
@@ -92,6 +96,7 @@ def run(options: Experiment) -> None:
             written.save("results.csv", _csv(curves), "--csv")
         if options.out is not None:
             drawings = {FIGURE: lambda: draw_distributions(curves, radius_m=scenario.radius_m)}
+            drawings[CORRIDOR] = lambda: draw_corridor(curves, courses[::-1])
             drawings |= {name: partial(_b_plane, scenario, curves, noise) for noise, name in b_planes.items()}
             written.draw(drawings, begin("figure"))
     show(_parts(scenario, curves), options.quiet, stdout_taken=written.stdout_taken)

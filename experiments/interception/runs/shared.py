@@ -12,6 +12,7 @@ import numpy as np
 from experiments.common.errors import InputError
 from experiments.common.output import library_version
 from experiments.common.screen import NOT_FINITE
+from experiments.interception.course import Courses
 from experiments.interception.scenario_file import scenario_hash, scenario_warnings
 from experiments.interception.study import set_counts
 from guidance import Strategy
@@ -23,7 +24,10 @@ Progress = Callable[[float], None]
 
 
 def simulate_in_threads(
-    jobs: Sequence[tuple[Scenario, Strategy | None, Progress]], runs: int, seed: int
+    jobs: Sequence[tuple[Scenario, Strategy | None, Progress]],
+    runs: int,
+    seed: int,
+    courses: Sequence[Courses] = (),
 ) -> list[Results]:
     """Simulate scenarios in parallel, one thread per core; the kernels release the interpreter lock.
 
@@ -31,6 +35,8 @@ def simulate_in_threads(
     ----------
     jobs : sequence
         Scenario, own strategy and progress callback of each simulation, the slowest first.
+    courses : sequence of Courses
+        Observer of each simulation; empty without observers.
 
     Raises
     ------
@@ -39,7 +45,7 @@ def simulate_in_threads(
     """
     stopped = Event()
 
-    def simulate_one(job: tuple[Scenario, Strategy | None, Progress]) -> Results:
+    def simulate_one(job: tuple[Scenario, Strategy | None, Progress], course: Courses | None) -> Results:
         scenario, own, report = job
 
         def progress(share: float) -> None:
@@ -47,13 +53,14 @@ def simulate_in_threads(
                 raise InterruptedError
             report(share)
 
-        results = simulate(scenario, runs, seed=seed, strategy=own, progress=progress)
+        observe = None if course is None else course.observe
+        results = simulate(scenario, runs, seed=seed, strategy=own, progress=progress, observe=observe)
         need_finite(results)
         return results
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         try:
-            return list(pool.map(simulate_one, jobs))
+            return list(pool.map(simulate_one, jobs, courses or [None] * len(jobs)))
         except BaseException:
             stopped.set()
             raise

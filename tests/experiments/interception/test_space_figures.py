@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -14,10 +15,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 from PIL import Image, ImageSequence
 
-from experiments.interception.course import Clock, duration_text, true_predicted_misses
+from experiments.interception.course import Clock, Courses, duration_text, possible_misses, true_predicted_misses
+from experiments.interception.curves import Curve
 from experiments.interception.figures.animation import GIF, animate
 from experiments.interception.figures.approach import draw_approach
 from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane, ellipse, greatest_guarantee
+from experiments.interception.figures.corridor import draw_corridor
 from experiments.interception.figures.process import draw_process
 from experiments.interception.figures.sets import TRUTH_MARK, choose_sections, draw_sets
 from experiments.interception.page import interception_page
@@ -288,6 +291,67 @@ def test_approach_shows_possible_misses_and_the_schedule(records: list[Record]) 
     assert b_plane.get_xlim() == b_plane.get_ylim()
     assert "times of the schedule" in legend(figure)
     assert len(draw_approach(records).axes) == 6
+
+
+@pytest.mark.parametrize("name", ["asteroid-1997", "asteroid-1997-space"])
+def test_courses_are_those_of_single_engagements(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules["sim.simulate"], "ENGAGEMENTS_AT_ONCE", 2)
+    monkeypatch.setattr("experiments.interception.course.MOST_COURSES", 3)
+    scenario = load_scenario(name)
+    scenario = replace(scenario, set_model=replace(scenario.set_model, sections=5))
+    courses = Courses(scenario, 4)
+    flown = simulate(scenario, 4, observe=courses.observe)
+    assert flown.to_dict() == simulate(scenario, 4).to_dict()
+    assert courses.possible_m.shape == courses.impulse_m_s.shape == (3, len(courses.steps))
+    for run in range(3):
+        record = fly_one(scenario, run)
+        _, misses = possible_misses(record)
+        greatest = np.hypot.reduce([np.abs(interval).max(axis=1) for interval in misses.values()])
+        stored = courses.possible_m[run]
+        greatest = greatest[: min(len(greatest) - 1, len(stored))]
+        np.testing.assert_array_equal(stored[: len(greatest)], greatest)
+        assert np.isnan(stored[len(greatest) :]).all()
+        given = [abs(step.impulse_m_s) for step in record.steps[: len(stored)]]
+        np.testing.assert_allclose(courses.impulse_m_s[run, : len(given)], given, rtol=1e-12)
+
+
+def test_courses_of_long_flights_keep_the_greatest_impulses(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("experiments.interception.course.MOST_STEPS", 40)
+    scenario = load_scenario("haiv-2013")
+    courses = Courses(scenario, 2)
+    assert len(courses.steps) <= 44
+    assert set(scenario.thruster.impulses_s) <= set(courses.before_arrival_s)
+    flown = simulate(scenario, 2, observe=courses.observe)
+    at = [courses.before_arrival_s.tolist().index(time_s) for time_s in scenario.thruster.impulses_s]
+    assert flown.burns_m_s is not None
+    np.testing.assert_allclose(courses.impulse_m_s[:, at], flown.burns_m_s, rtol=1e-12)
+    every = load_scenario("asteroid-1997-space")
+    courses = Courses(every, 1)
+    simulate(every, 1, observe=courses.observe)
+    impulses = [step.impulse_m_s for step in fly_one(every).steps]
+    assert courses.impulse_m_s.max() == pytest.approx(max(impulses), rel=1e-12)
+
+
+def test_the_corridor_has_quantiles_of_possible_misses_and_impulses() -> None:
+    scenario = load_scenario("haiv-2013")
+    courses = Courses(scenario, 3)
+    curve = Curve(1, NoiseKind.RANDOM, False, simulate(scenario, 3, observe=courses.observe))
+    figure = draw_corridor([curve, curve], [courses, courses])
+    left, right, left_impulse, _ = figure.axes
+    assert left.get_title() == "(a) random noise, 3 runs"
+    median, greatest = (np.asarray(line.get_xydata(), dtype=np.float64) for line in left.lines[:2])
+    np.testing.assert_allclose(median[:, 1], np.median(courses.possible_m, axis=0)[: len(median)])
+    np.testing.assert_allclose(greatest[:, 1], courses.possible_m.max(axis=0)[: len(greatest)])
+    assert left.get_ylim() == right.get_ylim()
+    assert left.get_xlim() == left_impulse.get_xlim()
+    assert legend(figure) == [
+        "possible miss: median",
+        "possible miss: greatest",
+        "impulse: median",
+        "greatest guaranteed miss Φ",
+        "body radius, 50 m",
+        "times of the schedule",
+    ]
 
 
 def test_long_flights_and_schedules_have_a_logarithmic_time_axis(records: list[Record]) -> None:
