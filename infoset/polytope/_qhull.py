@@ -34,6 +34,8 @@ _LEAST_RANK = 1e-11
 _ENTRIES = 4_000_000
 _APART_BY_ROUNDING = 1e-7
 _ON_PLANE = 1e-13
+_MOST_JOGGLED = 200
+"""Greatest number of joggled vertices. Their facets are simplices: 915 vertices in 8 dimensions have 3.7 million."""
 
 
 def hull_of_points(points: Floats, flat: float = FLAT) -> Description:
@@ -245,14 +247,17 @@ def _need_agreement(points: Floats, corners: Places, on_facets: Flags) -> None:
 
 
 def _surface(vertices: Floats) -> ConvexHull:
-    """Return the hull of vertices, of joggled ones if rounding of the merged facets stops Qhull."""
+    """Return the hull of vertices; if merged facets stop Qhull and the vertices are few, of joggled vertices."""
     try:
         return ConvexHull(vertices)
-    except QhullError:
+    except QhullError as error:
+        failed = error
+    if len(vertices) <= _MOST_JOGGLED:
         try:
             return ConvexHull(vertices, qhull_options=_OPTIONS[1])
         except QhullError as error:
-            raise UncertainHullError(f"rounding decides which of {len(vertices)} points are vertices") from error
+            failed = error
+    raise UncertainHullError(f"rounding decides which of {len(vertices)} points are vertices") from failed
 
 
 def _widest_gap(gaps: Floats) -> float:
