@@ -438,8 +438,8 @@ def _size_of(shape: Set) -> float:
     return float(np.abs(shape.vertices).max())
 
 
-def _finite(name: str, value: object) -> Floats:
-    numbers = real_values(name, value)  # type: ignore[arg-type]
+def _finite(name: str, value: ArrayLike) -> Floats:
+    numbers = real_values(name, value)
     if not np.isfinite(numbers).all():
         raise ValueError(f"{name} must be finite: got {shown(value)}")
     return numbers

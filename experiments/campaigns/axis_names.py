@@ -7,6 +7,9 @@ from experiments.common.display_units import split_unit
 SCALE = "scale"
 """Name, after the table of a sensor, of the factor of its error bounds."""
 
+_BEFORE_ARRIVAL = ("first_image_s", "last_image_s", "last_impulse_s")
+"""Times that count from the nominal arrival back."""
+
 
 def tied_keys(key: str) -> list[str]:
     """Return the keys of an axis: several if they have the same values, `a.one_m=b.two_m`."""
@@ -35,7 +38,7 @@ def _words(key: str) -> str:
     _, name, end = _parts(key)
     if name == SCALE:
         return "factor of the error bounds"
-    return f"{split_unit(name)[0]} {end}".strip()
+    return f"{split_unit(name)[0]} {'before arrival' if name in _BEFORE_ARRIVAL else end}".strip()
 
 
 def _parts(key: str) -> tuple[str, str, str]:

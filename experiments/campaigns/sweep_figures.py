@@ -86,10 +86,16 @@ _LINE: dict[str, Any] = {"color": INK, "linewidth": 1.3}
 _CLOSED_FORM: dict[str, Any] = {"color": "#2f6b3a", "linewidth": 1.3, "linestyle": (0, (5, 1.5))}
 """Lines on which the estimate and the closed form equal the bound."""
 _MOST_LEGEND_COLUMNS = 5
+_LINE_MM, _LETTER_MM = 3.6, 1.5
+"""Height of a line of an axis label, and width of a letter of a tick label."""
 _STRIP = 0.045
 """Height of the strip of decisions above a panel, as a fraction of the panel."""
-_BAR_AT, _NUMBER_AT = 0.2, 0.6
-"""Heights of the limit and of the number in the cells of a map, as fractions of a row."""
+_BAR_AT, _NUMBERS_AT = 0.2, (0.6, 0.5, 0.75, 0.35)
+"""Heights of the limit, and possible heights of the number, in the cells of a map, as fractions of a row."""
+_NUMBER_WIDTH, _NUMBER_HEIGHT = 0.7, 0.36
+"""Size of the number in a cell, as fractions of the cell."""
+_MOST_LETTERS = {"x": 52, "y": 36}
+"""Greatest number of letters of a line of an axis label."""
 _MM_PER_POINT = 25.4 / 72.0
 
 
@@ -289,8 +295,13 @@ def _maps(table: SweepTable, shown: Sequence[QuantileName], noise: str) -> Figur
     ]
     columns = min(2, 1 + len(quantiles))
     rows = -(-(1 + len(quantiles)) // columns)
-    figure = new_figure(height_mm=rows * _PANEL_MM + (rows - 1) * 21.0 + 35.0, width_mm=_COLUMN_MM * columns)
-    grid = place_axes(figure, rows, columns, margins_mm=(17.0, 17.0, 27.0, 8.0), gaps_mm=(36.0, 21.0))
+    up = table.axes[1]
+    letters = max(len(_tick_text(up, value)) for value in up.values)
+    left_mm = max(17.0, _LINE_MM * (_axis_label(up, "y").count("\n") + 1) + _LETTER_MM * letters + 3.0)
+    size_mm = rows * _PANEL_MM + (rows - 1) * 21.0 + 35.0, columns * (_COLUMN_MM - 17.0 + left_mm)
+    figure = new_figure(*size_mm)
+    margins_mm = (left_mm, 17.0, 27.0, 8.0)
+    grid = place_axes(figure, rows, columns, margins_mm=margins_mm, gaps_mm=(19.0 + left_mm, 21.0))
     first, *others = (axes for row in grid for axes in row)
     _decision_panel(first, table, noise)
     first.set_title(f"(a) {requirement_words(required)}; {noise} noise")
@@ -359,25 +370,48 @@ def _decision_panel(axes: Axes, table: SweepTable, noise: str) -> None:
     _scale(axes, across, "x")
     _scale(axes, up, "y")
     axes.grid(visible=False)
-    values = np.ma.MaskedArray(
-        [0.0 if verdict is None else verdict.value or 0.0 for verdict in verdicts],
-        mask=[verdict is None or verdict.value is None for verdict in verdicts],
-    ).reshape(shape)
-    _write_numbers(axes, across, up, values.T, lambda row, column: shown[column, row] == 0, _NUMBER_AT)
-    for text, decision in zip(axes.texts, shown.T.flat, strict=False):  # readable on the lines
-        ground = "white" if decision is np.ma.masked else DECISION_COLOURS[decisions[int(decision)]]
-        text.set_path_effects([Stroke(linewidth=1.4, foreground=ground), Normal()])
     for row, height in enumerate(_heights(up, _BAR_AT)):
         cells = [verdicts[column * shape[1] + row] for column in range(shape[0])]
         for limit in limits(across, cells, table.required):
             ends = [limit.lower, limit.upper]
             axes.plot(ends, [height, height], color="white", linewidth=3.2, solid_capstyle="butt", zorder=4.0)
             axes.plot(ends, [height, height], color=IMPULSE, linewidth=1.5, solid_capstyle="butt", zorder=4.5)
-    known = [verdict.value for verdict in verdicts if verdict is not None and verdict.value is not None]
-    for grid, look in ((values, _LINE), (_closed_form(table), _CLOSED_FORM)):
-        for line in bound_lines(across, up, grid, table.required, spans_decades(known)):
-            axes.plot(*line.T, zorder=3.5, **look)
+    values = np.ma.MaskedArray(
+        [0.0 if verdict is None else verdict.value or 0.0 for verdict in verdicts],
+        mask=[verdict is None or verdict.value is None for verdict in verdicts],
+    ).reshape(shape)
+    grids = [(_closed_form(table), _CLOSED_FORM)]
+    if {Decision.MET, Decision.NOT_MET} <= {verdict.decision for verdict in verdicts if verdict is not None}:
+        grids.append((values, _LINE))
+    halo = [Stroke(linewidth=2.6, foreground="white"), Normal()]
+    for grid, look in grids:
+        for line in bound_lines(across, up, grid, table.required, spans_decades(values.compressed().tolist())):
+            axes.plot(*line.T, zorder=3.5, path_effects=halo, **look)
+    _write_numbers(axes, across, up, values.T, lambda row, column: shown[column, row] == 0, _clear_heights(axes, table))
+    for text, decision in zip(axes.texts, shown.T.flat, strict=False):  # readable on the lines
+        ground = "white" if decision is np.ma.masked else DECISION_COLOURS[decisions[int(decision)]]
+        text.set_path_effects([Stroke(linewidth=1.6, foreground=ground), Normal()])
     separate_labels(axes)
+
+
+def _clear_heights(axes: Axes, table: SweepTable) -> Floats:
+    """Return heights at which numbers in the cells of a map cover little of its lines, shape (rows, columns)."""
+    across, up = table.axes
+    axes.set(xlim=axes.get_xlim(), ylim=axes.get_ylim())
+    lines = [axes.transData.transform(np.asarray(line.get_xydata())) for line in axes.lines]
+    parts = np.linspace(0.0, 1.0, 50)[:, None, None]
+    points = np.concatenate(
+        [((1.0 - parts) * line[:-1] + parts * line[1:]).reshape(-1, 2) for line in [np.zeros((1, 2)), *lines]]
+    )
+    heights = np.array([_heights(up, part) for part in _NUMBERS_AT])
+    middle = axes.transData.transform(
+        np.stack(np.broadcast_arrays(across.values, heights[:, :, None]), axis=-1).reshape(-1, 2)
+    )
+    cell = np.array(axes.get_window_extent().size) / (len(across.values), len(up.values))
+    size = 0.5 * cell * (_NUMBER_WIDTH, _NUMBER_HEIGHT)
+    covered = (np.abs(points - middle[:, None]) < size).all(axis=2).sum(axis=1)
+    best = covered.reshape(len(heights), len(up.values), len(across.values)).argmin(axis=0)
+    return np.asarray(heights[best, np.arange(len(up.values))[:, None]])
 
 
 def _closed_form(table: SweepTable) -> Grid:
@@ -401,7 +435,7 @@ def bound_lines(across: Axis, up: Axis, values: Grid, required: AnyRequirement, 
     x, y = (np.log(axis.values) if axis.scale == "log" else np.array(axis.values) for axis in (across, up))
     logarithmic = log_values and isinstance(required, Requirement)
     heights, bound = (np.ma.log(values), math.log(required.bound)) if logarithmic else (values, required.bound)
-    lines: list[Floats] = contour_generator(x=x, y=y, z=np.ma.MaskedArray(heights).T).lines(bound)  # type: ignore[assignment]
+    lines = map(np.asarray, contour_generator(x=x, y=y, z=np.ma.MaskedArray(heights).T).lines(bound))
     return [
         np.stack(
             [np.exp(line[:, k]) if axis.scale == "log" else line[:, k] for k, axis in enumerate((across, up))], axis=1
@@ -424,25 +458,32 @@ def _map_panel(figure: Figure, axes: Axes, table: SweepTable, noise: str, quanti
     _scale(axes, across, "x")
     _scale(axes, up, "y")
     axes.grid(visible=False)
-    _write_numbers(axes, across, up, values, lambda row, column: float(norm(float(values[row, column]))) > 0.48)
+    middle = np.broadcast_to(_heights(up, 0.5)[:, None], values.shape)
+    _write_numbers(axes, across, up, values, lambda row, column: float(norm(float(values[row, column]))) > 0.48, middle)
     separate_labels(axes)
     separate_labels(bar.ax)
 
 
-def _write_numbers(axes: Axes, across: Axis, up: Axis, values: Grid, is_dark: Any, part: float = 0.5) -> None:
-    """Write the values into the cells of a map, `_NO_VALUE` where they are not known, unless there are too many."""
+def _write_numbers(axes: Axes, across: Axis, up: Axis, values: Grid, is_dark: Any, heights: Floats) -> None:
+    """Write the values into the cells of a map, `_NO_VALUE` where they are not known, unless there are too many.
+
+    Parameters
+    ----------
+    heights : ndarray, shape (rows, columns)
+        Positions of the numbers on the vertical axis.
+    """
     if values.size > MOST_NUMBERS:
         return
     room_mm = width_mm(axes) / len(across.values)
     size = min(6.5, room_mm / _MM_PER_POINT / 2.6)
-    for row, height in enumerate(_heights(up, part)):
+    for row in range(len(up.values)):
         for column, x in enumerate(across.values):
             known = not np.ma.getmaskarray(values)[row, column]
             value = float(values[row, column]) if known else 0.0
             text = f"{value:.3g}" if value < 100.0 else f"{value:.0f}"
             axes.text(
                 x,
-                height,
+                heights[row, column],
                 text if known else _NO_VALUE,
                 ha="center",
                 va="center",
@@ -507,14 +548,25 @@ def _scale(axes: Axes, axis: Axis, which: str) -> None:
     if len(axis.values) <= _MOST_TICKS:
         one.set_major_locator(FixedLocator(axis.values))
         one.set_minor_locator(NullLocator())
-    power, digits = _power(axis), max(3, separating_digits(axis))
-    one.set_major_formatter(FuncFormatter(lambda tick, _: f"{float(f'{tick / 10.0**power:.{digits}g}'):.{digits}g}"))
+    one.set_major_formatter(FuncFormatter(lambda tick, _: _tick_text(axis, tick)))
     one.set_minor_formatter(NullFormatter())
     one.set_tick_params(length=2.0)
-    unit = unit_of(axis.key)
-    scaled = f"$10^{{{power}}}$ {unit}".strip() if power else unit
+    one.set_label_text(_axis_label(axis, which))
+
+
+def _axis_label(axis: Axis, which: str) -> str:
+    """Return the label of an axis with the power of ten of its tick labels, in lines."""
+    power, unit = _power(axis), unit_of(axis.key)
     name = key_label(axis.key).removesuffix(f", {unit}") if unit else key_label(axis.key)
-    one.set_label_text("\n".join(textwrap.wrap(f"{name}, {scaled}" if scaled else name, 52)))
+    letters = f"10{power}\N{NO-BREAK SPACE}{unit}" if power else unit
+    scaled = f"$10^{{{power}}}$ {unit}".strip() if power else unit
+    label = "\n".join(textwrap.wrap(f"{name}, {letters}" if letters else name, _MOST_LETTERS[which]))
+    return label.removesuffix(letters) + scaled
+
+
+def _tick_text(axis: Axis, tick: float) -> str:
+    digits = max(3, separating_digits(axis))
+    return f"{float(f'{tick / 10.0 ** _power(axis):.{digits}g}'):.{digits}g}"
 
 
 def _power(axis: Axis) -> int:

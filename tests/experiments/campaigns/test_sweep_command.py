@@ -608,6 +608,8 @@ def test_keys_as_labels() -> None:
     assert key_label("angle_sensor.error_at_zero_range_rad") == "angle sensor: error at zero range, rad"
     assert key_label("uncertainty.vx_km_s.least") == "uncertainty: vx least, km/s"
     assert key_label("information_set.sections") == "information set: sections"
+    assert key_label("thruster.last_impulse_s") == "thruster: last impulse before arrival, s"
+    assert key_label("angle_sensor.first_image_s") == "angle sensor: first image before arrival, s"
     units = {"sun.gravitational_parameter_km3_s2": "km³/s²", "a.b_m_s2": "m/s²", "a.error_rad_s": "rad/s", "a.b_s": "s"}
     assert {key: unit_of(key) for key in units} == units
 
@@ -706,6 +708,17 @@ def made_table(axes: Sequence[Axis], required: Requirement | HitRequirement, val
             Axis("nominal.range_km", tuple(np.linspace(5701.31, 5901.39, 8))),
             Axis("thruster.budget_m_s", (1.0, 1.01, 2.0, 2000.0)),
         ),
+        (
+            Axis("thruster.last_impulse_s", (30.0, 900.0)),
+            Axis("angle_sensor.error_at_zero_range_rad=angle_sensor.error_at_nominal_range_rad", (1e-6, 1.1e-6, 1e-3)),
+        ),
+        (
+            Axis("thruster.last_impulse_s", (30.0, 900.0)),
+            Axis(
+                "angle_sensor.error_at_nominal_range_rad=rate_sensor.error_rad_s=guidance.closing_speed_km_s",
+                (1e-6, 1.1e-6),
+            ),
+        ),
     ],
 )
 def test_labels_never_touch(axes: tuple[Axis, ...], required: Requirement | HitRequirement) -> None:
@@ -734,6 +747,30 @@ def test_interpolated_limits_are_marked_on_the_drawn_line(
     for mark in marks:
         ((x, y),) = axes.transData.transform(np.column_stack(mark.get_data()))
         assert np.interp(x, *on_paper.T) == pytest.approx(y, abs=1e-6)
+
+
+def test_numbers_of_a_map_stay_off_its_lines_and_undecided_cells_have_no_limit() -> None:
+    axes = (
+        Axis("angle_sensor.pixel_error_rad", tuple(np.linspace(1e-6, 5e-5, 8).tolist())),
+        Axis("thruster.last_impulse_s", tuple(np.linspace(30.0, 900.0, 8).tolist())),
+    )
+    required = Requirement(QuantileName("guaranteed_miss_m", 0.99), 25.0)
+    table = made_table(axes, required, lambda error_rad, time_s: 0.05 * time_s + 1e5 * error_rad)
+    figure = draw_sweep(table, SHOWN, "game")
+    figure.draw_without_rendering()
+    first = figure.axes[0]
+    (line,) = [line for line in first.lines if line.get_color() == INK]
+    vertices = first.transData.transform(np.asarray(line.get_xydata(), dtype=np.float64))
+    x = np.linspace(vertices[0, 0], vertices[-1, 0], 2000)
+    points = np.column_stack([x, np.interp(x, *vertices[vertices[:, 0].argsort()].T)])
+    crossed = [
+        text.get_text() for text in first.texts if text.get_window_extent().shrunk(1.0, 0.6).count_contains(points)
+    ]
+    assert len(crossed) <= 1, crossed
+    undecided = [{"game": replace(each["game"], decision=OPEN)} for each in table.verdicts]
+    few = draw_sweep(replace(table, verdicts=tuple(undecided)), SHOWN, "game")
+    assert not [line for line in few.axes[0].lines if line.get_color() == INK]
+    assert [text.get_text() for text in few.legends[0].get_texts()] == ["undecided"]
 
 
 @pytest.mark.parametrize("scale", ["linear", "log"])
