@@ -189,8 +189,13 @@ def real_values(name: str, value: ArrayLike) -> NDArray[np.float64]:
     ------
     TypeError
         If it is masked, complex, or does not hold numbers.
+    ValueError
+        If its rows have different lengths.
     """
-    values = value if isinstance(value, np.ndarray) else np.asarray(value)
+    try:
+        values = value if isinstance(value, np.ndarray) else np.asarray(value)
+    except ValueError:
+        raise ValueError(f"{name} must be an array, its rows of equal length: got {shown(value)}") from None
     if isinstance(values, np.ma.MaskedArray):
         raise TypeError(f"{name} must be real numbers, not masked: got {shown(value)}")
     if values.dtype.kind not in "fiu":

@@ -233,8 +233,8 @@ def corner(points: Points, count: int) -> tuple[int, int, float]:
     turns : int
         1 for a counter-clockwise ring, -1 for a clockwise one, 0 if all vertices are on one line.
     reflex : int
-        The first vertex at which the ring turns the other way or back, or from which it goes around a second time; -1
-        if the ring is convex.
+        The first vertex at which the ring turns the other way or back; without one, the first from which it goes
+        around a second time; -1 if the ring is convex.
     depth : float
         Greatest distance by which such a vertex must move, to the line through its neighbours or to one of them,
         relative to the largest coordinates.
@@ -255,7 +255,7 @@ def corner(points: Points, count: int) -> tuple[int, int, float]:
     if flat:
         return 0, -1, 0.0
     turns = 1 if area > 0.0 else -1
-    reflex, depth, highest, second = -1, 0.0, 0.0, 0.0
+    reflex, around, depth, highest, second = -1, -1, 0.0, 0.0, 0.0
     for j in range(count):
         i, k = (j - 1) % count, (j + 1) % count
         ax, ay, bx, by = points[i, 0], points[i, 1], points[j, 0], points[j, 1]
@@ -264,15 +264,12 @@ def corner(points: Points, count: int) -> tuple[int, int, float]:
         before = max(abs(bx - ax) / max(size_x, SMALLEST), abs(by - ay) / max(size_y, SMALLEST))
         after = max(abs(cx - bx) / max(size_x, SMALLEST), abs(cy - by) / max(size_y, SMALLEST))
         shorter = min(before, after)
-        again = False
         if (by > ay or (by == ay and bx > ax)) and (cy < by or (cy == by and cx < bx)):  # a peak
-            again = highest > 0.0
+            around = j if around < 0.0 < highest else around
             second = max(second, min(highest, shorter))
             highest = max(highest, shorter)
-        if turn < 0.0 or again or (turn == 0.0 and (bx - ax) * (cx - bx) + (by - ay) * (cy - by) < 0.0):
-            if reflex < 0:
-                reflex = j
+        if turn < 0.0 or (turn == 0.0 and (bx - ax) * (cx - bx) + (by - ay) * (cy - by) < 0.0):
+            reflex = j if reflex < 0 else reflex
             reach = abs(cx - ax) * size_y + abs(cy - ay) * size_x
-            if not again:
-                depth = max(depth, min(shorter, -turn / reach) if turn < 0.0 < reach else shorter)
-    return turns, reflex, max(depth, second)
+            depth = max(depth, min(shorter, -turn / reach) if turn < 0.0 < reach else shorter)
+    return turns, reflex if reflex >= 0 else around, max(depth, second)

@@ -9,8 +9,8 @@ from infoset.polytope._affine_hull import (
     null_space_basis,
     relative_interior,
 )
-from infoset.polytope.operations import cut, intersection, linear_image, minkowski_sum, projection, shadow
-from infoset.polytope.polytope import Polytope, product
+from infoset.polytope.operations import cut, intersection, linear_image, minkowski_sum, product, projection, shadow
+from infoset.polytope.polytope import Polytope
 
 __all__ = [
     "HIGHS",

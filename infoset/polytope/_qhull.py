@@ -96,8 +96,11 @@ def _hull(inner: Floats) -> tuple[Floats, Floats, Floats]:
     raise failed
 
 
-def _corners(rows: Floats, limits: Floats, centre: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return vertices and facets of a bounded set with an interior."""
+def _corners(rows: Floats, limits: Floats, centre: Floats, again: int = 3) -> tuple[Floats, Floats, Floats]:
+    """Return vertices and facets of a bounded set with an interior.
+
+    If the vertices of a long set were too inexact to find coordinates in which it is round, they are found `again`.
+    """
     if rows.shape[1] == 1:
         least = float((limits[rows[:, 0] < 0] / rows[rows[:, 0] < 0, 0]).max())
         most = float((limits[rows[:, 0] > 0] / rows[rows[:, 0] > 0, 0]).min())
@@ -115,7 +118,12 @@ def _corners(rows: Floats, limits: Floats, centre: Floats) -> tuple[Floats, Floa
         frame = Frame(frame.centre, np.eye(rows.shape[1]), np.full(rows.shape[1], scale), np.zeros((rows.shape[1], 0)))
         inner_rows, inner_limits = rows, (limits - rows @ frame.centre) / scale
         inner = frame.inward(first)
-    points, sides, ends = essential(_met(inner, inner_rows, inner_limits), inner_rows, inner_limits)
+    try:
+        points, sides, ends = essential(_met(inner, inner_rows, inner_limits), inner_rows, inner_limits)
+    except UncertainHullError:
+        if not again:
+            raise
+        points, sides, ends = _corners(inner_rows, inner_limits, chebyshev_ball(inner_rows, inner_limits)[0], again - 1)
     return (frame.outward(points), *frame.rows_outward(sides, ends))
 
 

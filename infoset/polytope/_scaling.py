@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from infoset.polytope._affine_hull import FLAT, HIGHS
-from infoset.polytope._qhull import Description
+from infoset.polytope._affine_hull import (
+    FLAT,
+    HIGHS,
+    EmptyPolytopeError,
+    UnboundedPolytopeError,
+    UncertainHullError,
+)
+from infoset.polytope._qhull import Description, intersection_of_halfspaces
 
 Floats = NDArray[np.float64]
 
@@ -104,3 +112,36 @@ def stretched(description: Description, scale: Floats) -> Description:
         rows = rows - rows @ across.T @ across
     lengths = np.linalg.norm(rows, axis=1)
     return vertices * scale, rows / lengths[:, None], offsets / lengths, across, levels
+
+
+def described(rows: Floats, limits: Floats, across: Floats, levels: Floats, *, bounded: bool) -> Description:
+    """Return both representations as `intersection_of_halfspaces`, in scaled coordinates if their sizes differ much.
+
+    Raises
+    ------
+    EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError
+        If the set is empty, is unbounded, or depends on rounding.
+    """
+    result: Description | None = None
+    failure: ValueError | ArithmeticError | None = None
+    try:
+        result = intersection_of_halfspaces(rows, limits, across, levels, bounded=bounded)
+        if not len(result[3]):
+            return result
+    except (EmptyPolytopeError, UnboundedPolytopeError, UncertainHullError) as error:
+        failure = error
+    known = scale_of_constraints(rows, limits, across, levels)
+    if known is not None:
+        scale, lower, upper = known
+        with contextlib.suppress(EmptyPolytopeError, UncertainHullError):
+            near, ends = without_far(rows * scale, limits, lower / scale, upper / scale)
+            return stretched(intersection_of_halfspaces(near, ends, across * scale, levels, bounded=True), scale)
+        # The bounds exist, so the set is not emptier than their rounding.
+        if isinstance(failure, EmptyPolytopeError) and failure.relaxation > 1e-6 * np.abs(known[1:]).max():
+            failure = UncertainHullError(
+                "the half-spaces have common points, but their sizes differ too much for a hull: scale the coordinates"
+            )
+    if result is None:
+        assert failure is not None
+        raise failure
+    return result

@@ -7,7 +7,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
 
+from infoset._set_arguments import need_set
 from infoset.polytope.polytope import Polytope
 
 Floats = NDArray[np.float64]
@@ -96,3 +98,26 @@ def shadow(
             return hull
         points = np.vstack([hull.vertices, new])
     raise ArithmeticError("the projection did not end")
+
+
+def product(*polytopes: Polytope) -> Polytope:
+    """Return the Cartesian product of `polytopes`, with v1 v2 ... vertices and f1 + f2 + ... facets.
+
+    Raises
+    ------
+    ValueError
+        If there is no polytope.
+    """
+    if not [need_set("each factor", factor, Polytope) for factor in polytopes]:
+        raise ValueError("a product needs at least one polytope")
+    vertices = polytopes[0].vertices
+    for factor in polytopes[1:]:
+        left = np.repeat(vertices, len(factor.vertices), axis=0)
+        vertices = np.hstack([left, np.tile(factor.vertices, (len(vertices), 1))])
+    return Polytope(
+        vertices,
+        block_diag(*[factor.normals for factor in polytopes]),
+        np.concatenate([factor.offsets for factor in polytopes]),
+        block_diag(*[factor.across for factor in polytopes]),
+        np.concatenate([factor.levels for factor in polytopes]),
+    )

@@ -2,43 +2,38 @@
 
 from __future__ import annotations
 
-import contextlib
-import itertools
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import block_diag
-from scipy.spatial import ConvexHull, Delaunay
 from scipy.spatial.distance import cdist
 
-from infoset.polytope._affine_hull import (
-    FLAT,
-    EmptyPolytopeError,
-    UnboundedPolytopeError,
-    UncertainHullError,
-    chebyshev_ball,
-    frame_of,
+from infoset._set_arguments import (
+    axis_numbers,
+    bound_values,
+    finite_values,
+    need_plot_axes,
+    need_set,
+    need_tolerance,
+    random_source,
 )
+from infoset.limits import NOT_NEGATIVE, Limits, real_values
+from infoset.polytope._measures import largest_ball, simplices_of, volume_of
 from infoset.polytope._nearest import nearest_difference
-from infoset.polytope._qhull import hull_of_points, intersection_of_halfspaces, together
-from infoset.polytope._scaling import scale_of, scale_of_box, scale_of_constraints, stretched, tightened, without_far
+from infoset.polytope._scaling import scale_of, scale_of_box, stretched, tightened, without_far
+from infoset.polytope.arrays import PolytopeArrays
 from infoset.renamed import renamed
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_TOGETHER = 1e-7
 _FLAT_WIDTH = 1e-12
 _EPS = float(np.finfo(np.float64).eps)
 
 
-@dataclass(frozen=True, eq=False)
-class Polytope:
+class Polytope(PolytopeArrays):
     """A convex polytope; it may be flat, a segment, a point, or empty.
 
     It is {x: normals x <= offsets, across x = levels}, and the hull of its `vertices`, shape (v, n), without redundant
@@ -51,223 +46,16 @@ class Polytope:
     length, with which a point satisfies them, if it is known. Operations on it give the empty set; points such as its
     centroid do not exist, and an EmptyPolytopeError is raised.
 
-    Operations are exact up to rounding: about 1e-12 of the size of the set, and 1e-9 at most. Their cost is that of a
-    convex hull: O(k log k) for k points or half-spaces in up to three dimensions, O(k^(n/2)) at worst in n.
+    All arguments are checked: numbers are finite (TypeError if they are not real numbers), shapes and spaces fit
+    (ValueError). Operations are exact up to rounding: about 1e-12 of the size of the set, and 1e-9 at most. Their cost
+    is that of a convex hull: O(k log k) for k points or half-spaces in up to three dimensions, O(k^(n/2)) at worst in
+    n.
 
     Operators: `P & Q` (intersection), `P + Q` (Minkowski sum), `P + vector` (translation), `A @ P` (linear map),
     `point in P`, `P <= Q` (subset, to rounding).
     """
 
-    vertices: Floats
-    normals: Floats
-    offsets: Floats
-    across: Floats
-    levels: Floats
-    relaxation: float = 0.0
-
     __array_ufunc__ = None
-
-    @classmethod
-    def from_vertices(cls, points: ArrayLike, flat: float = FLAT) -> Polytope:
-        """Return the convex hull of `points`, shape (k, n), at least one.
-
-        `flat` is the relative thickness below which a set counts as flat: greater for points that are known to fewer
-        digits. The affine hull first, then Qhull in coordinates of it in which the set is round, then a check that
-        facets and vertices agree. Qhull takes O(k log k) for n to 3, O(k^(n/2)) beyond at worst.
-
-        Raises
-        ------
-        ValueError
-            If there is no point, or one is not finite.
-        UncertainHullError
-            If rounding decides which points are vertices.
-        """
-        array = np.asarray(points, dtype=float)
-        if array.ndim != 2 or not len(array) or not array.shape[1]:
-            raise ValueError("points must have the shape (k, n), with k and n at least 1")
-        if not np.isfinite(array).all():
-            raise ValueError("points must be finite")
-        scale = scale_of(array)
-        return cls(
-            *hull_of_points(array, flat) if scale is None else stretched(hull_of_points(array / scale, flat), scale)
-        )
-
-    @classmethod
-    def from_constraints(
-        cls,
-        normals: ArrayLike,
-        offsets: ArrayLike,
-        across: ArrayLike | None = None,
-        levels: ArrayLike | None = None,
-        *,
-        bounded: bool = False,
-    ) -> Polytope:
-        """Return {x: normals x <= offsets, across x = levels}, of shapes (m, n), (m,), (k, n) and (k,); it may be
-        empty.
-
-        A set that is known to be `bounded` saves a linear program. Equations hidden in the half-spaces are found first,
-        by linear programs (HiGHS); then Qhull intersects in the affine hull, around the Chebyshev centre.
-
-        Raises
-        ------
-        ValueError
-            If shapes do not fit, or a number is not finite.
-        UnboundedPolytopeError
-            If the set is unbounded; it holds a direction.
-        UncertainHullError
-            If rounding decides which points are vertices.
-        """
-        rows, limits = np.asarray(normals, dtype=float), np.asarray(offsets, dtype=float)
-        if rows.ndim != 2 or limits.shape != (len(rows),) or not rows.shape[1]:
-            raise ValueError("half-spaces must have normals of shape (m, n) and offsets of shape (m,)")
-        flat = np.zeros((0, rows.shape[1])) if across is None else np.asarray(across, dtype=float)
-        heights = np.zeros(0) if levels is None else np.asarray(levels, dtype=float)
-        if flat.ndim != 2 or flat.shape[1] != rows.shape[1] or heights.shape != (len(flat),):
-            raise ValueError("equations must have rows of shape (k, n) and levels of shape (k,)")
-        if not all(np.isfinite(array).all() for array in (rows, limits, flat, heights)):
-            raise ValueError("half-spaces and equations must be finite")
-        failure: ValueError | ArithmeticError | None = None
-        try:
-            polytope = cls(*intersection_of_halfspaces(rows, limits, flat, heights, bounded=bounded))
-        except EmptyPolytopeError as error:
-            polytope = cls.empty(rows.shape[1], error.relaxation)
-        except (UnboundedPolytopeError, UncertainHullError) as error:
-            polytope, failure = cls.empty(rows.shape[1]), error
-        if polytope.dimension < polytope.space:
-            known = scale_of_constraints(rows, limits, flat, heights)
-            with contextlib.suppress(EmptyPolytopeError, UncertainHullError):
-                if known is not None:
-                    scale, lower, upper = known
-                    near, ends = without_far(rows * scale, limits, lower / scale, upper / scale)
-                    inner = intersection_of_halfspaces(near, ends, flat * scale, heights, bounded=True)
-                    return cls(*stretched(inner, scale))
-            # The bounds exist, so the set is not emptier than their rounding.
-            if known is not None and failure is None and polytope.relaxation > 1e-6 * np.abs(known[1:]).max():
-                failure = UncertainHullError(
-                    "the half-spaces have common points, but their sizes differ too much for a hull: scale the "
-                    "coordinates"
-                )
-        if failure is not None:
-            raise failure
-        return polytope
-
-    @classmethod
-    def empty(cls, space: int, relaxation: float = 0.0) -> Polytope:
-        """Return the empty set of R^n, n = `space`, with the `relaxation` of its constraints if it is known."""
-        return cls(
-            np.zeros((0, space)), np.zeros((1, space)), -np.ones(1), np.zeros((0, space)), np.zeros(0), relaxation
-        )
-
-    @classmethod
-    def from_box(cls, lower: ArrayLike, upper: ArrayLike) -> Polytope:
-        """Return {x: lower <= x <= upper}, flat across the axes along which `lower` and `upper`, shape (n,), are
-        equal. Exact.
-
-        Raises
-        ------
-        ValueError
-            If lower exceeds upper somewhere, or a number is not finite.
-        """
-        least, most = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
-        if least.shape != most.shape or least.ndim != 1 or not len(least) or not np.isfinite([least, most]).all():
-            raise ValueError("lower and upper must be finite, of the same shape (n,)")
-        if (least > most).any():
-            raise ValueError(
-                f"the box is empty: its lower end exceeds the upper one by {float((least - most).max()):g}"
-            )
-        unit, wide = np.eye(len(least)), least < most
-        corners = list(itertools.product(*(dict.fromkeys(pair) for pair in zip(least, most, strict=True))))
-        return cls(
-            np.array(corners),
-            np.vstack([unit[wide], -unit[wide]]),
-            np.concatenate([most[wide], -least[wide]]),
-            unit[~wide],
-            most[~wide],
-        )
-
-    @classmethod
-    def from_ball(cls, centre: ArrayLike, radius: float, *, outer: bool = True) -> Polytope:
-        """Return a polytope around the ball with `centre`, shape (n,), and `radius`, or in it.
-
-        Its facets, or its vertices if not `outer`, are in the 3^n - 1 directions whose components are in ratios of -1,
-        0 and 1: it extends beyond the ball, or stays inside it, by the factor 1.09 in two dimensions, 1.14 in three
-        and 1.23 in six at most.
-
-        Raises
-        ------
-        ValueError
-            If the radius is negative or a number is not finite.
-        """
-        middle = np.asarray(centre, dtype=float)
-        if middle.ndim != 1 or not np.isfinite(middle).all() or not 0.0 <= radius < np.inf:
-            raise ValueError("centre must be finite, of shape (n,), and radius finite and not negative")
-        rows = np.array([row for row in itertools.product((-1.0, 0.0, 1.0), repeat=len(middle)) if any(row)])
-        rows /= np.linalg.norm(rows, axis=1)[:, None]
-        if not outer or radius == 0.0:
-            return cls.from_vertices(middle + radius * rows)
-        return cls.from_constraints(rows, np.full(len(rows), radius), bounded=True).translate(middle)
-
-    @classmethod
-    def from_zonotope(cls, centre: ArrayLike, generators: ArrayLike) -> Polytope:
-        """Return {centre + sum of z_i generators[i]: -1 <= z_i <= 1}; `generators`, shape (g, n), has a row for each.
-
-        One Minkowski sum for each generator: O(g^(n-1)) vertices.
-
-        Raises
-        ------
-        ValueError
-            If shapes do not fit or a number is not finite.
-        """
-        middle = np.asarray(centre, dtype=float)
-        rows = np.asarray(generators, dtype=float)
-        rows = rows.reshape(0, *middle.shape) if not rows.size else rows
-        if middle.ndim != 1 or rows.ndim != 2 or rows.shape[1] != len(middle):
-            raise ValueError(
-                f"centre of shape (n,) and generators of shape (g, n) are needed: got {middle.shape} and {rows.shape}"
-            )
-        zonotope = cls.from_vertices(middle[None, :])
-        for row in rows:
-            zonotope = cls.from_vertices(np.vstack([zonotope.vertices - row, zonotope.vertices + row]))
-        return zonotope
-
-    @property
-    def space(self) -> int:
-        """Dimension n of the space."""
-        return int(self.vertices.shape[1])
-
-    @property
-    def dimension(self) -> int:
-        """Dimension of the affine hull; -1 for the empty set."""
-        return int(self.space - len(self.across)) if len(self.vertices) else -1
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether the set is empty."""
-        return not len(self.vertices)
-
-    def needed(self) -> Polytope:
-        """Return the set itself.
-
-        Raises
-        ------
-        EmptyPolytopeError
-            If it is empty; the error has the least relaxation of the constraints.
-        """
-        if self.is_empty:
-            raise EmptyPolytopeError(self.relaxation)
-        return self
-
-    def __repr__(self) -> str:
-        if self.is_empty:
-            return f"<empty polytope in R^{self.space}>"
-        return (
-            f"<polytope of dimension {self.dimension} in R^{self.space}: "
-            f"{len(self.vertices)} vertices, {len(self.normals)} facets>"
-        )
-
-    def essential_vertices(self) -> int:
-        """Return the number of vertices; those within 1e-7 of each other in every coordinate count once."""
-        return int(together(self.vertices, _TOGETHER).max()) + 1
 
     # Sets -----------------------------------------------------------------------------------------------------------
 
@@ -281,22 +69,21 @@ class Polytope:
 
         The hull of the images of the vertices, each rounded n + 1 times.
         """
-        rows = np.asarray(matrix, dtype=float)
+        rows = finite_values("matrix", matrix, "m", self.space)
+        moved = self._shift(offset, len(rows))
         if self.is_empty:
             return self.empty(len(rows), self.relaxation)
-        return self.from_vertices(self.vertices @ rows.T + np.asarray(offset, dtype=float))
+        return self.from_vertices(self.vertices @ rows.T + moved)
+
+    @staticmethod
+    def _shift(offset: ArrayLike, space: int) -> Floats:
+        """Return an offset, shape (space,), from such an array or from one number for all coordinates."""
+        shift = real_values("offset", offset)
+        return np.broadcast_to(finite_values("offset", shift, *[space] * min(shift.ndim, 1)), (space,))
 
     def translate(self, offset: ArrayLike) -> Polytope:
-        """Return the set moved by an offset, shape (n,). O((v + f) n): no hull is needed.
-
-        Raises
-        ------
-        ValueError
-            If the offset is not finite or has another shape.
-        """
-        by = np.asarray(offset, dtype=float)
-        if by.shape != (self.space,) or not np.isfinite(by).all():
-            raise ValueError(f"offset must be finite, of shape ({self.space},): got the shape {by.shape}")
+        """Return the set moved by an offset, shape (n,). O((v + f) n): no hull is needed."""
+        by = finite_values("offset", offset, self.space)
         if self.is_empty:
             return self
         offsets, levels = self.offsets + self.normals @ by, self.levels + self.across @ by
@@ -305,13 +92,9 @@ class Polytope:
     def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> Polytope:
         """Return {x in R^m: matrix x + offset in the set}, with a matrix of shape (n, m): its facets, mapped.
 
-        Raises
-        ------
-        UnboundedPolytopeError
-            If the preimage is unbounded: the matrix has a null space.
+        An UnboundedPolytopeError is raised if the preimage is unbounded: the matrix has a null space.
         """
-        rows = np.asarray(matrix, dtype=float)
-        moved = np.broadcast_to(np.asarray(offset, dtype=float), (self.space,))
+        rows, moved = finite_values("matrix", matrix, self.space, "m"), self._shift(offset, self.space)
         if self.is_empty:
             return self.empty(rows.shape[1], self.relaxation)
         offsets, levels = self.offsets - self.normals @ moved, self.levels - self.across @ moved
@@ -319,6 +102,7 @@ class Polytope:
 
     def minkowski_sum(self, other: Polytope) -> Polytope:
         """Return {x + y: x in the set, y in the other}, the hull of all v1 v2 sums of two vertices."""
+        self._need_other(other)
         if self.is_empty or other.is_empty:
             return self if self.is_empty else other
         sums = self.vertices[:, None, :] + other.vertices[None, :, :]
@@ -332,6 +116,7 @@ class Polytope:
         ValueError
             If the other set is empty and this one is not: every point would satisfy the condition.
         """
+        self._need_other(other)
         if self.is_empty:
             return self
         if other.is_empty:
@@ -348,7 +133,7 @@ class Polytope:
 
     def intersection(self, *others: Polytope) -> Polytope:
         """Return the intersection with one or more polytopes, from the facets of all."""
-        sets = (self, *others)
+        sets = (self, *map(self._need_other, others))
         for one in sets:
             if one.is_empty:
                 return one
@@ -378,7 +163,7 @@ class Polytope:
 
     def convex_hull(self, *others: Polytope) -> Polytope:
         """Return the convex hull of the union with one or more polytopes."""
-        points = np.vstack([self.vertices, *(one.vertices for one in others)])
+        points = np.vstack([self.vertices, *(self._need_other(one).vertices for one in others)])
         return self.from_vertices(points) if len(points) else self
 
     def cut(
@@ -401,18 +186,14 @@ class Polytope:
         slack_ulp : float
             Each strip is wider on both sides by this number of ulp of the products in normals x: a point that
             satisfies the bounds up to rounding is not lost.
-
-        Raises
-        ------
-        ValueError
-            If a normal is not finite or of another length, or a bound is NaN.
         """
-        rows = np.atleast_2d(np.asarray(normals, dtype=float))
-        least, most = np.broadcast_to(lower, len(rows)), np.broadcast_to(upper, len(rows))
-        if rows.shape[1:] != (self.space,) or not np.isfinite(rows).all() or np.isnan([least, most]).any():
-            raise ValueError(
-                f"normals must be finite, of shape ({self.space},) or (m, {self.space}), and bounds not NaN"
-            )
+        rows = real_values("normals", normals)
+        rows = np.atleast_2d(finite_values("normals", rows, *["m"] * (rows.ndim > 1), self.space))
+        least, most = (
+            np.broadcast_to(bound_values(name, bound, (), (len(rows),)), len(rows))
+            for name, bound in (("lower", lower), ("upper", upper))
+        )
+        NOT_NEGATIVE.need("slack_ulp", slack_ulp)
         if self.is_empty:
             return self
         wider = slack_ulp * _EPS * (np.abs(rows) @ np.abs(self.vertices).max(axis=0))
@@ -430,29 +211,26 @@ class Polytope:
             *tightened(rows[cuts], limits[cuts], *self.bounding_box()),
         )
 
-    def project(self, axes: Sequence[int]) -> Polytope:
-        """Return the projection on some `axes`, in a space of as many dimensions."""
-        return self.affine_map(np.eye(self.space)[list(axes)])
+    def project(self, axes: ArrayLike) -> Polytope:
+        """Return the projection on `axes`, an integer or a sequence of integers, as a set of as many dimensions."""
+        return self.affine_map(np.eye(self.space)[axis_numbers(axes, self.space, self.space)])
 
-    def slice(self, axes: Sequence[int], values: ArrayLike) -> Polytope:
-        """Return the set of the other coordinates where the coordinates `axes` have some `values`.
+    def slice(self, axes: ArrayLike, values: ArrayLike) -> Polytope:
+        """Return the set of the other coordinates where the coordinates `axes`, not all, have some `values`.
 
-        Raises
-        ------
-        ValueError
-            If an axis does not exist, or none is left.
+        `axes` is an integer or a sequence of integers; `values` is a number, or an array with one for each of them.
         """
-        if not set(axes) < set(range(self.space)):
-            raise ValueError(f"axes must be some of the numbers from 0 to {self.space - 1}, not all: got {list(axes)}")
-        rest = [axis for axis in range(self.space) if axis not in axes]
+        numbers = axis_numbers(axes, self.space, self.space - 1)
+        fixed = finite_values("values", values, *[len(numbers)] * min(np.ndim(values), 1))
+        rest = np.delete(np.arange(self.space), numbers)
         if self.is_empty:
             return self.empty(len(rest), self.relaxation)
-        fixed = np.broadcast_to(np.asarray(values, dtype=float), (len(axes),))
+        point = np.broadcast_to(fixed, len(numbers))
         return self.from_constraints(
             self.normals[:, rest],
-            self.offsets - self.normals[:, list(axes)] @ fixed,
+            self.offsets - self.normals[:, numbers] @ point,
             self.across[:, rest],
-            self.levels - self.across[:, list(axes)] @ fixed,
+            self.levels - self.across[:, numbers] @ point,
             bounded=True,
         )
 
@@ -461,14 +239,8 @@ class Polytope:
 
         It starts with the bounding box. Then it is cut by the facet of the set beyond which a vertex is farthest,
         until it has `cap` facets: one intersection for each.
-
-        Raises
-        ------
-        ValueError
-            If `cap` is less than 2n.
         """
-        if cap < 2 * self.space:
-            raise ValueError(f"cap must be at least {2 * self.space}: got {cap}")
+        Limits(least=2 * self.space, whole=True).need("cap", cap)
         if self.is_empty or len(self.normals) <= cap:
             return self
         outer = self.from_box(*self.bounding_box())
@@ -482,6 +254,12 @@ class Polytope:
                 break
             outer = tighter
         return outer
+
+    def _need_other(self, other: Polytope) -> Polytope:
+        """Return another polytope; it must be in the same space."""
+        if need_set("other", other, Polytope).space != self.space:
+            raise ValueError(f"other must be a polytope in R^{self.space}, as this one: got {other!r}")
+        return other
 
     # Measures ---------------------------------------------------------------------------------------------------------
 
@@ -498,11 +276,13 @@ class Polytope:
 
         O(v n).
         """
-        return np.asarray((np.asarray(directions, dtype=float) @ self.vertices.T).max(axis=-1, initial=-np.inf))
+        rows = finite_values("directions", directions, "...", self.space)
+        return np.asarray((rows @ self.vertices.T).max(axis=-1, initial=-np.inf))
 
     def support_vector(self, direction: ArrayLike) -> Floats:
         """Return a vertex farthest along a `direction`, both of shape (n,). O(v n)."""
-        heights = self.needed().vertices @ np.asarray(direction, dtype=float)
+        row = finite_values("direction", direction, self.space)
+        heights = self.needed().vertices @ row
         return np.asarray(self.vertices[int(heights.argmax())])
 
     @cached_property
@@ -524,7 +304,7 @@ class Polytope:
         It has shape (...), and is at most 0 inside, also for the vertices: the rounding of a scalar product, and of the
         representation (distances of vertices beyond facets), is subtracted. Infinite for the empty set.
         """
-        x = np.asarray(points, dtype=float)
+        x = finite_values("points", points, "...", self.space)
         if self.is_empty:
             return np.full(x.shape[:-1], np.inf)
         reach = (self.space + 2) * _EPS * np.maximum(np.abs(x), np.abs(self.vertices).max(axis=0))
@@ -542,14 +322,14 @@ class Polytope:
 
         O(f n).
         """
-        return np.asarray(self.excess(points) <= tolerance)
+        return np.asarray(self.excess(points) <= need_tolerance(tolerance))
 
     def is_subset(self, other: Polytope, tolerance: float = 0.0) -> bool:
         """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of its facets.
 
         O(v f n).
         """
-        return bool(other.contains(self.vertices, tolerance).all())
+        return bool(self._need_other(other).contains(self.vertices, tolerance).all())
 
     def equals(self, other: Polytope, tolerance: float = 0.0) -> bool:
         """Return whether each set is a subset of the other one, with the tolerance of `is_subset`."""
@@ -561,36 +341,21 @@ class Polytope:
 
     def volume(self) -> float:
         """Return the volume within the affine hull, of its dimension; 1 for a point, 0 for the empty set."""
-        if self.is_empty:
-            return 0.0
-        stretch = self._stretch
-        if stretch is not None:
-            return float(np.prod(stretch)) * Polytope.from_vertices(self.vertices / stretch).volume()
-        frame = frame_of(self.vertices)
-        scale = float(np.prod(frame.extents))
-        if frame.dimension < 2:
-            return scale * 2.0 if frame.dimension else 1.0
-        return float(ConvexHull(frame.inward(self.vertices)).volume) * scale
+        return 0.0 if self.is_empty else volume_of(self.vertices, self._stretch)
 
-    def _simplices(self) -> tuple[Floats, Floats]:
-        """Return simplices that divide the set, shape (k, d + 1, n), and their shares of the volume, shape (k,)."""
-        frame = frame_of(self.needed().vertices / (1.0 if self._stretch is None else self._stretch))
-        if len(self.vertices) == frame.dimension + 1:
-            return self.vertices[None], np.ones(1)
-        inner = frame.inward(self.vertices / (1.0 if self._stretch is None else self._stretch))
-        corners = Delaunay(inner, qhull_options="QJ").simplices
-        sizes = np.abs(np.linalg.det(inner[corners[:, 1:]] - inner[corners[:, :1]]))
-        return self.vertices[corners], sizes / sizes.sum()
+    def area(self) -> float:
+        """Return the area of a set of R^2; 0 for a segment or a point. `volume` is for any space."""
+        return self.volume() if self._of_plane().dimension == 2 else 0.0
 
     def centroid(self) -> Floats:
         """Return the centroid within the affine hull, shape (n,), from a division into simplices."""
-        simplices, shares = self._simplices()
+        simplices, shares = simplices_of(self.needed().vertices, self._stretch)
         return np.asarray(shares @ simplices.mean(axis=1))
 
     def sample(self, count: int, seed: int | np.random.Generator = 0) -> Floats:
         """Return points distributed uniformly over the set, shape (count, n), from a division into simplices."""
-        random = np.random.default_rng(seed)
-        simplices, shares = self._simplices()
+        random = random_source(count, seed)
+        simplices, shares = simplices_of(self.needed().vertices, self._stretch)
         weights = random.dirichlet(np.ones(simplices.shape[1]), count)
         return np.asarray(np.einsum("ij,ijk->ik", weights, simplices[random.choice(len(shares), count, p=shares)]))
 
@@ -599,22 +364,7 @@ class Polytope:
 
         A linear program (HiGHS) in coordinates about the centre of the vertices.
         """
-        if self._stretch is not None:  # in units of the axes, and of the shortest axis for the radius
-            least = float(self._stretch.min())
-            middle, rows = self.vertices.mean(axis=0), self.normals * self._stretch
-            sizes = np.abs(rows).max(axis=1)
-            limits = (self.offsets - self.normals @ middle) / sizes
-            inner, radius = chebyshev_ball(rows / sizes[:, None], limits, least / sizes)
-            return middle + self._stretch * inner, least * max(0.0, radius)
-        frame = frame_of(self.needed().vertices)
-        if not frame.dimension:
-            return frame.centre, 0.0
-        scale = float(frame.extents.max())
-        rows = self.normals @ frame.basis
-        sizes = np.linalg.norm(rows, axis=1)
-        limits = (self.offsets - self.normals @ frame.centre) / (scale * sizes)
-        centre, radius = chebyshev_ball(rows / sizes[:, None], limits)
-        return frame.centre + scale * frame.basis @ centre, scale * max(0.0, radius)
+        return largest_ball(self.needed().vertices, self.normals, self.offsets, self._stretch)
 
     def diameter(self) -> float:
         """Return the greatest distance between two vertices; 0 for the empty set. O(v^2 n)."""
@@ -625,7 +375,7 @@ class Polytope:
 
         Wolfe's algorithm: a least-squares problem of at most n + 1 points in each of a few steps.
         """
-        x = np.asarray(point, dtype=float)
+        x = finite_values("point", point, self.space)
         return np.asarray(x + nearest_difference(self.needed().vertices, x[None, :])) if x not in self else x
 
     def distance(self, other: Polytope | ArrayLike) -> float:
@@ -633,26 +383,23 @@ class Polytope:
 
         As `closest_point`.
         """
-        points = other.vertices if isinstance(other, Polytope) else np.atleast_2d(np.asarray(other, dtype=float))
+        if isinstance(other, Polytope):
+            points = self._need_other(other).vertices
+        else:
+            points = finite_values("other", other, self.space)[None]
         if self.is_empty or not len(points):
             return float("inf")
         return float(np.linalg.norm(nearest_difference(self.vertices, points)))
 
     def hausdorff_distance(self, other: Polytope) -> float:
         """Return the Hausdorff distance; inf between an empty and a nonempty set. One `distance` for each vertex."""
-        pairs = (self, other), (other, self)
+        pairs = (self, self._need_other(other)), (other, self)
         return max((two.distance(vertex) for one, two in pairs for vertex in one.vertices), default=0.0)
 
     def plot(self, axes: Any, **style: Any) -> None:
-        """Fill a set of R^2 on matplotlib axes, with the options of `matplotlib.axes.Axes.fill`.
-
-        Raises
-        ------
-        ValueError
-            If the space does not have two dimensions: `project` the set first.
-        """
-        if self.space != 2:
-            raise ValueError(f"a set of R^2 is needed: project this one, of R^{self.space}, on two axes first")
+        """Fill a set of R^2 on matplotlib axes, with the options of `matplotlib.axes.Axes.fill`."""
+        self._of_plane()
+        need_plot_axes(axes)
         points = self.vertices - self.vertices.mean(axis=0) if len(self.vertices) else self.vertices
         order = np.argsort(np.arctan2(points[:, 1], points[:, 0]))
         axes.fill(*self.vertices[order].T, **style)
@@ -677,18 +424,8 @@ class Polytope:
         return self.is_subset(other) if isinstance(other, Polytope) else NotImplemented
 
     support = renamed("support", "support_function")
-
-    @property
-    def bounds(self) -> tuple[Floats, Floats]:
-        """Return `bounding_box()`. Deprecated."""
-        warnings.warn("bounds is deprecated and will be removed: use bounding_box", DeprecationWarning, stacklevel=2)
-        return self.bounding_box()
-
-    @classmethod
-    def box(cls, lower: ArrayLike, upper: ArrayLike) -> Polytope:
-        """Return `from_box(lower, upper)`. Deprecated."""
-        warnings.warn("box is deprecated and will be removed: use from_box", DeprecationWarning, stacklevel=2)
-        return cls.from_box(lower, upper)
+    bounds = property(renamed("bounds", "bounding_box"))
+    box = classmethod(renamed("box", "from_box"))
 
     @classmethod
     def from_halfspaces(cls, *arguments: Any, **options: Any) -> Polytope:
@@ -702,18 +439,3 @@ class Polytope:
 def _bent(reach: Floats, rows: Floats) -> Floats:
     """Return bounds of the rounding of scalar products of points and rows."""
     return np.asarray(reach @ np.abs(rows).T)
-
-
-def product(*polytopes: Polytope) -> Polytope:
-    """Return the Cartesian product of `polytopes`, at least one, with v1 v2 ... vertices and f1 + f2 + ... facets."""
-    vertices = polytopes[0].vertices
-    for factor in polytopes[1:]:
-        left = np.repeat(vertices, len(factor.vertices), axis=0)
-        vertices = np.hstack([left, np.tile(factor.vertices, (len(vertices), 1))])
-    return Polytope(
-        vertices,
-        block_diag(*[factor.normals for factor in polytopes]),
-        np.concatenate([factor.offsets for factor in polytopes]),
-        block_diag(*[factor.across for factor in polytopes]),
-        np.concatenate([factor.levels for factor in polytopes]),
-    )

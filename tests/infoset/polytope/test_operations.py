@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -63,6 +63,8 @@ def assert_same(got: Polytope, exact: RationalSet, size: Floats) -> None:
 @needs_ppl
 @some
 @given(SEED, SPACE, KIND, KIND)
+@example(seed=827447, space=4, kind="lattice", other_kind="mixed")
+@example(seed=7293, space=4, kind="lattice", other_kind="mixed")
 def test_operations_on_two_sets(seed: int, space: int, kind: str, other_kind: str) -> None:
     points = points_of(kind, seed, space)
     others = points_of("mixed" if kind == "mixed" else other_kind, seed if kind == "mixed" else seed + 1, space)
@@ -145,7 +147,7 @@ def test_measures(seed: int, space: int, kind: str) -> None:
     assert one.distance(far) == pytest.approx(float(np.linalg.norm(far - near)), rel=1e-9)
     moved = one.translate(4.0 * size * np.eye(space)[0])
     assert one.hausdorff_distance(moved) == pytest.approx(4.0 * size, rel=1e-9)
-    assert one.distance(moved) <= 4.0 * size
+    assert one.distance(moved) <= 4.0 * size * (1.0 + 1e-15)
     assert one.diameter() == pytest.approx(max(float(np.linalg.norm(p - q)) for p in points for q in points), rel=1e-9)
     if kind == "plain":
         fewer = one.reduce_outward(2 * space + 2)
@@ -368,13 +370,13 @@ def test_cuts_that_leave_a_billionth_of_a_set() -> None:
 def test_mistaken_arguments_of_polytopes_have_a_clear_message() -> None:
     cube = Polytope.from_box([0, 0, 0], [1, 1, 1])
     for axes in ([-1], [3], [0, 1, 2]):
-        with pytest.raises(ValueError, match="axes must be some of the numbers from 0 to 2"):
+        with pytest.raises(ValueError, match="axes must be one or more different numbers from 0 to 2, not all"):
             cube.slice(axes, 0.5)
     for generators in (np.ones((3, 2)), [[1, 2]]):
-        with pytest.raises(ValueError, match="generators of shape"):
+        with pytest.raises(ValueError, match=r"generators must have the shape \(g, 3\)"):
             Polytope.from_zonotope([0, 0, 0], generators)
     for normal, bound in (([1, 0, 0], np.nan), ([1, np.nan, 0], 1.0), ([1, 0], 1.0)):
-        with pytest.raises(ValueError, match="normals must be finite"):
+        with pytest.raises(ValueError, match=r"upper must be a number|normals must (be finite|have the shape \(3,\))"):
             cube.cut(normal, upper=bound)
     with pytest.raises(TypeError, match="unsupported operand"):
         _ = cube & None  # type: ignore[operator]

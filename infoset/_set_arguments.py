@@ -1,0 +1,152 @@
+"""Checks of the arguments of operations on sets: each message has the name of the argument and what is possible."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from infoset.limits import COUNT, LARGEST, NOT_NEGATIVE, WHOLE, real_values, shown
+
+Floats = NDArray[np.float64]
+Set = TypeVar("Set")
+
+
+def need_finite(name: str, values: Floats) -> None:
+    """Raise an error if a number is not finite, or too large for exact decisions."""
+    # The sum of squares shows it for almost all arrays; it is the fastest test of a small one.
+    if not np.vdot(values, values) <= LARGEST and not (np.abs(values) <= LARGEST).all():
+        raise ValueError(f"{name} must be finite, at most {LARGEST:g} in size: got {shown(values)}")
+
+
+def finite_values(name: str, value: ArrayLike, *shape: str | int) -> Floats:
+    """Return finite numbers of a shape.
+
+    Parameters
+    ----------
+    value : array_like
+        Its unit is that of the set. An empty list is an array without rows.
+    *shape : str or int
+        Sizes of the axes. A letter is any size, of the axes n and m at least 1; "..." is any number of axes.
+    """
+    values = real_values(name, value)
+    last = shape[1:] if shape[:1] == ("...",) else shape
+    if values.shape == (0,) and len(last) == 2 and not isinstance(last[1], str):
+        values = values.reshape(0, last[1])
+    sizes = values.shape[values.ndim - len(last) :]
+    if (values.ndim != len(last) if last is shape else values.ndim < len(last)) or any(
+        size != wanted if isinstance(wanted, int) else wanted in "nm" and not size
+        for size, wanted in zip(sizes, last, strict=True)
+    ):
+        text = f"({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''})"
+        raise ValueError(f"{name} must have the shape {text}: got {values.shape}")
+    need_finite(name, values)
+    return values
+
+
+def bound_values(name: str, value: ArrayLike, *shapes: tuple[int, ...]) -> Floats:
+    """Return numbers that may be infinite, of one of some shapes; any shape if there is none."""
+    bounds = real_values(name, value)
+    if np.isnan(np.vdot(bounds, bounds)):
+        raise ValueError(f"{name} must be a number, not NaN: got {shown(value)}")
+    if shapes and bounds.shape not in shapes:
+        raise ValueError(f"{name} must have the shape {' or '.join(map(str, shapes))}: got {bounds.shape}")
+    return bounds
+
+
+def constraint_values(names: tuple[str, str], rows: ArrayLike, limits: ArrayLike, *shape: str | int) -> Any:
+    """Return rows of a shape (..., k, n) and their limits, shape (..., k), which may be infinite."""
+    normals, ends = finite_values(names[0], rows, *shape), real_values(names[1], limits)
+    if (ends.ndim != 1 and shape[0] != "...") or ends.shape[-1:] != normals.shape[-2:-1]:
+        raise ValueError(
+            f"{names[0]} and {names[1]} must have as many rows: got the shapes {normals.shape} and {ends.shape}"
+        )
+    need_finite(names[1], np.where(np.isinf(ends), 0.0, ends))
+    return normals, ends
+
+
+def box_ends(lower: ArrayLike, upper: ArrayLike, *shape: str | int) -> tuple[Floats, Floats]:
+    """Return the ends of boxes, of the same shape."""
+    least = finite_values("lower", lower, *shape)
+    most = finite_values("upper", upper, *(shape if shape[0] == "..." else least.shape))
+    common_shape("lower and upper", least.shape, most.shape)
+    least, most = np.broadcast_arrays(least, most)
+    if (least > most).any():
+        raise ValueError(f"the box is reversed: its lower end exceeds the upper one by {float((least - most).max()):g}")
+    return least, most
+
+
+def common_shape(names: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the shape to which some shapes are broadcast."""
+    try:
+        return np.broadcast_shapes(*shapes)
+    except ValueError:
+        text = " and ".join(map(str, shapes))
+        raise ValueError(f"{names} must have the same shape, or shapes that can be broadcast: got {text}") from None
+
+
+def radius_values(radius: ArrayLike, *shape: str) -> Floats:
+    """Return radii of a shape."""
+    radii = finite_values("radius", radius, *shape)
+    if (radii < 0.0).any():
+        raise ValueError(f"radius must not be negative: got {shown(radius)}")
+    return radii
+
+
+def axis_numbers(axes: ArrayLike, space: int, most: int) -> list[int]:
+    """Return different axes of a space from one number or several, at most some."""
+    numbers = np.atleast_1d(real_values("axes", axes))
+    listed = [int(number) for number in numbers.flat if number in range(space)]
+    if numbers.ndim > 1 or not 0 < len(set(listed)) == numbers.size <= most:
+        raise ValueError(
+            f"axes must be one or more different numbers from 0 to {space - 1}{', not all' if most < space else ''}: "
+            f"got {shown(axes)}"
+        )
+    return listed
+
+
+def need_set(name: str, value: object, kind: type[Set]) -> Set:
+    """Return an argument that is a set of a class."""
+    if not isinstance(value, kind):
+        raise TypeError(f"{name} must be of the type {kind.__name__}: got {shown(value)}")
+    return value
+
+
+def need_tolerance(value: float) -> float:
+    """Return a distance that is not negative."""
+    NOT_NEGATIVE.need("tolerance", value)
+    return value
+
+
+def random_source(count: int, seed: int | np.random.Generator) -> np.random.Generator:
+    """Return the source of the random numbers of a sample of `count` points, at least one."""
+    COUNT.need("count", count)
+    if isinstance(seed, np.random.Generator):
+        return seed
+    WHOLE.need("seed", seed)
+    return np.random.default_rng(seed)
+
+
+def need_plot_axes(axes: Any) -> Any:
+    """Return axes of matplotlib."""
+    if not hasattr(axes, "add_patch"):
+        raise TypeError(f"axes must be Axes of matplotlib: got {shown(axes)}")
+    return axes
+
+
+def ring_of(geometry: Any) -> Floats:
+    """Return the vertices of a shapely Point, LineString of one segment, or Polygon without holes, shape (k, 2)."""
+    kind = getattr(geometry, "geom_type", None)
+    if kind is None:
+        raise TypeError(f"geometry must be a shapely geometry: got {shown(geometry)}")
+    if geometry.is_empty:
+        return np.zeros((0, 2))
+    if kind not in ("Point", "LineString", "Polygon"):
+        raise ValueError(f"a Point, LineString or Polygon is needed: got {kind}")
+    if kind == "Polygon" and len(geometry.interiors):
+        raise ValueError("the polygon has a hole: it is not convex")
+    vertices = np.asarray((geometry.exterior if kind == "Polygon" else geometry).coords)[:, :2]
+    if kind == "LineString" and len(vertices) > 2:
+        raise ValueError("a line must be a single segment")
+    return vertices
