@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from infoset._compile import by_reference
-from infoset.section_life import IMPULSE, NO_WINDOW, PREDICTION, RATE, Flags, Floats, Integers, Tape
+from infoset.section_life import IMPULSE, NO_SIGHT, NO_WINDOW, PREDICTION, RATE, Flags, Floats, Integers, Tape
 
 ROOM_AT_START = 64
 
@@ -46,6 +46,10 @@ class History:
         Number of events.
     elapsed : int
         Number of predictions.
+    sights : ndarray, shape (C, B, columns)
+        Fields of the last sight of each axis and engagement after the first `seen` events, for measured rates.
+    seen : int
+        Number of events before the latest measured rate. They are final: `retract` removes only the latest measurement.
     """
 
     def __init__(self, channels: int, batch: int) -> None:
@@ -55,6 +59,8 @@ class History:
         self.applies = np.zeros((ROOM_AT_START, batch), dtype=bool)
         self.events = 0
         self.elapsed = 0
+        self.sights = np.zeros((channels, batch, len(NO_SIGHT)))
+        self.seen = 0
         self._has_rates = False
         self._fired = np.zeros(batch)
 
@@ -108,5 +114,6 @@ class History:
         twin.kinds, twin.errors = self.kinds.copy(), self.errors.copy()
         twin.values, twin.applies = self.values.copy(), self.applies.copy()
         twin.events, twin.elapsed = self.events, self.elapsed
+        twin.sights, twin.seen = self.sights.copy(), self.seen
         twin._has_rates, twin._fired = self._has_rates, self._fired
         return twin

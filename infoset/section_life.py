@@ -348,16 +348,6 @@ def across_of(tape: Tape, event: int, law: SectionLaw) -> float:
 
 
 @allocation_free
-def last_sight(tape: Tape, law: SectionLaw) -> LastSight:
-    """Return the last sight after a whole history."""
-    sight = NO_SIGHT
-    for event in range(tape.events):
-        value, across = tape.values[law.channel, event], across_of(tape, event, law)
-        sight = sight_after(sight, tape.kinds[event], value, across, tape.applies[event], law)
-    return sight
-
-
-@allocation_free
 def rate_band(
     label: float,
     near_label: float,

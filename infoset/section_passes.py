@@ -9,7 +9,7 @@ import numpy as np
 from infoset import chain_steps, chains, whole_chains
 from infoset._compile import ZERO, allocation_free, by_reference, entry, inlined
 from infoset.history import Tapes
-from infoset.section_law import law_of
+from infoset.section_law import SectionLaw, law_of
 from infoset.section_life import (
     ALIVE,
     CUT_SLACK,
@@ -21,14 +21,15 @@ from infoset.section_life import (
     Flags,
     Floats,
     Integers,
+    LastSight,
     Tape,
     impulse_doubt,
-    last_sight,
     measure_rate_section,
     measure_section,
     predict_section,
     range_of,
     shift_section,
+    sight_after,
     start_section,
     steepest_angles,
     summarise_section,
@@ -229,6 +230,31 @@ def tape_of(tapes: Tapes, b: int, values: Floats, applies: Flags) -> Tape:
     return Tape(tapes.kinds, values, applies, tapes.events, np.inf, -np.inf)
 
 
+@allocation_free
+def follow_sight(tapes: Tapes, done: int, b: int, sights: Floats, law: SectionLaw) -> LastSight:
+    """Return the last sight of an engagement along an axis.
+
+    `sights` contains the last sights after `done` events, shape (C, B, columns), and is updated.
+    """
+    c = law.channel
+    sight = LastSight(
+        sights[c, b, 0] != 0.0,
+        sights[c, b, 1],
+        sights[c, b, 2],
+        int(sights[c, b, 3]),
+        sights[c, b, 4],
+        sights[c, b, 5],
+        sights[c, b, 6],
+    )
+    for event in range(done, tapes.events):
+        across = tapes.values[event, law.other, b] if law.other >= 0 else 0.0
+        sight = sight_after(sight, tapes.kinds[event], tapes.values[event, c, b], across, tapes.applies[event, b], law)
+    sights[c, b, 0] = 1.0 if sight.known else 0.0
+    sights[c, b, 1], sights[c, b, 2], sights[c, b, 3] = sight.alpha, sight.across, sight.steps
+    sights[c, b, 4], sights[c, b, 5], sights[c, b, 6] = sight.moved, sight.doubt, sight.fired
+    return sight
+
+
 @entry
 def measure_rate_all(
     active: Flags,
@@ -237,28 +263,25 @@ def measure_rate_all(
     elapsed: int,
     event: int,
     tapes: Tapes,
-    values: Floats,
-    applies: Flags,
+    done: int,
+    sights: Floats,
     sections: Sections,
     laws: Floats,
     points: Floats,
 ) -> int:
     """Cut the living sections of the active engagements by rates and summarise them; return how many became empty.
 
-    `omega` has the shape (C, B); `values` and `applies` are working arrays for the history of one engagement.
+    `omega` has the shape (C, B); `sights` contains the last sights after `done` events and is updated.
     """
     deaths = 0
     labels, used, living = sections.labels, sections.used, sections.living
     origins, rings, marks = sections.origins, sections.rings, sections.marks
     for b in range(labels.shape[0]):
-        if not active[b]:
-            continue
-        tape = tape_of(tapes, b, values, applies)
         for channel in range(laws.shape[0]):
             law = law_of(laws, channel)
-            sight = last_sight(tape, law)
+            sight = follow_sight(tapes, done, b, sights, law)
             for s in range(used[b]):
-                if not is_cut(sections, channel, event, b, s):
+                if not (active[b] and is_cut(sections, channel, event, b, s)):
                     continue
                 n, label = row_of(labels, channel, b, s), labels[b, s]
                 survives, overlap = measure_rate_section(

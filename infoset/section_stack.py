@@ -168,7 +168,6 @@ class SectionStack:
         """Cut the living sections by rates of shape (C, B), rad/s; return the number of labels that became empty."""
         self._catch_up()
         self._make_room(active)
-        values, applies = np.empty((len(self.laws), history.events)), np.empty(history.events, dtype=bool)
         deaths = section_passes.measure_rate_all(
             active,
             omega,
@@ -176,12 +175,13 @@ class SectionStack:
             elapsed,
             event,
             history.tapes,
-            values,
-            applies,
+            history.seen,
+            history.sights,
             self.sections,
             self.table,
             chains.working_room(),
         )
+        history.seen = history.events
         self._set_summarised(active)
         return deaths
 
