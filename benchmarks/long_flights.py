@@ -2,6 +2,7 @@
 
     python -m benchmarks.long_flights
     python -m benchmarks.long_flights --strategies symmetric-miss,patient,kalman,least-squares
+    python -m benchmarks.long_flights --rate-error 1e-7
 
 The flight is `dart-2022`, 4 h, with steps of 144, 14.4 and 1.44 s, one image at every step, and an engine of the same
 acceleration. Times are processor times of one thread, with the guaranteed miss, of one engagement in a batch of 40.
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments import load_scenario
-from infoset import chains
+from infoset import RateSensor, chains
 from sim import Scenario, simulate
 from sim.draws import draw
 from sim.engagement import Engagements
@@ -63,11 +64,13 @@ class Cost:
 
 
 def of_steps(scenario: Scenario, steps: int) -> Scenario:
-    """Return the scenario with another number of steps."""
+    """Return the scenario with another number of steps. A rate sensor measures at each of them."""
     step_s = scenario.nominal_arrival_s / steps
+    rate_sensor = scenario.rate_sensor and replace(scenario.rate_sensor, period_s=step_s)
     sensor = replace(scenario.set_model.angle_sensor, period_s=step_s)
     return replace(
         scenario,
+        rate_sensor=rate_sensor,
         set_model=replace(scenario.set_model, step_s=step_s, angle_sensor=sensor),
         thruster=replace(scenario.thruster, greatest_impulse_m_s=ACCELERATION_M_S2 * step_s),
     )
@@ -125,13 +128,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--strategies", default="symmetric-miss")
     parser.add_argument("--scenario", default="dart-2022")
+    parser.add_argument("--rate-error", type=float, help="error of a rate sensor, rad/s; without one if absent")
     options = parser.parse_args()
+    rate_sensor = options.rate_error and RateSensor(1.0, options.rate_error)
     sys.stdout.write(
         "| strategy | steps | a step, us | arrival, ms | whole flight, us a step | vertices, mean / most | sections | "
         "memory, MB | miss, m | guaranteed miss, m | sound |\n" + "|---" * 11 + "|\n"
     )
     for strategy in options.strategies.split(","):
-        scenario = replace(load_scenario(options.scenario), strategy=strategy)
+        scenario = replace(load_scenario(options.scenario), strategy=strategy, rate_sensor=rate_sensor)
         for steps in STEPS:
             of = cost(scenario, steps)
             whole = of.step_us + 1e3 * of.arrival_ms / steps

@@ -31,6 +31,8 @@ MOST_LEAVING_WINDOWS = 16
 """Greatest number of windows of the labels that leave at one step, with rates: a power of two."""
 LOOSE = 1.25
 """A window is halved if its bound exceeds the greatest value known to be reached by this factor."""
+GROUPS = 3000
+"""Labels that leave within this part of a flight are bounded together, if they need several steps."""
 LEAST, GREATEST, NEAREST, FARTHEST = range(4)
 """Columns of a piece: bounds of its predicted miss, and the labels of its ends, m."""
 RESOLUTION = 1e-10
@@ -328,6 +330,9 @@ class GuaranteedMiss:
         self._laws, self._law, self._speed_error = laws, laws[0], speed_error
         self._settled = np.zeros(batch)
         self.exists: Flags = np.zeros(batch, dtype=bool)
+        steps = self._law.label_greatest / (self._law.closing_speed * self._law.step)
+        self._group_steps = max(1, int(steps / GROUPS))
+        self._bounded_below = np.full(batch, -np.inf)
         # Pieces whose range is not zero yet, so that impulses move them.
         self._pending: list[tuple[Floats, Flags]] = []
 
@@ -340,6 +345,7 @@ class GuaranteedMiss:
         """Return an independent copy."""
         twin = GuaranteedMiss(self._laws, len(self._settled), self._speed_error)
         twin._settled, twin.exists = self._settled.copy(), self.exists.copy()
+        twin._bounded_below = self._bounded_below.copy()
         twin._pending = [(pieces.copy(), real.copy()) for pieces, real in self._pending]
         return twin
 
@@ -363,9 +369,20 @@ class GuaranteedMiss:
         self._pending = still
 
     def leave(self, active: Flags, lower: Floats, upper: Floats, stack: SectionStack, history: History) -> None:
-        """Add the bound of the labels that leave now: the living ones from `lower` to `upper`."""
-        if not (active & (lower < upper)).any():
+        """Add the bound of the living labels from `lower` to `upper` that leave in this step.
+
+        Notes
+        -----
+        Each label is replayed from the start. Labels that leave during the following steps of a group are bounded
+        too, so that the number of replays does not grow with the number of steps.
+        """
+        lower = np.maximum(lower, self._bounded_below)
+        active = active & (lower < np.minimum(upper, self._least_label(history.elapsed + 1)))
+        if not active.any():
             return
+        below = self._least_label(history.elapsed + self._group_steps)
+        upper = np.minimum(upper, below)
+        self._bounded_below = np.where(active, below, self._bounded_below)
         channels, batch = len(self._laws), len(active)
         errors = history.errors_if_any
         most = PIECES if errors is None else PIECES * MOST_LEAVING_WINDOWS
@@ -394,6 +411,10 @@ class GuaranteedMiss:
         if real.any():
             self.exists |= real.any(axis=1)
             self._pending.append((pieces, real))
+
+    def _least_label(self, elapsed: int) -> float:
+        """Return the least label, m, that is not below the range threshold after a number of steps."""
+        return self._law.least_range + self._law.closing_speed * (self._law.step * elapsed)
 
     def _worst(self, parts: list[tuple[Floats, Flags]]) -> Floats:
         worst = np.zeros_like(self._settled)

@@ -281,8 +281,7 @@ class InformationSet(InformationSetView):
         state, active, least_label = self._state, self.tracking, self._least_label_next()
         computes_phi = self._computes_phi
         if state.phi is not None:
-            leaving_below = np.minimum(state.upper_label, least_label)
-            state.phi.leave(computes_phi, state.lower_label, leaving_below, state.stack, state.history)
+            state.phi.leave(computes_phi, state.lower_label, state.upper_label, state.stack, state.history)
         if self.model.is_guaranteed:
             # A label between the stored ones may pass the threshold. The status must not depend on whether Phi is
             # computed.

@@ -184,9 +184,8 @@ def drop_inner_edges(points: Points, count: int, fewest: int, added: Points) -> 
 
     Parameters
     ----------
-    added : ndarray, shape (>= count, 2)
-        Working array: its first column holds the area that the removal of each edge adds. A removal changes four of
-        these areas.
+    added : ndarray, shape (>= count,)
+        Working array: the area that the removal of each edge adds. A removal changes four of these areas.
 
     Returns
     -------
@@ -198,18 +197,20 @@ def drop_inner_edges(points: Points, count: int, fewest: int, added: Points) -> 
     first, last = 1, count - 3
     while count > fewest:
         for i in range(first, last + 1):
-            added[i, 0] = removed_edge(points, i - 1, i, i + 1, i + 2)[0]
-        least, chosen = np.inf, 0
+            added[i] = removed_edge(points, i - 1, i, i + 1, i + 2)[0]
+        least = np.inf
         for i in range(1, count - 2):
-            if added[i, 0] < least:
-                least, chosen = added[i, 0], i
-        if chosen == 0 or least < 0.0:
+            least = min(least, added[i])
+        if least == np.inf or least < 0.0:
             return count, False
+        chosen = 1
+        while added[chosen] > least:
+            chosen += 1
         _, points[chosen, 0], points[chosen, 1] = removed_edge(points, chosen - 1, chosen, chosen + 1, chosen + 2)
         count -= 1
         for i in range(chosen + 1, count):
             points[i, 0], points[i, 1] = points[i + 1, 0], points[i + 1, 1]
-            added[i, 0] = added[i + 1, 0]
+            added[i] = added[i + 1]
         first, last = max(chosen - 2, 1), min(chosen + 1, count - 3)
     return count, True
 

@@ -58,7 +58,7 @@ def reduce_outward(origins: Floats, rings: Floats, marks: Integers, n: int, tau:
     for i in range(begin_of(marks, n, side), end_of(marks, n, side)):
         v, m = read(rings, offset_of(marks, n, side, i))
         count = polygon.append(points, polygon_hull.drop_turned(points, count, 1, v, m), v, m)
-    count, done = polygon_hull.drop_inner_edges(points, count, REDUCED - other, points[CAPACITY + 2 :])
+    count, done = polygon_hull.drop_inner_edges(points, count, REDUCED - other, points[CAPACITY + 2 :].reshape(-1))
     if not done:
         count = box_around(points, count, sign_of(side), tau)
     for i in range(count):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from infoset import AngleSensor, InitialSet, Model, StateBox
+from infoset import AngleSensor, InformationSet, InitialSet, Model, StateBox, guaranteed_miss
 from infoset.section_life import IMPULSE
 from sim import Scenario, simulate
 from sim.draws import Draws, draw
@@ -48,8 +48,8 @@ def test_substeps_of_the_built_in_scenarios_are_their_steps(asteroid: Scenario) 
     assert longest_substep_s(replace(asteroid, sun=None)) == LONGEST_SUBSTEP_S
 
 
-def test_the_history_of_a_long_flight_has_two_events_a_step(asteroid: Scenario) -> None:
-    """An impulse is an event only where it is given; sections stay small, and the guarantee holds."""
+def of_2000_steps(asteroid: Scenario) -> Scenario:
+    """Return the scenario with steps of 0.05 s, three impulses and the guaranteed model."""
     model = replace(
         asteroid.set_model,
         step_s=0.05,
@@ -58,8 +58,12 @@ def test_the_history_of_a_long_flight_has_two_events_a_step(asteroid: Scenario) 
         initial_set=InitialSet.BOX,
         sections=5,
     )
-    thruster = replace(asteroid.thruster, impulses_s=(60.0, 20.0, 5.0))
-    scenario = replace(asteroid, set_model=model, thruster=thruster)
+    return replace(asteroid, set_model=model, thruster=replace(asteroid.thruster, impulses_s=(60.0, 20.0, 5.0)))
+
+
+def test_the_history_of_a_long_flight_has_two_events_a_step(asteroid: Scenario) -> None:
+    """An impulse is an event only where it is given; sections stay small, and the guarantee holds."""
+    scenario = of_2000_steps(asteroid)
     flight = Engagements(scenario, draw(scenario, range(2), 1))
     while flight.flying:
         flight.advance()
@@ -88,3 +92,54 @@ def test_a_batch_of_long_flights_is_smaller(asteroid: Scenario, monkeypatch: pyt
     monkeypatch.setattr(module, "STEPS_AT_ONCE", 500)
     assert simulate(asteroid, 5, guarantee=False).miss_m.tolist() == whole.miss_m.tolist()
     assert batches == [2, 2, 1]
+
+
+def test_labels_of_a_long_flight_leave_in_groups(asteroid: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The number of replays does not grow with the number of steps. Phi holds, and depends little on the groups."""
+    scenario = of_2000_steps(asteroid)
+    calls: list[int] = []
+    whole = guaranteed_miss.bound_leaving_all
+
+    def counted(*arguments: object) -> None:
+        calls.append(1)
+        whole(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(guaranteed_miss, "bound_leaving_all", counted)
+    single = simulate(scenario, 3)
+    steps = len(calls)
+    calls.clear()
+    monkeypatch.setattr(guaranteed_miss, "GROUPS", 400)
+    grouped = simulate(scenario, 3)
+    assert steps >= 4 * len(calls)
+    assert grouped.miss_m.tolist() == single.miss_m.tolist()
+    assert grouped.truth_kept.all()
+    assert grouped.phi_held.all()
+    np.testing.assert_allclose(grouped.guaranteed_miss_m, single.guaranteed_miss_m, rtol=0.02)
+    # The groups of an engagement do not depend on the others of its batch.
+    alone = [simulate(scenario, [run]).guaranteed_miss_m[0] for run in range(3)]
+    assert alone == grouped.guaranteed_miss_m.tolist()
+
+
+def test_a_measured_rate_reads_the_events_since_the_previous_one(asteroid: Scenario) -> None:
+    """A contradicting angle is retracted and does not count; stored sections equal replays of the whole history."""
+    information = InformationSet(asteroid.set_model, 2)
+
+    def step(sets: InformationSet, alpha_rad: float) -> None:
+        sets.measure_angle(alpha_rad)
+        sets.shift(1.5)
+        sets.predict()
+        sets.measure_rate(1e-8, 1e-5)
+        sets.predict()
+
+    for alpha_rad in (1e-4, 0.9, 2e-4):
+        step(information, alpha_rad)
+    assert information.inconsistent.all()
+    for section in information.sections():
+        replayed = information.section_at(section.label_m).polygon
+        np.testing.assert_array_equal(section.polygon.vertices, replayed.vertices)
+    twin = information.copy()
+    twin._state.history.values[: twin._state.history.seen] = np.nan
+    for sets in (information, twin):
+        step(sets, 1.5e-4)
+    for section, other in zip(information.sections(), twin.sections(), strict=True):
+        np.testing.assert_array_equal(section.polygon.vertices, other.polygon.vertices)
