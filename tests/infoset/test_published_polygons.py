@@ -1,4 +1,4 @@
-"""Pairs of convex polygons from the tests of JTS (which GEOS runs too) and boost geometry, against exact rationals.
+"""Pairs of polygons from the tests of JTS (which GEOS runs too), boost geometry and Clipper2, against exact rationals.
 
 `published_polygons.json` has their coordinates and where they were published.
 """
@@ -23,13 +23,14 @@ NAMES = [f"{pair['source']}: {pair['case']}" for pair in PAIRS]
 
 def cases(pair: dict[str, Any]) -> tuple[Case, Case]:
     rings = [np.array(pair[key], dtype=float) for key in "ab"]
-    one, other = (Case(ConvexPolygons.from_vertices(ring), hull(exact(ring))) for ring in rings)
+    make = ConvexPolygons.from_points if "hull" in pair else ConvexPolygons.from_vertices
+    one, other = (Case(make(ring), hull(exact(ring))) for ring in rings)
     return one, other
 
 
 def test_there_are_many() -> None:
     assert len(PAIRS) >= 100
-    assert {name.split(",")[0] for name in NAMES} == {"JTS", "boost geometry"}
+    assert {name.split(",")[0] for name in NAMES} == {"JTS", "boost geometry", "Clipper2"}
 
 
 @pytest.mark.parametrize("pair", PAIRS, ids=NAMES)
@@ -37,7 +38,8 @@ def test_sets_of_a_pair(pair: dict[str, Any]) -> None:
     one, other = cases(pair)
     for case, key in ((one, "a"), (other, "b")):
         assert set(exact(case.polygon.polygon())) == set(case.exact)
-        assert ConvexPolygons.from_shapely(shapely.Polygon(pair[key])).equals(case.polygon)
+        ring = shapely.Polygon(pair[key])
+        assert ConvexPolygons.from_shapely(ring.convex_hull if "hull" in pair else ring).equals(case.polygon)
     size = (max(one.size[0], other.size[0]), max(one.size[1], other.size[1]))
     box = (8 * U * size[0], 8 * U * size[1])
     wanted = exact_intersection(one.exact, other.exact)
@@ -57,10 +59,25 @@ def test_sets_of_a_pair(pair: dict[str, Any]) -> None:
     )
 
 
+@pytest.mark.parametrize("pair", [pair for pair in PAIRS if "area" in pair], ids=lambda pair: pair["case"])
+def test_published_areas(pair: dict[str, Any]) -> None:
+    """Clipper2 rounds vertices to whole numbers, and its areas with them."""
+    one, other = (case.polygon for case in cases(pair))
+    common = float((one & other).area())
+    kind, published = pair["area"]
+    area = {
+        "intersection": common,
+        "difference": one.area() - common,
+        "union": one.area() + other.area() - common,
+        "symmetric difference": one.area() + other.area() - 2.0 * common,
+    }[kind]
+    assert float(area) == pytest.approx(published, rel=6e-3)
+
+
 def test_all_pairs_as_one_batch() -> None:
-    first, second = (ConvexPolygons.from_vertices([pair[key] for pair in PAIRS]) for key in "ab")
+    polygons = [cases(pair) for pair in PAIRS]
+    first, second = (ConvexPolygons.stack([pair[i].polygon for pair in polygons]) for i in (0, 1))
     common = first & second
     assert common.shape == (len(PAIRS),)
-    for i, pair in enumerate(PAIRS):
-        one, other = cases(pair)
+    for i, (one, other) in enumerate(polygons):
         assert common[i].polygon().tolist() == (one.polygon & other.polygon).polygon().tolist()
