@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
@@ -318,6 +318,9 @@ def test_preimage(case: Case, entries: tuple[float, ...], offset: tuple[float, f
 
 @SOME
 @given(CASES)
+@example(
+    case_of([(0.0, 0.0), (-8.270011920337144e-25, -3.784833429991908e-25), (-0.2080734182735712, 0.454648713412840)])
+)
 def test_largest_disc(case: Case) -> None:
     """The disc lies in the set, and no larger one does: linear programs about a corner, in units of the extent."""
     centre, radius = case.polygon.chebyshev_centre()
@@ -329,7 +332,8 @@ def test_largest_disc(case: Case) -> None:
     if len(case.exact) < 3:
         assert radius == 0.0
         return
-    along = np.roll(corners, -1, axis=0) - corners
+    sides = zip(case.exact, [*case.exact[1:], case.exact[0]], strict=True)
+    along = np.array([[float(q[0] - p[0]), float(q[1] - p[1])] for p, q in sides])
     normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.hypot(*along.T)[:, None]
     limits = (normals * corners).sum(axis=1) / width
     rows = np.column_stack([normals, np.ones(len(normals))])
