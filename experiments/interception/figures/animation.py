@@ -19,7 +19,7 @@ from experiments.common.figure_style import INK, new_figure, place_axes, plain, 
 from experiments.interception.course import Clock, evenly
 from experiments.interception.figures.approach import count_down
 from experiments.interception.figures.process import draw_predicted_miss, level_predicted_miss, traces_of
-from experiments.interception.figures.sets import Plane, draw_plane, level_planes, planes_at
+from experiments.interception.figures.sets import Plane, angle_unit, draw_plane, level_planes, planes_at
 from experiments.interception.record_titles import angle_name, record_titles
 from sim import Record
 
@@ -147,6 +147,8 @@ def _draw_planes(row: Sequence[Axes], planes: Sequence[Plane], clock: Clock) -> 
         axes.set_title(f"{title}, {time}")
         axes.set_xlabel(f"line-of-sight rate ω{along}, µrad/s")
         axes.set_ylabel(
-            f"{angle_name(plane.record.scenario, plane.axis)}{along}, mrad" if in_space or axes is row[0] else ""
+            f"{angle_name(plane.record.scenario, plane.axis)}{along}, {angle_unit(axes)}"
+            if in_space or axes is row[0]
+            else ""
         )
         axes.tick_params(labelleft=in_space or axes is row[0])

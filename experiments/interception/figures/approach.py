@@ -28,7 +28,6 @@ from experiments.common.figure_style import (
     width_mm,
 )
 from experiments.interception.course import (
-    FEW_TICKS_S,
     TICKS_S,
     Clock,
     duration_text,
@@ -50,9 +49,9 @@ MOST_VECTORS = 2000
 _SIDE_MM, _IMPULSES_MM, _GAP_MM = 62.0, 17.0, 3.0
 _LEFT_MM, _RIGHT_MM, _BETWEEN_MM, _FOOT_MM = 17.0, 5.0, 21.0, 12.0
 _NARROW_MM = 60.0
-"""Width of axes up to which the time axis has few ticks."""
-_TICK_LETTER_MM, _TICK_LETTERS, _TICK_GAP_MM = 1.4, 4, 1.5
-"""Width of a letter of a tick of the time axis, letters of a tick, and gap between ticks."""
+"""Width of axes up to which the label of the time axis is short."""
+_TICK_LETTER_MM, _TICK_GAP_MM = 1.4, 1.5
+"""Width of a letter of a tick of the time axis, and gap between ticks."""
 MARK_LOOK: dict[str, Any] = {"color": LIMIT, "linewidth": 0.8, "linestyle": (0, (1.5, 1.5))}
 _CENTRED_LOOK: dict[str, Any] = {"color": SET_EDGE, "linewidth": 1.1, "linestyle": (0, (4, 1.5))}
 _TRUE_LOOK: dict[str, Any] = {"color": INK, "linewidth": 0.9}
@@ -111,15 +110,17 @@ def count_down(axes: Axes, scenario: Scenario) -> None:
     begin, end = scenario.nominal_arrival_s, least_to_go_s(scenario)
     axes.set_xscale("log")
     axes.set_xlim(1.1 * begin, end)
-    wide = width_mm(axes) > _NARROW_MM
-    decades_mm = width_mm(axes) / np.log10(1.1 * begin / end)
-    letters = len(duration_text(begin)) + _TICK_LETTERS
-    apart = 10.0 ** ((0.5 * _TICK_LETTER_MM * letters + _TICK_GAP_MM) / decades_mm)
-    ticks = [tick for tick in (TICKS_S if wide else FEW_TICKS_S) if end <= tick <= begin / apart]
-    axes.xaxis.set_major_locator(FixedLocator([*ticks, begin]))
+    decade_mm = width_mm(axes) / np.log10(1.1 * begin / end)
+    ticks = [begin]
+    for tick in TICKS_S[::-1]:
+        letters = len(duration_text(ticks[-1])) + len(duration_text(tick))
+        apart_mm = 0.5 * _TICK_LETTER_MM * letters + _TICK_GAP_MM
+        if tick >= end and decade_mm * np.log10(ticks[-1] / tick) >= apart_mm:
+            ticks.append(tick)
+    axes.xaxis.set_major_locator(FixedLocator(ticks))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda tick, _: duration_text(tick)))
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.set_xlabel(f"time before {'the nominal ' if wide else ''}arrival")
+    axes.set_xlabel(f"time before {'the nominal ' if width_mm(axes) > _NARROW_MM else ''}arrival")
     for time in marks(scenario).values():
         axes.axvline(time, zorder=1.5, **MARK_LOOK)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Sequence
 from typing import Any
@@ -11,6 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from experiments.common.figure_style import (
@@ -28,7 +31,7 @@ from experiments.common.figure_style import (
     style,
     width_mm,
 )
-from experiments.interception.course import Clock, duration_text, marks
+from experiments.interception.course import Clock, duration_text, marks, true_predicted_misses
 from experiments.interception.figures.approach import MARK_LOOK, MOST_VECTORS, count_down
 from experiments.interception.record_titles import angle_name, outcome_title, record_titles
 from sim import Record
@@ -59,15 +62,18 @@ Trace = tuple[Record, str]
 """An engagement and one of its lateral axes."""
 
 _MODULUS = "#c9c9c9"
-_LINEAR_SHARE = 0.05
-"""Share of the values in the linear part of a bent axis."""
+_LEAST_RATE = 0.02
+"""Quantile of the moduli of the rates at which their logarithmic axis starts: a rate can be zero."""
+_BOUND_ALPHA = 0.18
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def draw_process(records: Sequence[Record]) -> Figure:
     """Draw angle, angular rate, impulse and predicted miss over time, one column per record and lateral axis.
 
-    The axes of a row have the same limits. At least one record is needed.
+    The axes of a row have the same limits. At least one record is needed. On a logarithmic time axis (`Clock`), where
+    angle and rate grow by many decades, the angle is replaced by the error of its measurement with its bound, the rate
+    by its modulus, and the predicted miss has that of the true state.
     """
     if not records:
         raise ValueError("at least one record is needed")
@@ -85,15 +91,19 @@ def draw_process(records: Sequence[Record]) -> Figure:
         figure = new_figure(height_mm=184.0 + top)
         grid = place_axes(figure, _ROWS, len(traces), margins_mm=(21.0, 4.0, 24.0, top), gaps_mm=(gap, 4.0))
         for trace, column in zip(traces, zip(*grid, strict=True), strict=True):
-            _draw_sight(column[0], trace, clock, "angle", "true_angle_rad", 1e3)
             column[1].axhline(0.0, color=LIMIT, linewidth=0.6)
-            _draw_sight(column[1], trace, clock, "rate", "true_rate_rad_s", 1e6)
+            if clock.counts_down:
+                _draw_angle_error(column[0], trace, clock)
+                _draw_sight(column[1], trace, clock, "rate", "true_rate_rad_s", 1e6, is_modulus=True)
+            else:
+                _draw_sight(column[0], trace, clock, "angle", "true_angle_rad", 1e3)
+                _draw_sight(column[1], trace, clock, "rate", "true_rate_rad_s", 1e6)
             _draw_impulse(column[2], trace, clock, span_m_s)
             draw_predicted_miss(column[3], trace, clock)
         _write_titles(grid[0], records, titles)
         if clock.counts_down:
-            _level_decades(grid[0], [_course(each, "true_angle_rad") * 1e3 for each in traces])
-            _level_decades(grid[1], [_course(each, "true_rate_rad_s") * 1e6 for each in traces])
+            _level_angle_errors(grid[0], traces)
+            _level_moduli(grid[1], np.concatenate([1e6 * np.abs(_course(each, "true_rate_rad_s")) for each in traces]))
         else:
             _level(grid[0], [_extent(each, "angle", "true_angle_rad", ANGLE_RANGE_SHARE) for each in traces], scale=1e3)
             _level(grid[1], [_extent(each, "rate", "true_rate_rad_s", RATE_RANGE_SHARE) for each in traces], scale=1e6)
@@ -132,8 +142,10 @@ def _write_titles(row: Sequence[Axes], records: Sequence[Record], titles: Sequen
         first.annotate(title, (middle, 1.0), linespacing=1.3, **place, **look)
 
 
-def _draw_sight(axes: Axes, trace: Trace, clock: Clock, sensor: str, field: str, scale: float) -> None:
-    """Draw a quantity of the line of sight, and its measurements as dots."""
+def _draw_sight(
+    axes: Axes, trace: Trace, clock: Clock, sensor: str, field: str, scale: float, *, is_modulus: bool = False
+) -> None:
+    """Draw a quantity of the line of sight or its modulus, and its measurements as dots."""
     record, axis = trace
     times = clock.at(record)
     steps = zip(times, [step.axes[axis].measured for step in record.steps], strict=True)
@@ -142,9 +154,53 @@ def _draw_sight(axes: Axes, trace: Trace, clock: Clock, sensor: str, field: str,
         measured_at, values = np.array(measured).T
         size = 6.0 if _marker(record) and sensor == "angle" else 3.0
         look: dict[str, Any] = {"markersize": size, "rasterized": len(values) > MOST_VECTORS}
+        values = np.abs(values) if is_modulus else values
         axes.plot(measured_at, values * scale, ".", color=MEASURED, markeredgewidth=0.0, **look)
-    true = _course(trace, field)
+    true = np.abs(_course(trace, field)) if is_modulus else _course(trace, field)
     axes.plot(times, true * scale, color=TRUTH, marker=_marker(record), markersize=3.0)
+
+
+def _angle_errors(trace: Trace) -> tuple[NDArray[np.int64], Floats, Floats]:
+    """Return the steps with a measured angle, and the error of each and its bound, µrad."""
+    record, axis = trace
+    steps = [index for index, step in enumerate(record.steps) if "angle" in step.axes[axis].measured]
+    along = [record.steps[index].axes[axis] for index in steps]
+    errors = np.array([step.measured["angle"] - step.true_angle_rad for step in along])
+    sensor = record.scenario.set_model.axis(axis).angle_sensor
+    bounds = sensor.error_bound(np.array([record.steps[index].true_range_m for index in steps]))
+    return np.array(steps, dtype=np.int64), 1e6 * errors, 1e6 * bounds
+
+
+def _draw_angle_error(axes: Axes, trace: Trace, clock: Clock) -> None:
+    """Draw the errors of the measured angles and their bound."""
+    steps, errors, bounds = _angle_errors(trace)
+    times = clock.at(trace[0])[steps]
+    axes.axhline(0.0, color=LIMIT, linewidth=0.6)
+    axes.fill_between(times, -bounds, bounds, color=MEASURED, alpha=_BOUND_ALPHA, linewidth=0.0)
+    look: dict[str, Any] = {"markersize": 3.0, "rasterized": len(steps) > MOST_VECTORS}
+    axes.plot(times, errors, ".", color=MEASURED, markeredgewidth=0.0, **look)
+
+
+def _level_angle_errors(row: Sequence[Axes], traces: Sequence[Trace]) -> None:
+    """Give axes of angle errors the same limits: logarithmic beyond ten times the power of ten of the first bound."""
+    bounds = [bounds for _, _, bounds in map(_angle_errors, traces) if len(bounds)]
+    greatest = max((float(each.max()) for each in bounds), default=1.0)
+    first = math.ceil(math.log10(max((float(each[0]) for each in bounds), default=1.0)))
+    if greatest > 10.0**first:
+        _bend(row, first, greatest)
+        return
+    for axes in row:
+        axes.set_ylim(-1.3 * greatest, 1.3 * greatest)
+
+
+def _level_moduli(row: Sequence[Axes], moduli: Floats) -> None:
+    """Give logarithmic axes the same limits, without the smallest values."""
+    known = moduli[moduli > 0.0] if moduli.any() else np.ones(1)
+    for axes in row:
+        axes.set_yscale("log")
+        axes.set_ylim(0.5 * float(np.quantile(known, _LEAST_RATE)), 2.0 * float(known.max()))
+        axes.yaxis.set_major_locator(LogLocator(numticks=7))
+        axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, span_m_s: float) -> None:
@@ -165,6 +221,7 @@ def _draw_impulse(axes: Axes, trace: Trace, clock: Clock, span_m_s: float) -> No
         textcoords="offset points",
         ha="right",
         va="bottom",
+        path_effects=[withStroke(linewidth=2.0, foreground="white")],
     )
     if record.scenario.is_spatial:
         moduli = np.array([step.impulse_m_s for step in record.steps])
@@ -184,6 +241,8 @@ def draw_predicted_miss(axes: Axes, trace: Trace, clock: Clock) -> None:
     axes.fill_between(times, lower, upper, color=SET_FILL, linewidth=0.0)
     for bound in (lower, upper):
         axes.plot(times, bound, color=SET_EDGE, linewidth=0.9, marker=_marker(trace[0]), markersize=3.0)
+    if clock.counts_down:
+        axes.plot(clock.at(trace[0]), true_predicted_misses(trace[0])[trace[1]], color=TRUTH, linewidth=1.0)
 
 
 def _level(row: Sequence[Axes], extents: Sequence[tuple[float, float]], scale: float) -> None:
@@ -207,16 +266,9 @@ def level_predicted_miss(row: Sequence[Axes], traces: Sequence[Trace]) -> None:
     _bend(row, 1, float(np.abs(bounds).max(initial=10.0)))
 
 
-def _level_decades(row: Sequence[Axes], courses: Sequence[Floats]) -> None:
-    """Give axes the same limits: linear below the size that most values exceed, logarithmic beyond."""
-    sizes = np.abs(np.concatenate(courses))
-    least = float(np.quantile(sizes, _LINEAR_SHARE))
-    _bend(row, int(np.floor(np.log10(least))) if least > 0.0 else 0, float(sizes.max()) or 1.0)
-
-
 def _bend(row: Sequence[Axes], first: int, greatest: float) -> None:
     """Make vertical axes linear to 10**first, logarithmic beyond, with symmetric limits."""
-    last = int(np.floor(np.log10(greatest) + 1e-9))
+    last = int(np.floor(np.log10(2.0 * greatest)))
     powers = range(first, last + 1, 1 if last - first < _MOST_DECADES else 2)
     names = ["1" if power == 0 else "10" + (str(power).translate(_RAISED) if power != 1 else "") for power in powers]
     sizes = [10.0**power for power in powers]
@@ -275,9 +327,10 @@ def _note_exit(axes: Axes, values: Floats, trace: Trace, scale: float, unit: str
 def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], traces: Sequence[Trace], clock: Clock) -> None:
     records = [record for record, _ in traces]
     in_space = any(record.scenario.is_spatial for record in records)
+    bent = clock.counts_down
     labels = (
-        "line-of-sight angle α, mrad",
-        "line-of-sight rate ω, µrad/s",
+        "error of the measured\nangle α, µrad" if bent else "line-of-sight angle α, mrad",
+        "modulus of the\nline-of-sight rate ω, µrad/s" if bent else "line-of-sight rate ω, µrad/s",
         "impulse component k, m/s" if in_space else "impulse k, m/s",
         "predicted miss π, m\n(linear within ±10 m)",
     )
@@ -298,8 +351,11 @@ def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], traces: Sequence[Tra
         row[0].yaxis.set_label_coords(-12.5 / width_mm(row[0]), 0.5)
     rated = any("rate" in step.measured for record in records for step in record.steps)
     measured = "measured angle and rate" if rated else "measured angle"
+    true = "true rate and predicted miss" if bent else "true angle and rate"
+    if bent:
+        measured = "error of the measured angle" + (", measured rate" if rated else "")
     handles: list[Line2D | Patch] = [
-        Line2D([], [], color=TRUTH, label="true angle and rate"),
+        Line2D([], [], color=TRUTH, label=true),
         Line2D([], [], color=MEASURED, marker=".", markersize=7, linestyle="none", label=measured),
         Line2D([], [], color=IMPULSE, linewidth=1.2, label="impulse component" if in_space else "impulse"),
         Line2D([], [], color=LIMIT, linewidth=0.8, linestyle=(0, (4, 2)), label="greatest impulse"),
@@ -308,12 +364,13 @@ def _finish(figure: Figure, grid: Sequence[Sequence[Axes]], traces: Sequence[Tra
     if in_space:
         modulus = "modulus of the impulse vector, upward"
         handles.insert(3, Line2D([], [], color=_MODULUS, linewidth=1.8, label=modulus))
-    if clock.counts_down:
+    if bent:
+        handles.insert(2, Patch(facecolor=MEASURED, alpha=_BOUND_ALPHA, label="bound of the angle error"))
         times = {name: duration_text(time) for record in records for name, time in marks(record.scenario).items()}
         if times:
             label = ", ".join(f"{name} {time}" for name, time in times.items())
             handles.append(Line2D([], [], label=label, **MARK_LOOK))
-    figure.legend(handles=handles, loc="lower center", ncols=3, columnspacing=2.5, labelcolor=INK)
+    figure.legend(handles=handles, loc="lower center", ncols=3, columnspacing=2.0, labelcolor=INK)
 
 
 def _course(trace: Trace, field: str) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from string import ascii_lowercase
 from typing import Any
@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 from numpy.typing import NDArray
 
 from experiments.common.figure_style import INK, MEASURED, WIDTH_MM, new_figure, place_axes, plain, style, width_mm
@@ -33,6 +33,10 @@ _DARK, _LIGHT = (0.03, 0.14, 0.36), (0.36, 0.66, 0.86)
 _PLANE_MM = 90.0
 """Least width of a plane and its labels in space, mm."""
 _LETTER_MM = 1.8
+_COINCIDE = 0.1
+"""Share of the size of sections: of a long flight only two sections are drawn if all differ by less."""
+_SMALL_MRAD = 0.1
+"""Angle below which the ticks of angles are in µrad."""
 _LABEL_MM, _LABEL_ROOM_MM = 14.0, 19.0
 """Position of the labels, and width that the sets leave for them, from the right side of the axes."""
 
@@ -82,7 +86,7 @@ def draw_sets(records: Sequence[Record], times_s: Sequence[float] = (0.5, 4.0, 8
                 axes.set_title(f"{next(letters)}{title}, {clock.text(plane.record, plane.step.time_s)}")
                 along = f" along {plane.axis}" if in_space else ""
                 axes.set_xlabel(f"line-of-sight rate ω{along}, µrad/s", labelpad=2.0)
-                axes.set_ylabel(f"{angle_name(plane.record.scenario, plane.axis)}{along}, mrad")
+                axes.set_ylabel(f"{angle_name(plane.record.scenario, plane.axis)}{along}, {angle_unit(axes)}")
                 axes.yaxis.label.set_visible(in_space or axes is row[0])
                 axes.tick_params(labelleft=in_space or axes is row[0])
         measured = any("angle" in plane.along.measured for planes in rows for plane in planes)
@@ -120,6 +124,14 @@ class Plane:
         return [polygon.polygon() * np.array([1e6, 1e3]) for polygon in polygons if polygon is not None]
 
     @property
+    def sections_coincide(self) -> bool:
+        """Whether the boxes around the outlines differ by less than `_COINCIDE` of their size."""
+        boxes = np.array([[outline.min(axis=0), outline.max(axis=0)] for outline in self.outlines if len(outline)])
+        if not len(boxes):
+            return False
+        return bool((np.ptp(boxes, axis=0) <= _COINCIDE * np.ptp(boxes[0], axis=0)).all())
+
+    @property
     def extent(self) -> Floats:
         """All points (omega in µrad/s, alpha in mrad) that a drawing must contain."""
         rate, angle = self.along.true_rate_rad_s * 1e6, self.along.true_angle_rad * 1e3
@@ -131,11 +143,15 @@ class Plane:
 
 def planes_at(records: Sequence[Record], titles: Sequence[str], time_s: float, sections: int) -> list[Plane]:
     """Return the planes of each record at its step nearest to a time, with at most so many sections."""
-    planes = []
+    planes, is_long = [], Clock.of(records).counts_down
     for record, title in zip(records, titles, strict=True):
         step = min(record.steps, key=lambda step: abs(step.time_s - time_s))
         chosen = choose_sections(step.sections, sections)
-        planes += [Plane(title, record, axis, step, chosen) for axis in record.scenario.set_model.axes]
+        row = [Plane(title, record, axis, step, chosen) for axis in record.scenario.set_model.axes]
+        if is_long and all(plane.sections_coincide for plane in row):
+            chosen = choose_sections(step.sections, min(2, sections))
+            row = [replace(plane, chosen=chosen) for plane in row]
+        planes += row
     return planes
 
 
@@ -284,6 +300,14 @@ def level_planes(row: Sequence[Axes], planes: Sequence[Plane]) -> None:
             axes.set_ylim(float(least[1]), float(greatest[1]))
             nbins = 6 if np.abs(least[0]) < 1e4 else 3
             axes.xaxis.set_major_locator(MaxNLocator(nbins=nbins, steps=[1, 2, 2.5, 5, 10]))
+
+
+def angle_unit(axes: Axes) -> str:
+    """Return the unit of the ticks of the angles; those of small angles become µrad."""
+    if np.abs(axes.get_ylim()).max() > _SMALL_MRAD:
+        return "mrad"
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{1e3 * tick:g}".replace("-", "\N{MINUS SIGN}")))
+    return "µrad"
 
 
 def _colour(index: int, count: int) -> Colour:

@@ -22,7 +22,7 @@ from experiments.interception.figures.approach import draw_approach
 from experiments.interception.figures.b_plane import Cloud, cloud, draw_b_plane, ellipse, greatest_guarantee
 from experiments.interception.figures.corridor import draw_corridor
 from experiments.interception.figures.process import draw_process
-from experiments.interception.figures.sets import TRUTH_MARK, choose_sections, draw_sets
+from experiments.interception.figures.sets import TRUTH_MARK, choose_sections, draw_sets, planes_at
 from experiments.interception.page import interception_page
 from experiments.interception.scenario_file import load_scenario
 from guidance import NoiseKind
@@ -221,7 +221,7 @@ def test_the_sets_of_both_planes_are_side_by_side(records: list[Record]) -> None
     for number, axes in enumerate(figure.axes):
         step, axis = records[0].steps[(1, 16)[number // 2]], AXES[number % 2]
         assert axes.get_xlabel() == f"line-of-sight rate ω along {axis}, µrad/s"
-        assert axes.get_ylabel() == f"line-of-sight angle α along {axis}, mrad"
+        assert axes.get_ylabel().split(",")[0] == f"line-of-sight angle α along {axis}"
         chosen = choose_sections(step.sections, 3)
         polygons = [section.omega_alpha if axis == "z" else section.omega_alpha_y for section in chosen]
         drawn = [patch.get_xy() for patch in axes.patches if isinstance(patch, Polygon) and patch.get_closed()]
@@ -383,8 +383,43 @@ def test_the_axis_of_impulses_extends_to_small_impulses(records: list[Record]) -
 def test_figures_name_the_angles_of_a_gimbal() -> None:
     record = fly_one(load_scenario("asteroid-1997-space", ["angle_sensor.convention=gimbal"]))
     labels = [axes.get_ylabel() for axes in draw_sets([record], (8.0,)).axes]
-    assert labels == ["azimuth α along y, mrad", "elevation α along z, mrad"]
+    assert [label.split(",")[0] for label in labels] == ["azimuth α along y", "elevation α along z"]
     assert [axes.get_title() for axes in draw_process([record]).axes[:2]] == [
         "along y (azimuth)",
         "along z (elevation)",
     ]
+
+
+def test_process_of_a_long_flight_shows_errors_moduli_and_the_true_miss(records: list[Record]) -> None:
+    record = scheduled(records[0])
+    figure = draw_process([record])
+    errors, rates, _, misses = (figure.axes[2 * row] for row in range(4))
+    seen = [step for step in record.steps if "angle" in step.axes["y"].measured]
+    dots = next(line for line in errors.lines if line.get_marker() == ".")
+    expected = [1e6 * (step.axes["y"].measured["angle"] - step.axes["y"].true_angle_rad) for step in seen]
+    np.testing.assert_allclose(np.asarray(dots.get_ydata(), dtype=np.float64), expected)
+    sensor = record.scenario.set_model.angle_sensor
+    (band,) = errors.collections
+    ends = np.asarray(band.get_paths()[0].vertices)[:, 1]
+    assert ends.max() == pytest.approx(1e6 * max(float(sensor.error_bound(step.true_range_m)) for step in seen))
+    assert np.abs(expected).max() <= ends.max()
+    true = np.asarray(rates.lines[1].get_ydata(), dtype=np.float64)
+    np.testing.assert_allclose(true, [1e6 * abs(step.axes["y"].true_rate_rad_s) for step in record.steps])
+    true = np.asarray(misses.lines[3].get_ydata(), dtype=np.float64)
+    np.testing.assert_allclose(true, true_predicted_misses(record)["y"])
+    assert "bound of the angle error" in legend(figure)
+
+
+def test_sections_that_coincide_are_two_and_small_angles_are_in_microradians() -> None:
+    record = fly_one(load_scenario("haiv-2013"))
+    early, late = (planes_at([record], [""], time_s, 5) for time_s in (3600.0, 7150.0))
+    assert [len(plane.chosen) for plane in early] == [2, 2]
+    assert [len(plane.chosen) for plane in late] == [5, 5]
+    assert [plane.chosen[0].range_m for plane in early] == [early[0].step.sections[0].range_m] * 2
+    figure = draw_sets([record], (3600.0,))
+    axes = figure.axes[0]
+    assert axes.get_ylabel() == "line-of-sight angle α along y, µrad"
+    figure.draw_without_rendering()
+    low, high = (1e3 * limit for limit in axes.get_ylim())
+    ticks = [float(tick.get_text().replace("\N{MINUS SIGN}", "-")) for tick in axes.get_yticklabels()]
+    assert sum(low <= tick <= high for tick in ticks) >= 2
