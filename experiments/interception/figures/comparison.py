@@ -31,6 +31,9 @@ _HILL = 0.62
 _BAR = 0.17
 """Distance of the quantile bar below its histogram, in rows."""
 
+_FEW_DECADES = 3
+"""Number of decades up to which a logarithmic axis also has ticks at 2 and 5."""
+
 _NOISES = ((NoiseKind.RANDOM, "random noise"), (NoiseKind.GAME, "game noise, worst of four tie rules"))
 
 
@@ -88,8 +91,9 @@ def _draw_row(
                 _draw_strategy(axes, names.index(each.strategy), value(each), (left, right), logarithmic=logarithmic)
         if logarithmic:
             axes.set_xscale("log")
-            decades = 10.0 ** np.arange(np.ceil(np.log10(left) - 1e-9), np.floor(np.log10(right)) + 1.0)
-            axes.xaxis.set_major_locator(FixedLocator(decades.tolist()))
+            powers = np.arange(np.floor(np.log10(left)), np.floor(np.log10(right)) + 1.0)
+            ticks = np.outer(10.0**powers, (1.0, 2.0, 5.0) if len(powers) <= _FEW_DECADES else (1.0,)).ravel()
+            axes.xaxis.set_major_locator(FixedLocator(ticks[(ticks >= 0.999 * left) & (ticks <= right)].tolist()))
             axes.xaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
             axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_xlim(left, right)

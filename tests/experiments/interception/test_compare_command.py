@@ -229,6 +229,16 @@ def test_misses_of_zero_can_be_drawn(compared: list[Comparison]) -> None:
     assert all(np.isfinite([*axes.get_xlim(), *axes.get_ylim()]).all() for axes in figure.axes)
 
 
+def test_misses_within_a_decade_have_several_tick_labels(compared: list[Comparison]) -> None:
+    narrow = [
+        replace(each, results={tie: replace(r, miss_m=12.0 + 0.0 * r.miss_m) for tie, r in each.results.items()})
+        for each in compared
+    ]
+    axes = axes_of(draw_comparison(narrow))["(a)"]
+    low, high = axes.get_xlim()
+    assert [tick for tick in axes.get_xticks() if low <= tick <= high] == [2.0, 5.0, 10.0]
+
+
 def test_a_comparison_of_nothing_cannot_be_drawn() -> None:
     with pytest.raises(ValueError, match="at least one strategy"):
         draw_comparison([])
