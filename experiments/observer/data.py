@@ -136,8 +136,12 @@ def read_csv(file: Path, outputs: int, inputs: int) -> Data:
     unknown = [name for name in header if name not in (*wanted, "k")]
     missing = [name for name in wanted if name not in header]
     if unknown or missing or len(set(header)) < len(header):
-        problem = f"has no column {missing[0]}" if missing else f"has a wrong column {shown((unknown or header)[0])}"
-        raise InputError(f"--data: {file}: {problem}; the header is {','.join(wanted)} (and k, optionally)")
+        repeated = [name for name in header if header.count(name) > 1]
+        problem = f"column {missing[0]} is missing" if missing else f"wrong column {shown((unknown or repeated)[0])}"
+        raise InputError(
+            f"--data: {file}: {problem}; the header must be {','.join(wanted)} (and k, optionally), found "
+            f"{shown(','.join(header))}"
+        )
     while rows and not rows[-1]:
         rows.pop()
     # In a file of one column an empty line is an empty cell.

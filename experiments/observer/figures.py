@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from experiments.common.figure_style import INK, MEASURED, SET_EDGE, SET_FILL, TRUTH, figure_grid, plain, style
+from experiments.common.figure_style import IMPULSE, INK, MEASURED, SET_EDGE, SET_FILL, TRUTH, figure_grid, plain, style
 from experiments.observer.report import Report
 
 Floats = NDArray[np.float64]
@@ -45,6 +47,8 @@ def draw_bounds(report: Report) -> Figure:
                 marker="|",
                 label="no measurement",
             )
+        if report.contradicted:
+            _mark_contradiction(panel, report, f"no state from step {int(report.inconsistency.step)} on")
         panel.set_ylabel(plain(name))
         panel.margins(x=0.01)
         if index < len(names) - 1:
@@ -54,16 +58,29 @@ def draw_bounds(report: Report) -> Figure:
         if report.smoothed is not None:
             smoothed = [float(each.upper[index] - each.lower[index]) for each in report.smoothed]
             panel.plot(time, smoothed, color=MEASURED, linewidth=0.9, linestyle=(0, (4, 1.5)))
+        if report.contradicted:
+            _mark_contradiction(panel, report)
         panel.set_ylabel(f"width of {plain(name)}")
         panel.set_ylim(bottom=0.0)
         panel.margins(x=0.01)
         if index < len(names) - 1:
             panel.tick_params(labelbottom=False)
-    panels[-1].set_xlabel(title)
-    widths[-1].set_xlabel(title)
+    for panel in (panels[-1], widths[-1]):
+        panel.set_xlabel(title)
+    if report.problem.step_s is None:
+        for panel in grid:
+            panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="upper center", ncols=4)
+    figure.legend(handles, labels, loc="upper center", ncols=5, columnspacing=1.2)
     return figure
+
+
+def _mark_contradiction(panel: Axes, report: Report, label: str | None = None) -> None:
+    """Mark the steps without a possible state."""
+    time, _ = times(report)
+    empty = time[[estimate.is_empty for estimate in report.estimates]]
+    panel.axvspan(empty[0], time[-1], facecolor="none", edgecolor=IMPULSE, hatch="////", linewidth=0.0, alpha=0.35)
+    panel.axvline(empty[0], color=IMPULSE, linewidth=1.2, label=label)
 
 
 def times(report: Report) -> tuple[Floats, str]:
@@ -87,10 +104,13 @@ def draw_sets(report: Report) -> Figure:
         panel.update_datalim(np.vstack(outlines))
         for first in (0, len(outlines) - 1):
             at = outlines[first].mean(axis=0)
-            panel.annotate(f"{shown[first].step}", at, fontsize=7.0, ha="center", va="center")
+            panel.annotate(f"step {shown[first].step}", at, fontsize=7.0, ha="center", va="center")
     if report.data.states is not None:
         states = report.data.states
-        panel.plot(states[:, 0], states[:, 1], color=TRUTH, marker=".", markersize=3.0, linewidth=0.7)
+        panel.plot(
+            states[:, 0], states[:, 1], color=TRUTH, marker=".", markersize=3.0, linewidth=0.7, label="true state"
+        )
+        panel.legend(loc="best")
     panel.autoscale_view()
     panel.set(xlabel=plain(report.problem.names[0]), ylabel=plain(report.problem.names[1]))
     panel.set_title("possible states, light (first step) to dark (last step)", loc="left")

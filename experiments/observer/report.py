@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.table import Table
 
 from experiments.common.output import Cell, library_version, to_csv
 from experiments.common.screen import Part, number_table
@@ -17,6 +18,8 @@ from infoset import Estimate, Inconsistency
 Floats = NDArray[np.float64]
 
 _SHOWN_STEPS = 12
+_ROUNDING = 1e-12
+"""Share of the greatest bound of a state below which a printed bound is zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,20 +114,28 @@ def report_csv(report: Report) -> str:
     return to_csv(["k", "empty", *ends, *true], rows)
 
 
+def _bounds_table(names: Sequence[str], estimates: Sequence[Estimate]) -> Table:
+    """Return a table of the bounds of the last steps; those within rounding errors of the column's values are zero."""
+    table = number_table("step", *(f"{name}\n{end}" for name in names for end in ("from", "to")))
+    bounds = np.array([[estimate.lower, estimate.upper] for estimate in estimates])
+    bounds[np.abs(bounds) < _ROUNDING * np.abs(np.nan_to_num(bounds)).max(axis=(0, 1))] = 0.0
+    for estimate, ends in list(zip(estimates, bounds, strict=True))[-_SHOWN_STEPS:]:
+        table.add_row(str(estimate.step), *("empty" if np.isnan(end) else f"{end:.6g}" for end in ends.T.ravel()))
+    return table
+
+
 def report_parts(report: Report) -> Iterator[Part]:
     """Yield the bounds of the last steps and a contradiction, for the screen."""
     problem, count = report.problem, len(report.estimates)
     missing = int(np.isnan(report.data.measured).any(axis=1).sum())
     gaps = f", {missing} with missing measurements" if missing else ""
     yield f"{problem.name}: {len(problem.a)} states, {count} steps{gaps}; {report.data.origin}"
-    table = number_table("step", *(f"{name}\n{end}" for name in problem.names for end in ("from", "to")))
-    first = max(0, count - _SHOWN_STEPS)
-    for estimate in report.estimates[first:]:
-        ends = np.column_stack([estimate.lower, estimate.upper]).ravel()
-        table.add_row(str(estimate.step), *("empty" if np.isnan(end) else f"{end:.6g}" for end in ends))
-    if first:
+    if count > _SHOWN_STEPS:
         yield f"bounds of the last {_SHOWN_STEPS} steps:"
-    yield table
+    yield _bounds_table(problem.names, report.estimates)
+    if report.smoothed is not None:
+        yield "the same with later measurements (--smooth):"
+        yield _bounds_table(problem.names, report.smoothed)
     inside = report.inside()
     if inside is not None:
         yield f"true state inside the set: {inside} of {count} steps"

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from experiments.common.errors import InputError
 from experiments.common.output import output_of, to_json
-from experiments.common.screen import figure_files, progress_bar, show
+from experiments.common.screen import figure_files, progress_bar, say_warnings, show
 from experiments.observer.command import Observe
 from experiments.observer.data import Data, data_of, need_size
 from experiments.observer.figures import draw_bounds, draw_sets
@@ -27,6 +27,7 @@ def run(options: Observe) -> None:
         output_of(options, ("problem.toml", "results.json", "bounds.csv", *figure_files(*names))) as written,
         progress_bar(options.quiet) as begin,
     ):
+        say_warnings(_unused_inputs(problem, data) if options.data is None else [], options.quiet)
         report = _observed(problem, data, options.smooth, begin("sets"))
         written.save("problem.toml", problem.toml)
         written.save("results.json", to_json(report_json(report)), "--json")
@@ -35,6 +36,16 @@ def run(options: Observe) -> None:
             written.deliver("--html", observer_page(report))
         written.draw({name: _drawings(report)[name] for name in names}, begin("figures"))
     show(report_parts(report), options.quiet, stdout_taken=written.stdout_taken)
+
+
+def _unused_inputs(problem: ObserverProblem, data: Data) -> list[str]:
+    """Return a warning about inputs of the problem file after the last measurement."""
+    rows, steps = 0 if problem.inputs is None else len(problem.inputs), len(data.measured)
+    if rows <= steps:
+        return []
+    return [
+        f"{problem.source}: measurements.u has {rows} rows, and there are {steps} steps: the later rows are not used"
+    ]
 
 
 def _observed(problem: ObserverProblem, data: Data, smooth: bool, progress: Callable[[float], None]) -> Report:

@@ -12,8 +12,10 @@ import pytest
 
 from experiments.common.file_kinds import built_in_files
 from experiments.observer.command import Errors
-from experiments.observer.data import simulate
+from experiments.observer.data import data_of, simulate
+from experiments.observer.figures import draw_bounds
 from experiments.observer.file import load_observer
+from experiments.observer.report import Report
 from tests.experiments.command_line import Command, strict
 
 PUBLISHED = json.loads((Path(__file__).parents[2] / "data" / "observer" / "alamo-2005.json").read_text())
@@ -106,10 +108,11 @@ def test_an_empty_cell_is_a_missing_measurement(infoset: Command) -> None:
     ("content", "parts"),
     [
         ("y1,u1\n", ["has 0 steps"]),
-        ("", ["has no column y1", "the header is y1,u1"]),
-        ("y1\n1\n", ["has no column u1"]),
-        ("y1,u1,y2\n1,1,1\n", ['has a wrong column "y2"']),
-        ("y1,u1,u1\n1,1,1\n", ["has a wrong column"]),
+        ("", ["column y1 is missing", "the header must be y1,u1"]),
+        ("y1\n1\n", ["column u1 is missing", "the header must be y1,u1", 'found "y1"']),
+        ("y1;u1\n1;1\n", ["column y1 is missing", 'found "y1;u1"']),
+        ("y1,u1,y2\n1,1,1\n", ['wrong column "y2"']),
+        ("y1,u1,u1\n1,1,1\n", ['wrong column "u1"']),
         ("y1,u1\n1,1,1\n", ["line 2 has 3 cells, and the header has 2"]),
         ("y1,u1\n1,1\nfast,1\n", ["line 3, y1", 'found "fast"']),
         ("y1,u1\n1,\n", ["line 2, u1: must be a number"]),
@@ -171,11 +174,49 @@ def test_a_contradiction_is_reported(infoset: Command) -> None:
     assert [step["empty"] for step in results["steps"]] == [False] * 10 + [True] * 10
     assert results["final"] == {"lower": None, "upper": None}
     assert results["inconsistency"]["k"] == 10
+    figure = draw_bounds(observed("odd.toml"))
+    assert [text.get_text() for text in figure.legends[0].get_texts()][-1] == "no state from step 10 on"
+    for panel in figure.axes:
+        assert 10.0 in [float(np.asarray(line.get_xdata(), dtype=np.float64)[0]) for line in panel.lines]
+        assert all(tick == round(tick) for tick in panel.get_xticks())
     # With the bound enlarged by the excess a state is possible.
     width = 0.2 + results["inconsistency"]["excess"]
     alone = Path("odd.toml").read_text().replace("half_width = [0.2]", f"half_width = [{width + 1e-9!r}]")
     Path("wide.toml").write_text(alone)
     assert infoset.json("observe", "wide.toml")["steps"][10]["empty"] is False
+
+
+def observed(name: str) -> Report:
+    problem = load_observer(name)
+    data = data_of(problem, None, Errors.EXTREMAL, 0)
+    observer = problem.observer()
+    estimates = observer.run(data.measured, data.inputs)
+    return Report(problem, data, estimates, observer.smooth(estimates, data.inputs), observer.inconsistency)
+
+
+def test_printed_bounds_are_zero_within_rounding_and_smoothed_ones_are_printed_too(infoset: Command) -> None:
+    Path("flat.toml").write_text(
+        'schema = 1\nkind = "observer"\n[system]\nA = [[1.0, 0.0], [0.0, 1.0]]\nC = [[1.0, 0.0]]\n[initial]\n'
+        "lower = [-0.3, -1.0]\nupper = [0.5, 1.0]\n[noise]\nhalf_width = [0.1]\n[measurements]\n"
+        "y = [[0.1], [0.1], [0.2]]\n"
+    )
+    code, out, _ = infoset("observe", "flat.toml", "--smooth")
+    assert code == 0
+    before, after = out.split("the same with later measurements (--smooth):")
+    rows = [
+        [line.split() for line in part.splitlines() if line[:1] in "012" and line.strip()] for part in (before, after)
+    ]
+    ends = ["-1", "1"]
+    assert rows[0] == [["0", "0", "0.2", *ends], ["1", "0", "0.2", *ends], ["2", "0.1", "0.2", *ends]]
+    assert rows[1] == [[step, "0.1", "0.2", *ends] for step in "012"]
+
+
+def test_inputs_after_the_last_measurement_are_warned_of(infoset: Command) -> None:
+    Path("short.toml").write_text(changed("steps = 40", "steps = 20"))
+    code, _, err = infoset("observe", "short.toml")
+    assert code == 0
+    assert "short.toml: measurements.u has 32 rows, and there are 20 steps: the later rows are not used" in err
+    assert "warning" not in infoset("observe", "vehicle")[2]
 
 
 @pytest.mark.parametrize("errors", list(Errors))
