@@ -66,6 +66,17 @@ if (plane) {
     },
   }));
 }
+const stroke = (look) => (context) => drawPath(context, [[1, 6], [21, 6]], look);
+const boundsLegend = [
+  ["possible states", (context) => drawPath(context, [[1, 1], [21, 1], [21, 11], [1, 11]],
+    { fill: theme.colours.set, opacity: 0.35, stroke: theme.colours.line, width: 1, closed: true })],
+  ...(DATA.steps.some((step) => step.later)
+    ? [["with later measurements", stroke({ stroke: theme.colours.measured, width: 1.5, dash: [4, 2] })]] : []),
+  ...(DATA.steps[0].state ? [["true state", stroke({ stroke: theme.colours.ink, width: 1.5 })]] : []),
+  ...(DATA.empty_from !== null
+    ? [["no state is possible from this step on", stroke({ stroke: theme.colours.impulse, width: 2 })]] : []),
+  ["present step", stroke({ stroke: theme.colours.quiet, width: 1.5 })],
+];
 const numbers = element("table", { "aria-label": "Numbers of this step", "aria-live": "polite" });
 top_.append(element("figure", {}, element("figcaption", {}, "Numbers of the present step"), numbers));
 
@@ -75,14 +86,24 @@ DATA.names.forEach((name, index) => {
   const chart = new Chart(graphs, {
     caption: name,
     label: `Bounds of ${name} against time`,
+    legend: boundsLegend,
     draw(drawn) {
       drawn.begin({ x: limitsOf(DATA.time, 0.01), y, xTitle: DATA.time_title, yTitle: name });
       drawn.area(known.map(([step, at]) => [at, step.lower[index]]), known.map(([step, at]) => [at, step.upper[index]]),
         { fill: theme.colours.set, opacity: 0.35, stroke: theme.colours.line, width: 1 });
       const states = DATA.steps.map((step, k) => [DATA.time[k], step.state]).filter(([, state]) => state);
+      const later = DATA.steps.map((step, k) => [DATA.time[k], step.later]).filter(([, ends]) => ends);
+      for (const end of [0, 1]) {
+        drawn.curve(later.map(([at, ends]) => [at, ends[end][index]]),
+          { stroke: theme.colours.measured, width: 1, dash: [4, 2] });
+      }
+      if (DATA.empty_from !== null) {
+        const empty = DATA.time[DATA.empty_from];
+        drawn.upright(empty, empty, { stroke: theme.colours.impulse, width: 2 });
+      }
       drawn.curve(states.map(([at, state]) => [at, state[index]]), { stroke: theme.colours.ink, width: 1.5 });
       const now = DATA.time[frame];
-      drawn.upright(now, now, { stroke: theme.colours.measured, width: 1 });
+      drawn.upright(now, now, { stroke: theme.colours.quiet, width: 1.5 });
       drawn.end();
       drawn.describe(rows(DATA.steps[frame]).map((row) => row.join(" ")).join(", "));
     },

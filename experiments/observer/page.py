@@ -8,7 +8,7 @@ import numpy as np
 
 from experiments.common.page_document import page
 from experiments.observer.figures import times
-from experiments.observer.report import Report
+from experiments.observer.report import Report, shown_bounds
 
 
 def observer_page(report: Report) -> str:
@@ -19,17 +19,23 @@ def observer_page(report: Report) -> str:
     about.append(f"{len(report.estimates)} steps; {data.origin}. Step with the arrow keys or the slider.")
     if report.contradicted:
         about.append(f"The measurements contradict the model at step {int(report.inconsistency.step)}.")
+    bounds = shown_bounds(report.estimates)
+    later = None if report.smoothed is None else shown_bounds(report.smoothed)
     content = {
         "heading": f"Possible states of {problem.name}",
         "about": about,
         "names": problem.names,
         "time": time,
         "time_title": title,
+        "empty_from": int(np.argmax([estimate.is_empty for estimate in report.estimates]))
+        if report.contradicted
+        else None,
         "steps": [
             {
                 "k": estimate.step,
-                "lower": None if estimate.is_empty else estimate.lower,
-                "upper": None if estimate.is_empty else estimate.upper,
+                "lower": None if estimate.is_empty else bounds[index, 0],
+                "upper": None if estimate.is_empty else bounds[index, 1],
+                "later": None if later is None or np.isnan(later[index]).any() else later[index],
                 "centre": None if estimate.is_empty else estimate.chebyshev_centre(),
                 "vertices": estimate.polygons.polygon() if estimate.states == 2 else [],
                 "smoothed": []

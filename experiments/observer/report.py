@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 _SHOWN_STEPS = 12
 _ROUNDING = 1e-12
-"""Share of the greatest bound of a state below which a printed bound is zero."""
+"""Share of the greatest bound of a state below which a bound that is shown is zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,12 +114,20 @@ def report_csv(report: Report) -> str:
     return to_csv(["k", "empty", *ends, *true], rows)
 
 
-def _bounds_table(names: Sequence[str], estimates: Sequence[Estimate]) -> Table:
-    """Return a table of the bounds of the last steps; those within rounding errors of the column's values are zero."""
-    table = number_table("step", *(f"{name}\n{end}" for name in names for end in ("from", "to")))
+def shown_bounds(estimates: Sequence[Estimate]) -> Floats:
+    """Return the lower and upper bounds of the states, shape (N, 2, n), to be read; NaN for the empty set.
+
+    Bounds within the rounding errors of the greatest bounds of a state are zero.
+    """
     bounds = np.array([[estimate.lower, estimate.upper] for estimate in estimates])
     bounds[np.abs(bounds) < _ROUNDING * np.abs(np.nan_to_num(bounds)).max(axis=(0, 1))] = 0.0
-    for estimate, ends in list(zip(estimates, bounds, strict=True))[-_SHOWN_STEPS:]:
+    return bounds
+
+
+def _bounds_table(names: Sequence[str], estimates: Sequence[Estimate]) -> Table:
+    """Return a table of the bounds of the last steps."""
+    table = number_table("step", *(f"{name}\n{end}" for name in names for end in ("from", "to")))
+    for estimate, ends in list(zip(estimates, shown_bounds(estimates), strict=True))[-_SHOWN_STEPS:]:
         table.add_row(str(estimate.step), *("empty" if np.isnan(end) else f"{end:.6g}" for end in ends.T.ravel()))
     return table
 

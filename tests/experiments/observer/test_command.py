@@ -174,6 +174,7 @@ def test_a_contradiction_is_reported(infoset: Command) -> None:
     assert [step["empty"] for step in results["steps"]] == [False] * 10 + [True] * 10
     assert results["final"] == {"lower": None, "upper": None}
     assert results["inconsistency"]["k"] == 10
+    assert '"empty_from":10' in Path("page.html").read_text(encoding="utf-8")
     figure = draw_bounds(observed("odd.toml"))
     assert [text.get_text() for text in figure.legends[0].get_texts()][-1] == "no state from step 10 on"
     for panel in figure.axes:
