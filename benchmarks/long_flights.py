@@ -130,13 +130,14 @@ def main() -> None:
     parser.add_argument("--scenario", default="dart-2022")
     parser.add_argument("--rate-error", type=float, help="error of a rate sensor, rad/s; without one if absent")
     options = parser.parse_args()
-    rate_sensor = options.rate_error and RateSensor(1.0, options.rate_error)
     sys.stdout.write(
         "| strategy | steps | a step, us | arrival, ms | whole flight, us a step | vertices, mean / most | sections | "
         "memory, MB | miss, m | guaranteed miss, m | sound |\n" + "|---" * 11 + "|\n"
     )
     for strategy in options.strategies.split(","):
-        scenario = replace(load_scenario(options.scenario), strategy=strategy, rate_sensor=rate_sensor)
+        scenario = replace(load_scenario(options.scenario), strategy=strategy)
+        if options.rate_error is not None:
+            scenario = replace(scenario, rate_sensor=RateSensor(scenario.set_model.step_s, options.rate_error))
         for steps in STEPS:
             of = cost(scenario, steps)
             whole = of.step_us + 1e3 * of.arrival_ms / steps

@@ -70,7 +70,8 @@ class ScriptedNoise:
                 continue
             label = f"errors[{name!r}]"
             now = draws_of_step(label, self.errors[name], sight.step, sight.shape(sensor))
-            if isinstance(sensor, AngleSensor) and sensor.is_disc and np.hypot(*now).max() > 1.0 + DISC_TOLERANCE:
+            is_disc = now.ndim == 2 and isinstance(sensor, AngleSensor) and sensor.is_disc
+            if is_disc and np.hypot(*now).max() > 1.0 + DISC_TOLERANCE:
                 raise ValueError(
                     f"{label} must lie in the unit disc, because the angle sensor's error is in a disc or a cone: at "
                     f"step {sight.step} the root of the sum of squares is {np.hypot(*now).max():.6g}"
@@ -114,8 +115,10 @@ class RandomNoise(ScriptedNoise):
     def errors_of_step(self, sight: LineOfSight) -> dict[str, Floats]:
         """Return the errors of a step by sensor, in units of their bounds."""
         errors = super().errors_of_step(sight)
+        if self.bias is None:
+            return errors
         camera = sight.sensors.get(AngleSensor.name)
-        if self.bias is not None and isinstance(camera, AngleSensor):
+        if isinstance(camera, AngleSensor):
             errors[camera.name] = camera.with_bias(sight, errors[camera.name], self.bias)
         return errors
 

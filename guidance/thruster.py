@@ -124,7 +124,9 @@ class Thruster:
         """
         size, limit = modulus(wanted_m_s), np.minimum(self.greatest_impulse_m_s, budget_left_m_s)
         given, over = wanted_m_s, size > limit
-        if over.any():
+        if wanted_m_s.ndim == 1:
+            given = np.copysign(np.minimum(size, limit), wanted_m_s)
+        elif over.any():
             given = np.where(over, wanted_m_s / np.where(over, size, 1.0) * limit, wanted_m_s)
             # Rounding must not make the modulus greater than the limit.
             while (above := modulus(given) > limit).any():

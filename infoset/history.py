@@ -62,7 +62,7 @@ class History:
         self.sights = np.zeros((channels, batch, len(NO_SIGHT)))
         self.seen = 0
         self._has_rates = False
-        self._fired = np.zeros(batch)
+        self._fired, self._summed = np.zeros(batch), 0
 
     def record(self, kind: int, values: Floats | None = None, applies: Flags | bool = True, error: float = 0.0) -> int:
         """Append an event, with values of shape (C, B), and return its number."""
@@ -78,9 +78,6 @@ class History:
         if values is not None:
             self.values[event] = values
         self.applies[event] = applies
-        if kind == IMPULSE:
-            modulus = np.abs(np.hypot.reduce(self.values[event]))
-            self._fired = self._fired + np.where(self.applies[event], modulus, 0.0)
         self.events += 1
         self.elapsed += kind == PREDICTION
         return event
@@ -91,6 +88,11 @@ class History:
 
     def total_impulse(self) -> Floats:
         """Return the sum of the impulses' magnitudes in each engagement, m/s, shape (B,)."""
+        new = self._summed + np.flatnonzero(self.kinds[self._summed : self.events] == IMPULSE)
+        for event in new:
+            modulus = np.abs(np.hypot.reduce(self.values[event]))
+            self._fired = self._fired + np.where(self.applies[event], modulus, 0.0)
+        self._summed = self.events
         return self._fired
 
     @property
@@ -115,5 +117,5 @@ class History:
         twin.values, twin.applies = self.values.copy(), self.applies.copy()
         twin.events, twin.elapsed = self.events, self.elapsed
         twin.sights, twin.seen = self.sights.copy(), self.seen
-        twin._has_rates, twin._fired = self._has_rates, self._fired
+        twin._has_rates, twin._fired, twin._summed = self._has_rates, self._fired, self._summed
         return twin

@@ -263,7 +263,7 @@ class InformationSet(InformationSetView):
         """
         impulse = self._spread(impulse_m_s, "impulse_m_s")
         state, elapsed = self._state, self._state.history.elapsed
-        active = self._computes_phi & flags("where", where, (self.batch,)) & (impulse != 0.0).any(axis=0)
+        active = self._computes_phi & flags("where", where, (self.batch,)) & impulse.any(axis=0)
         if state.phi is not None:
             state.phi.fire(np.where(active, impulse, 0.0), elapsed)
         if active.any():

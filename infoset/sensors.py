@@ -398,7 +398,7 @@ class AngleSensor(Sensor):
         (0, error_y, error_z) on the plane across it.
         """
         if self.convention is not Convention.CONE:
-            return super().measured(sight, error)
+            return self.true_value(sight) + self.error_bounds(sight.range_m) * error
         (a, b, c), (right, up) = _direction(sight.alpha_rad), np.broadcast_to(error, sight.alpha_rad.shape)
         along = right * b + up * c
         x, y, z = -along * a, right - along * b, up - along * c

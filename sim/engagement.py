@@ -34,6 +34,8 @@ from sim.truth_section import TruthSection
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Pending = tuple[tuple[float, Floats], ...]
+"""Impulses that are decided and not given yet: times from now, s, and impulses, m/s."""
 
 
 @dataclass(frozen=True)
@@ -142,7 +144,7 @@ class Engagements:
     @property
     def flying(self) -> bool:
         """Whether any true motion is before its closest approach or before x = 0, where its label leaves the set."""
-        return bool((self._flying | ~self._arrived).any()) and self.step < self._draws.steps
+        return not self._arrived.all() and self.step < self._draws.steps
 
     @property
     def inconsistency(self) -> tuple[MaskedIntegers, MaskedFloats]:
@@ -154,8 +156,8 @@ class Engagements:
         model, thruster = self.scenario.set_model, self.scenario.thruster
         sight = self._truth.sight()
         self._tracking = self._flying & self._information.tracking
-        measured = self._measure(sight)
         pending = self._pending()
+        measured = self._measure(sight, pending)
         miss = self._information.predicted_miss(pending)
         tracking = self._tracking = self._tracking & self._information.tracking
         situation = self._situation(miss, measured, pending)
@@ -167,8 +169,9 @@ class Engagements:
         self._queue.append(thruster.give(wanted, self._budget))
         self._budget = np.maximum(self._budget - modulus(self._queue[-1]), 0.0)
         self._impulse = self._give()
+        given = modulus(self._impulse)
         if self.step in self._number_of_burn:
-            self._burns_m_s[:, self._number_of_burn[self.step]] = modulus(self._impulse)
+            self._burns_m_s[:, self._number_of_burn[self.step]] = given
         if observe is not None:
             observe(
                 Step(
@@ -185,7 +188,7 @@ class Engagements:
             )
         self._truth.fire(self._executed(self._impulse))
         self._information.shift(self._impulse, self._flying)
-        self._truth_section.shift(self._impulse, modulus(self._impulse) > 0.0)
+        self._truth_section.shift(self._impulse, given > 0.0)
         self._finish_labels()
         self._information.predict()
         self._truth_section.predict()
@@ -197,9 +200,10 @@ class Engagements:
             self._arrival_s = np.where(passing, self.step * model.step_s + passage.arrival_s, self._arrival_s)
             self._flying &= ~passage.passed
         self.step += 1
-        # The label leaves at x = 0, which may come after the closest approach.
-        self._arrived |= ~self._flying & (self._arrival_s <= self.step * model.step_s)
-        self._information.stop(self._arrived)
+        if not self._flying.all():
+            # The label leaves at x = 0, which may come after the closest approach.
+            self._arrived |= ~self._flying & (self._arrival_s <= self.step * model.step_s)
+            self._information.stop(self._arrived)
 
     def truth_margins_m(self) -> list[MaskedFloats]:
         """Return the signed margins (m) of the true states in their sections, one array of shape (B,) per step.
@@ -216,7 +220,7 @@ class Engagements:
         ahead_s = self.step * self.scenario.set_model.step_s + self._truth.arrival_s()
         return np.where(self._flying, ahead_s, self._arrival_s)
 
-    def _measure(self, sight: Sight) -> Measurements:
+    def _measure(self, sight: Sight, pending: Pending) -> Measurements:
         """Measure with the sensors that are due, cut the sets, and return the measured values."""
         before_s = self.scenario.nominal_arrival_s - self.step * self.scenario.set_model.step_s
         due = {
@@ -227,7 +231,7 @@ class Engagements:
         self._seen = {}
         if not due or not self._tracking.any():
             return {}
-        asked = LineOfSight(self.step, sight.alpha_rad, sight.omega_rad_s, sight.range_m, due, self._pending())
+        asked = LineOfSight(self.step, sight.alpha_rad, sight.omega_rad_s, sight.range_m, due, pending)
         measured = checked_measurements(self._noise.measure(asked, self._view), asked, self._noise)
         if self._draws.images is not None and AngleSensor.name in measured:
             return self._measure_some(sight, due, measured, self._draws.images[:, self.step])
@@ -260,10 +264,12 @@ class Engagements:
 
     def _executed(self, impulse: Floats) -> Floats:
         """Return the executed impulses."""
-        size, direction = (
-            None if errors is None else errors[:, self.step] for errors in (self._draws.execution, self._draws.pointing)
+        size, direction = self._draws.execution, self._draws.pointing
+        return self.scenario.thruster.executed(
+            impulse,
+            None if size is None else size[:, self.step],
+            None if direction is None else direction[:, self.step],
         )
-        return self.scenario.thruster.executed(impulse, size, direction)
 
     def _manoeuvre(self, sight: Sight) -> Floats | None:
         """Return the acceleration of the targets over this step; None without a target that manoeuvres."""
@@ -275,7 +281,7 @@ class Engagements:
         predicted = (sight.omega_rad_s * sight.range_m - self._impulse) * left
         return acceleration_m_s2(target, self._draws.target, self.step, step_s, predicted)
 
-    def _pending(self) -> tuple[tuple[float, Floats], ...]:
+    def _pending(self) -> Pending:
         """Return the impulses that are decided and not given yet, with the times from now to them, s."""
         step_s = self.scenario.set_model.step_s
         return tuple((step * step_s, impulse) for step, impulse in enumerate(self._queue) if impulse.any())
@@ -288,9 +294,7 @@ class Engagements:
         self._not_given += np.where(self._flying, 0.0, modulus(due))
         return np.where(self._flying, due, 0.0)
 
-    def _situation(
-        self, miss: PredictedMiss, measured: Measurements, pending: tuple[tuple[float, Floats], ...]
-    ) -> Situation:
+    def _situation(self, miss: PredictedMiss, measured: Measurements, pending: Pending) -> Situation:
         time_s, lead_s, later_times_s = self.step * self.scenario.set_model.step_s, self._lead_s, self._impulse_times_s
         may_fire = True
         if later_times_s is not None:

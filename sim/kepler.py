@@ -157,7 +157,7 @@ class KeplerMotion:
         """Return the times to x = 0 of some motions without impulses, s."""
         duration = motion[POSITION, X, RELATIVE] / -motion[VELOCITY, X, RELATIVE]
         for _ in range(leaps):
-            motion = self._leap(motion, duration / leaps, manoeuvre_m_s2)
+            motion, _ = self._leap(motion, duration / leaps, manoeuvre_m_s2)
         return np.asarray(duration - motion[POSITION, X, RELATIVE] / motion[VELOCITY, X, RELATIVE])
 
     def advance(self, step_s: float, manoeuvre_m_s2: Floats | None = None) -> Passage:
@@ -179,7 +179,9 @@ class KeplerMotion:
         least, arrival = np.full(passed.shape, np.inf), np.zeros(passed.shape)
         closest = np.zeros(self._motion.shape[1:2] + passed.shape)
         for substep in range(substeps):
-            before, self._motion = self._motion, self._leap(self._motion, duration, self._manoeuvre)
+            before, (self._motion, some_recede) = self._motion, self._leap(self._motion, duration, self._manoeuvre)
+            if not some_recede:
+                continue
             new = (_dot(self._motion[POSITION, :, RELATIVE], self._motion[VELOCITY, :, RELATIVE]) >= 0.0) & ~passed
             if new.any():
                 position, velocity, acceleration = before[:LOST, :, RELATIVE, new]
@@ -194,11 +196,10 @@ class KeplerMotion:
                 passed |= new
         return Passage(passed, least, arrival, closest[self._lateral])
 
-    def _leap(self, motion: Floats, duration_s: Floats, manoeuvre_m_s2: Floats) -> Floats:
-        """Return a motion at a later time, in new memory."""
+    def _leap(self, motion: Floats, duration_s: Floats, manoeuvre_m_s2: Floats) -> tuple[Floats, bool]:
+        """Return a motion at a later time, in new memory, and whether some distance increases then."""
         after = np.empty_like(motion)
-        leap_all(motion, duration_s, manoeuvre_m_s2, self._gravitational_parameter, after)
-        return after
+        return after, leap_all(motion, duration_s, manoeuvre_m_s2, self._gravitational_parameter, after)
 
 
 def longest_substep_s(scenario: Scenario) -> float:
@@ -281,8 +282,14 @@ def accelerate_all(motion: Floats, manoeuvre_m_s2: Floats, gravitational_paramet
 @entry
 def leap_all(
     motion: Floats, duration_s: Floats, manoeuvre_m_s2: Floats, gravitational_parameter_m3_s2: float, after: Floats
-) -> None:
-    """Write a motion after times of shape (B,), in the form of `accelerate_all`: one step of velocity Verlet."""
+) -> bool:
+    """Write a motion after times of shape (B,), in the form of `accelerate_all`: one step of velocity Verlet.
+
+    Returns
+    -------
+    bool
+        Whether the distance of some relative motion increases then.
+    """
     for axis in range(motion.shape[1]):
         for craft in (RELATIVE, SPACECRAFT):
             for b in range(motion.shape[3]):
@@ -300,6 +307,13 @@ def leap_all(
         for craft in (RELATIVE, SPACECRAFT):
             for b in range(motion.shape[3]):
                 after[VELOCITY, axis, craft, b] += 0.5 * duration_s[b] * after[ACCELERATION, axis, craft, b]
+    for b in range(motion.shape[3]):
+        growth = 0.0
+        for axis in range(motion.shape[1]):
+            growth += after[POSITION, axis, RELATIVE, b] * after[VELOCITY, axis, RELATIVE, b]
+        if growth >= 0.0:
+            return True
+    return False
 
 
 def closest_position(position_m: Floats, velocity_m_s: Floats, acceleration_m_s2: Floats, duration_s: float) -> Floats:
