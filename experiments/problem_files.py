@@ -11,7 +11,7 @@ import typer
 from experiments.common.errors import InputError, nearest, shown
 from experiments.common.file_kinds import PROBLEM_COMMANDS, SCENARIO, built_in_files, kind_of, taken_by
 from experiments.common.options import choice
-from experiments.common.output import library_version, write_file
+from experiments.common.output import library_version, write_template
 from experiments.common.problem_file import ProblemTables, problem_form, problem_text
 from experiments.common.screen import show_built_in, show_checked
 from experiments.common.template import template
@@ -73,6 +73,5 @@ def new(kind: str, file: Path, overwrite: bool, quiet: bool) -> None:
         f"A problem for: infoset {command} FILE. Check it with: infoset problems check FILE",
         "Every key carries its unit in its name. A line `# key = value` is optional: the default or an example.",
     ]
-    write_file(file, template(FILES[kind][0], head), overwrite=overwrite)
-    if not quiet:
-        typer.echo(f"wrote {file}; edit it, then: infoset problems check {file}, and: infoset {command} {file}")
+    steps = f"infoset problems check {file}, and: infoset {command} {file}"
+    write_template(file, template(FILES[kind][0], head), steps, overwrite=overwrite, quiet=quiet)

@@ -33,7 +33,7 @@ def new(
             "observer; or the command that takes it, for example reach.",
         ),
     ],
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The file to write.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")],
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> None:

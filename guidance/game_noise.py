@@ -28,6 +28,10 @@ class GameNoise:
         rule for both axes, or two rules, for y and z.
     tie_draws : ndarray, shape (B, steps), or (2, B, steps) in space
         Uniform in [-1, 1], used by `TieRule.RANDOM`: the upper extreme where the draw is not negative.
+    shift_m : ndarray, shape (steps,), or None
+        Shift of the measured position across x in each step with `TieRule.UPPER`, m, limited by the error bound; the
+        last one holds for later steps. With `TieRule.LOWER` it has the other sign. These two rules then do not choose
+        the angle by the set. None is no shift.
 
     Raises
     ------
@@ -36,6 +40,10 @@ class GameNoise:
 
     Notes
     -----
+    The errors that keep an extreme have one sign in most steps, so that the true state stays near the middle of a wide
+    set. Before a cut-off, errors that change from one bound to the other are worse: the true state is then at an end
+    of the set (`sim.closed_form.worst_shift_m`).
+
     In space, each axis has its own extremes and its own worse one; the measured angles are chosen for each axis. The
     range has the rule of the plane, for the corner (worse extreme of y, worse extreme of z) of the rectangle of
     predicted misses of each section: the point to keep is in the section where this corner has the greatest modulus,
@@ -48,6 +56,7 @@ class GameNoise:
 
     tie: TieRule | tuple[TieRule, TieRule]
     tie_draws: Floats
+    shift_m: Floats | None = None
 
     def __post_init__(self) -> None:
         rules = self.tie if isinstance(self.tie, tuple) else (self.tie,)
@@ -63,7 +72,7 @@ class GameNoise:
         for name, sensor in sight.sensors.items():
             true = sensor.true_value(sight)
             if isinstance(sensor, AngleSensor):
-                chosen = _angle(sensor, sight, predicted, miss, upper_is_worse)
+                chosen = self._shifted(sensor, sight, _angle(sensor, sight, predicted, miss, upper_is_worse))
             elif isinstance(sensor, RangeSensor):
                 chosen = _range(sensor, sight, predicted, miss, upper_is_worse)
             else:
@@ -71,6 +80,17 @@ class GameNoise:
                 chosen = sensor.nearest(sight, np.where(upper_is_worse, upper, lower))
             measured[name] = np.where(miss.exists, chosen, true)
         return measured
+
+    def _shifted(self, sensor: AngleSensor, sight: LineOfSight, chosen: Floats) -> Floats:
+        """Return the measured angles with the shift of this step where there is one, and the chosen ones elsewhere."""
+        if self.shift_m is None:
+            return chosen
+        signs = {TieRule.UPPER: 1.0, TieRule.LOWER: -1.0}
+        rules = self.tie if isinstance(self.tie, tuple) else (self.tie,)
+        sign = np.array([[signs.get(rule, 0.0)] for rule in rules]) if len(rules) > 1 else signs.get(rules[0], 0.0)
+        shift_m = self.shift_m[min(sight.step, len(self.shift_m) - 1)]
+        shifted = sensor.nearest(sight, sight.alpha_rad + sign * shift_m / sight.range_m)
+        return np.where(sign == 0.0, chosen, shifted)
 
     def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
         upper, lower = np.abs(miss.upper_m), np.abs(miss.lower_m)

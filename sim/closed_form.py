@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from sim.scenario import Scenario
 
-FloatOrFloats = TypeVar("FloatOrFloats", float, NDArray[np.float64])
+Floats = NDArray[np.float64]
+FloatOrFloats = TypeVar("FloatOrFloats", float, Floats)
 
 
 def possible_miss_m(
@@ -48,6 +49,20 @@ def possible_miss_m(
     return of_pixels + centroid_error_m * (1.0 + share) / (1.0 - share)
 
 
+def _images_s(scenario: Scenario) -> list[float]:
+    """Return the times before the nominal arrival of the images until the last decision of an impulse, s."""
+    model, thruster, arrival_s = scenario.set_model, scenario.thruster, scenario.nominal_arrival_s
+    steps = thruster.impulse_steps(arrival_s, model.step_s)
+    end_s = arrival_s - model.least_range_m / model.closing_speed_m_s
+    last_step = int(end_s / model.step_s) if steps is None else int(max(steps))
+    camera = model.angle_sensor
+    before_s = (
+        arrival_s - step * model.step_s
+        for step in range(0, last_step - thruster.delay_steps + 1, model.steps_in(camera.period_s))
+    )
+    return [time_s for time_s in before_s if camera.measures_at(time_s)]
+
+
 def images_s(scenario: Scenario) -> tuple[float, float]:
     """Return the times before the arrival of the first image and of the last one before the last decision, s.
 
@@ -56,19 +71,43 @@ def images_s(scenario: Scenario) -> tuple[float, float]:
     ValueError
         If there are fewer than two such images.
     """
-    model, thruster, arrival_s = scenario.set_model, scenario.thruster, scenario.nominal_arrival_s
-    steps = thruster.impulse_steps(arrival_s, model.step_s)
-    end_s = arrival_s - model.least_range_m / model.closing_speed_m_s
-    last_step = int(end_s / model.step_s) if steps is None else int(max(steps))
-    camera = model.angle_sensor
-    before_s = [
-        arrival_s - step * model.step_s
-        for step in range(0, last_step - thruster.delay_steps + 1, model.steps_in(camera.period_s))
-    ]
-    before_s = [time_s for time_s in before_s if camera.measures_at(time_s)]
+    before_s = _images_s(scenario)
     if len(before_s) < 2:
         raise ValueError("a bound of the miss needs two images before the last impulse: take more images, or earlier")
     return before_s[0], before_s[-1]
+
+
+def worst_shift_m(scenario: Scenario) -> Floats | None:
+    """Return how far game noise shifts the measured position across x in each step, along each axis, m.
+
+    None without a cut-off or times of impulses, or with fewer than two images before the last decision.
+
+    Notes
+    -----
+    Two motions with the same images differ by at most 2 b along an axis at each image, with the error bound b, m. Let
+    this difference be 2 b0 at the last image before the last decision, and 2 b0 - s u + nu u^2 at the time u before it:
+    the disturbance nu accelerates the motions apart. It is at least -2 b at all images if s is at most
+    (2 b0 + 2 b)/u + nu u, and its speed is possible at t = 0 if s is at most 2 w + 2 nu t, with the half-width w of the
+    speeds of the initial set and the time t of the last image. With the greatest s the misses differ most; before its
+    least value, at u = s/(2 nu), the difference is constant. If one of the motions is the true one, images in the
+    middle of both are shifted by half the difference.
+    """
+    model, thruster, arrival_s = scenario.set_model, scenario.thruster, scenario.nominal_arrival_s
+    if thruster.impulse_steps(arrival_s, model.step_s) is None:
+        return None
+    before_s = np.array(_images_s(scenario))
+    if before_s.size < 2:
+        return None
+    range_m = before_s * model.closing_speed_m_s
+    bound_m, last_s = model.angle_sensor.error_bound(range_m) * range_m, before_s[-1]
+    earlier_s, disturbance, (least, greatest) = before_s[:-1] - last_s, model.disturbance_m_s2, model.bounds.vz_m_s
+    speed_m_s = min(
+        np.min(2.0 * (bound_m[-1] + bound_m[:-1]) / earlier_s + disturbance * earlier_s),
+        greatest - least + 2.0 * disturbance * (arrival_s - last_s),
+    )
+    times_s = arrival_s - last_s - model.step_s * np.arange(math.ceil((arrival_s - last_s) / model.step_s) + 1)
+    times_s = np.clip(times_s, 0.0, 0.5 * speed_m_s / disturbance if disturbance else None)
+    return np.asarray(bound_m[-1] - 0.5 * speed_m_s * times_s + 0.5 * disturbance * times_s**2, dtype=np.float64)
 
 
 def possible_miss_of(scenario: Scenario) -> float:
@@ -77,11 +116,16 @@ def possible_miss_of(scenario: Scenario) -> float:
     Raises
     ------
     ValueError
-        If the angle sensor is not a camera, or there are fewer than two images before the last impulse.
+        If the angle sensor is not a camera, images can be lost, or there are fewer than two images before the last
+        impulse.
     """
     camera = scenario.set_model.angle_sensor
     if camera.centroid_error_m is None:
         raise ValueError("the closed form is that of a camera: set angle_sensor.pixel_error_rad and centroid_error_m")
+    if camera.miss_probability > 0.0:
+        raise ValueError(
+            "the closed form is that of a camera that loses no image: set angle_sensor.miss_probability = 0"
+        )
     first_s, last_s = images_s(scenario)
     speed_m_s, axes = scenario.set_model.closing_speed_m_s, len(scenario.set_model.axes)
     along_one = possible_miss_m(speed_m_s, camera.pixel_error_rad, camera.centroid_error_m, first_s, last_s)

@@ -24,6 +24,7 @@ from guidance.thruster import modulus
 from infoset import AngleSensor, InformationSet, InformationSetView, PredictedMiss
 from infoset.sensors import Measurements, Sensor
 from infoset.set_queries import MaskedFloats, MaskedIntegers
+from sim.closed_form import worst_shift_m
 from sim.draws import Draws
 from sim.gravity import on_board_model
 from sim.kepler import KeplerMotion, Sight, longest_substep_s
@@ -382,5 +383,5 @@ def _outcome(diverged: bool, lost: bool, spent: bool) -> Outcome:
 
 def _make_noise(scenario: Scenario, draws: Draws) -> MeasurementNoise:
     if scenario.noise is NoiseKind.GAME:
-        return GameNoise(scenario.tie, draws.tie)
+        return GameNoise(scenario.tie, draws.tie, worst_shift_m(scenario))
     return RandomNoise(draws.errors, draws.bias)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from infoset.limits import Fraction, Positive, check_fields
 from sim.statistics import estimate_hits, number_text, shows
-from sim.stopping_rule import NUMBER, QuantileName, parse_quantile
+from sim.stopping_rule import DIGITS, NUMBER, QUANTITIES, QuantileName, parse_quantile
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -27,6 +27,12 @@ _HIT = re.compile(rf"\s*hit\s*>=?{NUMBER}")
 DEFAULT_QUANTILE = "p99"
 """Quantile of a requirement that names none."""
 _WITHOUT_QUANTILE = re.compile(r"^\s*(?P<quantity>\w+)\s*<")
+_ALMOST = re.compile(
+    rf"\s*(?P<quantity>[a-z]\w*)\s*(?:p?(?P<level>{DIGITS})\s*%?)?\s*(?P<sign>[<>=]=?|[≤≥])\s*(?P<number>{DIGITS})"
+    r"\s*(?P<unit>%|[a-z/]*)\s*",
+    re.IGNORECASE,
+)
+"""A requirement with a common mistake: another sign, a percentage, a unit, or a part of a name."""
 _STEPS = 50
 """Steps of bisection for an end of an interval."""
 
@@ -163,12 +169,55 @@ def parse_requirement(text: str) -> AnyRequirement:
         If the text has another form, or a number is out of its range.
     """
     match = _HIT.fullmatch(text[:100])
+    try:
+        if match is None:
+            return Requirement.parse(text)
+        share = float(match["number"])
+        if not 0.0 < share < 1.0:
+            raise ValueError(f"the share of hits must be between 0 and 1, found {match['number']}")
+        return HitRequirement(share)
+    except ValueError as error:
+        mistake = _mistake(text[:100])
+        raise ValueError(mistake or (f"{error}; for example hit>=0.95" if match else str(error))) from None
+
+
+def _mistake(text: str) -> str | None:
+    """Return what is wrong with a requirement that is almost right, and the corrected text; None if not recognized."""
+    match = _ALMOST.fullmatch(text)
     if match is None:
-        return Requirement.parse(text)
-    share = float(match["number"])
-    if not 0.0 < share < 1.0:
-        raise ValueError(f"the share of hits must be between 0 and 1, found {match['number']}; for example hit>=0.95")
-    return HitRequirement(share)
+        return None
+    name, level, sign, number, unit = match.group("quantity", "level", "sign", "number", "unit")
+    name = name.lower()
+    faults = []
+    if name.startswith("hit"):
+        share = float(number) / (100.0 if unit == "%" or float(number) > 1.0 else 1.0)
+        if share == 1.0:
+            reason = "the share of hits must be less than 1, because no number of runs shows that all engagements hit"
+            return f'{reason}: write "hit>=0.99", found {text.strip()!r}'
+        if level or not 0.0 < share < 1.0 or unit not in ("", "%"):
+            return None
+        corrected = str(HitRequirement(float(f"{share:.12g}")))
+        if "<" in sign:
+            faults.append("hits must be bounded from below, with >=")
+        if share != float(number):
+            faults.append("the share of hits must be a number between 0 and 1")
+    else:
+        quantity = next((known for known in QUANTITIES if known.startswith(name)), None)
+        if quantity is None or not float(number) > 0.0 or unit == "%":
+            return None
+        corrected = f"{quantity} {f'p{level}' if level else DEFAULT_QUANTILE}<{number}"
+        try:
+            Requirement.parse(corrected)
+        except ValueError:
+            return None
+        if quantity != name:
+            faults.append(f"the quantity must be {quantity}")
+        if ">" in sign:
+            faults.append(f"{quantity} must be bounded from above, with <")
+        if unit:
+            faults.append("the bound must be written without its unit, which is that of the quantity")
+    faults = faults or ["the form must be QUANTITY pLEVEL<BOUND or hit>=SHARE"]
+    return f'{"; ".join(faults)}: write "{corrected}", found {text.strip()!r}'
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,9 @@ QUANTITIES = ("miss_m", "impulse_m_s", "guaranteed_miss_m")
 GROWTH = 1.05
 """The sample grows by at least this factor between two checks: a check after every chunk would cost O(N^2)."""
 
-_DIGITS = r"[0-9]{1,20}(?:\.[0-9]{1,25})?(?:[eE][+-]?[0-9]{1,3})?"
-_QUANTILE = rf"\s*(?P<quantity>\w+)\s+p(?P<level>{_DIGITS})\s*"
-NUMBER = rf"\s*(?P<number>{_DIGITS})\s*"
+DIGITS = r"[0-9]{1,20}(?:\.[0-9]{1,25})?(?:[eE][+-]?[0-9]{1,3})?"
+_QUANTILE = rf"\s*(?P<quantity>\w+)\s+p(?P<level>{DIGITS})\s*"
+NUMBER = rf"\s*(?P<number>{DIGITS})\s*"
 
 
 @dataclass(frozen=True)

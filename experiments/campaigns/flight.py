@@ -21,7 +21,7 @@ from rich.progress import Progress as ProgressBars
 from experiments.campaigns.cluster import connected, is_open
 from experiments.campaigns.command import Flight
 from experiments.common.errors import InputError
-from experiments.common.screen import NOT_FINITE, number, say
+from experiments.common.screen import LINE_EVERY_S, NOT_FINITE, number, say
 from experiments.interception.choices import study_scenario
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
 from sim import Campaign, CampaignNoise, CampaignResult, Scenario
@@ -40,7 +40,6 @@ ESTIMATED_FROM = 50_000
 MOST_WARNINGS = 5
 """Greatest number of warnings shown for a sweep, whose cells have similar warnings."""
 BYTES_A_RUN, BYTES_A_SHARD = 66, 6_000
-_LINE_EVERY_S = 60.0
 _WARM_UP = 8
 
 
@@ -84,7 +83,7 @@ def fly(campaign: Campaign, options: Flight, notes: Sequence[str]) -> Flown:
         note(f"warning: {warning}")
     with _workers(options, note) as workers:
         if campaign.engagements >= ESTIMATED_FROM:
-            note(f"{_estimate(campaign, workers.cores)}{' at most' if campaign.until else ''}")
+            note(_estimate(campaign, workers.cores))
         began_s = time.perf_counter()
         with campaign_progress(campaign.kind, options.quiet) as progress:
             result = campaign.run(
@@ -181,9 +180,10 @@ def _estimate(campaign: Campaign, cores: int) -> str:
     needed = BYTES_A_RUN * campaign.engagements + BYTES_A_SHARD * manifest.chunks
     existing = next(path for path in (folder, *folder.absolute().parents) if path.is_dir())
     free = shutil.disk_usage(existing).free
+    most, about = ("at most ", "at most") if campaign.until else ("", "about")
     line = (
-        f"{campaign.engagements} engagements: about {duration(seconds)} on {cores} core{'s' if cores > 1 else ''}, and "
-        f"{size(needed)} in {manifest.chunks} shards"
+        f"{most}{campaign.engagements} engagements: {about} {duration(seconds)} on {cores} "
+        f"core{'s' if cores > 1 else ''}, and {most}{size(needed)} in {manifest.chunks} shards"
     )
     if needed > free:
         raise InputError(f"{folder}: {line}, but the disk has {size(free)} left; free some space, or give fewer --runs")
@@ -192,7 +192,7 @@ def _estimate(campaign: Campaign, cores: int) -> str:
 
 @contextlib.contextmanager
 def campaign_progress(name: str, quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """Yield a function that shows progress on stderr: a bar on a terminal, otherwise one line per minute."""
+    """Yield a function that shows progress on stderr: a bar on a terminal, otherwise a line every `LINE_EVERY_S`."""
     if quiet:
         yield lambda _: None
     elif not sys.stderr.isatty():
@@ -200,7 +200,7 @@ def campaign_progress(name: str, quiet: bool) -> Iterator[Callable[[Progress], N
 
         def line(progress: Progress) -> None:
             nonlocal last_s
-            if time.monotonic() - last_s >= _LINE_EVERY_S:
+            if time.monotonic() - last_s >= LINE_EVERY_S:
                 last_s = time.monotonic()
                 of = " runs" if progress.undecided is not None else f" of {progress.total}"
                 typer.echo(f"{name}: {progress.done}{of}, {_pace(progress)}", err=True)

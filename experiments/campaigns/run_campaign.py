@@ -8,7 +8,7 @@ from rich.table import Table
 
 from experiments.campaigns.command import Campaign as Options
 from experiments.campaigns.flight import RESUME_HINT, SCENARIO_FILE, Flown, campaign_errors, duration, fly, scenario_of
-from experiments.campaigns.samples import heading, sample_json, samples, samples_table, stop_notes
+from experiments.campaigns.samples import game_notes, heading, sample_json, samples, samples_table, stop_notes
 from experiments.common.errors import InputError
 from experiments.common.output import Output, output, to_json
 from experiments.common.screen import Part, show
@@ -70,7 +70,7 @@ def _parts(flown: Flown, table: Table, notes: Sequence[str]) -> Iterator[Part]:
     runs = f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}, {duration(flown.elapsed_s)}"
     yield f"{runs}; quantiles with {'' if stopped else '95 % '}confidence limits"
     yield table
-    yield from (*notes, *stop_notes(manifest))
+    yield from (*notes, *game_notes(folder), *stop_notes(manifest))
     if manifest.until is not None and manifest.stopped_after is None:
         yield f"the rule {manifest.until} is not met; continue with --resume and a greater --runs"
     yield f"to see the results: infoset report {folder.path}"

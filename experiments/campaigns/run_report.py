@@ -20,6 +20,7 @@ from experiments.campaigns.flight import SCENARIO_FILE, campaign_errors
 from experiments.campaigns.samples import (
     START,
     Sample,
+    game_notes,
     heading,
     noise_flags,
     noises_of,
@@ -190,7 +191,7 @@ def _parts(
     table, notes = samples_table(by_noise, manifest.scenario)
     yield f"{manifest.scenario.name}, {folder.finished_runs} runs{stopped}"
     yield table
-    yield from (*notes, *stop_notes(manifest), "")
+    yield from (*notes, *game_notes(folder), *stop_notes(manifest), "")
     runs = ", ".join(f"{sample.runs} runs of {sample.noise} noise" for sample in by_noise)
     yield f"correlation of the miss with the initial state ({runs}; CI by Fisher's z):"
     table = number_table("noise", "component", "Pearson", "95 % CI", "Spearman", "95 % CI", left=2)

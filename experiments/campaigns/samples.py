@@ -15,7 +15,8 @@ from rich.table import Table
 from experiments.common.output import hit_key, library_version
 from experiments.common.screen import number, number_table, quantile_notes
 from experiments.interception.runs.shared import bound_name
-from experiments.interception.study import SetCounts, hit_text, set_counts, set_warnings
+from experiments.interception.study import SetCounts, game_note, hit_text, set_counts, set_warnings
+from guidance import NoiseKind
 from sim import HitEstimate, Outcome, QuantileEstimate, Scenario, estimate_hits, estimate_quantiles
 from sim.statistics import level_name, shows
 from sim.stopping_rule import QUANTITIES
@@ -170,7 +171,13 @@ def heading(folder: CampaignFolder) -> dict[str, Any]:
         "complete": folder.complete,
         "until": manifest.until,
         "stopped_after": manifest.stopped_after,
+        **({"notes": notes} if (notes := game_notes(folder)) else {}),
     }
+
+
+def game_notes(folder: CampaignFolder) -> list[str]:
+    """Return a line about what results with game noise are; no line without game noise."""
+    return [game_note(folder.manifest.scenario)] if NoiseKind.GAME.value in noises_of(folder) else []
 
 
 def worst_runs(folder: CampaignFolder, scenario_file: Path) -> list[dict[str, Any]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.campaigns.axis_names import unit_of
-from experiments.campaigns.samples import heading, sample_json
+from experiments.campaigns.samples import game_notes, heading, sample_json
 from experiments.campaigns.sweep_figures import QUANTITY_NAMES, draw_sweep
 from experiments.campaigns.sweep_table import (
     SHOWN,
@@ -26,6 +27,7 @@ from experiments.common.errors import InputError
 from experiments.common.output import Output, hit_key
 from experiments.common.screen import Part, number, number_table
 from experiments.interception.study import SetCounts, set_warnings
+from guidance import NoiseKind
 from sim import QuantileName, Requirement
 from sim.requirement import CONFIDENCE, AnyRequirement, Decision, Verdict, parse_requirement
 from sim.storage import CampaignFolder
@@ -67,6 +69,7 @@ class SweepReport:
         table = self.table
         return {
             **heading(self.folder),
+            **({"notes": notes} if (notes := self._notes()) else {}),
             **({} if elapsed_s is None else {"elapsed_s": elapsed_s}),
             "axes": [
                 {"key": axis.key, "unit": unit_of(axis.key), "scale": axis.scale, "values": list(axis.values)}
@@ -127,15 +130,30 @@ class SweepReport:
         for noise in table.noises:
             verdicts = [table.verdict(cell, noise) for cell in range(len(table.cells))]
             counts = Counter(verdict.decision for verdict in verdicts if verdict is not None)
-            decisions = ", ".join(f"{decision} in {counts[decision]}" for decision in Decision)
+            against = _against(noise, table.required)
+            words = {Decision.MET: f"met{against}"}
+            decisions = ", ".join(f"{words.get(decision, decision)} in {counts[decision]}" for decision in Decision)
             yield f"{noise} noise: {table.required} is {decisions} of {len(verdicts)} cells"
             yield from self._answer_lines(noise)
             yield from _decision_tables(table, noise)
             yield from _unknown_notes(verdicts, table.required)
             yield from self._undecided_notes(noise)
         sets = sum((sample.sets for samples in table.cells for sample in samples), SetCounts())
+        yield from self._notes()
         yield f"all cells: {sets}"
         yield from set_warnings(manifest.scenario.set_model.kind, sets)
+
+    def _notes(self) -> list[str]:
+        """Return lines about keys without an effect, and about game noise."""
+        lines = []
+        shape = [len(axis.values) for axis in self.table.axes]
+        digests = np.array([_digest(self.folder, cell) for cell in range(len(self.table.cells))]).reshape(shape)
+        for number_of_axis, axis in enumerate(self.table.axes):
+            first = digests.take([0], axis=number_of_axis)
+            if len(axis.values) > 1 and (digests == first).all():
+                which = f"all {len(axis.values)} cells" if len(shape) == 1 else "all cells that differ only in it"
+                lines.append(f"{axis.key} has no effect: {which} have the same results")
+        return lines + game_notes(self.folder)
 
     def _undecided_notes(self, noise: str) -> list[str]:
         """Return a line about the runs of the undecided cells, and how many more may decide them."""
@@ -171,6 +189,18 @@ class SweepReport:
             yield f"  {answer.met}{f' (at {answer.at})' if answer.at else ''}"
         if len(lines) > MOST_LINES:
             yield f"  {len(lines) - MOST_LINES} more lines are in the JSON report (--json)"
+
+
+def _digest(folder: CampaignFolder, cell: int) -> int:
+    """Return a checksum of the misses, impulses and bounds of a cell."""
+    names = ("miss_m", "impulse_m_s", "guaranteed_miss_m")
+    return zlib.crc32(b"".join(folder.numbers(name, cell).filled(-1.0).tobytes() for name in names))
+
+
+def _against(noise: str, required: AnyRequirement) -> str:
+    """Return what restricts the decision that a requirement is met: game noise is one adversary."""
+    is_bounded = required.quantity in ("miss_m", "hit")
+    return " against this adversary" if noise == NoiseKind.GAME.value and is_bounded else ""
 
 
 def _verdict_json(verdict: Verdict | None) -> dict[str, object] | None:

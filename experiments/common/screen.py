@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -25,6 +26,8 @@ _GAP = 2
 """Width of the space between the columns of a table."""
 _NARROWEST_TEXT = 12
 """Width to which texts in a table are wrapped before the table is divided; no word is divided."""
+LINE_EVERY_S = 30.0
+"""Time between two lines of progress in a log."""
 NOT_FINITE = (
     "the numbers of the scenario are so large or so small that the results are not finite; "
     "check its units with: infoset scenarios check FILE"
@@ -110,12 +113,15 @@ def _print_table(console: Console, table: Table) -> None:
 
 @contextlib.contextmanager
 def progress_bar(quiet: bool) -> Iterator[BeginProgress]:
-    """Show progress bars on stderr if that is a terminal.
+    """Show progress on stderr: bars on a terminal, otherwise a line every `LINE_EVERY_S`.
 
     The context is a function that starts a bar with a title, and returns a function that sets the fraction done.
     """
-    if quiet or not sys.stderr.isatty():
+    if quiet:
         yield lambda _name: lambda _done: None
+        return
+    if not sys.stderr.isatty():
+        yield _progress_lines()
         return
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
@@ -125,6 +131,27 @@ def progress_bar(quiet: bool) -> Iterator[BeginProgress]:
             return lambda done: progress.update(task, completed=done)
 
         yield begin
+
+
+def _progress_lines() -> BeginProgress:
+    """Return the function of `progress_bar` for a log: a line with all unfinished parts every `LINE_EVERY_S`."""
+    shares: dict[str, float] = {}
+    last_s = time.monotonic()
+
+    def begin(name: str) -> Callable[[float], None]:
+        shares[name] = 0.0
+
+        def progress(done: float) -> None:
+            nonlocal last_s
+            shares[name] = done
+            if time.monotonic() - last_s >= LINE_EVERY_S:
+                last_s = time.monotonic()
+                parts = ", ".join(f"{part} {100.0 * share:.0f} %" for part, share in [*shares.items()] if share < 1.0)
+                say(f"progress: {parts}", quiet=not parts)
+
+        return progress
+
+    return begin
 
 
 def number(value: float | None) -> str:

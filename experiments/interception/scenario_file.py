@@ -191,6 +191,15 @@ def _timing_warnings(scenario: Scenario) -> list[str]:
             f"angle_sensor.last_image_s is {sensor.last_image_s:g} s, and the nominal arrival is {arrival_s:g} s after "
             "the start: no image is taken"
         ]
+    all_steps = range(0, int(arrival_s / model.step_s) + 1, model.steps_in(sensor.period_s))
+    if not any(sensor.measures_at(arrival_s - step * model.step_s) for step in all_steps):
+        before_s = (arrival_s - step * model.step_s for step in all_steps)
+        nearest_s = min(before_s, key=lambda time_s: abs(time_s - sensor.last_image_s))
+        return [
+            f"angle_sensor.first_image_s is {sensor.first_image_s or 0.0:g} s and last_image_s {sensor.last_image_s:g} "
+            f"s: no image is taken, because no time of a measurement (every {sensor.period_s:g} s from the start) lies "
+            f"between them; the nearest is {nearest_s:g} s before the nominal arrival"
+        ]
     last_s = arrival_s - last_step * model.step_s
     lead = f", decided {last_s + delay_s:g} s before it" if delay_s > 0.0 else ""
     first_s = arrival_s if sensor.first_image_s is None else sensor.first_image_s

@@ -24,7 +24,7 @@ app = file_commands(
 
 @app.command(epilog="Example: infoset scenarios new mine.toml")
 def new(
-    file: Annotated[Path, typer.Argument(help="The file to write.")],
+    file: Annotated[Path, typer.Argument(help="The file to write; - is stdout.")],
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> None:

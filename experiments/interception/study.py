@@ -70,6 +70,15 @@ def set_warnings(model: Model, counts: SetCounts) -> list[str]:
     ]
 
 
+def game_note(scenario: Scenario, rule: str | None = None) -> str:
+    """Return a line about what a result with game noise is; `rule` is its tie rule, None that of the scenario."""
+    bound = "; no errors give a miss above Phi" if scenario.set_model.is_guaranteed else ""
+    return (
+        f"game noise ({rule or f'tie rule {scenario.tie.value}'}) is one adversary, not the worst case: infoset bound "
+        f"prints a miss that no strategy can prevent{bound}"
+    )
+
+
 def hit_text(hits: HitEstimate | None, scenario: Scenario) -> str:
     """Return the share of hits with its interval; an empty text if the body has no size."""
     if hits is None or scenario.body is None:

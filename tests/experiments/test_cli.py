@@ -97,7 +97,7 @@ def test_help_imports_nothing_heavy() -> None:
 
 def test_experiment_as_json(infoset: Command, tmp_path: Path) -> None:
     found = infoset.json("experiment", "--runs", 3, "--seed", 5)
-    assert list(found) == ["version", "scenario", "scenario_hash", "seed", "runs", "elapsed_s", "curves"]
+    assert list(found) == ["version", "scenario", "scenario_hash", "seed", "runs", "elapsed_s", "curves", "notes"]
     scenario = load_scenario("asteroid-1997")
     assert found["version"] == version("infoset")
     assert found["scenario"] == "asteroid-1997"

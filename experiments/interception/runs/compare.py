@@ -27,11 +27,12 @@ from experiments.interception.figures.b_plane import B_PLANE, cloud, draw_b_plan
 from experiments.interception.figures.comparison import draw_comparison
 from experiments.interception.runs.shared import Progress, simulate_in_threads, summary_head
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
-from experiments.interception.study import QUANTILES, SetCounts, percent, set_counts, set_warnings
+from experiments.interception.study import QUANTILES, SetCounts, game_note, percent, set_counts, set_warnings
 from guidance import NoiseKind, Strategy
 from sim import Scenario
 
 FIGURE = "figure-comparison"
+TIES = "for each run, the worst of the four tie rules"
 COLUMNS = ("strategy", "noise", "tie", "run", "miss_m", "impulse_m_s", "outcome", "truth_kept", "set_emptied", "hit")
 COLUMNS_IN_SPACE = (*COLUMNS, "miss_y_m", "miss_z_m")
 
@@ -59,6 +60,7 @@ def run(options: Compare) -> None:
             "runs": options.runs,
             "elapsed_s": perf_counter() - began_s,
             "strategies": [_summary(comparison) for comparison in compared],
+            "notes": [game_note(scenario, TIES)],
         }
         written.save("scenario.toml", scenario_to_toml(scenario))
         written.save("results.json", to_json(result), "--json")
@@ -169,9 +171,10 @@ def _parts(scenario: Scenario, compared: Sequence[Comparison]) -> Iterator[Part]
             title = ""
     meter = "with" if scenario.range_sensor is not None else "without"
     runs = len(compared[0].miss_m)
-    yield f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}: quantiles of {runs} runs"
+    title = f"{scenario.name}, {meter} range meter, model {scenario.set_model.kind.value}: quantiles of {runs} runs"
+    yield f"{title}; game noise: {TIES}"
     yield table
     yield from ("", f"of the {runs} runs:", sets)
-    yield "game noise: for each run, the worst of its four tie rules"
+    yield game_note(scenario, TIES)
     yield from quantile_notes(runs, [*QUANTILES.values()])
     yield from set_warnings(scenario.set_model.kind, total)

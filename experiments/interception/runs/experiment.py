@@ -37,7 +37,7 @@ from experiments.interception.runs.shared import (
     summary_head,
 )
 from experiments.interception.scenario_file import scenario_to_toml, scenario_warnings
-from experiments.interception.study import QUANTILES, SetCounts, hit_text, set_counts, set_warnings
+from experiments.interception.study import QUANTILES, SetCounts, game_note, hit_text, set_counts, set_warnings
 from guidance import NoiseKind
 from infoset import Recovery
 from sim import Outcome, Scenario
@@ -89,6 +89,7 @@ def run(options: Experiment) -> None:
                 }
                 for curve in curves
             ],
+            "notes": [game_note(scenario)],
         }
         written.save("scenario.toml", scenario_to_toml(scenario))
         written.save("results.json", to_json(summary), "--json")
@@ -156,6 +157,7 @@ def _parts(scenario: Scenario, curves: Sequence[Curve]) -> list[Part]:
     if counts.set_emptied:
         notes.append(f"an empty set {'was enlarged, and guidance continued' if enlarged else 'ended guidance'}")
     notes += set_warnings(scenario.set_model.kind, counts)
+    notes.append(f"{game_note(scenario)}; infoset compare shows the worst of all tie rules")
     if allowed := allowance(scenario):
         notes.append(allowed)
     if scenario.name in (MANY, SINGLE):
@@ -166,4 +168,5 @@ def _parts(scenario: Scenario, curves: Sequence[Curve]) -> list[Part]:
     runs = len(curves[0].results)
     notes += quantile_notes(runs, levels)
     burns = [burn_table(scenario, curves)] if scenario.thruster.impulses_s else []
-    return [f"{scenario.name}: quantiles of {runs} runs per curve", table, *burns, *notes]
+    title = f"{scenario.name}: quantiles of {runs} runs per curve; game noise with the tie rule {scenario.tie.value}"
+    return [title, table, *burns, *notes]

@@ -7,7 +7,7 @@ from pathlib import Path
 import typer
 
 from experiments.common.file_kinds import SCENARIO, built_in_files
-from experiments.common.output import library_version, write_file
+from experiments.common.output import library_version, write_template
 from experiments.common.screen import show_built_in, show_checked
 from experiments.interception.scenario_file import (
     load_scenario,
@@ -39,6 +39,5 @@ def check(file: str, json: bool, quiet: bool) -> None:
 
 def new(file: Path, overwrite: bool, quiet: bool) -> None:
     """Write a scenario file to start from."""
-    write_file(file, scenario_template(), overwrite=overwrite)
-    if not quiet:
-        typer.echo(f"wrote {file}; edit it, then: infoset scenarios check {file}")
+    steps = f"infoset scenarios check {file}"
+    write_template(file, scenario_template(), steps, overwrite=overwrite, quiet=quiet)

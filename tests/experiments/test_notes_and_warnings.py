@@ -1,0 +1,108 @@
+"""Messages, notes and warnings that keep an analyst from a wrong conclusion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from experiments import load_scenario
+from experiments.common import screen
+from experiments.interception.scenario_file import scenario_warnings
+from guidance import Thruster
+from sim.closed_form import possible_miss_of
+from sim.requirement import parse_requirement
+from tests.experiments.command_line import Command
+
+
+@pytest.mark.parametrize(
+    ("text", "mistake", "corrected"),
+    [
+        ("hit>=99%", "a number between 0 and 1", "hit>=0.99"),
+        ("hit>=95", "a number between 0 and 1", "hit>=0.95"),
+        ("hit<=0.5", "from below", "hit>=0.5"),
+        ("Hits = 0.9", "the form must be", "hit>=0.9"),
+        ("hit>=100%", "no number of runs", "hit>=0.99"),
+        ("miss_m>10", "from above", "miss_m p99<10"),
+        ("miss_m 90% <= 10", "the form must be", "miss_m p90<10"),
+        ("miss<10 m", "the quantity must be miss_m; the bound must be written without", "miss_m p99<10"),
+    ],
+)
+def test_a_requirement_that_is_almost_right_is_corrected(text: str, mistake: str, corrected: str) -> None:
+    with pytest.raises(ValueError, match=mistake) as error:
+        parse_requirement(text)
+    assert f'write "{corrected}"' in str(error.value)
+    parse_requirement(corrected)
+
+
+@pytest.mark.parametrize(
+    ("thruster", "message"),
+    [
+        (
+            {"last_impulse_s": 50.0, "delay_steps": 6},
+            "40 s before the nominal arrival, because thruster.delay_steps = 6",
+        ),
+        ({"last_impulse_s": 50.0, "impulses_s": (30.0, 20.0)}, "the last of thruster.impulses_s is 20 s before"),
+        ({"last_impulse_s": 500.0}, "the nominal arrival is 100 s after the start"),
+        ({"impulses_s": (90.0,), "delay_steps": 2}, "give later times or fewer delay_steps: got 90.0"),
+    ],
+)
+def test_a_schedule_without_impulses_names_the_key_to_change(thruster: dict[str, object], message: str) -> None:
+    engine = Thruster(10.0, 0.0, 1.0, **thruster)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=message):
+        engine.impulse_steps(100.0, 10.0)
+
+
+def test_a_template_is_printed_on_stdout(infoset: Command, tmp_path: Path) -> None:
+    """It was written into a file called '-'."""
+    for command in (("scenarios", "new"), ("problems", "new", "multipoint")):
+        code, out, err = infoset(*command, "-")
+        assert (code, err) == (0, "")
+        assert "schema = 1" in out
+    assert not [*tmp_path.iterdir()]
+
+
+def test_an_image_window_between_two_measurements_has_a_warning() -> None:
+    scenario = load_scenario("dart-2022", ["angle_sensor.first_image_s=308", "angle_sensor.last_image_s=302"])
+    (line,) = scenario_warnings(scenario)
+    assert "no image is taken" in line
+    assert "the nearest is 300 s before" in line
+
+
+def test_the_closed_form_is_not_that_of_a_camera_that_loses_images() -> None:
+    scenario = load_scenario("dart-2022")
+    lossy = replace(scenario.set_model.angle_sensor, miss_probability=0.5)
+    with pytest.raises(ValueError, match="loses no image"):
+        possible_miss_of(replace(scenario, set_model=replace(scenario.set_model, angle_sensor=lossy)))
+
+
+def test_a_log_has_lines_of_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(screen, "LINE_EVERY_S", 0.0)
+    with screen.progress_bar(quiet=False) as begin:
+        first, _ = begin("patient"), begin("kalman")
+        first(0.5)
+    assert capsys.readouterr().err == "progress: patient 50 %, kalman 0 %\n"
+
+
+def test_a_sweep_names_keys_without_an_effect_and_its_adversary(infoset: Command) -> None:
+    pytest.importorskip("pyarrow")
+    arguments = ["sweep", "haiv-2013", "--set", "thruster.impulses_s=[5400, 180]", "--noise", "game", "--runs", "6"]
+    arguments += ["--vary", "thruster.last_impulse_s=10:100:2", "--require", "miss_m p50<500", "--out", "out"]
+    _, out, _ = infoset(*arguments)
+    assert "thruster.last_impulse_s has no effect: all 2 cells have the same results" in out
+    assert "miss_m p50<500 is met against this adversary in " in out
+    assert "game noise (tie rule upper) is one adversary, not the worst case: infoset bound" in out
+    notes = infoset.json("report", "out")["notes"]
+    assert len(notes) == 2
+    _, out, _ = infoset("report", "out", "--require", "impulse_m_s p50<100")
+    assert "is met in " in out
+
+
+def test_every_output_with_game_noise_names_its_tie_rule(infoset: Command) -> None:
+    _, out, _ = infoset("experiment", "haiv-2013", "--runs", "2")
+    assert "game noise with the tie rule upper" in out.splitlines()[0]
+    assert "is one adversary" in infoset.json("experiment", "haiv-2013", "--runs", "2")["notes"][0]
+    _, out, _ = infoset("compare", "haiv-2013", "--runs", "2", "--strategies", "patient")
+    assert "game noise: for each run, the worst of the four tie rules" in out.splitlines()[0]
+    assert "is one adversary" in out
