@@ -219,7 +219,7 @@ class LinearObserver:
         self._sets: Sets = (
             Polygons.of(initial, self._runs)
             if self.states == 2
-            else Polytopes.of(initial, self._runs, _size_of(self._disturbance))
+            else Polytopes.of(initial, self._runs, _sizes_of(self._disturbance))
         )
         self.step = 0
         self._empty = np.full(self._runs, -1), np.zeros(self._runs, dtype=np.int64), np.zeros(self._runs)
@@ -431,11 +431,11 @@ def _half_spaces(polytope: Polytope) -> tuple[Floats, Floats, Floats]:
     )
 
 
-def _size_of(shape: Set) -> float:
-    """Return the greatest coordinate of the vertices of a set, or a bound of it."""
+def _sizes_of(shape: Set) -> Floats:
+    """Return the greatest coordinates of a set, shape (n,), or bounds of them."""
     if isinstance(shape, Zonotope):
-        return float((np.abs(shape.centre) + np.abs(shape.generators).sum(axis=0)).max())
-    return float(np.abs(shape.vertices).max())
+        return np.asarray(np.abs(shape.centre) + np.abs(shape.generators).sum(axis=0))
+    return np.asarray(np.abs(shape.vertices).reshape(-1, shape.vertices.shape[-1]).max(axis=0))
 
 
 def _finite(name: str, value: ArrayLike) -> Floats:

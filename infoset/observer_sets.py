@@ -203,9 +203,9 @@ class Polytopes:
     members: tuple[FacetsAndVertices | None, ...]
 
     @classmethod
-    def of(cls, start: Set, runs: int, size: float = 0.0) -> Polytopes:
-        """Return the same set for all runs; a flat one is widened by 3e-8 of its coordinates, or of `size`."""
-        return cls((FacetsAndVertices.of(polytope_of(start), size).enlarged(_SCALE_ULP),) * runs)
+    def of(cls, start: Set, runs: int, sizes: Floats | float = 0.0) -> Polytopes:
+        """Return the same set for all runs; a flat one is widened by 3e-8 of its coordinates, or of `sizes`."""
+        return cls((FacetsAndVertices.of(polytope_of(start), sizes).enlarged(_SCALE_ULP),) * runs)
 
     @property
     def is_empty(self) -> Flags:
@@ -242,7 +242,7 @@ class Polytopes:
                     f"the exact set has {len(moved.vertices)} vertices, and at most {MOST_POLYTOPE_VERTICES} are "
                     "possible; use fewer states, fewer steps, or zonotopes of another library"
                 )
-            results.append(moved.enlarged(_SCALE_ULP, float(term.max())))
+            results.append(moved.enlarged(_SCALE_ULP, term))
         return Polytopes(tuple(results))
 
     def cut(self, strips: Strips, excess: Floats) -> Polytopes:
@@ -276,7 +276,8 @@ class Polytopes:
                 continue
             levels = (target.vertices @ target.normals.T).max(axis=0)
             open_ends = np.full((1, len(levels)), -np.inf)
-            strips = Strips(target.normals @ motion.matrix, open_ends, levels[None], np.abs(levels)[None])
+            terms = np.abs(target.normals) @ np.abs(target.vertices).max(axis=0)
+            strips = Strips(target.normals @ motion.matrix, open_ends, levels[None], terms[None])
             (member,) = Polytopes((start,)).cut(strips, np.zeros((1, len(levels)))).members
             results.append(member)
         return Polytopes(tuple(results))

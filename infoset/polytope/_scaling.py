@@ -11,6 +11,7 @@ from scipy.optimize import linprog
 from infoset.polytope._affine_hull import (
     FLAT,
     HIGHS,
+    ROUNDING,
     EmptyPolytopeError,
     UnboundedPolytopeError,
     UncertainHullError,
@@ -19,27 +20,37 @@ from infoset.polytope._qhull import Description, intersection_of_halfspaces
 
 Floats = NDArray[np.float64]
 
-_MOST = 1e6
+MOST_RATIO = 1e6
 """Greatest ratio of widths along the axes without scaling."""
 _LEAST = 3e-12
-"""A width along an axis that is less than this part of the width along another one is rounding: the set is flat."""
+"""A width along an axis that is less than this part of the width along another one may be rounding: the set is flat,
+unless it is known to be solid."""
 
 
-def scale_of(points: Floats) -> Floats | None:
-    """Return a power of two near the width along each axis, shape (n,); None if the widths do not differ much."""
-    return scale_of_box(points.min(axis=0), points.max(axis=0))
+def scale_of(points: Floats, *, solid: bool = False) -> Floats | None:
+    """Return a power of two near the width along each axis, shape (n,); None if the widths do not differ much.
+
+    A set that is known to be `solid` has an interior: no width is rounding.
+    """
+    lower, upper = points.min(axis=0), points.max(axis=0)
+    return scale_of_box(lower, upper, upper - lower if solid else None)
 
 
-def scale_of_box(lower: Floats, upper: Floats) -> Floats | None:
-    """Return scales as `scale_of` for a set with these bounds."""
-    return _scales(upper - lower, np.maximum(np.abs(lower), np.abs(upper)))
+def scale_of_box(lower: Floats, upper: Floats, solid: Floats | None = None) -> Floats | None:
+    """Return scales as `scale_of` for a set with these bounds, in sets that have an interior and the widths `solid`."""
+    return _scales(upper - lower, np.maximum(np.abs(lower), np.abs(upper)), solid)
 
 
-def _scales(widths: Floats, sizes: Floats) -> Floats | None:
-    wide = (widths > FLAT * sizes) & (widths > _LEAST * widths.max())
-    if wide.sum() < 2 or widths[wide].max() < _MOST * widths[wide].min():
+def _scales(widths: Floats, sizes: Floats, solid: Floats | None) -> Floats | None:
+    wide = (widths > FLAT * sizes) & (widths > _LEAST * (widths.max() if solid is None else solid))
+    if wide.sum() < 2 or widths[wide].max() < MOST_RATIO * widths[wide].min():
         return None
-    return np.asarray(np.exp2(np.rint(np.log2(np.where(wide, widths, np.where(sizes > 0.0, sizes, 1.0))))))
+    return powers_of_two(np.where(wide, widths, np.where(sizes > 0.0, sizes, 1.0)))
+
+
+def powers_of_two(sizes: Floats) -> Floats:
+    """Return powers of two near positive sizes: scales that round nothing."""
+    return np.asarray(np.exp2(np.rint(np.log2(sizes))))
 
 
 def scale_of_constraints(
@@ -53,9 +64,15 @@ def scale_of_constraints(
     columns = np.ones(1)
     if rows.any(axis=0).all():
         columns = np.exp(np.mean(np.log(np.where(rows != 0.0, np.abs(rows), 1.0)), axis=0, where=rows != 0.0))
+    bounds = _bounds_of_axes(normals, offsets)
+    box = None
+    if np.isfinite(bounds).all() and (bounds[0] < bounds[1]).all():
+        lower, upper = tightened(normals, offsets, *bounds)
+        box = scale_of_box(lower, upper, upper - lower)
+    columns = columns if box is None else 1.0 / box
     lengths = np.linalg.norm(normals, axis=1)
     sizes = np.abs(offsets[(lengths > 0.0) & (offsets != 0.0)] / lengths[(lengths > 0.0) & (offsets != 0.0)])
-    if columns.max() < 1e3 * columns.min() and (not len(sizes) or sizes.max() < _MOST * sizes.min()):
+    if columns.max() < 1e3 * columns.min() and (not len(sizes) or sizes.max() < MOST_RATIO * sizes.min()):
         return None
     rows = normals / columns
     lengths = np.linalg.norm(rows, axis=1)
@@ -71,9 +88,18 @@ def scale_of_constraints(
             ends[side, axis] = sign * optimum.fun
     # Widths that may be rounding of the linear programs count as zero.
     widths = np.where(ends[1] - ends[0] > 1e-8 * np.abs(ends).max(), ends[1] - ends[0], 0.0)
-    scale = _scales(widths / columns, np.abs(ends).max(axis=0) / columns)
+    scale = _scales(widths / columns, np.abs(ends).max(axis=0) / columns, widths / columns)
     lower, upper = ends / columns
     return np.ones_like(lower) if scale is None else scale, lower, upper
+
+
+def _bounds_of_axes(rows: Floats, limits: Floats) -> Floats:
+    """Return the least and the greatest coordinates that the rows along the axes allow, shape (2, n)."""
+    along = rows[np.count_nonzero(rows, axis=1) == 1]
+    ends = limits[np.count_nonzero(rows, axis=1) == 1, None]
+    ends = np.divide(ends, along, out=np.zeros_like(along), where=along != 0.0)
+    lower = np.where(along < 0.0, ends, -np.inf).max(axis=0, initial=-np.inf)
+    return np.array([lower, np.where(along > 0.0, ends, np.inf).min(axis=0, initial=np.inf)])
 
 
 def tightened(rows: Floats, limits: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
@@ -83,6 +109,13 @@ def tightened(rows: Floats, limits: Floats, lower: Floats, upper: Floats) -> tup
     ends = np.divide(ends, rows, out=np.zeros_like(rows), where=rows != 0.0)
     most = np.where(rows > 0.0, ends, np.inf).min(axis=0, initial=np.inf)
     return np.where(rows < 0.0, ends, -np.inf).max(axis=0, initial=-np.inf).clip(lower), most.clip(max=upper)
+
+
+def scaled_rows(rows: Floats, limits: Floats, scale: Floats) -> tuple[Floats, Floats]:
+    """Return half-spaces of x / scale with normals of unit length, except those whose normal is rounding."""
+    lengths = np.linalg.norm(rows, axis=1)
+    units = np.where(lengths > ROUNDING * lengths.max(initial=0.0), np.linalg.norm(rows * scale, axis=1), 1.0)
+    return rows * scale / units[:, None], limits / units
 
 
 def without_far(rows: Floats, limits: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
@@ -134,7 +167,7 @@ def described(rows: Floats, limits: Floats, across: Floats, levels: Floats, *, b
     if known is not None:
         scale, lower, upper = known
         with contextlib.suppress(EmptyPolytopeError, UncertainHullError):
-            near, ends = without_far(rows * scale, limits, lower / scale, upper / scale)
+            near, ends = without_far(*scaled_rows(rows, limits, scale), lower / scale, upper / scale)
             return stretched(intersection_of_halfspaces(near, ends, across * scale, levels, bounded=True), scale)
         # The bounds exist, so the set is not emptier than their rounding.
         if isinstance(failure, EmptyPolytopeError) and failure.relaxation > 1e-6 * np.abs(known[1:]).max():

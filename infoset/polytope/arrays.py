@@ -13,7 +13,7 @@ from infoset._set_arguments import box_ends, constraint_values, finite_values, n
 from infoset.limits import COUNT
 from infoset.polytope._affine_hull import FLAT, EmptyPolytopeError
 from infoset.polytope._qhull import hull_of_points, together
-from infoset.polytope._scaling import described, scale_of, stretched
+from infoset.polytope._scaling import MOST_RATIO, described, powers_of_two, scale_of, stretched
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -52,10 +52,15 @@ class PolytopeArrays:
         array = finite_values("points", points, "k", "n")
         if not len(array):
             raise ValueError("points must have at least one row: Polytope.empty makes the empty set")
-        scale = scale_of(array)
-        return cls(
-            *hull_of_points(array, flat) if scale is None else stretched(hull_of_points(array / scale, flat), scale)
-        )
+        return cls._hull(array, flat)
+
+    @classmethod
+    def _hull(cls, points: Floats, flat: float = FLAT, *, solid: bool = False) -> Self:
+        """Return the convex hull of points, which is `solid` if it surely has an interior."""
+        scale = scale_of(points, solid=solid)
+        if scale is None:
+            return cls(*hull_of_points(points, flat))
+        return cls(*stretched(hull_of_points(points / scale, flat), scale))
 
     @classmethod
     def from_constraints(
@@ -138,6 +143,15 @@ class PolytopeArrays:
         """
         middle = finite_values("centre", centre, "n")
         rows = finite_values("generators", generators, "g", len(middle))
+        widths = np.abs(rows).sum(axis=0)
+        known = widths[widths > 0.0]
+        if len(known) and known.max() > MOST_RATIO * known.min():
+            scale = powers_of_two(np.where(widths > 0.0, widths, 1.0))
+            inner = cls.from_zonotope(0.0 * middle, rows / scale)
+            vertices, normals, offsets, across, levels = stretched(
+                (inner.vertices, inner.normals, inner.offsets, inner.across, inner.levels), scale
+            )
+            return cls(vertices + middle, normals, offsets + normals @ middle, across, levels + across @ middle)
         zonotope = cls.from_vertices(middle[None, :])
         for row in rows:
             zonotope = cls.from_vertices(np.vstack([zonotope.vertices - row, zonotope.vertices + row]))

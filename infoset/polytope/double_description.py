@@ -2,7 +2,8 @@
 
 A cut makes new vertices on edges, and the Minkowski sum with a segment makes new facets on ridges; edges and ridges
 follow from the incidence. Each new vertex is an interpolation between two others, so that the result is exact to a few
-ulp, where a hull merges points that are nearer than 1e-10.
+ulp, where a hull merges points that are nearer than 1e-10. Tolerances do not depend on the units of the coordinates:
+they are relative to the terms of a scalar product, or to the sizes of the set along the axes.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from infoset.polytope._scaling import powers_of_two
 from infoset.polytope.polytope import Polytope
 
 Floats = NDArray[np.float64]
@@ -52,15 +54,17 @@ class FacetsAndVertices:
     incidence: Flags
 
     @classmethod
-    def of(cls, polytope: Polytope, size: float = 0.0) -> FacetsAndVertices:
-        """Return a polytope; a flat one is widened by 3e-8 of its greatest coordinate, or of `size`."""
+    def of(cls, polytope: Polytope, sizes: Floats | float = 0.0) -> FacetsAndVertices:
+        """Return a polytope; a flat one is widened by 3e-8 of its greatest coordinates, or of `sizes`, shape (n,)."""
         vertices, normals = polytope.vertices, polytope.normals
         depth = (heights := vertices @ normals.T).max(axis=0) - heights
         incidence, offsets = depth <= _INCIDENT * depth.max(axis=0), heights.max(axis=0)
-        half = _THIN * (max(size, float(np.abs(vertices).max())) or 1.0)
+        sizes = np.maximum(np.abs(vertices).max(axis=0), sizes)
         for row, level in zip(polytope.across, polytope.levels, strict=True):
+            half = _THIN * (float(np.abs(row) @ sizes) or 1.0)
+            along = half * row / (row @ row)
             above = np.repeat([False, True], len(vertices))
-            vertices = np.vstack([vertices - half * row, vertices + half * row])
+            vertices = np.vstack([vertices - along, vertices + along])
             normals, offsets = np.vstack([normals, row, -row]), np.append(offsets, [level + half, half - level])
             incidence = np.column_stack([np.vstack([incidence, incidence]), above, ~above])
         return cls(vertices, normals, offsets, incidence)
@@ -71,14 +75,16 @@ class FacetsAndVertices:
         size = self.vertices.shape[1]
         return Polytope(self.vertices, self.normals, self.offsets, np.zeros((0, size)), np.zeros(0))
 
-    def enlarged(self, slack: float, size: float = 0.0) -> FacetsAndVertices:
+    def enlarged(self, slack: float, sizes: Floats | float = 0.0) -> FacetsAndVertices:
         """Return the set scaled about its centre, so that each facet moves outward by at least `slack` ulp.
 
-        The ulp is that of the greatest coordinate, or of `size` if that is greater.
+        The ulp is that of the terms of normal . x, in which x has the greatest coordinates of the set or `sizes`, shape
+        (n,), if these are greater.
         """
-        least = float((self.offsets - self.normals @ self.vertices.mean(axis=0)).min())
-        size = max(size, float(np.abs(self.vertices).max()))
-        return self._scaled(1.0 + slack * EPSILON * (1.0 + size / max(least, 1e-300)))
+        depths = self.offsets - self.normals @ self.vertices.mean(axis=0)
+        terms = np.abs(self.normals) @ np.maximum(np.abs(self.vertices).max(axis=0), sizes)
+        ratio = float((terms / np.maximum(depths, 1e-300)).max())
+        return self._scaled(1.0 + slack * EPSILON * (1.0 + ratio))
 
     def _scaled(self, factor: float) -> FacetsAndVertices:
         """Return the set scaled about the mean of its vertices."""
@@ -89,37 +95,52 @@ class FacetsAndVertices:
 
     def affine_image(self, matrix: Floats, shift: Floats) -> FacetsAndVertices:
         """Return {matrix x + shift}; the image under a singular matrix is widened by 1e-6 of its size."""
-        left, sizes, right = np.linalg.svd(matrix)
-        size = float(np.abs(self.vertices).max())
+        before = np.abs(self.vertices).max(axis=0)
+        before = powers_of_two(np.where(before > 0.0, before, 1.0))
+        after = np.abs(matrix) @ before
+        after = powers_of_two(np.where(after > 0.0, after, 1.0))
+        left, sizes, right = np.linalg.svd(matrix * before / after[:, None])
         floor = _SINGULAR * (float(sizes[0]) or 1.0)
         small = sizes < floor
         if small.any():
             # A regular matrix, and segments that contain the difference of both images.
-            lengths = floor * np.maximum(np.abs(self.vertices @ right[small].T).max(axis=0), _THIN * (size or 1.0))
-            matrix = (left * np.maximum(sizes, floor)) @ right
+            reach = np.abs((self.vertices / before) @ right[small].T).max(axis=0)
+            lengths = floor * np.maximum(reach, _THIN * float(np.abs(self.vertices / before).max()))
+            matrix = (left * np.maximum(sizes, floor)) @ right * after[:, None] / before
         vertices = self.vertices @ matrix.T + shift
-        normals = np.array(np.linalg.solve(matrix.T, self.normals.T).T, dtype=np.float64)
+        scaled = matrix * before / after[:, None]
+        normals = np.array(np.linalg.solve(scaled.T, (self.normals * before).T).T, dtype=np.float64) / after
         normals /= np.sqrt((normals**2).sum(axis=1))[:, None]
         # The offsets follow from the vertices, so that rounding errors of both do not add up over many steps.
         image = FacetsAndVertices(vertices, normals, (vertices @ normals.T).max(axis=0), self.incidence)
         for axis, length in zip(left.T[small], lengths if small.any() else (), strict=True):
-            image = image.plus_segment(length * axis)
+            image = image.plus_segment(length * axis * after)
         return image
 
     def plus(self, other: Polytope) -> FacetsAndVertices:
         """Return the Minkowski sum with a polytope: a hull, enlarged by 1e-8 of its size."""
-        return FacetsAndVertices.of(self.polytope + other)._scaled(1.0 + _HULL)
+        scale = powers_of_two(np.ptp(self.vertices, axis=0))
+        sums = (self.vertices[:, None, :] + other.vertices).reshape(-1, len(scale)) / scale
+        hull = FacetsAndVertices.of(Polytope.from_vertices(sums))._scaled(1.0 + _HULL)
+        return hull.in_units(scale)
+
+    def in_units(self, scale: Floats) -> FacetsAndVertices:
+        """Return the set whose coordinates are those of this one times powers of two, shape (n,): exact."""
+        normals = self.normals / scale
+        lengths = np.sqrt((normals**2).sum(axis=1))
+        return FacetsAndVertices(
+            self.vertices * scale, normals / lengths[:, None], self.offsets / lengths, self.incidence
+        )
 
     def plus_segment(self, half: Floats) -> FacetsAndVertices:
         """Return the Minkowski sum with the segment from -half to +half.
 
         Each facet moves, and each ridge between two facets that face opposite ends of the segment becomes a facet.
         """
-        length = float(np.linalg.norm(half))
-        if length == 0.0:
+        if not half.any():
             return self
-        along = self.normals @ half
-        ahead, behind = along > _PARALLEL * length, along < -_PARALLEL * length
+        along, terms = self.normals @ half, np.abs(self.normals) @ np.abs(half)
+        ahead, behind = along > _PARALLEL * terms, along < -_PARALLEL * terms
         opposite = np.flatnonzero(behind) if len(half) > 1 else np.zeros(0, dtype=np.int64)  # an interval has no ridges
         first, second, common = _adjacent(self.incidence.T, np.flatnonzero(ahead), opposite, len(half))
         weight, other = -along[second], along[first]

@@ -22,7 +22,7 @@ from infoset._set_arguments import (
 from infoset.limits import NOT_NEGATIVE, Limits, real_values
 from infoset.polytope._measures import largest_ball, simplices_of, volume_of
 from infoset.polytope._nearest import nearest_difference
-from infoset.polytope._scaling import scale_of, scale_of_box, stretched, tightened, without_far
+from infoset.polytope._scaling import scale_of, scale_of_box, scaled_rows, stretched, tightened, without_far
 from infoset.polytope.arrays import PolytopeArrays
 from infoset.renamed import renamed
 
@@ -39,15 +39,15 @@ class Polytope(PolytopeArrays):
     It is {x: normals x <= offsets, across x = levels}, and the hull of its `vertices`, shape (v, n), without redundant
     points. The f normals of the facets have unit length and are in the directions of the affine hull; the n - dimension
     rows of `across` are orthonormal. Construct it with `from_vertices`, `from_constraints`, `from_box`, `from_ball` or
-    `from_zonotope`. Coordinates should be of similar size: a set that is 1e9 times thinner than it is long counts as
-    flat.
+    `from_zonotope`. A set that is 1e9 times thinner than it is long counts as flat. The units of the axes do not
+    matter, except that points whose width along one axis is 3e-12 times that along another one, or less, count as flat.
 
     An empty set has no vertices; `relaxation` is then the least relaxation of all constraints, their normals of unit
     length, with which a point satisfies them, if it is known. Operations on it give the empty set; points such as its
     centroid do not exist, and an EmptyPolytopeError is raised.
 
     All arguments are checked: numbers are finite (TypeError if they are not real numbers), shapes and spaces fit
-    (ValueError). Operations are exact up to rounding: about 1e-12 of the size of the set, and 1e-9 at most. Their cost
+    (ValueError). Operations are exact up to rounding: about 1e-12 of the size of the set, and 2e-9 at most. Their cost
     is that of a convex hull: O(k log k) for k points or half-spaces in up to three dimensions, O(k^(n/2)) at worst in
     n.
 
@@ -106,7 +106,7 @@ class Polytope(PolytopeArrays):
         if self.is_empty or other.is_empty:
             return self if self.is_empty else other
         sums = self.vertices[:, None, :] + other.vertices[None, :, :]
-        return self.from_vertices(sums.reshape(-1, self.space))
+        return self._hull(sums.reshape(-1, self.space), solid=self.space in (self.dimension, other.dimension))
 
     def minkowski_difference(self, other: Polytope) -> Polytope:
         """Return the Pontryagin difference {x: x + y in the set for all y in the other}: each facet moves inward.
@@ -137,25 +137,37 @@ class Polytope(PolytopeArrays):
         for one in sets:
             if one.is_empty:
                 return one
-        boxes = [one.bounding_box() for one in sets]
+        boxes = np.array([one.bounding_box() for one in sets])
+        solid = np.min(boxes[:, 1] - boxes[:, 0], axis=0) if all(one.dimension == one.space for one in sets) else None
         return self._in_box(
             np.vstack([one.normals for one in sets]),
             np.concatenate([one.offsets for one in sets]),
             np.vstack([one.across for one in sets]),
             np.concatenate([one.levels for one in sets]),
-            np.max([lower for lower, _ in boxes], axis=0),
-            np.min([upper for _, upper in boxes], axis=0),
+            boxes[:, 0].max(axis=0),
+            boxes[:, 1].min(axis=0),
+            solid,
         )
 
     @classmethod
     def _in_box(
-        cls, rows: Floats, limits: Floats, across: Floats, levels: Floats, lower: Floats, upper: Floats
+        cls,
+        rows: Floats,
+        limits: Floats,
+        across: Floats,
+        levels: Floats,
+        lower: Floats,
+        upper: Floats,
+        solid: Floats | None,
     ) -> Polytope:
-        """Return {x: rows x <= limits, across x = levels}, which is known to lie between `lower` and `upper`."""
-        scale = None if (lower > upper).any() else scale_of_box(lower, upper)
+        """Return {x: rows x <= limits, across x = levels}, which is known to lie between `lower` and `upper`.
+
+        `solid` are widths of sets with an interior that contain it, None if one of these is flat.
+        """
+        scale = None if (lower > upper).any() else scale_of_box(lower, upper, solid)
         if scale is None:
             return cls.from_constraints(*without_far(rows, limits, lower, upper), across, levels, bounded=True)
-        rows, limits = without_far(rows * scale, limits, lower / scale, upper / scale)
+        rows, limits = without_far(*scaled_rows(rows, limits, scale), lower / scale, upper / scale)
         inner = cls.from_constraints(rows, limits, across * scale, levels, bounded=True)
         if inner.is_empty:
             return cls.empty(len(lower))
@@ -164,7 +176,8 @@ class Polytope(PolytopeArrays):
     def convex_hull(self, *others: Polytope) -> Polytope:
         """Return the convex hull of the union with one or more polytopes."""
         points = np.vstack([self.vertices, *(self._need_other(one).vertices for one in others)])
-        return self.from_vertices(points) if len(points) else self
+        solid = self.space in (self.dimension, *(one.dimension for one in others))
+        return self._hull(points, solid=solid) if len(points) else self
 
     def cut(
         self,
@@ -203,12 +216,14 @@ class Polytope(PolytopeArrays):
             return self
         if np.isneginf(limits).any() or (least > most).any():
             return self.empty(self.space, 0.5 * float(np.max(least - most)))
+        lower, upper = self.bounding_box()
         return self._in_box(
             np.vstack([self.normals, rows[cuts]]),
             np.concatenate([self.offsets, limits[cuts]]),
             self.across,
             self.levels,
-            *tightened(rows[cuts], limits[cuts], *self.bounding_box()),
+            *tightened(rows[cuts], limits[cuts], lower, upper),
+            upper - lower if self.dimension == self.space else None,
         )
 
     def project(self, axes: ArrayLike) -> Polytope:
@@ -296,7 +311,7 @@ class Polytope(PolytopeArrays):
     @cached_property
     def _stretch(self) -> Floats | None:
         """Scales of the axes of a set with an interior if they differ much, shape (n,)."""
-        return scale_of(self.vertices) if self.dimension == self.space else None
+        return scale_of(self.vertices, solid=True) if self.dimension == self.space else None
 
     def excess(self, points: ArrayLike) -> Floats:
         """Return the greatest distance of `points`, shape (..., n), beyond a facet or from the affine hull.

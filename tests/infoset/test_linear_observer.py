@@ -220,11 +220,33 @@ def test_hulls_equal_linear_programs(axes: int, order: int, steps: int) -> None:
     for step in (steps - 1, steps // 2):
         wanted = Programs(a, c, generators, np.ones(size), noise, y[: step + 1]).hull(step)
         np.testing.assert_allclose([estimates[step].lower, estimates[step].upper], wanted, rtol=0.0, atol=1e-9)
-    if size < 6:
-        programs = Programs(a, c, generators, np.ones(size), noise, y)
-        for estimate in observer.smooth(estimates)[:2]:
-            hulls = [estimate.lower, estimate.upper]
-            np.testing.assert_allclose(hulls, programs.hull(estimate.step), rtol=0.0, atol=1e-9)
+    programs = Programs(a, c, generators, np.ones(size), noise, y)
+    for estimate in observer.smooth(estimates):
+        hulls = [estimate.lower, estimate.upper]
+        np.testing.assert_allclose(hulls, programs.hull(estimate.step), rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "units", [[1e9, 1.0, 1e-9] * 2, [1.0, 1e-9, 1e9, 1e-9, 1.0, 1e9], [1e9] * 3 + [1e-9] * 3, [1e-9] * 6]
+)
+def test_units_of_six_states_do_not_matter(units: list[float]) -> None:
+    """Formerly sets in mixed units were too wide, with thousands of vertices after two steps."""
+    a, c, generators = chain(2, 3)
+    rng = np.random.default_rng(6)
+    y = simulated(a, c, generators, np.full(2, 0.2), 3, rng)[0] @ c.T + rng.uniform(-0.15, 0.15, (3, 2))
+    hulls = []
+    for scale in (np.ones(6), np.array(units)):
+        observer = LinearObserver(
+            a * scale[:, None] / scale,
+            c / scale,
+            Zonotope.box(-scale, scale),
+            noise=0.2,
+            disturbance=Zonotope(np.zeros(6), generators * scale),
+        )
+        estimates = observer.run(y)
+        sets = estimates + observer.smooth(estimates)
+        hulls.append([[estimate.lower / scale, estimate.upper / scale] for estimate in sets])
+    np.testing.assert_allclose(hulls[1], hulls[0], rtol=0.0, atol=1e-9)
 
 
 def test_smoothed_sets_of_two_states_equal_linear_programs() -> None:
@@ -441,9 +463,9 @@ def test_a_section_of_the_interception_is_an_observer() -> None:
     assert section.polygon.hausdorff_distance(observer.estimate().polygons) < 1e-9
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(70))
 def test_the_true_state_is_inside_for_any_matrices_of_other_numbers_of_states(seed: int) -> None:
-    """Singular and regular matrices, flat initial sets, exact measurements, gaps."""
+    """Singular and regular matrices, flat initial sets, exact measurements, gaps, units that differ by 1e18."""
     rng = np.random.default_rng(seed)
     states, outputs = int(rng.choice([1, 3, 3, 4])), int(rng.integers(1, 3))
     a = rng.normal(size=(states, states)) * rng.choice([0.3, 0.6])
@@ -454,6 +476,9 @@ def test_the_true_state_is_inside_for_any_matrices_of_other_numbers_of_states(se
     c = np.eye(outputs, states) if seed % 3 == 0 else rng.normal(size=(outputs, states))
     generators = 0.1 * rng.normal(size=(int(rng.integers(0, 3)), states))
     half, noise = rng.choice([0.0, 0.5, 1.0], states), float(rng.choice([0.0, 0.05, 0.5]))
+    if seed >= 40:  # other units of the states
+        units = 10.0 ** rng.integers(-9, 10, states)
+        a, c, generators, half = a * units[:, None] / units, c / units, generators * units, half * units
     observer = LinearObserver(
         a, c, Zonotope.box(-half, half), noise=noise, disturbance=Zonotope(np.zeros(states), generators)
     )

@@ -49,7 +49,10 @@ def exactly(points: Floats) -> list[list[Fraction]]:
 
 
 def assert_same(got: Polytope, exact: RationalSet, size: Floats) -> None:
-    """Each vertex of one set is within 1e-9 of the other set, in units of the sizes of the axes."""
+    """Each vertex of one set is within 1e-9 of the other set, in units of the sizes of the axes.
+
+    The bounds of a set that counts as flat can be as far away as its thickness: 1e-9 on both sides of its centre.
+    """
     assert got.is_empty == (not len(exact.vertices))
     if got.is_empty:
         return
@@ -57,7 +60,7 @@ def assert_same(got: Polytope, exact: RationalSet, size: Floats) -> None:
     scaled = Polytope.from_vertices(got.vertices / size)
     assert float(wanted.excess(scaled.vertices).max()) <= 1e-9
     assert float(scaled.excess(wanted.vertices).max()) <= 1e-9
-    assert np.abs(got.bounding_box() - exact.bounds.T).max(axis=0) / size == pytest.approx(0.0, abs=1e-9)
+    assert np.abs(got.bounding_box() - exact.bounds.T).max(axis=0) / size == pytest.approx(0.0, abs=2e-9)
 
 
 @needs_ppl
@@ -98,6 +101,7 @@ def test_operations_on_two_sets(seed: int, space: int, kind: str, other_kind: st
 @needs_ppl
 @some
 @given(SEED, SPACE, KIND)
+@example(seed=2000, space=3, kind="mixed")
 def test_maps_projections_and_slices(seed: int, space: int, kind: str) -> None:
     points = points_of(kind, seed, space)
     one = Polytope.from_vertices(points)

@@ -296,7 +296,34 @@ def test_a_far_constraint_does_not_hide_a_set(far: float) -> None:
     assert cube.volume() == pytest.approx(1.0, rel=1e-12)
 
 
+@pytest.mark.parametrize("units", [[1e9, 1.0, 1e-9], [1e-9, 1e9, 1.0], [1e9, 1e9, 1e-9], [1e12, 1.0, 1e-6]])
+@pytest.mark.parametrize("seed", range(4))
+def test_units_of_the_axes_do_not_matter(units: list[float], seed: int) -> None:
+    """Constraints, cuts, intersections, sums and hulls of a unit cube, and of the same cube in other units."""
+    rng, unit, scale = np.random.default_rng(seed), np.eye(3), np.array(units)
+    rows = rng.normal(size=(3, 3))
+    limits = rows @ rng.uniform(0.0, 1.0, 3) + 0.2
+    cube, box = Polytope.from_box(np.zeros(3), np.ones(3)), Polytope.from_box(np.zeros(3), scale)
+    zonotope = Polytope.from_zonotope(0.5 * scale, 0.5 * np.diag(scale))
+    plain, other = cube.cut(rows, upper=limits), box.cut(rows / scale, upper=limits)
+    stacked = np.vstack([unit, -unit, rows / scale]), np.concatenate([scale, np.zeros(3), limits])
+    moved = 0.25 * np.ones(3)
+    pairs = [
+        (plain, other),
+        (plain, zonotope.cut(rows / scale, upper=limits)),
+        (plain, Polytope.from_constraints(*stacked)),
+        (plain & cube.translate(moved), other & box.translate(moved * scale)),
+        (plain + cube, other + box),
+        (plain.convex_hull(cube.translate(moved)), other.convex_hull(box.translate(moved * scale))),
+    ]
+    for wanted, got in pairs:
+        assert got.dimension == 3
+        assert np.array(got.bounding_box()) / scale == pytest.approx(np.array(wanted.bounding_box()), abs=1e-9)
+        assert got.volume() / scale.prod() == pytest.approx(wanted.volume(), rel=1e-9)
+
+
 def test_a_set_whose_sizes_differ_too_much_is_not_called_empty() -> None:
-    unit = np.eye(3)
+    units, row = np.array([1e9, 1e-9, 1e-9]), np.array([0.1, -0.1, 0.6])
+    cut = Polytope.from_box(np.zeros(3), units).cut(row / units, upper=0.3)
     with pytest.raises(UncertainHullError, match="their sizes differ too much for a hull: scale the coordinates"):
-        Polytope.from_constraints(np.vstack([unit, -unit]), [1e9, 1.0, 1e-9, 0.0, 0.0, 0.0])
+        Polytope.from_constraints(*cut.constraints())
