@@ -32,6 +32,8 @@ _CONFIDENCE = 0.95
 _LOOKS = 28
 _DOTTED: dict[str, Any] = {"linestyle": (0, (1, 1.2)), "linewidth": 0.9}
 _BINS = 24
+_SMALL_KM_S = 0.01
+"""Extent of a velocity below which its axis is in m/s."""
 _START_LABELS = {
     "y_km": "initial y, km",
     "z_km": "initial z, km",
@@ -141,8 +143,12 @@ def draw_dispersion(columns: Sequence[CampaignColumns]) -> Figure:
         for row, (column, line) in zip(grid, rows, strict=True):
             limit = axis_limit([column.miss_m])
             for axes, name in zip(row, line, strict=True):
-                binned |= _cloud(axes, column.start[name], column.miss_m, str(column.look["color"]))
-                axes.set_xlabel(_START_LABELS[name])
+                label, values = _START_LABELS[name], column.start[name]
+                if label.endswith("km/s") and 0.0 < np.ptp(values) < _SMALL_KM_S:
+                    label, values = label.replace("km/s", "m/s"), 1e3 * values
+                binned |= _cloud(axes, values, column.miss_m, str(column.look["color"]))
+                axes.set_xlabel(label)
+                axes.ticklabel_format(axis="x", useOffset=False)
                 axes.set_ylim(0.0, 1.04 * limit or 1.0)
                 axes.locator_params(axis="x", nbins=3)
                 axes.tick_params(labelleft=axes is row[0])

@@ -61,6 +61,8 @@ class Clock:
         if not self.counts_down:
             return f"t = {time_s:g} s"
         left_s = record.scenario.nominal_arrival_s - time_s
+        if abs(left_s) < least_to_go_s(record.scenario):
+            return "at the nominal arrival"
         return (
             f"{duration_text(left_s)} before arrival" if left_s > 0.0 else f"{-left_s:.3g} s after the nominal arrival"
         )

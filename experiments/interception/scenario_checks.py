@@ -44,12 +44,14 @@ def cross_problems(known: Known) -> Iterator[Problem]:
     """Yield the problems between valid values."""
     yield from _space(known)
     yield from _error_keys(known)
-    yield from _images(known)
+    hint = "exchange them: both are times before the nominal arrival"
+    yield from _not_less(known, "angle_sensor", "first_image_s", "last_image_s", hint)
     yield from _impulses(known)
     yield from _schedule(known)
     yield from _periods(known)
-    yield from _sections(known)
-    geometric = [*_ranges(known), *_error_law(known), *_sun(known), *_body(known), *_closing_speeds(known)]
+    hint = "raise it, or lower fewest_sections"
+    yield from _not_less(known, "information_set", "sections", "fewest_sections", hint)
+    geometric = [*_ranges(known), *_error_law(known), *_sizes(known), *_closing_speeds(known)]
     # A range or a speed in another unit causes problems of other keys.
     yield from [*_other_units(known)] or geometric if geometric else ()
 
@@ -163,14 +165,11 @@ def _error_keys(known: Known) -> Iterator[Problem]:
         )
 
 
-def _images(known: Known) -> Iterator[Problem]:
-    first, last = (known.number("angle_sensor", key) for key in ("first_image_s", "last_image_s"))
-    if first is not None and last is not None and first < last:
-        yield Problem(
-            ("angle_sensor", "first_image_s"),
-            f"must be at least angle_sensor.last_image_s, {shown(last)}, found {shown(first)}",
-            "exchange them: both are times before the nominal arrival",
-        )
+def _not_less(known: Known, table: str, key: str, other: str, hint: str) -> Iterator[Problem]:
+    """Yield a problem if the value of a key is less than that of another key of its table."""
+    value, least = known.number(table, key), known.number(table, other)
+    if value is not None and least is not None and value < least:
+        yield Problem((table, key), f"must be at least {table}.{other}, {shown(least)}, found {shown(value)}", hint)
 
 
 def _schedule(known: Known) -> Iterator[Problem]:
@@ -320,39 +319,22 @@ def _bound_key(known: Known, end: str, axis: str) -> str:
     return own if is_own else f"error_at_{end}_range_rad"
 
 
-def _sections(known: Known) -> Iterator[Problem]:
-    sections = known.number("information_set", "sections")
-    fewest = known.number("information_set", "fewest_sections")
-    if sections is not None and fewest is not None and sections < fewest:
-        yield Problem(
-            ("information_set", "sections"),
-            f"must be at least information_set.fewest_sections, {fewest}, found {sections}",
-            "raise it, or lower fewest_sections",
-        )
-
-
-def _sun(known: Known) -> Iterator[Problem]:
-    distance = known.number("sun", "distance_km")
+def _sizes(known: Known) -> Iterator[Problem]:
+    """The Sun must be farther than the greatest possible range, and the body smaller than the least one."""
+    distance, radius = known.number("sun", "distance_km"), known.number("body", "radius_m")
     spans = list(_spans(known, "x_km"))
-    if distance is None or not spans:
+    if not spans:
         return
     where, (_, greatest) = max(spans, key=lambda span: span[1][1])
-    if distance <= greatest:
+    if distance is not None and distance <= greatest:
         yield Problem(
             ("sun", "distance_km"),
             f"must be greater than the greatest possible range, {shown(greatest)} km of {where}, "
             f"found {shown(distance)}",
             "check the unit; for free space omit the table [sun]",
         )
-
-
-def _body(known: Known) -> Iterator[Problem]:
-    radius = known.number("body", "radius_m")
-    spans = list(_spans(known, "x_km"))
-    if radius is None or not spans:
-        return
     where, (least, _) = min(spans, key=lambda span: span[1][0])
-    if radius >= least * 1000:
+    if radius is not None and radius >= least * 1000:
         yield Problem(
             ("body", "radius_m"),
             f"must be less than the least possible range, {shown(least)} km of {where}, found {shown(radius)}",

@@ -202,6 +202,13 @@ def test_texts_of_figures_never_touch() -> None:
     for drawn in (both, [both[0], far]):
         for draw in (draw_campaign_distributions, draw_convergence, draw_dispersion):
             need_room(draw(drawn))
+    slow = replace(
+        both[0], start={name: 6.14 + 1e-4 * values / np.abs(values).max() for name, values in far.start.items()}
+    )
+    figure = draw_dispersion([slow])
+    need_room(figure)
+    assert figure.axes[3].get_xlabel() == "initial V$_x$, m/s"
+    assert all(not axes.xaxis.get_offset_text().get_text() for axes in figure.axes)
     row = draw_dispersion([far]).axes[0]
     assert row.get_ylabel() == "miss, m\nruns beyond the axis: 1 of 400"
 

@@ -358,6 +358,9 @@ def test_long_flights_and_schedules_have_a_logarithmic_time_axis(records: list[R
     assert not Clock.of(records).counts_down
     record = scheduled(records[0])
     assert Clock.of([record]).counts_down
+    clock, arrival_s = Clock.of([record]), record.scenario.nominal_arrival_s
+    assert clock.text(record, arrival_s + 1e-12) == "at the nominal arrival"
+    assert clock.text(record, arrival_s + 2.0) == "2 s after the nominal arrival"
     assert Clock.of([replace(records[0], steps=2 * records[0].steps)]).counts_down
     figure = draw_process([record])
     assert {axes.get_xscale() for axes in figure.axes} == {"log"}
