@@ -201,16 +201,18 @@ def steepest_angles(alpha: float, across: float, range_m: float, law: SectionLaw
 
 
 @inlined
-def slope_band(alpha: float, across: float, label: float, x: float, law: SectionLaw) -> tuple[float, float]:
-    """Return the least and the greatest slope z/x that agree with measured angles, for a label at range x.
+def slope_band(alpha: float, across: float, travelled: float, x: float, law: SectionLaw) -> tuple[float, float]:
+    """Return the least and the greatest slope z/x that agree with measured angles, at range x.
 
     Parameters
     ----------
     alpha, across : float
         Measured angles of this axis and of the other one, rad.
+    travelled : float
+        Decrease of the range since the start, m, the same for all labels.
     """
     if law.angles != PLANE:
-        return wide_slope_band(alpha, across, label, x, law)
+        return wide_slope_band(alpha, across, travelled, x, law)
     bound = law.error_at_zero_range + law.error_slope * x
     lower, upper = alpha - bound, alpha + bound
     if law.exact_angles:
@@ -220,7 +222,7 @@ def slope_band(alpha: float, across: float, label: float, x: float, law: Section
 
 
 @allocation_free
-def wide_slope_band(alpha: float, across: float, label: float, x: float, law: SectionLaw) -> tuple[float, float]:
+def wide_slope_band(alpha: float, across: float, travelled: float, x: float, law: SectionLaw) -> tuple[float, float]:
     """Return what `slope_band` does if the band of an axis depends on the angle of the other one, or is not concave.
 
     Notes
@@ -237,7 +239,6 @@ def wide_slope_band(alpha: float, across: float, label: float, x: float, law: Se
         bound += law.centroid_error / x
     if not law.exact_angles:
         return alpha - bound, alpha + bound
-    travelled = label - x
     near, far = max(law.label_least - travelled, 0.0), law.label_greatest - travelled
     own, other = steepest_angles(alpha, across, far, law)
     if own >= RIGHT_ANGLE:
@@ -301,7 +302,7 @@ def measure_section(
     """
     x = range_of(label, elapsed, law)
     bound = law.error_at_zero_range + law.error_slope * x
-    lower, upper = slope_band(alpha, across, label, x, law)
+    lower, upper = slope_band(alpha, across, law.closing_speed * (law.step * elapsed), x, law)
     slack = CUT_SLACK * (label * (abs(alpha) + bound) + origins[n, RIGHT, REACH] * (label / law.closing_speed))
     return chain_steps.cut(origins, rings, marks, n, x / law.closing_speed, x * lower - slack, x * upper + slack)
 
@@ -381,8 +382,8 @@ def rate_band(
     then = e * ago
     near_then, far_then = near + then, far + then
     if sight.known:
-        least_near, greatest_near = slope_band(sight.alpha, sight.across, near_label, near_then, law)
-        least_far, greatest_far = slope_band(sight.alpha, sight.across, far_label, far_then, law)
+        least_near, greatest_near = slope_band(sight.alpha, sight.across, travelled - then, near_then, law)
+        least_far, greatest_far = slope_band(sight.alpha, sight.across, travelled - then, far_then, law)
     else:
         least_near, greatest_near = law.z_least / near_then, law.z_greatest / near_then
         least_far, greatest_far = law.z_least / far_then, law.z_greatest / far_then

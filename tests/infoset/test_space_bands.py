@@ -47,8 +47,8 @@ def bands(model: SetModel, measured: Floats, elapsed_m: float) -> Callable[[floa
     y, z = measured[:, 0].tolist()
     law_y, law_z = section_laws(model)
     return lambda label: [
-        slope_band(y, z, label, label - elapsed_m, law_y),
-        slope_band(z, y, label, label - elapsed_m, law_z),
+        slope_band(y, z, elapsed_m, label - elapsed_m, law_y),
+        slope_band(z, y, elapsed_m, label - elapsed_m, law_z),
     ]
 
 
@@ -145,11 +145,6 @@ def contain_and_are_convex(model: SetModel, true: Sight, errors: Floats, label: 
         bend = np.diff(heights, n=2, axis=0)
         steepest = np.abs(heights / ranges[:, None, None]).max()
         rounding = 64.0 * EPS * greatest * (1.0 + steepest)
-        # The nearest range that a label can have is a difference of labels: its rounding error is that of a label. A
-        # camera's centroid error c widens the band by c/near, and the steepest slope amplifies it.
-        near = ranges[0]
-        centroid = model.angle_sensor.centroid_error_m or 0.0
-        rounding += ranges.max() * (centroid / near) * (EPS * greatest / near) * (1.0 + steepest**2) ** 2
         assert bend[..., 0].min() >= -rounding
         assert bend[..., 1].max() <= rounding
 

@@ -367,13 +367,13 @@ def test_bands_are_mirrored_for_a_negative_angle_and_empty_behind_the_target() -
     (law,) = section_laws(model)
     label = 3600.0 * SPEED_M_S
     for alpha in (1e-5, 0.02, 1.2):
-        lower, upper = slope_band(alpha, 0.0, label, 2e3, law)
-        assert slope_band(-alpha, 0.0, label, 2e3, law) == (-upper, -lower)
+        lower, upper = slope_band(alpha, 0.0, label - 2e3, 2e3, law)
+        assert slope_band(-alpha, 0.0, label - 2e3, 2e3, law) == (-upper, -lower)
         # Labels below the threshold extend the band in the range; behind the target, its limits are reversed there.
-        heights = [np.multiply(x, slope_band(alpha, 0.0, label, x, law)) for x in (500.0, 1000.0, 1500.0)]
+        heights = [np.multiply(x, slope_band(alpha, 0.0, label - x, x, law)) for x in (500.0, 1000.0, 1500.0)]
         assert np.diff(heights, n=2, axis=0) == pytest.approx(0.0, abs=1e-9)
         for x in (0.0, -1e4):
-            lower, upper = np.multiply(x, slope_band(alpha, 0.0, label, x, law))
+            lower, upper = np.multiply(x, slope_band(alpha, 0.0, label - x, x, law))
             assert upper <= lower
 
 
@@ -382,7 +382,7 @@ def test_the_published_model_takes_the_angle_itself() -> None:
     (law,) = section_laws(model)
     for x in (1e3, 2e4, 1e7):
         bound = PIXEL_RAD + CENTROID_M / x
-        assert slope_band(0.01, 0.0, 2e7, x, law) == pytest.approx((0.01 - bound, 0.01 + bound), rel=1e-8)
+        assert slope_band(0.01, 0.0, 2e7 - x, x, law) == pytest.approx((0.01 - bound, 0.01 + bound), rel=1e-8)
     results = simulate(replace(camera_scenario(), set_model=model, noise=NoiseKind.GAME), 4)
     assert np.isfinite(results.miss_m).all()
 
