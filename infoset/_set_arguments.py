@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, TypeVar
 
 import numpy as np
@@ -48,7 +49,7 @@ def finite_values(name: str, value: ArrayLike, *shape: str | int) -> Floats:
 def bound_values(name: str, value: ArrayLike, *shapes: tuple[int, ...]) -> Floats:
     """Return numbers that may be infinite, of one of some shapes; any shape if there is none."""
     bounds = real_values(name, value)
-    if np.isnan(np.vdot(bounds, bounds)):
+    if math.isnan(np.vdot(bounds, bounds)):
         raise ValueError(f"{name} must be a number, not NaN: got {shown(value)}")
     if shapes and bounds.shape not in shapes:
         raise ValueError(f"{name} must have the shape {' or '.join(map(str, shapes))}: got {bounds.shape}")
@@ -113,9 +114,10 @@ def need_set(name: str, value: object, kind: type[Set]) -> Set:
     return value
 
 
-def need_tolerance(value: float) -> float:
-    """Return a distance that is not negative."""
-    NOT_NEGATIVE.need("tolerance", value)
+def not_negative(name: str, value: float) -> float:
+    """Return a number that is not negative."""
+    if value != 0.0:
+        NOT_NEGATIVE.need(name, value)
     return value
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from infoset import polygon_batches as kernels
-from infoset._set_arguments import axis_numbers, finite_values, need_plot_axes, need_tolerance, random_source
-from infoset.limits import NOT_NEGATIVE, Limits, need_pair, real_values
+from infoset._set_arguments import axis_numbers, finite_values, need_plot_axes, not_negative, random_source
+from infoset.limits import Limits, need_pair, real_values
 from infoset.pictures import outlines_svg
 from infoset.polygon_arrays import PolygonArrays
 from infoset.renamed import renamed
@@ -122,7 +122,7 @@ class ConvexPolygons(PolygonArrays):
         normals = self._vectors(normal, "normal")
         if not np.logical_or.reduce(normals, axis=-1).all():
             raise ValueError("the normal of a strip must not be zero")
-        NOT_NEGATIVE.need("slack_ulp", slack_ulp)
+        not_negative("slack_ulp", slack_ulp)
         bounds = self._scalars(lower, "lower"), self._scalars(upper, "upper")
         return self._make(2, kernels.cut, normals, *bounds, float(slack_ulp))
 
@@ -287,7 +287,7 @@ class ConvexPolygons(PolygonArrays):
 
         O(n). Exact for a tolerance of 0: rounding does not affect the answer.
         """
-        need_tolerance(tolerance)
+        not_negative("tolerance", tolerance)
         values = self._measure(kernels.holds, self._vectors(point, "point"))
         return np.asarray((values[..., 0] > 0.0) | (values[..., 1] >= -tolerance if tolerance else False))
 
@@ -298,7 +298,7 @@ class ConvexPolygons(PolygonArrays):
         only up to rounding in general.
         """
         one, two = self._with(other)
-        need_tolerance(tolerance)
+        not_negative("tolerance", tolerance)
         values = one._compare(kernels.is_subset, two)
         return np.asarray((values[..., 0] > 0.0) | ((values[..., 1] <= tolerance) if tolerance else False))
 

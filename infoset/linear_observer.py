@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from infoset._set_arguments import finite_values
 from infoset.convex_polygons import ConvexPolygons
 from infoset.limits import COUNT, real_values, shown
 from infoset.observer_sets import Motion, Polygons, Polytopes, Set, Sets, Strips, polytope_of
@@ -205,7 +206,7 @@ class LinearObserver:
         if self._b.shape[-2] != self.states:
             raise ValueError(f"input_matrix must have {self.states} rows, one a state: got {self._b.shape}")
         self.inputs = self._b.shape[-1]
-        self._offset = np.zeros(self.states) if offset is None else _finite("offset", offset)
+        self._offset = np.zeros(self.states) if offset is None else finite_values("offset", offset, "...")
         if self._offset.ndim not in (1, 2) or self._offset.shape[-1] != self.states:
             raise ValueError(f"offset must have the shape ({self.states},) or (K, {self.states})")
         if runs is not None:
@@ -392,7 +393,7 @@ class _Noise:
             if polytope.space != outputs:
                 raise ValueError(f"noise must have {outputs} coordinates, one an output: got {polytope.space}")
             return cls(*_half_spaces(polytope), polytope)
-        half = _finite("noise", noise)
+        half = finite_values("noise", noise, "...")
         if half.shape not in ((), (outputs,)) or (half < 0.0).any():
             raise ValueError(
                 f"noise must be half-widths of at least 0, a number or of shape ({outputs},): got {shown(noise)}"
@@ -438,13 +439,6 @@ def _sizes_of(shape: Set) -> Floats:
     return np.asarray(np.abs(shape.vertices).reshape(-1, shape.vertices.shape[-1]).max(axis=0))
 
 
-def _finite(name: str, value: ArrayLike) -> Floats:
-    numbers = real_values(name, value)
-    if not np.isfinite(numbers).all():
-        raise ValueError(f"{name} must be finite: got {shown(value)}")
-    return numbers
-
-
 def _series(inputs: ArrayLike | None, steps: int) -> Floats | None:
     """Return inputs of at least a number of steps."""
     rows = None if inputs is None else real_values("inputs", inputs)
@@ -454,7 +448,7 @@ def _series(inputs: ArrayLike | None, steps: int) -> Floats | None:
 
 
 def _matrices(name: str, value: ArrayLike) -> Floats:
-    matrices = _finite(name, value)
+    matrices = finite_values(name, value, "...")
     if matrices.ndim not in (2, 3):
         raise ValueError(f"{name} must be a matrix, or one for each step: got the shape {matrices.shape}")
     return np.ascontiguousarray(matrices)

@@ -2,6 +2,9 @@
 
 Every step is outward by a few ulp: the computed set contains the exact one, and a true state that is computed with
 floating-point numbers from errors at their bounds.
+
+Arrays hold B polygons: `vertices`, shape (B, room, 2), and their numbers, `counts`. Kernels write the results to `out`
+and `made`, which have the same shapes, with room for more vertices.
 """
 
 from __future__ import annotations
@@ -51,8 +54,6 @@ def predict_all(
 
     Parameters
     ----------
-    vertices : ndarray, shape (B, room, 2)
-        Polygons.
     shifts, terms : ndarray, shape (B, 2) or (1, 2)
         Shifts, and the sums of the sizes of their terms.
     generators : ndarray, shape (g, 2)
@@ -62,9 +63,7 @@ def predict_all(
     slack : float
         Half the width of the box that is added, relative to the terms of a coordinate.
     out : ndarray, shape (B, larger room, 2)
-        Receives the polygons, with at most 2 g + m + 4 vertices more.
-    made : ndarray of int, shape (B,)
-        Receives the numbers of vertices.
+        Receives at most 2 g + m + 4 vertices more.
     """
     scratch, second = np.empty((out.shape[1], 2)), np.empty((out.shape[1], 2))
     xx, xy, yx, yy = matrix[0, 0], matrix[0, 1], matrix[1, 0], matrix[1, 1]
@@ -255,8 +254,6 @@ def update_all(
 
     Parameters
     ----------
-    vertices : ndarray, shape (B, room, 2)
-        Polygons.
     normals : ndarray, shape (r, 2)
         Normals of the strips.
     lower, upper : ndarray, shape (B, r)
@@ -266,9 +263,7 @@ def update_all(
     slack : float
         Enlargement of the bounds, relative to their terms and those of normal . x.
     out : ndarray, shape (B, larger room, 2)
-        Receives the polygons, with at most 2 r vertices more.
-    made : ndarray of int, shape (B,)
-        Receives the numbers of vertices.
+        Receives at most 2 r vertices more.
     excess : ndarray, shape (B, r)
         Receives the distance between set and strip, in the unit of the bounds, where the set becomes empty.
     """
@@ -308,13 +303,10 @@ def cut_to_preimage(
 
     Parameters
     ----------
-    vertices : ndarray, shape (B, room, 2)
-        Polygons.
     later : ndarray, shape (B, later room, 2)
         Later polygons.
     slack : float
         Enlargement of the half-planes of the later polygon, relative to the terms of a height.
-
     out : ndarray, shape (B, larger room, 2)
         Receives the polygons, with at most four vertices more than both.
     made : ndarray of int, shape (B,)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from infoset.limits import LARGEST, real_values, shown
+from infoset._set_arguments import box_ends, finite_values
 
 Floats = NDArray[np.float64]
 
@@ -33,34 +33,14 @@ class Zonotope:
     generators: Floats
 
     def __init__(self, centre: ArrayLike, generators: ArrayLike) -> None:
-        centre = real_values("centre", centre)
-        is_point = np.size(generators) == 0 and centre.ndim == 1
-        rows = np.zeros((0, len(centre))) if is_point else real_values("generators", generators)
-        if centre.ndim != 1 or not len(centre) or rows.ndim != 2 or rows.shape[1] != len(centre):
-            raise ValueError(
-                f"centre of shape (n,) and generators of shape (m, n), one a row, are needed: "
-                f"got {centre.shape} and {rows.shape}"
-            )
-        for name, values in (("centre", centre), ("generators", rows)):
-            if not (np.abs(values) <= LARGEST).all():
-                raise ValueError(f"{name} must be finite, at most {LARGEST:g} in size: got {shown(values)}")
-        object.__setattr__(self, "centre", centre)
-        object.__setattr__(self, "generators", rows)
+        middle = finite_values("centre", centre, "n")
+        object.__setattr__(self, "centre", middle)
+        object.__setattr__(self, "generators", finite_values("generators", generators, "g", len(middle)))
 
     @classmethod
     def box(cls, lower: ArrayLike, upper: ArrayLike) -> Zonotope:
-        """Return {x: lower <= x <= upper}; equal ends give a flat box.
-
-        Raises
-        ------
-        ValueError
-            If `lower` exceeds `upper` in a coordinate.
-        """
-        least, greatest = real_values("lower", lower), real_values("upper", upper)
-        if least.shape != greatest.shape or least.ndim != 1:
-            raise ValueError(f"lower and upper of shape (n,) are needed: got {least.shape} and {greatest.shape}")
-        if not (least <= greatest).all():
-            raise ValueError(f"lower must not exceed upper: got {shown(least)} and {shown(greatest)}")
+        """Return {x: lower <= x <= upper}; equal ends give a flat box."""
+        least, greatest = box_ends(lower, upper, "n")
         centre = 0.5 * least + 0.5 * greatest
         # Rounding of the centre must not lose an end.
         half = np.maximum(greatest - centre, centre - least)

@@ -16,10 +16,10 @@ from infoset._set_arguments import (
     finite_values,
     need_plot_axes,
     need_set,
-    need_tolerance,
+    not_negative,
     random_source,
 )
-from infoset.limits import NOT_NEGATIVE, Limits, real_values
+from infoset.limits import Limits, real_values
 from infoset.polytope._measures import largest_ball, simplices_of, volume_of
 from infoset.polytope._nearest import nearest_difference
 from infoset.polytope._scaling import scale_of, scale_of_box, scaled_rows, stretched, tightened, without_far
@@ -206,7 +206,7 @@ class Polytope(PolytopeArrays):
             np.broadcast_to(bound_values(name, bound, (), (len(rows),)), len(rows))
             for name, bound in (("lower", lower), ("upper", upper))
         )
-        NOT_NEGATIVE.need("slack_ulp", slack_ulp)
+        not_negative("slack_ulp", slack_ulp)
         if self.is_empty:
             return self
         wider = slack_ulp * _EPS * (np.abs(rows) @ np.abs(self.vertices).max(axis=0))
@@ -337,7 +337,7 @@ class Polytope(PolytopeArrays):
 
         O(f n).
         """
-        return np.asarray(self.excess(points) <= need_tolerance(tolerance))
+        return np.asarray(self.excess(points) <= not_negative("tolerance", tolerance))
 
     def is_subset(self, other: Polytope, tolerance: float = 0.0) -> bool:
         """Return whether all vertices are in the other set, to rounding, or within a `tolerance` of its facets.

@@ -29,9 +29,9 @@ from infoset.observer_sets import Polytopes
 from infoset.observer_steps import enlarge
 from infoset.polytope import HIGHS, Polytope
 from infoset.section_life import SUM_SLACK
+from tests.infoset.test_polygon_oracle import Exact, hull
 
 Floats = NDArray[np.float64]
-Exact = tuple[Fraction, Fraction]
 
 PUBLISHED: dict[str, Any] = json.loads(
     (Path(__file__).parents[1] / "data" / "observer" / "alamo-2005.json").read_text(encoding="utf-8")
@@ -55,26 +55,6 @@ def measurements() -> Floats:
 
 
 # Exact rational sets --------------------------------------------------------------------------------------------
-
-
-def hull(points: list[Exact]) -> list[Exact]:
-    """Strictly convex hull, counter-clockwise."""
-    ordered = sorted(set(points))
-    if len(ordered) < 3:
-        return ordered
-    chains: list[list[Exact]] = []
-    for run in (ordered, ordered[::-1]):
-        chain: list[Exact] = []
-        for point in run:
-            while len(chain) > 1 and turn(chain[-2], chain[-1], point) <= 0:
-                chain.pop()
-            chain.append(point)
-        chains.append(chain[:-1])
-    return chains[0] + chains[1]
-
-
-def turn(a: Exact, b: Exact, c: Exact) -> Fraction:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def cut(points: list[Exact], normal: Exact, level: Fraction) -> list[Exact]:
@@ -582,9 +562,9 @@ def test_nothing_measured_changes_nothing() -> None:
         (lambda: published().update([0.0, 0.0]), r"measurement must have the shape \(1,\)"),
         (lambda: published().update([np.inf]), "finite or NaN"),
         (lambda: published().predict([1.0]), r"inputs must have the shape \(0,\)"),
-        (lambda: Zonotope([0.0], [[1.0, 2.0]]), "one a row"),
+        (lambda: Zonotope([0.0], [[1.0, 2.0]]), r"generators must have the shape \(g, 2\)"),
         (lambda: Zonotope([np.inf], []), "finite"),
-        (lambda: Zonotope.box([1.0], [0.0]), "must not exceed"),
+        (lambda: Zonotope.box([1.0], [0.0]), "the box is reversed"),
     ],
 )
 def test_wrong_values_are_refused(wrong: Callable[[], object], message: str) -> None:
