@@ -562,7 +562,7 @@ def test_nothing_measured_changes_nothing() -> None:
         (lambda: published().update([0.0, 0.0]), r"measurement must have the shape \(1,\)"),
         (lambda: published().update([np.inf]), "finite or NaN"),
         (lambda: published().predict([1.0]), r"inputs must have the shape \(0,\)"),
-        (lambda: Zonotope([0.0], [[1.0, 2.0]]), r"generators must have the shape \(g, 2\)"),
+        (lambda: Zonotope([0.0], [[1.0, 2.0]]), r"generators must have the shape \(g, 1\)"),
         (lambda: Zonotope([np.inf], []), "finite"),
         (lambda: Zonotope.box([1.0], [0.0]), "the box is reversed"),
     ],
