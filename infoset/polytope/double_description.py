@@ -139,8 +139,9 @@ class FacetsAndVertices:
         """
         if not half.any():
             return self
-        along, terms = self.normals @ half, np.abs(self.normals) @ np.abs(half)
-        ahead, behind = along > _PARALLEL * terms, along < -_PARALLEL * terms
+        along, widths = self.normals @ half, np.ptp(self.vertices, axis=0) + np.abs(half)
+        rounding = _PARALLEL * np.linalg.norm(half / widths) * np.linalg.norm(self.normals * widths, axis=1)
+        ahead, behind = along > rounding, along < -rounding
         opposite = np.flatnonzero(behind) if len(half) > 1 else np.zeros(0, dtype=np.int64)  # an interval has no ridges
         first, second, common = _adjacent(self.incidence.T, np.flatnonzero(ahead), opposite, len(half))
         weight, other = -along[second], along[first]
