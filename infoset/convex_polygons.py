@@ -99,25 +99,17 @@ class ConvexPolygons(PolygonArrays):
     ) -> ConvexPolygons:
         """Return the intersection with the strip lower <= normal . p <= upper.
 
-        Parameters
-        ----------
-        normal : array_like, shape (2,) or (..., 2)
-            Normal of the strip, of any nonzero length.
-        lower, upper : array_like, shape () or (...)
-            Bounds; infinite ones give half-planes, and lower > upper gives the empty set.
-        slack_ulp : float
-            The strip is wider on both sides by this number of ulp of the products in normal . p: a point that
-            satisfies the bounds up to rounding is not lost.
+        `normal` has the shape (2,) or (..., 2), and any length. The bounds have the shape () or (...); infinite ones
+        give half-planes, and lower > upper gives the empty set. The strip is wider on both sides by `slack_ulp` ulp of
+        the products in normal . p: a point that satisfies the bounds up to rounding is not lost.
+
+        O(n). Vertices inside do not change; new ones are within a few ulp of the coordinates. A vertex on a border is
+        inside.
 
         Raises
         ------
         ValueError
             If the normal is zero.
-
-        Notes
-        -----
-        O(n). Vertices inside do not change; new ones are within a few ulp of the coordinates. A vertex on a border is
-        inside.
         """
         normals = self._vectors(normal, "normal")
         if not np.logical_or.reduce(normals, axis=-1).all():

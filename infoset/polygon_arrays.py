@@ -86,14 +86,10 @@ class PolygonArrays:
 
     @classmethod
     def from_vertices(cls, rings: ArrayLike, counts: ArrayLike | None = None) -> Self:
-        """Return the polygons with given rings of vertices, in either order around the polygon. O(n).
+        """Return the polygons with rings of vertices, shape (..., V, 2), in either order around the polygon. O(n).
 
-        Parameters
-        ----------
-        rings : array_like, shape (..., V, 2), or a sequence of arrays of shape (n, 2)
-            Vertices in order. A ring may repeat vertices, also its first at the end, and have vertices along a side.
-        counts : array_like of int, shape (...), optional
-            Number of vertices of each ring; all V if omitted.
+        Rings of different lengths are a list of arrays of shape (n, 2), or have `counts` vertices, shape (...). A ring
+        may repeat vertices, also its first at the end, and have vertices along a side.
 
         Raises
         ------
@@ -121,17 +117,10 @@ class PolygonArrays:
 
     @classmethod
     def from_constraints(cls, normals: ArrayLike, offsets: ArrayLike) -> Self:
-        """Return {p: normals p <= offsets}. O(k^2).
+        """Return {p: normals p <= offsets}, with normals of shape (..., k, 2), of any length, and offsets (..., k).
 
-        Exact: which constraints are redundant, and whether the set is empty, is decided without rounding, and each
-        coordinate is within a few ulp of itself.
-
-        Parameters
-        ----------
-        normals : array_like, shape (k, 2) or (..., k, 2)
-            A row for each half-plane, of any length.
-        offsets : array_like, shape (k,) or (..., k)
-            Infinite ones are no limit.
+        Infinite offsets are no limit. O(k^2). Exact: which constraints are redundant, and whether the set is empty, is
+        decided without rounding, and each coordinate is within a few ulp of itself.
 
         Raises
         ------

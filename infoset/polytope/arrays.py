@@ -147,11 +147,9 @@ class PolytopeArrays:
         known = widths[widths > 0.0]
         if len(known) and known.max() > MOST_RATIO * known.min():
             scale = powers_of_two(np.where(widths > 0.0, widths, 1.0))
-            inner = cls.from_zonotope(0.0 * middle, rows / scale)
-            vertices, normals, offsets, across, levels = stretched(
-                (inner.vertices, inner.normals, inner.offsets, inner.across, inner.levels), scale
-            )
-            return cls(vertices + middle, normals, offsets + normals @ middle, across, levels + across @ middle)
+            thin = cls.from_zonotope(0.0 * middle, rows / scale)._stretched(scale)
+            offsets, levels = thin.offsets + thin.normals @ middle, thin.levels + thin.across @ middle
+            return cls(thin.vertices + middle, thin.normals, offsets, thin.across, levels)
         zonotope = cls.from_vertices(middle[None, :])
         for row in rows:
             zonotope = cls.from_vertices(np.vstack([zonotope.vertices - row, zonotope.vertices + row]))
@@ -170,6 +168,11 @@ class PolytopeArrays:
         from infoset.convex_polygons import ConvexPolygons
 
         return ConvexPolygons.from_points(self._of_plane().vertices).to_shapely()
+
+    def _stretched(self, scale: Floats) -> Self:
+        """Return the set whose coordinates are those of this one times a scale, shape (n,)."""
+        parts = self.vertices, self.normals, self.offsets, self.across, self.levels
+        return self.empty(self.space) if self.is_empty else type(self)(*stretched(parts, scale))
 
     @property
     def space(self) -> int:

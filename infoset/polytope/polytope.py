@@ -22,7 +22,7 @@ from infoset._set_arguments import (
 from infoset.limits import Limits, real_values
 from infoset.polytope._measures import largest_ball, simplices_of, volume_of
 from infoset.polytope._nearest import nearest_difference
-from infoset.polytope._scaling import scale_of, scale_of_box, scaled_rows, stretched, tightened, without_far
+from infoset.polytope._scaling import scale_of, scale_of_box, scaled_rows, tightened, without_far
 from infoset.polytope.arrays import PolytopeArrays
 from infoset.renamed import renamed
 
@@ -139,39 +139,22 @@ class Polytope(PolytopeArrays):
                 return one
         boxes = np.array([one.bounding_box() for one in sets])
         solid = np.min(boxes[:, 1] - boxes[:, 0], axis=0) if all(one.dimension == one.space for one in sets) else None
-        return self._in_box(
-            np.vstack([one.normals for one in sets]),
-            np.concatenate([one.offsets for one in sets]),
-            np.vstack([one.across for one in sets]),
-            np.concatenate([one.levels for one in sets]),
-            boxes[:, 0].max(axis=0),
-            boxes[:, 1].min(axis=0),
-            solid,
-        )
+        names = ("normals", "offsets", "across", "levels")
+        sides = tuple(np.concatenate([getattr(one, name) for one in sets]) for name in names)
+        return self._in_box(sides, boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0), solid)
 
     @classmethod
-    def _in_box(
-        cls,
-        rows: Floats,
-        limits: Floats,
-        across: Floats,
-        levels: Floats,
-        lower: Floats,
-        upper: Floats,
-        solid: Floats | None,
-    ) -> Polytope:
+    def _in_box(cls, sides: tuple[Floats, ...], lower: Floats, upper: Floats, solid: Floats | None) -> Polytope:
         """Return {x: rows x <= limits, across x = levels}, which is known to lie between `lower` and `upper`.
 
         `solid` are widths of sets with an interior that contain it, None if one of these is flat.
         """
+        rows, limits, across, levels = sides
         scale = None if (lower > upper).any() else scale_of_box(lower, upper, solid)
         if scale is None:
             return cls.from_constraints(*without_far(rows, limits, lower, upper), across, levels, bounded=True)
         rows, limits = without_far(*scaled_rows(rows, limits, scale), lower / scale, upper / scale)
-        inner = cls.from_constraints(rows, limits, across * scale, levels, bounded=True)
-        if inner.is_empty:
-            return cls.empty(len(lower))
-        return cls(*stretched((inner.vertices, inner.normals, inner.offsets, inner.across, inner.levels), scale))
+        return cls.from_constraints(rows, limits, across * scale, levels, bounded=True)._stretched(scale)
 
     def convex_hull(self, *others: Polytope) -> Polytope:
         """Return the convex hull of the union with one or more polytopes."""
@@ -190,15 +173,9 @@ class Polytope(PolytopeArrays):
         """Return the intersection with one or more strips lower <= normals x <= upper, or the set itself if they
         contain it.
 
-        Parameters
-        ----------
-        normals : array_like, shape (n,) or (m, n)
-            Normals of the strips, of any length.
-        lower, upper : array_like, shape () or (m,)
-            Bounds; infinite ones give half-spaces.
-        slack_ulp : float
-            Each strip is wider on both sides by this number of ulp of the products in normals x: a point that
-            satisfies the bounds up to rounding is not lost.
+        `normals`, shape (n,) or (m, n), have any length. The bounds have the shape () or (m,); infinite ones give
+        half-spaces. Each strip is wider on both sides by `slack_ulp` ulp of the products in normals x: a point that
+        satisfies the bounds up to rounding is not lost.
         """
         rows = real_values("normals", normals)
         rows = np.atleast_2d(finite_values("normals", rows, *["m"] * (rows.ndim > 1), self.space))
@@ -217,14 +194,10 @@ class Polytope(PolytopeArrays):
         if np.isneginf(limits).any() or (least > most).any():
             return self.empty(self.space, 0.5 * float(np.max(least - most)))
         lower, upper = self.bounding_box()
-        return self._in_box(
-            np.vstack([self.normals, rows[cuts]]),
-            np.concatenate([self.offsets, limits[cuts]]),
-            self.across,
-            self.levels,
-            *tightened(rows[cuts], limits[cuts], lower, upper),
-            upper - lower if self.dimension == self.space else None,
-        )
+        sides = np.vstack([self.normals, rows[cuts]]), np.concatenate([self.offsets, limits[cuts]])
+        solid = upper - lower if self.dimension == self.space else None
+        ends = tightened(rows[cuts], limits[cuts], lower, upper)
+        return self._in_box((*sides, self.across, self.levels), *ends, solid)
 
     def project(self, axes: ArrayLike) -> Polytope:
         """Return the projection on `axes`, an integer or a sequence of integers, as a set of as many dimensions."""
