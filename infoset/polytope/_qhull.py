@@ -129,7 +129,8 @@ def _corners(rows: Floats, limits: Floats, centre: Floats, again: int = 3) -> tu
 
 def _intersect(rows: Floats, limits: Floats, centre: Floats) -> Floats:
     try:
-        points = HalfspaceIntersection(np.column_stack([rows, -limits]), centre).intersections
+        with np.errstate(divide="ignore", invalid="ignore"):  # vertices at infinity are refused below
+            points = HalfspaceIntersection(np.column_stack([rows, -limits]), centre).intersections
     except QhullError as error:
         raise UncertainHullError(f"rounding decides where {len(rows)} half-spaces meet") from error
     if not np.isfinite(points).all():

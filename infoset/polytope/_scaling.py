@@ -74,6 +74,16 @@ def scale_of_constraints(
     sizes = np.abs(offsets[(lengths > 0.0) & (offsets != 0.0)] / lengths[(lengths > 0.0) & (offsets != 0.0)])
     if columns.max() < 1e3 * columns.min() and (not len(sizes) or sizes.max() < MOST_RATIO * sizes.min()):
         return None
+    if box is None and columns.size > 1:
+        # The sizes of coordinates at which a row is tight.
+        tight = (normals != 0.0) & (offsets != 0.0)[:, None]
+        sizes = (
+            np.log(np.where(tight, np.abs(normals), 1.0))
+            - np.log(np.where(offsets != 0.0, np.abs(offsets), 1.0))[:, None]
+        )
+        columns = np.where(
+            tight.any(axis=0), np.exp(sizes.sum(axis=0, where=tight) / np.maximum(tight.sum(axis=0), 1)), columns
+        )
     rows = normals / columns
     lengths = np.linalg.norm(rows, axis=1)
     rows, limits = rows[lengths > 0.0] / lengths[lengths > 0.0, None], offsets[lengths > 0.0] / lengths[lengths > 0.0]

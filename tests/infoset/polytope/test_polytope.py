@@ -312,6 +312,7 @@ def test_units_of_the_axes_do_not_matter(units: list[float], seed: int) -> None:
         (plain, other),
         (plain, zonotope.cut(rows / scale, upper=limits)),
         (plain, Polytope.from_constraints(*stacked)),
+        (plain, Polytope.from_constraints(*other.constraints())),
         (plain & cube.translate(moved), other & box.translate(moved * scale)),
         (plain + cube, other + box),
         (plain.convex_hull(cube.translate(moved)), other.convex_hull(box.translate(moved * scale))),
@@ -323,7 +324,7 @@ def test_units_of_the_axes_do_not_matter(units: list[float], seed: int) -> None:
 
 
 def test_a_set_whose_sizes_differ_too_much_is_not_called_empty() -> None:
-    units, row = np.array([1e9, 1e-9, 1e-9]), np.array([0.1, -0.1, 0.6])
-    cut = Polytope.from_box(np.zeros(3), units).cut(row / units, upper=0.3)
+    units, row = np.array([1e15, 1.0, 1e-15]), np.array([0.5, -0.7, -0.2])
+    box = Polytope.from_box(np.zeros(3), units)
     with pytest.raises(UncertainHullError, match="their sizes differ too much for a hull: scale the coordinates"):
-        Polytope.from_constraints(*cut.constraints())
+        box.cut(row / units, upper=-0.2)
