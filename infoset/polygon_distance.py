@@ -90,13 +90,13 @@ def largest_disc(points: Points, count: int) -> tuple[float, float, float]:
     a = a[:n].copy()
     origin_x, origin_y = a[0, 0], a[0, 1]
     normals = np.empty((n, 2))
-    a[:, 0] -= origin_x
-    a[:, 1] -= origin_y
     for i in range(n if n > 2 else 0):
         j = (i + 1) % n
         along_x, along_y = a[j, 0] - a[i, 0], a[j, 1] - a[i, 1]
         length = math.hypot(along_x, along_y)
         normals[i, 0], normals[i, 1] = -along_y / length, along_x / length
+    a[:, 0] -= origin_x  # after the normals: a short side may vanish here
+    a[:, 1] -= origin_y
     speed = np.empty((n, 2))
     radius = 0.0
     while n > 2:
