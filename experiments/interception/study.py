@@ -75,7 +75,7 @@ def game_note(scenario: Scenario, rule: str | None = None) -> str:
     bound = "; no errors give a miss above Phi" if scenario.set_model.is_guaranteed else ""
     return (
         f"game noise ({rule or f'tie rule {scenario.tie.value}'}) is one adversary, not the worst case: infoset bound "
-        f"prints a miss that no strategy can prevent{bound}"
+        f"--budget 0 prints a miss, from the worst start, that no strategy can prevent{bound}"
     )
 
 
