@@ -45,8 +45,8 @@ def simulate(
     progress : callable or None
         Called with the fraction done, from 0 to 1.
     observe : callable or None
-        Called at each step of each batch, with the index in `runs` of the batch's first run, and the step
-        (`sim.engagement.Step`).
+        Called at each step of each batch, with the index in `runs` of the batch's first run, and the step: `time_s`,
+        `tracking`, `measured`, `predicted_miss`, `impulse_m_s` and `information` (the view of the set), among others.
 
     Returns
     -------
