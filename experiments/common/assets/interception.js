@@ -109,7 +109,9 @@ class Column {
       legend: [
         ["sections", nearToFar],
         ["true state and its range", mark("cross", "ink")],
-        ["ranges allowed by the range meter", stroke("measured", { dash: [5, 3] })],
+        ...(this.record.range_error_relative === null
+          ? []
+          : [["ranges allowed by the range meter", stroke("measured", { dash: [5, 3] })]]),
       ],
       draw: () => this.drawScene(),
       tell: (x, y) => this.tellScene(x, y),
