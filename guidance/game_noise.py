@@ -90,7 +90,9 @@ class GameNoise:
         sign = np.array([[signs.get(rule, 0.0)] for rule in rules]) if len(rules) > 1 else signs.get(rules[0], 0.0)
         shift_m = self.shift_m[min(sight.step, len(self.shift_m) - 1)]
         shifted = sensor.nearest(sight, sight.alpha_rad + sign * shift_m / sight.range_m)
-        return np.where(sign == 0.0, chosen, shifted)
+        joined = np.where(sign == 0.0, chosen, shifted)
+        # Components of two points of a disc can be outside the disc.
+        return sensor.measured(sight, sensor.limited(sensor.error(sight, joined))) if sensor.is_disc else joined
 
     def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
         upper, lower = np.abs(miss.upper_m), np.abs(miss.lower_m)

@@ -90,7 +90,7 @@ def worst_shift_m(scenario: Scenario) -> Floats | None:
     (2 b0 + 2 b)/u + nu u, and its speed is possible at t = 0 if s is at most 2 w + 2 nu t, with the half-width w of the
     speeds of the initial set and the time t of the last image. With the greatest s the misses differ most; before its
     least value, at u = s/(2 nu), the difference is constant. If one of the motions is the true one, images in the
-    middle of both are shifted by half the difference.
+    middle of both are shifted by half the difference. Bounds and speeds are those of z, also for the shift along y.
     """
     model, thruster, arrival_s = scenario.set_model, scenario.thruster, scenario.nominal_arrival_s
     if thruster.impulse_steps(arrival_s, model.step_s) is None:

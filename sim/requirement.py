@@ -190,21 +190,24 @@ def _mistake(text: str) -> str | None:
     name = name.lower()
     faults = []
     if name.startswith("hit"):
-        share = float(number) / (100.0 if unit == "%" or float(number) > 1.0 else 1.0)
+        if "<" in sign:
+            return f'hits must be bounded from below: write for example "hit>=0.95", found {text.strip()!r}'
+        share = float(number) / (100.0 if unit == "%" or float(number) >= 50.0 else 1.0)
         if share == 1.0:
             reason = "the share of hits must be less than 1, because no number of runs shows that all engagements hit"
             return f'{reason}: write "hit>=0.99", found {text.strip()!r}'
         if level or not 0.0 < share < 1.0 or unit not in ("", "%"):
             return None
         corrected = str(HitRequirement(float(f"{share:.12g}")))
-        if "<" in sign:
-            faults.append("hits must be bounded from below, with >=")
         if share != float(number):
             faults.append("the share of hits must be a number between 0 and 1")
     else:
         quantity = next((known for known in QUANTITIES if known.startswith(name)), None)
-        if quantity is None or not float(number) > 0.0 or unit == "%":
+        if quantity is None or not float(number) > 0.0:
             return None
+        own_unit = "m/s" if quantity.endswith("_m_s") else "m"
+        if unit not in ("", own_unit):
+            return f"the bound of {quantity} must be a number in {own_unit}, without its unit, found {text.strip()!r}"
         corrected = f"{quantity} {f'p{level}' if level else DEFAULT_QUANTILE}<{number}"
         try:
             Requirement.parse(corrected)

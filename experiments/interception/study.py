@@ -72,7 +72,7 @@ def set_warnings(model: Model, counts: SetCounts) -> list[str]:
 
 def game_note(scenario: Scenario, rule: str | None = None) -> str:
     """Return a line about what a result with game noise is; `rule` is its tie rule, None that of the scenario."""
-    bound = "; no errors give a miss above Phi" if scenario.set_model.is_guaranteed else ""
+    bound = "; no errors within the bounds give a miss above Phi" if scenario.set_model.is_guaranteed else ""
     return (
         f"game noise ({rule or f'tie rule {scenario.tie.value}'}) is one adversary, not the worst case: infoset bound "
         f"--budget 0 prints a miss, from the worst start, that no strategy can prevent{bound}"

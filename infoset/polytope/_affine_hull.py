@@ -213,6 +213,8 @@ def solutions(across: Floats, levels: Floats) -> tuple[Floats, Floats]:
     """
     if not len(across):
         return np.zeros(across.shape[1]), np.eye(across.shape[1])
+    factors = _balance(across)
+    across, levels = across * factors[:, None], levels * factors
     point = np.linalg.lstsq(across, levels, rcond=FLAT)[0]
     misfit = float(np.abs(across @ point - levels).max())
     if misfit > 1e2 * FLAT * max(1.0, float(np.abs(levels).max())):
@@ -224,7 +226,16 @@ def null_space_basis(across: Floats) -> Floats:
     """Return an orthonormal basis of the null space of `across`, shape (e, n), as columns of shape (n, d)."""
     if not across.any():
         return np.eye(across.shape[1])
-    return np.asarray(null_space(across, rcond=FLAT))
+    return np.asarray(null_space(across * _balance(across)[:, None], rcond=FLAT))
+
+
+def _balance(across: Floats) -> Floats:
+    """Return powers of two that make the lengths of rows similar, shape (e,); ones if they differ little."""
+    lengths = np.linalg.norm(across, axis=1)
+    lengths = np.where(lengths > 0.0, lengths, lengths.max(initial=0.0))
+    if lengths.max() <= 1e3 * lengths.min():
+        return np.ones(len(lengths))
+    return np.asarray(np.exp2(-np.round(np.log2(lengths))))
 
 
 def _need_bounded(rows: Floats, limits: Floats, slack: float, basis: Floats) -> None:

@@ -40,7 +40,8 @@ class Polytope(PolytopeArrays):
     points. The f normals of the facets have unit length and are in the directions of the affine hull; the n - dimension
     rows of `across` are orthonormal. Construct it with `from_vertices`, `from_constraints`, `from_box`, `from_ball` or
     `from_zonotope`. A set that is 1e9 times thinner than it is long counts as flat. The units of the axes do not
-    matter, except that points whose width along one axis is 3e-12 times that along another one, or less, count as flat.
+    matter for sets with an interior, except that points whose width along one axis is 3e-12 times that along another
+    one, or less, count as flat.
 
     An empty set has no vertices; `relaxation` is then the least relaxation of all constraints, their normals of unit
     length, with which a point satisfies them, if it is known. Operations on it give the empty set; points such as its

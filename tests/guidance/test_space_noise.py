@@ -112,6 +112,17 @@ def test_tie_rules_by_axis() -> None:
     assert (upper != lower).all()
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_shift_along_one_axis_keeps_the_errors_possible(kind: tuple[Convention, ErrorShape | None]) -> None:
+    """A component of a shifted image with one of a chosen image was 1.22 bounds from the true angles in a disc."""
+    angle = replace(SENSOR, convention=kind[0], error_shape=kind[1])
+    seen, view = sight({"angle": angle}), moved(replace(MODEL, angle_sensor=angle))
+    for rules in ((TieRule.UPPER, TieRule.ALTERNATE), (TieRule.RANDOM, TieRule.LOWER)):
+        measured = GameNoise(rules, draws(), np.array([1e9])).measure(seen, view)["angle"]
+        error = angle.error(seen, measured)
+        assert (np.hypot(*error) if angle.is_disc else np.abs(error)).max() <= 1.0 + 1e-9
+
+
 def test_bounds_by_axis_are_used_by_the_game() -> None:
     angle = replace(SENSOR, error_at_nominal_range_y_rad=0.0003, error_at_zero_range_y_rad=0.0001)
     model = replace(MODEL, angle_sensor=angle)

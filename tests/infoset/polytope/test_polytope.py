@@ -328,3 +328,11 @@ def test_a_set_whose_sizes_differ_too_much_is_not_called_empty() -> None:
     box = Polytope.from_box(np.zeros(3), units)
     with pytest.raises(UncertainHullError, match="their sizes differ too much for a hull: scale the coordinates"):
         box.cut(row / units, upper=-0.2)
+
+
+def test_equations_in_mixed_units() -> None:
+    point = Polytope.from_box([1.0, 2.0], [1.0, 2.0]).preimage(np.diag([1e-6, 1e6]))
+    np.testing.assert_allclose(point.vertices, [[1e6, 2e-6]], rtol=1e-9)
+    rows, levels = [[0.0, 1e-7, 0.0], [0.0, 0.0, 1e6]], [1e-7, 1e6]
+    segment = Polytope.from_constraints([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], [1.0, 1.0], rows, levels)
+    np.testing.assert_allclose(np.sort(segment.vertices, axis=0), [[-1.0, 1.0, 1.0], [1.0, 1.0, 1.0]], rtol=1e-9)
