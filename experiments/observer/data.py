@@ -181,7 +181,7 @@ def _numbers(file: Path, line: int, row: list[str], header: list[str], wanted: l
         if not is_missing and not abs(number) <= float(LARGEST):
             raise InputError(
                 f"--data: {file}: line {line}, {name}: must be a number of at most {LARGEST:g} in size, found "
-                f"{shown(text)}; an empty cell of y is a missing measurement"
+                f"{shown(text)}; an empty cell of y is a missing measurement; an input of zero is written 0"
             )
         numbers.append(number)
     return numbers
