@@ -195,7 +195,9 @@ def _schedule(known: Known) -> Iterator[Problem]:
         yield Problem(
             ("thruster", key),
             text,
-            "write times before the nominal arrival, the earliest first, after the start and before the cut-off",
+            "write times before the nominal arrival, the earliest first, after the start and before the cut-off"
+            if key == "impulses_s"
+            else "write a time before the nominal arrival that is less than the flight and leaves an impulse possible",
         )
 
 

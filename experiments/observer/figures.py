@@ -61,8 +61,8 @@ def draw_bounds(report: Report) -> Figure:
         if report.contradicted:
             _mark_contradiction(panel, report)
         panel.set_ylabel(f"width of {plain(name)}")
+        panel.margins(x=0.01, y=0.05)
         panel.set_ylim(bottom=0.0)
-        panel.margins(x=0.01)
         if index < len(names) - 1:
             panel.tick_params(labelbottom=False)
     for panel in (panels[-1], widths[-1]):
