@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance.predicted_miss import impulse_beyond_dead_zone
 from guidance.situation import Situation
 from infoset import Bias, SetModel
+from infoset.arrays import Floats
 from infoset.sensors import AngleSensor
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

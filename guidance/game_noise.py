@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance.noise import LineOfSight, TieRule, draws_of_step, need_draws
 from infoset import AngleSensor, InformationSetView, PredictedMiss, RangeSensor
+from infoset.arrays import Flags, Floats
 from infoset.sensors import Measurements
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 TIE_TOLERANCE = 1e-6
 

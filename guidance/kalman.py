@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance.estimate import MissEstimate, constant_error_m, correct_outside_dead_zone, independent_error_rad
 from guidance.situation import Situation
 from infoset import RangeSensor
+from infoset.arrays import Floats
 from infoset.limits import COUNT, NotNegative, check_fields
-
-Floats = NDArray[np.float64]
 
 Z, VZ, X, SPEED, ACCELERATION = range(5)
 """Components of a state: lateral offset, its rate, range, closing speed and lateral acceleration."""

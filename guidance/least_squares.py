@@ -6,15 +6,12 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance.estimate import MissEstimate, constant_error_m, correct_outside_dead_zone, independent_error_rad
 from guidance.situation import Situation
 from infoset import RangeSensor
+from infoset.arrays import Flags, Floats
 from infoset.limits import COUNT, NotNegative, check_fields
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 Z, VZ, X, SPEED, ACCELERATION = range(5)
 """Components of a start: lateral offset, its rate, range and closing speed at t = 0, and lateral acceleration."""

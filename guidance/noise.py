@@ -8,13 +8,11 @@ from enum import Enum
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from infoset import InformationSetView
+from infoset.arrays import Floats
 from infoset.limits import real_array, real_values, shown
 from infoset.sensors import Measurements, Sensor
-
-Floats = NDArray[np.float64]
 
 
 class NoiseKind(Enum):

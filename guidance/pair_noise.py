@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance.noise import LineOfSight
 from infoset import AngleSensor, Convention, InformationSetView
+from infoset.arrays import Floats
 from infoset.sensors import Measurements, Sensor
-
-Floats = NDArray[np.float64]
 
 
 class PairNoise:

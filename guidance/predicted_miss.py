@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from infoset import PredictedMiss
+from infoset.arrays import Floats
 from infoset.limits import POSITIVE
-
-Floats = NDArray[np.float64]
 
 
 def zero_effort_miss(omega_rad_s: Floats, range_m: Floats, closing_speed_m_s: float) -> Floats:

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance.estimate import Estimator, EstimatorKind
 from guidance.kalman import KalmanBank
 from guidance.situation import Situation
+from infoset.arrays import Floats
 from infoset.limits import Limits, check_fields
-
-Floats = NDArray[np.float64]
 
 _SPACING = Limits(above=1.0)
 

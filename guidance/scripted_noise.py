@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance.noise import LineOfSight, draws_of_step, need_draws
 from infoset import AngleSensor, InformationSetView
+from infoset.arrays import Floats
 from infoset.sensors import Measurements
-
-Floats = NDArray[np.float64]
 
 DISC_TOLERANCE = 1e-9
 """Greatest distance outside the unit disc that is taken as rounding."""

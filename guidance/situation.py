@@ -7,14 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance.thruster import Thruster
 from infoset import InformationSetView, PredictedMiss
+from infoset.arrays import Flags, Floats
 from infoset.sensors import AngleSensor, Measurements, Sensor
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

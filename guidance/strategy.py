@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance.situation import Situation
+from infoset.arrays import Flags, Floats
 from infoset.limits import shown
 
 
@@ -39,9 +39,7 @@ def check_axes(strategy: Strategy, axes: Sequence[str]) -> None:
         )
 
 
-def decide(
-    strategy: Strategy, situation: Situation, states: Sequence[Any], tracking: NDArray[np.bool_]
-) -> NDArray[np.float64]:
+def decide(strategy: Strategy, situation: Situation, states: Sequence[Any], tracking: Flags) -> Floats:
     """Return the impulses of a step, m/s, shape (B,); in space (2, B), along y and z.
 
     Parameters
@@ -74,9 +72,7 @@ def _is_spatial(strategy: Strategy) -> bool:
     return bool(getattr(strategy, "spatial", False))
 
 
-def checked_impulses(
-    wanted: object, situation: Situation, tracking: NDArray[np.bool_], strategy: object
-) -> NDArray[np.float64]:
+def checked_impulses(wanted: object, situation: Situation, tracking: Flags, strategy: object) -> Floats:
     """Return the impulses of a strategy in a situation as an array, if they are real and finite.
 
     Parameters
@@ -118,7 +114,7 @@ class Strategy(Protocol):
     def start(self, batch: int) -> Any:
         """Return the state of the strategy for `batch` engagements, or None."""
 
-    def decide(self, situation: Situation, state: Any) -> NDArray[np.float64]:
+    def decide(self, situation: Situation, state: Any) -> Floats:
         """Return the impulses of a step along z, m/s, shape (B,).
 
         The state is the return value of `start`; it may be changed.

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from guidance.predicted_miss import symmetric_impulse
 from guidance.situation import Situation
+from infoset.arrays import Floats
 
 
 class SymmetricMiss:
@@ -24,6 +22,6 @@ class SymmetricMiss:
     def start(self, batch: int) -> None:
         """Start without a state."""
 
-    def decide(self, situation: Situation, state: None) -> NDArray[np.float64]:
+    def decide(self, situation: Situation, state: None) -> Floats:
         """Return k_s of equation (15), m/s."""
         return symmetric_impulse(situation.predicted_miss, situation.closing_speed_m_s, situation.lead_s)

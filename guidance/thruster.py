@@ -9,11 +9,9 @@ from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
+from infoset.arrays import Floats
 from infoset.limits import ADDED_LATER, POSITIVE, WHOLE, NotNegative, Part, Positive, check_fields
-
-Floats = NDArray[np.float64]
 
 STEP_TOLERANCE = 1e-9
 """Part of a step by which a time may be after a step and still belong to it, for times that are rounded decimals."""

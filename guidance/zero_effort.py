@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance.predicted_miss import range_at_impulse
 from guidance.situation import Situation
-
-Floats = NDArray[np.float64]
+from infoset.arrays import Floats
 
 
 class ZeroEffortMiss:

@@ -6,11 +6,11 @@ import math
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from infoset.arrays import Floats
 from infoset.limits import COUNT, LARGEST, NOT_NEGATIVE, WHOLE, real_values, shown
 
-Floats = NDArray[np.float64]
 Set = TypeVar("Set")
 
 

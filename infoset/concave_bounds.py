@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from infoset._compile import ZERO, allocation_free
+from infoset.arrays import Floats
 from infoset.replays import Records
-from infoset.section_life import Floats
 
 CERTAIN = 1e-13
 """Labels count as dead if their overlap is certainly less than minus this number times the label."""

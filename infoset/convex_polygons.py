@@ -6,10 +6,11 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from infoset import polygon_batches as kernels
 from infoset._set_arguments import axis_numbers, finite_values, need_plot_axes, not_negative, random_source
+from infoset.arrays import Flags, Floats
 from infoset.limits import Limits, need_pair, real_values
 from infoset.pictures import outlines_svg
 from infoset.polygon_arrays import PolygonArrays
@@ -18,8 +19,6 @@ from infoset.renamed import renamed
 if TYPE_CHECKING:
     from infoset.polytope import Polytope
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 _CAP = Limits(least=4, whole=True)
 _NAMES = ("empty set", "point", "segment", "triangle", "quadrangle", "pentagon", "hexagon")

@@ -8,7 +8,9 @@ from functools import cache
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from infoset.arrays import Flags, Floats
 
 LARGEST = 1e60
 """Greatest absolute value of any number: products of a few such numbers do not overflow."""
@@ -182,7 +184,7 @@ def need_pair(name: str, value: object, limits: Limits = NUMBER) -> None:
         raise ValueError(f"{name} must be a pair (least, greatest), and is reversed: got {shown(value)}")
 
 
-def real_values(name: str, value: ArrayLike) -> NDArray[np.float64]:
+def real_values(name: str, value: ArrayLike) -> Floats:
     """Return an array of real numbers, finite or not, of any shape; `name` is for the message.
 
     Raises
@@ -203,7 +205,7 @@ def real_values(name: str, value: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(values, dtype=np.float64)
 
 
-def real_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def real_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
     """Return finite real numbers as an array of a shape, from such an array or from one number for all elements.
 
     Raises
@@ -221,7 +223,7 @@ def real_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[n
     return values if values.shape == shape else np.ascontiguousarray(np.broadcast_to(values, shape))
 
 
-def flags(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def flags(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Flags:
     """Return flags as an array of a shape, or a single flag for all elements.
 
     Raises

@@ -8,18 +8,15 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from infoset._set_arguments import finite_values
+from infoset.arrays import Flags, Floats, Integers
 from infoset.convex_polygons import ConvexPolygons
 from infoset.limits import COUNT, real_values, shown
 from infoset.observer_sets import Motion, Polygons, Polytopes, Set, Sets, Strips, polytope_of
 from infoset.polytope import Polytope
 from infoset.zonotope import Zonotope
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 MOST_STATES = 6
 

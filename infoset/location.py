@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from infoset._compile import allocation_free, entry
+from infoset.arrays import Flags, Floats
 from infoset.chains import CAPACITY, copy_section, count_of, room_of
 from infoset.concave_bounds import is_dead_between
 from infoset.history import Tapes
@@ -31,7 +32,7 @@ from infoset.replays import (
     run,
 )
 from infoset.section_law import law_of
-from infoset.section_life import ALIVE, Flags, Floats, Tape, summarise_section
+from infoset.section_life import ALIVE, Tape, summarise_section
 from infoset.section_passes import Sections, row_of, tape_of
 
 LABEL_RESOLUTION = 1e-13

@@ -6,18 +6,14 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from infoset import observer_steps
+from infoset.arrays import Flags, Floats, Integers
 from infoset.convex_polygons import ConvexPolygons
 from infoset.polytope import Polytope
 from infoset.polytope.double_description import FacetsAndVertices
 from infoset.section_life import CUT_SLACK, SUM_SLACK
 from infoset.zonotope import Zonotope
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 Set = ConvexPolygons | Polytope | Zonotope
 

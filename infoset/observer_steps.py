@@ -10,14 +10,11 @@ and `made`, which have the same shapes, with room for more vertices.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from infoset import polygon, polygon_hull, polygon_sum
 from infoset._compile import compiled, inlined
+from infoset.arrays import Floats, Integers
 from infoset.polygon import Points
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 MOST_VERTICES = 512
 """Polygons with more vertices are reduced outward."""

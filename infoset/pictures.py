@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from infoset.arrays import Flags, Floats
 from infoset.svg import ACCENT, NEAR, Plane, evenly, limits, note, shade, side_by_side
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 MOST_OUTLINES = 9
 MOST_INTERVALS = 24

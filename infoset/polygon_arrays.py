@@ -21,14 +21,12 @@ from infoset._set_arguments import (
     radius_values,
     ring_of,
 )
+from infoset.arrays import Flags, Floats, Integers
 from infoset.limits import WHOLE, Limits, real_values, shown
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Integers = NDArray[np.int64]
 
 _SIDES = Limits(least=3, whole=True)
 _ROUNDING = 64.0 * float(np.finfo(np.float64).eps)

@@ -8,13 +8,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from infoset import polygon, polygon_distance, polygon_exact, polygon_hull, polygon_lines, polygon_sum
 from infoset._compile import compiled
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from infoset.arrays import Floats, Integers
 
 
 @compiled

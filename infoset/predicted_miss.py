@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-import numpy as np
-from numpy.typing import NDArray
-
+from infoset.arrays import Flags, Floats
 from infoset.pictures import predicted_miss_svg
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -49,7 +45,7 @@ class PredictedMiss:
     Kumkov and Patsko (1997), equations (13) and (14), with the sign of omega kept.
     """
 
-    exists: NDArray[np.bool_]
+    exists: Flags
     lower_m: Floats
     upper_m: Floats
     lower_point: ExtremePoints

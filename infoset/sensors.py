@@ -13,12 +13,12 @@ from functools import lru_cache
 from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from infoset.arrays import Flags, Floats
 from infoset.limits import ADDED_LATER, Fraction, NotNegative, Part, Positive, check_fields
 
-Floats = NDArray[np.float64]
-RangeOrRanges = TypeVar("RangeOrRanges", float, NDArray[np.float64])
+RangeOrRanges = TypeVar("RangeOrRanges", float, Floats)
 Measurements = Mapping[str, Floats]
 """Measured values of a batch by the name of the sensor; a sensor that does not measure in a step is left out."""
 
@@ -79,15 +79,15 @@ class Geometry(Protocol):
 class Cuttable(Protocol):
     """A batch of sets that measurements cut; `InformationSet` describes the methods."""
 
-    def measure_angle(self, alpha_rad: Floats, where: NDArray[np.bool_]) -> None:
+    def measure_angle(self, alpha_rad: Floats, where: Flags) -> None:
         """Cut by a line-of-sight angle."""
 
     def measure_range(
-        self, range_m: Floats, relative_error: float, where: NDArray[np.bool_], *, alpha_rad: ArrayLike | None
+        self, range_m: Floats, relative_error: float, where: Flags, *, alpha_rad: ArrayLike | None
     ) -> None:
         """Cut by a range."""
 
-    def measure_rate(self, omega_rad_s: Floats, error_rad_s: float, where: NDArray[np.bool_]) -> None:
+    def measure_rate(self, omega_rad_s: Floats, error_rad_s: float, where: Flags) -> None:
         """Cut by a rate of the line of sight."""
 
 
@@ -127,7 +127,7 @@ class Sensor(ABC):
         """Return the greatest size of the error, in the unit of the quantity, broadcast against the true value."""
 
     @abstractmethod
-    def cut(self, sets: Cuttable, measured: Measurements, where: NDArray[np.bool_]) -> None:
+    def cut(self, sets: Cuttable, measured: Measurements, where: Flags) -> None:
         """Cut sets by the measurement of this sensor.
 
         Parameters
@@ -440,7 +440,7 @@ class AngleSensor(Sensor):
         error = self.error(sight, wanted)
         return np.where(np.hypot(*error) <= 1.0, wanted, self.measured(sight, self.limited(error)))
 
-    def cut(self, sets: Cuttable, measured: Measurements, where: NDArray[np.bool_]) -> None:
+    def cut(self, sets: Cuttable, measured: Measurements, where: Flags) -> None:
         """Cut by the angle."""
         sets.measure_angle(measured[self.name], where)
 
@@ -522,7 +522,7 @@ class RangeSensor(Sensor):
         """Return the error bound, m."""
         return self.relative_error * sight.range_m
 
-    def cut(self, sets: Cuttable, measured: Measurements, where: NDArray[np.bool_]) -> None:
+    def cut(self, sets: Cuttable, measured: Measurements, where: Flags) -> None:
         """Cut by the range; an angle measured in the same step sharpens the cut."""
         sets.measure_range(measured[self.name], self.relative_error, where, alpha_rad=measured.get(AngleSensor.name))
 
@@ -574,7 +574,7 @@ class RateSensor(Sensor):
         """Return the error bound, rad/s."""
         return self.error_rad_s
 
-    def cut(self, sets: Cuttable, measured: Measurements, where: NDArray[np.bool_]) -> None:
+    def cut(self, sets: Cuttable, measured: Measurements, where: Flags) -> None:
         """Cut by the rate."""
         sets.measure_rate(measured[self.name], self.error_rad_s, where)
 

@@ -7,9 +7,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from infoset.arrays import Floats
+
 Limits = tuple[float, float]
 
 WIDTH, HEIGHT = 420, 270

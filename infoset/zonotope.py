@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from infoset._set_arguments import box_ends, finite_values
-
-Floats = NDArray[np.float64]
+from infoset.arrays import Floats
 
 
 @dataclass(frozen=True, eq=False, init=False)

@@ -14,10 +14,11 @@ import numpy as np
 from guidance import Strategy, TieRule, make_strategy
 from guidance.scripted_noise import ScriptedNoise
 from infoset import StateBox
+from infoset.arrays import Floats
 from infoset.limits import COUNT, WHOLE
 from sim.draws import Draws, corners, draw
 from sim.engagement import Engagements
-from sim.planned_flights import ANGLE, ROWS, Floats, Flown, PlannedNoise, Plans, by_axis
+from sim.planned_flights import ANGLE, ROWS, Flown, PlannedNoise, Plans, by_axis
 from sim.record import Record, fly_one
 from sim.results import Outcome
 from sim.scenario import Scenario, with_strategy

@@ -9,14 +9,10 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from infoset import AngleSensor, Convention, SetModel
+from infoset.arrays import Flags, Floats, Integers
 from sim.scenario import Scenario
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 LABELS_A_PERIOD, PERIODS_LOOKED_AT = 8, 7
 """The bound oscillates with the label; the period is the distance travelled between two measurements."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance import NoiseKind, Strategy
+from infoset.arrays import Integers
 from sim.results import Results, join
 from sim.scenario import Scenario
 from sim.simulate import ENGAGEMENTS_AT_ONCE, simulate
@@ -66,7 +66,7 @@ class Chunk:
     strategy: Strategy | None = None
     versions: tuple[tuple[str, str], ...] = field(default_factory=calculating_versions)
 
-    def noises(self, runs: NDArray[np.int64]) -> list[NoiseKind]:
+    def noises(self, runs: Integers) -> list[NoiseKind]:
         """Noise of each run."""
         kinds = self.noise.kinds
         return [kinds[run % len(kinds)] for run in runs.tolist()]

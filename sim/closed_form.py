@@ -6,11 +6,10 @@ import math
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from infoset.arrays import Floats
 from sim.scenario import Scenario
 
-Floats = NDArray[np.float64]
 FloatOrFloats = TypeVar("FloatOrFloats", float, Floats)
 
 

@@ -7,13 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance import NoiseKind, TieRule
 from infoset import AngleSensor, Bias, StateBox
+from infoset.arrays import Floats
 from sim.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 START, TIE, EXECUTION, TARGET, POINTING, BIAS, IMAGES = 0, 3, 5, 6, 7, 8, 9
 """Streams of a run; each kind of sensor has its own as well (`Sensor.stream`)."""

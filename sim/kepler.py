@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
 from infoset._compile import entry, inlined
+from infoset.arrays import Flags, Floats
 from sim.scenario import Scenario, Sun
-
-Floats = NDArray[np.float64]
 
 LONGEST_SUBSTEP_S = 0.5
 """Greatest length of a substep, s, if longer ones are not accurate enough for a scenario (`longest_substep_s`)."""
@@ -65,7 +63,7 @@ class Passage:
         z, or (y, z), at the closest approach where it lies within the step, zero elsewhere.
     """
 
-    passed: NDArray[np.bool_]
+    passed: Flags
     least_distance_m: Floats
     arrival_s: Floats
     lateral_m: Floats

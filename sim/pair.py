@@ -5,18 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance import Strategy
 from guidance.pair_noise import PairNoise
+from infoset.arrays import Floats
 from sim.bound import TruthPair
 from sim.draws import Draws
 from sim.engagement import Engagements
 from sim.kepler import LONGEST_SUBSTEP_S, KeplerMotion, Passage, longest_substep_s
 from sim.results import Results
 from sim.scenario import Scenario, Sun
-
-Floats = NDArray[np.float64]
 
 STEPS_BEYOND = 2
 """Greatest number of simulated steps after the one in which x = 0."""

@@ -7,11 +7,9 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from infoset.arrays import Floats
 from infoset.svg import ACCENT, NEAR, Plane, limits
-
-Floats = NDArray[np.float64]
 
 LEVELS = (0.1, 0.5, 0.9)
 _DECADES = 10.0

@@ -12,11 +12,9 @@ from guidance import GameNoise, LineOfSight, TieRule
 from guidance.game_noise import SwitchingNoise
 from guidance.scripted_noise import errors_made, measure_with_errors
 from infoset import InformationSetView
+from infoset.arrays import Flags, Floats, Integers
 from infoset.sensors import Measurements, Sensor
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Counts = NDArray[np.int64]
 ROWS = ("angle", "range", "rate")
 """Sensors of the first rows of a sequence, also if absent: the random numbers of a search depend on the row count."""
 ANGLE = 0
@@ -43,13 +41,13 @@ class Plans:
     start: Floats
     sequence: Floats
     prescribed: Flags
-    lineage: Counts
-    changes: Counts
+    lineage: Integers
+    changes: Integers
 
     def __len__(self) -> int:
         return len(self.start)
 
-    def take(self, which: Counts | slice) -> Plans:
+    def take(self, which: Integers | slice) -> Plans:
         """Return copies of some plans."""
         return Plans(*(getattr(self, field.name)[which].copy() for field in fields(self)))
 
@@ -138,7 +136,7 @@ class Flown:
     truth_kept: Flags
     lateral_miss_m: Floats
 
-    def take(self, which: Counts | slice) -> Flown:
+    def take(self, which: Integers | slice) -> Flown:
         """Return some plans with their outcomes."""
         return Flown(self.plans.take(which), *(getattr(self, field.name)[which] for field in fields(self)[1:]))
 

@@ -6,19 +6,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guidance import MeasurementNoise, Strategy
 from infoset import Section
+from infoset.arrays import Floats
 from infoset.limits import WHOLE
 from sim.draws import draw
 from sim.engagement import Engagements, Step
 from sim.pictures import course_html
 from sim.results import Results, ending
 from sim.scenario import Scenario, strategy_name, with_strategy
-
-Floats = NDArray[np.float64]
-
 
 _MOST_DRAWN = 1000
 """Most steps of the predicted misses in a notebook."""

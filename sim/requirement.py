@@ -10,14 +10,12 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from infoset.arrays import Flags, Floats, Integers
 from infoset.limits import Fraction, Positive, check_fields
 from sim.statistics import estimate_hits, number_text, shows
 from sim.stopping_rule import DIGITS, NUMBER, QUANTITIES, QuantileName, parse_quantile
-
-Floats = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 CONFIDENCE = 0.95
 MOST_RUNS_NEEDED = 1_000_000
@@ -104,7 +102,7 @@ class Requirement:
         """Value of a run without the quantity, for example without a bound Phi: it does not satisfy the bound."""
         return math.inf
 
-    def holds(self, values: Floats) -> NDArray[np.bool_]:
+    def holds(self, values: Floats) -> Flags:
         """Return for each of the quantity's `values` whether it is below the bound."""
         return np.asarray(values < self.bound)
 
@@ -152,7 +150,7 @@ class HitRequirement:
         """Value of a run without the quantity."""
         return 0.0
 
-    def holds(self, values: Floats) -> NDArray[np.bool_]:
+    def holds(self, values: Floats) -> Flags:
         """Return for each of the `values` of the column, 0 or 1, whether the run hits."""
         return np.asarray(values > 0.0)
 
@@ -348,7 +346,7 @@ def share_interval(count: int, runs: int) -> tuple[float, float]:
     return end(0, share, 0.0) if count else 0.0, end(1, share, 1.0) if count < runs else 1.0
 
 
-def critical_counts(size: int, share: float, *, watched: bool) -> tuple[Counts, Counts]:
+def critical_counts(size: int, share: float, *, watched: bool) -> tuple[Integers, Integers]:
     """Return the numbers of runs that satisfy a bound at which a requirement is decided.
 
     Parameters
@@ -375,7 +373,7 @@ def critical_counts(size: int, share: float, *, watched: bool) -> tuple[Counts, 
 
 
 @functools.lru_cache(maxsize=32)
-def _critical_counts(first: int, last: int, share: float, watched: bool) -> tuple[Counts, Counts]:
+def _critical_counts(first: int, last: int, share: float, watched: bool) -> tuple[Integers, Integers]:
     runs = np.arange(first, last + 1)
     fewest_met = _least(runs, lambda count: p_values(runs, count, share, watched=watched)[0] <= _TAIL)
     most_missed = _least(runs, lambda count: p_values(runs, count, share, watched=watched)[1] > _TAIL) - 1
@@ -384,7 +382,7 @@ def _critical_counts(first: int, last: int, share: float, watched: bool) -> tupl
     return fewest_met, most_missed
 
 
-def _least(most: Counts, is_enough: Callable[[Counts], NDArray[np.bool_]]) -> Counts:
+def _least(most: Integers, is_enough: Callable[[Integers], Flags]) -> Integers:
     """Return the least count from 0 to `most` that is enough, or `most` + 1; greater counts are enough too."""
     low, high = np.zeros_like(most), most + 1
     while (low < high).any():
@@ -429,7 +427,7 @@ def runs_needed(count: int, runs: int, share: float) -> int | None:
     None is more than `MOST_RUNS_NEEDED`. If all runs satisfy the bound so far, it is the least number that can decide.
     """
 
-    def deciding(sizes: Counts) -> Counts:
+    def deciding(sizes: Integers) -> Integers:
         values = p_values(sizes, count / runs * sizes, share, watched=True)
         return sizes[(np.minimum(*values) <= _TAIL) & (sizes > runs)]
 

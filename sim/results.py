@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from infoset.arrays import Flags, Floats, Integers
 from infoset.limits import NOT_NEGATIVE
 from infoset.set_queries import MaskedFloats
 from sim.columns import Column, columns, columns_with_values, documented, values_of
 from sim.pictures import results_html
 from sim.statistics import HitEstimate, estimate_hits
 
-Floats = NDArray[np.float64]
 MaskedFlags = np.ma.MaskedArray[tuple[int], np.dtype[np.bool_]]
 
 
@@ -76,7 +76,7 @@ class Results:
         Moduli of the impulses at the times of the schedule, m/s; None without a schedule, and for results from files.
     """
 
-    runs: NDArray[np.int64] = field(metadata=columns(Column("run", "", "Run number", int)))
+    runs: Integers = field(metadata=columns(Column("run", "", "Run number", int)))
     miss_m: Floats = field(
         metadata=columns(Column("miss_m", "m", "Least distance between the centres of mass", limits=NOT_NEGATIVE))
     )
@@ -87,9 +87,9 @@ class Results:
         metadata=columns(Column("guaranteed_miss_m", "m", _PHI, nullable=True, limits=NOT_NEGATIVE))
     )
     outcomes: tuple[Outcome, ...] = field(metadata=columns(Column("outcome", "", "How the engagement ended", Outcome)))
-    set_emptied: NDArray[np.bool_] = field(metadata=columns(Column("set_emptied", "", _EMPTY, bool, nullable=True)))
+    set_emptied: Flags = field(metadata=columns(Column("set_emptied", "", _EMPTY, bool, nullable=True)))
     hit: MaskedFlags = field(metadata=columns(Column("hit", "", _HIT, bool, nullable=True)))
-    truth_kept: NDArray[np.bool_] = field(
+    truth_kept: Flags = field(
         init=False, metadata=columns(Column("truth_kept", "", "True state inside its section at every step", bool))
     )
     truth_margin_m: MaskedFloats = field(metadata=columns(Column("truth_margin_m", "m", _MARGIN, nullable=True)))

@@ -9,11 +9,10 @@ from decimal import Decimal
 from statistics import NormalDist
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from infoset.arrays import Floats
 from infoset.limits import COUNT, FRACTION, Limits, real_values
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,10 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from infoset.arrays import Floats
 from infoset.limits import Fraction, Positive, check_fields
 from sim.statistics import estimate_quantiles, level_name, number_text
-
-Floats = NDArray[np.float64]
 
 QUANTITIES = ("miss_m", "impulse_m_s", "guaranteed_miss_m")
 GROWTH = 1.05

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from infoset.arrays import Floats
 from sim.scenario import Manoeuvre, Target
-
-Floats = NDArray[np.float64]
 
 ROUNDING = 1e-12
 

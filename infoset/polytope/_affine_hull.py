@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.optimize import linprog
 
-Floats = NDArray[np.float64]
-Places = NDArray[np.int64]
+from infoset.arrays import Floats, Integers
 
 FLAT = 1e-9
 """Relative thickness below which a set is flat."""
@@ -106,7 +104,7 @@ class RelativeInterior:
     basis: Floats
     rows: Floats
     limits: Floats
-    kept: Places
+    kept: Integers
     centre: Floats
     radius: float
 
@@ -257,7 +255,7 @@ def _need_bounded(rows: Floats, limits: Floats, slack: float, basis: Floats) -> 
     raise UnboundedPolytopeError(basis @ direction)
 
 
-def _always_tight(rows: Floats, limits: Floats, tolerance: float) -> Places:
+def _always_tight(rows: Floats, limits: Floats, tolerance: float) -> Integers:
     """Return the rows that every point meets with equality; none in a set that is thin but not flat."""
     loose = np.zeros(len(rows), dtype=bool)
     size = rows.shape[1]

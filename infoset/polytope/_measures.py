@@ -6,12 +6,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, Delaunay
 
+from infoset.arrays import Floats
 from infoset.polytope._affine_hull import chebyshev_ball, frame_of
-
-Floats = NDArray[np.float64]
 
 
 def volume_of(vertices: Floats, stretch: Floats | None) -> float:

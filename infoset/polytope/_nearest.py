@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from infoset.arrays import Floats
 
 _MOST_STEPS = 1000
 _PRECISION = 1e-14

@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError, cKDTree
 
+from infoset.arrays import Flags, Floats, Integers
 from infoset.polytope._affine_hull import FLAT, Frame, UncertainHullError, chebyshev_ball, frame_of, relative_interior
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Places = NDArray[np.int64]
 Description = tuple[Floats, Floats, Floats, Floats, Floats]
 """Vertices; facets normals x <= offsets; the affine hull across x = levels: the fields of a `Polytope`."""
 
@@ -218,7 +215,7 @@ def essential(points: Floats, normals: Floats, offsets: Floats) -> tuple[Floats,
     raise failed
 
 
-def _agreeing(points: Floats, normals: Floats, on: Flags, negligible: float) -> tuple[Places, Places]:
+def _agreeing(points: Floats, normals: Floats, on: Flags, negligible: float) -> tuple[Integers, Integers]:
     """Return which points are vertices and which planes facets, given which points are on which planes."""
     size = points.shape[1]
     facets = _largest(on, size)
@@ -242,7 +239,7 @@ def _agreeing(points: Floats, normals: Floats, on: Flags, negligible: float) -> 
     return corners, facets
 
 
-def _need_agreement(points: Floats, corners: Places, on_facets: Flags) -> None:
+def _need_agreement(points: Floats, corners: Integers, on_facets: Flags) -> None:
     """Check that the hull of the vertices contains all points, and that each simplex of its surface is in a facet."""
     hull = _surface(points[corners])
     outside = float((points @ hull.equations[:, :-1].T + hull.equations[:, -1]).max())
@@ -278,7 +275,7 @@ def _widest_gap(gaps: Floats) -> float:
     return float(np.exp(0.5 * (ends[widest] + ends[widest + 1])))
 
 
-def together(points: Floats, within: float) -> Places:
+def together(points: Floats, within: float) -> Integers:
     """Label points that are nearer to each other than a distance, in every coordinate, with the same number."""
     # Scipy 1.11.0 looks for components among indices of 32 bits only.
     pairs = cKDTree(points).query_pairs(within, p=np.inf, output_type="ndarray").astype(np.int32)
@@ -286,7 +283,7 @@ def together(points: Floats, within: float) -> Places:
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
-def _largest(on: Flags, least: int) -> Places:
+def _largest(on: Flags, least: int) -> Integers:
     """Return the planes whose points are not all on another plane; of planes with the same points, the first."""
     planes = np.flatnonzero(on.sum(axis=0) >= least)
     held = on[:, planes].astype(np.float32)
@@ -298,7 +295,7 @@ def _largest(on: Flags, least: int) -> Places:
     return np.asarray(planes[~beaten.any(axis=1)])
 
 
-def _ranks(count: int, height: int, stack: Callable[[slice], Floats], negligible: float) -> Places:
+def _ranks(count: int, height: int, stack: Callable[[slice], Floats], negligible: float) -> Integers:
     """Return the ranks of matrices, which are built in batches."""
     size = max(1, _ENTRIES // max(1, height))
     ranks = [np.zeros(0, np.int64)]

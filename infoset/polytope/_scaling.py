@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from infoset.arrays import Floats
 from infoset.polytope._affine_hull import (
     FLAT,
     HIGHS,
@@ -17,8 +17,6 @@ from infoset.polytope._affine_hull import (
     UncertainHullError,
 )
 from infoset.polytope._qhull import Description, intersection_of_halfspaces
-
-Floats = NDArray[np.float64]
 
 MOST_RATIO = 1e6
 """Greatest ratio of widths along the axes without scaling."""

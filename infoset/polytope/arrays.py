@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from infoset._set_arguments import box_ends, constraint_values, finite_values, need_finite, radius_values
+from infoset.arrays import Floats
 from infoset.limits import COUNT
 from infoset.polytope._affine_hull import FLAT, EmptyPolytopeError
 from infoset.polytope._qhull import hull_of_points, together
@@ -18,7 +19,6 @@ from infoset.polytope._scaling import MOST_RATIO, described, powers_of_two, scal
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-Floats = NDArray[np.float64]
 
 _TOGETHER = 1e-7
 

@@ -11,13 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from infoset.arrays import Flags, Floats, Integers
 from infoset.polytope._scaling import powers_of_two
 from infoset.polytope.polytope import Polytope
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 EPSILON = float(np.finfo(np.float64).eps)
 _ON = 64.0 * EPSILON
@@ -186,9 +183,7 @@ class FacetsAndVertices:
         return FacetsAndVertices(vertices, normals[facets], offsets[facets], incidence[:, facets]), lowest
 
 
-def _adjacent(
-    incidence: Flags, first: NDArray[np.int64], second: NDArray[np.int64], size: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64], Flags]:
+def _adjacent(incidence: Flags, first: Integers, second: Integers, size: int) -> tuple[Integers, Integers, Flags]:
     """Return the pairs of rows, one of each list, that span an edge, and what both lie on.
 
     Two vertices span an edge if no third vertex lies on all facets on which both lie. With rows and columns exchanged,
@@ -206,7 +201,7 @@ def _adjacent(
     return first[i[edge]], second[j[edge]], common[edge]
 
 
-def _facets(incidence: Flags, size: int) -> NDArray[np.int64]:
+def _facets(incidence: Flags, size: int) -> Integers:
     """Return the columns that are facets: with at least `size` vertices that do not all lie on another column."""
     counts = incidence.sum(axis=0)
     wide = np.flatnonzero(counts >= size)

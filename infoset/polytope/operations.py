@@ -6,13 +6,12 @@ import warnings
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import block_diag
 
 from infoset._set_arguments import need_set
+from infoset.arrays import Floats
 from infoset.polytope.polytope import Polytope
-
-Floats = NDArray[np.float64]
 
 _MOST_ROUNDS = 200
 _FLAT = 1e-7

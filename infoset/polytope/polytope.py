@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.distance import cdist
 
 from infoset._set_arguments import (
@@ -19,15 +19,13 @@ from infoset._set_arguments import (
     not_negative,
     random_source,
 )
+from infoset.arrays import Flags, Floats
 from infoset.limits import Limits, real_values
 from infoset.polytope._measures import largest_ball, simplices_of, volume_of
 from infoset.polytope._nearest import nearest_difference
 from infoset.polytope._scaling import scale_of, scale_of_box, scaled_rows, tightened, without_far
 from infoset.polytope.arrays import PolytopeArrays
 from infoset.renamed import renamed
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 _FLAT_WIDTH = 1e-12
 _EPS = float(np.finfo(np.float64).eps)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from infoset.arrays import Floats
 from sim.storage.files import DamagedError, MissingLibraryError, reporting
 from sim.storage.manifest import Manifest, read_manifest
 from sim.versions import install_command
@@ -125,9 +126,7 @@ class CampaignFolder:
         for index in self._wanted(cell):
             yield self._columns_of(index, quantities, texts)
 
-    def sample(
-        self, quantity: str, noise: str, cell: int | None = None, *, unknown: float | None = None
-    ) -> NDArray[np.float64]:
+    def sample(self, quantity: str, noise: str, cell: int | None = None, *, unknown: float | None = None) -> Floats:
         """Return the values of a quantity under a noise, in the order of cells and runs.
 
         Runs without a value have the value `unknown`; None omits them.
@@ -142,7 +141,7 @@ class CampaignFolder:
 
     def chunk_samples(
         self, index: int, quantity: str, noises: Sequence[str], *, unknown: float | None = None
-    ) -> list[NDArray[np.float64]]:
+    ) -> list[Floats]:
         """Return the values of a quantity in one chunk, an array for each noise, as in `sample`."""
         numbers, codes = self._columns_of(index, [quantity], {"noise": noises})
         return _by_noise(numbers[quantity], codes["noise"], len(noises), unknown)
@@ -266,7 +265,7 @@ class CampaignFolder:
         return fault
 
 
-def _by_noise(values: Numbers, codes: Codes, noises: int, unknown: float | None) -> list[NDArray[np.float64]]:
+def _by_noise(values: Numbers, codes: Codes, noises: int, unknown: float | None) -> list[Floats]:
     samples = [values[codes == code] for code in range(noises)]
     return [sample.compressed() if unknown is None else sample.filled(unknown) for sample in samples]
 

@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from infoset.arrays import Floats
 from infoset.limits import LARGEST, SMALLEST
 from sim import QuantileName, Requirement, StoppingRule, estimate_quantiles
 from sim.requirement import HitRequirement, parse_requirement
 from sim.statistics import level_name
-from sim.stopping_rule import Floats, Watch
+from sim.stopping_rule import Watch
 
 RULE = StoppingRule(QuantileName("miss_m", 0.5), 0.5)
 
