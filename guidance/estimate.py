@@ -8,7 +8,6 @@ from typing import Protocol
 
 import numpy as np
 
-from guidance.predicted_miss import impulse_beyond_dead_zone
 from guidance.situation import Situation
 from infoset import Bias, SetModel
 from infoset.arrays import Floats
@@ -25,10 +24,6 @@ class MissEstimate:
         Signed miss and its standard deviation, m. Pending impulses count as given.
     to_go_s : ndarray, shape (B,)
         Time from the impulse that is decided now to the closest approach, s; not negative.
-
-    Notes
-    -----
-    The rate of the line of sight at the impulse is miss / (c tau^2), with the closing speed c and the time to go tau.
     """
 
     miss_m: Floats
@@ -38,7 +33,15 @@ class MissEstimate:
     @property
     def correction_m_s(self) -> Floats:
         """Impulse that makes the miss zero, m/s, shape (B,); zero at the closest approach."""
-        return np.divide(self.miss_m, self.to_go_s, out=np.zeros_like(self.miss_m), where=self.to_go_s > 0.0)
+        return self._correcting(self.miss_m)
+
+    def correction_outside_m_s(self, dead_zone: float, last_s: float) -> Floats:
+        """Return the impulse that corrects the part of the miss outside a dead zone, m/s; see `Kalman`."""
+        zone = np.where(self.to_go_s > last_s, dead_zone, 0.0) * self.deviation_m
+        return self._correcting(self.miss_m - np.clip(self.miss_m, -zone, zone))
+
+    def _correcting(self, miss_m: Floats) -> Floats:
+        return np.divide(miss_m, self.to_go_s, out=np.zeros_like(miss_m), where=self.to_go_s > 0.0)
 
 
 class Estimator(Protocol):
@@ -58,8 +61,6 @@ EstimatorKind = Callable[[int, bool], Estimator]
 def independent_error_rad(model: SetModel, range_m: Floats) -> Floats:
     """Return the bound of the part of an angle error that is independent between measurements, rad.
 
-    Notes
-    -----
     A line that falls with the range is positive up to the greatest possible distance, and an estimate can be beyond it.
     The bound is therefore at least half of that at the greatest distance.
     """
@@ -81,17 +82,11 @@ def constant_error_m(sensor: AngleSensor) -> float:
 def correct_outside_dead_zone(situation: Situation, estimator: Estimator, dead_zone: float, last_s: float) -> Floats:
     """Update an estimator, and return the impulses (m/s) that correct the part of the miss outside a dead zone.
 
-    Parameters
-    ----------
-    dead_zone : float
-        Half-width of the dead zone, in standard deviations of the miss.
-    last_s : float
-        Time before the closest approach, and before the last impulse that the engine allows, without a dead zone, s.
+    The dead zone is in standard deviations of the miss. There is none in the last seconds, `last_s`, before the closest
+    approach, and before the last impulse that the engine allows.
     """
     estimator.update(situation)
     if not situation.may_fire:
         return np.zeros_like(situation.last_impulse_m_s)
-    estimate = estimator.estimate(situation)
-    if situation.last_s - situation.lead_s <= last_s:
-        dead_zone = 0.0
-    return impulse_beyond_dead_zone(estimate.miss_m, estimate.deviation_m, estimate.to_go_s, dead_zone, last_s)
+    is_last = situation.last_s - situation.lead_s <= last_s
+    return estimator.estimate(situation).correction_outside_m_s(0.0 if is_last else dead_zone, last_s)

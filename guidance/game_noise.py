@@ -38,8 +38,8 @@ class GameNoise:
     Notes
     -----
     The errors that keep an extreme have one sign in most steps, so that the true state stays near the middle of a wide
-    set. Before a cut-off, errors that change from one bound to the other are worse: the true state is then at an end
-    of the set (`sim.closed_form.worst_shift_m`).
+    set. Before a cut-off, errors that change from one bound to the other are worse: the true state is then at an end of
+    the set (`sim.closed_form.worst_shift_m`).
 
     In space, each axis has its own extremes and its own worse one; the measured angles are chosen for each axis. The
     range has the rule of the plane, for the corner (worse extreme of y, worse extreme of z) of the rectangle of
@@ -109,13 +109,7 @@ class GameNoise:
 
 @dataclass(frozen=True)
 class SwitchingNoise(GameNoise):
-    """Game noise with the extreme to keep prescribed for every step, not only for ties.
-
-    Parameters
-    ----------
-    tie_draws : ndarray, shape (B, steps), or (2, B, steps) in space
-        The upper extreme is kept where the value is not negative, the lower one elsewhere.
-    """
+    """Game noise that keeps the extreme prescribed for each step: the upper one where `tie_draws` is not negative."""
 
     def _upper_is_worse(self, miss: PredictedMiss, step: int) -> Flags:
         return draws_of_step("tie_draws", self.tie_draws, step, miss.upper_m.shape) >= 0.0
@@ -165,8 +159,6 @@ def _range(
 def _ranges_of_corners(predicted: InformationSetView, upper_is_worse: Flags) -> tuple[Floats, Floats]:
     """Return the ranges of the sections of the worst corner and of the opposite one, m, each (B,).
 
-    Notes
-    -----
     Corners on the other side of zero count as negative, so that the rule is that of the plane if an axis is exactly
     zero.
     """
@@ -192,25 +184,21 @@ def keep_point(
     lower: Floats,
     upper: Floats,
 ) -> Floats:
-    """Return the measured values that keep a point, and otherwise as much of the set as possible.
+    """Return the measured values in [lower, upper] that keep a point, and otherwise as much of the set as possible.
 
-    A measured value agrees with an interval of values; "top" and "bottom" are the ends of that interval.
+    A measured value agrees with an interval of values; "top" and "bottom" are the ends of that interval. All arrays
+    have the shape (..., B).
 
     Parameters
     ----------
-    is_larger : ndarray of bool, shape (..., B)
+    is_larger : ndarray of bool
         Whether the point to keep is the larger of the two extremes in the measured quantity.
-    point_at_top, point_at_bottom : ndarray, shape (..., B)
+    point_at_top, point_at_bottom : ndarray
         Measured values whose interval ends at the point, above or below.
-    least_at_bottom, greatest_at_top : ndarray, shape (..., B)
+    least_at_bottom, greatest_at_top : ndarray
         Measured values whose interval begins at the least value of the set, or ends at its greatest.
-    lower, upper : ndarray, shape (..., B)
+    lower, upper : ndarray
         Measured values that the true value allows.
-
-    Returns
-    -------
-    ndarray, shape (..., B)
-        Within [lower, upper].
 
     References
     ----------

@@ -33,10 +33,8 @@ class KalmanBank:
 
     Attributes
     ----------
-    mean : ndarray, shape (B, M, n)
+    mean, covariance : ndarray, shape (B, M, n) and (B, M, n, n)
         Estimates of (z, V_z, x, closing speed), m and m/s, and of the acceleration, m/s^2, if n is 5.
-    covariance : ndarray, shape (B, M, n, n)
-        Their covariances.
     log_weight : ndarray, shape (B, M)
         Logarithms of the probabilities of the intervals, up to a constant.
 
@@ -56,8 +54,8 @@ class KalmanBank:
     has this spectral density (Zarchan).
 
     A camera with a constant centroid error has two parts of errors. The pixel part is the noise of the measurements;
-    the variance c^2/3 of the centroid part is added to that of the miss. Errors of the engine add the variance
-    (delta k)^2/3 to that of V_z after an impulse k.
+    the variance c^2/3 of the centroid part is added to that of the miss. Errors of the engine add the variance (delta
+    k)^2/3 to that of V_z after an impulse k.
 
     References
     ----------
@@ -192,13 +190,8 @@ class Kalman:
     members : int
         Number of filters, one for each interval of the possible ranges.
     process_noise : float
-        Standard deviation of the acceleration along z, constant over a step and independent between steps,
-        in units of that of an acceleration uniform within the bound of the set's model.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a value is negative or not finite, or there is no filter.
+        Standard deviation of the acceleration along z, constant over a step and independent between steps, in units of
+        that of an acceleration uniform within the bound of the set's model.
 
     Notes
     -----

@@ -22,16 +22,10 @@ MOST_KEPT = 640
 
 @dataclass(frozen=True)
 class Measurements:
-    """Measurements of one sensor that are linearised at each fit.
+    """Measurements of one sensor that are linearised at each fit, at times of shape (n,).
 
-    Parameters
-    ----------
-    times_s : ndarray, shape (n,)
-        Times of the measurements, s.
-    values, offsets_m : ndarray, shape (B, n)
-        Measured values, rad or m, and the change of z by the impulses until then, m.
-    seen : ndarray of bool, shape (B, n)
-        Engagements that measured.
+    `values`, rad or m, and `offsets_m`, the change of z by the impulses until then, have the shape (B, n), as `seen`:
+    whether an engagement measured.
     """
 
     times_s: Floats
@@ -75,9 +69,9 @@ class LeastSquaresFit:
     Notes
     -----
     The motion is z(t) = z_0 + V_0 t + a t^2/2 - sum k_j (t - t_j), x(t) = x_0 - c t, with the impulses as given. A fit
-    solves the normal equations of all measurements, with weights 1/variance: b^2/3 for an error uniform within +-b,
-    and width^2/12 for the initial bounds, which count as one more measurement. The acceleration a has the variance
-    nu^2/3, with the bound nu of the set's model. The covariance of the miss is that of the normal equations.
+    solves the normal equations of all measurements, with weights 1/variance: b^2/3 for an error uniform within +-b, and
+    width^2/12 for the initial bounds, which count as one more measurement. The acceleration a has the variance nu^2/3,
+    with the bound nu of the set's model. The covariance of the miss is that of the normal equations.
 
     If there are more than `MOST_KEPT` measurements of a sensor, the older half is linearised once and for all at the
     fit of that step, and only its normal equations are stored. The linearised angle keeps the errors z - x tan(alpha)
@@ -234,17 +228,11 @@ class LeastSquares:
 
     Parameters
     ----------
-    dead_zone : float
-        Half-width of the dead zone of the estimated miss, in standard deviations.
-    last_s : float
-        Time to go below which there is no dead zone, s. With a cut-off, the time before the cut-off.
+    dead_zone, last_s : float
+        Half-width of the dead zone in standard deviations, and the time to go below which there is none, s: as in
+        `Kalman`.
     iterations : int
         Gauss-Newton steps after each measurement, starting from the previous fit.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a value is negative or not finite, or `iterations` is less than 1.
 
     Notes
     -----

@@ -38,8 +38,8 @@ class LineOfSight:
     Parameters
     ----------
     alpha_rad, omega_rad_s : ndarray, shape (B,)
-        True line-of-sight angle (rad) and its rate (rad/s). In space, shape (2, B): the angles atan2(y, x) and
-        atan2(z, x), whatever the convention of the sensor.
+        True line-of-sight angle (rad) and its rate (rad/s). In space, shape (2, B): the angles atan2(y, x) and atan2(z,
+        x) in every convention of the sensor.
     range_m : ndarray, shape (B,)
         True distance, m.
     sensors : mapping of str to Sensor
@@ -61,14 +61,12 @@ class LineOfSight:
 
 
 def checked_measurements(measured: Measurements, sight: LineOfSight, noise: object) -> dict[str, Floats]:
-    """Return the measurements of a noise as arrays, if they are finite and of sensors that measure.
+    """Return the measurements of a noise as arrays; `real_array` describes the errors in numbers and shapes.
 
     Raises
     ------
-    TypeError
-        If the noise returned no mapping, or a value is not a real number.
-    ValueError
-        If a number is not finite, a shape is wrong, or a sensor does not measure in this step.
+    TypeError, ValueError
+        If the noise returned no mapping, or measured with a sensor that does not measure in this step.
     """
     where = f"noise {type(noise).__name__} at step {sight.step}"
     if not isinstance(measured, Mapping):
@@ -89,18 +87,7 @@ def checked_measurements(measured: Measurements, sight: LineOfSight, noise: obje
 
 
 def need_draws(name: str, draws: Floats) -> None:
-    """Refuse errors, in units of their bounds, of a wrong number of dimensions, or not within [-1, 1].
-
-    Parameters
-    ----------
-    draws : ndarray, shape (B, steps) or (2, B, steps)
-        Errors, or choices between ties; along y and z in space.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If they are not.
-    """
+    """Raise ValueError if errors, in units of their bounds, are not within [-1, 1] or not of shape ([2,] B, steps)."""
     if not isinstance(draws, np.ndarray) or draws.shape[:-2] not in ((), (2,)) or draws.ndim < 2:
         raise ValueError(f"{name} must have the shape (B, steps), or (2, B, steps) in space: got {np.shape(draws)}")
     if not (np.abs(real_values(name, draws)) <= 1.0).all():  # refuses NaN as well
@@ -108,13 +95,7 @@ def need_draws(name: str, draws: Floats) -> None:
 
 
 def draws_of_step(name: str, draws: Floats, step: int, shape: tuple[int, ...]) -> Floats:
-    """Return the draws of one step, if they have a shape: (B,), or (2, B) along y and z.
-
-    Raises
-    ------
-    ValueError
-        If the shape is different, or there are no draws for this step.
-    """
+    """Return the draws of one step; raise ValueError if there are none, or their shape is not that of measurements."""
     steps = draws.shape[-1]
     if draws.shape[:-1] != shape:
         raise ValueError(f"{name} must have the shape {(*shape, steps)} in this engagement: got {draws.shape}")
@@ -127,16 +108,8 @@ class MeasurementNoise(Protocol):
     """A rule that chooses measurement errors within their bounds."""
 
     def measure(self, sight: LineOfSight, predicted: InformationSetView) -> Measurements:
-        """Choose the measurements of a step.
+        """Choose the measurements of a step, rad, m or rad/s, shape (B,), by sensor.
 
-        Parameters
-        ----------
-        sight : LineOfSight
-            True line of sight, and the sensors that measure.
-
-        Returns
-        -------
-        mapping of str to ndarray, shape (B,)
-            Measured values by sensor, rad, m or rad/s. A sensor that is left out gives no measurement in this step. In
-            space, angles in the convention of the sensor and rates have shape (2, B).
+        `sight` has the true line of sight, and the sensors that measure. A sensor that is left out gives no measurement
+        in this step. In space, angles in the convention of the sensor and rates have shape (2, B).
         """

@@ -13,6 +13,9 @@ from infoset.sensors import Measurements, Sensor
 class PairNoise:
     """Measurements that are the same for the two truths of a pair up to some step, and exact after it.
 
+    Engagements 2k and 2k + 1 of a batch are a pair. Both get the same measurements, so a strategy that uses nothing
+    else acts alike in both.
+
     Parameters
     ----------
     last_common_step : int
@@ -23,11 +26,6 @@ class PairNoise:
     ----------
     greatest_share : float
         Greatest error so far, in units of its bound; at most 1 if all errors are within their bounds.
-
-    Notes
-    -----
-    Engagements 2k and 2k + 1 of a batch are a pair. Both get the same measurements, so a strategy that uses nothing
-    else acts alike in both.
     """
 
     def __init__(self, last_common_step: int) -> None:

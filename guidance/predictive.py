@@ -20,10 +20,7 @@ _SPACING = Limits(above=1.0)
 class ManoeuvreState:
     """State of predictive guidance.
 
-    Parameters
-    ----------
-    due_s : ndarray, shape (B,)
-        Time to go at which the next manoeuvre begins, s; infinite before the first estimate.
+    `due_s`, shape (B,), is the time to go at which the next manoeuvre begins, s; infinite before the first estimate.
     """
 
     estimator: Estimator

@@ -18,12 +18,8 @@ _RATIO = Limits(above=2.0)
 
 @dataclass
 class PulseState:
-    """State of pulsed proportional navigation.
-
-    Parameters
-    ----------
-    accumulated_m_s : ndarray, shape (B,)
-        Commands that were too small for an impulse so far.
+    """State of pulsed proportional navigation; `accumulated_m_s`, shape (B,), has the commands too small for an
+    impulse.
     """
 
     estimator: Estimator
@@ -45,11 +41,6 @@ class ProportionalNavigation:
         Navigation ratio N, greater than 2; 3 to 5 are usual.
     dead_band_m_s : float or None
         Commands accumulate until their sum has this size, m/s; None is the least impulse of the engine.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a number is outside these limits.
 
     Notes
     -----

@@ -100,10 +100,7 @@ class Situation:
     def pending_m(self, time_to_go_s: Floats) -> Floats:
         """Return the changes of a predicted miss by the pending impulses, m, which are to be subtracted from it.
 
-        Parameters
-        ----------
-        time_to_go_s : ndarray, shape (B,) or (B, S)
-            Time to x = 0 of the predicted misses.
+        `time_to_go_s`, shape (B,) or (B, S), is the time to x = 0 of the predicted misses.
         """
         change = np.zeros(time_to_go_s.shape)
         for time_s, impulse in self.pending:
@@ -118,10 +115,7 @@ class Situation:
     def axis(self, name: str) -> Situation:
         """Return the planar situation of x and one lateral axis, "y" or "z", which is z in it.
 
-        Notes
-        -----
-        The measured angle is the plane angle, whatever the convention of the sensor. Budget and engine are the whole
-        ones.
+        The measured angle is the plane angle in every convention of the sensor. Budget and engine are the whole ones.
         """
         if len(self.axes) == 1:
             return self

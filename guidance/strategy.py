@@ -13,25 +13,13 @@ from infoset.limits import shown
 
 
 def start(strategy: Strategy, batch: int, axes: Sequence[str]) -> list[Any]:
-    """Return the states of a strategy for `decide`: one for each lateral axis, or one if it decides for both axes.
-
-    Raises
-    ------
-    ValueError
-        If it decides for both axes, and the engagement is in a plane.
-    """
+    """Return the states of a strategy for `decide`: one for each lateral axis, or one if it decides for both axes."""
     check_axes(strategy, axes)
     return [strategy.start(batch) for _ in (axes[:1] if _is_spatial(strategy) else axes)]
 
 
 def check_axes(strategy: Strategy, axes: Sequence[str]) -> None:
-    """Refuse a strategy that decides for both lateral axes in an engagement that has one.
-
-    Raises
-    ------
-    ValueError
-        If its class has ``spatial = True`` and there is one axis. Engagements of a batch would be taken for axes.
-    """
+    """Raise ValueError if a strategy with ``spatial = True`` has one axis: it would take engagements for axes."""
     if _is_spatial(strategy) and len(axes) == 1:
         raise ValueError(
             f"strategy {type(strategy).__name__} decides for both lateral axes (its class has `spatial = True`), and "
@@ -42,21 +30,8 @@ def check_axes(strategy: Strategy, axes: Sequence[str]) -> None:
 def decide(strategy: Strategy, situation: Situation, states: Sequence[Any], tracking: Flags) -> Floats:
     """Return the impulses of a step, m/s, shape (B,); in space (2, B), along y and z.
 
-    Parameters
-    ----------
-    states : sequence
-        Return value of `start`.
-    tracking : ndarray of bool, shape (B,)
-        Engagements that have a set; elsewhere an impulse need not be finite.
-
-    Raises
-    ------
-    ValueError
-        If the strategy returns impulses of another shape, or impulses that are not real and finite.
-
-    Notes
-    -----
-    In space, a strategy that decides for one axis gets the planar situation of each axis.
+    In space, a strategy that decides for one axis gets the planar situation of each axis. `states` is the return value
+    of `start`. Only in engagements that are `tracking`, shape (B,), must the impulses be finite.
     """
     if _is_spatial(strategy):
         return checked_impulses(strategy.decide(situation, states[0]), situation, tracking, strategy)
@@ -73,17 +48,8 @@ def _is_spatial(strategy: Strategy) -> bool:
 
 
 def checked_impulses(wanted: object, situation: Situation, tracking: Flags, strategy: object) -> Floats:
-    """Return the impulses of a strategy in a situation as an array, if they are real and finite.
-
-    Parameters
-    ----------
-    tracking : ndarray of bool, shape (B,)
-        Engagements that have a set; elsewhere an impulse need not be finite.
-
-    Raises
-    ------
-    ValueError
-        If they are not, or their shape is not that of the impulses of the situation.
+    """Return the impulses of a strategy as an array; raise ValueError if they are not real and finite, or of another
+    shape.
     """
     values, shape = np.asarray(wanted), situation.last_impulse_m_s.shape
     real = values.dtype.kind in "fiu" and not isinstance(wanted, np.ma.MaskedArray)

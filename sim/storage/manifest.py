@@ -244,20 +244,24 @@ def read_manifest(folder: Path) -> Manifest:
     with reporting(file), file.open("rb") as stream:
         content = stream.read(LARGEST_BYTES + 1)
     try:
-        if len(content) > LARGEST_BYTES:
-            raise ValueError(f"is over {LARGEST_BYTES // 1_000_000} MB")
-        value = json.loads(content)
-        if not isinstance(value, dict) or value.get("format") != FORMAT:
-            raise ValueError(f"format: must be {FORMAT}")
-        if value.get("schema") != SCHEMA:
-            raise ValueError(f"schema: must be {SCHEMA}, the only one this version reads, found {value.get('schema')}")
-        manifest = from_json(Manifest, {key: inner for key, inner in value.items() if key not in _DERIVED})
-        if value.get("kind") != manifest.kind:
-            raise ValueError("kind: must be sweep with axes, and campaign without")
-        if value.get("sha256") != checksum(value):
-            raise ValueError("the checksum differs: the file is damaged")
+        return _parsed(content)
     except (ValueError, RecursionError) as error:
         raise ManifestError(f"{file}: is not a readable manifest: {str(error)[:300]}") from None
+
+
+def _parsed(content: bytes) -> Manifest:
+    if len(content) > LARGEST_BYTES:
+        raise ValueError(f"is over {LARGEST_BYTES // 1_000_000} MB")
+    value = json.loads(content)
+    if not isinstance(value, dict) or value.get("format") != FORMAT:
+        raise ValueError(f"format: must be {FORMAT}")
+    if value.get("schema") != SCHEMA:
+        raise ValueError(f"schema: must be {SCHEMA}, the only one this version reads, found {value.get('schema')}")
+    manifest = from_json(Manifest, {key: inner for key, inner in value.items() if key not in _DERIVED})
+    if value.get("kind") != manifest.kind:
+        raise ValueError("kind: must be sweep with axes, and campaign without")
+    if value.get("sha256") != checksum(value):
+        raise ValueError("the checksum differs: the file is damaged")
     return manifest
 
 

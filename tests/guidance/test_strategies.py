@@ -22,10 +22,10 @@ from guidance import (
     ZeroEffortMiss,
     strategy_names,
 )
+from guidance.estimate import MissEstimate
 from guidance.kalman import KalmanBank
 from guidance.least_squares import LeastSquaresFit
 from guidance.patient import correctable_later_m
-from guidance.predicted_miss import impulse_beyond_dead_zone
 from infoset import AngleSensor, ExtremePoints, InformationSet, PredictedMiss, RangeSensor, SetModel, StateBox
 from sim import Results, Scenario, simulate
 from sim.draws import Draws, draw
@@ -265,7 +265,7 @@ def test_an_angle_that_is_not_new_tells_nothing(make: Callable[[], Strategy]) ->
     ],
 )
 def test_the_dead_zone(miss: float, deviation: float, to_go: float, expected: float) -> None:
-    found = impulse_beyond_dead_zone(np.array([miss]), np.array([deviation]), np.array([to_go]), 1.0, 3.0)
+    found = MissEstimate(np.array([miss]), np.array([deviation]), np.array([to_go])).correction_outside_m_s(1.0, 3.0)
     assert found[0] == pytest.approx(expected)
 
 
