@@ -113,6 +113,24 @@ def use_of_file(path: Path) -> str | None:
     return None if kind is None else taken_by(kind)
 
 
+def read_input(file: Path, noun: str, most_bytes: int, remedy: str) -> bytes:
+    """Return the content of a file of the user; `InputError` if it cannot be read or is larger than any such file."""
+    try:
+        size = file.stat().st_size
+        if file.is_dir():
+            raise InputError(f"{file}: {use_of_folder(file, noun)}")
+        if not file.is_file():
+            raise InputError(f"{file}: is not an ordinary file; {remedy}")
+        if size > most_bytes:
+            raise InputError(f"{file}: has {size} bytes, more than any {noun} ({most_bytes}); {remedy}")
+        return file.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{file}: there is no such file; {remedy}") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise InputError(f"{file}: cannot be read: {reason}; check its name and permissions") from None
+
+
 def use_of_folder(path: Path, wanted: str) -> str:
     """Return what a folder is, and what to name in place of it."""
     if (path / "manifest.json").is_file():

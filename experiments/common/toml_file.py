@@ -23,9 +23,9 @@ from experiments.common.file_kinds import (
     built_in,
     built_in_names,
     kind_of,
+    read_input,
     taken_by,
     use_of_file,
-    use_of_folder,
 )
 from experiments.common.toml_form import (
     ENDS,
@@ -241,25 +241,12 @@ def _exists(path: str) -> bool:
 
 def _text_of_file(form: Form[Tables], path: str) -> str:
     """Read a file of the user."""
-    try:
-        with Path(path).open("rb") as file:
-            content = file.read(LARGEST_FILE_BYTES + 1)
-    except FileNotFoundError:
-        raise InputError(
-            f"{path}: there is no such file; check the path, or see `{form.listed_by}` for the built-in names"
-        ) from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: {use_of_folder(Path(path), f'{form.noun} file')}") from None
-    except PermissionError:
-        raise InputError(f"{path}: cannot be read, permission denied; check who may read it") from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise InputError(f"{shown(path)}: cannot be read: {reason}; check the path") from None
-    if len(content) > LARGEST_FILE_BYTES:
-        raise InputError(
-            f"{path}: is over {LARGEST_FILE_BYTES // 1000} kB, far more than a {form.noun} needs; name a {form.noun} "
-            f"file"
-        )
+    content = read_input(
+        Path(path),
+        f"{form.noun} file",
+        LARGEST_FILE_BYTES,
+        f"check the path, or see `{form.listed_by}` for the built-in names",
+    )
     if content.startswith(ZIP):
         raise InputError(f"{path}: {use_of_file(Path(path))}")
     try:

@@ -106,9 +106,9 @@ def test_damage_whose_sums_were_made_to_fit(content: bytes, tmp_path: Path) -> N
         read_or_refused(tmp_path / "x.npz")
 
 
-FLOATS = [name for name, (kind, _) in record_file._MEMBERS.items() if kind == record_file._FLOAT]
+FLOATS = [name for name, member in record_file.MEMBERS.items() if member.kind == record_file.FLOAT]
 ABSURD = [
-    *((name, "asteroid-1997") for name in FLOATS if name not in record_file._OF_Y.values()),
+    *((name, "asteroid-1997") for name in FLOATS if name not in record_file.OF_Y.values()),
     *((name, "asteroid-1997-space") for name in FLOATS),
 ]
 
@@ -144,7 +144,7 @@ def deflated_bomb(gigabytes: int) -> bytes:
     block = packer.compress(bytes(1 << 20)) + packer.flush(zlib.Z_FULL_FLUSH)
     data, sizes = block * 1024 + packer.flush(), struct.pack("<I", 1 << 30)
     out = io.BytesIO()
-    names = [f"{name}.npy" for name in record_file._MEMBERS]
+    names = [f"{name}.npy" for name in record_file.MEMBERS]
     with zipfile.ZipFile(out, "w") as archive:
         for name in names:
             archive.writestr(name, data if name in names[:gigabytes] else b"")
