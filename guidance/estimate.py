@@ -36,7 +36,7 @@ class MissEstimate:
         return self._correcting(self.miss_m)
 
     def correction_outside_m_s(self, dead_zone: float, last_s: float) -> Floats:
-        """Return the impulse that corrects the part of the miss outside a dead zone, m/s; see `Kalman`."""
+        """Return the impulse that corrects the part of the miss beyond `dead_zone` standard deviations, m/s."""
         zone = np.where(self.to_go_s > last_s, dead_zone, 0.0) * self.deviation_m
         return self._correcting(self.miss_m - np.clip(self.miss_m, -zone, zone))
 
